@@ -1,0 +1,232 @@
+"""What flows through the house: frozen records with read-only arrays, SI units, in the task plane.
+
+message -> HandSample -> HandState -> Candidates -> Solutions -> Prediction -> message.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+NANOSECONDS = 1_000_000_000
+LEFT, RIGHT = 1, -1
+"""Side on which a path passes an obstacle, seen in the direction of travel (spec section 4, `sides`)."""
+
+
+class Record:
+    """Base of the records: freezes every array field after construction."""
+
+    def __post_init__(self) -> None:
+        for item in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, item.name)
+            if isinstance(value, np.ndarray) and value.flags.writeable:
+                value = value.copy()
+                value.flags.writeable = False
+                object.__setattr__(self, item.name, value)
+
+
+@dataclass(frozen=True, eq=False)
+class HandSample(Record):
+    """One measured hand position.
+
+    stamp_ns: message stamp [ns]; position (2,): in the task plane [m]; height: along the plane's normal [m];
+    frame_id: the frame it was measured in.
+    """
+
+    stamp_ns: int
+    position: Array
+    height: float = 0.0
+    frame_id: str = ''
+
+
+@dataclass(frozen=True, eq=False)
+class HandState(Record):
+    """The estimator's answer at a stamp.
+
+    mean (6,): x, y, vx, vy, ax, ay [m, m/s, m/s^2]; covariance (6, 6) in the same order;
+    onset_ns: stamp at which the present movement began, None at rest; onset_position (2,): where it began [m];
+    effort_spent: integral of squared jerk since onset [m^2/s^5].
+    """
+
+    stamp_ns: int
+    mean: Array
+    covariance: Array
+    height: float = 0.0
+    frame_id: str = ''
+    onset_ns: int | None = None
+    onset_position: Array | None = None
+    effort_spent: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacles(Record):
+    """Circles in the task plane, as a table of n rows.
+
+    ids: identity of each, used in labels; centre (n, 2) [m]; radius (n,) mean [m]; radius_stddev (n,) [m];
+    velocity (n, 2) [m/s]; centre_covariance (n, 2, 2) [m^2].
+    """
+
+    ids: tuple[str, ...]
+    centre: Array
+    radius: Array
+    radius_stddev: Array
+    velocity: Array
+    centre_covariance: Array
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def take(self, rows: NDArray[np.intp] | list[int]) -> Obstacles:
+        """Return the obstacles of the given rows, in that order."""
+        index = np.asarray(rows, dtype=np.intp)
+        return Obstacles(
+            tuple(self.ids[i] for i in index),
+            self.centre[index],
+            self.radius[index],
+            self.radius_stddev[index],
+            self.velocity[index],
+            self.centre_covariance[index],
+        )
+
+    def after(self, seconds: float) -> Obstacles:
+        """Return the obstacles moved on at their velocity for `seconds` [s]."""
+        return Obstacles(
+            self.ids,
+            self.centre + seconds * self.velocity,
+            self.radius,
+            self.radius_stddev,
+            self.velocity,
+            self.centre_covariance,
+        )
+
+
+def make_obstacles(
+    centre: object = (),
+    radius: object = (),
+    radius_stddev: object = 0.0,
+    ids: tuple[str, ...] | None = None,
+    velocity: object = 0.0,
+    centre_covariance: object = 0.0,
+) -> Obstacles:
+    """Build :class:`Obstacles` from anything numpy can read; scalars hold for every row, ids default to positions."""
+    centres = np.asarray(centre, dtype=float).reshape(-1, 2)
+    n = len(centres)
+    return Obstacles(
+        tuple(str(i) for i in range(n)) if ids is None else tuple(ids),
+        centres,
+        np.broadcast_to(np.asarray(radius, dtype=float) if np.size(radius) else np.zeros(0), (n,)).copy(),
+        np.broadcast_to(np.asarray(radius_stddev, dtype=float), (n,)).copy(),
+        np.broadcast_to(np.asarray(velocity, dtype=float), (n, 2)).copy(),
+        np.broadcast_to(np.asarray(centre_covariance, dtype=float), (n, 2, 2)).copy(),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate(Record):
+    """One way round: a homotopy class towards one goal, with a timed guess inside it.
+
+    label: stable name such as `goal0:+l1-l2` (+ passes on the left); goal: row of the goals; sides: (obstacle id, LEFT or
+    RIGHT) of the obstacles in the name; guess (N + 1, 2): positions at steps 0..N [m]; length: of the path [m].
+    """
+
+    label: str
+    goal: int
+    sides: tuple[tuple[str, int], ...]
+    guess: Array
+    length: float
+
+
+class Status(Enum):
+    """How a candidate's forward optimal control ended. Only SOLVED takes part in the likelihood."""
+
+    SOLVED = 'solved'
+    ETA_UNREACHABLE = 'eta_unreachable'
+    INFEASIBLE = 'infeasible'
+    ITERATION_LIMIT = 'iteration_limit'
+    DEADLINE = 'deadline'
+    LEFT_CLASS = 'left_class'
+
+
+@dataclass(frozen=True, eq=False)
+class Solution(Record):
+    """The forward optimal control's answer for one candidate.
+
+    status, message: how it ended, in words and numbers. dt [s]; mean (N + 1, n) and covariance (N + 1, n, n) of the state at
+    steps 0..N (positions first); control (N, 2): jerk [m/s^3]. effort: J_U = sum |U|^2 [m^2/s^6]; costs: every term of J_aug
+    by name; tau [m^2], lam (lambda); eta: achieved, the smallest over obstacles and steps; eta_at: (obstacle id, step) where;
+    multipliers: (obstacle id, step, value) of the active rows; qp_solves; solve_s: wall time [s].
+    """
+
+    status: Status
+    message: str
+    dt: float
+    mean: Array
+    covariance: Array
+    control: Array
+    effort: float
+    costs: dict[str, float]
+    tau: float
+    lam: float
+    eta: float
+    eta_at: tuple[str, int] | None = None
+    multipliers: tuple[tuple[str, int, float], ...] = ()
+    qp_solves: int = 0
+    solve_s: float = 0.0
+
+    @property
+    def path(self) -> Array:
+        """Mean positions, (N + 1, 2) [m]."""
+        return self.mean[:, :2]
+
+    @property
+    def times(self) -> Array:
+        """Seconds from now, (N + 1,) [s]."""
+        times: Array = self.dt * np.arange(len(self.mean))
+        return times
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """One candidate with its solution; sides: side of every obstacle its path really passes, by id.
+
+    cost: effort spent since onset plus effort to go [m^2/s^5]; likelihood in [0, 1]: 0 unless solved.
+    """
+
+    candidate: Candidate
+    solution: Solution
+    sides: dict[str, int]
+    cost: float
+    likelihood: float
+
+    @property
+    def solved(self) -> bool:
+        """Whether this outcome takes part in the likelihood."""
+        return self.solution.status is Status.SOLVED
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """The whole answer to one hand sample.
+
+    outcomes: solved ones first, most likely first; then those that could not be solved, with their status.
+    most_likely: label after hysteresis, None where nothing was solved. notes: facts for diagnostics (relaxed margins, merged
+    classes, culled obstacles), as counts by name. solve_s: wall time of the whole prediction [s].
+    """
+
+    stamp_ns: int
+    frame_id: str
+    height: float
+    outcomes: tuple[Outcome, ...]
+    most_likely: str | None
+    notes: dict[str, int] = field(default_factory=dict)
+    solve_s: float = 0.0
+
+    @property
+    def solved(self) -> tuple[Outcome, ...]:
+        """The outcomes that meet the wanted eta, most likely first."""
+        return tuple(outcome for outcome in self.outcomes if outcome.solved)
