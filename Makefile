@@ -1,0 +1,52 @@
+# make setup [PYTHON=python3.12] [ROS=wheels|system]   a .venv with everything; re-run only when needed
+# make demo | test | lint | clean
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+# wheels: rclpy from the package index into .venv; system: the rclpy of the ROS installation that is sourced.
+# What setup chose holds for the other targets.
+ROS ?= $(if $(wildcard $(VENV)/.setup-system),system,wheels)
+STAMP := $(VENV)/.setup-$(ROS)
+PIP := $(BIN)/python -m pip --disable-pip-version-check --retries 10 --timeout 120
+WORKERS ?= auto
+
+export ROS_LOG_DIR := $(CURDIR)/build/ros_log
+export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+# A ROS in the surrounding shell must not mix with the one in .venv; the wheels' own loader sets these anew for every process.
+ifeq ($(ROS),wheels)
+EXTRAS := ros,report,test
+export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV)
+unexport LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONPATH RMW_IMPLEMENTATION
+else ifeq ($(ROS),system)
+EXTRAS := report,test
+export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
+VENV_OPTIONS := --system-site-packages
+else
+$(error ROS is wheels or system, got '$(ROS)')
+endif
+
+.PHONY: setup demo test lint clean
+
+setup: $(STAMP)
+
+$(STAMP): setup.py setup.cfg pyproject.toml
+	$(PYTHON) -m venv --clear $(VENV_OPTIONS) $(VENV) || { echo 'make setup: needs Python with venv (Debian, Ubuntu: apt install python3-venv)' >&2; exit 1; }
+	$(PIP) install --quiet --editable '.[$(EXTRAS)]'
+	touch $@
+
+demo: $(STAMP)
+	$(BIN)/python -m foc_ros demo
+
+test: $(STAMP)
+	ROS_PYTHON_CHECK_FIELDS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
+
+lint: $(STAMP)
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+clean:
+	rm -rf $(VENV) build dist install log demo_output *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,65 @@
+"""Packaging of foc_ros, for pip and for colcon (ament_python)."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+PACKAGE = 'foc_ros'
+
+setup(
+    name=PACKAGE,
+    version='0.1.0',
+    description='Predicts where the hand of a teleoperator is going among obstacles, with uncertainty and likelihood, on ROS 2',
+    long_description=open('README.md', encoding='utf-8').read(),
+    long_description_content_type='text/markdown',
+    author='foc_ros developers',
+    author_email='developers@foc-ros.invalid',
+    maintainer='foc_ros developers',
+    maintainer_email='developers@foc-ros.invalid',
+    license='Apache-2.0',
+    keywords=['ROS', 'teleoperation', 'motion prediction', 'stochastic optimal control', 'homotopy'],
+    packages=find_packages(exclude=['test', 'test.*']),
+    package_data={PACKAGE: ['py.typed', 'recordings/*.mcap']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
+        (f'share/{PACKAGE}', ['package.xml']),
+        (f'share/{PACKAGE}/config', sorted(glob('config/*.yaml'))),
+        (f'share/{PACKAGE}/rosdep', sorted(glob('rosdep/*.yaml'))),
+        # `ros2 run foc_ros COMMAND` looks here. As console scripts they would put `node` and `demo` on everybody's PATH.
+        (f'lib/{PACKAGE}', sorted(glob('scripts/ros2_run/*'))),
+    ],
+    zip_safe=False,
+    python_requires='>=3.11',
+    install_requires=[
+        'numpy>=1.23',
+        'piqp>=0.6',
+        'qpsolvers>=4.3',
+        'PyYAML>=6.0',
+        'rich>=13.0',
+        'rosbags>=0.10',
+    ],
+    extras_require={
+        # rclpy with Fast DDS and the common interfaces as wheels, for machines without a ROS installation
+        'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
+        'report': ['matplotlib>=3.6'],
+        'test': [
+            'hypothesis>=6.80',
+            'import-linter>=2.1',
+            'mcap>=1.1',
+            'mcap-ros2-support>=0.5',
+            'mypy>=1.11',
+            'pytest>=7.4',
+            'pytest-timeout>=2.2',
+            'pytest-xdist>=3.3',
+            'ruff>=0.8',
+            'setuptools>=70.1',
+            'types-PyYAML',
+        ],
+    },
+    entry_points={
+        'console_scripts': [
+            'foc_node = foc_ros.node:main',
+            'foc_ros = foc_ros.command_line:main',
+        ],
+    },
+)
