@@ -1,0 +1,224 @@
+#!/usr/bin/env python3
+"""Make the packaged recording: a simulated operator carries things to and fro among obstacles, each time another way round.
+
+    python scripts/make_demo_recording.py [FILE]
+
+The movements owe nothing to the predictor they are shown to. Each reach is the minimum-jerk movement through hand-picked via
+points (a quintic spline, continuous up to the fourth derivative, with the passing times that make its squared jerk least; Flash
+and Hogan 1985). Its jerk, with noise in proportion, drives a triple integrator; a weak feedback brings the hand to the target all
+the same. What is recorded has the noise of a tracker on top. Everything is drawn from one seed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
+from rosbags.typesys import Stores, get_typestore
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.optimize import minimize
+
+from foc_ros.conversions.types import RosbagsTypes, header
+
+Array = NDArray[np.float64]
+
+PACKAGED = Path(__file__).resolve().parents[1] / 'foc_ros' / 'recordings' / 'reaching.mcap'
+SEED = 20
+FRAME = 'world'
+HEIGHT = 0.12
+STEP_S = 0.01
+START_NS = 1_767_225_600_000_000_000
+"""Stamp of the first message: the first second of 2026, UTC."""
+MOTOR_NOISE = 0.25
+"""Standard deviation of the jerk's noise per unit of jerk, drawn once per step."""
+SENSOR_NOISE_M = 0.0007
+FEEDBACK_RATE = 3.5
+"""All three poles of the feedback [1/s]: slow beside a reach, so that the noise shows, and done within a rest."""
+
+NEAR = np.array([[0.0, -0.06], [0.0, 0.07]])
+FAR = np.array([[0.36, -0.065], [0.35, 0.08]])
+OBSTACLES = np.array(
+    [  # id, x, y, radius, radius_stddev
+        [1, 0.170, 0.005, 0.035, 0.003],
+        [2, 0.135, 0.125, 0.030, 0.002],
+        [3, 0.200, -0.125, 0.030, 0.002],
+        [4, 0.255, 0.075, 0.020, 0.002],
+    ]
+)
+
+
+@dataclass(frozen=True)
+class Reach:
+    """From one of the sites to one of the opposite ones: `via` (m, 2) points [m], duration [s], rest before it [s]."""
+
+    outward: bool
+    target: int
+    via: tuple[tuple[float, float], ...]
+    duration_s: float
+    rest_s: float
+
+
+REACHES = (
+    Reach(True, 0, ((0.180, -0.065),), 1.05, 1.2),
+    Reach(False, 1, ((0.165, 0.072),), 1.20, 1.3),
+    Reach(True, 1, ((0.150, 0.068), (0.245, 0.125)), 1.10, 1.2),
+    Reach(False, 1, ((0.145, 0.185),), 1.25, 1.3),
+    Reach(True, 0, ((0.100, -0.010), (0.190, -0.064)), 1.20, 1.2),
+    Reach(False, 0, ((0.190, -0.185),), 1.30, 1.4),
+    Reach(True, 1, ((0.190, -0.060),), 1.10, 1.2),
+    Reach(False, 0, ((0.225, 0.042), (0.150, 0.062)), 1.25, 1.3),
+)
+REST_AT_END_S = 1.0
+SWITCH_S = 0.4
+"""Seconds after an arrival at which the goals change: what was carried is put down."""
+
+
+def minimum_jerk(points: Array, duration_s: float) -> BSpline:
+    """Return the movement through `points` (m, 2), at rest at both ends, whose integral of squared jerk is least."""
+
+    def through(inner: Array) -> BSpline:
+        times = np.concatenate([[0.0], inner, [duration_s]])
+        rest = [(1, np.zeros(2)), (2, np.zeros(2))]
+        return make_interp_spline(times, points, k=5, bc_type=(rest, rest))
+
+    grid = np.linspace(0.0, duration_s, 501)
+
+    def cost(inner: Array) -> float:
+        if np.any(np.diff([0.0, *inner, duration_s]) < 0.05):
+            return np.inf
+        return float(np.mean(through(inner)(grid, nu=3) ** 2))
+
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    first = duration_s * length[1:-1] / length[-1]
+    return through(minimize(cost, first, method='Nelder-Mead', options={'xatol': 1e-7, 'fatol': 1e-10}).x)
+
+
+def reference() -> tuple[Array, list[tuple[float, bool]]]:
+    """Return what the operator means to do, (n, 3, 2): position, velocity, acceleration at every step.
+
+    With it, from which second on which sites are the goals: True for the far ones.
+    """
+    parts: list[Array] = []
+    goals = [(0.0, True)]
+    at, elapsed = NEAR[0], 0.0
+    for reach in REACHES:
+        target = (FAR if reach.outward else NEAR)[reach.target]
+        parts.append(_resting(at, reach.rest_s))
+        movement = minimum_jerk(np.vstack([at, *reach.via, target]), reach.duration_s)
+        times = STEP_S * np.arange(round(reach.duration_s / STEP_S))
+        parts.append(np.stack([movement(times, nu=order) for order in range(3)], axis=1))
+        elapsed += reach.rest_s + reach.duration_s
+        goals.append((elapsed + SWITCH_S, not reach.outward))
+        at = target
+    parts.append(_resting(at, REST_AT_END_S))
+    return np.concatenate(parts), goals
+
+
+def _resting(at: Array, seconds: float) -> Array:
+    return np.stack([np.array([at, np.zeros(2), np.zeros(2)])] * round(seconds / STEP_S))
+
+
+def moved(intended: Array, random: np.random.Generator) -> Array:
+    """Return where the hand really goes, (n, 2): the intended jerk plus feedback plus noise, through the triple integrator."""
+    dt, rate = STEP_S, FEEDBACK_RATE
+    a = np.array([[1.0, dt, dt**2 / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
+    b = np.array([dt**3 / 6, dt**2 / 2, dt])
+    gain = np.array([rate**3, 3 * rate**2, 3 * rate])
+    state = intended[0].copy()
+    positions = [state[0].copy()]
+    for now, following in pairwise(intended):
+        jerk = (following[2] - now[2]) / dt + gain @ (now - state)
+        jerk = jerk + MOTOR_NOISE * np.abs(jerk) * random.standard_normal(2)
+        state = a @ state + np.outer(b, jerk)
+        positions.append(state[0].copy())
+    return np.array(positions)
+
+
+def messages(types: RosbagsTypes) -> list[tuple[int, str, str, Any]]:
+    """Return every message of the recording in order: stamp [ns], topic, type, message."""
+    random = np.random.default_rng(SEED)
+    intended, switches = reference()
+    truth = moved(intended, random)
+    measured = np.column_stack([truth, np.full(len(truth), HEIGHT)]) + SENSOR_NOISE_M * random.standard_normal((len(truth), 3))
+    out: list[tuple[int, str, str, Any]] = []
+
+    def say(seconds: float, topic: str, kind: str, **values: Any) -> None:
+        stamp_ns = START_NS + round(seconds * 1e3) * 1_000_000
+        out.append((stamp_ns, topic, kind, types.make(kind, header=header(types, stamp_ns, FRAME), **values)))
+
+    goal_times = sorted({*np.arange(0.0, STEP_S * len(truth), 1.0), *(time for time, _ in switches)})
+    for seconds in goal_times:
+        far = [outward for time, outward in switches if time <= seconds][-1]
+        say(
+            seconds,
+            '/goals',
+            'geometry_msgs/msg/PoseArray',
+            poses=[_pose(types, x, y, HEIGHT) for x, y in (FAR if far else NEAR)],
+        )
+    for seconds in np.arange(0.0, STEP_S * len(truth), 0.2):
+        say(seconds, '/obstacles', 'sensor_msgs/msg/PointCloud2', **_cloud(types))
+    for step, position in enumerate(measured):
+        say(STEP_S * step, '/hand_pose', 'geometry_msgs/msg/PoseStamped', pose=_pose(types, *position))
+    order = {'/goals': 0, '/obstacles': 1, '/hand_pose': 2}
+    return sorted(out, key=lambda item: (item[0], order[item[1]]))
+
+
+def _pose(types: RosbagsTypes, x: float, y: float, z: float) -> Any:
+    return types.make(
+        'geometry_msgs/msg/Pose',
+        position=types.make('geometry_msgs/msg/Point', x=x, y=y, z=z),
+        orientation=types.make('geometry_msgs/msg/Quaternion', w=1.0),
+    )
+
+
+def _cloud(types: RosbagsTypes) -> dict[str, Any]:
+    names = ('x', 'y', 'z', 'radius', 'radius_stddev')
+    rows = np.zeros(len(OBSTACLES), dtype=[(name, '<f4') for name in names] + [('id', '<u4')])
+    for column, name in enumerate(('id', 'x', 'y', 'radius', 'radius_stddev')):
+        rows[name] = OBSTACLES[:, column]
+    rows['z'] = HEIGHT
+    float32, uint32 = 7, 6
+    fields = [(name, float32) for name in names] + [('id', uint32)]
+    return {
+        'height': 1,
+        'width': len(rows),
+        'fields': [
+            types.make('sensor_msgs/msg/PointField', name=name, offset=4 * place, datatype=kind, count=1)
+            for place, (name, kind) in enumerate(fields)
+        ],
+        'point_step': rows.itemsize,
+        'row_step': rows.nbytes,
+        'data': rows.tobytes(),
+        'is_dense': True,
+    }
+
+
+def write(file: Path) -> None:
+    """Write the recording as one MCAP file, replacing what is there."""
+    typestore = get_typestore(Stores.ROS2_JAZZY)
+    with tempfile.TemporaryDirectory() as directory:
+        writer = Writer(Path(directory) / 'reaching', version=9, storage_plugin=StoragePlugin.MCAP)
+        writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+        with writer:
+            connections: dict[str, Any] = {}
+            for stamp_ns, topic, kind, message in messages(RosbagsTypes(typestore)):
+                if topic not in connections:
+                    connections[topic] = writer.add_connection(topic, kind, typestore=typestore)
+                writer.write(connections[topic], stamp_ns, typestore.serialize_cdr(message, kind))
+        (made,) = (Path(directory) / 'reaching').glob('*.mcap')
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(made.read_bytes())
+
+
+if __name__ == '__main__':
+    parser = argparse.ArgumentParser(description='Make the packaged recording.')
+    parser.add_argument('file', nargs='?', type=Path, default=PACKAGED)
+    write(parser.parse_args().file)
