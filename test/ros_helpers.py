@@ -1,0 +1,144 @@
+"""A private ROS graph for each test: own context, own domain, own executor; deadlines instead of sleeps.
+
+Use the `ros` fixture of conftest.py (or :func:`graph`) and :meth:`Graph.spin_until`.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import itertools
+import os
+import tempfile
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import pytest
+
+DOMAINS = range(1, 102)
+"""Domains whose ports lie below the ephemeral ones of Linux."""
+
+_turn = itertools.count(os.getpid() * 37)
+
+
+def prepare_environment() -> None:
+    """Checked message fields and a graph that stays on this host; to be called before a message class is imported."""
+    os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    os.environ.setdefault('ROS_LOG_DIR', str(Path(tempfile.gettempdir()) / 'foc_ros_test_log'))
+    with warnings.catch_warnings(), suppress(ImportError):
+        warnings.simplefilter('ignore')  # the parser behind rosidl uses modules that Python has deprecated
+        import rosidl_generator_py  # noqa: F401
+
+
+def require_ros() -> None:
+    """Skip where rclpy is missing; fail instead where FOC_ROS_REQUIRE_ROS=1."""
+    try:
+        import rclpy  # noqa: F401
+    except ImportError as error:
+        reason = f'rclpy cannot be imported ({error}): install ROS 2, or the extra `ros`'
+        if os.environ.get('FOC_ROS_REQUIRE_ROS') == '1':
+            pytest.fail(f'{reason}; FOC_ROS_REQUIRE_ROS is 1')
+        pytest.skip(reason)
+
+
+@contextmanager
+def free_domain() -> Iterator[int]:
+    """Hold a domain that no other test process on this host holds, by a lock that dies with the process."""
+    for turn in itertools.islice(_turn, 10 * len(DOMAINS)):
+        domain = DOMAINS[turn % len(DOMAINS)]
+        with (Path(tempfile.gettempdir()) / f'foc_ros_test_domain_{os.getuid()}_{domain}.lock').open('w') as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                continue
+            yield domain
+            return
+    raise RuntimeError(f'all domains {DOMAINS} are taken')
+
+
+class Graph:
+    """One context in one domain with one executor; `nodes` are destroyed with it."""
+
+    def __init__(self, domain: int, args: list[str] | None = None) -> None:
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+        from rclpy.signals import SignalHandlerOptions
+
+        self.domain = domain
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, args=args or [], domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.nodes: list[Any] = []
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """The environment in which a child process joins this graph."""
+        return os.environ | {'ROS_DOMAIN_ID': str(self.domain)}
+
+    def add(self, node: Any) -> Any:
+        """Spin a node (made with `context=graph.context`) with the others."""
+        self.nodes.append(node)
+        self.executor.add_node(node)
+        return node
+
+    def node(self, name: str = 'helper', **options: Any) -> Any:
+        """Return a plain node."""
+        from rclpy.node import Node
+
+        return self.add(Node(name, context=self.context, **options))
+
+    def collect(self, node: Any, message_type: Any, topic: str, qos: Any = 100) -> list[Any]:
+        """Subscribe, and return the list that the messages will be appended to."""
+        received: list[Any] = []
+        node.create_subscription(message_type, topic, received.append, qos)
+        return received
+
+    def spin_until(self, condition: Callable[[], bool], what: str, seconds: float = 20.0) -> None:
+        """Spin until the condition holds; fail, saying `what` was waited for, after a deadline."""
+        deadline = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < deadline, f'waited {seconds} s for: {what}'
+            self.executor.spin_once(timeout_sec=0.02)
+
+    def spin_for(self, seconds: float) -> None:
+        """Spin for a while: only to see that something does not happen."""
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            self.executor.spin_once(timeout_sec=0.02)
+
+    def call(self, node: Any, service_type: Any, name: str, request: Any) -> Any:
+        """Call a service and return its response."""
+        client = node.create_client(service_type, name)
+        self.spin_until(client.service_is_ready, f'service {name}')
+        future = client.call_async(request)
+        self.spin_until(future.done, f'the response of {name}')
+        node.destroy_client(client)
+        return future.result()
+
+    def close(self) -> None:
+        """Destroy the nodes, the executor and the context."""
+        for node in self.nodes:
+            self.executor.remove_node(node)
+            node.destroy_node()
+        self.executor.shutdown()
+        self.context.try_shutdown()
+        self.context.destroy()
+
+    def __enter__(self) -> Graph:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+
+@contextmanager
+def graph(args: list[str] | None = None) -> Iterator[Graph]:
+    """Return a graph in a free domain; args: ROS arguments such as ['--ros-args', '-p', 'rate_hz:=20.0']."""
+    require_ros()
+    with free_domain() as domain, Graph(domain, args) as made:
+        yield made
