@@ -1,0 +1,50 @@
+"""Short recordings for tests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from foc_ros.bags import TYPESTORE, BagWriter
+from foc_ros.conversions.types import RosbagsTypes
+from foc_ros.input_messages import goal_poses, hand_pose, obstacle_cloud
+
+TYPES = RosbagsTypes(TYPESTORE)
+FRAME = 'world'
+START_NS = 5_000_000_000
+SCENE = [(0.15, 0.0, 0.0, 0.03, 0.002, 7)]
+GOAL = np.array([[0.3, 0.0, 0.0]])
+
+
+def ns(seconds: float) -> int:
+    return START_NS + round(seconds * 1e9)
+
+
+def reach(seconds: float = 0.6, rate_hz: float = 50.0) -> list[tuple[float, np.ndarray]]:
+    """Times and positions of a minimum-jerk reach of 0.3 m in 1 s, bulging 5 cm to the left, as far as it goes in `seconds`."""
+    times = np.arange(0.0, seconds, 1 / rate_hz)
+    s = 10 * times**3 - 15 * times**4 + 6 * times**5
+    return [(time, np.array([0.3 * part, 0.05 * np.sin(np.pi * part), 0.1])) for time, part in zip(times, s, strict=True)]
+
+
+def messages(seconds: float = 0.6, rate_hz: float = 50.0, scene_hz: float = 5.0) -> list[tuple[str, int, Any]]:
+    """A reach past one obstacle: (topic, stamp [ns], message), in order."""
+    out = []
+    for time in np.arange(-0.1, seconds, 1 / scene_hz):
+        out.append(('/obstacles', ns(time), obstacle_cloud(TYPES, ns(time), FRAME, SCENE)))
+        out.append(('/goals', ns(time), goal_poses(TYPES, ns(time), FRAME, GOAL)))
+    out += [('/hand_pose', ns(time), hand_pose(TYPES, ns(time), FRAME, position)) for time, position in reach(seconds, rate_hz)]
+    return sorted(out, key=lambda item: item[1])
+
+
+def write_bag(path: Path, items: Iterable[tuple[str, int, Any]] | None = None, rename: dict[str, str] | None = None) -> Path:
+    """Write a bag; rename: other topic names, '' leaves a topic out."""
+    names = rename or {}
+    with BagWriter(path) as writer:
+        for topic, stamp_ns, message in messages() if items is None else items:
+            if names.get(topic, topic):
+                writer.write(names.get(topic, topic), message, stamp_ns)
+    return path

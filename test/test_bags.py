@@ -1,0 +1,214 @@
+"""Recordings in and out: nothing lost, nothing overwritten, every damage named."""
+
+from __future__ import annotations
+
+import random
+import re
+import struct
+from pathlib import Path
+from typing import Any
+
+import pytest
+from bag_helpers import START_NS, TYPES, messages, write_bag
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from foc_ros.bags import TYPESTORE, BagReader, BagWriter
+from foc_ros.foc.errors import RecordingError
+from foc_ros.input_messages import hand_pose
+
+
+def read(path: Path, chosen: dict[str, str] | None = None) -> list[Any]:
+    with BagReader(path, chosen) as reader:
+        return list(reader)
+
+
+def assert_same(items: list[Any], written: list[tuple[str, int, Any]]) -> None:
+    assert [(item.topic, item.log_ns) for item in items] == [(topic, stamp_ns) for topic, stamp_ns, _ in written]
+    for item, (_, _, message) in zip(items, written, strict=True):
+        assert bytes(TYPESTORE.serialize_cdr(item.message, message.__msgtype__)) == bytes(item.raw)
+        assert bytes(item.raw) == bytes(TYPESTORE.serialize_cdr(message, message.__msgtype__))
+
+
+def mcap(bag: Path) -> Path:
+    return bag / f'{bag.name}.mcap'
+
+
+def test_a_bag_comes_back_as_it_was_written(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'one')
+    assert sorted(each.name for each in bag.iterdir()) == ['metadata.yaml', 'one.mcap']
+    with BagReader(bag) as reader:
+        items = list(reader)
+        assert reader.message_count == len(items) == len(messages())
+        assert reader.duration_s == pytest.approx(0.68, abs=1e-6)
+        assert reader.roles == {'hand_pose': '/hand_pose', 'obstacles': '/obstacles', 'goals': '/goals'}
+    assert_same(items, messages())
+
+
+def test_a_single_mcap_file_reads_alike(tmp_path: Path) -> None:
+    assert_same(read(mcap(write_bag(tmp_path / 'one'))), messages())
+
+
+@pytest.mark.parametrize('whole', [True, False])
+def test_sqlite_bags_read_alike(tmp_path: Path, whole: bool) -> None:
+    bag = tmp_path / 'old'
+    with Writer(bag, version=8, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        connections: dict[str, Any] = {}
+        for topic, stamp_ns, message in messages():
+            kind = message.__msgtype__
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=TYPESTORE)
+            writer.write(connections[topic], stamp_ns, TYPESTORE.serialize_cdr(message, kind))
+    items = read(bag if whole else bag / 'old.db3')
+    assert len(items) == len(messages())
+    assert_same([item for item in items if item.topic == '/hand_pose'], [each for each in messages() if each[0] == '/hand_pose'])
+
+
+def test_other_topics_are_left_out_but_counted(tmp_path: Path) -> None:
+    extra = TYPES.make('std_msgs/msg/String', data='hello')
+    bag = write_bag(tmp_path / 'more', [*messages(), ('/log', START_NS + 10**9, extra)])
+    with BagReader(bag) as reader:
+        assert len(list(reader)) == reader.message_count - 1
+
+
+def test_a_copy_is_byte_for_byte(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'one')
+    with BagReader(bag) as reader, BagWriter(tmp_path / 'two') as writer:
+        for item in reader:
+            writer.copy(item, reader.connection_of(item.topic))
+    assert [bytes(item.raw) for item in read(tmp_path / 'two')] == [bytes(item.raw) for item in read(bag)]
+
+
+def test_the_hand_can_be_chosen(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'arms', [*messages(), ('/left/measured_cp', START_NS, hand_pose(TYPES, 1, 'world', (9, 9, 9)))])
+    chosen = [item for item in read(bag, {'hand_pose': '/left/measured_cp'}) if item.role == 'hand_pose']
+    assert [item.message.pose.position.x for item in chosen] == [9.0]
+
+
+def test_an_existing_path_is_not_overwritten(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'one')
+    before = mcap(bag).read_bytes()
+    with pytest.raises(RecordingError, match='exists already and is not overwritten'):
+        write_bag(bag)
+    assert mcap(bag).read_bytes() == before
+
+
+def test_an_unfinished_bag_is_taken_away(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), BagWriter(tmp_path / 'half') as writer:
+        writer.write('/hand_pose', hand_pose(TYPES, 1, 'world', (0, 0, 0)), 1)
+        raise KeyboardInterrupt
+    assert not (tmp_path / 'half').exists()
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    (tmp_path / 'file').write_text('not a directory')
+    with pytest.raises(RecordingError, match=re.escape(str(tmp_path / 'file' / 'bag'))):
+        write_bag(tmp_path / 'file' / 'bag')
+
+
+@pytest.mark.parametrize('topic', ['/hand_pose', '/obstacles', '/goals'])
+def test_a_missing_topic_is_named(tmp_path: Path, topic: str) -> None:
+    bag = write_bag(tmp_path / 'poor', rename={topic: ''})
+    with pytest.raises(RecordingError, match=f'^{re.escape(str(bag))}: no topic for {topic[1:]}'):
+        read(bag)
+
+
+def test_an_empty_hand_topic_is_said(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'none') as writer:
+        writer._writer.add_connection('/hand_pose', 'geometry_msgs/msg/PoseStamped', typestore=TYPESTORE)
+        for topic, stamp_ns, message in messages():
+            if topic != '/hand_pose':
+                writer.write(topic, message, stamp_ns)
+    with pytest.raises(RecordingError, match='topic /hand_pose holds no message'):
+        read(tmp_path / 'none')
+
+
+def test_a_bag_without_messages_is_said(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'none'):
+        pass
+    with pytest.raises(RecordingError, match='holds no messages'):
+        read(tmp_path / 'none')
+
+
+def test_two_types_on_one_topic_are_said(tmp_path: Path) -> None:
+    bag = tmp_path / 'two'
+    with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        for kind in ('geometry_msgs/msg/PoseArray', 'geometry_msgs/msg/PoseStamped'):
+            made = TYPES.make(kind)
+            connection = writer.add_connection('/hand_pose', kind, typestore=TYPESTORE)
+            writer.write(connection, 1, TYPESTORE.serialize_cdr(made, kind))
+        for topic, kind in (('/obstacles', 'sensor_msgs/msg/PointCloud2'), ('/goals', 'geometry_msgs/msg/PoseArray')):
+            writer.add_connection(topic, kind, typestore=TYPESTORE)
+    with pytest.raises(RecordingError, match='topic /hand_pose: expected one message type'):
+        read(bag)
+
+
+@pytest.mark.parametrize(
+    ('make', 'reason'),
+    [
+        (lambda path: None, 'no such file or directory'),
+        (lambda path: path.mkdir(), 'no metadata.yaml in the directory'),
+        (lambda path: path.write_bytes(b''), 'the file is empty'),
+        (lambda path: path.write_bytes(b'not a bag at all, whatever its name says'), 'cannot be read'),
+        (lambda path: path.write_bytes(b'\x89MCAP0\r\n'), 'cannot be read'),
+    ],
+)
+def test_what_is_no_bag_is_said(tmp_path: Path, make: Any, reason: str) -> None:
+    path = tmp_path / 'it.mcap'
+    make(path)
+    with pytest.raises(RecordingError, match=f'^{re.escape(str(path))}: {reason}'):
+        read(path)
+
+
+def test_a_file_of_another_kind_is_said(tmp_path: Path) -> None:
+    (tmp_path / 'notes.txt').write_text('hello')
+    with pytest.raises(RecordingError, match=re.escape('expected a bag directory, a .mcap or a .db3 file')):
+        read(tmp_path / 'notes.txt')
+
+
+@pytest.mark.parametrize('share', [0.02, 0.3, 0.6, 0.9, 0.999])
+@pytest.mark.parametrize('single', [True, False])
+def test_a_cut_bag_is_never_read_in_part(tmp_path: Path, share: float, single: bool) -> None:
+    bag = write_bag(tmp_path / 'cut')
+    whole = mcap(bag).read_bytes()
+    mcap(bag).write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(RecordingError, match='damaged or cut short'):
+        read(mcap(bag) if single else bag)
+
+
+def test_a_cut_sqlite_bag_is_said(tmp_path: Path) -> None:
+    bag = tmp_path / 'old'
+    with Writer(bag, version=8, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        for topic, stamp_ns, message in messages(seconds=2.0):
+            kind = message.__msgtype__
+            known = {each.topic: each for each in writer.connections}
+            connection = known.get(topic) or writer.add_connection(topic, kind, typestore=TYPESTORE)
+            writer.write(connection, stamp_ns, TYPESTORE.serialize_cdr(message, kind))
+    database = bag / 'old.db3'
+    database.write_bytes(database.read_bytes()[: 3 * database.stat().st_size // 5])
+    with pytest.raises(RecordingError, match=re.escape(str(bag))):
+        read(bag)
+
+
+def test_fewer_messages_than_the_bag_says_is_an_error(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'less')
+    metadata = bag / 'metadata.yaml'
+    count = len(messages())
+    metadata.write_text(metadata.read_text().replace(f'message_count: {count}', f'message_count: {count + 3}'))
+    with pytest.raises(RecordingError, match=f'damaged or cut short: {count} of its {count + 3} messages can be read'):
+        read(bag)
+
+
+@pytest.mark.parametrize('seed', range(40))
+def test_a_damaged_file_gives_all_messages_or_one_error(tmp_path: Path, seed: int) -> None:
+    """Whatever bytes are wrong, the answer is a RecordingError or a stream of full length."""
+    source = random.Random(seed)
+    bag = write_bag(tmp_path / 'bad')
+    data = bytearray(mcap(bag).read_bytes())
+    for _ in range(source.randint(1, 30)):
+        struct.pack_into('B', data, source.randrange(len(data)), source.randrange(256))
+    mcap(bag).write_bytes(data)
+    try:
+        items = read(mcap(bag))
+    except RecordingError:
+        return
+    assert len(items) == len(messages())
