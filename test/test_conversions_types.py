@@ -14,7 +14,6 @@ from foc_ros.conversions import types as conversion_types
 from foc_ros.conversions.types import MessageTypes, RclpyTypes, RosbagsTypes
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
-IDENTITY = {'x': 0, 'y': 0, 'z': 0, 'w': 1}
 
 
 def samples(types: MessageTypes) -> list[object]:
@@ -28,7 +27,9 @@ def samples(types: MessageTypes) -> list[object]:
         point,
         types.make('geometry_msgs/msg/PoseWithCovariance', pose=pose, covariance=range(36)),
         types.make('std_msgs/msg/Float64MultiArray', data=[1, 2, 3]),
-        types.make('sensor_msgs/msg/JointState', name=['a', 'b'], position=np.arange(2, dtype=np.float32), effort=[5]),
+        types.make(
+            'sensor_msgs/msg/JointState', name=['a', 'b'], position=np.arange(2, dtype=np.float32), velocity=[1], effort=[5]
+        ),
         types.make(
             'sensor_msgs/msg/PointCloud2', data=b'\x01\x02', header=conversion_types.header(types, 3_000_000_004, 'world')
         ),
