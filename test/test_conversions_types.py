@@ -19,20 +19,17 @@ STORE = get_typestore(Stores.ROS2_JAZZY)
 def samples(types: MessageTypes) -> list[object]:
     """One message of each shape of field, every number given as the wrong kind of number."""
     point = types.make('geometry_msgs/msg/Point', x=1, y=np.float32(0.5), z=np.int64(-3))
-    pose = types.make(
-        'geometry_msgs/msg/Pose', position=point, orientation=types.make('geometry_msgs/msg/Quaternion', **IDENTITY)
-    )
+    quaternion = types.make('geometry_msgs/msg/Quaternion', x=0, y=0, z=0, w=1)
+    pose = types.make('geometry_msgs/msg/Pose', position=point, orientation=quaternion)
+    header = conversion_types.header(types, 3_000_000_004, 'world')
     key = types.make('diagnostic_msgs/msg/KeyValue', key='k', value='v')
+    positions = np.arange(2, dtype=np.float32)
     return [
         point,
         types.make('geometry_msgs/msg/PoseWithCovariance', pose=pose, covariance=range(36)),
         types.make('std_msgs/msg/Float64MultiArray', data=[1, 2, 3]),
-        types.make(
-            'sensor_msgs/msg/JointState', name=['a', 'b'], position=np.arange(2, dtype=np.float32), velocity=[1], effort=[5]
-        ),
-        types.make(
-            'sensor_msgs/msg/PointCloud2', data=b'\x01\x02', header=conversion_types.header(types, 3_000_000_004, 'world')
-        ),
+        types.make('sensor_msgs/msg/JointState', name=['a', 'b'], position=positions, velocity=[1], effort=[5]),
+        types.make('sensor_msgs/msg/PointCloud2', data=b'\x01\x02', header=header),
         types.make('diagnostic_msgs/msg/DiagnosticStatus', level=2, name='n', values=[key, key]),
         types.make('diagnostic_msgs/msg/DiagnosticArray'),
     ]
