@@ -1,8 +1,12 @@
-"""What all tests share: where ROS is required, a test that skips for want of it fails."""
+"""What all tests share: a private ROS graph, and that where ROS is required, a test that skips for want of it fails."""
 
 import os
+from collections.abc import Iterator
 
 import pytest
+from ros_helpers import Graph, graph, prepare_environment
+
+prepare_environment()
 
 REQUIRE_ROS = os.environ.get('FOC_ROS_REQUIRE_ROS') == '1'
 # Skips that remain skips: they want data that does not come with the sources.
@@ -30,3 +34,10 @@ def pytest_make_collect_report():
     report = yield
     _fail_if_skipped(report)
     return report
+
+
+@pytest.fixture
+def ros() -> Iterator[Graph]:
+    """A private ROS graph: own context, domain and executor."""
+    with graph() as made:
+        yield made
