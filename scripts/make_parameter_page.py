@@ -1,0 +1,56 @@
+"""Write doc/parameters.md from the configuration: `python scripts/make_parameter_page.py`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from foc_ros.foc.config import Config, Parameter, parameters
+
+PAGE = Path(__file__).parents[1] / 'doc' / 'parameters.md'
+
+HEAD = """# Parameters
+
+Every parameter of the node, of `replay` and of the configuration in Python. This page is made from
+`foc_ros/foc/config.py` by `scripts/make_parameter_page.py`; `config/foc.yaml` holds the same defaults as a ROS 2 parameter file.
+
+A value outside its range, of the wrong type, or of an unknown name is refused, by name, value and bound, and nothing is changed.
+Read-only parameters are set at the start. In Python, `likelihood.beta` is `Config().likelihood.beta`.
+"""
+
+TABLE = """
+| parameter | default | unit | range | meaning |
+|---|---|---|---|---|
+"""
+
+
+def page() -> str:
+    """Return the page: a section for each group, in the order of the configuration."""
+    text, group = HEAD, None
+    for parameter in parameters():
+        name = parameter.name.rpartition('.')[0]
+        if name != group:
+            text += f'\n## {name or "General"}\n\n{_meaning(name)}\n{TABLE}'
+            group = name
+        text += _row(parameter)
+    return text
+
+
+def _meaning(group: str) -> str:
+    """Return the first sentence of the docstring of a group's class."""
+    document = type(getattr(Config(), group) if group else Config()).__doc__ or ''
+    return document.strip().splitlines()[0]
+
+
+def _row(parameter: Parameter) -> str:
+    bound = parameter.bound
+    if bound.choices:
+        span = ', '.join(f'`{choice}`' for choice in bound.choices)
+    else:
+        span = '' if bound.low is None else f'{bound.low:g} .. {bound.high:g}'
+    default = f'`{parameter.default}`' if parameter.default != '' else 'empty'
+    meaning = bound.meaning + (' (read-only)' if bound.read_only else '')
+    return f'| `{parameter.name}` | {default} | {bound.unit} | {span} | {meaning} |\n'
+
+
+if __name__ == '__main__':
+    PAGE.write_text(page(), encoding='utf-8')

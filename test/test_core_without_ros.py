@@ -1,0 +1,71 @@
+"""The numeric core knows no ROS, and a recording is replayed where ROS is not installed."""
+
+import subprocess
+import sys
+
+import pytest
+
+BLOCKED = ('rclpy', 'ament_index_python', 'builtin_interfaces', 'rcl_interfaces', 'std_srvs')
+
+BLOCK = f"""
+import sys
+
+class Blocker:
+    def find_spec(self, name, path=None, target=None):
+        root = name.partition('.')[0]
+        if root in BLOCKED or root.endswith('_msgs'):
+            raise ModuleNotFoundError(f'{{name}} is blocked', name=name)
+
+BLOCKED = {{*{BLOCKED!r}}}
+sys.meta_path.insert(0, Blocker())
+"""
+
+IMPORT_ALL = """
+import importlib, pkgutil
+import foc_ros.foc
+names = [module.name for module in pkgutil.walk_packages(foc_ros.foc.__path__, 'foc_ros.foc.')]
+for name in names:
+    importlib.import_module(name)
+assert 'foc_ros.foc.predictor' in names, names
+"""
+
+PREDICT = """
+import numpy as np
+from foc_ros.foc.config import Config
+from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.records import HandState, make_obstacles
+hand = HandState(0, np.zeros(6), np.zeros((6, 6)))
+scene = make_obstacles([[0.15, 0.0]], [0.03], 0.002)
+prediction, _ = predict(Config(), hand, scene, np.array([[0.3, 0.0]]), Memory())
+sides = sorted(outcome.sides['0'] for outcome in prediction.solved)
+assert sides == [-1, 1], sides
+"""
+
+
+def run(program: str, *blocked: str) -> subprocess.CompletedProcess[str]:
+    """Run a program in a Python in which ROS and the packages `blocked` cannot be imported."""
+    block = BLOCK + f'BLOCKED |= {set(blocked)!r}\n' if blocked else BLOCK
+    return subprocess.run([sys.executable, '-c', block + program], capture_output=True, text=True, timeout=100, check=False)
+
+
+@pytest.mark.parametrize('package', ['rclpy', 'sensor_msgs.msg', 'rosbags'])
+def test_the_block_holds(package: str) -> None:
+    result = run(f'import {package}', 'rosbags')
+    assert result.returncode == 1
+    assert 'is blocked' in result.stderr
+
+
+def test_core_imports_and_predicts_without_ros_and_rosbags() -> None:
+    result = run(IMPORT_ALL + PREDICT, 'rosbags', 'rich', 'matplotlib')
+    assert result.returncode == 0, result.stderr
+
+
+def test_replay_runs_without_ros() -> None:
+    program = """
+from foc_ros.command_line import main
+from importlib.resources import files
+sys.exit(main(['replay', str(files('foc_ros') / 'recordings' / 'reaching.mcap'), '--json']))
+"""
+    result = run(program)
+    assert result.returncode == 0, result.stderr
+    assert '"most_likely"' in result.stdout or '"candidates"' in result.stdout, result.stdout[:500]

@@ -1,0 +1,113 @@
+"""What pip and colcon install: metadata that agrees, and every file that the program needs."""
+
+import re
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+import zipfile
+from email.parser import HeaderParser
+from pathlib import Path
+
+import pytest
+import yaml
+
+import foc_ros
+from foc_ros.command_line import COMMANDS
+
+ROOT = Path(__file__).parents[1]
+SKIPPED = shutil.ignore_patterns('.*', '__pycache__', 'build', 'dist', 'install', 'log', 'demo_output', '*.egg-info')
+
+
+@pytest.fixture(scope='module')
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
+    """Build a wheel of a copy of the sources, without the network."""
+    setuptools = pytest.importorskip('setuptools', '70.1', reason='setuptools 70.1 is needed to build a wheel')
+    source, target = tmp_path_factory.mktemp('source') / 'foc_ros', tmp_path_factory.mktemp('wheel')
+    shutil.copytree(ROOT, source, ignore=SKIPPED)
+    pip = [sys.executable, '-m', 'pip', 'wheel', '--quiet', '--no-deps', '--no-build-isolation', '--no-index']
+    result = subprocess.run([*pip, '--wheel-dir', target, source], capture_output=True, text=True, timeout=100, check=False)
+    assert result.returncode == 0, f'setuptools {setuptools.__version__}: {result.stderr}'
+    return zipfile.ZipFile(next(target.glob('*.whl')))
+
+
+@pytest.fixture(scope='module')
+def package_xml() -> ET.Element:
+    return ET.parse(ROOT / 'package.xml').getroot()
+
+
+def test_package_xml_agrees_with_the_wheel(package_xml: ET.Element, wheel: zipfile.ZipFile) -> None:
+    metadata = HeaderParser().parsestr(wheel.read(next(n for n in wheel.namelist() if n.endswith('/METADATA'))).decode())
+    text = {child.tag: child.text for child in package_xml}
+    assert package_xml.get('format') == '3'
+    assert text['name'] == metadata['Name'] == ROOT.joinpath('resource', 'foc_ros').name
+    assert text['version'] == metadata['Version'] == foc_ros.__version__
+    assert text['license'] == metadata['License'] == 'Apache-2.0'
+    assert text['description'] == metadata['Summary']
+    assert package_xml.find('maintainer').get('email') == metadata['Maintainer-email']
+    assert package_xml.findtext('export/build_type') == 'ament_python'
+
+
+def test_package_xml_names_every_requirement(package_xml: ET.Element, wheel: zipfile.ZipFile) -> None:
+    metadata = HeaderParser().parsestr(wheel.read(next(n for n in wheel.namelist() if n.endswith('/METADATA'))).decode())
+    required = [line for line in metadata.get_all('Requires-Dist') if 'extra ==' not in line]
+    keys = {node.text.removeprefix('python3-').removesuffix('-pip') for node in package_xml.findall('exec_depend')}
+    for line in required:
+        name = re.match(r'[A-Za-z0-9-]+', line).group().lower()
+        assert name.replace('pyyaml', 'yaml') in keys, f'{line} is not in package.xml'
+
+
+def test_package_xml_names_every_message_package(package_xml: ET.Element) -> None:
+    keys = {node.text for node in package_xml.findall('exec_depend')}
+    used = set()
+    for file in (ROOT / 'foc_ros').rglob('*.py'):
+        used |= set(re.findall(r"""(?:from |import |['"])(\w+_msgs|std_srvs|rcl_interfaces)[./]""", file.read_text('utf-8')))
+    assert {'sensor_msgs', 'geometry_msgs', 'std_srvs'} <= used
+    assert used - {'builtin_interfaces'} <= keys
+
+
+def test_rosdep_rule_resolves_what_rosdep_does_not_know(package_xml: ET.Element) -> None:
+    rules = yaml.safe_load((ROOT / 'rosdep' / 'foc_ros.yaml').read_text('utf-8'))
+    keys = {node.text for node in package_xml if node.tag.endswith('depend')}
+    assert set(rules) <= keys
+    assert rules['python3-piqp-pip']['ubuntu'] == {'pip': {'packages': ['piqp']}}
+
+
+def test_wheel_holds_what_the_program_needs(wheel: zipfile.ZipFile) -> None:
+    names = set(wheel.namelist())
+    data = 'foc_ros-0.1.0.data/data/'.replace('0.1.0', foc_ros.__version__)
+    assert f'{data}share/ament_index/resource_index/packages/foc_ros' in names
+    assert f'{data}share/foc_ros/package.xml' in names
+    assert f'{data}share/foc_ros/config/foc.yaml' in names
+    sources = {path.relative_to(ROOT).as_posix() for path in (ROOT / 'foc_ros').rglob('*') if path.suffix in ('.py', '.mcap')}
+    assert 'foc_ros/recordings/reaching.mcap' in sources
+    assert sources <= names, sources - names
+    assert not [name for name in names if name.startswith(('test', 'scripts', 'benchmarks'))]
+
+
+def test_ros2_run_knows_every_command(wheel: zipfile.ZipFile) -> None:
+    """`ros2 run` starts files of lib/foc_ros: one per command, executable, and none of them on everybody's PATH."""
+    scripts = {Path(info.filename).name: info for info in wheel.infolist() if '.data/data/lib/foc_ros/' in info.filename}
+    assert set(scripts) == set(COMMANDS)
+    assert all(info.external_attr >> 16 & 0o111 == 0o111 for info in scripts.values())
+    entry_points = wheel.read(next(n for n in wheel.namelist() if n.endswith('/entry_points.txt'))).decode()
+    assert re.findall(r'^(\w+) =', entry_points, re.MULTILINE) == ['foc_node', 'foc_ros']
+
+
+@pytest.mark.parametrize('command', sorted(path.name for path in (ROOT / 'scripts' / 'ros2_run').iterdir()))
+def test_ros2_run_starts_the_command(command: str) -> None:
+    script = ROOT / 'scripts' / 'ros2_run' / command
+    result = subprocess.run([sys.executable, script, '--help'], capture_output=True, text=True, timeout=100, check=False)
+    assert result.returncode == 0, result.stderr
+    assert f' {command} ' in result.stdout
+
+
+def test_no_file_names_a_path_of_somebodys_machine() -> None:
+    listed = subprocess.run(['git', 'ls-files', '-z'], cwd=ROOT, capture_output=True, check=False)
+    if listed.returncode:
+        pytest.skip('not a git checkout: the list of files is unknown')
+    wrong = re.compile(rb'/(?:home|root|Users|work)/\w')
+    for name in filter(None, listed.stdout.decode().split('\0')):
+        file = ROOT / name
+        if file.is_file() and file.suffix not in ('.png', '.mcap') and file != Path(__file__):
+            assert not wrong.search(file.read_bytes()), f'{name} names a path of a machine'

@@ -1,0 +1,17 @@
+"""doc/parameters.md says what the configuration says."""
+
+import importlib.util
+from pathlib import Path
+
+from foc_ros.foc.config import parameters
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_the_page_is_current() -> None:
+    spec = importlib.util.spec_from_file_location('make_parameter_page', ROOT / 'scripts' / 'make_parameter_page.py')
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    assert script.PAGE.read_text('utf-8') == script.page(), 'run: python scripts/make_parameter_page.py'
+    for parameter in parameters():
+        assert f'| `{parameter.name}` |' in script.page()
