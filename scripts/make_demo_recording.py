@@ -20,13 +20,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
-from rosbags.typesys import Stores, get_typestore
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.optimize import minimize
 
-from foc_ros.conversions.types import RosbagsTypes, header
+from foc_ros.bags import TYPESTORE, BagWriter
+from foc_ros.conversions.types import RosbagsTypes
+from foc_ros.input_messages import goal_poses, hand_pose, obstacle_cloud
 
 Array = NDArray[np.float64]
 
@@ -45,14 +44,12 @@ FEEDBACK_RATE = 3.5
 
 NEAR = np.array([[0.0, -0.06], [0.0, 0.07]])
 FAR = np.array([[0.36, -0.065], [0.35, 0.08]])
-OBSTACLES = np.array(
-    [  # id, x, y, radius, radius_stddev
-        [1, 0.170, 0.005, 0.035, 0.003],
-        [2, 0.135, 0.125, 0.030, 0.002],
-        [3, 0.200, -0.125, 0.030, 0.002],
-        [4, 0.255, 0.075, 0.020, 0.002],
-    ]
-)
+OBSTACLES = [  # x, y, z, radius, radius_stddev, id
+    (0.170, 0.005, HEIGHT, 0.035, 0.003, 1),
+    (0.135, 0.125, HEIGHT, 0.030, 0.002, 2),
+    (0.200, -0.125, HEIGHT, 0.030, 0.002, 3),
+    (0.255, 0.075, HEIGHT, 0.020, 0.002, 4),
+]
 
 
 @dataclass(frozen=True)
@@ -142,78 +139,39 @@ def moved(intended: Array, random: np.random.Generator) -> Array:
     return np.array(positions)
 
 
-def messages(types: RosbagsTypes) -> list[tuple[int, str, str, Any]]:
-    """Return every message of the recording in order: stamp [ns], topic, type, message."""
-    random = np.random.default_rng(SEED)
+def messages() -> list[tuple[int, str, Any]]:
+    """Return every message of the recording in order: stamp [ns], topic, message."""
+    types, random = RosbagsTypes(TYPESTORE), np.random.default_rng(SEED)
     intended, switches = reference()
     truth = moved(intended, random)
     measured = np.column_stack([truth, np.full(len(truth), HEIGHT)]) + SENSOR_NOISE_M * random.standard_normal((len(truth), 3))
-    out: list[tuple[int, str, str, Any]] = []
-
-    def say(seconds: float, topic: str, kind: str, **values: Any) -> None:
-        stamp_ns = START_NS + round(seconds * 1e3) * 1_000_000
-        out.append((stamp_ns, topic, kind, types.make(kind, header=header(types, stamp_ns, FRAME), **values)))
-
-    goal_times = sorted({*np.arange(0.0, STEP_S * len(truth), 1.0), *(time for time, _ in switches)})
-    for seconds in goal_times:
+    end_s = STEP_S * len(truth)
+    out: list[tuple[int, str, Any]] = []
+    for seconds in sorted({*np.arange(0.0, end_s, 1.0), *(time for time, _ in switches)}):
         far = [outward for time, outward in switches if time <= seconds][-1]
-        say(
-            seconds,
-            '/goals',
-            'geometry_msgs/msg/PoseArray',
-            poses=[_pose(types, x, y, HEIGHT) for x, y in (FAR if far else NEAR)],
-        )
-    for seconds in np.arange(0.0, STEP_S * len(truth), 0.2):
-        say(seconds, '/obstacles', 'sensor_msgs/msg/PointCloud2', **_cloud(types))
-    for step, position in enumerate(measured):
-        say(STEP_S * step, '/hand_pose', 'geometry_msgs/msg/PoseStamped', pose=_pose(types, *position))
-    order = {'/goals': 0, '/obstacles': 1, '/hand_pose': 2}
-    return sorted(out, key=lambda item: (item[0], order[item[1]]))
+        sites = np.column_stack([FAR if far else NEAR, np.full(2, HEIGHT)])
+        out.append((_stamp(seconds), '/goals', goal_poses(types, _stamp(seconds), FRAME, sites)))
+    stamps = [_stamp(seconds) for seconds in np.arange(0.0, end_s, 0.2)]
+    out += [(stamp_ns, '/obstacles', obstacle_cloud(types, stamp_ns, FRAME, OBSTACLES)) for stamp_ns in stamps]
+    stamps = [_stamp(STEP_S * step) for step in range(len(measured))]
+    out += [
+        (stamp_ns, '/hand_pose', hand_pose(types, stamp_ns, FRAME, at)) for stamp_ns, at in zip(stamps, measured, strict=True)
+    ]
+    return sorted(out, key=lambda item: item[0])
 
 
-def _pose(types: RosbagsTypes, x: float, y: float, z: float) -> Any:
-    return types.make(
-        'geometry_msgs/msg/Pose',
-        position=types.make('geometry_msgs/msg/Point', x=x, y=y, z=z),
-        orientation=types.make('geometry_msgs/msg/Quaternion', w=1.0),
-    )
-
-
-def _cloud(types: RosbagsTypes) -> dict[str, Any]:
-    names = ('x', 'y', 'z', 'radius', 'radius_stddev')
-    rows = np.zeros(len(OBSTACLES), dtype=[(name, '<f4') for name in names] + [('id', '<u4')])
-    for column, name in enumerate(('id', 'x', 'y', 'radius', 'radius_stddev')):
-        rows[name] = OBSTACLES[:, column]
-    rows['z'] = HEIGHT
-    float32, uint32 = 7, 6
-    fields = [(name, float32) for name in names] + [('id', uint32)]
-    return {
-        'height': 1,
-        'width': len(rows),
-        'fields': [
-            types.make('sensor_msgs/msg/PointField', name=name, offset=4 * place, datatype=kind, count=1)
-            for place, (name, kind) in enumerate(fields)
-        ],
-        'point_step': rows.itemsize,
-        'row_step': rows.nbytes,
-        'data': rows.tobytes(),
-        'is_dense': True,
-    }
+def _stamp(seconds: float) -> int:
+    return START_NS + round(seconds * 1e3) * 1_000_000
 
 
 def write(file: Path) -> None:
     """Write the recording as one MCAP file, replacing what is there."""
-    typestore = get_typestore(Stores.ROS2_JAZZY)
     with tempfile.TemporaryDirectory() as directory:
-        writer = Writer(Path(directory) / 'reaching', version=9, storage_plugin=StoragePlugin.MCAP)
-        writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
-        with writer:
-            connections: dict[str, Any] = {}
-            for stamp_ns, topic, kind, message in messages(RosbagsTypes(typestore)):
-                if topic not in connections:
-                    connections[topic] = writer.add_connection(topic, kind, typestore=typestore)
-                writer.write(connections[topic], stamp_ns, typestore.serialize_cdr(message, kind))
-        (made,) = (Path(directory) / 'reaching').glob('*.mcap')
+        bag = Path(directory) / 'reaching'
+        with BagWriter(bag) as writer:
+            for stamp_ns, topic, message in messages():
+                writer.write(topic, message, stamp_ns)
+        (made,) = bag.glob('*.mcap')
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(made.read_bytes())
 

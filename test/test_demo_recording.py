@@ -87,8 +87,8 @@ def test_rates_length_and_frame(recorded: list[tuple[str, int, Any]]) -> None:
 
 
 def test_movements_are_reaches_that_touch_nothing(script: ModuleType, recorded: list[tuple[str, int, Any]]) -> None:
-    track = hand(recorded)
-    clearance = np.linalg.norm(track[:, None, 1:3] - script.OBSTACLES[None, :, 1:3], axis=2) - script.OBSTACLES[:, 3]
+    track, OBSTACLES = hand(recorded), np.array(script.OBSTACLES)
+    clearance = np.linalg.norm(track[:, None, 1:3] - OBSTACLES[None, :, :2], axis=2) - OBSTACLES[:, 3]
     assert clearance.min() > 0.008
     starts = np.cumsum([0.0, *(r.rest_s + r.duration_s for r in script.REACHES)])
     for reach, start, end in zip(script.REACHES, starts, starts[1:], strict=False):
