@@ -1,0 +1,64 @@
+"""What a control achieves: the surrogate at its own mean, for every obstacle and step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .chance import CERTAIN_K, achieved_k, eta_of_k, expectation, k_of_eta, variance
+from .problem import Problem
+from .records import Array, Record
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment(Record):
+    """k achieved per obstacle and step (m, N), infinite where the hand is still leaving a margin; relaxed: ids of those margins."""
+
+    k: Array
+    relaxed: tuple[str, ...]
+
+    @property
+    def smallest_k(self) -> float:
+        """The k that holds everywhere; CERTAIN_K where there is no obstacle."""
+        return min(float(self.k.min(initial=CERTAIN_K)), CERTAIN_K)
+
+    @property
+    def eta(self) -> float:
+        """The eta that holds for every obstacle and step."""
+        return eta_of_k(self.smallest_k)
+
+    @property
+    def place(self) -> tuple[int, int] | None:
+        """Obstacle row and step (1..N) where eta is attained; None without obstacles."""
+        if self.k.size == 0:
+            return None
+        row, column = np.unravel_index(int(self.k.argmin()), self.k.shape)
+        return int(row), int(column) + 1
+
+
+def assess(problem: Problem, control: Array) -> Assessment:
+    """Evaluate k = -E[C] / sqrt(Var[C]) linearised at the control's own mean (paper, equation 7). control: stacked (2N,)."""
+    offset = problem.positions(control)[None] - problem.centres
+    mean = expectation(offset, np.zeros(offset.shape[1:]), problem.size[0])
+    var = variance(offset, problem.position_variance(control), problem.size[1], problem.obstacles.centre_covariance)
+    k = achieved_k(mean, np.sqrt(var))
+    inside = _inside_now(problem)
+    if inside.any():
+        leaving = problem.horizon.dt * np.arange(1, problem.horizon.steps + 1) < problem.recovery_s
+        k[np.ix_(inside, leaving)] = np.inf
+    return Assessment(k, tuple(np.array(problem.obstacles.ids, dtype=object)[inside]))
+
+
+def _inside_now(problem: Problem) -> Array:
+    """Whether the hand is now inside the margin of each obstacle, (m,) bool: always False without a recovery time."""
+    obstacles = problem.obstacles
+    if problem.recovery_s <= 0 or not len(obstacles):
+        return np.zeros(len(obstacles), dtype=bool)
+    offset = (problem.initial_mean[:2] - obstacles.centre)[:, None, :]
+    now = problem.free_covariance[0]
+    covariance = np.array([[now[0, 0]], [now[1, 1]], [now[0, 1]]])
+    mean = expectation(offset, np.zeros((1, 2)), problem.size[0])
+    var = variance(offset, covariance, problem.size[1], obstacles.centre_covariance)
+    inside: Array = achieved_k(mean, np.sqrt(var))[:, 0] < k_of_eta(problem.eta)
+    return inside

@@ -1,0 +1,116 @@
+"""Linear plants of the hand and their maps over a horizon.
+
+State X, control U of two channels: X(t+1) = A X(t) + B (U(t) + noise). The first two states are the position, the next two the
+velocity. Everything downstream works for any such (A, B).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from .errors import InputError
+from .records import Array, Record
+
+CACHED_HORIZONS = 16
+"""Horizons kept: those of one tick (one per duration) and a few ticks before it, about 0.1 MB each at N = 50."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plant(Record):
+    """A discrete linear plant: A (n, n), B (n, 2), dt [s]; states 0 and 1 are the position [m], 2 and 3 the velocity [m/s]."""
+
+    A: Array
+    B: Array
+    dt: float
+
+    def __post_init__(self) -> None:
+        n = len(self.A)
+        if self.A.shape != (n, n) or n < 4 or self.B.shape != (n, 2):
+            raise InputError('plant', 'A (n, n) and B (n, 2) with n >= 4', f'A {self.A.shape}, B {self.B.shape}')
+        if not (np.isfinite(self.A).all() and np.isfinite(self.B).all() and np.isfinite(self.dt) and self.dt > 0):
+            raise InputError('plant', 'finite A and B and dt > 0', f'dt = {self.dt}')
+        super().__post_init__()
+
+
+def triple_integrator(dt: float) -> Plant:
+    """Return the paper's hand: X = (x, y, vx, vy, ax, ay), U = jerk [m/s^3], piecewise constant over dt [s].
+
+    Per axis A = [[1, dt, dt^2/2], [0, 1, dt], [0, 0, 1]], B = [dt^3/6, dt^2/2, dt] (paper, equation 1).
+    """
+    axis_a = np.array([[1.0, dt, dt**2 / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
+    axis_b = np.array([[dt**3 / 6], [dt**2 / 2], [dt]])
+    return Plant(np.kron(axis_a, np.eye(2)), np.kron(axis_b, np.eye(2)), dt)
+
+
+def damped_mass(dt: float, mass: float, damping: float) -> Plant:
+    """Return the paper's second-order hand: X = (x, y, vx, vy), U = force [N], mass [kg] > 0, damping [N s/m] >= 0.
+
+    m dv/dt = U - b v, discretised exactly for a force that is constant over dt [s] (paper, section V).
+    """
+    if not mass > 0 or not damping >= 0:
+        raise InputError('plant', 'mass > 0 and damping >= 0', f'mass {mass}, damping {damping}')
+    rate = damping / mass * dt
+    decay = np.exp(-rate)
+    # f1 = (1 - e^-r)/r and f2 = (1 - f1)/r, by their series where r is too small for the quotient
+    f1 = -np.expm1(-rate) / rate if rate > 1e-5 else 1 - rate / 2
+    f2 = (1 - f1) / rate if rate > 1e-5 else 0.5 - rate / 6
+    axis_a = np.array([[1.0, dt * f1], [0.0, decay]])
+    axis_b = np.array([[dt**2 / mass * f2], [dt / mass * f1]])
+    return Plant(np.kron(axis_a, np.eye(2)), np.kron(axis_b, np.eye(2)), dt)
+
+
+@dataclass(frozen=True, eq=False)
+class Horizon(Record):
+    """What N steps of a plant do, stacked: X(t) = A^t X(0) + response[t-1] u for t = 1..N.
+
+    u (2N,) is the control stacked axis after axis: first channel at steps 0..N-1, then the second. response (N, n, 2N);
+    powers (N + 1, n, n): A^0..A^N. dt [s].
+    """
+
+    powers: Array
+    response: Array
+    dt: float
+
+    @property
+    def steps(self) -> int:
+        """N."""
+        return len(self.response)
+
+    @property
+    def position(self) -> Array:
+        """S: positions at steps 1..N from u, (2, N, 2N)."""
+        position: Array = self.response[:, :2].swapaxes(0, 1)
+        return position
+
+
+def horizon(plant: Plant, steps: int) -> Horizon:
+    """Stack a plant over `steps` >= 1 steps."""
+    n = len(plant.A)
+    powers = np.empty((steps + 1, n, n))
+    powers[0] = np.eye(n)
+    for t in range(steps):
+        powers[t + 1] = plant.A @ powers[t]
+    impulse = np.concatenate((np.zeros((1, n, 2)), powers[:-1] @ plant.B))  # after j steps; nothing before it is felt
+    lag = np.arange(1, steps + 1)[:, None] - np.arange(steps)[None, :]
+    response = impulse[np.maximum(lag, 0)]  # (t, k, n, channel)
+    return Horizon(powers, response.transpose(0, 2, 3, 1).reshape(steps, n, 2 * steps), plant.dt)
+
+
+@lru_cache(maxsize=CACHED_HORIZONS)
+def _unit_horizon(steps: int) -> Horizon:
+    return horizon(triple_integrator(1.0), steps)
+
+
+@lru_cache(maxsize=CACHED_HORIZONS)
+def triple_integrator_horizon(dt: float, steps: int) -> Horizon:
+    """Return the triple integrator's horizon for any dt [s] by scaling the one of unit step.
+
+    With X = D X', D = diag(1, 1, 1/dt, 1/dt, 1/dt^2, 1/dt^2) and U = U'/dt^3 the dynamics have no unit of time left.
+    """
+    unit = _unit_horizon(steps)
+    scale = np.repeat([1.0, 1 / dt, 1 / dt**2], 2)
+    powers = unit.powers * (scale[:, None] / scale[None, :])
+    return Horizon(powers, unit.response * (dt**3 * scale)[None, :, None], dt)

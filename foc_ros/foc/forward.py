@@ -1,0 +1,124 @@
+"""The forward optimal control of one candidate: a strategy applied to a problem from a guess, and its result in full."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from .assess import Assessment, assess
+from .config import FocConfig
+from .continuous import Curve, walk
+from .noise import state_covariance
+from .problem import Problem
+from .qp import clearance_qp
+from .records import Array, Solution, Status
+from .sequential import Converged, converge
+from .solver import WorkingSet, solve
+
+
+@dataclass(frozen=True)
+class _Ended:
+    """How a strategy ended: a control with the (tau, lambda) it belongs to, what it achieves, the rows that hold it."""
+
+    status: Status
+    message: str
+    control: Array
+    tau: float
+    lam: float
+    qp_solves: int
+    active: WorkingSet
+    multipliers: Array
+
+
+def forward(problem: Problem, guess: Array, settings: FocConfig) -> Solution:
+    """Solve one problem in the class of a guess (N + 1, 2) [m] at steps 0..N.
+
+    Never raises for a problem that has no solution: the status says so, and the mean is then the best effort (the largest eta that
+    the strategy reached, or the smallest violation).
+    """
+    began = time.perf_counter()
+    ended = _STRATEGIES[settings.strategy](problem, np.asarray(guess, dtype=float)[1:], settings)
+    return _solution(problem, ended, assess(problem, ended.control), time.perf_counter() - began)
+
+
+def _continuous(problem: Problem, guess: Array, settings: FocConfig) -> _Ended:
+    delta = settings.lv_delta if settings.strategy == 'lv' else settings.hc_delta
+    curve = Curve(delta, settings.growth, settings.lam)
+    walked = walk(problem, guess, curve)
+    if walked.point is None:
+        return _best_effort(problem, guess, *curve.at(0.0), walked.qp_solves)
+    return _ended(walked.status, walked.message, walked.point.converged, *curve.at(walked.point.s), walked.qp_solves)
+
+
+def _fixed(problem: Problem, guess: Array, settings: FocConfig) -> _Ended:
+    converged = converge(problem, guess, WorkingSet(), settings.tau, settings.lam)
+    if converged is None:
+        return _best_effort(problem, guess, settings.tau, settings.lam, 0)
+    status = Status.SOLVED if converged.stays else Status.ITERATION_LIMIT
+    message = 'solved' if converged.stays else 'the linearisation had not settled when its QPs ran out'
+    return _ended(status, message, converged, settings.tau, settings.lam, converged.qp_solves)
+
+
+def _ended(status: Status, message: str, converged: Converged, tau: float, lam: float, qp_solves: int) -> _Ended:
+    solution = converged.solution
+    return _Ended(status, message, converged.control, tau, lam, qp_solves, solution.active, solution.multipliers)
+
+
+def _best_effort(problem: Problem, guess: Array, tau: float, lam: float, qp_solves: int) -> _Ended:
+    """Let the contradicting rows share the violation, at the guess: what the hand can do where nothing meets them all."""
+    elastic = solve(clearance_qp(problem, guess, tau, lam), WorkingSet(), elastic=True)
+    if elastic is None:
+        control, active, multipliers = np.zeros(2 * problem.horizon.steps), WorkingSet(), np.zeros(0)
+    else:
+        control, active, multipliers = elastic.control, elastic.active, elastic.multipliers
+    message = 'no way between the obstacles of this class meets the goal: the path shown violates them least'
+    return _Ended(Status.INFEASIBLE, message, control, tau, lam, qp_solves, active, multipliers)
+
+
+_STRATEGIES = {'lv': _continuous, 'hc': _continuous, 'fixed': _fixed}
+
+
+def _solution(problem: Problem, ended: _Ended, assessment: Assessment, seconds: float) -> Solution:
+    horizon, ids = problem.horizon, problem.obstacles.ids
+    mean = problem.free.copy()
+    mean[1:] += horizon.response @ ended.control
+    covariance = state_covariance(horizon, problem.free_covariance, problem.noise, ended.control)
+    message = ended.message
+    if assessment.relaxed:
+        message += f'; inside the margin of {", ".join(assessment.relaxed)} now: eta holds from {problem.recovery_s:g} s on'
+    place = assessment.place
+    return Solution(
+        status=ended.status,
+        message=message,
+        dt=horizon.dt,
+        mean=mean,
+        covariance=covariance,
+        control=ended.control.reshape(2, -1).T,
+        effort=float(ended.control @ ended.control),
+        costs=_costs(problem, ended.control, mean, covariance, ended.lam),
+        tau=ended.tau,
+        lam=ended.lam,
+        eta=assessment.eta,
+        eta_at=None if place is None else (ids[place[0]], place[1]),
+        multipliers=tuple(
+            (ids[row], int(step) + 1, float(value))
+            for row, step, value in zip(ended.active.obstacle, ended.active.step, ended.multipliers, strict=True)
+        ),
+        qp_solves=ended.qp_solves,
+        solve_s=seconds,
+    )
+
+
+def _costs(problem: Problem, control: Array, mean: Array, covariance: Array, lam: float) -> dict[str, float]:
+    """Every term of J_aug by name: effort, and weighted mean errors, variances and the lambda term."""
+    variances = np.diagonal(covariance, axis1=1, axis2=2)[1:]
+    squared_error = (mean[1:] - problem.goal) ** 2
+    weights = np.concatenate((np.tile(problem.way_weights, (len(variances) - 1, 1)), problem.end_weights[None]))
+    return {
+        'effort': float(control @ control),
+        'mean_error': float((weights * squared_error).sum()),
+        'variance': float((weights * variances).sum()),
+        'lambda_variance': float(lam * variances[:, :2].sum()),
+    }

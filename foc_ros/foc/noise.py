@@ -1,0 +1,38 @@
+"""Signal-dependent noise: every variance is a diagonal quadratic in the control.
+
+U + eps, eps_i = c_i phi U_i with phi standard normal at every step and channel (paper, equations 2-3), so that
+P(t) = A^t P(0) A'^t + sum_k R_k diag(c^2 u_k^2) R_k', with R_k the response of the state at step t to the control at step k.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .dynamics import Horizon
+from .records import Array
+
+
+def stacked_noise(noise: Array, steps: int) -> Array:
+    """Return c for every entry of u, (2N,): noise (2,) per channel, drawn once per step."""
+    return np.repeat(np.asarray(noise, dtype=float), steps)
+
+
+def noise_per_step(noise_at_reference: Array, reference_step: float, dt: float) -> Array:
+    """Scale c from a reference step [s] to dt [s]: c sqrt(reference / dt), so that the noise power per second stays."""
+    scaled: Array = np.asarray(noise_at_reference, dtype=float) * np.sqrt(reference_step / dt)
+    return scaled
+
+
+def state_covariance(horizon: Horizon, free: Array, noise: Array, control: Array) -> Array:
+    """Return P at steps 0..N, (N + 1, n, n): free part (N + 1, n, n), noise (2,), control stacked (2N,)."""
+    spread = horizon.response * (stacked_noise(noise, horizon.steps) * control)
+    covariance = free.copy()
+    covariance[1:] += spread @ spread.swapaxes(1, 2)
+    return covariance
+
+
+def position_variance_maps(horizon: Horizon, noise: Array) -> Array:
+    """Return V (3, N, 2N): variances xx, yy and covariance xy of the position at steps 1..N are V u^2 plus their free part."""
+    x, y = horizon.position
+    squared = stacked_noise(noise, horizon.steps) ** 2
+    return np.stack((x * x, y * y, x * y)) * squared

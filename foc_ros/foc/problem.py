@@ -1,0 +1,158 @@
+"""One reaching problem: from a hand state to a goal among obstacles, stacked over its horizon."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .chance import centres, size_moments
+from .dynamics import Horizon
+from .errors import SceneError
+from .noise import position_variance_maps, stacked_noise
+from .records import Array, Obstacles, Record
+
+
+@dataclass(frozen=True, eq=False)
+class Problem(Record):
+    """What the forward optimal control is asked.
+
+    horizon: the plant over N steps; initial_mean (n,) and initial_covariance (n, n): the state now; error_map (N + 1, n, n): what
+    an error of the initial state becomes at steps 0..N (`horizon.powers` where nobody corrects it); goal (n,), of which the states
+    in at_goal (n,) bool are reached exactly by the mean; end_weights and way_weights (n,): w of the mean error and variance at the
+    last step and at each step before it; noise (2,): c per step; obstacles: circles now; eta: wanted probability of avoidance per
+    obstacle and step; recovery_s: time in which a hand that is inside a margin has to be out of it [s].
+    """
+
+    horizon: Horizon
+    initial_mean: Array
+    initial_covariance: Array
+    error_map: Array
+    goal: Array
+    noise: Array
+    obstacles: Obstacles
+    eta: float
+    at_goal: Array
+    end_weights: Array
+    way_weights: Array
+    recovery_s: float = 0.0
+
+    @cached_property
+    def free(self) -> Array:
+        """Mean state at steps 0..N without control, (N + 1, n)."""
+        return self.horizon.powers @ self.initial_mean
+
+    @cached_property
+    def free_covariance(self) -> Array:
+        """The part of the state covariance at steps 0..N that the control does not cause, (N + 1, n, n)."""
+        return self.error_map @ self.initial_covariance @ self.error_map.swapaxes(1, 2)
+
+    @cached_property
+    def free_variance(self) -> Array:
+        """Rows xx, yy, xy of the free position covariance at steps 1..N, (3, N) [m^2]."""
+        covariance = self.free_covariance[1:]
+        return np.stack((covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]))
+
+    @cached_property
+    def centres(self) -> Array:
+        """Mean centres of the obstacles at steps 1..N, (m, N, 2) [m]."""
+        return centres(self.obstacles, self.horizon.dt, self.horizon.steps)
+
+    @cached_property
+    def size(self) -> tuple[Array, Array]:
+        """E[R^2] and Var[R^2] of each obstacle, (m,) each [m^2, m^4]."""
+        return size_moments(self.obstacles)
+
+    @cached_property
+    def position_map(self) -> Array:
+        """S (2, N, 2N): positions at steps 1..N from the stacked control."""
+        return np.ascontiguousarray(self.horizon.position)
+
+    @cached_property
+    def variance_maps(self) -> Array:
+        """V (3, N, 2N): position variances xx, yy, xy at steps 1..N are free_variance + V u^2."""
+        return position_variance_maps(self.horizon, self.noise)
+
+    @cached_property
+    def summed_variance(self) -> Array:
+        """(2N,): sum over steps of the variances of x and y is this times u^2, plus the free part."""
+        summed: Array = self.variance_maps[:2].sum(axis=(0, 1))
+        return summed
+
+    @cached_property
+    def weighted_variance(self) -> Array:
+        """(2N,): the variance terms of J_X are this times u^2, plus the free part."""
+        squared = self.horizon.response**2 * stacked_noise(self.noise, self.horizon.steps) ** 2
+        ends: Array = self.end_weights @ squared[-1] + self.way_weights @ squared[:-1].sum(axis=0)
+        return ends
+
+    @cached_property
+    def goal_rows(self) -> tuple[Array, Array, Array]:
+        """Rows (r, 2N), targets (r,) and softness (r,) that bring the mean to the goal.
+
+        Softness 0 is an equality; 1 / (2 w) is a term w (X_i - goal_i)^2 of the cost.
+        """
+        hard = np.flatnonzero(self.at_goal)
+        soft = np.flatnonzero(~self.at_goal & (self.end_weights > 0))
+        way = np.flatnonzero(self.way_weights > 0)
+        last, before = self.horizon.response[-1], self.horizon.response[:-1, way]
+        missing = self.goal - self.free[1:]
+        rows = np.concatenate((last[hard], last[soft], before.reshape(-1, before.shape[-1])))
+        targets = np.concatenate((missing[-1, hard], missing[-1, soft], missing[:-1, way].ravel()))
+        softness = np.concatenate(
+            (
+                np.zeros(len(hard)),
+                0.5 / self.end_weights[soft],
+                np.tile(0.5 / self.way_weights[way], self.horizon.steps - 1),
+            )
+        )
+        return rows, targets, softness
+
+    def positions(self, control: Array) -> Array:
+        """Mean positions at steps 1..N from the stacked control, (N, 2) [m]."""
+        positions: Array = self.free[1:, :2] + (self.position_map @ control).T
+        return positions
+
+    def position_variance(self, control: Array) -> Array:
+        """Rows xx, yy, xy of the position covariance at steps 1..N, (3, N) [m^2]."""
+        variance: Array = self.free_variance + self.variance_maps @ control**2
+        return variance
+
+
+def rest_to_goal(
+    horizon: Horizon,
+    initial_mean: Array,
+    goal_position: Array,
+    obstacles: Obstacles,
+    noise: Array,
+    eta: float,
+    initial_covariance: Array | None = None,
+    error_map: Array | None = None,
+    goal_weight: float = 0.0,
+    recovery_s: float = 0.0,
+) -> Problem:
+    """Build the default problem: the mean reaches the goal position (2,) [m] exactly, at rest.
+
+    goal_weight: w of the position variance at the end. Raises SceneError for anything not finite.
+    """
+    n = len(initial_mean)
+    goal = np.zeros(n)
+    goal[:2] = goal_position
+    for field, value in (('start', initial_mean), ('goal', goal_position), ('noise', noise)):
+        if not np.isfinite(value).all():
+            raise SceneError(field, 'finite numbers', np.asarray(value).tolist())
+    return Problem(
+        horizon=horizon,
+        initial_mean=np.asarray(initial_mean, dtype=float),
+        initial_covariance=np.zeros((n, n)) if initial_covariance is None else initial_covariance,
+        error_map=horizon.powers if error_map is None else error_map,
+        goal=goal,
+        noise=np.asarray(noise, dtype=float),
+        obstacles=obstacles,
+        eta=eta,
+        at_goal=np.ones(n, dtype=bool),
+        end_weights=np.where(np.arange(n) < 2, goal_weight, 0.0),
+        way_weights=np.zeros(n),
+        recovery_s=recovery_s,
+    )
