@@ -1,5 +1,5 @@
 # make setup [PYTHON=python3.12] [ROS=wheels|system]   a .venv with everything; re-run only when needed
-# make demo | test | lint | clean
+# make demo | test | lint | pages | clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -22,16 +22,22 @@ else ifeq ($(ROS),system)
 EXTRAS := report,test
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 VENV_OPTIONS := --system-site-packages
+# the pytest plugins of a ROS installation are for launch tests, and older than our pytest
+export PYTEST_DISABLE_PLUGIN_AUTOLOAD := 1
+export PYTEST_ADDOPTS := -p xdist.plugin -p pytest_timeout
 else
 $(error ROS is wheels or system, got '$(ROS)')
 endif
 
-.PHONY: setup demo test lint clean
+.PHONY: setup demo test lint pages clean
 
 setup: $(STAMP)
+ifneq ($(origin PYTHON),file)
+	@test "$$($(BIN)/python -V)" = "$$($(PYTHON) -V)" || { echo "make: .venv is $$($(BIN)/python -V), not $$($(PYTHON) -V): make clean first" >&2; exit 1; }
+endif
 
 $(STAMP): setup.py setup.cfg pyproject.toml
-	$(PYTHON) -m venv --clear $(VENV_OPTIONS) $(VENV) || { echo 'make setup: needs Python with venv (Debian, Ubuntu: apt install python3-venv)' >&2; exit 1; }
+	@test -e $@ || $(PYTHON) -m venv --clear $(VENV_OPTIONS) $(VENV) || { echo 'make: no venv in $(PYTHON); on Debian and Ubuntu: apt install python3-venv' >&2; exit 1; }
 	$(PIP) install --quiet --editable '.[$(EXTRAS)]'
 	touch $@
 
@@ -46,6 +52,10 @@ lint: $(STAMP)
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# What is derived from foc_ros/foc/config.py
+pages: $(STAMP)
+	$(BIN)/python scripts/make_parameter_page.py
 
 clean:
 	rm -rf $(VENV) build dist install log demo_output *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
