@@ -1,6 +1,7 @@
 """Packaging of foc_ros, for pip and for colcon (ament_python)."""
 
 from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
@@ -10,7 +11,8 @@ setup(
     name=PACKAGE,
     version='0.1.0',
     description='Predicts where the hand of a teleoperator is going among obstacles, with uncertainty and likelihood, on ROS 2',
-    long_description=open('README.md', encoding='utf-8').read(),
+    # resolved: colcon build --symlink-install runs a link to this file
+    long_description=Path(__file__).resolve().with_name('README.md').read_text(encoding='utf-8'),
     long_description_content_type='text/markdown',
     author='foc_ros developers',
     author_email='developers@foc-ros.invalid',
