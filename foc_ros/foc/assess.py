@@ -8,11 +8,11 @@ import numpy as np
 
 from .chance import CERTAIN_K, achieved_k, eta_of_k, expectation, k_of_eta, variance
 from .problem import Problem
-from .records import Array, Record
+from .records import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Assessment(Record):
+class Assessment:
     """k achieved per obstacle and step (m, N), infinite where the hand is still leaving a margin; relaxed: ids of those margins."""
 
     k: Array

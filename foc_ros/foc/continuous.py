@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from .assess import Assessment, assess
 from .chance import eta_of_k, k_of_eta
 from .problem import Problem
-from .records import Array, Record, Status
+from .records import Array, Status
 from .sequential import Converged, converge
 from .solver import WorkingSet
 
@@ -45,7 +45,7 @@ class Curve:
 
 
 @dataclass(frozen=True, eq=False)
-class Point(Record):
+class Point:
     """One converged solution on the curve."""
 
     s: float
@@ -59,7 +59,7 @@ class Point(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Walk(Record):
+class Walk:
     """How a walk ended: status, words, the point it ended at (None: no feasible point at all), QPs solved."""
 
     status: Status

@@ -99,6 +99,11 @@ def horizon(plant: Plant, steps: int) -> Horizon:
     return Horizon(powers, response.transpose(0, 2, 3, 1).reshape(steps, n, 2 * steps), plant.dt)
 
 
+def state_scale(dt: float) -> Array:
+    """Diagonal of D, (6,): the triple integrator's state at step dt [s] is D times its state at unit step."""
+    return np.repeat([1.0, 1 / dt, 1 / dt**2], 2)
+
+
 @lru_cache(maxsize=CACHED_HORIZONS)
 def _unit_horizon(steps: int) -> Horizon:
     return horizon(triple_integrator(1.0), steps)
@@ -111,6 +116,6 @@ def triple_integrator_horizon(dt: float, steps: int) -> Horizon:
     With X = D X', D = diag(1, 1, 1/dt, 1/dt, 1/dt^2, 1/dt^2) and U = U'/dt^3 the dynamics have no unit of time left.
     """
     unit = _unit_horizon(steps)
-    scale = np.repeat([1.0, 1 / dt, 1 / dt**2], 2)
+    scale = state_scale(dt)
     powers = unit.powers * (scale[:, None] / scale[None, :])
     return Horizon(powers, unit.response * (dt**3 * scale)[None, :, None], dt)

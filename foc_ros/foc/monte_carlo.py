@@ -8,14 +8,14 @@ import numpy as np
 
 from .noise import stacked_noise
 from .problem import Problem
-from .records import Array, Record
+from .records import Array
 
 BATCH = 2000
 """Roll-outs held at once, to bound the memory."""
 
 
 @dataclass(frozen=True, eq=False)
-class MonteCarlo(Record):
+class MonteCarlo:
     """Fractions of roll-outs that stay clear, each with its 95 % interval (Wilson).
 
     step: the worst obstacle and step, (estimate, low, high), at `place` = (obstacle row, step 1..N); path: of every obstacle

@@ -15,7 +15,7 @@ from .homotopy import path_sides, search
 from .likelihood import likelihoods, most_likely
 from .noise import noise_per_step
 from .problem import Problem, rest_to_goal
-from .replanning import replanned_error_map
+from .replanning import triple_integrator_error_map
 from .records import Array, Candidate, HandState, Obstacles, Outcome, Prediction, Solution, Status
 
 
@@ -60,7 +60,7 @@ def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal
         noise_per_step(np.array([foc.noise_x, foc.noise_y]), REFERENCE_STEP_S, dt),
         foc.eta,
         initial_covariance=hand.covariance,
-        error_map=replanned_error_map(horizon),
+        error_map=triple_integrator_error_map(dt, foc.steps),
         goal_weight=foc.goal_weight,
         recovery_s=foc.recovery_s,
     )

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from .problem import Problem
-from .records import Array, Record
+from .records import Array
 
 
 @dataclass(frozen=True, eq=False)
-class ReachingQP(Record):
+class ReachingQP:
     """A QP in the stacked control u (2N,).
 
     hessian (2N,) > 0; linear (2N,); goal_rows (r, 2N), goal_targets (r,), softness (r,) >= 0; maps (q, N, 2N), coefficients

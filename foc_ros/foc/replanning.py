@@ -11,18 +11,28 @@ from functools import lru_cache
 
 import numpy as np
 
-from .dynamics import CACHED_HORIZONS, Horizon
+from .dynamics import CACHED_HORIZONS, Horizon, horizon, state_scale, triple_integrator
 from .records import Array
 
 
-@lru_cache(maxsize=CACHED_HORIZONS)
-def replanned_error_map(horizon: Horizon) -> Array:
+def replanned_error_map(stacked: Horizon) -> Array:
     """Return what an initial error becomes at steps 0..N, (N + 1, n, n), for a goal that fixes every state."""
-    last = horizon.response[-1]
+    last = stacked.response[-1]
     # rows scaled to unit length first: they mix metres, metres per second and their like
     scale = 1.0 / np.sqrt((last**2).sum(axis=1))
-    correction = -np.linalg.pinv(scale[:, None] * last) @ (scale[:, None] * horizon.powers[-1])
-    error_map = horizon.powers.copy()
-    error_map[1:] += horizon.response @ correction
-    error_map.flags.writeable = False
+    correction = -np.linalg.pinv(scale[:, None] * last) @ (scale[:, None] * stacked.powers[-1])
+    error_map = stacked.powers.copy()
+    error_map[1:] += stacked.response @ correction
+    return error_map
+
+
+@lru_cache(maxsize=CACHED_HORIZONS)
+def _unit_error_map(steps: int) -> Array:
+    return replanned_error_map(horizon(triple_integrator(1.0), steps))
+
+
+def triple_integrator_error_map(dt: float, steps: int) -> Array:
+    """Return the same for the triple integrator at any dt [s], by scaling the map of unit step."""
+    scale = state_scale(dt)
+    error_map: Array = _unit_error_map(steps) * (scale[:, None] / scale[None, :])
     return error_map

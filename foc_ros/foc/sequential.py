@@ -13,7 +13,7 @@ import numpy as np
 
 from .problem import Problem
 from .qp import clearance_qp, half_planes, hessian, recovery_allowance
-from .records import Array, Record
+from .records import Array
 from .solver import QPSolution, WorkingSet, solve
 
 STAYS = 1e-7
@@ -25,7 +25,7 @@ NEWTON_STEPS = 6
 
 
 @dataclass(frozen=True, eq=False)
-class Converged(Record):
+class Converged:
     """A control that its own linearisation returns: stacked control (2N,), positions (N, 2) at steps 1..N, active rows."""
 
     control: Array

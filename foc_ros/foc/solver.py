@@ -13,7 +13,7 @@ import numpy as np
 
 from .backend import DenseQP, solve_named, solve_piqp
 from .qp import ReachingQP
-from .records import Array, Record
+from .records import Array
 
 TOLERANCE = 1e-9
 """Violation of an obstacle row that is not worth another round [m]."""
@@ -24,7 +24,7 @@ ELASTICITY = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class WorkingSet(Record):
+class WorkingSet:
     """Obstacle rows taken into account: obstacle and step index, (k,) each."""
 
     obstacle: Array = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
@@ -35,7 +35,7 @@ class WorkingSet(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class QPSolution(Record):
+class QPSolution:
     """control (2N,); active: the rows with a positive multiplier; multipliers (k,) of those; solves: QPs it took."""
 
     control: Array
