@@ -4,7 +4,10 @@ import os
 from collections.abc import Iterator
 
 import pytest
+from message_helpers import message_types
 from ros_helpers import Graph, graph, prepare_environment
+
+from foc_ros.conversions.types import MessageTypes
 
 prepare_environment()
 
@@ -41,3 +44,9 @@ def ros() -> Iterator[Graph]:
     """A private ROS graph: own context, domain and executor."""
     with graph() as made:
         yield made
+
+
+@pytest.fixture
+def types(request: pytest.FixtureRequest) -> MessageTypes:
+    """Message classes of the kind that the test is parametrised with (`message_helpers.both_kinds`)."""
+    return message_types(request.param)

@@ -1,0 +1,41 @@
+"""Between space and the task plane: a plane is named by its two axes of the working frame, 'xy', 'xz' or 'yz'.
+
+A point's height is its coordinate along the third axis. Left and right are those of the plane drawn with its first axis to the
+right and its second axis up. For 'xy' and 'yz' that is the view against the third axis, for 'xz' the view along it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from foc_ros.foc.records import Array
+
+_AXES = {'xy': (0, 1, 2), 'xz': (0, 2, 1), 'yz': (1, 2, 0)}
+"""First and second axis of each plane, then its normal."""
+
+
+def project(points: ArrayLike, plane: str) -> tuple[Array, Array]:
+    """Split points (..., 3) [m] into positions in the plane (..., 2) and heights (...)."""
+    first, second, normal = _AXES[plane]
+    array = np.asarray(points, dtype=float)
+    return array[..., [first, second]], array[..., normal]
+
+
+def lift(positions: ArrayLike, height: ArrayLike, plane: str) -> Array:
+    """Return the points (..., 3) of positions in the plane (..., 2) at a height [m]; velocities lift at height 0."""
+    first, second, normal = _AXES[plane]
+    array = np.asarray(positions, dtype=float)
+    points = np.empty((*array.shape[:-1], 3))
+    points[..., [first, second]] = array
+    points[..., normal] = height
+    return points
+
+
+def lift_covariance(covariance: ArrayLike, plane: str) -> Array:
+    """Return covariances (..., 3, 3) in space of covariances (..., 2, 2) in the plane: none along the normal."""
+    axes = _AXES[plane][:2]
+    array = np.asarray(covariance, dtype=float)
+    space = np.zeros((*array.shape[:-2], 3, 3))
+    space[..., np.ix_(axes, axes)[0], np.ix_(axes, axes)[1]] = array
+    return space

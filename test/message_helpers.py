@@ -1,0 +1,93 @@
+"""Input messages for tests, made for either kind of message class."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+import ros_helpers
+from rosbags.typesys import Stores, get_typestore
+
+from foc_ros.conversions.types import MessageTypes, RclpyTypes, RosbagsTypes, header
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+DATATYPES = {'i1': 1, 'u1': 2, 'i2': 3, 'u2': 4, 'i4': 5, 'u4': 6, 'f4': 7, 'f8': 8}
+SECOND = 1_000_000_000
+
+
+def message_types(kind: str) -> MessageTypes:
+    """Return the classes of 'rclpy' (skipping where it is missing) or 'rosbags'."""
+    if kind == 'rosbags':
+        return RosbagsTypes(STORE)
+    ros_helpers.require_ros()
+    return RclpyTypes()
+
+
+both_kinds = pytest.mark.parametrize('types', ['rclpy', 'rosbags'], indirect=True)
+"""For tests with the fixture `types` of conftest: once with each kind of message."""
+
+
+def pose(types: MessageTypes, position: Sequence[float]) -> Any:
+    point = dict(zip('xyz', position, strict=True))
+    return types.make(
+        'geometry_msgs/msg/Pose',
+        position=types.make('geometry_msgs/msg/Point', **point),
+        orientation=types.make('geometry_msgs/msg/Quaternion', w=1.0),
+    )
+
+
+def pose_stamped(types: MessageTypes, position: Sequence[float], stamp_ns: int = SECOND, frame_id: str = 'world') -> Any:
+    return types.make('geometry_msgs/msg/PoseStamped', header=header(types, stamp_ns, frame_id), pose=pose(types, position))
+
+
+def pose_array(types: MessageTypes, positions: Iterable[Sequence[float]], frame_id: str = 'world') -> Any:
+    poses = [pose(types, position) for position in positions]
+    return types.make('geometry_msgs/msg/PoseArray', header=header(types, SECOND, frame_id), poses=poses)
+
+
+def cloud(types: MessageTypes, table: np.ndarray, stamp_ns: int = SECOND, frame_id: str = 'world', **changes: Any) -> Any:
+    """Return the PointCloud2 of a structured array; changes: fields set differently afterwards."""
+    fields = [
+        types.make('sensor_msgs/msg/PointField', name=name, offset=offset, datatype=DATATYPES[kind.str[1:]], count=1)
+        for name, (kind, offset, *_) in (table.dtype.fields or {}).items()
+    ]
+    values: dict[str, Any] = {
+        'header': header(types, stamp_ns, frame_id),
+        'height': 1,
+        'width': len(table),
+        'fields': fields,
+        'is_bigendian': any(kind.str[0] == '>' for kind, *_ in (table.dtype.fields or {}).values()),
+        'point_step': table.dtype.itemsize,
+        'row_step': table.nbytes,
+        'data': table.tobytes(),
+        'is_dense': True,
+    }
+    return types.make('sensor_msgs/msg/PointCloud2', **values | changes)
+
+
+def obstacle_table(rows: Sequence[tuple[float, ...]], dtype: Any = None) -> np.ndarray:
+    """Return rows (x, y, z, radius) as a structured array, or with other columns."""
+    return np.array(rows, dtype=dtype or [(name, '<f4') for name in ('x', 'y', 'z', 'radius')])
+
+
+def marker(
+    types: MessageTypes, position: Sequence[float] = (0, 0, 0), scale: Sequence[float] = (0.1, 0.1, 0.1), **changes: Any
+) -> Any:
+    """Return a sphere that is added; changes: ns, id, type, action, lifetime [s], stamp_ns, frame_id."""
+    head = header(types, changes.pop('stamp_ns', SECOND), changes.pop('frame_id', 'world'))
+    seconds, nanoseconds = divmod(round(changes.pop('lifetime', 0) * SECOND), SECOND)
+    values = {'ns': 'a', 'id': 0, 'type': 2, 'action': 0} | changes
+    return types.make(
+        'visualization_msgs/msg/Marker',
+        header=head,
+        pose=pose(types, position),
+        scale=types.make('geometry_msgs/msg/Vector3', **dict(zip('xyz', scale, strict=True))),
+        lifetime=types.make('builtin_interfaces/msg/Duration', sec=seconds, nanosec=nanoseconds),
+        **values,
+    )
+
+
+def marker_array(types: MessageTypes, *markers: Any) -> Any:
+    return types.make('visualization_msgs/msg/MarkerArray', markers=list(markers))
