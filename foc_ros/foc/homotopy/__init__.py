@@ -1,0 +1,6 @@
+"""Ways round: homotopy classes found, named and seeded, and the side on which a path really passes an obstacle."""
+
+from .search import Search, search
+from .sides import path_sides, swept_angles
+
+__all__ = ['Search', 'path_sides', 'search', 'swept_angles']
