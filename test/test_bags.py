@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import re
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -93,9 +94,12 @@ def test_an_existing_path_is_not_overwritten(tmp_path: Path) -> None:
 
 
 def test_an_unfinished_bag_is_taken_away(tmp_path: Path) -> None:
-    with pytest.raises(KeyboardInterrupt), BagWriter(tmp_path / 'half') as writer:
-        writer.write('/hand_pose', hand_pose(TYPES, 1, 'world', (0, 0, 0)), 1)
+    def interrupted() -> Iterator[tuple[str, int, Any]]:
+        yield from messages()
         raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_bag(tmp_path / 'half', interrupted())
     assert not (tmp_path / 'half').exists()
 
 

@@ -1,0 +1,129 @@
+"""`convert`: motion capture in CSV tables to bags, one per recording, as a tracker and a perception node would have left them."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .bags import TYPESTORE, BagWriter
+from .conversions.types import RosbagsTypes
+from .foc.errors import RecordingError
+from .foc.records import NANOSECONDS, Array
+from .input_messages import goal_poses, hand_pose, obstacle_cloud
+from .tables import rows
+from .terminal import track
+
+FRAME = 'world'
+EPOCH_NS = NANOSECONDS
+"""Stamp of t_s = 0: not 0, which means `not set` in a message."""
+
+LATEST_S, LONGEST_S = 2e9, 86400.0
+"""Bounds on a time (the seconds of a stamp have 31 bits) and on a recording's length: beyond a day, two clocks are mixed up."""
+
+SCENE_PERIOD_NS = NANOSECONDS // 2
+SCENE_LEAD_NS = NANOSECONDS // 10
+"""The scene is told twice a second, and first a tenth of a second before the first hand pose."""
+
+
+@dataclass(frozen=True)
+class Movement:
+    """One recording: stamps [ns], never falling, and positions (n, 3) [m]."""
+
+    name: str
+    stamps_ns: tuple[int, ...]
+    positions: Array
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument('csv', type=Path, metavar='CSV', help='recordings: columns recording, t_s, x_m, y_m[, z_m]')
+    parser.add_argument(
+        '--obstacles', type=Path, metavar='CSV', required=True, help='columns x_m, y_m, radius_m[, radius_stddev_m, id, z_m]'
+    )
+    parser.add_argument('--goals', type=Path, metavar='CSV', help='columns x_m, y_m[, z_m]')
+    parser.add_argument('--output', type=Path, metavar='DIR', required=True, help='folder for the bags, one per recording')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Convert; all tables are checked before the first bag is written."""
+    movements = read_movements(arguments.csv)
+    obstacles = read_obstacles(arguments.obstacles)
+    goals = None if arguments.goals is None else read_goals(arguments.goals)
+    bags = {arguments.output / name: movement for name, movement in _folders(movements).items()}
+    for bag in bags:
+        if bag.exists():
+            raise RecordingError(f'{bag}: exists already and is not overwritten; choose another --output')
+    for bag, movement in track(bags.items(), 'convert', len(bags)):
+        write_movement(bag, movement, obstacles, goals)
+    count = sum(len(movement.stamps_ns) for movement in movements)
+    print(f'{len(bags)} bags with {count} hand poses and {len(obstacles)} obstacles written to {arguments.output}')
+    return 0
+
+
+def read_movements(file: Path) -> list[Movement]:
+    """Return the recordings in order of their first rows; within one, time must not run backward."""
+    found: dict[str, list[tuple[float, ...]]] = {}
+    for row in rows(file, ('recording', 't_s', 'x_m', 'y_m')):
+        if not row.cells['recording']:
+            raise row.fault('recording', 'a name')
+        samples = found.setdefault(row.cells['recording'], [])
+        bounds = (samples[-1][0], samples[0][0] + LONGEST_S) if samples else (0.0, LATEST_S)
+        time = row.number('t_s', *bounds)
+        samples.append((time, row.number('x_m'), row.number('y_m'), row.number('z_m', default=0.0)))
+    if not found:
+        raise RecordingError(f'{file}: expected at least one row, got none')
+    return [
+        Movement(name, tuple(EPOCH_NS + round(each[0] * NANOSECONDS) for each in samples), np.array(samples)[:, 1:])
+        for name, samples in found.items()
+    ]
+
+
+def read_obstacles(file: Path) -> list[tuple[float, ...]]:
+    """Return obstacles as rows x, y, z, radius, radius_stddev, id; ids default to the position in the table; none is allowed."""
+    found: dict[int, tuple[float, ...]] = {}
+    for place, row in enumerate(rows(file, ('x_m', 'y_m', 'radius_m'))):
+        identity = row.whole('id', -(2**31), 2**31 - 1, default=place)
+        if identity in found:
+            raise row.fault('id', 'another id than the rows above')
+        radius, stddev = row.number('radius_m', 0.0), row.number('radius_stddev_m', 0.0, default=0.0)
+        found[identity] = (row.number('x_m'), row.number('y_m'), row.number('z_m', default=0.0), radius, stddev, identity)
+    return list(found.values())
+
+
+def read_goals(file: Path) -> Array:
+    """Return goals (g, 3) [m], at least one."""
+    goals = [(row.number('x_m'), row.number('y_m'), row.number('z_m', default=0.0)) for row in rows(file, ('x_m', 'y_m'))]
+    if not goals:
+        raise RecordingError(f'{file}: expected at least one row, got none')
+    return np.array(goals)
+
+
+def write_movement(bag: Path, movement: Movement, obstacles: list[tuple[float, ...]], goals: Array | None) -> None:
+    """Write one bag: /hand_pose, /obstacles and, where there are any, /goals, in order of their stamps."""
+    types = RosbagsTypes(TYPESTORE)
+    messages: list[tuple[int, str, Any]] = []
+    for stamp_ns in range(movement.stamps_ns[0] - SCENE_LEAD_NS, movement.stamps_ns[-1] + 1, SCENE_PERIOD_NS):
+        messages.append((stamp_ns, '/obstacles', obstacle_cloud(types, stamp_ns, FRAME, obstacles)))
+        if goals is not None:
+            messages.append((stamp_ns, '/goals', goal_poses(types, stamp_ns, FRAME, goals)))
+    for stamp_ns, position in zip(movement.stamps_ns, movement.positions, strict=True):
+        messages.append((stamp_ns, '/hand_pose', hand_pose(types, stamp_ns, FRAME, position)))
+    with BagWriter(bag) as writer:
+        for stamp_ns, topic, message in sorted(messages, key=lambda each: each[0]):
+            writer.write(topic, message, stamp_ns)
+
+
+def _folders(movements: list[Movement]) -> dict[str, Movement]:
+    """Return the recordings by a name that any file system takes; two that would share one are refused."""
+    folders: dict[str, Movement] = {}
+    for movement in movements:
+        name = re.sub(r'[^A-Za-z0-9._-]', '_', movement.name).lstrip('.-') or '_'
+        if name in folders:
+            raise RecordingError(f'recordings {folders[name].name!r} and {movement.name!r} would both be written to {name}')
+        folders[name] = movement
+    return folders

@@ -1,0 +1,180 @@
+"""CSV tables to bags: every number arrives, and every wrong cell is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from foc_ros.bags import BagReader
+from foc_ros.command_line import main
+from foc_ros.foc.errors import RecordingError
+
+RECORDINGS = 'recording,t_s,x_m,y_m\na,0.0,0.1,0.2\na,0.5,0.3,0.4\na,1.2,0.5,0.6\nb,3.25,-1,2e-3\n'
+OBSTACLES = 'name,x_m,y_m,radius_m\nleft,0.5,-0.1,0.03\nright,0.425,0.08,0.025\n'
+GOALS = 'goal,x_m,y_m\n0,0.28,0.35\n1,0.42,0.35\n'
+SHARED = Path(__file__).parents[2] / 'shared' / 'data' / 'd3il_avoiding'
+
+
+def convert(folder: Path, recordings: str = RECORDINGS, obstacles: str = OBSTACLES, goals: str | None = GOALS) -> int:
+    arguments = ['convert', str(folder / 'r.csv'), '--obstacles', str(folder / 'o.csv'), '--output', str(folder / 'bags')]
+    (folder / 'r.csv').write_text(recordings, 'utf-8')
+    (folder / 'o.csv').write_text(obstacles, 'utf-8')
+    if goals is not None:
+        (folder / 'g.csv').write_text(goals, 'utf-8')
+        arguments += ['--goals', str(folder / 'g.csv')]
+    return main(arguments)
+
+
+def table(message: object) -> np.ndarray:
+    names = [field.name for field in message.fields]
+    formats = [{7: '<f4', 5: '<i4'}[field.datatype] for field in message.fields]
+    offsets = [field.offset for field in message.fields]
+    kind = np.dtype({'names': names, 'formats': formats, 'offsets': offsets, 'itemsize': message.point_step})
+    return np.frombuffer(message.data.tobytes(), kind)
+
+
+def test_every_number_arrives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert convert(tmp_path) == 0
+    assert capsys.readouterr().out.startswith('2 bags with 4 hand poses and 2 obstacles written to ')
+    assert sorted(each.name for each in (tmp_path / 'bags').iterdir()) == ['a', 'b']
+    with BagReader(tmp_path / 'bags' / 'a') as reader:
+        items = list(reader)
+    hands = [item for item in items if item.role == 'hand_pose']
+    assert [item.log_ns for item in hands] == [1_000_000_000, 1_500_000_000, 2_200_000_000]
+    stamps = [item.message.header.stamp for item in hands]
+    assert [stamp.sec * 10**9 + stamp.nanosec for stamp in stamps] == [item.log_ns for item in hands]
+    positions = [item.message.pose.position for item in hands]
+    assert [(each.x, each.y, each.z) for each in positions] == [(0.1, 0.2, 0.0), (0.3, 0.4, 0.0), (0.5, 0.6, 0.0)]
+    assert {item.message.pose.orientation.w for item in hands} == {1.0}
+    assert {item.message.header.frame_id for item in items} == {'world'}
+    goals = [item for item in items if item.role == 'goals']
+    assert [(each.position.x, each.position.y) for each in goals[0].message.poses] == [(0.28, 0.35), (0.42, 0.35)]
+    rows = table(next(item.message for item in items if item.role == 'obstacles'))
+    assert rows['id'].tolist() == [0, 1]
+    assert (
+        np.allclose(rows['x'], [0.5, 0.425])
+        and np.allclose(rows['y'], [-0.1, 0.08])
+        and np.allclose(rows['radius'], [0.03, 0.025])
+    )
+    assert not rows['z'].any() and not rows['radius_stddev'].any()
+
+
+def test_the_scene_comes_first_and_twice_a_second(tmp_path: Path) -> None:
+    assert convert(tmp_path) == 0
+    for name in ('a', 'b'):
+        with BagReader(tmp_path / 'bags' / name) as reader:
+            items = list(reader)
+        roles = [item.role for item in items]
+        assert set(roles[:2]) == {'obstacles', 'goals'} and roles.count('hand_pose') >= 1
+        for role in ('obstacles', 'goals'):
+            stamps = np.array([item.log_ns for item in items if item.role == role] + [items[-1].log_ns])
+            assert np.diff(stamps).max(initial=0) <= 500_000_000
+            assert stamps[0] == next(item.log_ns for item in items if item.role == 'hand_pose') - 100_000_000
+
+
+def test_optional_columns(tmp_path: Path) -> None:
+    obstacles = 'id,x_m,y_m,radius_m,radius_stddev_m,z_m\n7,0.5,-0.1,0.03,0.002,0.1\n-2,0,0,0,0,0\n'
+    assert convert(tmp_path, 'recording,t_s,x_m,y_m,z_m\n1,0,0.1,0.2,0.3\n', obstacles, 'x_m,y_m,z_m\n0.1,0.2,0.4\n') == 0
+    with BagReader(tmp_path / 'bags' / '1') as reader:
+        items = {item.role: item.message for item in reader}
+    assert items['hand_pose'].pose.position.z == 0.3
+    assert [pose.position.z for pose in items['goals'].poses] == [0.4]
+    expected = [(0.5, -0.1, 0.1, 0.03, 0.002, 7), (0.0, 0.0, 0.0, 0.0, 0.0, -2)]
+    assert np.allclose(table(items['obstacles']).tolist(), expected)
+
+
+def test_without_goals_the_bag_has_none(tmp_path: Path) -> None:
+    assert convert(tmp_path, goals=None) == 0
+    with pytest.raises(RecordingError, match='no topic for goals'), BagReader(tmp_path / 'bags' / 'a'):
+        pass
+
+
+def test_a_scene_without_obstacles_is_said_so(tmp_path: Path) -> None:
+    assert convert(tmp_path, obstacles='x_m,y_m,radius_m\n') == 0
+    with BagReader(tmp_path / 'bags' / 'a') as reader:
+        assert {item.message.width for item in reader if item.role == 'obstacles'} == {0}
+
+
+def test_excel_tables_read_alike(tmp_path: Path) -> None:
+    assert convert(tmp_path, '\ufeff' + RECORDINGS.replace('\n', '\r\n') + '\r\n,,,\r\n') == 0
+    with BagReader(tmp_path / 'bags' / 'a') as reader:
+        assert sum(item.role == 'hand_pose' for item in reader) == 3
+
+
+def test_names_are_safe(tmp_path: Path) -> None:
+    assert convert(tmp_path, 'recording,t_s,x_m,y_m\n../up,0,0,0\nüb er,0,0,0\n..,0,0,0\n') == 0
+    assert sorted(each.name for each in (tmp_path / 'bags').iterdir()) == ['_', '_b_er', '_up']
+
+
+def test_an_existing_bag_stops_before_anything_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / 'bags' / 'b').mkdir(parents=True)
+    assert convert(tmp_path) == 2
+    assert 'exists already and is not overwritten' in capsys.readouterr().err
+    assert [each.name for each in (tmp_path / 'bags').iterdir()] == ['b']
+
+
+@pytest.mark.parametrize(
+    ('which', 'text', 'message'),
+    [
+        ('recordings', 'recording,t_s,x_m\na,0,0\n', 'r.csv: row 1: no column y_m; it has recording, t_s, x_m'),
+        ('recordings', 'recording;t_s;x_m;y_m\na;0;0;0\n', 'r.csv: row 1: no column recording, t_s, x_m, y_m'),
+        ('recordings', 'recording,t_s,x_m,y_m,y_m\na,0,0,0,0\n', 'r.csv: row 1: a column is named twice'),
+        ('recordings', '', 'r.csv: the file is empty: expected columns recording, t_s, x_m, y_m'),
+        ('recordings', 'recording,t_s,x_m,y_m\n', 'r.csv: expected at least one row, got none'),
+        ('rows', 'a,0,0,0\na,1,0', 'r.csv: row 3: expected 4 cells, got 3'),
+        ('rows', 'a,0,0,0\na,1,nan,0', "r.csv: row 3, column x_m: expected a number in [-10000, 10000], got 'nan'"),
+        ('rows', 'a,0,0,inf', "row 2, column y_m: expected a number in [-10000, 10000], got 'inf'"),
+        ('rows', 'a,0,0,1e5', "row 2, column y_m: expected a number in [-10000, 10000], got '1e5'"),
+        ('rows', 'a,0,,0', "row 2, column x_m: expected a number in [-10000, 10000], got ''"),
+        ('rows', 'a,x,0,0', "row 2, column t_s: expected a number in [0, 2000000000], got 'x'"),
+        ('rows', 'a,-1,0,0', "row 2, column t_s: expected a number in [0, 2000000000], got '-1'"),
+        ('rows', 'a,1.5,0,0\na,1.4,0,0', "row 3, column t_s: expected a number in [1.5, 86401.5], got '1.4'"),
+        ('rows', 'a,0,0,0\na,1e9,0,0', "row 3, column t_s: expected a number in [0, 86400], got '1e9'"),
+        ('rows', ',0,0,0', "row 2, column recording: expected a name, got ''"),
+        ('rows', 'a b,0,0,0\na_b,0,0,0', "recordings 'a b' and 'a_b' would both be written to a_b"),
+        ('rows', '"a,0,0,0', 'r.csv: not a CSV table'),
+        ('obstacles', 'x_m,y_m\n0,0\n', 'o.csv: row 1: no column radius_m'),
+        ('obstacles', 'x_m,y_m,radius_m\n0,0,-0.1\n', "o.csv: row 2, radius_m: expected a number in [0, 10000], got '-0.1'"),
+        ('obstacles', 'x_m,y_m,radius_m,radius_stddev_m\n0,0,1,-1\n', "stddev_m: expected a number in [0, 10000], got '-1'"),
+        ('obstacles', 'x_m,y_m,radius_m,id\n0,0,1,1.5\n', "expected a whole number in [-2147483648, 2147483647], got '1.5'"),
+        ('obstacles', 'x_m,y_m,radius_m,id\n0,0,1,3\n0,0,1,3\n', "row 3, column id: expected another id than the rows above"),
+        ('goals', 'x_m\n0\n', 'g.csv: row 1: no column y_m'),
+        ('goals', 'x_m,y_m\n', 'g.csv: expected at least one row, got none'),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], which: str, text: str, message: str
+) -> None:
+    tables = {'recordings': f'recording,t_s,x_m,y_m\n{text}\n'} if which == 'rows' else {which: text}
+    assert convert(tmp_path, **tables) == 2
+    error = capsys.readouterr().err
+    assert error.startswith('foc_ros convert: ') and message in error and error.count('\n') == 1
+    assert not (tmp_path / 'bags').exists()
+
+
+def test_files_that_are_no_text_or_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / 'binary.csv').write_bytes(b'recording,t_s,x_m,y_m\na,0,\xff,0\n')
+    for file, reason in (
+        ('binary.csv', 'expected UTF-8 text, got byte 0xff'),
+        ('none.csv', 'No such file'),
+        ('.', 'Is a directory'),
+    ):
+        assert main(['convert', str(tmp_path / file), '--obstacles', 'o.csv', '--output', str(tmp_path / 'bags')]) == 2
+        error = capsys.readouterr().err
+        assert reason in error and error.count('\n') == 1
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason='optional data ../shared/data/d3il_avoiding is not there')
+def test_human_recordings(tmp_path: Path) -> None:
+    tables = {name: str(SHARED / f'{name}.csv') for name in ('recordings', 'obstacles', 'goals')}
+    options = ['--obstacles', tables['obstacles'], '--goals', tables['goals'], '--output', str(tmp_path / 'bags')]
+    assert main(['convert', tables['recordings'], *options]) == 0
+    bags = sorted((tmp_path / 'bags').iterdir())
+    assert len(bags) == 48
+    hands = 0
+    for bag in bags:
+        with BagReader(bag) as reader:
+            hands += sum(item.role == 'hand_pose' for item in reader)
+    assert hands == len(Path(tables['recordings']).read_text('utf-8').splitlines()) - 1
