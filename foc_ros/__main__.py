@@ -1,0 +1,7 @@
+"""`python -m foc_ros COMMAND`."""
+
+import sys
+
+from .command_line import main
+
+sys.exit(main())
