@@ -50,6 +50,9 @@ class FocConfig:
     growth: float = _p(2.0, 'factor on lambda per unit of s (Delta)', '', 1.0001, 1e6)
     tau: float = _p(0.0, 'clearance term of strategy fixed', 'm^2', 0.0, 100.0)
     lam: float = _p(1.0, 'variance weight of strategy fixed, first lambda of the others', '', 0.0, 1e15)
+    algorithm1_delta: float = _p(5e-5, 'step of tau in strategy algorithm1 (delta)', 'm^2', 0.0, 1.0)
+    algorithm1_growth: float = _p(10.0, 'factor on lambda per step of strategy algorithm1 (Delta)', '', 1.0, 1e6)
+    algorithm1_xi: float = _p(1.0, 'change of effort at which strategy algorithm1 ends (xi)', 'm^2/s^6', 0.0, 1e12)
     goal_weight: float = _p(0.0, 'weight of the position variance at the goal, in effort per m^2', '1/s^6', 0.0, 1e15)
     recovery_s: float = _p(0.2, 'time in which a hand inside a margin has to be out of it', 's', 0.0, 10.0)
 

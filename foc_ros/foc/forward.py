@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .algorithm1 import algorithm1
 from .assess import Assessment, assess
 from .config import FocConfig
 from .continuous import Curve, walk
 from .noise import state_covariance
+from .optimal import optimise
 from .problem import Problem
 from .qp import clearance_qp
 from .records import Array, Solution, Status
@@ -52,6 +54,25 @@ def _continuous(problem: Problem, guess: Array, settings: FocConfig) -> _Ended:
     return _ended(walked.status, walked.message, walked.point.converged, *curve.at(walked.point.s), walked.qp_solves)
 
 
+def _optimal(problem: Problem, guess: Array, settings: FocConfig) -> _Ended:
+    optimum = optimise(problem, guess)
+    if optimum is None:
+        return _best_effort(problem, guess, 0.0, 0.0, 0)
+    return _Ended(
+        optimum.status, optimum.message, optimum.control, 0.0, 0.0, optimum.qp_solves, optimum.active, optimum.multipliers
+    )
+
+
+def _algorithm1(problem: Problem, guess: Array, settings: FocConfig) -> _Ended:
+    stepped = algorithm1(problem, guess, settings.algorithm1_delta, settings.algorithm1_growth, settings.algorithm1_xi)
+    last = stepped.solution
+    if last is None:
+        return _best_effort(problem, guess, stepped.tau, stepped.lam, stepped.iterations)
+    return _Ended(
+        stepped.status, stepped.message, last.control, stepped.tau, stepped.lam, stepped.iterations, last.active, last.multipliers
+    )
+
+
 def _fixed(problem: Problem, guess: Array, settings: FocConfig) -> _Ended:
     converged = converge(problem, guess, WorkingSet(), settings.tau, settings.lam)
     if converged is None:
@@ -77,7 +98,7 @@ def _best_effort(problem: Problem, guess: Array, tau: float, lam: float, qp_solv
     return _Ended(Status.INFEASIBLE, message, control, tau, lam, qp_solves, active, multipliers)
 
 
-_STRATEGIES = {'lv': _continuous, 'hc': _continuous, 'fixed': _fixed}
+_STRATEGIES = {'lv': _continuous, 'hc': _continuous, 'optimal': _optimal, 'algorithm1': _algorithm1, 'fixed': _fixed}
 
 
 def _solution(problem: Problem, ended: _Ended, assessment: Assessment, seconds: float) -> Solution:

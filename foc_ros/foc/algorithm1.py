@@ -1,0 +1,50 @@
+"""Strategy `algorithm1`: the paper's algorithm as printed, its loop condition the right way round, for the record.
+
+tau = 0, lambda = 1. Solve the QP, linearise at its mean; while the surrogate is violated tau += delta, lambda *= Delta; end when it
+holds and the cost changes by less than xi. Both grow in leaps, so it overshoots, or leaps over what is feasible.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .assess import assess
+from .chance import k_of_eta
+from .problem import Problem
+from .qp import clearance_qp
+from .records import Array, Status
+from .solver import QPSolution, WorkingSet, solve
+
+MAX_ITERATIONS = 500
+
+
+@dataclass(frozen=True, eq=False)
+class Stepped:
+    """How the loop ended: status, words, the last solution (None: not even the first QP has one), its tau, lambda, QP count."""
+
+    status: Status
+    message: str
+    solution: QPSolution | None
+    tau: float
+    lam: float
+    iterations: int
+
+
+def algorithm1(problem: Problem, guess: Array, delta: float, growth: float, xi: float) -> Stepped:
+    """Run algorithm 1 from a guess (N, 2) [m] at steps 1..N: delta [m^2], growth Delta, xi [m^2/s^6] on the effort."""
+    tau, lam, wanted = 0.0, 1.0, k_of_eta(problem.eta)
+    solution: QPSolution | None = None
+    for iteration in range(1, MAX_ITERATIONS + 1):
+        before, last = (tau, lam), solution
+        if last is not None and assess(problem, last.control).smallest_k < wanted:
+            tau, lam = tau + delta, lam * growth
+        solution = solve(clearance_qp(problem, guess, tau, lam, literal=True), last.active if last else WorkingSet())
+        if solution is None:
+            message = f'QP {iteration} is infeasible at tau = {tau:.3g}, lambda = {lam:.3g}'
+            return Stepped(Status.INFEASIBLE, message, last, *before, iteration)
+        guess = problem.positions(solution.control)
+        change = abs(solution.control @ solution.control - last.control @ last.control) if last else float('inf')
+        if change < xi and assess(problem, solution.control).smallest_k >= wanted:
+            return Stepped(Status.SOLVED, 'solved', solution, tau, lam, iteration)
+    message = f'not settled after {MAX_ITERATIONS} QPs at tau = {tau:.3g}, lambda = {lam:.3g}'
+    return Stepped(Status.ITERATION_LIMIT, message, solution, tau, lam, MAX_ITERATIONS)

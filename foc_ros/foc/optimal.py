@@ -1,0 +1,152 @@
+"""Strategy `optimal`: the least cost subject to the surrogate itself.
+
+f(u) = E[R^2] - |d(u)|^2 + k sqrt(Var(u)) <= 0 for every obstacle and step, d = mean(p) - mean(o). Each QP takes f linear at the
+last u, divided by 2 |d| so that a row is a distance, and bends the cost by what the multipliers y say of sqrt(Var): its convex
+part, y 2 k / (|d| sqrt(Var)) times the variance map, on the Hessian's diagonal. That is a lambda for every step and a tau for
+every row.
+
+Var itself grows with |d|. Far from the solution the rows leave that out, as the paper's linearisation does: with it, a row whose
+spread exceeds its distance would ask the hand to come nearer, through the obstacle. Once settled, it is taken in, and the
+solution is a minimum of the problem as it stands.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .assess import assess
+from .chance import eta_of_k, k_of_eta, variance
+from .problem import Problem
+from .qp import ReachingQP, hessian, recovery_allowance
+from .records import Array, Status
+from .sequential import converge
+from .solver import WorkingSet, solve
+
+SETTLED = 1e-6
+"""Largest move of the mean, relative to the way, at which the sequence has settled."""
+ROUGHLY = 1e-2
+"""The same for the rows that leave the growth of Var out."""
+MAX_QPS = 80
+SMALLEST_STEP = 1.0 / 64
+"""Smallest share of the way to the wanted k that is tried at once before k is called out of reach."""
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """How the search ended: control (2N,), the rows that hold it with their multipliers, QPs solved."""
+
+    status: Status
+    message: str
+    control: Array
+    active: WorkingSet
+    multipliers: Array
+    qp_solves: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Iterate:
+    """A control, its active rows and their multipliers."""
+
+    control: Array
+    active: WorkingSet
+    multipliers: Array
+
+
+def optimise(problem: Problem, guess: Array) -> Optimum | None:
+    """Find a local minimum from a guess (N, 2) [m] at steps 1..N; None where even its obstacle rows contradict each other."""
+    start = converge(problem, guess, WorkingSet(), 0.0, 0.0)
+    if start is None:
+        return None
+    wanted, solves = k_of_eta(problem.eta), start.qp_solves
+    iterate = _Iterate(start.control, start.solution.active, start.solution.multipliers)
+    reached = assess(problem, start.control).smallest_k
+    if reached >= wanted:
+        return _optimum(Status.SOLVED, 'solved', iterate, solves)
+    share = 1.0
+    while True:
+        target = min(wanted, reached + share * (wanted - reached)) if share < 1 else wanted
+        settled, qps = _settle(problem, iterate, target)
+        solves += qps
+        if settled is not None:
+            iterate, reached = settled, target
+            if target == wanted:
+                return _optimum(Status.SOLVED, 'solved', iterate, solves)
+            share = min(1.0, 2 * share)
+        elif share > SMALLEST_STEP:
+            share /= 2
+        else:
+            message = f'eta {problem.eta:g} is out of reach: the largest found is {eta_of_k(reached):.4g}'
+            return _optimum(Status.ETA_UNREACHABLE, message, iterate, solves)
+
+
+def _optimum(status: Status, message: str, iterate: _Iterate, solves: int) -> Optimum:
+    return Optimum(status, message, iterate.control, iterate.active, iterate.multipliers, solves)
+
+
+def _settle(problem: Problem, iterate: _Iterate, k: float) -> tuple[_Iterate | None, int]:
+    """Settle the surrogate at k, roughly with the rows that leave the growth of Var out, then with the true ones.
+
+    None where a QP has no answer or the sequence never settles. Counts its QPs.
+    """
+    rough, first = _repeat(problem, iterate, k, ROUGHLY, complete=False)
+    if rough is None:
+        return None, first
+    settled, second = _repeat(problem, rough, k, SETTLED, complete=True)
+    return settled, first + second
+
+
+def _repeat(problem: Problem, iterate: _Iterate, k: float, tolerance: float, *, complete: bool) -> tuple[_Iterate | None, int]:
+    """Repeat the QP until it moves the mean by less than the tolerance, relative to the way; None if it does not."""
+    solves, scale = 0, float(np.abs(problem.goal[:2] - problem.initial_mean[:2]).max()) or 1.0
+    for _ in range(MAX_QPS):
+        qp = surrogate_qp(problem, iterate.control, iterate.active, iterate.multipliers, k, complete=complete)
+        solution = solve(qp, iterate.active)
+        if solution is None:
+            return None, solves
+        solves += solution.solves
+        moved = np.abs(problem.position_map @ (solution.control - iterate.control)).max()
+        iterate = _Iterate(solution.control, solution.active, solution.multipliers)
+        if moved < tolerance * scale:
+            return iterate, solves
+    return None, solves
+
+
+def surrogate_qp(
+    problem: Problem, control: Array, active: WorkingSet, multipliers: Array, k: float, *, complete: bool = True
+) -> ReachingQP:
+    """Build the QP of f <= 0 linearised at a control (2N,), with the curvature of active rows (multipliers (k,)).
+
+    complete: with the derivative of Var by the position.
+    """
+    positions, spread = problem.positions(control), problem.position_variance(control)
+    offset = positions[None] - problem.centres
+    distance = np.maximum(np.hypot(offset[..., 0], offset[..., 1]), 1e-9)
+    var = variance(offset, spread, problem.size[1], problem.obstacles.centre_covariance)
+    stddev = np.sqrt(np.maximum(var, 1e-24))
+    x, y = offset[..., 0] / distance, offset[..., 1] / distance
+    pull = 2 * k * distance / stddev  # d sqrt(Var) / d P along the normal, in rows that are distances
+    by_variance = pull[..., None] * np.stack((x * x, y * y, 2 * x * y), axis=-1)
+    by_position = np.stack((x, y), axis=-1)
+    if complete:
+        by_position = by_position - 2 * k / stddev[..., None] * _turned(problem, spread, by_position)
+    slope = np.concatenate((by_position, -by_variance), axis=-1)
+    maps = np.concatenate((problem.position_map, problem.variance_maps * control))
+    reach2 = (np.sqrt(problem.size[0])[:, None] - recovery_allowance(problem, 0.0)) ** 2
+    value = (distance**2 - reach2 - k * stddev) / (2 * distance)  # -f / 2 |d|, to be >= 0
+    limits = np.einsum('jtq,qt->jt', slope, maps @ control) - value
+    bend = np.zeros_like(control)
+    if len(active):
+        weight = multipliers[:, None] * by_variance[active.obstacle, active.step]
+        bend = np.einsum('kq,qku->u', weight, problem.variance_maps[:, active.step])
+    rows, targets, softness = problem.goal_rows
+    return ReachingQP(hessian(problem, 0.0) + bend, bend * control, rows, targets, softness, maps, slope, limits)
+
+
+def _turned(problem: Problem, spread: Array, normal: Array) -> Array:
+    """P n for every obstacle and step, (m, N, 2), P the covariance of p - o."""
+    c = problem.obstacles.centre_covariance
+    xx, yy, xy = (spread[i][None] + c[:, a, b, None] for i, (a, b) in enumerate(((0, 0), (1, 1), (0, 1))))
+    x, y = normal[..., 0], normal[..., 1]
+    return np.stack((xx * x + xy * y, xy * x + yy * y), axis=-1)

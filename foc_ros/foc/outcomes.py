@@ -1,0 +1,57 @@
+"""From candidates to outcomes: each solved, judged by the class it is really in, told apart, and weighed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .chance import centres
+from .config import FocConfig
+from .forward import forward
+from .homotopy import path_sides
+from .likelihood import likelihoods
+from .problem import Problem
+from .records import Candidate, Outcome, Status
+
+
+def solve_candidates(
+    candidates: Sequence[Candidate], problems: Sequence[Problem], settings: FocConfig, beta: float, effort_spent: float = 0.0
+) -> list[Outcome]:
+    """Solve each candidate and rank them.
+
+    problems: one for every goal; effort_spent: since movement onset [m^2/s^5]. Returns the solved ones first, most likely first.
+    """
+    judged = [_judged(candidate, problems[candidate.goal], settings, effort_spent) for candidate in candidates]
+    return ranked(distinct(judged), beta)
+
+
+def _judged(candidate: Candidate, problem: Problem, settings: FocConfig, effort_spent: float) -> Outcome:
+    """Solve one; its cost is the integral of squared jerk, spent and to go, so that durations compare."""
+    solution = forward(problem, candidate.guess, settings)
+    moved = centres(problem.obstacles, solution.dt, problem.horizon.steps)
+    where = np.concatenate((problem.obstacles.centre[:, None], moved), axis=1).swapaxes(0, 1)
+    sides = path_sides(solution.path, problem.obstacles, where)
+    if solution.status is Status.SOLVED and any(sides.get(identity, side) != side for identity, side in candidate.sides):
+        solution = replace(solution, status=Status.LEFT_CLASS, message='the solution slid into another class')
+    return Outcome(candidate, solution, sides, effort_spent + solution.effort * solution.dt, 0.0)
+
+
+def distinct(outcomes: Sequence[Outcome]) -> list[Outcome]:
+    """Drop what slid into a class that another outcome solved: the same way round is never counted twice."""
+    held = {_class(outcome) for outcome in outcomes if outcome.solved}
+    return [outcome for outcome in outcomes if outcome.solution.status is not Status.LEFT_CLASS or _class(outcome) not in held]
+
+
+def _class(outcome: Outcome) -> tuple[int, frozenset[tuple[str, int]]]:
+    return outcome.candidate.goal, frozenset(outcome.sides.items())
+
+
+def ranked(outcomes: Sequence[Outcome], beta: float) -> list[Outcome]:
+    """Give the solved ones their likelihoods and put the most likely first; the others follow in their order, at 0."""
+    solved = [outcome for outcome in outcomes if outcome.solved]
+    shares = likelihoods(np.array([outcome.cost for outcome in solved]), beta)
+    weighed = [replace(outcome, likelihood=float(share)) for outcome, share in zip(solved, shares, strict=True)]
+    weighed.sort(key=lambda outcome: (-outcome.likelihood, outcome.candidate.label))
+    return weighed + [outcome for outcome in outcomes if not outcome.solved]
