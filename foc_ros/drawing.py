@@ -1,0 +1,142 @@
+"""What goes on the axes of a picture: scenes, ways through them, the real hand, likelihoods, speeds.
+
+Colours tell apart without hue: likelihood is viridis from pale to dark, classes are Okabe and Ito's colours with a letter each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from string import ascii_uppercase
+from typing import Any
+
+import numpy as np
+
+from .foc.errors import FocError
+from .foc.records import NANOSECONDS, Array, Obstacles
+from .moments import Moment, Track, Way
+
+try:
+    import matplotlib as mpl
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap, Normalize
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Circle, Ellipse
+except ImportError as error:
+    raise FocError("pictures need matplotlib: install python3-matplotlib, or pip install 'foc_ros[report]'") from error
+
+CLASS_COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')
+"""Okabe and Ito's, without the yellow that vanishes on white and the black that is the real hand's."""
+LIKELIHOOD_COLOURS = ListedColormap(mpl.colormaps['viridis'](np.linspace(0.88, 0.0, 256)), name='likelihood')
+LIKELIHOOD_SCALE = Normalize(0.0, 1.0)
+STDDEVS = 2.0
+"""Standard deviations that ellipses and rings stand for."""
+CLASSES = 2 * len(CLASS_COLOURS)
+"""Classes told apart by colour and dash; there are no letters and colours for more."""
+ELLIPSES_PER_WAY = 9
+NAMED_OBSTACLES = 30
+"""Above this many, the obstacles' names would hide the scene."""
+
+Bounds = tuple[float, float, float, float]
+
+
+def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds) -> None:
+    """Draw obstacles (disc: mean radius; pale ring: two standard deviations of the radius more) and goals."""
+    for name, centre, radius, stddev in zip(
+        obstacles.ids, obstacles.centre, obstacles.radius, obstacles.radius_stddev, strict=True
+    ):
+        axes.add_patch(Circle(centre, radius + STDDEVS * stddev, facecolor='0.88', edgecolor='0.7', linewidth=0.6))
+        axes.add_patch(Circle(centre, radius, facecolor='0.65', edgecolor='0.35', linewidth=0.8))
+        if len(obstacles) <= NAMED_OBSTACLES:
+            axes.text(*centre, name, ha='center', va='center', fontsize=8)
+    for number, goal in enumerate(goals):
+        axes.plot(*goal, marker='*', markersize=12, color='black', markerfacecolor='white', zorder=5)
+        axes.annotate(f'goal{number}', goal, xytext=(6, 6), textcoords='offset points', fontsize=8, zorder=6)
+    axes.set(xlim=bounds[:2], ylim=bounds[2:], xlabel='m', ylabel='m')
+    axes.set_aspect('equal')
+
+
+def draw_ways(axes: Any, ways: Sequence[Way], numbers: Mapping[str, int]) -> None:
+    """Draw ways, the most likely on top, coloured by likelihood, with ellipses of two standard deviations of the position."""
+    for rank, way in reversed(list(enumerate(ways))):
+        colour = LIKELIHOOD_COLOURS(LIKELIHOOD_SCALE(way.likelihood))
+        for row in np.unique(np.linspace(0, len(way.path) - 1, ELLIPSES_PER_WAY).astype(int)):
+            ellipse = stddev_ellipse(way.path[row], way.covariance[row])
+            ellipse.set(facecolor=(*colour[:3], 0.15), edgecolor=(*colour[:3], 0.6), linewidth=0.6, zorder=2)
+            axes.add_patch(ellipse)
+        axes.plot(*way.path.T, color=colour, linewidth=2.2, zorder=3)
+        if way.label in numbers:
+            place = way.path[int((0.45 + 0.12 * (rank % 3)) * (len(way.path) - 1))]
+            tag(axes, place, ascii_uppercase[numbers[way.label]], class_style(numbers[way.label])[0])
+
+
+def draw_hand(axes: Any, track: Track, now_ns: int, span: tuple[int, int]) -> None:
+    """Draw where the hand came from (solid), where it is, and where it really went (dotted)."""
+    before, after = track.between(span[0], now_ns), track.between(now_ns, span[1])
+    axes.plot(*track.positions[before].T, color='black', linewidth=2.0, zorder=4)
+    axes.plot(*track.positions[after].T, color='black', linewidth=1.4, linestyle=':', zorder=4)
+    axes.plot(*track.positions[before][-1:].T, marker='o', markersize=6, color='black', zorder=6)
+
+
+def draw_likelihoods(axes: Any, moments: Sequence[Moment], numbers: Mapping[str, int], origin_ns: int) -> None:
+    """Draw the likelihood of every numbered class over time; one that is no candidate for a while leaves a gap."""
+    times = [(moment.stamp_ns - origin_ns) / NANOSECONDS for moment in moments]
+    tables = [{way.label: way.likelihood for way in moment.ways} for moment in moments]
+    for label, number in reversed(list(numbers.items())):
+        values = np.array([table.get(label, np.nan) for table in tables])
+        colour, dash = class_style(number)
+        axes.plot(times, values, color=colour, linestyle=dash, linewidth=1.8, marker='.', markersize=2.5, label=label)
+        known = np.flatnonzero(np.isfinite(values))
+        if len(known):
+            place = known[(2 * number + 1) * len(known) // (2 * len(numbers))]
+            tag(axes, (times[place], values[place]), ascii_uppercase[number], colour)
+    axes.set(ylim=(-0.03, 1.03), ylabel='likelihood')
+    axes.tick_params(labelbottom=False)
+
+
+def draw_speeds(axes: Any, track: Track, moment: Moment, span: tuple[int, int], origin_ns: int) -> None:
+    """Draw the measured speed over a movement and, from the moment on, the predicted ones, coloured by likelihood."""
+    rows = track.between(*span)
+    times = (track.stamps_ns[rows] - origin_ns) / NANOSECONDS
+    now = (moment.stamp_ns - origin_ns) / NANOSECONDS
+    for way in reversed(moment.ways):
+        axes.plot(now + way.times, way.speed, color=LIKELIHOOD_COLOURS(LIKELIHOOD_SCALE(way.likelihood)), linewidth=1.6)
+    axes.plot(times, np.linalg.norm(track.velocity[rows], axis=1), color='black', linewidth=1.6, linestyle=':')
+    past = times <= now
+    axes.plot(times[past], np.linalg.norm(track.velocity[rows][past], axis=1), color='black', linewidth=2.0)
+    axes.set(ylabel='speed [m/s]', xlabel='time [s]')
+    axes.set_ylim(bottom=0.0)
+
+
+def draw_legend(axes: Any, ways: Sequence[Way], numbers: Mapping[str, int]) -> None:
+    """Write the letter, likelihood and label of every way."""
+    axes.axis('off')
+    if not ways:
+        axes.text(0.0, 0.5, 'no candidate could be solved', transform=axes.transAxes, va='center')
+    for row, way in enumerate(ways):
+        height = 1.0 - (row + 0.5) / len(ways)
+        letter = ascii_uppercase[numbers[way.label]] if way.label in numbers else ' '
+        text = f'{letter}  {100 * way.likelihood:3.0f} %  {way.label}'
+        axes.text(0.0, height, text, transform=axes.transAxes, va='center', family='monospace', fontsize=8)
+
+
+def stddev_ellipse(centre: Array, covariance: Array, stddevs: float = STDDEVS) -> Ellipse:
+    """Return the ellipse of so many standard deviations; covariance (2, 2) [m^2]."""
+    variances, vectors = np.linalg.eigh(covariance)
+    minor, major = 2.0 * stddevs * np.sqrt(np.maximum(variances, 0.0))
+    return Ellipse(tuple(centre), major, minor, angle=float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))))
+
+
+def class_style(number: int) -> tuple[str, str]:
+    """Return the colour and dash of a class, or of a numbered movement."""
+    return CLASS_COLOURS[number % len(CLASS_COLOURS)], ('-', '--')[number // len(CLASS_COLOURS) % 2]
+
+
+def tag(axes: Any, place: Any, text: str, colour: str) -> None:
+    """Write a letter or number in a small circle at a place (2,)."""
+    box = {'boxstyle': 'circle,pad=0.18', 'facecolor': 'white', 'edgecolor': colour, 'linewidth': 1.4}
+    axes.text(*place, text, fontsize=7.5, ha='center', va='center', zorder=7, bbox=box, clip_on=True)
+
+
+def draw_colour_bar(figure: Figure, axes: Any) -> None:
+    """Draw the scale of the likelihood beside a scene."""
+    figure.colorbar(ScalarMappable(LIKELIHOOD_SCALE, LIKELIHOOD_COLOURS), ax=axes, label='likelihood', shrink=0.8, pad=0.02)

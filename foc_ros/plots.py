@@ -1,0 +1,148 @@
+"""All pictures, made of what `drawing` puts on axes: a scene with the ways through it, a recording, a movement at one moment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from .drawing import (
+    CLASSES,
+    STDDEVS,
+    Bounds,
+    class_style,
+    draw_colour_bar,
+    draw_hand,
+    draw_legend,
+    draw_likelihoods,
+    draw_scene,
+    draw_speeds,
+    draw_ways,
+    tag,
+)
+from .foc.errors import InputError
+from .foc.records import NANOSECONDS, Array, Obstacles, Outcome
+from .moments import Moment, Track, Way, ways_of
+
+STYLE = {
+    'font.size': 10,
+    'axes.spines.top': False,
+    'axes.spines.right': False,
+    'axes.grid': True,
+    'grid.color': '0.92',
+    'axes.axisbelow': True,
+    'savefig.dpi': 110,
+}
+WIDTH_IN = 6.4
+LINE_IN = 0.2
+"""Height of a line of the legend [in]."""
+
+
+def plot_outcomes(file: Path | str, obstacles: Obstacles, goals: Array, outcomes: Sequence[Outcome]) -> None:
+    """Write a picture of the solved outcomes in their scene, in the format that the file's suffix says.
+
+    goals (g, 2) [m]. Raises InputError where the file's suffix is no picture format or it cannot be written.
+    """
+    ways = ways_of(outcomes)
+    save(scene_figure(obstacles, goals, ways, bounds_of(obstacles, goals, ways)), file)
+
+
+def scene_figure(obstacles: Obstacles, goals: Array, ways: Sequence[Way], bounds: Bounds) -> Figure:
+    """Return a figure of one scene: obstacles, goals, ways coloured by likelihood; letters and a legend name them."""
+    numbers = _numbered([way.label for way in ways])
+    with mpl.rc_context(STYLE):
+        heights = [_scene_height(bounds), LINE_IN * max(1, len(ways))]
+        figure = Figure(figsize=(WIDTH_IN, sum(heights) + 0.8), layout='constrained')
+        scene, legend = figure.subplots(2, 1, height_ratios=heights)
+        draw_scene(scene, obstacles, goals, bounds)
+        draw_ways(scene, ways, numbers)
+        draw_colour_bar(figure, scene)
+        draw_legend(legend, ways, numbers)
+    return figure
+
+
+def track_figure(track: Track, moment: Moment, spans: Sequence[tuple[int, int]], bounds: Bounds) -> Figure:
+    """Return a figure of all movements of a recording in the scene of one moment; spans: start and end [ns] of each."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH_IN, _scene_height(bounds) + 0.6), layout='constrained')
+        axes = figure.subplots()
+        draw_scene(axes, moment.obstacles, moment.goals, bounds)
+        axes.plot(*track.positions.T, color='0.75', linewidth=0.8)
+        for number, (start_ns, end_ns) in enumerate(spans):
+            positions = track.positions[track.between(start_ns, end_ns)]
+            colour, dash = class_style(number)
+            axes.plot(*positions.T, color=colour, linestyle=dash, linewidth=1.8)
+            tag(axes, positions[len(positions) * (2 + number % 3) // 6], str(number + 1), colour)
+    return figure
+
+
+def moment_figure(track: Track, moment: Moment, around: Sequence[Moment], span: tuple[int, int], bounds: Bounds) -> Figure:
+    """Return one movement at one moment: scene above, then likelihoods and speeds over the whole movement.
+
+    around: the predictions during the movement; span: its start and end [ns].
+    """
+    numbers = _numbered(_ranked(moment, around))
+    origin_ns = int(track.stamps_ns[0])
+    now = (moment.stamp_ns - origin_ns) / NANOSECONDS
+    with mpl.rc_context(STYLE):
+        heights = [_scene_height(bounds), LINE_IN * max(1, len(moment.ways)), 2.0, 1.6]
+        figure = Figure(figsize=(WIDTH_IN, sum(heights) + 1.2), layout='constrained')
+        scene, legend, likelihoods, speeds = figure.subplots(4, 1, height_ratios=heights)
+        draw_scene(scene, moment.obstacles, moment.goals, bounds)
+        draw_ways(scene, moment.ways, numbers)
+        draw_hand(scene, track, moment.stamp_ns, span)
+        draw_colour_bar(figure, scene)
+        draw_legend(legend, moment.ways, numbers)
+        draw_likelihoods(likelihoods, around, numbers, origin_ns)
+        draw_speeds(speeds, track, moment, span, origin_ns)
+        for axes in (likelihoods, speeds):
+            axes.axvline(now, color='0.4', linewidth=1.0, linestyle=':')
+            axes.set_xlim(*((stamp - origin_ns) / NANOSECONDS for stamp in span))
+        scene.set_title(f'at {now:.2f} s')
+    return figure
+
+
+def bounds_of(obstacles: Obstacles, goals: Array, ways: Sequence[Way], *points: Array) -> Bounds:
+    """Return x and y limits [m] that hold obstacles, goals, ways with their ellipses, and other points (m, 2), with a margin."""
+    reach = (obstacles.radius + STDDEVS * obstacles.radius_stddev)[:, None]
+    spread = [(way.path, STDDEVS * np.sqrt(np.diagonal(way.covariance, axis1=1, axis2=2))) for way in ways]
+    discs = [(obstacles.centre, reach), *spread]
+    edges = [centre + sign * width for centre, width in discs for sign in (-1.0, 1.0)]
+    everything = np.concatenate([*edges, np.reshape(goals, (-1, 2)), *points])
+    low, high = (everything.min(axis=0), everything.max(axis=0)) if len(everything) else (np.zeros(2), np.ones(2))
+    margin = 0.04 * max(*(high - low), 0.05)
+    return float(low[0] - margin), float(high[0] + margin), float(low[1] - margin), float(high[1] + margin)
+
+
+def save(figure: Figure, file: Path | str) -> None:
+    """Write a figure in the format that the file's suffix says; InputError where that cannot be done."""
+    known = figure.canvas.get_supported_filetypes()
+    if Path(file).suffix.lower().removeprefix('.') not in known:
+        raise InputError('picture file', f'a name that ends in {", ".join("." + each for each in sorted(known))}', str(file))
+    try:
+        figure.savefig(file)
+    except OSError as error:
+        raise InputError('picture file', 'a file that can be written', f'{file}: {error.strerror or error}') from error
+
+
+def _scene_height(bounds: Bounds) -> float:
+    """Return the height [in] that a scene needs, with equal axes, beside its colour bar."""
+    wide, high = bounds[1] - bounds[0], bounds[3] - bounds[2]
+    return float(np.clip(0.8 * WIDTH_IN * high / wide, 2.0, 7.0))
+
+
+def _ranked(moment: Moment, around: Sequence[Moment]) -> list[str]:
+    """Return the labels of the moment by likelihood, then the others of the movement by the greatest likelihood they reach."""
+    peak: dict[str, float] = {}
+    for way in (way for each in around for way in each.ways):
+        peak[way.label] = max(peak.get(way.label, 0.0), way.likelihood)
+    now = [way.label for way in moment.ways]
+    return now + sorted((label for label in peak if label not in now), key=lambda label: (-peak[label], label))
+
+
+def _numbered(labels: Sequence[str]) -> dict[str, int]:
+    """Return the number of each class, which gives it letter and colour; those beyond the number of classes get none."""
+    return {label: number for number, label in enumerate(labels[:CLASSES])}

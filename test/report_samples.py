@@ -1,0 +1,76 @@
+"""A scene, a track and predictions to draw: made by hand, so that a test knows what has to be in the picture."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from foc_ros.foc.records import (
+    NANOSECONDS,
+    Array,
+    Candidate,
+    HandSample,
+    Obstacles,
+    Outcome,
+    Prediction,
+    Solution,
+    Status,
+    make_obstacles,
+)
+
+START_NS = 1_000 * NANOSECONDS
+OBSTACLES = make_obstacles([[0.15, 0.0], [0.22, 0.1]], [0.03, 0.02], [0.003, 0.0], ids=('1', 'post'))
+GOALS: Array = np.array([[0.3, 0.0], [0.3, 0.12]])
+
+
+def quintic(s: Array) -> Array:
+    return s**3 * (10 - 15 * s + 6 * s**2)
+
+
+def samples(reaches: int = 1, seconds: float = 1.0, rest: float = 0.5) -> list[HandSample]:
+    """Return reaches to and fro along x, over the first obstacle, at 100 Hz."""
+    made = []
+    for step in range(round(100 * reaches * (seconds + rest))):
+        number, phase = divmod(step / 100, seconds + rest)
+        s = quintic(np.clip((phase - rest) / seconds, 0.0, 1.0))
+        s = s if number % 2 == 0 else 1.0 - s
+        position = np.array([0.3 * s, 0.05 * np.sin(np.pi * s)])
+        made.append(HandSample(START_NS + step * 10_000_000, position, 0.1, 'world'))
+    return made
+
+
+def outcome(label: str, goal: int, bow: float, likelihood: float, start: Array, status: Status = Status.SOLVED) -> Outcome:
+    s = np.linspace(0.0, 1.0, 21)
+    path = start + quintic(s)[:, None] * (GOALS[goal] - start) + np.outer(np.sin(np.pi * s), [0.0, bow])
+    dt = 0.05
+    mean = np.column_stack([path, np.gradient(path, dt, axis=0), np.zeros_like(path)])
+    covariance = np.zeros((21, 6, 6))
+    covariance[:, 0, 0] = (0.001 + 0.01 * s) ** 2
+    covariance[:, 1, 1] = (0.001 + 0.004 * s) ** 2
+    solution = Solution(status, '', dt, mean, covariance, np.zeros((20, 2)), 100.0 * (2 - likelihood), {}, 0.0, 1.0, 0.9)
+    return Outcome(
+        Candidate(label, goal, (), path, 0.3),
+        solution,
+        {},
+        100.0 * (2 - likelihood),
+        likelihood if solution.status is Status.SOLVED else 0.0,
+    )
+
+
+def prediction(stamp_ns: int, start: Array, share: float = 0.6) -> Prediction:
+    outcomes = [
+        outcome('goal0:+1', 0, 0.06, share, start),
+        outcome('goal0:-1', 0, -0.06, 0.9 - share, start),
+        outcome('goal1:+1-post', 1, 0.02, 0.1, start),
+    ]
+    outcomes.sort(key=lambda each: -each.likelihood)
+    lost = outcome('goal1:+1+post', 1, 0.1, 0.0, start, Status.ETA_UNREACHABLE)
+    return Prediction(stamp_ns, 'world', 0.1, (*outcomes, lost), outcomes[0].candidate.label, solve_s=0.004)
+
+
+def predictions(of: list[HandSample], every: int = 4) -> list[Prediction]:
+    chosen = of[::every]
+    return [prediction(sample.stamp_ns, sample.position, 0.3 + 0.5 * row / len(chosen)) for row, sample in enumerate(chosen)]
+
+
+def scene() -> tuple[Obstacles, Array]:
+    return OBSTACLES, GOALS

@@ -1,0 +1,135 @@
+"""Pictures: what is drawn is what was computed, in colours that everybody can tell apart."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip('matplotlib', reason='matplotlib is not installed')
+
+from matplotlib.colors import to_rgb
+from matplotlib.patches import Circle, Ellipse
+from report_samples import START_NS, prediction, predictions, samples, scene
+
+from foc_ros.drawing import CLASS_COLOURS, LIKELIHOOD_COLOURS, stddev_ellipse
+from foc_ros.foc.errors import InputError
+from foc_ros.foc.records import make_obstacles
+from foc_ros.moments import moment_of, movements, track_of, ways_of
+from foc_ros.plots import bounds_of, moment_figure, plot_outcomes, save, scene_figure
+
+PNG = b'\x89PNG\r\n\x1a\n'
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_ellipse_is_the_level_set_of_the_covariance(seed: int) -> None:
+    root = np.random.default_rng(seed).normal(size=(2, 2))
+    covariance, centre = root @ root.T, np.array([0.3, -0.1])
+    ellipse = stddev_ellipse(centre, covariance, 2.0)
+    edge = ellipse.get_patch_transform().transform(np.array([[1.0, 0.0], [0.0, 1.0], [-0.6, 0.8]])) - centre
+    np.testing.assert_allclose(np.einsum('ki,ij,kj->k', edge, np.linalg.inv(covariance), edge), 4.0, rtol=1e-9)
+
+
+def test_ellipse_of_no_uncertainty_is_a_point() -> None:
+    ellipse = stddev_ellipse(np.zeros(2), np.array([[0.0, 0.0], [0.0, -1e-18]]))
+    assert (ellipse.width, ellipse.height) == (0.0, 0.0)
+
+
+def luminance(colour: tuple[float, float, float]) -> float:
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in to_rgb(colour)]
+    return float(np.dot([0.2126, 0.7152, 0.0722], linear))
+
+
+def test_likelihood_darkens_steadily_and_shows_on_white() -> None:
+    values = [luminance(LIKELIHOOD_COLOURS(step)[:3]) for step in np.linspace(0.0, 1.0, 50)]
+    assert np.all(np.diff(values) < 0.0)
+    assert 1.05 / (values[0] + 0.05) > 1.5
+
+
+def test_class_colours_differ_for_the_colour_blind() -> None:
+    """Seen by a deuteranope and a protanope (Vienot, Brettel, Mollon 1999, linear RGB), no two fall together."""
+    deuteranope = np.array([[0.29275, 0.70725, 0.0], [0.29275, 0.70725, 0.0], [-0.02234, 0.02234, 1.0]])
+    protanope = np.array([[0.11238, 0.88762, 0.0], [0.11238, 0.88762, 0.0], [0.00401, -0.00401, 1.0]])
+    linear = np.array([to_rgb(colour) for colour in CLASS_COLOURS]) ** 2.2
+    for seen in (np.clip(linear @ matrix.T, 0.0, 1.0) ** (1 / 2.2) for matrix in (deuteranope, protanope)):
+        gaps = np.linalg.norm(seen[:, None] - seen[None], axis=2)[np.triu_indices(len(seen), 1)]
+        assert gaps.min() > 0.1
+
+
+def test_scene_holds_every_obstacle_goal_and_way() -> None:
+    obstacles, goals = scene()
+    ways = ways_of(prediction(START_NS, np.zeros(2)).outcomes)
+    axes = scene_figure(obstacles, goals, ways, bounds_of(obstacles, goals, ways)).axes[0]
+    radii = sorted(patch.radius for patch in axes.patches if isinstance(patch, Circle))
+    np.testing.assert_allclose(radii, [0.02, 0.02, 0.03, 0.036])
+    drawn = [line.get_xydata() for line in axes.lines]
+    for way in ways:
+        assert any(np.array_equal(line, way.path) for line in drawn)
+    for goal in goals:
+        assert any(np.array_equal(line, [goal]) for line in drawn)
+    assert sum(type(patch) is Ellipse for patch in axes.patches) == 9 * len(ways)
+
+
+def test_unsolved_outcomes_are_not_drawn() -> None:
+    outcomes = prediction(START_NS, np.zeros(2)).outcomes
+    assert [way.label for way in ways_of(outcomes)] == [each.candidate.label for each in outcomes if each.solved]
+    assert any(not each.solved for each in outcomes)
+
+
+def test_bounds_hold_the_ellipses() -> None:
+    obstacles, goals = scene()
+    ways = ways_of(prediction(START_NS, np.zeros(2)).outcomes)
+    left, right, bottom, top = bounds_of(obstacles, goals, ways)
+    assert right > 0.3 + 2 * 0.011
+    assert left < 0.0
+    assert bottom < -0.06
+    assert top > 0.12
+
+
+def test_moment_shows_past_and_future_of_the_hand() -> None:
+    made = samples()
+    track = track_of(made)
+    (span,) = movements(track, 0.05)
+    around = [moment_of(each, *scene()) for each in predictions(made) if span[0] <= each.stamp_ns <= span[1]]
+    moment = around[len(around) // 3]
+    figure = moment_figure(track, moment, around, span, bounds_of(*scene(), moment.ways))
+    hand = [line for line in figure.axes[0].lines if line.get_color() == 'black' and len(line.get_xdata()) > 1]
+    assert [line.get_linestyle() for line in hand] == ['-', ':']
+    now = track.positions[track.stamps_ns == moment.stamp_ns][0]
+    np.testing.assert_array_equal(hand[0].get_xydata()[-1], now)
+    likelihoods = {line.get_label(): line.get_ydata() for line in figure.axes[2].lines if ':' in str(line.get_label())}
+    for way in moment.ways:
+        shown = likelihoods[way.label][around.index(moment)]
+        assert shown == way.likelihood
+
+
+@pytest.mark.parametrize('suffix', ['png', 'pdf', 'svg'])
+def test_plot_outcomes(tmp_path: Path, suffix: str) -> None:
+    file = tmp_path / f'scene.{suffix}'
+    plot_outcomes(file, *scene(), prediction(START_NS, np.zeros(2)).outcomes)
+    start = {'png': PNG, 'pdf': b'%PDF', 'svg': b'<?xml'}[suffix]
+    assert file.read_bytes().startswith(start)
+
+
+def test_plot_without_a_solution_or_an_obstacle(tmp_path: Path) -> None:
+    outcomes = [each for each in prediction(START_NS, np.zeros(2)).outcomes if not each.solved]
+    plot_outcomes(tmp_path / 'none.png', make_obstacles(), scene()[1], outcomes)
+    assert (tmp_path / 'none.png').read_bytes().startswith(PNG)
+
+
+@pytest.mark.parametrize(
+    ('name', 'expected'), [('scene.xyz', r'\.png'), ('scene', r'\.png'), ('no/such/scene.png', 'can be written')]
+)
+def test_a_file_that_cannot_be_written(tmp_path: Path, name: str, expected: str) -> None:
+    with pytest.raises(InputError, match=expected):
+        plot_outcomes(tmp_path / name, *scene(), prediction(START_NS, np.zeros(2)).outcomes)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_equal_input_gives_equal_pictures(tmp_path: Path) -> None:
+    obstacles, goals = scene()
+    ways = ways_of(prediction(START_NS, np.zeros(2)).outcomes)
+    for name in ('one.png', 'two.png'):
+        save(scene_figure(obstacles, goals, ways, bounds_of(obstacles, goals, ways)), tmp_path / name)
+    assert (tmp_path / 'one.png').read_bytes() == (tmp_path / 'two.png').read_bytes()

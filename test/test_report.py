@@ -1,0 +1,155 @@
+"""The report: one page that needs nothing else, and numbers that agree with the predictions."""
+
+from __future__ import annotations
+
+import base64
+import json
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip('matplotlib', reason='matplotlib is not installed')
+
+from report_samples import OBSTACLES, START_NS, prediction, predictions, samples, scene
+
+from foc_ros.foc.errors import InputError
+from foc_ros.foc.records import HandSample, Prediction
+from foc_ros.moments import moment_of, track_of
+from foc_ros.report import write_report
+
+
+class Page(HTMLParser):
+    """What a browser would find: tags with attributes, and text."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.open: list[str] = []
+        self.text = ''
+        self.feed(file.read_text(encoding='utf-8'))
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in ('meta', 'img', 'link', 'br'):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def report(directory: Path, reaches: int = 1, title: str = 'A title') -> list[Path]:
+    made = samples(reaches)
+    moments = [moment_of(each, *scene()) for each in predictions(made)]
+    return write_report(directory, title, track_of(made), moments, {'recording': 'some <bag> & more'})
+
+
+def test_files_are_there(tmp_path: Path) -> None:
+    files = report(tmp_path / 'new' / 'report')
+    assert {file.name for file in files} == {
+        'index.html',
+        'predictions.json',
+        'overview.png',
+        *(f'moment_{n:02d}.png' for n in (1, 2, 3, 4)),
+    }
+    assert set((tmp_path / 'new' / 'report').iterdir()) == set(files)
+
+
+def test_page_needs_nothing_else(tmp_path: Path) -> None:
+    files = report(tmp_path)
+    page = Page(tmp_path / 'index.html')
+    for _, attributes in page.tags:
+        assert not {'href', 'srcset', 'action'} & attributes.keys()
+        assert attributes.get('src', 'data:').startswith('data:')
+    source = (tmp_path / 'index.html').read_text(encoding='utf-8')
+    assert 'http' not in source
+    assert 'url(' not in source
+    embedded = [base64.b64decode(attributes['src'].partition(',')[2]) for tag, attributes in page.tags if tag == 'img']
+    assert sorted(embedded) == sorted(file.read_bytes() for file in files if file.suffix == '.png')
+    assert ('meta', {'name': 'viewport', 'content': 'width=device-width, initial-scale=1'}) in page.tags
+
+
+def test_text_is_escaped_and_facts_are_shown(tmp_path: Path) -> None:
+    report(tmp_path, title='<script>alert(1)</script>')
+    page = Page(tmp_path / 'index.html')
+    assert 'script' not in [tag for tag, _ in page.tags]
+    assert 'some <bag> & more' in page.text
+    assert '4.0 ms (median)' in page.text
+    assert '38 candidates ended as eta_unreachable' in page.text
+
+
+def test_numbers_agree_with_the_predictions(tmp_path: Path) -> None:
+    made = samples()
+    expected = predictions(made)
+    write_report(tmp_path, 'x', track_of(made), [moment_of(each, *scene()) for each in expected], {})
+    numbers = json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))
+    assert numbers['hand_samples'] == len(made)
+    assert len(numbers['predictions']) == len(expected)
+    for told, known in zip(numbers['predictions'], expected, strict=True):
+        assert told['stamp_ns'] == known.stamp_ns
+        assert told['t_s'] == pytest.approx((known.stamp_ns - START_NS) * 1e-9)
+        assert told['most_likely'] == known.most_likely
+        assert [each['label'] for each in told['candidates']] == [each.candidate.label for each in known.solved]
+        assert [each['likelihood'] for each in told['candidates']] == pytest.approx(
+            [each.likelihood for each in known.solved], rel=1e-5
+        )
+        assert told['candidates'][0]['end'] == pytest.approx(known.solved[0].solution.path[-1], abs=1e-6)
+        assert told['unsolved'] == {'goal1:+1+post': 'eta_unreachable'}
+
+
+@pytest.mark.parametrize(('reaches', 'pictures'), [(1, 4), (3, 3), (10, 8)])
+def test_every_movement_is_shown_up_to_a_number(tmp_path: Path, reaches: int, pictures: int) -> None:
+    report(tmp_path, reaches)
+    assert len(list(tmp_path.glob('moment_*.png'))) == pictures
+
+
+def test_nothing_predicted_is_said(tmp_path: Path) -> None:
+    files = write_report(tmp_path, 'x', track_of(samples()), [], {})
+    assert [file.name for file in files] == ['index.html', 'predictions.json']
+    assert 'There is no prediction.' in Page(tmp_path / 'index.html').text
+
+
+def test_nothing_solved_is_said(tmp_path: Path) -> None:
+    lost = [each for each in prediction(START_NS, np.zeros(2)).outcomes if not each.solved]
+    moments = [moment_of(Prediction(START_NS + n, 'world', 0.0, tuple(lost), None), *scene()) for n in range(3)]
+    write_report(tmp_path, 'x', track_of(samples()), moments, {})
+    assert 'In 3 of 3 predictions no candidate could be solved.' in Page(tmp_path / 'index.html').text
+
+
+def test_a_hand_that_never_moves(tmp_path: Path) -> None:
+    still = [HandSample(START_NS + n * 10_000_000, np.zeros(2)) for n in range(50)]
+    write_report(tmp_path, 'x', track_of(still), [moment_of(prediction(still[20].stamp_ns, np.zeros(2)), *scene())], {})
+    assert (tmp_path / 'moment_01.png').exists()
+
+
+def test_numbers_that_json_has_not_become_null(tmp_path: Path) -> None:
+    made = prediction(START_NS, np.zeros(2))
+    object.__setattr__(made.outcomes[0].solution, 'eta', float('nan'))
+    write_report(tmp_path, 'x', track_of(samples()), [moment_of(made, *scene())], {})
+    text = (tmp_path / 'predictions.json').read_text(encoding='utf-8')
+    assert 'NaN' not in text
+    assert json.loads(text)['predictions'][0]['candidates'][0]['eta'] is None
+
+
+def test_no_hand_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match='hand pose'):
+        write_report(tmp_path / 'report', 'x', track_of([]), [], {})
+    assert not (tmp_path / 'report').exists()
+
+
+def test_directory_that_is_a_file(tmp_path: Path) -> None:
+    (tmp_path / 'report').write_text('mine')
+    with pytest.raises(InputError, match='report directory'):
+        report(tmp_path / 'report')
+    assert (tmp_path / 'report').read_text() == 'mine'
+
+
+def test_report_leaves_its_input_alone(tmp_path: Path) -> None:
+    before = OBSTACLES.centre.copy()
+    report(tmp_path)
+    np.testing.assert_array_equal(OBSTACLES.centre, before)
