@@ -1,0 +1,59 @@
+"""Predictions made by hand, for tests of what is done with them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from foc_ros.foc.records import Candidate, Outcome, Prediction, Solution, Status, make_obstacles
+
+STEPS, DT = 4, 0.05
+
+
+def outcome(label: str = 'goal0:+l1', likelihood: float = 0.6, bend: float = 0.1, cost: float = 2.0, **changes: Any) -> Outcome:
+    """Return a candidate from (0, 0) to (0.3, 0) that bends to the left; changes: to the solution."""
+    shape = np.sin(np.linspace(0, np.pi, STEPS + 1))
+    mean = np.zeros((STEPS + 1, 6))
+    mean[:, 0], mean[:, 1] = np.linspace(0, 0.3, STEPS + 1), bend * shape
+    mean[:, 2], mean[:, 3] = 1.5, bend * np.cos(np.linspace(0, np.pi, STEPS + 1))
+    covariance = np.zeros((STEPS + 1, 6, 6))
+    covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1], covariance[:, 1, 0] = 4e-6, 9e-6, 1e-6, 1e-6
+    values = {
+        'status': Status.SOLVED,
+        'message': 'as wanted',
+        'dt': DT,
+        'mean': mean,
+        'covariance': covariance,
+        'control': np.ones((STEPS, 2)),
+        'effort': 20.0,
+        'costs': {'effort': 20.0},
+        'tau': 0.0,
+        'lam': 1.0,
+        'eta': 0.93,
+        'qp_solves': 5,
+        'solve_s': 0.002,
+    }
+    solution = Solution(**(values | changes))
+    side = 1 if bend > 0 else -1
+    candidate = Candidate(label, 0, (('1', side),), mean[:, :2].copy(), 0.31)
+    return Outcome(candidate, solution, {'1': side}, cost, likelihood if solution.status is Status.SOLVED else 0.0)
+
+
+def prediction(*outcomes: Outcome, stamp_ns: int = 5_000_000_000, **changes: Any) -> Prediction:
+    """Return a prediction of these outcomes, the first being the most likely."""
+    solved = [each.candidate.label for each in outcomes if each.solved]
+    values = {'frame_id': 'world', 'height': 0.2, 'most_likely': solved[0] if solved else None}
+    return Prediction(stamp_ns=stamp_ns, outcomes=outcomes, **(values | changes))
+
+
+def three_ways() -> Prediction:
+    """Return two solved candidates and one that is not."""
+    return prediction(
+        outcome('goal0:+l1', 0.7, 0.1, 2.0),
+        outcome('goal0:-l1', 0.3, -0.1, 5.0, eta=0.91),
+        outcome('goal0:+l2', bend=0.2, status=Status.INFEASIBLE),
+    )
+
+
+OBSTACLES = make_obstacles([[0.1, 0.0], [0.2, 0.1]], [0.03, 0.02], [0.005, 0.0])
