@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from .assess import assess
 from .chance import k_of_eta
 from .problem import Problem
-from .qp import clearance_qp
+from .qp import clearance_qp, effort_cost
 from .records import Array, Status
 from .solver import QPSolution, WorkingSet, solve
 
@@ -38,7 +38,7 @@ def algorithm1(problem: Problem, guess: Array, delta: float, growth: float, xi: 
         before, last = (tau, lam), solution
         if last is not None and assess(problem, last.control).smallest_k < wanted:
             tau, lam = tau + delta, lam * growth
-        solution = solve(clearance_qp(problem, guess, tau, lam, literal=True), last.active if last else WorkingSet())
+        solution = solve(clearance_qp(problem, effort_cost(problem, lam), guess, tau, literal=True), last.active if last else WorkingSet())
         if solution is None:
             message = f'QP {iteration} is infeasible at tau = {tau:.3g}, lambda = {lam:.3g}'
             return Stepped(Status.INFEASIBLE, message, last, *before, iteration)

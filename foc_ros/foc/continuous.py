@@ -16,13 +16,18 @@ from .problem import Problem
 from .records import Array, Status
 from .sequential import Converged, converge
 from .solver import WorkingSet
+from .start import Start
 
 STRIDE = 4.0
 """First look along the curve, in s: lambda grows by 16 from one to the next."""
+WARM_STRIDE = 0.25
+"""First look around the s of a warm start."""
 LARGEST_LAMBDA = 1e12
 """Where the walk ends: the variance weight is then all that counts, and k has stopped growing."""
-CLOSE = 1e-7
+CLOSE = 1e-6
 """Relative excess of k over the wanted one at which the root is found."""
+NARROW = 1e-5
+"""Bracket in s at which the root is as good as found: k jumps there, because the touching step changes."""
 MAX_TRIALS = 60
 
 
@@ -37,6 +42,10 @@ class Curve:
     def at(self, s: float) -> tuple[float, float]:
         """Return (tau, lambda) at s >= 0."""
         return self.delta * s, self.first_lambda * self.growth**s
+
+    def s_of(self, lam: float) -> float:
+        """Return the s of a lambda on the curve."""
+        return max(0.0, math.log(lam / self.first_lambda) / math.log(self.growth)) if lam > self.first_lambda > 0 else 0.0
 
     @property
     def end(self) -> float:
@@ -85,37 +94,55 @@ class _Walker:
         return self.point(s, neighbour.converged.positions, neighbour.converged.solution.active)
 
 
-def walk(problem: Problem, guess: Array, curve: Curve) -> Walk:
-    """Find the smallest s whose converged solution meets the surrogate. guess: positions at steps 1..N, (N, 2) [m]."""
+def walk(problem: Problem, start: Start, curve: Curve) -> Walk:
+    """Find the smallest s whose converged solution meets the surrogate; a warm start looks around the s it had."""
     walker, wanted = _Walker(problem, curve), k_of_eta(problem.eta)
-    first = walker.point(0.0, guess, WorkingSet())
+    s, stride = (0.0, STRIDE) if start.lam is None else (curve.s_of(start.lam), WARM_STRIDE)
+    first = walker.point(s, start.positions, start.active)
     if first is None:
         return Walk(Status.INFEASIBLE, 'no control meets every linearised obstacle row', None, walker.qp_solves)
-    low, high, best = first, None, first
-    for point in _strides(walker, first) if first.k < wanted else [first]:
-        best = max(best, point, key=lambda p: p.k)
-        if point.k >= wanted:
-            high = point
-            break
-        low = point
+    low, high = _bracket(walker, first, wanted, stride)
     if high is None:
-        message = f'eta {problem.eta:g} is out of reach: the largest on the curve is {eta_of_k(best.k):.4g}, at s = {best.s:.3g}'
-        return Walk(Status.ETA_UNREACHABLE, message, best, walker.qp_solves)
-    point = high if high is first else _root(walker, low, high, wanted)
+        message = f'eta {problem.eta:g} is out of reach: the largest on the curve is {eta_of_k(low.k):.4g}, at s = {low.s:.3g}'
+        return Walk(Status.ETA_UNREACHABLE, message, low, walker.qp_solves)
+    point = high if low is high else _root(walker, low, high, wanted)
     if not point.converged.stays:
         return Walk(Status.ITERATION_LIMIT, 'the linearisation had not settled when its QPs ran out', point, walker.qp_solves)
     return Walk(Status.SOLVED, 'solved', point, walker.qp_solves)
 
 
-def _strides(walker: _Walker, first: Point) -> Iterator[Point]:
-    """Yield points further and further along the curve; towards an infeasible end in halved strides."""
-    point, stride = first, STRIDE
-    while stride > STRIDE / 16 and point.s < walker.curve.end:
-        further = walker.beside(min(point.s + stride, walker.curve.end), point)
+def _bracket(walker: _Walker, first: Point, wanted: float, stride: float) -> tuple[Point, Point | None]:
+    """Return the last point below the wanted k and the first at or above it.
+
+    Both the same where the curve's beginning is enough; no upper one where the wanted k is out of reach: then the best point.
+    """
+    if first.k >= wanted:
+        high = first
+        for point in _strides(walker, first, -stride):
+            if point.k < wanted:
+                return point, high
+            high = point
+        return high, high
+    low, best = first, first
+    for point in _strides(walker, first, stride):
+        if point.k >= wanted:
+            return low, point
+        low, best = point, max(best, point, key=lambda p: p.k)
+    return best, None
+
+
+def _strides(walker: _Walker, first: Point, stride: float) -> Iterator[Point]:
+    """Yield points further and further along the curve, or back for a negative stride; towards an infeasible end in halves."""
+    point, end = first, walker.curve.end if stride > 0 else 0.0
+    while point.s != end and abs(stride) > WARM_STRIDE / 2:
+        s = min(point.s + stride, end) if stride > 0 else max(point.s + stride, end)
+        further = walker.beside(s, point)
         if further is None:
-            stride /= 2
+            stride /= 4
+            end = point.s + 3 * stride
         else:
             point = further
+            stride = min(4 * abs(stride), STRIDE) * (1 if stride > 0 else -1)
             yield point
 
 
@@ -124,7 +151,7 @@ def _root(walker: _Walker, low: Point, high: Point, wanted: float) -> Point:
     below, above = low.k - wanted, high.k - wanted
     side = 0
     for _ in range(MAX_TRIALS):
-        if high.k <= wanted * (1 + CLOSE) or high.s - low.s < 1e-10:
+        if high.k <= wanted * (1 + CLOSE) or high.s - low.s < NARROW:
             break
         s = (low.s * above - high.s * below) / (above - below)
         nearest = low if s - low.s < high.s - s else high

@@ -14,10 +14,11 @@ from .continuous import Curve, walk
 from .noise import state_covariance
 from .optimal import optimise
 from .problem import Problem
-from .qp import clearance_qp
+from .qp import clearance_qp, effort_cost
 from .records import Array, Solution, Status
 from .sequential import Converged, converge
 from .solver import WorkingSet, solve
+from .start import Start
 
 
 @dataclass(frozen=True)
@@ -34,49 +35,49 @@ class _Ended:
     multipliers: Array
 
 
-def forward(problem: Problem, guess: Array, settings: FocConfig) -> Solution:
-    """Solve one problem in the class of a guess (N + 1, 2) [m] at steps 0..N.
+def forward(problem: Problem, start: Start, settings: FocConfig) -> Solution:
+    """Solve one problem in the class in which it starts.
 
     Never raises for a problem that has no solution: the status says so, and the mean is then the best effort (the largest eta that
     the strategy reached, or the smallest violation).
     """
     began = time.perf_counter()
-    ended = _STRATEGIES[settings.strategy](problem, np.asarray(guess, dtype=float)[1:], settings)
+    ended = _STRATEGIES[settings.strategy](problem, start, settings)
     return _solution(problem, ended, assess(problem, ended.control), time.perf_counter() - began)
 
 
-def _continuous(problem: Problem, guess: Array, settings: FocConfig) -> _Ended:
+def _continuous(problem: Problem, start: Start, settings: FocConfig) -> _Ended:
     delta = settings.lv_delta if settings.strategy == 'lv' else settings.hc_delta
     curve = Curve(delta, settings.growth, settings.lam)
-    walked = walk(problem, guess, curve)
+    walked = walk(problem, start, curve)
     if walked.point is None:
-        return _best_effort(problem, guess, *curve.at(0.0), walked.qp_solves)
+        return _best_effort(problem, start, *curve.at(0.0), walked.qp_solves)
     return _ended(walked.status, walked.message, walked.point.converged, *curve.at(walked.point.s), walked.qp_solves)
 
 
-def _optimal(problem: Problem, guess: Array, settings: FocConfig) -> _Ended:
-    optimum = optimise(problem, guess)
+def _optimal(problem: Problem, start: Start, settings: FocConfig) -> _Ended:
+    optimum = optimise(problem, start)
     if optimum is None:
-        return _best_effort(problem, guess, 0.0, 0.0, 0)
+        return _best_effort(problem, start, 0.0, 0.0, 0)
     return _Ended(
         optimum.status, optimum.message, optimum.control, 0.0, 0.0, optimum.qp_solves, optimum.active, optimum.multipliers
     )
 
 
-def _algorithm1(problem: Problem, guess: Array, settings: FocConfig) -> _Ended:
-    stepped = algorithm1(problem, guess, settings.algorithm1_delta, settings.algorithm1_growth, settings.algorithm1_xi)
+def _algorithm1(problem: Problem, start: Start, settings: FocConfig) -> _Ended:
+    stepped = algorithm1(problem, start.positions, settings.algorithm1_delta, settings.algorithm1_growth, settings.algorithm1_xi)
     last = stepped.solution
     if last is None:
-        return _best_effort(problem, guess, stepped.tau, stepped.lam, stepped.iterations)
+        return _best_effort(problem, start, stepped.tau, stepped.lam, stepped.iterations)
     return _Ended(
         stepped.status, stepped.message, last.control, stepped.tau, stepped.lam, stepped.iterations, last.active, last.multipliers
     )
 
 
-def _fixed(problem: Problem, guess: Array, settings: FocConfig) -> _Ended:
-    converged = converge(problem, guess, WorkingSet(), settings.tau, settings.lam)
+def _fixed(problem: Problem, start: Start, settings: FocConfig) -> _Ended:
+    converged = converge(problem, start.positions, start.active, settings.tau, settings.lam)
     if converged is None:
-        return _best_effort(problem, guess, settings.tau, settings.lam, 0)
+        return _best_effort(problem, start, settings.tau, settings.lam, 0)
     status = Status.SOLVED if converged.stays else Status.ITERATION_LIMIT
     message = 'solved' if converged.stays else 'the linearisation had not settled when its QPs ran out'
     return _ended(status, message, converged, settings.tau, settings.lam, converged.qp_solves)
@@ -87,9 +88,9 @@ def _ended(status: Status, message: str, converged: Converged, tau: float, lam: 
     return _Ended(status, message, converged.control, tau, lam, qp_solves, solution.active, solution.multipliers)
 
 
-def _best_effort(problem: Problem, guess: Array, tau: float, lam: float, qp_solves: int) -> _Ended:
-    """Let the contradicting rows share the violation, at the guess: what the hand can do where nothing meets them all."""
-    elastic = solve(clearance_qp(problem, guess, tau, lam), WorkingSet(), elastic=True)
+def _best_effort(problem: Problem, start: Start, tau: float, lam: float, qp_solves: int) -> _Ended:
+    """Let the contradicting rows share the violation, at the start: what the hand can do where nothing meets them all."""
+    elastic = solve(clearance_qp(problem, effort_cost(problem, lam), start.positions, tau), WorkingSet(), elastic=True)
     if elastic is None:
         control, active, multipliers = np.zeros(2 * problem.horizon.steps), WorkingSet(), np.zeros(0)
     else:

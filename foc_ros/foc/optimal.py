@@ -12,17 +12,18 @@ solution is a minimum of the problem as it stands.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .assess import assess
 from .chance import eta_of_k, k_of_eta, variance
 from .problem import Problem
-from .qp import ReachingQP, hessian, recovery_allowance
+from .qp import Cost, ReachingQP, effort_cost, wanted_distance
 from .records import Array, Status
 from .sequential import converge
 from .solver import WorkingSet, solve
+from .start import Start
 
 SETTLED = 1e-6
 """Largest move of the mean, relative to the way, at which the sequence has settled."""
@@ -54,14 +55,19 @@ class _Iterate:
     multipliers: Array
 
 
-def optimise(problem: Problem, guess: Array) -> Optimum | None:
-    """Find a local minimum from a guess (N, 2) [m] at steps 1..N; None where even its obstacle rows contradict each other."""
-    start = converge(problem, guess, WorkingSet(), 0.0, 0.0)
-    if start is None:
+def optimise(problem: Problem, start: Start) -> Optimum | None:
+    """Find a local minimum from a start; None where even the obstacle rows there contradict each other."""
+    wanted, solves = k_of_eta(problem.eta), 0
+    if start.control is not None and len(start.active):
+        settled, solves = _repeat(problem, _Iterate(start.control, start.active, start.multipliers), wanted, SETTLED, complete=True)
+        if settled is not None:
+            return _optimum(Status.SOLVED, 'solved', settled, solves)
+    free = converge(problem, start.positions, start.active, 0.0, 0.0)
+    if free is None:
         return None
-    wanted, solves = k_of_eta(problem.eta), start.qp_solves
-    iterate = _Iterate(start.control, start.solution.active, start.solution.multipliers)
-    reached = assess(problem, start.control).smallest_k
+    solves += free.qp_solves
+    iterate = _Iterate(free.control, free.solution.active, free.solution.multipliers)
+    reached = assess(problem, free.control).smallest_k
     if reached >= wanted:
         return _optimum(Status.SOLVED, 'solved', iterate, solves)
     share = 1.0
@@ -133,15 +139,20 @@ def surrogate_qp(
         by_position = by_position - 2 * k / stddev[..., None] * _turned(problem, spread, by_position)
     slope = np.concatenate((by_position, -by_variance), axis=-1)
     maps = np.concatenate((problem.position_map, problem.variance_maps * control))
-    reach2 = (np.sqrt(problem.size[0])[:, None] - recovery_allowance(problem, 0.0)) ** 2
-    value = (distance**2 - reach2 - k * stddev) / (2 * distance)  # -f / 2 |d|, to be >= 0
+    reach = wanted_distance(problem, 0.0)
+    value = (distance**2 - reach**2 - k * stddev) / (2 * distance)  # -f / 2 |d|, to be >= 0
     limits = np.einsum('jtq,qt->jt', slope, maps @ control) - value
-    bend = np.zeros_like(control)
-    if len(active):
-        weight = multipliers[:, None] * by_variance[active.obstacle, active.step]
-        bend = np.einsum('kq,qku->u', weight, problem.variance_maps[:, active.step])
-    rows, targets, softness = problem.goal_rows
-    return ReachingQP(hessian(problem, 0.0) + bend, bend * control, rows, targets, softness, maps, slope, limits)
+    return ReachingQP(_bent(problem, control, active, multipliers, by_variance), maps, slope, limits)
+
+
+def _bent(problem: Problem, control: Array, active: WorkingSet, multipliers: Array, by_variance: Array) -> Cost:
+    """Return the cost with the curvature of the active rows' standard deviations, about the control."""
+    cost = effort_cost(problem, 0.0)
+    if not len(active):
+        return cost
+    weight = multipliers[:, None] * by_variance[active.obstacle, active.step]
+    bend = np.einsum('kq,qku->u', weight, problem.variance_maps[:, active.step])
+    return replace(cost, hessian=cost.hessian + bend, linear=bend * control)
 
 
 def _turned(problem: Problem, spread: Array, normal: Array) -> Array:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,23 +13,49 @@ from .forward import forward
 from .homotopy import path_sides
 from .likelihood import likelihoods
 from .problem import Problem
-from .records import Candidate, Outcome, Status
+from .records import Candidate, Outcome, Solution, Status
+from .start import cold, warm
+
+
+@dataclass(frozen=True, eq=False)
+class Earlier:
+    """Solutions by label that were found elapsed_s [s] ago."""
+
+    solutions: Mapping[str, Solution] = field(default_factory=dict)
+    elapsed_s: float = 0.0
 
 
 def solve_candidates(
-    candidates: Sequence[Candidate], problems: Sequence[Problem], settings: FocConfig, beta: float, effort_spent: float = 0.0
+    candidates: Sequence[Candidate],
+    problems: Sequence[Problem],
+    settings: FocConfig,
+    beta: float,
+    effort_spent: float = 0.0,
+    earlier: Earlier | None = None,
 ) -> list[Outcome]:
     """Solve each candidate and rank them.
 
-    problems: one for every goal; effort_spent: since movement onset [m^2/s^5]. Returns the solved ones first, most likely first.
+    problems: one for every goal; effort_spent: since movement onset [m^2/s^5]; earlier: solutions to start from where there is one
+    of the same label. Returns the solved ones first, most likely first.
     """
-    judged = [_judged(candidate, problems[candidate.goal], settings, effort_spent) for candidate in candidates]
+    judged = [_solved(candidate, problems[candidate.goal], settings, effort_spent, earlier) for candidate in candidates]
     return ranked(distinct(judged), beta)
 
 
-def _judged(candidate: Candidate, problem: Problem, settings: FocConfig, effort_spent: float) -> Outcome:
-    """Solve one; its cost is the integral of squared jerk, spent and to go, so that durations compare."""
-    solution = forward(problem, candidate.guess, settings)
+def _solved(
+    candidate: Candidate, problem: Problem, settings: FocConfig, effort_spent: float, earlier: Earlier | None
+) -> Outcome:
+    """Solve from the earlier solution, and if that does not come out well, from the candidate's own guess."""
+    previous = earlier.solutions.get(candidate.label) if earlier else None
+    if earlier and previous is not None:
+        outcome = _judged(candidate, problem, forward(problem, warm(previous, earlier.elapsed_s, problem), settings), effort_spent)
+        if outcome.solved:
+            return outcome
+    return _judged(candidate, problem, forward(problem, cold(candidate.guess), settings), effort_spent)
+
+
+def _judged(candidate: Candidate, problem: Problem, solution: Solution, effort_spent: float) -> Outcome:
+    """Find the class it is really in; its cost is the integral of squared jerk, spent and to go, so that durations compare."""
     moved = centres(problem.obstacles, solution.dt, problem.horizon.steps)
     where = np.concatenate((problem.obstacles.centre[:, None], moved), axis=1).swapaxes(0, 1)
     sides = path_sides(solution.path, problem.obstacles, where)

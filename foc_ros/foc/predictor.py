@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,17 +14,19 @@ from .dynamics import triple_integrator_horizon
 from .homotopy import search
 from .likelihood import most_likely
 from .noise import noise_per_step
-from .outcomes import solve_candidates
+from .outcomes import Earlier, solve_candidates
 from .problem import Problem, rest_to_goal
 from .replanning import triple_integrator_error_map
-from .records import Array, HandState, Obstacles, Prediction
+from .records import NANOSECONDS, Array, HandState, Obstacles, Prediction, Solution
 
 
 @dataclass(frozen=True)
 class Memory:
-    """What one prediction hands to the next: the label that was the most likely."""
+    """What one prediction hands to the next: the label that was the most likely, and what it solved, by label, at its stamp."""
 
     most_likely: str | None = None
+    solutions: Mapping[str, Solution] = field(default_factory=dict)
+    stamp_ns: int = 0
 
 
 def predict(config: Config, hand: HandState, obstacles: Obstacles, goals: Array, memory: Memory) -> tuple[Prediction, Memory]:
@@ -35,7 +38,8 @@ def predict(config: Config, hand: HandState, obstacles: Obstacles, goals: Array,
     durations = [time_to_go(hand, goal, config.duration) for goal in goals]
     problems = [reaching_problem(config, hand, obstacles, *pair) for pair in zip(goals, durations, strict=True)]
     found = search(hand.mean, goals, obstacles, config.homotopy, durations, config.foc.steps)
-    outcomes = solve_candidates(found.candidates, problems, config.foc, config.likelihood.beta, hand.effort_spent)
+    earlier = Earlier(memory.solutions, (hand.stamp_ns - memory.stamp_ns) / NANOSECONDS)
+    outcomes = solve_candidates(found.candidates, problems, config.foc, config.likelihood.beta, hand.effort_spent, earlier)
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
     best = most_likely(labels, values, memory.most_likely, config.likelihood.margin)
@@ -43,7 +47,7 @@ def predict(config: Config, hand: HandState, obstacles: Obstacles, goals: Array,
     notes = dict(found.notes) | ({'merged': merged} if merged else {})
     seconds = time.perf_counter() - began
     prediction = Prediction(hand.stamp_ns, hand.frame_id, hand.height, tuple(outcomes), best, notes, seconds)
-    return prediction, Memory(best)
+    return prediction, Memory(best, {outcome.candidate.label: outcome.solution for outcome in answer}, hand.stamp_ns)
 
 
 def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: Array, duration_s: float) -> Problem:

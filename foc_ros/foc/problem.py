@@ -60,6 +60,23 @@ class Problem(Record):
         return centres(self.obstacles, self.horizon.dt, self.horizon.steps)
 
     @cached_property
+    def centres_from_free(self) -> Array:
+        """The same, less the mean position without control, (m, N, 2) [m]."""
+        return self.centres - self.free[1:, :2]
+
+    @cached_property
+    def distance_now(self) -> Array:
+        """Distance of the hand from each centre now, (m,) [m]."""
+        away = self.initial_mean[:2] - self.obstacles.centre
+        return np.hypot(away[:, 0], away[:, 1])
+
+    @cached_property
+    def recovery_left(self) -> Array:
+        """Share of the recovery time that is left at steps 1..N, (N,)."""
+        times = self.horizon.dt * np.arange(1, self.horizon.steps + 1)
+        return np.maximum(0.0, 1.0 - times / self.recovery_s)
+
+    @cached_property
     def size(self) -> tuple[Array, Array]:
         """E[R^2] and Var[R^2] of each obstacle, (m,) each [m^2, m^4]."""
         return size_moments(self.obstacles)

@@ -7,6 +7,7 @@ subject to sum_q coefficient[j, t, q] maps[q, t] u >= limit[j, t] for every obst
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -15,18 +16,54 @@ from .records import Array
 
 
 @dataclass(frozen=True, eq=False)
-class ReachingQP:
-    """A QP in the stacked control u (2N,).
+class Cost:
+    """What is minimised, and the goal: hessian (2N,) > 0; linear (2N,) or None for zero; goal_rows (r, 2N), targets and softness (r,).
 
-    hessian (2N,) > 0; linear (2N,); goal_rows (r, 2N), goal_targets (r,), softness (r,) >= 0; maps (q, N, 2N), coefficients
-    (m, N, q) and limits (m, N): the obstacle rows, m obstacles.
+    With H diagonal, the control that meets only the goal is known in closed form, and so is P, by which rows M press on it:
+    P = H^-1 - H^-1 E'(E H^-1 E' + softness)^-1 E H^-1, E the goal rows.
     """
 
     hessian: Array
-    linear: Array
+    linear: Array | None
     goal_rows: Array
     goal_targets: Array
     softness: Array
+
+    @cached_property
+    def _factors(self) -> tuple[Array, Array, Array]:
+        """H^-1 (2N,), root L (r, r) of (E H^-1 E' + softness)^-1 = L'L, and L E H^-1 (r, 2N)."""
+        inverse = 1.0 / self.hessian
+        weighted = self.goal_rows * inverse
+        gram = weighted @ self.goal_rows.T
+        # unit diagonal: the goal rows mix metres, metres per second and their like
+        scale = 1.0 / np.sqrt(gram.diagonal())
+        gram *= scale[:, None] * scale
+        gram.flat[:: len(gram) + 1] += self.softness * scale**2
+        root = np.linalg.inv(np.linalg.cholesky(gram)) * scale
+        return inverse, root, root @ weighted
+
+    @cached_property
+    def goal_control(self) -> Array:
+        """The minimiser without obstacle rows, (2N,)."""
+        inverse, root, factor = self._factors
+        if self.linear is None:
+            control: Array = (root @ self.goal_targets) @ factor
+            return control
+        free = inverse * self.linear
+        return free + (root @ (self.goal_targets - self.goal_rows @ free)) @ factor
+
+    def pressed(self, rows: Array) -> Array:
+        """Return M P for rows M (k, 2N): what each row's multiplier does to the control."""
+        inverse, _, factor = self._factors
+        control: Array = rows * inverse - (rows @ factor.T) @ factor
+        return control
+
+
+@dataclass(frozen=True, eq=False)
+class ReachingQP:
+    """A cost and obstacle rows: maps (q, N, 2N), coefficients (m, N, q) and limits (m, N), m obstacles."""
+
+    cost: Cost
     maps: Array
     coefficients: Array
     limits: Array
@@ -42,45 +79,44 @@ class ReachingQP:
         return rows
 
 
-def hessian(problem: Problem, lam: float) -> Array:
-    """Diagonal of the Hessian of J_aug, (2N,): 2 (1 + variance weights + lambda sum_t (V_xx + V_yy)) (paper, equation 14)."""
-    diagonal: Array = 2.0 * (1.0 + problem.weighted_variance + lam * problem.summed_variance)
-    return diagonal
+def effort_cost(problem: Problem, lam: float) -> Cost:
+    """Return J_aug: H = 2 (1 + variance weights + lambda sum_t (V_xx + V_yy)) (paper, equation 14), with the problem's goal."""
+    return Cost(2.0 * (1.0 + problem.weighted_variance + lam * problem.summed_variance), None, *problem.goal_rows)
 
 
 def half_planes(problem: Problem, guess: Array, tau: float, *, literal: bool = False) -> tuple[Array, Array]:
-    """Linearise |p - o|^2 >= E[R^2] + tau at a guess (N, 2): unit normals (m, N, 2) and limits (m, N) on normal . p [m].
+    """Linearise |p - o|^2 >= E[R^2] + tau at a guess (N, 2): unit normals (m, N, 2) and limits (m, N) on normal . (S u) [m].
 
     literal: the paper's E[C] + tau <= 0 divided by 2 |d|; its plane lies (reach^2 + d^2) / (2 d) from the centre, d = |guess -
     centre|. Otherwise the plane with the same normal that touches the circle: the two agree at a solution, where the constraint is
-    active, and the touching one cuts less off before it, so fewer relinearisations are needed. Both stay outside the circle.
+    active, and the touching one cuts less off before it, so a far obstacle is never in the way. Both stay outside the circle.
     """
-    offset = guess[None] - problem.centres
-    distance = np.sqrt(np.einsum('jti,jti->jt', offset, offset))
-    normal = np.where(distance[..., None] > 0, offset / np.where(distance > 0, distance, 1.0)[..., None], [0.0, 1.0])
-    reach = np.sqrt(problem.size[0] + tau)[:, None] - recovery_allowance(problem, tau)
-    clearance = (reach**2 + distance**2) / (2 * np.maximum(distance, 1e-12)) if literal else reach
-    return normal, np.einsum('jti,jti->jt', normal, problem.centres) + clearance
+    offset = guess - problem.centres
+    distance = np.hypot(offset[..., 0], offset[..., 1])
+    if not distance.all():  # a guess on a centre has no normal: take the left of the y axis
+        offset[distance == 0] = (0.0, 1.0)
+        distance[distance == 0] = 1.0
+    offset /= distance[..., None]
+    reach = wanted_distance(problem, tau)
+    clearance = (reach**2 + distance**2) / (2 * distance) if literal else reach
+    return offset, np.einsum('jti,jti->jt', offset, problem.centres_from_free) + clearance
 
 
-def recovery_allowance(problem: Problem, tau: float) -> Array:
-    """How much nearer than the wanted distance the hand may be, (m, N) [m].
+def wanted_distance(problem: Problem, tau: float) -> Array:
+    """Distance from each centre that the mean has to keep, (m, 1) or (m, N) [m]: sqrt(E[R^2] + tau).
 
-    Zero unless the hand is inside now: then what is missing now, falling to zero linearly over the recovery time, so that the
-    problem asks for a way out, not for a jump.
+    Less where the hand is nearer now: what is missing now may be missing still, falling to zero linearly over the recovery time, so
+    that the problem asks for a way out, not for a jump.
     """
-    wanted = np.sqrt(problem.size[0] + tau)
-    away = np.sqrt(((problem.initial_mean[:2] - problem.obstacles.centre) ** 2).sum(axis=1))
-    times = problem.horizon.dt * np.arange(1, problem.horizon.steps + 1)
-    left = np.maximum(0.0, 1.0 - times / problem.recovery_s) if problem.recovery_s > 0 else np.zeros_like(times)
-    allowance: Array = np.maximum(0.0, wanted - away)[:, None] * left[None, :]
-    return allowance
+    reach = np.sqrt(problem.size[0] + tau)[:, None]
+    missing = reach - problem.distance_now[:, None]
+    if problem.recovery_s <= 0 or missing.max(initial=0.0) <= 0:
+        return reach
+    distance: Array = reach - np.maximum(missing, 0.0) * problem.recovery_left
+    return distance
 
 
-def clearance_qp(problem: Problem, guess: Array, tau: float, lam: float, *, literal: bool = False) -> ReachingQP:
-    """Build the paper's reformulated problem (equation 14) at a guess (N, 2): E[C] + tau <= 0 everywhere, lambda on the variance."""
-    normal, limit = half_planes(problem, guess, tau, literal=literal)
-    rows, targets, softness = problem.goal_rows
-    free = np.einsum('jti,ti->jt', normal, problem.free[1:, :2])
-    diagonal = hessian(problem, lam)
-    return ReachingQP(diagonal, np.zeros_like(diagonal), rows, targets, softness, problem.position_map, normal, limit - free)
+def clearance_qp(problem: Problem, cost: Cost, guess: Array, tau: float, *, literal: bool = False) -> ReachingQP:
+    """Build the paper's reformulated problem (equation 14) at a guess (N, 2): E[C] + tau <= 0 everywhere; cost: with its lambda."""
+    normals, limits = half_planes(problem, guess, tau, literal=literal)
+    return ReachingQP(cost, problem.position_map, normals, limits)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .problem import Problem
-from .qp import clearance_qp, half_planes, hessian, recovery_allowance
+from .qp import Cost, clearance_qp, effort_cost, half_planes, wanted_distance
 from .records import Array
 from .solver import QPSolution, WorkingSet, solve
 
@@ -37,10 +37,10 @@ class Converged:
 
 def converge(problem: Problem, guess: Array, working: WorkingSet, tau: float, lam: float) -> Converged | None:
     """Solve the reformulated problem at (tau, lambda) from a guess (N, 2); None where its rows contradict each other."""
-    weights = hessian(problem, lam)
+    cost = effort_cost(problem, lam)
     solves, previous = 0, None
     for _ in range(MAX_QPS):
-        solution = solve(clearance_qp(problem, guess, tau, lam), working)
+        solution = solve(clearance_qp(problem, cost, guess, tau), working)
         if solution is None:
             return None
         solves += solution.solves
@@ -51,20 +51,20 @@ def converge(problem: Problem, guess: Array, working: WorkingSet, tau: float, la
         rows = (working.obstacle.tobytes(), working.step.tobytes())
         guess = positions
         if len(working) and (rows == previous or move < NEAR):
-            better = _newton(problem, positions, solution, tau, weights)
+            better = _newton(problem, positions, solution, tau, cost)
             guess = positions if better is None else better
         previous = rows
     return Converged(solution.control, positions, solution, solves, stays=False)
 
 
-def _newton(problem: Problem, positions: Array, solution: QPSolution, tau: float, weights: Array) -> Array | None:
+def _newton(problem: Problem, positions: Array, solution: QPSolution, tau: float, cost: Cost) -> Array | None:
     """Newton steps on the Karush-Kuhn-Tucker equations with the active rows held as touching their circles.
 
     A multiplier y at distance d adds the circle's curvature, -y / d along the tangent, to the Hessian: a goal row of negative
     softness -d / y. Returns positions (N, 2), or None where the steps leave what they assume: multipliers positive, a minimum
     (as many negative eigenvalues as curvature rows), all circles clear, cost not above that of `solution`.
     """
-    cost = 0.5 * float(solution.control @ (weights * solution.control))
+    weights, bound = cost.hessian, float(solution.control @ (cost.hessian * solution.control))
     multipliers, last = solution.multipliers, np.inf
     for _ in range(NEWTON_STEPS):
         step = _newton_step(problem, positions, solution.active, multipliers, tau, weights)
@@ -79,9 +79,8 @@ def _newton(problem: Problem, positions: Array, solution: QPSolution, tau: float
         if move < 0.01 * STAYS:
             break
     offset = positions[None] - problem.centres
-    reach = np.sqrt(problem.size[0] + tau)[:, None] - recovery_allowance(problem, tau)
-    clear = (np.hypot(offset[..., 0], offset[..., 1]) - reach).min() > -0.1 * STAYS
-    return positions if clear and 0.5 * float(control @ (weights * control)) <= cost * (1 + 1e-12) else None
+    clear = (np.hypot(offset[..., 0], offset[..., 1]) - wanted_distance(problem, tau)).min() > -0.1 * STAYS
+    return positions if clear and float(control @ (weights * control)) <= bound * (1 + 1e-12) else None
 
 
 def _newton_step(
@@ -98,7 +97,7 @@ def _newton_step(
     targets = np.concatenate(
         (
             goal_targets,
-            limits[active.obstacle, active.step] - np.einsum('ki,ki->k', normal, free),
+            limits[active.obstacle, active.step],
             np.einsum('ki,ki->k', tangent, positions[active.step] - free),
         )
     )

@@ -1,0 +1,122 @@
+"""Effort that a movement has taken so far: the integral of its squared jerk [m^2/s^5], from noisy positions.
+
+A minimum-jerk movement between two states is the quintic that joins them, and its effort has a closed form: over a stretch of
+duration T, with positions sum_k c_k s^k (s = t / T in [0, 1], k = 0..5),
+
+    J = c' H c / T^5,  H_jk = j(j-1)(j-2) k(k-1)(k-2) / (j + k - 5),  e.g. 720 D^2 / T^5 from rest to rest over a distance D.
+
+Jerk is a third derivative, so states of a filter at two nearby stamps give mostly noise. Instead the quintic is fitted to all
+samples of a stretch, and a stretch is as long as one quintic explains it: then noise does not grow with the sampling rate, nor
+with the slowness of the movement. The samples enter by sums alone, so a step costs the same however long the stretch is.
+
+Only what the samples show to be jerk is counted. In coordinates y = L' c that are uncorrelated (L L': the sums of powers, so that
+y_k is what degree k adds), each degree k >= 3 is shrunk by max(0, 1 - 12 E / |y_k|^2), where E = 2 sigma^2 is what noise alone
+gives; and it waits until noise alone would add less than a tenth of the effort of a straight reach as long as the stretch. So
+the estimate starts at zero and stays low, never noise.
+
+Measured (1 mm of noise, 0.3 m from rest to rest in 0.6 to 4 s, at 15, 50 and 200 Hz): at the end 0.4 to 0.7 of the true effort in
+the median, of which the part before onset is noticed is a quarter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .records import NANOSECONDS, Array, Record
+
+DEGREE = 5
+LEAST_SAMPLES = 8
+LEAST_TIME_S = 0.2
+"""A stretch is judged from here on. With shorter ones an outlier of 10 mm at 200 Hz made 1e5 times the true effort."""
+SHRINKAGE = 12.0
+"""Noise exceeds it once in exp(8) = 3000 times; with 4, spikes of 20 times the final effort came early in slow movements."""
+NOISE_SHARE = 0.1
+MISFIT = 2.0
+"""Root mean square of the residuals, in standard deviations of a position, beyond which a quintic does not explain a stretch."""
+
+_K = np.arange(DEGREE + 1)
+_THIRD = _K * (_K - 1.0) * (_K - 2.0)
+_H: Array = np.outer(_THIRD, _THIRD) / np.maximum(_K[:, None] + _K - 5.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Effort(Record):
+    """What is known of a movement's effort.
+
+    spent: so far [m^2/s^5]; before: of it, before the present stretch. The present stretch, as sums over its samples at times
+    t [s] since start_ns (None: no sample yet) and positions z (2,) [m] from origin: powers (11,) of t^0..t^10, products (6, 2) of
+    t^k z, square of |z|^2; last_s: time of the last sample [s].
+    """
+
+    spent: float = 0.0
+    before: float = 0.0
+    start_ns: int | None = None
+    last_s: float = 0.0
+    origin: Array = field(default_factory=lambda: np.zeros(2))
+    powers: Array = field(default_factory=lambda: np.zeros(2 * DEGREE + 1))
+    products: Array = field(default_factory=lambda: np.zeros((DEGREE + 1, 2)))
+    square: float = 0.0
+
+
+def advanced(effort: Effort, stamp_ns: int, position: Array, stddev: float) -> Effort:
+    """Take the movement's next sample; stddev: of a measured position [m].
+
+    A sample that the stretch's quintic does not explain ends the stretch, and belongs to none: it may be an outlier.
+    """
+    stretch = _with_sample(effort, stamp_ns, position)
+    fit = _fitted(stretch, stddev)
+    if fit is None:
+        return stretch
+    spent, residual = fit
+    if residual > MISFIT * stddev:
+        return Effort(spent=effort.spent, before=effort.spent)
+    return replace(stretch, spent=stretch.before + spent)
+
+
+def _with_sample(effort: Effort, stamp_ns: int, position: Array) -> Effort:
+    if effort.start_ns is None:
+        effort = replace(effort, start_ns=stamp_ns, origin=position)
+    assert effort.start_ns is not None
+    seconds = (stamp_ns - effort.start_ns) / NANOSECONDS
+    powers = seconds ** np.arange(2 * DEGREE + 1)
+    z = position - effort.origin
+    return replace(
+        effort,
+        last_s=seconds,
+        powers=effort.powers + powers,
+        products=effort.products + np.outer(powers[: DEGREE + 1], z),
+        square=effort.square + float(z @ z),
+    )
+
+
+def _fitted(stretch: Effort, stddev: float) -> tuple[float, float] | None:
+    """Return a stretch's effort [m^2/s^5] and the root mean square of its residuals [m]; None where it is too short to tell."""
+    count, T = stretch.powers[0], stretch.last_s
+    if count < LEAST_SAMPLES or T < LEAST_TIME_S:
+        return None
+    gram = stretch.powers[_K[:, None] + _K] / T ** (_K[:, None] + _K)
+    root = _root(gram)
+    if root is None:
+        return None
+    y = np.linalg.solve(root, stretch.products / T ** _K[:, None])
+    energy = np.sum(y**2, axis=1)
+    # The floor is what rounding leaves of the difference of two large sums.
+    residual = max(stretch.square - float(energy.sum()), 1e-12 * stretch.square) / (2.0 * (count - DEGREE - 1))
+    noise = 2.0 * max(stddev**2, residual)
+    jerk = np.linalg.solve(root, np.linalg.solve(root, _H).T)
+    length_squared = 12.0 * energy[1:].sum() / count
+    told = noise * np.diag(jerk) <= NOISE_SHARE * 720.0 * length_squared
+    y = (np.maximum(1.0 - SHRINKAGE * noise / np.maximum(energy, noise), 0.0) * told)[:, None] * y
+    return float(np.sum(y * (jerk @ y))) / T**5, float(np.sqrt(residual))
+
+
+def _root(gram: Array) -> Array | None:
+    """Return the Cholesky factor of the sums of powers; None where bunched stamps do not tell the degrees apart."""
+    try:
+        root: Array = np.linalg.cholesky(gram)
+    except np.linalg.LinAlgError:
+        return None
+    told_apart = bool(np.all(np.diag(root) ** 2 > 1e-9 * np.diag(gram)))
+    return root if told_apart else None

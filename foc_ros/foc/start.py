@@ -1,0 +1,54 @@
+"""Where the search for a solution begins: at a guess, or at the last tick's solution moved on in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .problem import Problem
+from .records import Array, Solution
+from .solver import WorkingSet
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Positions (N, 2) at steps 1..N [m] to linearise at.
+
+    From an earlier solution also its stacked control (2N,), its active rows with their multipliers, and its lambda; lam is None for a
+    cold start, which has none of these.
+    """
+
+    positions: Array
+    control: Array | None = None
+    active: WorkingSet = field(default_factory=WorkingSet)
+    multipliers: Array = field(default_factory=lambda: np.zeros(0))
+    lam: float | None = None
+
+
+def cold(guess: Array) -> Start:
+    """Start at a guess (N + 1, 2) [m] at steps 0..N."""
+    return Start(np.asarray(guess, dtype=float)[1:])
+
+
+def warm(previous: Solution, elapsed_s: float, problem: Problem) -> Start:
+    """Start at a solution found elapsed_s [s] ago, read off at the new steps; past its end it rests at its goal."""
+    steps, dt = problem.horizon.steps, problem.horizon.dt
+    times = elapsed_s + dt * np.arange(1, steps + 1)
+    positions = np.stack([np.interp(times, previous.times, axis) for axis in previous.path.T], axis=1)
+    held = ((times - dt) / previous.dt).astype(np.intp)
+    control = np.where(held < len(previous.control), previous.control[np.minimum(held, len(previous.control) - 1)].T, 0.0)
+    row = {identity: index for index, identity in enumerate(problem.obstacles.ids)}
+    kept: dict[tuple[int, int], float] = {}
+    for identity, step, value in previous.multipliers:
+        moved = round((step * previous.dt - elapsed_s) / dt)
+        if identity in row and 1 <= moved <= steps:
+            kept[row[identity], moved - 1] = kept.get((row[identity], moved - 1), 0.0) + value
+    rows = np.array(sorted(kept), dtype=np.intp).reshape(-1, 2)
+    return Start(
+        positions,
+        control.ravel(),
+        WorkingSet(rows[:, 0], rows[:, 1]),
+        np.array([kept[pair] for pair in sorted(kept)]),
+        previous.lam,
+    )
