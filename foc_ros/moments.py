@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .conversions.ranking import cost_ratios, ranked
 from .foc.records import NANOSECONDS, Array, HandSample, Obstacles, Outcome, Prediction, Record
 
 
@@ -81,14 +82,19 @@ def track_of(samples: Sequence[HandSample]) -> Track:
     return Track(stamps[fresh], positions[fresh])
 
 
-def way_of(outcome: Outcome, best_cost: float) -> Way:
-    """Return a solved outcome as a way; best_cost: the smallest cost of the prediction."""
+def ways_of(outcomes: Sequence[Outcome]) -> tuple[Way, ...]:
+    """Return the solved ones of the outcomes, in their order."""
+    solved = tuple(outcome for outcome in outcomes if outcome.solved)
+    return tuple(_way(outcome, ratio) for outcome, ratio in zip(solved, cost_ratios(solved), strict=True))
+
+
+def _way(outcome: Outcome, cost_ratio: float) -> Way:
     solution = outcome.solution
     return Way(
         outcome.candidate.label,
         outcome.likelihood,
         solution.effort,
-        outcome.cost / best_cost if best_cost > 0.0 else 1.0,
+        cost_ratio,
         solution.eta,
         solution.times,
         solution.path,
@@ -97,20 +103,13 @@ def way_of(outcome: Outcome, best_cost: float) -> Way:
     )
 
 
-def ways_of(outcomes: Sequence[Outcome]) -> tuple[Way, ...]:
-    """Return the solved ones of the outcomes, in their order."""
-    solved = [outcome for outcome in outcomes if outcome.solved]
-    best = min((outcome.cost for outcome in solved), default=0.0)
-    return tuple(way_of(outcome, best) for outcome in solved)
-
-
 def moment_of(prediction: Prediction, obstacles: Obstacles, goals: Array) -> Moment:
-    """Return a prediction with the scene it was made in."""
+    """Return a prediction with the scene it was made in. Raises FocError where it holds a number that is not finite."""
     return Moment(
         prediction.stamp_ns,
         obstacles,
         goals,
-        ways_of(prediction.outcomes),
+        ways_of(ranked(prediction)),
         prediction.most_likely,
         tuple((each.candidate.label, each.solution.status.value) for each in prediction.outcomes if not each.solved),
         prediction.solve_s,

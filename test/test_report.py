@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -128,9 +129,9 @@ def test_a_hand_that_never_moves(tmp_path: Path) -> None:
 
 
 def test_numbers_that_json_has_not_become_null(tmp_path: Path) -> None:
-    made = prediction(START_NS, np.zeros(2))
-    object.__setattr__(made.outcomes[0].solution, 'eta', float('nan'))
-    write_report(tmp_path, 'x', track_of(samples()), [moment_of(made, *scene())], {})
+    made = moment_of(prediction(START_NS, np.zeros(2)), *scene())
+    lost = replace(made, ways=(replace(made.ways[0], eta=float('nan')), *made.ways[1:]))
+    write_report(tmp_path, 'x', track_of(samples()), [lost], {})
     text = (tmp_path / 'predictions.json').read_text(encoding='utf-8')
     assert 'NaN' not in text
     assert json.loads(text)['predictions'][0]['candidates'][0]['eta'] is None
