@@ -1,0 +1,207 @@
+"""Parameters from the config classes: the file, and those of the node."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from ros_helpers import Graph
+
+from foc_ros import parameters as module
+from foc_ros.foc.config import Config, flatten, parameters, updated
+from foc_ros.foc.errors import FocError, ParameterError, RecordingError
+from foc_ros.parameters import config_of, declare_all, dump_parameter_file, load_parameter_file
+
+ROOT = Path(__file__).parents[1]
+NAMES = [parameter.name for parameter in parameters()]
+
+
+def load(folder: Path, text: str) -> Config:
+    file = folder / 'params.yaml'
+    file.write_text(text, 'utf-8')
+    return load_parameter_file(file)
+
+
+def test_the_shipped_file_is_current() -> None:
+    made = subprocess.run(
+        [sys.executable, '-m', 'foc_ros.parameters'], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
+    assert made == (ROOT / 'config' / 'foc.yaml').read_text('utf-8'), 'run: python -m foc_ros.parameters > config/foc.yaml'
+
+
+def test_the_shipped_file_holds_the_defaults() -> None:
+    assert load_parameter_file(ROOT / 'config' / 'foc.yaml') == Config()
+
+
+def test_the_file_explains_every_parameter() -> None:
+    lines = dump_parameter_file(Config()).splitlines()
+    for name in NAMES:
+        leaf = name.rpartition('.')[2]
+        above = [lines[i - 1] for i, line in enumerate(lines) if line.strip().startswith(f'{leaf}: ')]
+        assert above
+        assert all(re.match(r' +# \w', comment) for comment in above), leaf
+
+
+def values_of(parameter: Any) -> st.SearchStrategy[Any]:
+    bound = parameter.bound
+    if bound.choices:
+        return st.sampled_from(bound.choices)
+    if isinstance(parameter.default, str):
+        return st.text(st.characters(codec='ascii', exclude_categories=['Cc']), max_size=12)
+    if isinstance(parameter.default, int):
+        return st.integers(int(bound.low), int(bound.high))
+    return st.floats(bound.low, bound.high)
+
+
+@given(st.fixed_dictionaries({}, optional={parameter.name: values_of(parameter) for parameter in parameters()}))
+def test_every_configuration_comes_back_from_its_file(tmp_path_factory: pytest.TempPathFactory, values: dict[str, Any]) -> None:
+    config = updated(Config(), values)
+    assert load(tmp_path_factory.getbasetemp(), dump_parameter_file(config)) == config
+
+
+@pytest.mark.parametrize('key', ['/**', 'foc', '/foc'])
+@pytest.mark.parametrize(
+    'body', ['foc: {eta: 0.8, steps: 20}', '{foc.eta: 0.8, foc.steps: 20}', '{foc: {eta: 0.8}, foc.steps: 20}']
+)
+def test_names_are_nested_or_dotted(tmp_path: Path, key: str, body: str) -> None:
+    config = load(tmp_path, f'{key}: {{ros__parameters: {{{body.strip("{}") if body[0] == "{" else body}}}}}')
+    assert (config.foc.eta, config.foc.steps) == (0.8, 20)
+    assert dataclasses.replace(config, foc=Config().foc) == Config()
+
+
+def test_what_others_put_into_the_file_is_skipped(tmp_path: Path) -> None:
+    text = """
+/other_node: {ros__parameters: {gain: 3}}
+/**:
+  ros__parameters:
+    use_sim_time: true
+    start_type_description_service: false
+    qos_overrides: {/hand_pose: {subscription: {depth: 10}}}
+    rate_hz: 20
+foc: {ros__parameters: {rate_hz: 25}}
+"""
+    config = load(tmp_path, text)
+    assert config.rate_hz == 25.0
+    assert isinstance(config.rate_hz, float)
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('/**: {ros__parameters: {rate: 5}}', 'rate: expected a known parameter, got 5'),
+        ('/**: {ros__parameters: {foc: {eta: {low: 1}}}}', 'foc.eta: expected a finite number'),
+        ('/**: {ros__parameters: {foc: {etta: 0.5}}}', 'foc.etta: expected a known parameter, got 0.5'),
+        ('/**: {ros__parameters: {foc: 5}}', 'foc: expected a group of parameters, got 5'),
+        ('/**: {ros__parameters: {foc: {eta: 1.5}}}', 'foc.eta: expected a number in [0, 0.999], got 1.5'),
+        ('/**: {ros__parameters: {foc: {eta: .nan}}}', 'foc.eta: expected a finite number in [0, 0.999], got nan'),
+        ('/**: {ros__parameters: {foc: {steps: 20.5}}}', 'foc.steps: expected a whole number in [5, 400], got 20.5'),
+        ('/**: {ros__parameters: {foc: {steps: true}}}', 'foc.steps: expected a finite number in [5, 400], got True'),
+        ('/**: {ros__parameters: {foc: {steps: null}}}', 'foc.steps: expected a finite number in [5, 400], got None'),
+        (
+            '/**: {ros__parameters: {foc: {strategy: best}}}',
+            "foc.strategy: expected one of lv, hc, optimal, algorithm1, fixed, got 'best'",
+        ),
+        ('/**: {ros__parameters: {frame_id: 7}}', 'frame_id: expected a text, got 7'),
+        (f'/**: {{ros__parameters: {{rate_hz: {"9" * 400}}}}}', 'rate_hz: expected a number of 64 bits, got one of 400 digits'),
+        ('/**: {ros__parameters: [1, 2]}', '/**: expected ros__parameters with parameters below it'),
+        ('/**: {rate_hz: 5}', '/**: expected ros__parameters with parameters below it'),
+        ('foc:', 'foc: expected ros__parameters with parameters below it, got None'),
+        ('/other: {ros__parameters: {rate_hz: 5}}', 'expected a section /** or foc or /foc, got /other'),
+        ('[1, 2]', 'expected a section /** or foc or /foc, got list'),
+        ('', 'expected a section /** or foc or /foc, got NoneType'),
+    ],
+)
+def test_a_wrong_file_is_refused_in_words(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(ParameterError, match=re.escape(words)):
+        load(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    'text', ['/**: {ros__parameters: {rate_hz: 5', '!!python/object/apply:os.system ["true"]', '/**: {a: 1, a: 2}', '\x00']
+)
+def test_a_file_that_is_no_plain_yaml_is_refused(tmp_path: Path, text: str) -> None:
+    with pytest.raises(RecordingError, match=r'params\.yaml: not a YAML file'):
+        load(tmp_path, text)
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(FocError, match=r'absent\.yaml: cannot be read'):
+        load_parameter_file(tmp_path / 'absent.yaml')
+
+
+def test_aliases_do_not_multiply_without_bound(tmp_path: Path) -> None:
+    levels = ['a0: &a0 {x: 1}', *[f'a{i}: &a{i} {{b: *a{i - 1}, c: *a{i - 1}}}' for i in range(1, 60)]]
+    text = 'other:\n' + '\n'.join(f'  {line}' for line in levels) + '\n/**: {ros__parameters: {foc: {d: {e: 1}}}}'
+    with pytest.raises(ParameterError, match=r'foc\.d: expected a known parameter'):
+        load(tmp_path, text)
+
+
+def node_with(ros: Graph, **overrides: object) -> Any:
+    from rclpy.parameter import Parameter
+
+    given_values = [Parameter(name.replace('__', '.'), value=value) for name, value in overrides.items()]
+    return ros.node('foc', parameter_overrides=given_values, automatically_declare_parameters_from_overrides=True)
+
+
+def test_a_node_declares_every_parameter_with_its_meaning_and_range(ros: Graph) -> None:
+    node = node_with(ros)
+    assert declare_all(node, Config()) == Config() == config_of(node)
+    for parameter in parameters():
+        descriptor = node.describe_parameter(parameter.name)
+        assert node.get_parameter(parameter.name).value == parameter.default
+        assert descriptor.description.startswith(parameter.bound.meaning)
+        assert descriptor.read_only is parameter.bound.read_only
+        ranges = [*descriptor.integer_range, *descriptor.floating_point_range]
+        assert [(each.from_value, each.to_value) for each in ranges] == (
+            [] if parameter.bound.low is None else [(parameter.bound.low, parameter.bound.high)]
+        )
+        assert all(choice in descriptor.additional_constraints for choice in parameter.bound.choices)
+
+
+def test_a_node_starts_with_what_it_was_given(ros: Graph) -> None:
+    node = node_with(ros, rate_hz=20, foc__eta=0.7, use_sim_time=False)
+    config = declare_all(node, Config())
+    assert config == updated(Config(), {'rate_hz': 20.0, 'foc.eta': 0.7}) == config_of(node)
+    assert isinstance(node.get_parameter('rate_hz').value, float)
+
+
+def test_a_node_does_not_start_with_a_value_out_of_bounds(ros: Graph) -> None:
+    with pytest.raises(ParameterError, match=re.escape('foc.eta: expected a number in [0, 0.999], got 2.0')):
+        declare_all(node_with(ros, foc__eta=2.0), Config())
+
+
+def test_a_node_reads_the_file_that_replay_reads(tmp_path: Path) -> None:
+    from ros_helpers import graph
+
+    config = updated(Config(), {'foc.lv_delta': 5e-5, 'foc.lam': 1e15, 'frame_id': 'base', 'foc.steps': 33})
+    file = tmp_path / 'params.yaml'
+    file.write_text(dump_parameter_file(config), 'utf-8')
+    with graph(['--ros-args', '--params-file', str(file)]) as ros:
+        assert declare_all(node_with(ros), Config()) == config == load_parameter_file(file)
+
+
+def test_an_unknown_parameter_of_a_node_is_warned_of(ros: Graph) -> None:
+    class Log:
+        def __init__(self) -> None:
+            self.lines: list[str] = []
+
+        def warning(self, line: str) -> None:
+            self.lines.append(line)
+
+    node, log = node_with(ros, foc__etta=0.5), Log()
+    node.get_logger = lambda: log
+    declare_all(node, Config())
+    assert log.lines == ['parameter foc.etta is unknown and has no effect']
+
+
+def test_names_in_the_file_are_the_names_of_the_node() -> None:
+    tree = yaml.safe_load(dump_parameter_file(Config()))['/**']['ros__parameters']
+    assert dict(module._leaves(tree)) == flatten(Config())
