@@ -7,28 +7,46 @@ Per axis the state is x = (position, velocity, acceleration) driven by white jer
 
 the exact discretisation for any dt, so irregular stamps need no resampling. Both axes are measured equally well, so they share
 one 3 x 3 covariance and one gain.
+
+The first sample gives the position. Velocity and acceleration then start at zero with the covariance that a hand at rest would
+have got from the jerk in `gap_s`, the longest time for which the filter believes in an old state.
+
+A movement begins where the speed exceeds `onset_speed` and three of its own standard deviations, and ends below half of
+`onset_speed`. Measured at rest with 1 mm of noise and the default jerk density: the second condition lowers the false onsets from
+several per second to one in 45 s or fewer, and delays a true one (0.3 m in 1 s) by 0.03 s at 200 Hz and 0.09 s at 15 Hz.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from .config import EstimatorConfig
+from .effort import Effort, advanced
 from .records import NANOSECONDS, Array, HandSample, HandState
 from .verdict import Verdict
+
+ONSET_STDDEVS = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Track(HandState):
+    """A hand state, and what else the estimator remembers: the samples since onset, as far as the effort needs them."""
+
+    effort: Effort = field(default_factory=Effort)
 
 
 @dataclass(frozen=True)
 class Update:
     """The estimator's answer: the state to hand in next time, and what became of the sample."""
 
-    state: HandState
+    state: Track
     verdict: Verdict
 
 
-def update(state: HandState | None, sample: HandSample, config: EstimatorConfig) -> Update:
+def update(state: Track | None, sample: HandSample, config: EstimatorConfig) -> Update:
     """Take one sample into the filter.
 
     state: of the last update, None at the start. A sample of the same stamp, or late by no more than `gap_s`, is dropped: the
@@ -45,7 +63,7 @@ def update(state: HandState | None, sample: HandSample, config: EstimatorConfig)
         return Update(state, Verdict.LATE)
     if dt > config.gap_s:
         return Update(_first(sample, config), Verdict.RESTARTED_GAP)
-    return Update(_onset(_filtered(state, sample, dt, config), config), Verdict.ACCEPTED)
+    return Update(_moved(_filtered(state, sample, dt, config), sample, config), Verdict.ACCEPTED)
 
 
 def transition(dt: float) -> Array:
@@ -64,15 +82,15 @@ def gramian(dt: float) -> Array:
     )
 
 
-def _first(sample: HandSample, config: EstimatorConfig) -> HandState:
-    """Start: the position as measured; velocity and acceleration as far from rest as the jerk could bring them in `gap_s`."""
+def _first(sample: HandSample, config: EstimatorConfig) -> Track:
+    """Start from one position."""
     covariance = config.jerk_density**2 * gramian(config.gap_s)
     covariance[0] = covariance[:, 0] = (config.position_stddev**2, 0.0, 0.0)
     mean = np.concatenate([sample.position, np.zeros(4)])
-    return HandState(sample.stamp_ns, mean, _both_axes(covariance), sample.height, sample.frame_id)
+    return Track(sample.stamp_ns, mean, _both_axes(covariance), sample.height, sample.frame_id)
 
 
-def _filtered(state: HandState, sample: HandSample, dt: float, config: EstimatorConfig) -> HandState:
+def _filtered(state: Track, sample: HandSample, dt: float, config: EstimatorConfig) -> Track:
     """Predict to the sample's stamp and correct by it, in Joseph form: the covariance stays symmetric and positive."""
     variance = config.position_stddev**2
     a = transition(dt)
@@ -101,11 +119,14 @@ def _both_axes(covariance: Array) -> Array:
     return both
 
 
-def _onset(state: HandState, config: EstimatorConfig) -> HandState:
-    """Begin a movement above `onset_speed`, end it below half of that."""
-    speed = float(np.hypot(state.mean[2], state.mean[3]))
-    if state.onset_ns is None and speed > config.onset_speed:
-        return replace(state, onset_ns=state.stamp_ns, onset_position=state.mean[:2].copy(), effort_spent=0.0)
-    if state.onset_ns is not None and speed < config.onset_speed / 2.0:
-        return replace(state, onset_ns=None, onset_position=None, effort_spent=0.0)
-    return state
+def _moved(state: Track, sample: HandSample, config: EstimatorConfig) -> Track:
+    """Begin, go on with, or end a movement."""
+    speed = math.hypot(state.mean[2], state.mean[3])
+    if state.onset_ns is None:
+        if speed <= max(config.onset_speed, ONSET_STDDEVS * math.sqrt(state.covariance[2, 2])):
+            return state
+        state = replace(state, onset_ns=state.stamp_ns, onset_position=state.mean[:2])
+    elif speed < config.onset_speed / 2.0:
+        return replace(state, onset_ns=None, onset_position=None, effort_spent=0.0, effort=Effort())
+    effort = advanced(state.effort, sample.stamp_ns, sample.position, config.position_stddev)
+    return replace(state, effort=effort, effort_spent=effort.spent)

@@ -9,9 +9,9 @@ from collections import Counter
 
 from .config import Config
 from .errors import FocError, InputError
-from .estimator import update
+from .estimator import Track, update
 from .predictor import Memory, predict
-from .records import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction
+from .records import NANOSECONDS, Array, HandSample, Obstacles, Prediction
 from .scene import Part, Scene
 from .verdict import Verdict
 
@@ -27,7 +27,7 @@ class Pipeline:
 
     def __init__(self, config: Config) -> None:
         self.config = config
-        self.hand_state: HandState | None = None
+        self.hand_state: Track | None = None
         self.scene = Scene()
         self.engaged = True
         self.last_refusal: str | None = None

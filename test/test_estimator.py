@@ -1,0 +1,178 @@
+"""The Kalman filter of the hand: against plain matrices, consistent, with onset, and with every kind of stamp."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from foc_ros.foc.config import EstimatorConfig
+from foc_ros.foc.estimator import Track, gramian, transition, update
+from foc_ros.foc.records import NANOSECONDS, Array, HandSample
+from foc_ros.foc.verdict import Verdict
+
+CONFIG = EstimatorConfig(position_stddev=0.001, jerk_density=5.0, onset_speed=0.05, gap_s=0.5)
+START = 100 * NANOSECONDS
+
+
+def sample(seconds: float, x: float = 0.0, y: float = 0.0, height: float = 0.0) -> HandSample:
+    return HandSample(START + round(seconds * 1e9), np.array([x, y]), height, 'world')
+
+
+def run(times: Array, positions: Array, config: EstimatorConfig = CONFIG) -> list[Track]:
+    states: list[Track] = []
+    for t, (x, y) in zip(times, positions, strict=True):
+        states.append(update(states[-1] if states else None, sample(t, x, y), config).state)
+    return states
+
+
+def white_jerk(rng: np.random.Generator, dt: Array, q: float) -> Array:
+    """States (n + 1, 6) of a hand driven by white jerk from rest at the origin."""
+    states = [np.zeros((3, 2))]
+    for step in dt:
+        noise = np.linalg.cholesky(gramian(step)) @ rng.standard_normal((3, 2))
+        states.append(transition(step) @ states[-1] + q * noise)
+    return np.array(states).reshape(-1, 6)
+
+
+def test_gramian_is_the_integral_of_the_impulse_response() -> None:
+    dt, n = 0.7, 20000
+    t = (np.arange(n) + 0.5) * dt / n
+    response = np.stack([t**2 / 2.0, t, np.ones(n)])
+    np.testing.assert_allclose(gramian(dt), response @ response.T * dt / n, rtol=1e-6)
+
+
+def test_gramian_and_transition_compose() -> None:
+    a, b = 0.13, 0.4
+    np.testing.assert_allclose(transition(a) @ transition(b), transition(a + b), rtol=1e-12)
+    np.testing.assert_allclose(transition(b) @ gramian(a) @ transition(b).T + gramian(b), gramian(a + b), rtol=1e-12)
+
+
+def test_equals_a_plain_filter_with_six_states() -> None:
+    rng = np.random.default_rng(1)
+    times = np.cumsum(rng.uniform(0.002, 0.1, 60))
+    positions = 0.2 * rng.standard_normal((60, 2))
+    observe = np.hstack([np.eye(2), np.zeros((2, 4))])
+    first = run(times[:1], positions[:1])[0]
+    mean, covariance = first.mean, first.covariance
+    for state, dt, position in zip(run(times, positions)[1:], np.diff(np.round(times, 9)), positions[1:], strict=True):
+        a, q = np.kron(transition(dt), np.eye(2)), 25.0 * np.kron(gramian(dt), np.eye(2))
+        mean, covariance = a @ mean, a @ covariance @ a.T + q
+        gain = covariance @ observe.T @ np.linalg.inv(observe @ covariance @ observe.T + 1e-6 * np.eye(2))
+        mean, covariance = mean + gain @ (position - observe @ mean), (np.eye(6) - gain @ observe) @ covariance
+        np.testing.assert_allclose(state.mean, mean, rtol=1e-7, atol=1e-9)
+        np.testing.assert_allclose(state.covariance, covariance, rtol=1e-6, atol=1e-9)
+
+
+def test_the_first_sample_gives_the_position_and_broad_velocity() -> None:
+    state = update(None, sample(0.0, 0.2, -0.1, height=0.4), CONFIG).state
+    np.testing.assert_array_equal(state.mean, [0.2, -0.1, 0.0, 0.0, 0.0, 0.0])
+    deviations = np.sqrt(np.diag(state.covariance))
+    np.testing.assert_allclose(deviations[::2], [0.001, 5.0 * np.sqrt(0.5**3 / 3.0), 5.0 * np.sqrt(0.5)])
+    assert (state.height, state.frame_id, state.onset_ns, state.effort_spent) == (0.4, 'world', None, 0.0)
+
+
+def test_a_uniform_motion_is_found_exactly() -> None:
+    times = np.arange(0.0, 2.0, 0.02)
+    last = run(times, np.outer(times, [0.3, -0.2]))[-1]
+    np.testing.assert_allclose(last.mean, [*(0.3 * times[-1:]), *(-0.2 * times[-1:]), 0.3, -0.2, 0.0, 0.0], atol=2e-4)
+
+
+@pytest.mark.parametrize('rate', [15.0, 50.0, 200.0])
+def test_errors_are_as_large_as_the_covariance_says(rate: float) -> None:
+    """Normalised estimation error squared: its mean over n runs is chi-squared with 6 n degrees of freedom over n."""
+    rng, runs = np.random.default_rng(4), 150
+    scores = []
+    for _ in range(runs):
+        dt = rng.uniform(0.5, 1.5, 30) / rate
+        true = white_jerk(rng, dt, CONFIG.jerk_density)
+        times = np.concatenate([[0.0], np.cumsum(dt)])
+        last = run(times, true[:, :2] + CONFIG.position_stddev * rng.standard_normal((31, 2)))[-1]
+        error = last.mean - true[-1]
+        scores.append(error @ np.linalg.solve(last.covariance, error))
+    assert abs(np.mean(scores) - 6.0) < 3.5 * np.sqrt(12.0 / runs)
+
+
+def test_the_frame_does_not_matter() -> None:
+    rng = np.random.default_rng(2)
+    times, positions = np.arange(0.0, 1.0, 0.02), 0.3 * np.cumsum(rng.standard_normal((50, 2)), axis=0) * 0.02
+    turn, shift = np.array([[0.6, -0.8], [0.8, 0.6]]), np.array([1.0, -2.0])
+    here, there = run(times, positions)[-1], run(times, positions @ turn.T + shift)[-1]
+    expected = here.mean.reshape(3, 2) @ turn.T
+    expected[0] += shift
+    np.testing.assert_allclose(there.mean, expected.ravel(), atol=1e-10)
+    np.testing.assert_allclose(there.covariance, here.covariance, atol=1e-15)
+    assert there.onset_ns == here.onset_ns
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    stddev=st.floats(1e-7, 1.0),
+    density=st.floats(1e-6, 1e6),
+    gap=st.floats(0.001, 60.0),
+    steps=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=30),
+    far=st.floats(0.0, 1e6),
+)
+def test_stays_finite_and_positive_for_any_configuration(
+    stddev: float, density: float, gap: float, steps: list[float], far: float
+) -> None:
+    config = EstimatorConfig(position_stddev=stddev, jerk_density=density, gap_s=gap)
+    times = np.cumsum(np.maximum(np.array(steps) * gap, 1e-9))
+    for state in run(times, far * np.array([[(-1.0) ** i, i % 3] for i in range(len(times))]), config):
+        assert np.all(np.isfinite(state.mean))
+        np.testing.assert_array_equal(state.covariance, state.covariance.T)
+        scale = np.sqrt(np.diag(state.covariance))
+        assert np.all(scale > 0.0)
+        assert np.linalg.eigvalsh(state.covariance / np.outer(scale, scale)).min() > -1e-9
+        assert np.isfinite(state.effort_spent)
+        assert state.effort_spent >= 0.0
+
+
+def test_duplicates_and_late_samples_change_nothing() -> None:
+    state = run(np.arange(0.0, 1.0, 0.02), np.zeros((50, 2)))[-1]
+    for seconds, verdict in [(0.0, Verdict.DUPLICATE), (-1e-9, Verdict.LATE), (-0.5, Verdict.LATE)]:
+        answer = update(state, sample(0.98 + seconds, 9.0, 9.0), CONFIG)
+        assert answer.verdict is verdict
+        assert answer.state is state
+
+
+def test_jumps_back_and_gaps_start_anew() -> None:
+    state = run(np.arange(0.0, 1.0, 0.02), np.outer(np.arange(0.0, 1.0, 0.02), [0.5, 0.0]))[-1]
+    assert state.onset_ns is not None
+    for seconds, verdict in [(-0.501, Verdict.RESTARTED_BACKWARD), (0.501, Verdict.RESTARTED_GAP), (1e9, Verdict.RESTARTED_GAP)]:
+        jump = sample(0.98 + seconds, 0.7, 0.1)
+        answer, fresh = update(state, jump, CONFIG), update(None, jump, CONFIG).state
+        assert answer.verdict is verdict
+        np.testing.assert_array_equal(answer.state.mean, fresh.mean)
+        np.testing.assert_array_equal(answer.state.covariance, fresh.covariance)
+        assert answer.state.onset_ns is None
+    assert update(state, sample(0.98 + 0.5), CONFIG).verdict is Verdict.ACCEPTED
+
+
+def test_a_movement_begins_above_the_onset_speed_and_ends_below_half_of_it() -> None:
+    config = replace(CONFIG, position_stddev=1e-5)
+    times = np.arange(0.0, 6.0, 0.01)
+    speeds = np.interp(times, [0.0, 1.0, 3.0, 5.0, 6.0], [0.0, 0.0, 0.1, 0.0, 0.0])
+    states = run(times, np.stack([np.cumsum(speeds) * 0.01, 0.0 * times], axis=1), config)
+    moving = np.array([state.onset_ns is not None for state in states])
+    begun, ended = times[moving][0], times[moving][-1]
+    assert np.count_nonzero(np.diff(moving)) == 2
+    assert np.interp(begun, times, speeds) == pytest.approx(0.05, abs=0.002)
+    assert np.interp(ended, times, speeds) == pytest.approx(0.025, abs=0.002)
+    first = next(state for state in states if state.onset_ns is not None)
+    assert first.onset_ns == first.stamp_ns
+    np.testing.assert_array_equal(first.onset_position, first.mean[:2])
+    assert {state.onset_ns for state in states} == {None, first.onset_ns}
+
+
+@pytest.mark.parametrize('rate', [15.0, 50.0, 200.0])
+def test_noise_at_rest_begins_no_movement(rate: float) -> None:
+    rng = np.random.default_rng(8)
+    false = 0
+    for _ in range(10):
+        times = np.arange(0.0, 1.0, 1.0 / rate)
+        states = run(times, 1e-3 * rng.standard_normal((len(times), 2)))
+        false += sum(b.onset_ns is not None and a.onset_ns is None for a, b in itertools.pairwise(states))
+    assert false <= 1
