@@ -55,6 +55,7 @@ lint: $(STAMP)
 
 # What is derived from foc_ros/foc/config.py
 pages: $(STAMP)
+	$(BIN)/python -m foc_ros.parameters > config/foc.yaml
 	$(BIN)/python scripts/make_parameter_page.py
 
 clean:

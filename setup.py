@@ -45,6 +45,7 @@ setup(
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
         'report': ['matplotlib>=3.6'],
         'test': [
+            'daqp>=0.5',
             'hypothesis>=6.80',
             'import-linter>=2.1',
             'mcap>=1.1',
@@ -53,7 +54,9 @@ setup(
             'pytest>=7.4',
             'pytest-timeout>=2.2',
             'pytest-xdist>=3.3',
+            'quadprog>=0.1.11',
             'ruff>=0.8',
+            'scipy>=1.9',
             'setuptools>=70.1',
             'types-PyYAML',
         ],
