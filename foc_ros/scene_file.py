@@ -36,18 +36,8 @@ PARAMETERS = {
 }
 """Fields that are parameters, with their bounds."""
 
-FIELDS = (
-    'start',
-    'goal',
-    'goals',
-    'start_velocity',
-    'start_acceleration',
-    'start_stddev',
-    'noise',
-    'obstacles',
-    'guess',
-    *PARAMETERS,
-)
+STATE_FIELDS = ('start', 'start_velocity', 'start_acceleration', 'start_stddev')
+FIELDS = (*STATE_FIELDS, 'goal', 'goals', 'noise', 'obstacles', 'guess', *PARAMETERS)
 OBSTACLE_FIELDS = ('x', 'y', 'radius', 'radius_stddev', 'id')
 _NUMERAL = re.compile(r'[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+')
 

@@ -1,0 +1,179 @@
+"""Scene files: every field arrives, and every wrong one is named with its value and bound."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from foc_ros.foc.config import Config
+from foc_ros.foc.errors import FocError, RecordingError, SceneError
+from foc_ros.guess import guess_path
+from foc_ros.scene_file import load_scene, parse_scene
+
+SCENE: dict[str, Any] = {
+    'start': [0.0, 0.1],
+    'goal': [0.3, 0.0],
+    'start_velocity': [0.2, 0.0],
+    'start_acceleration': [0.0, -1.0],
+    'start_stddev': 0.002,
+    'duration_s': 0.8,
+    'steps': 40,
+    'noise': [0.15, 0.1],
+    'eta': 0.95,
+    'strategy': 'fixed',
+    'tau': 0.0012,
+    'lambda': 1e6,
+    'max_candidates': 3,
+    'obstacles': [
+        {'x': 0.1, 'y': 0.0, 'radius': 0.03, 'radius_stddev': 0.003, 'id': 'cup'},
+        {'x': 0.2, 'y': 0.1, 'radius': 0.02},
+    ],
+}
+
+
+def test_every_field_arrives() -> None:
+    scene = parse_scene(SCENE)
+    assert scene.hand.mean.tolist() == [0.0, 0.1, 0.2, 0.0, 0.0, -1.0]
+    assert np.allclose(np.diag(scene.hand.covariance), [4e-6, 4e-6, 0, 0, 0, 0])
+    assert scene.goals.tolist() == [[0.3, 0.0]] and scene.duration_s == 0.8 and scene.noise.tolist() == [0.15, 0.1]
+    foc = scene.config.foc
+    assert (foc.steps, foc.eta, foc.strategy, foc.tau, foc.lam) == (40, 0.95, 'fixed', 0.0012, 1e6)
+    assert scene.config.homotopy.max_candidates == 3
+    obstacles = scene.obstacles
+    assert obstacles.ids == ('cup', '1') and obstacles.centre.tolist() == [[0.1, 0.0], [0.2, 0.1]]
+    assert obstacles.radius.tolist() == [0.03, 0.02] and obstacles.radius_stddev.tolist() == [0.003, 0.0]
+    assert scene.guess is None
+
+
+def test_what_is_not_given_is_the_parameters_default() -> None:
+    scene = parse_scene({'start': [0, 0], 'goals': [[0.3, 0], [0.3, 0.1]]})
+    assert scene.config.foc == Config().foc and scene.config.homotopy == Config().homotopy
+    assert scene.duration_s == Config().duration.fixed_s
+    assert len(scene.obstacles) == 0 and not scene.hand.covariance.any() and not scene.hand.mean.any()
+    assert scene.goals.tolist() == [[0.3, 0.0], [0.3, 0.1]]
+
+
+@pytest.mark.parametrize('name', ['scene.yaml', 'scene.yml', 'scene.json', 'scene'])
+def test_yaml_and_json_read_alike(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text(json.dumps(SCENE, indent='\t' if name.endswith('json') else None), 'utf-8')
+    scene = load_scene(tmp_path / name)
+    assert scene.config.foc.lam == 1e6 and scene.obstacles.ids == ('cup', '1')
+
+
+def test_yaml_texts_of_numbers_are_numbers(tmp_path: Path) -> None:
+    (tmp_path / 's.yaml').write_text(
+        'start: [0, 0]\ngoal: [3e-1, 0]\nstrategy: fixed\nlambda: 2e6\nobstacles: [{x: 1e-1, y: 1, radius: 1e-2}]'
+    )
+    scene = load_scene(tmp_path / 's.yaml')
+    assert scene.goals[0, 0] == 0.3 and scene.config.foc.lam == 2e6 and scene.obstacles.radius.tolist() == [0.01]
+
+
+def without(*names: str) -> dict[str, Any]:
+    return {name: value for name, value in SCENE.items() if name not in names}
+
+
+def obstacle(count: int = 1, **fields: Any) -> dict[str, Any]:
+    return {**SCENE, 'obstacles': count * [{'x': 1, 'y': 1, 'radius': 0.1, **fields}]}
+
+
+@pytest.mark.parametrize(
+    ('scene', 'message'),
+    [
+        ([], r'scene: expected a mapping of fields, got \[\]'),
+        (None, 'scene: expected a mapping of fields, got None'),
+        ({**SCENE, 'etta': 0.9}, "scene: expected only the fields start, start_velocity, .*, got 'etta'"),
+        (without('start'), 'start: expected two numbers, got nothing'),
+        ({**SCENE, 'start': 0.1}, 'start: expected a list of 2 numbers, got 0.1'),
+        ({**SCENE, 'start': [0.1]}, r'start: expected a list of 2 numbers, got \[0.1\]'),
+        ({**SCENE, 'start': [0.1, 'a']}, r"start: expected a number in \[-10000, 10000\], got 'a'"),
+        ({**SCENE, 'start': [0.1, float('nan')]}, r'start: expected a number in \[-10000, 10000\], got nan'),
+        ({**SCENE, 'start': [0.1, True]}, r'start: expected a number in \[-10000, 10000\], got True'),
+        ({**SCENE, 'start_velocity': [0, None]}, r'start_velocity: expected a number in \[-10000, 10000\], got None'),
+        ({**SCENE, 'start_stddev': -0.1}, r'start_stddev: expected a number in \[0, 10000\], got -0.1'),
+        (without('goal'), 'goal: expected either goal or goals, got neither'),
+        ({**SCENE, 'goals': [[0, 0]]}, 'goal: expected either goal or goals, got both'),
+        ({**without('goal'), 'goals': []}, r'goals: expected at least one point, got \[\]'),
+        ({**without('goal'), 'goals': [[0, 0], [1e5, 0]]}, r'goals\[1\]: expected a number in \[-10000, 10000\], got 100000.0'),
+        ({**SCENE, 'eta': 1.0}, r'eta: expected a number in \[0, 0.999\], got 1.0'),
+        ({**SCENE, 'eta': -0.1}, r'eta: expected a number in \[0, 0.999\], got -0.1'),
+        ({**SCENE, 'eta': float('nan')}, 'eta: expected a finite number.*, got nan'),
+        ({**SCENE, 'steps': 2}, r'steps: expected a number in \[5, 400\], got 2'),
+        ({**SCENE, 'steps': 40.5}, 'steps: expected a whole number.*, got 40.5'),
+        ({**SCENE, 'duration_s': 0}, 'duration_s: expected a number in .* s, got 0'),
+        ({**SCENE, 'noise': 0.1}, 'noise: expected a list of 2 numbers, got 0.1'),
+        ({**SCENE, 'noise': [0.1, -0.1]}, r'noise: expected a number in \[0, 2\].*, got -0.1'),
+        ({**SCENE, 'strategy': 'best'}, "strategy: expected one of lv, hc, optimal, algorithm1, fixed, got 'best'"),
+        ({**SCENE, 'strategy': 'lv'}, 'tau: expected to be given with strategy fixed only, got strategy lv'),
+        ({**without('tau'), 'strategy': 'hc'}, 'lambda: expected to be given with strategy fixed only, got strategy hc'),
+        ({**SCENE, 'lambda': -1}, 'lambda: expected a number in .*, got -1'),
+        ({**SCENE, 'max_candidates': 0}, 'max_candidates: expected a number in .*, got 0'),
+        ({**SCENE, 'obstacles': {'x': 1}}, "obstacles: expected a list, got {'x': 1}"),
+        ({**SCENE, 'obstacles': [{'x': 1, 'y': 1}]}, r'obstacles\[0\].radius: expected a number, got nothing'),
+        (obstacle(radius=-1), r'obstacles\[0\].radius: expected a number in \[0, 10000\], got -1'),
+        (obstacle(r=1), r"obstacles\[0\]: expected only the fields x, .*, got 'r'"),
+        (obstacle(2, id=3), r'obstacles\[1\].id: expected another id .*, got 3'),
+        (obstacle(id='a;b'), r"obstacles\[0\].id: expected .*, got 'a;b'"),
+        ({**SCENE, 'start': [0.1, 0.02]}, r'start: expected a point outside obstacle cup, of radius 0.03 m, got .*, 0.02 m from'),
+        ({**SCENE, 'goal': [0.2, 0.1]}, 'goal: expected a point outside obstacle 1, of radius 0.02 m, got .*, 0 m from'),
+        ({**SCENE, 'guess': 0.1}, 'guess: expected a mapping of fields, got 0.1'),
+        ({**SCENE, 'guess': {}}, 'guess.amplitude: expected a number, got nothing'),
+        ({**SCENE, 'guess': {'amplitude': 'big'}}, r"guess.amplitude: expected a number in .*, got 'big'"),
+        ({**SCENE, 'guess': {'amplitude': 0.1, 'side': 1}}, "guess: expected only the fields amplitude, kind, got 'side'"),
+        ({**SCENE, 'guess': [[0, 0], [0]]}, r'guess\[1\]: expected a list of 2 numbers, got \[0\]'),
+        ({**without('goal'), 'goals': [[1, 0], [1, 1]], 'guess': {'amplitude': 0}}, 'guess: expected one goal, .*, got 2 goals'),
+        ({'start': [0, 0], 'goal': [0, 0], 'guess': {'amplitude': 0.1}}, 'guess: expected a goal away from the start, got both'),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_named(scene: object, message: str) -> None:
+    with pytest.raises(SceneError, match=f'^{message}'):
+        parse_scene(scene)
+
+
+@pytest.mark.parametrize(
+    ('name', 'text', 'message'),
+    [
+        ('s.yaml', 'start: [0, 0', 'not a YAML file'),
+        ('s.yaml', 'start: [0, 0]\nstart: [1, 1]\n', 'the key start is given twice'),
+        ('s.yaml', '!!python/object/apply:os.getcwd []', 'not a YAML file: could not determine a constructor'),
+        ('s.json', '{"start": [0, 0]', 'not a JSON file'),
+        ('s.json', '{"start": [0, 0], "start": [1, 1]}', 'the key start is given twice'),
+        ('s.json', '[' * 100_000, 'not a JSON file'),
+        ('s.yaml', '\x00', 'not a YAML file'),
+    ],
+)
+def test_files_that_cannot_be_read(tmp_path: Path, name: str, text: str, message: str) -> None:
+    (tmp_path / name).write_text(text, 'utf-8')
+    with pytest.raises(RecordingError, match=f'^{re.escape(str(tmp_path / name))}: .*{re.escape(message)}|{re.escape(message)}'):
+        load_scene(tmp_path / name)
+
+
+def test_a_missing_file_and_bytes_that_are_no_text(tmp_path: Path) -> None:
+    with pytest.raises(FocError, match=r'none\.yaml: cannot be read: No such file'):
+        load_scene(tmp_path / 'none.yaml')
+    (tmp_path / 'b.yaml').write_bytes(b'\xff\xfe\xfa')
+    with pytest.raises(FocError, match=r'b\.yaml: not a YAML file'):
+        load_scene(tmp_path / 'b.yaml')
+
+
+def test_a_guess_is_a_minimum_jerk_line_with_a_bulge_to_its_left() -> None:
+    guess = parse_scene(
+        {**without('obstacles'), 'start': [0, 0], 'goal': [0.3, 0], 'guess': {'amplitude': -0.05, 'kind': 'text'}}
+    ).guess
+    r = np.linspace(0, 1, 41)
+    assert np.allclose(guess, np.column_stack([0.3 * (10 * r**3 - 15 * r**4 + 6 * r**5), -0.05 * np.sin(np.pi * r)]))
+    turned = guess_path(np.zeros(2), np.array([0.0, 0.3]), 40, amplitude=0.05)
+    assert np.allclose(turned[20], [-0.05, 0.15])
+
+
+def test_a_guess_through_points() -> None:
+    start, goal = np.zeros(2), np.array([2.0, 0.0])
+    path = guess_path(start, goal, 100, via=np.array([[1.0, 1.0]]))
+    assert path[0].tolist() == [0, 0] and np.allclose(path[50], [1, 1]) and np.allclose(path[-1], [2, 0])
+    assert np.allclose(np.abs(path[:, 1]), np.minimum(path[:, 0], 2 - path[:, 0]))
+    timed = np.random.default_rng(1).standard_normal((11, 2))
+    assert np.array_equal(guess_path(start, goal, 10, via=timed), timed)
