@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 import piqp
 
 from .records import Array
 
-ACCURACY = 1e-11
-"""Absolute and relative accuracy asked of PIQP, on problems scaled to numbers around 1."""
+ATTEMPTS = ((1e-10, False), (1e-8, True), (1e-6, True))
+"""Accuracy (absolute and relative, on problems scaled to numbers around 1) and cost scaling asked of PIQP, one after the other."""
 
 
 @dataclass(frozen=True)
@@ -27,24 +25,21 @@ class DenseQP:
     lower: Array | None = None
 
 
-def _settings(solver: Any, scale_cost: bool) -> None:
-    solver.settings.eps_abs = ACCURACY
-    solver.settings.eps_rel = ACCURACY
-    solver.settings.check_duality_gap = False
-    solver.settings.compute_timings = False
-    solver.settings.preconditioner_scale_cost = scale_cost
-
-
 def solve_piqp(qp: DenseQP) -> Array | None:
     """Return the minimiser, or None where PIQP finds none with any of its settings.
 
-    PIQP can call a feasible problem infeasible, so a refusal is believed only after a second try with the cost scaled.
+    PIQP can call a feasible problem infeasible, or miss an accuracy that rounding does not allow, so a refusal is believed only
+    after further attempts.
     """
-    G, g = (None, None) if qp.G is None or qp.g is None else (np.asfortranarray(qp.G), qp.g)
-    for scale_cost in (False, True):
+    P = np.asfortranarray(qp.P)
+    A = None if qp.A is None else np.asfortranarray(qp.A)
+    G = None if qp.G is None else np.asfortranarray(qp.G)
+    for accuracy, scale_cost in ATTEMPTS:
         solver = piqp.DenseSolver()
-        _settings(solver, scale_cost)
-        solver.setup(np.asfortranarray(qp.P), qp.c, qp.A, qp.b, G, g, None, qp.lower, None)
+        solver.settings.eps_abs = solver.settings.eps_rel = accuracy
+        solver.settings.eps_duality_gap_abs = solver.settings.eps_duality_gap_rel = accuracy
+        solver.settings.preconditioner_scale_cost = scale_cost
+        solver.setup(P, qp.c, A, qp.b, G, qp.g, None, qp.lower, None)
         if solver.solve() == piqp.PIQP_SOLVED:
             return np.array(solver.result.x)
     return None

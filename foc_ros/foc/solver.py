@@ -24,6 +24,8 @@ MAX_ROUNDS = 25
 """Rounds of the working set before the full QP is solved instead; two or three are usual."""
 ELASTICITY = 1e-6
 """Softness of elastic rows, as a share of what a unit multiplier moves them: a lone row gives way by a millionth."""
+IMMOVABLE = 1e-12
+"""Share of a row's freedom that the goal leaves it, below which the goal fixes it: the last step's, above all."""
 NEGLIGIBLE = 1e-7
 """Multiplier that counts as zero, relative to the largest, in units in which every row moves itself by one."""
 
@@ -71,13 +73,14 @@ def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False) -> QPSo
             if answer is None:
                 return None
             control, multipliers = answer
-            active = multipliers > 0
-            working, multipliers = working.only(active), multipliers[active]
         violation = qp.limits - qp.row_values(control)
         # rows just solved for are met but for rounding; an elastic row may stay violated
         violation[working.obstacle, working.step] = 0.0
         if violation.max(initial=0.0) <= TOLERANCE:
-            return QPSolution(control, working, multipliers, solves)
+            active = multipliers > 0
+            return QPSolution(control, working.only(active), multipliers[active], solves)
+        if not elastic:
+            working = working.only(multipliers > 0)
         working = working.joined(*_peaks(violation), violation.shape[1])
     return None if elastic else solve_full(qp)
 
@@ -97,7 +100,14 @@ def _with_rows(qp: ReachingQP, working: WorkingSet, elastic: bool) -> tuple[Arra
     pressed = qp.cost.pressed(rows)
     missing = qp.limits[working.obstacle, working.step] - rows @ qp.cost.goal_control
     gram = pressed @ rows.T
-    scale = 1.0 / np.sqrt(np.maximum(gram.diagonal(), 1e-300))
+    moved, wanted = gram.diagonal(), (rows**2) @ (1.0 / qp.cost.hessian)
+    fixed = moved < IMMOVABLE * wanted
+    if fixed.any():
+        if not elastic and (missing[fixed] > TOLERANCE).any():
+            return None
+        gram[fixed], gram[:, fixed], missing[fixed] = 0.0, 0.0, 0.0
+        gram[fixed, fixed] = 1.0
+    scale = 1.0 / np.sqrt(gram.diagonal())
     missing = scale * missing
     size = max(-float(missing.min()), float(missing.max()), 1e-300)
     gram *= scale[:, None] * scale

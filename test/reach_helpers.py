@@ -1,0 +1,81 @@
+"""Reaching problems for the tests of the numeric core."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from foc_ros.foc.config import FocConfig
+from foc_ros.foc.dynamics import triple_integrator_horizon
+from foc_ros.foc.forward import forward
+from foc_ros.foc.problem import Problem, rest_to_goal
+from foc_ros.foc.records import Obstacles, Solution, make_obstacles
+from foc_ros.foc.start import cold
+
+REFERENCE = Path(__file__).resolve().parents[2] / 'shared' / 'reference' / 'cases.json'
+
+
+def reference_cases() -> list:
+    """Return the reference cases as pytest parameters, or one that skips where the optional folder is absent."""
+    if not REFERENCE.is_file():
+        return [pytest.param({}, marks=pytest.mark.skip(reason='optional data: ../shared/reference/cases.json is absent'))]
+    return [pytest.param(case, id=f'case{i}') for i, case in enumerate(json.loads(REFERENCE.read_text()))]
+
+
+def bowed(start, goal, steps: int, amplitude: float) -> np.ndarray:
+    """Minimum-jerk straight line plus amplitude sin(pi k / N) to the left, (N + 1, 2)."""
+    start, goal = np.asarray(start, dtype=float), np.asarray(goal, dtype=float)
+    s = np.arange(steps + 1)[:, None] / steps
+    along = (goal - start) / np.hypot(*(goal - start))
+    left = np.array([-along[1], along[0]])
+    return start + (goal - start) * (10 * s**3 - 15 * s**4 + 6 * s**5) + amplitude * np.sin(np.pi * s) * left
+
+
+def case_problem(case: dict, eta: float | None = None) -> Problem:
+    """Return the problem of a reference case."""
+    obstacles = case['obstacles']
+    return reach(
+        make_obstacles(
+            [[o['x'], o['y']] for o in obstacles], [o['radius'] for o in obstacles], [o['radius_stddev'] for o in obstacles]
+        ),
+        goal=case['goal'],
+        steps=case['steps'],
+        duration=case['duration_s'],
+        noise=case['noise'],
+        eta=case['min_effort_at_eta']['eta'] if eta is None else eta,
+    )
+
+
+def case_guess(case: dict) -> np.ndarray:
+    """Return the guess of a reference case, (N + 1, 2)."""
+    return bowed(case['start'], case['goal'], case['steps'], case['guess']['amplitude'])
+
+
+def reach(
+    obstacles: Obstacles, goal=(0.3, 0.0), start=(0.0, 0.0), steps=50, duration=1.0, noise=(0.15, 0.15), eta=0.9, **rest
+) -> Problem:
+    """Return a rest-to-rest problem."""
+    initial = np.zeros(6)
+    initial[:2] = start
+    horizon = triple_integrator_horizon(duration / steps, steps)
+    return rest_to_goal(horizon, initial, np.asarray(goal, dtype=float), obstacles, np.asarray(noise, dtype=float), eta, **rest)
+
+
+def one_obstacle(eta=0.9, noise=(0.15, 0.15), **rest) -> Problem:
+    """One obstacle at (0.12, 0) on the straight way from (0, 0) to (0.3, 0)."""
+    return reach(make_obstacles([[0.12, 0.0]], [0.03], [0.003]), eta=eta, noise=noise, **rest)
+
+
+def solved(problem: Problem, guess: np.ndarray, strategy: str = 'lv', **settings) -> Solution:
+    """Solve from a guess (N + 1, 2)."""
+    return forward(problem, cold(guess), FocConfig(strategy=strategy, **settings))
+
+
+def random_scene(generator: np.random.Generator, obstacles: int | None = None) -> tuple[Obstacles, np.ndarray, float]:
+    """Return obstacles, a goal and the amplitude of a guess, of the kind of the reference cases."""
+    n = int(generator.integers(1, 5)) if obstacles is None else obstacles
+    goal = np.array([generator.uniform(0.28, 0.45), 0.0])
+    centre = np.stack((goal[0] * generator.uniform(0.3, 0.7, n), generator.uniform(-0.07, 0.07, n)), axis=1)
+    made = make_obstacles(centre, generator.uniform(0.017, 0.03, n), generator.uniform(0.001, 0.0035, n))
+    return made, goal, float(generator.choice([-1, 1]) * generator.uniform(0.03, 0.12))

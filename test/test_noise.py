@@ -1,0 +1,57 @@
+"""Closed-form covariances against the recursion and against samples."""
+
+import numpy as np
+import pytest
+
+from foc_ros.foc.dynamics import damped_mass, horizon, triple_integrator
+from foc_ros.foc.noise import noise_per_step, position_variance_maps, state_covariance
+
+PLANTS = pytest.mark.parametrize('plant', [triple_integrator(0.03), damped_mass(0.04, 1.5, 4.0)], ids=['jerk', 'force'])
+
+
+def correlated(generator, n, size=1e-3):
+    root = size * generator.standard_normal((n, n))
+    return root @ root.T
+
+
+@PLANTS
+def test_covariance_is_the_recursion(plant):
+    generator = np.random.default_rng(2)
+    n, steps, noise = len(plant.A), 20, np.array([0.1, 0.2])
+    control, P = generator.standard_normal((steps, 2)), correlated(generator, n)
+    stacked = horizon(plant, steps)
+    free = stacked.powers @ P @ stacked.powers.swapaxes(1, 2)
+    closed = state_covariance(stacked, free, noise, control.T.ravel())
+    for t in range(steps):
+        np.testing.assert_allclose(closed[t], P, rtol=1e-9, atol=1e-15)
+        P = plant.A @ P @ plant.A.T + plant.B @ np.diag((noise * control[t]) ** 2) @ plant.B.T
+    np.testing.assert_allclose(closed[-1], P, rtol=1e-9, atol=1e-15)
+
+
+@PLANTS
+def test_position_variance_is_diagonal_in_the_squared_control(plant):
+    generator = np.random.default_rng(3)
+    stacked, noise = horizon(plant, 15), np.array([0.3, 0.1])
+    control = generator.standard_normal(30)
+    full = state_covariance(stacked, np.zeros((16, len(plant.A), len(plant.A))), noise, control)[1:]
+    xx, yy, xy = position_variance_maps(stacked, noise) @ control**2
+    np.testing.assert_allclose([xx, yy, xy], [full[:, 0, 0], full[:, 1, 1], full[:, 0, 1]], atol=1e-15)
+
+
+def test_covariance_is_that_of_noisy_rollouts():
+    generator = np.random.default_rng(4)
+    plant, steps, samples, noise = triple_integrator(0.05), 10, 40_000, np.array([0.2, 0.1])
+    control, P0 = generator.standard_normal((steps, 2)) * 50, correlated(generator, 6)
+    stacked = horizon(plant, steps)
+    closed = state_covariance(stacked, stacked.powers @ P0 @ stacked.powers.swapaxes(1, 2), noise, control.T.ravel())
+    states = generator.multivariate_normal(np.zeros(6), P0, samples, method='eigh')
+    for t in range(steps):
+        noisy = control[t] * (1 + noise * generator.standard_normal((samples, 2)))
+        states = states @ plant.A.T + noisy @ plant.B.T
+    sampled = np.cov(states.T)
+    scale = np.sqrt(np.outer(np.diag(closed[-1]), np.diag(closed[-1])))
+    assert np.abs((sampled - closed[-1]) / scale).max() < 4.5 / np.sqrt(samples / 2)
+
+
+def test_noise_for_another_step_keeps_the_power_per_second():
+    np.testing.assert_allclose(noise_per_step(np.array([0.1, 0.2]), 0.02, 0.005), [0.2, 0.4])
