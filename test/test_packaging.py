@@ -1,5 +1,6 @@
 """What pip and colcon install: metadata that agrees, and every file that the program needs."""
 
+import os
 import re
 import shutil
 import subprocess
@@ -97,7 +98,15 @@ def test_ros2_run_knows_every_command(wheel: zipfile.ZipFile) -> None:
 @pytest.mark.parametrize('command', sorted(path.name for path in (ROOT / 'scripts' / 'ros2_run').iterdir()))
 def test_ros2_run_starts_the_command(command: str) -> None:
     script = ROOT / 'scripts' / 'ros2_run' / command
-    result = subprocess.run([sys.executable, script, '--help'], capture_output=True, text=True, timeout=100, check=False)
+    paths = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get('PYTHONPATH')])])
+    result = subprocess.run(
+        [sys.executable, script, '--help'],
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+        env=os.environ | {'PYTHONPATH': paths},
+    )
     assert result.returncode == 0, result.stderr
     assert f' {command} ' in result.stdout
 
