@@ -67,7 +67,7 @@ class DurationConfig:
     fitts_b_s: float = _p(0.25, 'slope of Fitts law, per bit', 's', 0.0, 60.0)
     target_width: float = _p(0.02, 'target width of Fitts law', 'm', 1e-4, 10.0)
     min_time_to_go_s: float = _p(0.3, 'floor of the time to go', 's', 0.01, 60.0)
-    max_mean_speed: float = _p(0.5, 'mean speed that the time to go never asks to exceed', 'm/s', 0.001, 100.0)
+    max_time_to_go_s: float = _p(10.0, 'ceiling of the time to go', 's', 0.05, 120.0)
 
 
 @dataclass(frozen=True)

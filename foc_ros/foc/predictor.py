@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from .noise import noise_per_step
 from .outcomes import Earlier, solve_candidates
 from .problem import Problem, rest_to_goal
 from .replanning import triple_integrator_error_map
-from .records import NANOSECONDS, Array, HandState, Obstacles, Prediction, Solution
+from .records import NANOSECONDS, Array, HandState, Obstacles, Outcome, Prediction, Solution
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,7 @@ def predict(config: Config, hand: HandState, obstacles: Obstacles, goals: Array,
     found = search(hand.mean, goals, obstacles, config.homotopy, durations, config.foc.steps)
     earlier = Earlier(memory.solutions, (hand.stamp_ns - memory.stamp_ns) / NANOSECONDS)
     outcomes = solve_candidates(found.candidates, problems, config.foc, config.likelihood.beta, hand.effort_spent, earlier)
+    outcomes = [_seen(outcome, problems[outcome.candidate.goal], hand) for outcome in outcomes]
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
     best = most_likely(labels, values, memory.most_likely, config.likelihood.margin)
@@ -62,8 +63,17 @@ def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal
         obstacles,
         noise_per_step(np.array([foc.noise_x, foc.noise_y]), REFERENCE_STEP_S, dt),
         foc.eta,
-        initial_covariance=hand.covariance,
         error_map=triple_integrator_error_map(dt, foc.steps),
         goal_weight=foc.goal_weight,
         recovery_s=foc.recovery_s,
     )
+
+
+def _seen(outcome: Outcome, problem: Problem, hand: HandState) -> Outcome:
+    """Add what we do not know of the hand to what its own noise will do.
+
+    The operator knows the hand better than our filter and plans its margins by motor noise alone, so the filter's covariance is no part
+    of the chance constraint; but our prediction is as uncertain as the state it starts from.
+    """
+    carried = problem.error_map @ hand.covariance @ problem.error_map.swapaxes(1, 2)
+    return replace(outcome, solution=replace(outcome.solution, covariance=outcome.solution.covariance + carried))

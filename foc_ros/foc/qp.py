@@ -31,7 +31,10 @@ class Cost:
 
     @cached_property
     def _factors(self) -> tuple[Array, Array, Array]:
-        """H^-1 (2N,), root L (r, r) of (E H^-1 E' + softness)^-1 = L'L, and L E H^-1 (r, 2N)."""
+        """H^-1 (2N,), root L (r, r) of (E H^-1 E' + softness)^-1 = L'L, and L E H^-1 (r, 2N).
+
+        By eigenvalues, kept from zero: a Hessian over many orders of magnitude leaves no Cholesky factor.
+        """
         inverse = 1.0 / self.hessian
         weighted = self.goal_rows * inverse
         gram = weighted @ self.goal_rows.T
@@ -39,7 +42,8 @@ class Cost:
         scale = 1.0 / np.sqrt(gram.diagonal())
         gram *= scale[:, None] * scale
         gram.flat[:: len(gram) + 1] += self.softness * scale**2
-        root = np.linalg.inv(np.linalg.cholesky(gram)) * scale
+        values, vectors = np.linalg.eigh(gram)
+        root = vectors.T / np.sqrt(np.maximum(values, 1e-14 * values[-1]))[:, None] * scale
         return inverse, root, root @ weighted
 
     @cached_property
