@@ -5,13 +5,12 @@ Driven by message time alone: no clock is read, so the same messages give the sa
 
 from __future__ import annotations
 
-from collections import Counter
-
 from .config import Config
-from .errors import FocError, InputError
+from .errors import FocError
 from .estimator import Track, update
 from .predictor import Memory, predict
 from .records import NANOSECONDS, Array, HandSample, Obstacles, Prediction
+from .refusals import Refusals
 from .scene import Part, Scene
 from .verdict import Verdict
 
@@ -21,8 +20,8 @@ __all__ = ['Pipeline', 'Verdict']
 class Pipeline:
     """Follows the hand, keeps the scene, and predicts when a fresh hand sample is due.
 
-    Attributes: config; hand_state, None until a hand sample came; scene; counts of every refusal, drop, restart and failure by
-    kind; last_refusal, the text of the last one.
+    Attributes: config; hand_state, None until a hand sample came; scene; engaged; frame_id, the working frame, None until the
+    parameter or the first hand sample fixes it.
     """
 
     def __init__(self, config: Config) -> None:
@@ -30,9 +29,8 @@ class Pipeline:
         self.hand_state: Track | None = None
         self.scene = Scene()
         self.engaged = True
-        self.last_refusal: str | None = None
-        self._counts: Counter[str] = Counter()
-        self._frame = config.frame_id or None
+        self.frame_id = config.frame_id or None
+        self._refusals = Refusals()
         self._memory = Memory()
         self._fresh = False
         self._tried = False
@@ -41,12 +39,12 @@ class Pipeline:
     @property
     def counts(self) -> dict[str, int]:
         """How often each kind of refusal, drop, restart or failure occurred, by name."""
-        return dict(self._counts)
+        return dict(self._refusals.counts)
 
     @property
-    def frame_id(self) -> str | None:
-        """The working frame; None until the parameter or the first hand sample fixes it."""
-        return self._frame
+    def last_refusal(self) -> str | None:
+        """The text of the last refusal."""
+        return self._refusals.last
 
     @property
     def due(self) -> bool:
@@ -58,24 +56,24 @@ class Pipeline:
 
     def hand(self, sample: HandSample) -> Verdict:
         """Take a hand sample. The first one fixes the working frame where the parameter leaves it open."""
-        if not self._in_frame('hand_pose', sample.frame_id):
+        if not self._refusals.in_frame('hand_wrong_frame', 'hand_pose', sample.frame_id, self.frame_id):
             return Verdict.WRONG_FRAME
         before, superseded = self.hand_state, self.due and not self._tried and self.blocked() is None
         answer = update(before, sample, self.config.estimator)
         if not answer.verdict.taken:
             assert before is not None
-            self._refuse(f'hand_{answer.verdict}', _behind('hand_pose', sample.stamp_ns, before.stamp_ns))
+            self._refusals.behind(f'hand_{answer.verdict}', 'hand_pose', sample.stamp_ns, before.stamp_ns)
             return answer.verdict
-        if self._frame is None:
+        if self.frame_id is None:
             self._settle_frame(sample.frame_id)
         self.hand_state, self._fresh, self._tried = answer.state, True, False
         if superseded:
-            self._counts['hand_superseded'] += 1
+            self._refusals.count('hand_superseded')
         if answer.verdict.restarted:
-            self._counts[f'hand_{answer.verdict}'] += 1
+            self._refusals.count(f'hand_{answer.verdict}')
             self._forget_predictions()
         if not self.engaged:
-            self._refuse('hand_disengaged', 'hand_pose: disengaged, nothing is predicted')
+            self._refusals.refuse('hand_disengaged', 'hand_pose: disengaged, nothing is predicted')
             return Verdict.DISENGAGED
         return answer.verdict
 
@@ -84,19 +82,19 @@ class Pipeline:
 
         A table late by no more than `estimator.gap_s` does not replace a newer one of the same source.
         """
-        if not self._in_frame(source, frame_id):
+        if not self._refusals.in_frame('obstacles_wrong_frame', source, frame_id, self.frame_id):
             return Verdict.WRONG_FRAME
         held = self.scene.parts.get(source)
         newest_ns = held.stamp_ns if held is not None else None
         if stamp_ns and newest_ns and 0 < newest_ns - stamp_ns <= self.config.estimator.gap_s * NANOSECONDS:
-            self._refuse(f'obstacles_{Verdict.LATE}', _behind(source, stamp_ns, newest_ns))
+            self._refusals.behind('obstacles_late', source, stamp_ns, newest_ns)
             return Verdict.LATE
         self.scene = self.scene.with_part(source, Part(obstacles, stamp_ns or None, frame_id))
         return Verdict.ACCEPTED
 
     def set_goals(self, goals: Array, frame_id: str) -> Verdict:
         """Replace all goals, (g, 2) [m]; none is a way to take them back."""
-        if not self._in_frame('goals', frame_id):
+        if not self._refusals.in_frame('goals_wrong_frame', 'goals', frame_id, self.frame_id):
             return Verdict.WRONG_FRAME
         self.scene = self.scene.with_goals(goals, frame_id)
         return Verdict.ACCEPTED
@@ -108,7 +106,7 @@ class Pipeline:
         if obstruction is None and not self.due:
             obstruction = ('not_due', 'no hand pose since the last prediction that is 1/rate_hz after it')
         if obstruction is not None:
-            self._refuse(f'predict_{obstruction[0]}', obstruction[1])
+            self._refusals.refuse(f'predict_{obstruction[0]}', obstruction[1])
             return None
         assert self.hand_state is not None
         assert self.scene.goals is not None
@@ -117,13 +115,13 @@ class Pipeline:
         try:
             prediction, self._memory = predict(self.config, self.hand_state, obstacles, self.scene.goals, self._memory)
         except FocError as error:
-            self._refuse('predict_failed', str(error))
+            self._refusals.refuse('predict_failed', str(error))
             return None
         for outcome in prediction.outcomes:
             if not outcome.solved:
-                self._counts[f'candidate_{outcome.solution.status.value}'] += 1
+                self._refusals.count(f'candidate_{outcome.solution.status.value}')
         if not prediction.solved:
-            self._counts['predict_nothing_solved'] += 1
+            self._refusals.count('predict_nothing_solved')
         return prediction
 
     def blocked(self) -> str | None:
@@ -145,14 +143,13 @@ class Pipeline:
 
     def reconfigure(self, config: Config) -> None:
         """Go on with other parameters. Movement and scene are kept, unless the plane or the working frame is another one."""
-        frame = config.frame_id or self._frame
         if config.plane != self.config.plane:
             self.reset()
             self.scene = Scene()
-        elif frame is not None and frame != self._frame:
+        if config.frame_id and config.frame_id != self.frame_id:
             self.reset()
-            self._settle_frame(frame)
-        self.config, self._frame = config, frame
+            self._settle_frame(config.frame_id)
+        self.config = config
         self._memory = Memory(self._memory.most_likely)
 
     def _obstruction(self) -> tuple[str, str] | None:
@@ -165,32 +162,10 @@ class Pipeline:
     def _forget_predictions(self) -> None:
         self._memory, self._predicted_ns = Memory(), None
 
-    def _in_frame(self, topic: str, frame_id: str) -> bool:
-        if self._frame is None or frame_id == self._frame:
-            return True
-        self._refuse_frame(topic, frame_id)
-        return False
-
-    def _refuse_frame(self, topic: str, frame_id: str) -> None:
-        kind = {'hand_pose': 'hand', 'goals': 'goals'}.get(topic, 'obstacles')
-        error = InputError(f'{topic}.header.frame_id', f"the working frame '{self._frame}'", f"'{frame_id}'")
-        self._refuse(f'{kind}_{Verdict.WRONG_FRAME}', str(error))
-
     def _settle_frame(self, frame_id: str) -> None:
         """Fix the working frame; what came earlier in another one is dropped now."""
-        self._frame = frame_id
-        scene = Scene()
-        for source, part in self.scene.parts.items():
-            if self._in_frame(source, part.frame_id):
-                scene = scene.with_part(source, part)
-        if self.scene.goals is not None and self._in_frame('goals', self.scene.goals_frame):
-            scene = scene.with_goals(self.scene.goals, self.scene.goals_frame)
-        self.scene = scene
-
-    def _refuse(self, kind: str, words: str) -> None:
-        self._counts[kind] += 1
-        self.last_refusal = words
-
-
-def _behind(topic: str, stamp_ns: int, newest_ns: int) -> str:
-    return f'{topic}: the stamp {stamp_ns} ns is {(newest_ns - stamp_ns) / NANOSECONDS:g} s behind the newest one, {newest_ns} ns'
+        held, self.frame_id, self.scene = self.scene, frame_id, Scene()
+        for source, part in held.parts.items():
+            self.set_obstacles(source, part.obstacles, part.stamp_ns, part.frame_id)
+        if held.goals is not None:
+            self.set_goals(held.goals, held.goals_frame)

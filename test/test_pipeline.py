@@ -1,0 +1,429 @@
+"""The pipeline: what is due, what is refused and why, and that nothing old is ever passed off as new."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from foc_ros.foc import pipeline as module
+from foc_ros.foc.config import Config, updated
+from foc_ros.foc.errors import SceneError
+from foc_ros.foc.pipeline import Pipeline, Verdict
+from foc_ros.foc.predictor import Memory
+from foc_ros.foc.records import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction, make_obstacles
+
+START = 1000 * NANOSECONDS
+MS = NANOSECONDS // 1000
+CONFIG = updated(Config(), {'rate_hz': 50.0, 'scene.timeout_s': 2.0, 'foc.steps': 20})
+
+
+class Recorder:
+    """Stands in for the predictor and keeps what it was called with."""
+
+    def __init__(self) -> None:
+        self.calls: list[tuple[Config, HandState, Obstacles, Array, Memory]] = []
+
+    def __call__(
+        self, config: Config, hand: HandState, obstacles: Obstacles, goals: Array, memory: Memory
+    ) -> tuple[Prediction, Memory]:
+        self.calls.append((config, hand, obstacles, goals, memory))
+        label = f'call{len(self.calls)}'
+        return Prediction(hand.stamp_ns, hand.frame_id, hand.height, (), label), Memory(label)
+
+
+@pytest.fixture
+def recorder(monkeypatch: pytest.MonkeyPatch) -> Recorder:
+    stand_in = Recorder()
+    monkeypatch.setattr(module, 'predict', stand_in)
+    return stand_in
+
+
+def hand(ms: float, x: float = 0.0, frame: str = 'world') -> HandSample:
+    return HandSample(START + round(ms * MS), np.array([x, 0.0]), 0.3, frame)
+
+
+def ready(config: Config = CONFIG) -> Pipeline:
+    """Has a scene and a goal, no hand yet."""
+    pipeline = Pipeline(config)
+    pipeline.set_obstacles('cloud', make_obstacles([[0.15, 0.0]], 0.03), START, 'world')
+    pipeline.set_goals(np.array([[0.3, 0.0]]), 'world')
+    return pipeline
+
+
+def seen(pipeline: Pipeline) -> tuple[object, ...]:
+    return pipeline.hand_state, pipeline.scene, pipeline.due, pipeline.blocked(), pipeline.engaged, pipeline.frame_id
+
+
+def test_one_prediction_for_every_sample_that_is_due(recorder: Recorder) -> None:
+    pipeline, stamps = ready(), []
+    for ms in range(0, 200, 5):
+        assert pipeline.hand(hand(ms)) is Verdict.ACCEPTED
+        if pipeline.due:
+            prediction = pipeline.predict()
+            assert prediction is not None
+            stamps.append((prediction.stamp_ns - START) // MS)
+    assert stamps == list(range(0, 200, 20))
+    assert pipeline.counts == {'predict_nothing_solved': 10}
+
+
+def test_a_period_that_is_no_whole_number_of_nanoseconds(recorder: Recorder) -> None:
+    pipeline = ready(updated(CONFIG, {'rate_hz': 30.0}))
+    pipeline.hand(hand(0.0))
+    pipeline.predict()
+    pipeline.hand(HandSample(START + 33_333_333, np.zeros(2), 0.0, 'world'))
+    assert pipeline.due
+
+
+def test_the_predictor_gets_the_present_scene_and_its_own_memory(recorder: Recorder) -> None:
+    pipeline = ready()
+    pipeline.set_obstacles('markers', make_obstacles([[0.5, 0.5]], 0.1, ids=('m',), velocity=[1.0, 0.0]), START, 'world')
+    pipeline.hand(hand(0.0))
+    first = pipeline.predict()
+    pipeline.hand(hand(100.0, 0.01))
+    second = pipeline.predict()
+    assert first is not None
+    assert second is not None
+    config, state, obstacles, goals, memory = recorder.calls[1]
+    assert (config, memory.most_likely) == (pipeline.config, 'call1')
+    assert recorder.calls[0][4] == Memory()
+    assert state is pipeline.hand_state
+    assert (second.stamp_ns, second.frame_id, second.height) == (START + 100 * MS, 'world', 0.3)
+    assert obstacles.ids == ('0', 'm')
+    np.testing.assert_allclose(obstacles.centre, [[0.15, 0.0], [0.6, 0.5]])
+    np.testing.assert_array_equal(goals, [[0.3, 0.0]])
+
+
+def test_the_same_sample_is_never_predicted_from_twice(recorder: Recorder) -> None:
+    pipeline = ready()
+    pipeline.hand(hand(0.0))
+    assert pipeline.predict() is not None
+    assert not pipeline.due
+    assert pipeline.predict() is None
+    assert pipeline.hand(hand(0.0)) is Verdict.DUPLICATE
+    assert pipeline.hand(hand(-10.0)) is Verdict.LATE
+    assert not pipeline.due
+    assert pipeline.predict() is None
+    assert pipeline.counts['predict_not_due'] == 2
+
+
+def test_why_nothing_can_be_predicted(recorder: Recorder) -> None:
+    pipeline = Pipeline(CONFIG)
+    assert pipeline.blocked() == 'no hand pose yet'
+    pipeline.hand(hand(0.0))
+    assert pipeline.blocked() == 'no obstacles received yet: publish an empty cloud for an empty scene'
+    assert pipeline.predict() is None
+    assert pipeline.last_refusal == pipeline.blocked()
+    pipeline.set_obstacles('cloud', make_obstacles(), START - 3100 * MS, 'world')
+    assert pipeline.blocked() == 'no goal received'
+    pipeline.set_goals(np.zeros((1, 2)), 'world')
+    assert pipeline.blocked() == 'obstacles are 3.1 s older than the hand pose (scene.timeout_s is 2)'
+    assert pipeline.predict() is None
+    pipeline.set_obstacles('cloud', make_obstacles(), START, 'world')
+    assert pipeline.blocked() is None
+    assert pipeline.due
+    pipeline.engage(False)
+    assert pipeline.blocked() == 'disengaged'
+    assert pipeline.predict() is None
+    assert pipeline.counts == {'predict_no_obstacles': 1, 'predict_stale': 1, 'predict_disengaged': 1}
+    assert recorder.calls == []
+
+
+@pytest.mark.parametrize('stamp', [None, 0])
+def test_unstamped_obstacles_are_not_judged_by_age(recorder: Recorder, stamp: int | None) -> None:
+    pipeline = ready()
+    pipeline.set_obstacles('cloud', make_obstacles([[0.1, 0.0]], 0.01, velocity=[1.0, 0.0]), stamp, 'world')
+    pipeline.hand(hand(1e7))
+    assert pipeline.predict() is not None
+    np.testing.assert_array_equal(recorder.calls[0][2].centre, [[0.1, 0.0]])
+
+
+def test_a_refused_message_changes_nothing_and_is_counted_with_its_reason(recorder: Recorder) -> None:
+    pipeline = ready()
+    pipeline.hand(hand(100.0))
+    refusals = [
+        (lambda: pipeline.hand(hand(100.0)), Verdict.DUPLICATE, 'hand_duplicate', '0 s behind the newest one'),
+        (lambda: pipeline.hand(hand(90.0)), Verdict.LATE, 'hand_late', '0.01 s behind the newest one'),
+        (
+            lambda: pipeline.hand(hand(110.0, frame='camera')),
+            Verdict.WRONG_FRAME,
+            'hand_wrong_frame',
+            "hand_pose.header.frame_id: expected the working frame 'world', got 'camera'",
+        ),
+        (
+            lambda: pipeline.set_obstacles('cloud', make_obstacles(), START, 'camera'),
+            Verdict.WRONG_FRAME,
+            'obstacles_wrong_frame',
+            "cloud.header.frame_id: expected the working frame 'world', got 'camera'",
+        ),
+        (
+            lambda: pipeline.set_obstacles('cloud', make_obstacles(), START - MS, 'world'),
+            Verdict.LATE,
+            'obstacles_late',
+            '0.001 s behind the newest one',
+        ),
+        (
+            lambda: pipeline.set_goals(np.zeros((1, 2)), 'camera'),
+            Verdict.WRONG_FRAME,
+            'goals_wrong_frame',
+            "goals.header.frame_id: expected the working frame 'world', got 'camera'",
+        ),
+    ]
+    before = seen(pipeline)
+    for refuse, verdict, kind, words in refusals:
+        assert refuse() is verdict
+        assert not verdict.taken
+        assert seen(pipeline) == before
+        assert pipeline.counts[kind] == 1
+        assert pipeline.last_refusal is not None
+        assert words in pipeline.last_refusal
+    assert sum(pipeline.counts.values()) == len(refusals)
+
+
+def test_a_scene_much_older_than_the_last_one_is_a_clock_that_jumped(recorder: Recorder) -> None:
+    pipeline = ready()
+    assert pipeline.set_obstacles('cloud', make_obstacles(), START - 501 * MS, 'world') is Verdict.ACCEPTED
+    assert len(pipeline.scene.obstacles(START)) == 0
+
+
+def test_the_first_hand_sample_fixes_an_open_frame(recorder: Recorder) -> None:
+    pipeline = Pipeline(CONFIG)
+    assert pipeline.frame_id is None
+    pipeline.set_obstacles('cloud', make_obstacles([[0.0, 1.0]], 0.1, ids=('kept',)), START, 'world')
+    pipeline.set_obstacles('markers', make_obstacles([[0.0, 2.0]], 0.1, ids=('gone',)), START, 'camera')
+    pipeline.set_goals(np.zeros((1, 2)), 'camera')
+    pipeline.hand(hand(0.0))
+    assert pipeline.frame_id == 'world'
+    assert pipeline.scene.obstacles(START).ids == ('kept',)
+    assert pipeline.blocked() == 'no goal received'
+    assert pipeline.counts == {'obstacles_wrong_frame': 1, 'goals_wrong_frame': 1}
+
+
+def test_a_frame_given_as_a_parameter_holds_from_the_start(recorder: Recorder) -> None:
+    pipeline = Pipeline(updated(CONFIG, {'frame_id': 'base'}))
+    assert pipeline.hand(hand(0.0)) is Verdict.WRONG_FRAME
+    assert pipeline.set_goals(np.zeros((1, 2)), 'world') is Verdict.WRONG_FRAME
+    assert pipeline.hand_state is None
+    assert pipeline.hand(hand(0.0, frame='base')) is Verdict.ACCEPTED
+
+
+@pytest.mark.parametrize(
+    ('jump', 'verdict'),
+    [(-600.0, Verdict.RESTARTED_BACKWARD), (600.0, Verdict.RESTARTED_GAP), (-1e5, Verdict.RESTARTED_BACKWARD)],
+)
+def test_a_jump_of_the_hands_stamp_starts_anew(recorder: Recorder, jump: float, verdict: Verdict) -> None:
+    pipeline = ready(updated(CONFIG, {'scene.timeout_s': 0.0}))
+    pipeline.hand(hand(0.0))
+    pipeline.predict()
+    assert pipeline.hand(hand(jump)) is verdict
+    assert verdict.restarted
+    assert pipeline.due
+    assert pipeline.predict() is not None
+    assert recorder.calls[1][4] == Memory()
+    assert pipeline.counts[f'hand_{verdict}'] == 1
+
+
+def test_samples_that_were_due_but_overtaken_are_counted(recorder: Recorder) -> None:
+    pipeline = ready()
+    for ms in (0.0, 5.0, 10.0, 15.0):
+        pipeline.hand(hand(ms))
+    prediction = pipeline.predict()
+    assert prediction is not None
+    assert prediction.stamp_ns == START + 15 * MS
+    assert pipeline.counts['hand_superseded'] == 3
+    pipeline.hand(hand(20.0))
+    pipeline.hand(hand(25.0))
+    assert pipeline.counts['hand_superseded'] == 3
+
+
+def test_the_clutch(recorder: Recorder) -> None:
+    pipeline = ready()
+    pipeline.hand(hand(0.0))
+    pipeline.predict()
+    pipeline.engage(False)
+    assert pipeline.hand(hand(50.0, 0.02)) is Verdict.DISENGAGED
+    assert not pipeline.due
+    assert pipeline.hand_state is not None
+    assert pipeline.hand_state.stamp_ns == START + 50 * MS
+    assert pipeline.counts['hand_disengaged'] == 1
+    pipeline.engage(True)
+    assert not pipeline.due
+    assert pipeline.predict() is None
+    assert pipeline.hand(hand(51.0, 0.02)) is Verdict.ACCEPTED
+    assert pipeline.due
+    assert pipeline.predict() is not None
+    assert recorder.calls[1][4] == Memory()
+    pipeline.hand(hand(55.0))
+    pipeline.engage(True)
+    assert not pipeline.due
+
+
+def test_reset_forgets_the_movement_and_keeps_the_scene(recorder: Recorder) -> None:
+    pipeline = ready()
+    pipeline.hand(hand(0.0))
+    pipeline.predict()
+    scene, counts = pipeline.scene, pipeline.counts
+    pipeline.reset()
+    assert (pipeline.hand_state, pipeline.scene, pipeline.frame_id, pipeline.counts) == (None, scene, 'world', counts)
+    assert pipeline.blocked() == 'no hand pose yet'
+    assert pipeline.hand(hand(0.0)) is Verdict.ACCEPTED
+    assert pipeline.predict() is not None
+    assert recorder.calls[1][4] == Memory()
+
+
+def test_other_parameters_keep_movement_and_scene_where_they_can(recorder: Recorder) -> None:
+    pipeline = ready()
+    pipeline.hand(hand(0.0))
+    pipeline.predict()
+    state, scene = pipeline.hand_state, pipeline.scene
+    pipeline.reconfigure(updated(CONFIG, {'rate_hz': 10.0, 'foc.steps': 30}))
+    assert pipeline.hand_state is state
+    assert pipeline.scene is scene
+    pipeline.hand(hand(50.0))
+    assert not pipeline.due
+    pipeline.hand(hand(100.0))
+    pipeline.predict()
+    assert recorder.calls[1][0].foc.steps == 30
+    assert recorder.calls[1][4] == Memory('call1')
+
+
+@pytest.mark.parametrize(('name', 'value'), [('plane', 'xz'), ('frame_id', 'base')])
+def test_another_plane_or_frame_makes_movement_and_scene_void(recorder: Recorder, name: str, value: str) -> None:
+    pipeline = ready()
+    pipeline.hand(hand(0.0))
+    pipeline.reconfigure(replace(CONFIG, **{name: value}))
+    assert pipeline.hand_state is None
+    assert pipeline.scene.parts == {}
+    assert pipeline.scene.goals is None
+
+
+def test_a_scene_that_the_predictor_refuses_is_no_crash(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*arguments: object) -> tuple[Prediction, Memory]:
+        raise SceneError('goals[0]', 'a goal outside of every obstacle', '(0.15, 0)')
+
+    monkeypatch.setattr(module, 'predict', refuse)
+    pipeline = ready()
+    pipeline.hand(hand(0.0))
+    assert pipeline.predict() is None
+    assert not pipeline.due
+    assert pipeline.counts == {'predict_failed': 1}
+    assert pipeline.last_refusal == 'goals[0]: expected a goal outside of every obstacle, got (0.15, 0)'
+
+
+FRAMES = st.sampled_from(['world', 'world', 'world', 'camera', ''])
+EVENTS = st.one_of(
+    st.tuples(st.just('hand'), st.sampled_from([0, 1, 5, 5, 20, 20, 20, 100, 600, -5, -600, 10**7]), FRAMES),
+    st.tuples(st.just('obstacles'), st.sampled_from([0, 0, -10, -600, -3000, 3000, None]), FRAMES),
+    st.tuples(st.just('goals'), st.integers(0, 2), FRAMES),
+    st.tuples(st.just('engage'), st.sampled_from([True, True, False]), st.none()),
+    st.tuples(st.sampled_from(['predict', 'predict', 'predict', 'reset']), st.none(), st.none()),
+    st.tuples(st.just('rate'), st.sampled_from([10.0, 50.0, 1000.0]), st.none()),
+)
+
+
+class Driver:
+    """Feeds events to a pipeline and checks after each what must always hold."""
+
+    def __init__(self, pipeline: Pipeline) -> None:
+        self.pipeline = pipeline
+        self.now_ns = START
+        self.fresh = False
+        self.last_ns: int | None = None
+        self.predictions = 0
+
+    def feed(self, kind: str, value: object, frame: str | None) -> None:
+        before, total = seen(self.pipeline), sum(self.pipeline.counts.values())
+        verdict = getattr(self, kind)(value, frame)
+        if isinstance(verdict, Verdict) and not verdict.taken:
+            assert seen(self.pipeline) == before
+            assert sum(self.pipeline.counts.values()) == total + 1
+        assert sum(self.pipeline.counts.values()) >= total
+
+    def hand(self, ms: int, frame: str) -> Verdict:
+        stamp_ns = self.now_ns + ms * MS
+        x = 0.3 * np.sin((stamp_ns - START) / NANOSECONDS)
+        verdict = self.pipeline.hand(HandSample(stamp_ns, np.array([x, 0.02]), 0.0, frame))
+        if verdict.taken:
+            self.now_ns, self.fresh = stamp_ns, self.pipeline.engaged
+        if verdict.restarted:
+            self.last_ns = None
+        return verdict
+
+    def obstacles(self, ms: int | None, frame: str) -> Verdict:
+        stamp_ns = None if ms is None else self.now_ns + ms * MS
+        table = make_obstacles([[0.15, 0.0], [0.2, 0.1]], 0.03, 0.003, velocity=[0.01, 0.0])
+        return self.pipeline.set_obstacles('cloud' if ms else 'markers', table, stamp_ns, frame)
+
+    def goals(self, count: int, frame: str) -> Verdict:
+        return self.pipeline.set_goals(np.array([[0.3, 0.0], [0.3, 0.2]])[:count], frame)
+
+    def engage(self, on: bool, _: None) -> None:
+        if on != self.pipeline.engaged:
+            self.fresh, self.last_ns = False, None
+        self.pipeline.engage(on)
+
+    def reset(self, _: None, __: None) -> None:
+        self.pipeline.reset()
+        self.fresh, self.last_ns = False, None
+
+    def rate(self, rate_hz: float, _: None) -> None:
+        self.pipeline.reconfigure(updated(self.pipeline.config, {'rate_hz': rate_hz}))
+
+    def predict(self, _: None, __: None) -> None:
+        expected = self.pipeline.due and self.pipeline.blocked() is None
+        prediction = self.pipeline.predict()
+        assert (prediction is not None) == expected
+        if prediction is None:
+            return
+        assert self.fresh
+        assert self.pipeline.engaged
+        assert prediction.stamp_ns == self.now_ns
+        assert self.last_ns is None or prediction.stamp_ns - self.last_ns >= int(1e9 / self.pipeline.config.rate_hz)
+        for outcome in prediction.solved:
+            assert np.all(np.isfinite(outcome.solution.mean))
+            assert np.isfinite(outcome.likelihood)
+        self.fresh, self.last_ns = False, prediction.stamp_ns
+        self.predictions += 1
+
+
+def driven(pipeline: Pipeline, events: list[tuple[str, object, str | None]]) -> Driver:
+    driver = Driver(pipeline)
+    for event in events:
+        driver.feed(*event)
+    return driver
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.booleans(), st.lists(EVENTS, max_size=60))
+def test_any_sequence_of_events_gives_only_fresh_predictions(
+    scene_given: bool, events: list[tuple[str, object, str | None]]
+) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, 'predict', Recorder())
+        driven(ready() if scene_given else Pipeline(CONFIG), events)
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.lists(EVENTS, max_size=30))
+def test_any_sequence_of_events_through_the_real_predictor(events: list[tuple[str, object, str | None]]) -> None:
+    driven(ready(), events)
+
+
+def test_the_same_messages_give_the_same_predictions() -> None:
+    def run() -> list[Prediction]:
+        pipeline, predictions = ready(), []
+        for ms in range(0, 300, 20):
+            pipeline.hand(hand(ms, 0.3 * (ms / 1000.0) ** 2))
+            prediction = pipeline.predict()
+            assert prediction is not None
+            predictions.append(prediction)
+        return predictions
+
+    first, second = run(), run()
+    assert any(prediction.solved for prediction in first)
+    for one, other in zip(first, second, strict=True):
+        assert (one.stamp_ns, one.most_likely, one.notes) == (other.stamp_ns, other.most_likely, other.notes)
+        for a, b in zip(one.outcomes, other.outcomes, strict=True):
+            assert (a.candidate.label, a.likelihood, a.cost) == (b.candidate.label, b.likelihood, b.cost)
+            np.testing.assert_array_equal(a.solution.mean, b.solution.mean)
