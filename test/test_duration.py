@@ -1,4 +1,4 @@
-"""The time to go: whole durations, time since onset, and the two floors."""
+"""The time to go: whole durations, time since onset, the pace of a slow hand, floor and ceiling."""
 
 import math
 from dataclasses import replace
@@ -12,13 +12,15 @@ from foc_ros.foc.config import DurationConfig
 from foc_ros.foc.duration import movement_time, time_to_go
 from foc_ros.foc.records import NANOSECONDS, HandState
 
-FITTS = DurationConfig(model='fitts', fitts_a_s=0.2, fitts_b_s=0.25, target_width=0.02, min_time_to_go_s=0.3, max_mean_speed=0.5)
+FITTS = DurationConfig(
+    model='fitts', fitts_a_s=0.2, fitts_b_s=0.25, target_width=0.02, min_time_to_go_s=0.3, max_time_to_go_s=10.0
+)
 FIXED = replace(FITTS, model='fixed', fixed_s=1.5)
 GOAL = np.array([0.3, 0.0])
 
 
-def hand(x: float, onset: float | None = None, since_s: float = 0.0) -> HandState:
-    mean = np.array([x, 0.0, 0.0, 0.0, 0.0, 0.0])
+def hand(x: float, onset: float | None = None, since_s: float = 0.0, speed: float = 100.0) -> HandState:
+    mean = np.array([x, 0.0, 0.6 * speed, -0.8 * speed, 0.0, 0.0])
     stamp = 5 * NANOSECONDS
     if onset is None:
         return HandState(stamp, mean, np.eye(6))
@@ -41,26 +43,45 @@ def test_in_a_movement_the_duration_from_its_onset_less_the_time_since() -> None
     assert time_to_go(hand(0.1, onset=0.0, since_s=0.4), GOAL, FIXED) == pytest.approx(1.5 - 0.4)
 
 
-def test_never_below_the_floor_nor_faster_than_the_mean_speed() -> None:
+def test_floor_and_ceiling() -> None:
     assert time_to_go(hand(0.29, onset=0.0, since_s=5.0), GOAL, FITTS) == 0.3
-    assert time_to_go(hand(-0.7, onset=0.0, since_s=5.0), GOAL, FITTS) == pytest.approx(1.0 / 0.5)
     assert time_to_go(hand(0.3), GOAL, replace(FITTS, fitts_a_s=0.0)) == 0.3
+    assert time_to_go(hand(0.0), GOAL, replace(FIXED, fixed_s=30.0)) == 10.0
+    assert time_to_go(hand(0.1, onset=0.0, since_s=1.0, speed=0.0), GOAL, FIXED) == 10.0
 
 
-@given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6), st.floats(0.0, 1e4), st.sampled_from([FITTS, FIXED]))
-def test_is_continuous_at_onset_and_falls_with_time(x: float, onset: float, since_s: float, config: DurationConfig) -> None:
-    assert time_to_go(hand(x, x, 0.0), GOAL, config) == time_to_go(hand(x), GOAL, config)
-    now, before = time_to_go(hand(x, onset, since_s), GOAL, config), time_to_go(hand(x, onset, 0.0), GOAL, config)
-    assert 0.3 <= now <= before
-    assert now >= abs(x - 0.3) / 0.5
+def test_a_slow_hand_takes_as_long_as_its_way_does_at_its_pace() -> None:
+    assert time_to_go(hand(0.1, onset=0.0, since_s=1.0, speed=0.05), GOAL, FIXED) == pytest.approx(0.2 / 0.05)
+    assert time_to_go(hand(0.1, onset=0.0, since_s=3.0, speed=0.05), GOAL, FIXED) == pytest.approx(0.2 / 0.05)
+    # too early for the speed to tell
+    assert time_to_go(hand(0.01, onset=0.0, since_s=0.29 * 1.5, speed=0.05), GOAL, FIXED) == pytest.approx(0.71 * 1.5)
+
+
+@pytest.mark.parametrize('share', np.linspace(0.0, 0.99, 34))
+def test_a_minimum_jerk_movement_that_keeps_to_its_time_is_not_held_up(share: float) -> None:
+    config = replace(FIXED, min_time_to_go_s=0.01)
+    x = 0.3 * (10.0 * share**3 - 15.0 * share**4 + 6.0 * share**5)
+    speed = 0.3 / 1.5 * (30.0 * share**2 - 60.0 * share**3 + 30.0 * share**4)
+    state = hand(x, onset=0.0, since_s=1.5 * share, speed=speed)
+    assert time_to_go(state, GOAL, config) == pytest.approx(max(1.5 * (1.0 - share), 0.01), abs=1e-8)
+
+
+@given(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4), st.floats(0.0, 1e4), st.floats(0.0, 1e3), st.sampled_from([FITTS, FIXED]))
+def test_stays_in_bounds_and_is_continuous_at_onset(
+    x: float, onset: float, since_s: float, speed: float, config: DurationConfig
+) -> None:
+    assert 0.3 <= time_to_go(hand(x, onset, since_s, speed), GOAL, config) <= 10.0
+    assert time_to_go(hand(x, x, 0.0, speed), GOAL, config) == time_to_go(hand(x, speed=speed), GOAL, config)
+    slower = time_to_go(hand(x, onset, since_s, speed / 2.0), GOAL, config)
+    assert slower >= time_to_go(hand(x, onset, since_s, speed), GOAL, config)
 
 
 def test_the_frame_does_not_matter() -> None:
     turn, shift = np.array([[0.6, -0.8], [0.8, 0.6]]), np.array([3.0, -2.0])
-    state = hand(0.1, onset=0.0, since_s=0.4)
+    state = hand(0.1, onset=0.0, since_s=0.5, speed=0.1)
     moved = replace(
         state,
-        mean=np.concatenate([turn @ state.mean[:2] + shift, np.zeros(4)]),
+        mean=np.concatenate([turn @ state.mean[:2] + shift, turn @ state.mean[2:4], np.zeros(2)]),
         onset_position=turn @ state.onset_position + shift,
     )
     assert time_to_go(moved, turn @ GOAL + shift, FITTS) == pytest.approx(time_to_go(state, GOAL, FITTS), rel=1e-12)
