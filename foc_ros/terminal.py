@@ -1,14 +1,18 @@
-"""What a command shows while it works: a progress bar on standard error, and only on a terminal."""
+"""What a command shows: a progress bar on standard error, and only on a terminal; tables on standard output."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TypeVar
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import Progress
+from rich.table import Table
 
 T = TypeVar('T')
+WIDE = 400
+"""Columns within which no table is cut off; it takes no more than it needs."""
 
 
 def track(items: Iterable[T], words: str, total: int) -> Iterator[T]:
@@ -16,3 +20,13 @@ def track(items: Iterable[T], words: str, total: int) -> Iterator[T]:
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
         yield from progress.track(items, total=total, description=words)
+
+
+def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:
+    """Print a table on standard output, as wide as it needs to be."""
+    made = Table(title=title, title_justify='left', box=SIMPLE_HEAD, pad_edge=False)
+    for column in columns:
+        made.add_column(column, no_wrap=True)
+    for row in rows:
+        made.add_row(*row)
+    Console(width=WIDE).print(made)

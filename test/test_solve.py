@@ -1,0 +1,136 @@
+"""`solve`: scenes from files, against the reference cases, closed forms and Monte Carlo."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from foc_ros.command_line import main
+
+CASES = Path(__file__).parents[2] / 'shared' / 'reference' / 'cases.json'
+SCENE: dict[str, Any] = {
+    'start': [0.0, 0.0],
+    'goal': [0.3, 0.0],
+    'duration_s': 1.0,
+    'steps': 50,
+    'noise': [0.05, 0.05],
+    'eta': 0.9,
+    'strategy': 'lv',
+    'obstacles': [{'x': 0.15, 'y': 0.01, 'radius': 0.03, 'radius_stddev': 0.002}],
+}
+
+
+def solve(tmp_path: Path, scene: dict[str, Any], *options: str) -> int:
+    (tmp_path / 'scene.json').write_text(json.dumps(scene), 'utf-8')
+    return main(['solve', str(tmp_path / 'scene.json'), *options])
+
+
+def candidates(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], scene: dict[str, Any], *options: str, code: int = 0
+) -> list[dict[str, Any]]:
+    assert solve(tmp_path, scene, '--json', *options) == code
+    captured = capsys.readouterr()
+    assert code == 3 or captured.err == ''
+    return json.loads(captured.out)['candidates']
+
+
+@pytest.mark.skipif(not CASES.is_file(), reason='optional data ../shared/reference is not there')
+@pytest.mark.parametrize('row', range(10))
+def test_reference_cases(tmp_path: Path, capsys: pytest.CaptureFixture[str], row: int) -> None:
+    case = json.loads(CASES.read_text('utf-8'))[row]
+    expected = case['converged_qp']
+    scene = {name: case[name] for name in ('start', 'goal', 'duration_s', 'steps', 'noise', 'obstacles', 'guess')}
+    (answer,) = candidates(tmp_path, capsys, {**scene, 'strategy': 'fixed', 'tau': expected['tau'], 'lambda': expected['lam']})
+    assert answer['status'] == 'solved' and answer['effort'] == pytest.approx(expected['effort'], rel=1e-4)
+    sides = {str(place): 'left' if side > 0 else 'right' for place, side in enumerate(expected['sides'])}
+    assert answer['sides'] == sides
+    assert np.allclose(answer['mean'][scene['steps'] // 2], expected['mid'], atol=1e-4)
+    assert np.allclose(np.max(answer['stddev'], axis=0), expected['stddev_max'], rtol=1e-3, atol=1e-9)
+
+
+def test_json_has_the_promised_names(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = candidates(tmp_path, capsys, SCENE, '--monte-carlo', '500')
+    promised = (
+        'label goal sides status effort cost eta tau lambda likelihood qp_solves solve_ms mean velocity stddev mc_step mc_path'
+    )
+    assert len(found) == 2
+    for each in found:
+        assert set(promised.split()) <= set(each)
+        assert np.shape(each['mean']) == np.shape(each['velocity']) == np.shape(each['stddev']) == (51, 2)
+        assert each['status'] == 'solved' and each['eta'] == pytest.approx(0.9, abs=1e-3)
+        assert 0.9 - 0.05 < each['mc_path'] <= each['mc_step'] <= 1
+    assert [each['sides'] for each in found] == [{'0': 'right'}, {'0': 'left'}]
+    assert sum(each['likelihood'] for each in found) == pytest.approx(1) and found[0]['likelihood'] > found[1]['likelihood']
+
+
+def test_a_free_reach_is_minimum_jerk(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (found,) = candidates(tmp_path, capsys, {**SCENE, 'obstacles': [], 'steps': 100})
+    r = np.linspace(0, 1, 101)
+    assert np.allclose(np.array(found['mean'])[:, 0], 0.3 * (10 * r**3 - 15 * r**4 + 6 * r**5), atol=1e-4)
+    assert found['cost'] == pytest.approx(720 * 0.3**2, rel=1e-3) and found['effort'] == pytest.approx(100 * found['cost'])
+    assert found['eta'] == pytest.approx(1) and found['sides'] == {}
+
+
+def test_noise_is_per_step_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One random jerk per step: halving the step halves the variance at the goal."""
+    coarse, fine = (
+        candidates(tmp_path, capsys, {**SCENE, 'obstacles': [], 'steps': steps})[0]['stddev'][-1][0] for steps in (100, 200)
+    )
+    assert coarse / fine == pytest.approx(np.sqrt(2), rel=1e-2)
+
+
+def test_only_the_class_of_a_guess_is_solved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for amplitude, side in ((0.05, 'left'), (-0.05, 'right')):
+        (found,) = candidates(tmp_path, capsys, {**SCENE, 'guess': {'amplitude': amplitude}})
+        assert found['sides'] == {'0': side}
+        (via,) = candidates(tmp_path, capsys, {**SCENE, 'guess': [[0.15, amplitude]]})
+        assert via['sides'] == {'0': side} and via['effort'] == pytest.approx(found['effort'], rel=1e-3)
+
+
+def test_max_candidates_and_goals(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert len(candidates(tmp_path, capsys, {**SCENE, 'max_candidates': 1})) == 1
+    goals = {**{name: value for name, value in SCENE.items() if name != 'goal'}, 'goals': [[0.3, 0.0], [0.3, 0.2]]}
+    found = candidates(tmp_path, capsys, goals)
+    assert {each['goal'] for each in found} == {0, 1}
+    for each in found:
+        assert np.allclose(each['mean'][-1], goals['goals'][each['goal']], atol=1e-6)
+
+
+def test_the_table_and_the_picture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip('matplotlib', reason='matplotlib is not installed')
+    assert solve(tmp_path, SCENE, '--plot', str(tmp_path / 'ways.png')) == 0
+    assert (tmp_path / 'ways.png').read_bytes().startswith(b'\x89PNG')
+    out = capsys.readouterr().out
+    assert 'goal0:-0' in out and 'solved' in out and 'likelihood' in out
+
+
+def test_nothing_solved_is_exit_3_with_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    noisy = {**SCENE, 'noise': [0.5, 0.5], 'eta': 0.99, 'duration_s': 0.3}
+    found = candidates(tmp_path, capsys, noisy, code=3)
+    assert found and all(each['status'] != 'solved' and each['likelihood'] == 0 for each in found)
+    assert solve(tmp_path, noisy) == 3
+    error = capsys.readouterr().err
+    assert error.startswith('foc_ros solve: no candidate could be solved: goal0:') and error.count('\n') == 1
+
+
+@pytest.mark.parametrize(
+    ('scene', 'options', 'line'),
+    [
+        ({**SCENE, 'eta': 2}, (), 'foc_ros solve: eta: expected a number in [0, 0.999], got 2'),
+        (SCENE, ('--monte-carlo', '0'), 'foc_ros solve: --monte-carlo: expected a number in [1, 10000000], got 0'),
+        (SCENE, ('--monte-carlo', 'x'), "foc_ros solve: argument --monte-carlo: invalid int value: 'x'"),
+    ],
+)
+def test_wrong_input_is_exit_2_with_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], scene: dict[str, Any], options: tuple[str, ...], line: str
+) -> None:
+    try:
+        code = solve(tmp_path, scene, *options)
+    except SystemExit as leaving:
+        code = leaving.code
+    assert code == 2
+    assert capsys.readouterr() == ('', f'{line}\n')
