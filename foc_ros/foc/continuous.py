@@ -22,11 +22,15 @@ STRIDE = 4.0
 """First look along the curve, in s: lambda grows by 16 from one to the next."""
 WARM_STRIDE = 0.25
 """First look around the s of a warm start."""
-LARGEST_LAMBDA = 1e12
-"""Where the walk ends: the variance weight is then all that counts, and k has stopped growing."""
+SPAN = 60.0
+"""The largest s in any case: without noise, say, when lambda weighs nothing."""
+LARGEST_SHARE = 1e6
+"""Where the walk ends: a variance weight so many times the effort is all that counts, and k has stopped growing."""
+PATIENCE = 2
+"""Strides in a row without a larger k after which there is none to be found."""
 CLOSE = 1e-6
 """Relative excess of k over the wanted one at which the root is found."""
-NARROW = 1e-5
+NARROW = 1e-2
 """Bracket in s at which the root is as good as found: k jumps there, because the touching step changes."""
 MAX_TRIALS = 60
 
@@ -47,10 +51,12 @@ class Curve:
         """Return the s of a lambda on the curve."""
         return max(0.0, math.log(lam / self.first_lambda) / math.log(self.growth)) if lam > self.first_lambda > 0 else 0.0
 
-    @property
-    def end(self) -> float:
-        """The largest s worth trying."""
-        return max(STRIDE, math.log(LARGEST_LAMBDA / max(self.first_lambda, 1.0)) / math.log(self.growth))
+    def end(self, problem: Problem) -> float:
+        """Return the largest s worth trying."""
+        variance = float(problem.summed_variance.max())
+        if not self.first_lambda * variance > 0:
+            return SPAN
+        return min(max(STRIDE, math.log(LARGEST_SHARE / (self.first_lambda * variance)) / math.log(self.growth)), SPAN)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +87,7 @@ class _Walker:
     """Evaluates points, each from a neighbour's solution, and counts."""
 
     def __init__(self, problem: Problem, curve: Curve) -> None:
-        self.problem, self.curve, self.qp_solves = problem, curve, 0
+        self.problem, self.curve, self.end, self.qp_solves = problem, curve, curve.end(problem), 0
 
     def point(self, s: float, guess: Array, working: WorkingSet) -> Point | None:
         converged = converge(self.problem, guess, working, *self.curve.at(s))
@@ -123,17 +129,20 @@ def _bracket(walker: _Walker, first: Point, wanted: float, stride: float) -> tup
                 return point, high
             high = point
         return high, high
-    low, best = first, first
+    low, best, since = first, first, 0
     for point in _strides(walker, first, stride):
         if point.k >= wanted:
             return low, point
-        low, best = point, max(best, point, key=lambda p: p.k)
+        low, since = point, 0 if point.k > best.k else since + 1
+        best = max(best, point, key=lambda p: p.k)
+        if since == PATIENCE:
+            break
     return best, None
 
 
 def _strides(walker: _Walker, first: Point, stride: float) -> Iterator[Point]:
     """Yield points further and further along the curve, or back for a negative stride; towards an infeasible end in halves."""
-    point, end = first, walker.curve.end if stride > 0 else 0.0
+    point, end = first, walker.end if stride > 0 else 0.0
     while point.s != end and abs(stride) > WARM_STRIDE / 2:
         s = min(point.s + stride, end) if stride > 0 else max(point.s + stride, end)
         further = walker.beside(s, point)

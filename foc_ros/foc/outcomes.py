@@ -45,11 +45,11 @@ def solve_candidates(
 def _solved(
     candidate: Candidate, problem: Problem, settings: FocConfig, effort_spent: float, earlier: Earlier | None
 ) -> Outcome:
-    """Solve from the earlier solution, and if that does not come out well, from the candidate's own guess."""
+    """Solve from the earlier solution; if that gets into what the earlier one was not, from the candidate's own guess."""
     previous = earlier.solutions.get(candidate.label) if earlier else None
     if earlier and previous is not None:
         outcome = _judged(candidate, problem, forward(problem, warm(previous, earlier.elapsed_s, problem), settings), effort_spent)
-        if outcome.solved:
+        if outcome.solved or outcome.solution.status is previous.status:
             return outcome
     return _judged(candidate, problem, forward(problem, cold(candidate.guess), settings), effort_spent)
 

@@ -17,7 +17,7 @@ from .noise import noise_per_step
 from .outcomes import Earlier, solve_candidates
 from .problem import Problem, rest_to_goal
 from .replanning import triple_integrator_error_map
-from .records import NANOSECONDS, Array, HandState, Obstacles, Outcome, Prediction, Solution
+from .records import NANOSECONDS, Array, HandState, Obstacles, Outcome, Prediction, Solution, Status
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,8 @@ def predict(config: Config, hand: HandState, obstacles: Obstacles, goals: Array,
     notes = dict(found.notes) | ({'merged': merged} if merged else {})
     seconds = time.perf_counter() - began
     prediction = Prediction(hand.stamp_ns, hand.frame_id, hand.height, tuple(outcomes), best, notes, seconds)
-    return prediction, Memory(best, {outcome.candidate.label: outcome.solution for outcome in answer}, hand.stamp_ns)
+    useful = (outcome for outcome in outcomes if outcome.solution.status in (Status.SOLVED, Status.ETA_UNREACHABLE))
+    return prediction, Memory(best, {outcome.candidate.label: outcome.solution for outcome in useful}, hand.stamp_ns)
 
 
 def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: Array, duration_s: float) -> Problem:
