@@ -94,7 +94,7 @@ class BagReader:
         return roles
 
     def connection_of(self, topic: str) -> dict[str, Any]:
-        """Return what :meth:`BagWriter.copy` needs to know of a topic: type, definitions, quality of service offered."""
+        """Return what a writer needs to know of a topic: type, definitions, quality of service offered."""
         connection = next(each for each in self._reader.connections if each.topic == topic)
         offered = connection.ext.offered_qos_profiles if isinstance(connection.ext, ConnectionExtRosbag2) else []
         return {'msgtype': connection.msgtype, 'typestore': self._reader.typestore, 'offered_qos_profiles': offered}
@@ -133,9 +133,13 @@ class BagWriter:
         kind = message.__msgtype__
         self._put(topic, log_ns, TYPESTORE.serialize_cdr(message, kind), {'msgtype': kind, 'typestore': TYPESTORE})
 
-    def copy(self, item: Item, connection: Mapping[str, Any]) -> None:
-        """Write a message as it was read; connection: see :meth:`BagReader.connection_of`."""
-        self._put(item.topic, item.log_ns, item.raw, connection)
+    def write_raw(self, topic: str, kind: str, raw: bytes, log_ns: int) -> None:
+        """Write the bytes of a message of a type that :data:`TYPESTORE` knows."""
+        self._put(topic, log_ns, raw, {'msgtype': kind, 'typestore': TYPESTORE})
+
+    def copy(self, item: Item, reader: BagReader) -> None:
+        """Write a message as it was read, with its topic's definitions and offered quality of service."""
+        self._put(item.topic, item.log_ns, item.raw, {} if item.topic in self._connections else reader.connection_of(item.topic))
 
     def _put(self, topic: str, log_ns: int, raw: bytes | memoryview, connection: Mapping[str, Any]) -> None:
         if topic not in self._connections:

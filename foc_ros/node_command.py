@@ -17,6 +17,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the node until it is told to stop."""
     if find_spec('rclpy') is None:
         raise FocError('rclpy is not installed: source a ROS 2 installation, or install the extra `ros`')
-    from .node import main
+    from .node_main import main
 
-    return int(main(arguments.rest) or 0)
+    return main(arguments.rest)

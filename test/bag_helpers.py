@@ -10,9 +10,13 @@ import numpy as np
 
 from foc_ros.bags import TYPESTORE, BagWriter
 from foc_ros.conversions.types import RosbagsTypes
+from foc_ros.foc.config import Config, updated
 from foc_ros.input_messages import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.parameters import dump_parameter_file
 
 TYPES = RosbagsTypes(TYPESTORE)
+CONFIG = updated(Config(), {'foc.strategy': 'fixed', 'foc.tau': 5e-4, 'foc.steps': 30})
+"""Every class of these recordings is solved with it, whatever eta the hand's uncertainty allows."""
 FRAME = 'world'
 START_NS = 5_000_000_000
 SCENE = [(0.15, 0.0, 0.0, 0.03, 0.002, 7)]
@@ -48,3 +52,10 @@ def write_bag(path: Path, items: Iterable[tuple[str, int, Any]] | None = None, r
             if names.get(topic, topic):
                 writer.write(names.get(topic, topic), message, stamp_ns)
     return path
+
+
+def write_parameters(folder: Path, config: Config = CONFIG) -> str:
+    """Write the parameter file of CONFIG and return its path."""
+    file = folder / 'foc.yaml'
+    file.write_text(dump_parameter_file(config), 'utf-8')
+    return str(file)

@@ -75,7 +75,7 @@ def test_a_copy_is_byte_for_byte(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'one')
     with BagReader(bag) as reader, BagWriter(tmp_path / 'two') as writer:
         for item in reader:
-            writer.copy(item, reader.connection_of(item.topic))
+            writer.copy(item, reader)
     assert [bytes(item.raw) for item in read(tmp_path / 'two')] == [bytes(item.raw) for item in read(bag)]
 
 

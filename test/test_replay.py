@@ -1,0 +1,190 @@
+"""A recording through the predictor: the same each time, nothing lost, every refusal counted."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bag_helpers import CONFIG, FRAME, TYPES, messages, ns, reach, write_bag, write_parameters
+
+from foc_ros.bags import BagReader
+from foc_ros.command_line import main
+from foc_ros.foc.config import updated
+from foc_ros.input_messages import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.replay import Replay, replay
+
+FEW = 0.12
+"""Seconds of a reach that are enough for a few predictions."""
+
+
+@pytest.fixture
+def bag(tmp_path: Path) -> Path:
+    return write_bag(tmp_path / 'reach', messages(seconds=FEW))
+
+
+def run(bag: Path, *options: str) -> int:
+    return main(['replay', str(bag), '--params', write_parameters(bag.parent), *options])
+
+
+def answer_of(capsys: pytest.CaptureFixture[str], bag: Path, *options: str) -> dict[str, Any]:
+    assert run(bag, '--json', *options) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ''
+    return json.loads(captured.out, parse_constant=lambda name: pytest.fail(f'{name} is no JSON'))
+
+
+def without_times(answer: dict[str, Any]) -> dict[str, Any]:
+    return {**answer, 'summary': {name: value for name, value in answer['summary'].items() if name != 'prediction_ms'}}
+
+
+def test_json_has_the_promised_names(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    answer = answer_of(capsys, bag)
+    samples = len(reach(FEW))
+    summary = answer['summary']
+    assert {name: summary[name] for name in ('samples', 'predictions', 'refused')} == {
+        'samples': samples,
+        'predictions': samples,
+        'refused': {},
+    }
+    assert summary['duration_s'] == pytest.approx(FEW - 0.02 + 0.1)
+    assert 0 < summary['prediction_ms']['p50'] <= summary['prediction_ms']['p99']
+    assert [each['stamp_ns'] for each in answer['predictions']] == [ns(time) for time, _ in reach(FEW)]
+    for prediction in answer['predictions']:
+        solved = [each for each in prediction['candidates'] if each['status'] == 'solved']
+        assert solved and sum(each['likelihood'] for each in solved) == pytest.approx(1)
+        assert prediction['candidates'][0]['label'] == prediction['most_likely']
+        for each in prediction['candidates']:
+            assert ' '.join(each) == 'label goal sides status effort cost eta tau lambda likelihood qp_solves mean stddev'
+            assert each['goal'] == 0 and set(each['sides'].values()) <= {'left', 'right'}
+            assert np.shape(each['mean']) == np.shape(each['stddev']) == (CONFIG.foc.steps + 1, 2)
+        assert {each['sides']['7'] for each in solved} == {'left', 'right'}
+        assert np.allclose([each['mean'][-1] for each in solved], [0.3, 0.0], atol=1e-6)
+
+
+def test_the_same_answer_each_time(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first, second = (without_times(answer_of(capsys, bag)) for _ in range(2))
+    assert first == second
+
+
+def test_topics_by_type_give_the_same_answer(tmp_path: Path, bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    names = {'/hand_pose': '/tool/pose', '/obstacles': '/perception/spheres', '/goals': '/targets'}
+    renamed = write_bag(tmp_path / 'renamed', messages(seconds=FEW), names)
+    assert without_times(answer_of(capsys, renamed)) == without_times(answer_of(capsys, bag))
+
+
+def test_a_topic_can_be_chosen(tmp_path: Path, bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    still = [('/left/measured_cp', stamp_ns, message) for topic, stamp_ns, message in messages(FEW) if topic == '/hand_pose'][:1]
+    moving = [('/right/measured_cp' if each[0] == '/hand_pose' else each[0], *each[1:]) for each in messages(seconds=FEW)]
+    arms = write_bag(tmp_path / 'arms', [*moving, *still])
+    assert run(arms) == 2
+    assert 'several topics could be hand_pose: /left/measured_cp, /right/measured_cp; choose with' in capsys.readouterr().err
+    chosen = answer_of(capsys, arms, '--remap', 'hand_pose:=/right/measured_cp')
+    assert chosen['predictions'] == answer_of(capsys, bag)['predictions']
+
+
+def test_the_rate_bounds_the_predictions(tmp_path: Path) -> None:
+    fast = write_bag(tmp_path / 'fast', messages(seconds=FEW, rate_hz=200.0))
+    stamps = [prediction.stamp_ns for prediction in replay(fast, CONFIG)]
+    assert len(stamps) == 6 and min(np.diff(stamps)) >= 20_000_000
+
+
+def test_what_cannot_be_used_is_counted_and_the_rest_goes_on(tmp_path: Path) -> None:
+    spoiled = hand_pose(TYPES, ns(0.01), FRAME, (float('nan'), 0.0, 0.0))
+    elsewhere = hand_pose(TYPES, ns(0.03), 'camera', (0.0, 0.0, 0.0))
+    negative = obstacle_cloud(TYPES, ns(0.05), FRAME, [(0.1, 0.0, 0.0, -0.1, 0.0, 1)])
+    partly = obstacle_cloud(TYPES, ns(0.07), FRAME, [(0.15, 0.0, 0.0, 0.03, 0.002, 7), (float('inf'), 0, 0, 0.1, 0, 8)])
+    late = hand_pose(TYPES, ns(0.02), FRAME, (0.0, 0.0, 0.0))
+    bad = [
+        ('/hand_pose', ns(0.01), spoiled),
+        ('/hand_pose', ns(0.03), elsewhere),
+        ('/obstacles', ns(0.05), negative),
+        ('/obstacles', ns(0.07), partly),
+        ('/hand_pose', ns(0.09), late),
+    ]
+    bag = write_bag(tmp_path / 'bad', sorted([*messages(seconds=FEW), *bad], key=lambda each: each[1]))
+    replayed = Replay(CONFIG)
+    with BagReader(bag) as reader:
+        stamps = [step.prediction.stamp_ns for step in replayed.steps(reader) if step.prediction]
+    assert stamps == [ns(time) for time, _ in reach(FEW)]
+    expected = {'hand_pose_invalid': 1, 'hand_wrong_frame': 1, 'obstacles_invalid': 1, 'hand_late': 1}
+    counts = replayed.intake.counts
+    assert {name: counts.get(name) for name in expected} == expected
+    assert counts['obstacles_dropped_not_finite'] == 1
+
+
+def test_a_table_is_printed_without_json(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(bag) == 0
+    out, err = capsys.readouterr()
+    assert 'hand poses' in out and f'{len(reach(FEW))} with a solved candidate' in out and err == ''
+
+
+def test_nothing_solved_is_exit_3_and_says_why(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    stale = [each for each in messages(seconds=FEW) if each[0] == '/hand_pose']
+    stale += [
+        ('/obstacles', ns(-1), obstacle_cloud(TYPES, ns(-4.5), FRAME, [])),
+        ('/goals', ns(-1), goal_poses(TYPES, ns(-1), FRAME, np.zeros((1, 3)))),
+    ]
+    bag = write_bag(tmp_path / 'stale', sorted(stale, key=lambda each: each[1]))
+    assert run(bag) == 3
+    out, err = capsys.readouterr()
+    assert 'predictions' in out
+    assert err.startswith('foc_ros replay: no prediction has a solved candidate: obstacles are 4.6 s older')
+    assert err.count('\n') == 1
+
+
+def test_parameters_are_the_nodes(tmp_path: Path, bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    few = write_parameters(tmp_path, updated(CONFIG, {'homotopy.max_candidates': 1, 'foc.steps': 20}))
+    assert main(['replay', str(bag), '--json', '--params', few]) == 0
+    predictions = json.loads(capsys.readouterr().out)['predictions']
+    assert {len(each['candidates']) for each in predictions} == {1}
+    assert np.shape(predictions[0]['candidates'][0]['mean']) == (21, 2)
+    Path(few).write_text('/**:\n  ros__parameters:\n    foc.steps: 2\n')
+    assert main(['replay', str(bag), '--params', few]) == 2
+    assert capsys.readouterr().err == 'foc_ros replay: foc.steps: expected a number in [5, 400], got 2\n'
+
+
+def test_the_output_bag_holds_inputs_and_predictions(tmp_path: Path, bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(bag, '--output', str(tmp_path / 'out')) == 0
+    with BagReader(bag) as before, BagReader(tmp_path / 'out') as after:
+        inputs = [(item.topic, item.log_ns, bytes(item.raw)) for item in before]
+        assert [(item.topic, item.log_ns, bytes(item.raw)) for item in after] == inputs
+        assert after.message_count == len(inputs) + 4 * len(reach(FEW))
+    capsys.readouterr()
+    assert without_times(answer_of(capsys, tmp_path / 'out')) == without_times(answer_of(capsys, bag))
+
+
+def test_an_output_that_exists_is_left_alone(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(bag, '--output', str(bag)) == 2
+    assert 'exists already and is not overwritten' in capsys.readouterr().err
+    with BagReader(bag) as reader:
+        assert len(list(reader)) == len(messages(seconds=FEW))
+
+
+def test_a_cut_bag_leaves_neither_json_nor_output(tmp_path: Path, bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = bag / 'reach.mcap'
+    metadata = (bag / 'metadata.yaml').read_text()
+    count = len(messages(seconds=FEW))
+    (bag / 'metadata.yaml').write_text(metadata.replace(f'message_count: {count}', f'message_count: {count + 1}'))
+    assert run(bag, '--json', '--output', str(tmp_path / 'out')) == 2
+    out, err = capsys.readouterr()
+    assert out == '' and 'damaged or cut short' in err and not (tmp_path / 'out').exists()
+    file.write_bytes(file.read_bytes()[:-50])
+    assert run(bag) == 2
+    assert 'damaged or cut short' in capsys.readouterr().err
+
+
+def test_a_report_is_written(tmp_path: Path, bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip('matplotlib', reason='matplotlib is not installed')
+    assert run(bag, '--report', str(tmp_path / 'report')) == 0
+    page = (tmp_path / 'report' / 'index.html').read_text('utf-8')
+    assert 'reach' in page and 'hand poses' in page
+
+
+@pytest.mark.parametrize('remap', ['hand_pose', 'hand_pose:=', 'hand:=/hand_pose'])
+def test_a_wrong_remap_is_said(bag: Path, capsys: pytest.CaptureFixture[str], remap: str) -> None:
+    assert run(bag, '--remap', remap) == 2
+    err = capsys.readouterr().err
+    assert remap.split(':=')[0] in err and err.count('\n') == 1
