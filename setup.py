@@ -63,7 +63,7 @@ setup(
     },
     entry_points={
         'console_scripts': [
-            'foc_node = foc_ros.node:main',
+            'foc_node = foc_ros.node_main:main',
             'foc_ros = foc_ros.command_line:main',
         ],
     },

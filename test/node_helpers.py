@@ -1,0 +1,103 @@
+"""A FocNode and the operator's side of it, in one private graph."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped
+from ros_helpers import Graph
+
+from foc_ros.conversions.types import RclpyTypes
+
+TYPES = RclpyTypes()
+ROWS = [(0.15, 0.02, 0.0, 0.03)]
+GOALS = [(0.3, 0.0, 0.0)]
+QUICK = {'foc.steps': 20, 'homotopy.max_candidates': 2}
+"""Parameters with which a prediction takes little time."""
+RELIABLE_HAND = {'qos_overrides./hand_pose.subscription.reliability': 'reliable'}
+"""So that a test can tell when all it published has arrived."""
+
+
+def hand_path(count: int, rate_hz: float = 100.0, start_s: float = 10.0) -> list[Any]:
+    """Return hand poses that speed up towards the goal."""
+    times = np.arange(count) / rate_hz
+    return [pose_stamped(TYPES, (0.15 * t**2, 0.0, 0.1), round((start_s + t) * SECOND)) for t in times]
+
+
+class Bench:
+    """`node`: the FocNode; `player`: publishes its inputs; `received`: its outputs by name, `health`: its diagnostics."""
+
+    def __init__(
+        self, ros: Graph, outputs: Iterable[str] = ('prediction', 'likelihoods', 'path', 'markers'), **options: Any
+    ) -> None:
+        from diagnostic_msgs.msg import DiagnosticArray
+        from geometry_msgs.msg import PoseArray, PoseStamped
+        from rclpy.parameter import Parameter
+        from sensor_msgs.msg import PointCloud2
+        from visualization_msgs.msg import MarkerArray
+
+        from foc_ros.node import _OUTPUTS, FocNode
+
+        parameters = QUICK | RELIABLE_HAND | options.pop('parameters', {})
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        namespace = options.get('namespace', '')
+        self.ros = ros
+        self.node = ros.add(FocNode(context=ros.context, parameter_overrides=overrides, **options))
+        self.player = ros.node(f'player{namespace.replace("/", "_")}', namespace=namespace)
+        inputs = {
+            'hand_pose': PoseStamped,
+            'obstacles': PointCloud2,
+            'obstacle_markers': MarkerArray,
+            'goals': PoseArray,
+            'goal_pose': PoseStamped,
+        }
+        self.publishers = {name: self.player.create_publisher(kind, name, 1000) for name, kind in inputs.items()}
+        self.received = {name: ros.collect(self.player, _OUTPUTS[name], f'foc/{name}') for name in outputs}
+        self.diagnostics = ros.collect(self.player, DiagnosticArray, '/diagnostics')
+        ros.spin_until(self._connected, 'publishers and subscriptions find each other')
+
+    def _connected(self) -> bool:
+        heard = all(publisher.get_subscription_count() for publisher in self.publishers.values())
+        return heard and all(self.node._outputs[name].get_subscription_count() for name in self.received)
+
+    def send(self, name: str, *messages: Any) -> None:
+        """Publish, and return when the node has every message in its queue: none was looked at yet."""
+        from rclpy.duration import Duration
+
+        for message in messages:
+            self.publishers[name].publish(message)
+        assert self.publishers[name].wait_for_all_acked(Duration(seconds=20)), f'{name} was not received'
+
+    def hear(self, name: str, *messages: Any) -> None:
+        """Publish, and spin until the node has looked at every message."""
+        monitored = self.node._monitor._inputs
+        before = monitored[name].received if name in monitored else 0
+        self.send(name, *messages)
+        self.ros.spin_until(lambda: name in monitored and monitored[name].received >= before + len(messages), f'{name} is taken')
+
+    def show_scene(
+        self, rows: Sequence[tuple[float, ...]] = ROWS, goals: Sequence[Sequence[float]] = GOALS, stamp_s: float = 10.0
+    ) -> None:
+        self.hear('obstacles', cloud(TYPES, obstacle_table(rows), round(stamp_s * SECOND)))
+        self.hear('goals', pose_array(TYPES, goals))
+
+    def move(self, poses: Iterable[Any]) -> None:
+        """Send hand poses one by one, each when the one before was taken: the node keeps up."""
+        for pose in poses:
+            self.hear('hand_pose', pose)
+
+    def wait_for(self, name: str, count: int) -> list[Any]:
+        self.ros.spin_until(lambda: len(self.received[name]) >= count, f'{count} messages of {name}')
+        return self.received[name]
+
+    def health(self) -> Any:
+        """Return the next status that the node publishes."""
+        before = len(self.diagnostics)
+        self.ros.spin_until(lambda: len(self.diagnostics) > before, 'diagnostics')
+        return self.diagnostics[-1].status[0]
+
+
+def figures(status: Any) -> dict[str, str]:
+    return {entry.key: entry.value for entry in status.values}

@@ -1,0 +1,211 @@
+"""The node in its graph: what it publishes, when, and that it is what the pipeline computes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import ros_helpers
+
+ros_helpers.require_ros()
+
+from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped  # noqa: E402
+from node_helpers import GOALS, QUICK, ROWS, TYPES, Bench, figures, hand_path  # noqa: E402
+from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
+from ros_helpers import Graph  # noqa: E402
+
+from foc_ros.conversions.outputs import output_messages  # noqa: E402
+from foc_ros.foc.config import Config, updated  # noqa: E402
+from foc_ros.foc.pipeline import Pipeline  # noqa: E402
+from foc_ros.intake import Intake  # noqa: E402
+
+
+def stamps(messages: list[Any]) -> list[int]:
+    return [message.header.stamp.sec * SECOND + message.header.stamp.nanosec for message in messages]
+
+
+def sent(message: Any) -> Any:
+    """Return the message as it arrives, with its float32 fields rounded."""
+    return deserialize_message(serialize_message(message), type(message))
+
+
+def test_every_due_hand_pose_is_answered_as_the_pipeline_answers_it(ros: Graph) -> None:
+    bench, poses = Bench(ros), hand_path(20)
+    bench.show_scene()
+    bench.move(poses)
+    clouds = bench.wait_for('prediction', 10)
+    assert stamps(clouds) == stamps(poses)[::2]
+    pipeline = Pipeline(updated(Config(), QUICK))
+    intake = Intake(pipeline)
+    intake.take('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND))
+    intake.take('goals', pose_array(TYPES, GOALS))
+    expected = []
+    for pose in poses:
+        intake.take('hand_pose', pose)
+        prediction = pipeline.predict() if pipeline.due else None
+        if prediction is not None:
+            expected.append(output_messages(prediction, pipeline.scene.obstacles(prediction.stamp_ns), 'xy', TYPES))
+    assert len(expected) == 10
+    assert any(message['prediction'].width for message in expected)
+    for name in ('prediction', 'likelihoods', 'path', 'markers'):
+        assert bench.wait_for(name, 10) == [sent(message[name]) for message in expected]
+
+
+def test_every_output_carries_the_stamp_and_frame_of_the_hand(ros: Graph) -> None:
+    bench = Bench(ros)
+    bench.hear('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'base'))
+    bench.hear('goals', pose_array(TYPES, GOALS, 'base'))
+    bench.hear('hand_pose', pose_stamped(TYPES, (0.0, 0.0, 0.25), 10 * SECOND + 7, 'base'))
+    for name in ('prediction', 'path'):
+        head = bench.wait_for(name, 1)[0].header
+        assert (head.stamp.sec, head.stamp.nanosec, head.frame_id) == (10, 7, 'base')
+    assert {each.header.stamp.nanosec for each in bench.wait_for('markers', 1)[0].markers} == {7}
+    path = bench.received['path'][0].poses
+    assert path
+    assert {pose.pose.position.z for pose in path} == {0.25}
+
+
+def test_markers_and_a_single_goal_are_a_scene_too(ros: Graph) -> None:
+    bench = Bench(ros)
+    bench.hear(
+        'obstacle_markers', marker_array(TYPES, marker(TYPES, (0.15, 0.02, 0.0), (0.06, 0.06, 0.06), stamp_ns=10 * SECOND))
+    )
+    bench.hear('goal_pose', pose_stamped(TYPES, GOALS[0]))
+    bench.move(hand_path(2))
+    table = bench.wait_for('likelihoods', 1)[0]
+    assert 'a/0' in table.layout.dim[0].label
+
+
+def test_nothing_is_predicted_before_all_inputs_are_there_and_diagnostics_say_so(ros: Graph) -> None:
+    bench = Bench(ros)
+    assert 'no hand pose yet' in bench.health().message
+    bench.move(hand_path(1))
+    status = bench.health()
+    assert status.level == b'\x01'
+    assert 'no obstacles received yet' in status.message
+    bench.hear('obstacles', cloud(TYPES, obstacle_table([]), 10 * SECOND))
+    assert 'no goal received' in bench.health().message
+    assert not bench.received['prediction']
+    bench.hear('goals', pose_array(TYPES, GOALS))
+    bench.move(hand_path(3)[1:])
+    bench.wait_for('prediction', 1)
+
+
+def test_a_node_that_cannot_keep_up_predicts_from_the_newest_pose_and_counts_the_rest(ros: Graph) -> None:
+    bench, poses = Bench(ros), hand_path(41)
+    bench.show_scene()
+    bench.move(poses[:1])
+    bench.wait_for('prediction', 1)
+    bench.send('hand_pose', *poses[1:])
+    assert stamps(bench.wait_for('prediction', 2)) == [stamps(poses)[0], stamps(poses)[-1]]
+    values = figures(bench.health())
+    assert int(values['dropped cycles']) > 0
+    assert values['hand_pose refused'] == '0 of 41'
+    assert int(values['count predictions']) == 2
+
+
+def test_a_bag_that_loops_starts_anew(ros: Graph) -> None:
+    bench, poses = Bench(ros), hand_path(8, rate_hz=10.0)
+    bench.show_scene()
+    for _ in range(2):
+        bench.move(poses)
+    assert stamps(bench.wait_for('prediction', 16)) == stamps(poses) * 2
+    assert figures(bench.health())['count hand_restarted_backward'] == '1'
+
+
+def test_only_what_is_listened_to_is_made(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
+    from foc_ros import node
+
+    asked: list[list[str]] = []
+    monkeypatch.setattr(node, 'output_messages', lambda *args: asked.append(list(args[-1])) or output_messages(*args))
+    bench = Bench(ros, outputs=['likelihoods'])
+    bench.show_scene()
+    bench.move(hand_path(1))
+    bench.wait_for('likelihoods', 1)
+    assert asked == [['likelihoods']]
+
+
+def test_engage_is_a_clutch(ros: Graph) -> None:
+    from std_srvs.srv import SetBool
+
+    bench, poses = Bench(ros), hand_path(12)
+    bench.show_scene()
+    bench.move(poses[:3])
+    assert len(bench.wait_for('prediction', 2)) == 2
+    answer = ros.call(bench.player, SetBool, 'foc/engage', SetBool.Request(data=False))
+    assert (answer.success, answer.message) == (True, 'disengaged')
+    bench.move(poses[3:8])
+    status = bench.health()
+    assert (status.level, status.message) == (b'\x00', 'disengaged')
+    assert len(bench.received['prediction']) == 2
+    assert ros.call(bench.player, SetBool, 'foc/engage', SetBool.Request(data=True)).message == 'engaged'
+    bench.move(poses[8:10])
+    assert stamps(bench.wait_for('prediction', 3))[-1] == stamps(poses)[8]
+
+
+def test_reset_forgets_the_movement_and_keeps_the_scene(ros: Graph) -> None:
+    from std_srvs.srv import Trigger
+
+    bench = Bench(ros)
+    bench.show_scene()
+    bench.move(hand_path(4))
+    bench.wait_for('prediction', 2)
+    assert ros.call(bench.player, Trigger, 'foc/reset', Trigger.Request()).success
+    assert bench.node.pipeline.hand_state is None
+    bench.move(hand_path(1, start_s=9.9))
+    assert stamps(bench.wait_for('prediction', 3))[-1] == round(9.9 * SECOND)
+
+
+def test_two_arms_in_two_namespaces_do_not_hear_each_other(ros: Graph) -> None:
+    left, right = Bench(ros, namespace='left', parameters={}), Bench(ros, namespace='right', parameters={})
+    left.show_scene()
+    right.show_scene()
+    left.publishers['hand_pose'].publish(hand_path(1)[0])
+    left.wait_for('prediction', 1)
+    ros.spin_for(0.2)
+    assert not right.received['prediction']
+    names: set[str] = set()
+    for _ in range(4):
+        names.add(left.health().name)
+    assert names == {'left/foc: prediction', 'right/foc: prediction'}
+
+
+def test_a_scene_published_once_is_heard_later_where_durability_says_so(ros: Graph) -> None:
+    from rclpy.qos import QoSDurabilityPolicy, QoSProfile
+    from sensor_msgs.msg import PointCloud2
+
+    early = ros.node('early')
+    latched = QoSProfile(depth=1, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL)
+    publisher = early.create_publisher(PointCloud2, 'obstacles', latched)
+    publisher.publish(cloud(TYPES, obstacle_table(ROWS), 10 * SECOND))
+    overrides = {'qos_overrides./obstacles.subscription.durability': 'transient_local'}
+
+    from rclpy.parameter import Parameter
+
+    from foc_ros.node import FocNode
+
+    given = [Parameter(name, value=value) for name, value in overrides.items()]
+    node = ros.add(FocNode(context=ros.context, parameter_overrides=given))
+    ros.spin_until(lambda: 'cloud' in node.pipeline.scene.parts, 'the scene of before')
+    assert len(node.pipeline.scene.obstacles(0)) == len(ROWS)
+
+
+def test_diagnostics_tell_rates_ages_times_and_candidates(ros: Graph) -> None:
+    bench = Bench(ros)
+    bench.show_scene()
+    bench.move(hand_path(10))
+    bench.wait_for('prediction', 5)
+    status = bench.health()
+    values = figures(status)
+    assert status.name == 'foc: prediction'
+    assert values['working frame'] == 'world'
+    assert (values['obstacles of cloud'], values['goals']) == ('1', '1')
+    assert float(values['hand_pose age [s]']) >= 0.0
+    assert [float(text) > 0.0 for text in values['solve time p50, p99 [ms]'].split(', ')] == [True, True]
+    labels = bench.received['likelihoods'][-1].layout.dim[0].label.split(';')
+    for label in labels:
+        assert values[f'candidate {label}'].startswith('solved, likelihood ')
+    assert values['most likely'] == labels[0]
+    likelihoods = np.array(bench.received['likelihoods'][-1].data).reshape(-1, 4)[:, 0]
+    assert likelihoods.sum() == pytest.approx(1.0)
