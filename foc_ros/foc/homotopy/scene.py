@@ -1,67 +1,86 @@
-"""What of the scene matters on the way from the hand to one goal, as circles; obstacles near the ends have a decided answer."""
+"""What of the scene matters on the ways from the hand to each goal; obstacles at the ends of a way have a decided answer."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-from foc_ros.foc.records import Array
-from .roadmap import Complex
+import numpy as np
+
+from foc_ros.foc.records import Array, Candidate, Obstacles
+
+from .crossing import Complex, Flags
 
 REACH = 2.0
 """An obstacle is out of the way when passing it on its far side alone takes more than this times the straight way."""
+ENTER = 0.005
+"""An obstacle that was in no name to a goal enters it only this much within the bounds [m]: noise does not move it to and fro."""
 SMALLEST = 1e-6
-"""Least radius of a circle [m]: a point has no side."""
+"""Least radius of a circle, least length of a way [m]: a point has no side."""
 TOUCH = 1e-6
-"""A circle that holds the hand or the goal shrinks until its edge passes within this part of its radius."""
+"""A circle that holds the hand or a goal shrinks to this part less than its distance."""
 
 
-def shrunk(point: complex, centre: Complex, radius: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Shrink the circles that hold a point until it lies just outside; returns radii (n,) [m] and which were shrunk (n,)."""
-    distance = np.abs(centre - point)
-    held = distance <= radius
-    return np.where(held, np.maximum(distance * (1.0 - TOUCH), SMALLEST), radius), held
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """n obstacles as circles of radius + clearance, g goals, as seen from the hand.
 
-
-def between(hand: complex, goal: complex, centre: Complex) -> NDArray[np.bool_]:
-    """Which centres have their foot strictly between hand and goal: neither behind the hand nor beyond the goal."""
-    axis = goal - hand
-    foot = ((centre - hand) * np.conj(axis)).real
-    inside: NDArray[np.bool_] = (foot > 0.0) & (foot < abs(axis) ** 2)
-    return inside
-
-
-def detours(hand: complex, goal: complex, centre: Complex, radius: Array) -> tuple[Array, Array]:
-    """Lengths of the shortest ways round each circle alone, on its near side and on its far side (n,) [m].
-
-    Two tangents and the arc between them. With the angle g in [0, pi] between hand and goal as seen from the centre, the arc is
-    g - acos(r / a) - acos(r / b) on the near side, and nothing is in the way where that is negative; 2 pi - g instead of g is the far
-    side. Hand and goal lie outside.
+    hand, goals (g,), centre (n,): complex [m]; radius (g, n) on the way to each goal [m], smaller where a circle would hold the
+    hand (held (n,)) or that goal (near (g, n)); wanted (n,): radius + clearance [m]; inside (g,): goals inside an obstacle;
+    named (g, n): who takes part in the names of the ways to each goal; excess (n,): least length of a path to any goal that
+    touches the circle, as a multiple of the straight way to it.
     """
-    a, b = hand - centre, goal - centre
-    far_a, far_b = np.maximum(np.abs(a), SMALLEST), np.maximum(np.abs(b), SMALLEST)
-    tangents = np.sqrt((far_a**2 - radius**2).clip(0.0)) + np.sqrt((far_b**2 - radius**2).clip(0.0))
-    saved = np.arccos((radius / far_a).clip(0.0, 1.0)) + np.arccos((radius / far_b).clip(0.0, 1.0))
-    angle = np.abs(np.angle(b * a.conj()))
-    near = np.where(angle > saved, tangents + radius * (angle - saved), abs(goal - hand))
-    return near, tangents + radius * (2.0 * np.pi - angle - saved)
+
+    hand: complex
+    goals: Complex
+    centre: Complex
+    radius: Array
+    wanted: Array
+    held: Flags
+    near: Flags
+    inside: Flags
+    named: Flags
+    excess: Array
 
 
-def matters(hand: complex, goal: complex, centre: Complex, radius: Array) -> NDArray[np.bool_]:
-    """Which obstacles take part in the names of the ways to this goal (n,).
+def scene(hand: complex, goals: Complex, obstacles: Obstacles, clearance: float, previous: Sequence[Candidate]) -> Scene:
+    """Look at the obstacles from the hand; previous: the candidates of the tick before."""
+    centre = obstacles.centre[:, 0] + 1j * obstacles.centre[:, 1]
+    wanted = np.maximum(obstacles.radius + clearance, SMALLEST)
+    from_hand, from_goal = hand - centre, goals[:, None] - centre
+    a, b = np.abs(from_hand), np.abs(from_goal)
+    held, near = a <= wanted, b <= wanted
+    radius = np.where(held, np.maximum(a * (1.0 - TOUCH), SMALLEST), wanted)
+    radius = np.where(near, np.minimum(np.maximum(b * (1.0 - TOUCH), SMALLEST), radius), radius)
+    straight = np.maximum(np.abs(goals - hand), SMALLEST)[:, None]
+    named = _named(from_hand, from_goal, a, b, radius, straight, _strangers(obstacles.ids, len(goals), previous))
+    excess = (np.maximum(a + b - 2.0 * radius, straight) / straight).min(axis=0, initial=np.inf)
+    return Scene(hand, goals, centre, radius, wanted, held, near, np.asarray((b < obstacles.radius).any(axis=1)), named, excess)
 
-    Those whose foot lies between hand and goal and that block the straight way or have a far side within reach. It depends on no other
-    obstacle, so a name stays when obstacles appear, vanish or move elsewhere.
+
+def _named(from_hand: Complex, from_goal: Complex, a: Array, b: Array, radius: Array, straight: Array, slack: Array) -> Flags:
+    """Tell who takes part in the names (g, n): whose foot lies between hand and goal, and who blocks the way or is in reach.
+
+    With the angle between hand and goal as seen from the centre, a path round the circle alone is two tangents and an arc of
+    angle - acos(r / a) - acos(r / b); it blocks the way where that is positive, and 2 pi - angle in its place is the far side.
+    No other obstacle has a say, so a name stays when obstacles appear, vanish or move elsewhere.
     """
-    straight = abs(goal - hand)
-    near, far = detours(hand, goal, centre, radius)
-    named: NDArray[np.bool_] = between(hand, goal, centre) & ((near > straight) | (far <= REACH * straight))
-    return named
+    foot = (from_hand * (from_hand - from_goal).conj()).real / straight
+    between = (foot > slack) & (foot < straight - slack)
+    a, b = np.maximum(a, radius), np.maximum(b, radius)
+    saved = np.arccos(radius / a) + np.arccos(radius / b)
+    angle = np.abs(np.angle(from_goal * from_hand.conj()))
+    far = np.sqrt(a**2 - radius**2) + np.sqrt(b**2 - radius**2) + radius * (2.0 * np.pi - angle - saved)
+    return np.asarray(between & ((angle > saved) | (far <= REACH * straight - slack)))
 
 
-def excess(hand: complex, goals: Complex, centre: Complex, radius: Array) -> Array:
-    """Least length of a path to any goal that touches the circle, over the straight length to that goal (n,)."""
-    straight = np.abs(goals - hand)[:, None]
-    through = np.abs(centre - hand) + np.abs(centre - goals[:, None]) - 2.0 * radius
-    ratio: Array = (np.maximum(through, straight) / np.maximum(straight, SMALLEST)).min(axis=0)
-    return ratio
+def _strangers(ids: tuple[str, ...], goals: int, previous: Sequence[Candidate]) -> Array:
+    """ENTER for obstacles that were not in the names to a goal that had some (g, n) [m], else 0."""
+    known: dict[int, set[str]] = {}
+    for candidate in previous:
+        known.setdefault(candidate.goal, set()).update(identity for identity, _ in candidate.sides)
+    slack = np.zeros((goals, len(ids)))
+    for goal in range(goals):
+        if goal in known:
+            slack[goal] = [0.0 if identity in known[goal] else ENTER for identity in ids]
+    return slack

@@ -1,110 +1,136 @@
 """Classes in order of length: best-first search over the roadmap, each state with what it has crossed.
 
-The state is a run of the roadmap plus its signature: for every named obstacle how often the ray from its centre has been crossed. Two
-paths between the same ends pass the named obstacles on the same sides exactly when their signatures agree (Bhattacharya, Likhachev and
-Kumar, "Topological constraints in search-based robot path planning", 2012), so the first path that arrives with a signature is the
-shortest of its class, and classes come out in the order of their length without a list of all sign patterns.
+A state is a run of the roadmap plus a signature: for every named obstacle how often the ray from its centre has been crossed.
+Two paths between the same ends pass the named obstacles on the same sides exactly when their signatures agree (Bhattacharya,
+Likhachev and Kumar, "Topological constraints in search-based robot path planning", 2012), so the first path that arrives with a
+signature is the shortest of its class, and classes come out in the order of their length without a list of all sign patterns.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from heapq import heappop, heappush
+from functools import lru_cache
+from heapq import heapify, heappop, heappush
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from foc_ros.foc.records import Array
-from .roadmap import TURN, Roadmap
 
-BITS, BIAS, DIGITS = 4, 5, 15
-"""A signature is a whole number with four bits for each named obstacle: crossings + 5. Fifteen fit into 64 bits at a time."""
+from .crossing import BIAS, BITS, packed, unpacked
+from .roadmap import Roadmap, hand_runs
+from .tangents import TURN, Lists, Runs
+
 BACK = 1e-9
-"""An arc may turn back this much [rad], or neighbours that share a tangent would need a whole turn."""
+"""An arc may turn back this much [rad]: runs of neighbours that share a tangent follow each other without one."""
+COAST_S = 0.2
+"""A path that leaves at an angle p to the velocity v ranks as if |v| (1 - cos p) times this longer: a hand coasts first."""
+STATES = 20_000
+"""States that one search may look at: about 50 ms."""
 
 
-@dataclass(frozen=True)
-class Way:
-    """One path through the roadmap: key by which it ranks [m], its length [m], its runs, crossings of the named obstacles' rays."""
+class Way(NamedTuple):
+    """One path: key by which it ranks [m]; runs, rows of the plan's table; crossings of the rays from the named circles."""
 
     key: float
-    length: float
     runs: tuple[int, ...]
-    crossings: tuple[int, ...]
+    crossings: list[int]
 
 
-def ways(plan: Roadmap, goal: int, aim: Array, named: list[int], penalty: Array, budget: int) -> Iterator[Way]:
-    """Yield the shortest way of each class, shortest first, until there are no more or `budget` states have been looked at.
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A roadmap with the hand in it.
 
-    goal: node; aim (runs,): least distance from each run's end to the goal [m]; named: rows of the circles that tell classes apart;
-    penalty (runs,): added to the rank of a path that begins with the run [m]. A path that crosses a ray twice the same way winds
-    about its obstacle and is no class of its own.
+    start: the hand's runs; penalty: what the turn into each of these costs [m]; table: all runs, the hand's last.
     """
-    arrive, turn = _packed(plan.crossing[:, named]), _packed(plan.turn[:, named])
-    ones = sum(1 << BITS * i for i in range(len(named)))
+
+    roadmap: Roadmap
+    start: Runs
+    penalty: Array
+    table: Lists
+
+
+class _Maze(NamedTuple):
+    """What each step asks for. Per run: least distance left to the goal, crossings; per circle: crossings of a whole turn."""
+
+    to_go: list[float]
+    crossed: list[int]
+    whole: list[int]
+
+
+def plan(roadmap: Roadmap, hand: complex, velocity: complex) -> Plan:
+    """Put a hand with a velocity [m/s] into a roadmap."""
+    start = hand_runs(roadmap.circles, hand)
+    penalty = COAST_S * (abs(velocity) - (start.heading * velocity.conjugate()).real)
+    return Plan(roadmap, start, penalty, roadmap.runs.lists.followed_by(start.lists))
+
+
+def ways(plan: Plan, goal: int, named: tuple[int, ...]) -> Iterator[Way | None]:
+    """Yield the shortest way of each class, shortest first; at the end None if the search was cut at its bound.
+
+    goal: its number; named: the circles that tell classes apart. A path that winds about one of them on the way is not
+    followed.
+    """
+    n = plan.roadmap.circles.n
+    node, departures, radius = 2 * (n + goal) + 1, plan.roadmap.departures[goal], plan.roadmap.radius
+    heads, length, leave, reach, clear = plan.table[:5]
+    to_go, crossed, whole = _maze(plan, goal, named)
+    ones = sum(1 << BITS * digit for digit in range(len(named)))
     fours, eights = 4 * ones, 8 * ones
-    heads, length, leave, reach, clear = (a.tolist() for a in (plan.head, plan.length, plan.leave, plan.reach, plan.clear))
-    radius, least, extra = plan.radius.tolist(), aim.tolist(), penalty.tolist()
-    departures: list[list[int]] = [[] for _ in range(2 * (len(radius) + 1))]
-    for run, (tail, head) in enumerate(zip(plan.tail.tolist(), heads, strict=True)):
-        if head < len(departures) or head == goal:
-            departures[tail].append(run)
-    states: list[tuple[int, int]] = []
-    heap: list[tuple[float, int, float, int, int, int]] = []
-    pushed = 0
-    for run in departures[2 * len(radius) + 1]:
-        cost = length[run] + extra[run]
-        heappush(heap, (cost + least[run], pushed, cost, arrive[run] + BIAS * ones, run, -1))
-        pushed += 1
+    heap = [
+        (key + to_go[run], run, key, BIAS * ones + crossed[run], run, -1)
+        for run, key in enumerate((plan.start.length + plan.penalty).tolist(), len(plan.roadmap.runs.head))
+        if heads[run] < 2 * n or heads[run] == node
+    ]
+    heapify(heap)
+    met = len(heads)
+    trail: list[tuple[int, int]] = []
     seen: set[tuple[int, int]] = set()
-    found: set[int] = set()
-    while heap and len(states) < budget:
-        _, _, cost, signature, run, parent = heappop(heap)
+    while heap and len(trail) < STATES:
+        _, _, key, signature, run, parent = heappop(heap)
         if (signature, run) in seen:
             continue
         seen.add((signature, run))
-        states.append((run, parent))
-        node = heads[run]
-        if node == goal:
-            if signature not in found:
-                found.add(signature)
-                runs = _trace(states)
-                yield Way(cost, cost - extra[runs[0]], runs, _unpacked(signature, len(named)))
+        trail.append((run, parent))
+        if heads[run] == node:
+            yield Way(key, _trace(trail), unpacked(signature, len(named)))
             continue
-        here, circle, anticlockwise = len(states) - 1, node >> 1, node & 1
-        from_angle, free = reach[run], clear[run]
-        for following in departures[node]:
-            angle = leave[following] - from_angle if anticlockwise else from_angle - leave[following]
-            crossed = signature + arrive[following]
+        here, circle, anticlockwise, arrival, free = len(trail) - 1, heads[run] >> 1, heads[run] & 1, reach[run], clear[run]
+        for following in departures[heads[run]]:
+            angle = leave[following] - arrival if anticlockwise else arrival - leave[following]
+            after = signature + crossed[following]
             if angle < -BACK:
                 angle += TURN
-                crossed += turn[circle] if anticlockwise else -turn[circle]
-            if angle > free or (crossed + ones) & eights or fours & ~crossed or (crossed, following) in seen:
-                continue
-            onward = cost + radius[circle] * angle + length[following]
-            heappush(heap, (onward + least[following], pushed, onward, crossed, following, here))
-            pushed += 1
+                after += whole[circle] if anticlockwise else -whole[circle]
+            if angle <= free and not (after + ones) & eights and not fours & ~after and (after, following) not in seen:
+                onward = key + radius[circle] * angle + length[following]
+                heappush(heap, (onward + to_go[following], met, onward, after, following, here))
+                met += 1
+    if heap:
+        yield None
 
 
-def _trace(states: list[tuple[int, int]]) -> tuple[int, ...]:
-    """Runs from the hand to the last state."""
-    runs, state = [], len(states) - 1
+def _trace(trail: list[tuple[int, int]]) -> tuple[int, ...]:
+    """Return the runs from the hand to the last state."""
+    runs, state = [], len(trail) - 1
     while state >= 0:
-        run, state = states[state]
+        run, state = trail[state]
         runs.append(run)
     return tuple(reversed(runs))
 
 
-def _packed(crossings: NDArray[np.int64]) -> list[int]:
-    """Rows of crossings (m, n) as signed whole numbers, four bits for each column."""
-    total = [0] * len(crossings)
-    for first in range(0, crossings.shape[1], DIGITS):
-        part = crossings[:, first : first + DIGITS]
-        words = (part << BITS * np.arange(part.shape[1])).sum(axis=1).tolist()
-        total = [a + (b << BITS * first) for a, b in zip(total, words, strict=True)]
-    return total
+def _maze(plan: Plan, goal: int, named: tuple[int, ...]) -> _Maze:
+    to_go, crossed, whole = _inner_maze(plan.roadmap, goal, named)
+    target = complex(plan.roadmap.circles.centre[plan.roadmap.circles.n + goal])
+    own = [abs(end - target) for end in plan.start.lists.end]
+    return _Maze(to_go + own, crossed + packed(plan.start.crossing[:, named]), whole)
 
 
-def _unpacked(signature: int, digits: int) -> tuple[int, ...]:
-    return tuple((signature >> BITS * i & 15) - BIAS for i in range(digits))
+@lru_cache(maxsize=64)
+def _inner_maze(roadmap: Roadmap, goal: int, named: tuple[int, ...]) -> _Maze:
+    """Return the part that does not depend on the hand."""
+    circles, runs = roadmap.circles, roadmap.runs
+    to_go = np.abs(runs.end - circles.centre[circles.n + goal]).tolist()
+    whole = circles.held[: circles.n, named].astype(np.int64)
+    return _Maze(to_go, packed(runs.crossing[:, named]), packed(whole))

@@ -1,0 +1,54 @@
+"""Circles to go round, and how they hold and overlap each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from foc_ros.foc.records import Array
+
+from .crossing import Complex, Flags
+
+GRAZE = 1e-9
+"""A run may pass this much nearer to a circle than its radius [m]: neighbours in a row share tangents, up to rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Circles:
+    """n circles and, after them, g goals: circles of radius 0.
+
+    centre (n + g,), complex [m]; radius (n + g,) [m]; bar (n,): square of the distance from each centre that bars a run [m^2];
+    held (n + g, n): which centres each circle holds; outer (n + g,): which ones lie in no other circle, of equal ones the
+    first; blocker (n, n): direction of the outer circles that overlap with each [rad], NaN for others; overlapping: whether
+    there are any.
+    """
+
+    n: int
+    centre: Complex
+    radius: Array
+    bar: Array
+    held: Flags
+    outer: Flags
+    blocker: Array
+    overlapping: bool
+
+    @property
+    def goals(self) -> int:
+        """How many goals there are."""
+        return len(self.centre) - self.n
+
+
+def circles(centre: Complex, radius: Array, goals: Complex) -> Circles:
+    """Take centre (n,), complex [m], radius (n,) > 0 [m] and goals (g,), complex [m], together."""
+    n = len(centre)
+    c, r = np.concatenate([centre, goals]), np.concatenate([radius, np.zeros(len(goals))])
+    apart = centre - c[:, None]
+    distance = np.abs(apart)
+    within = (distance[:n] + radius[:, None] <= radius) & ~np.eye(n, dtype=bool)
+    within &= ~(within.T & np.triu(np.ones((n, n), dtype=bool)))
+    outer = np.append(~within.any(axis=1), np.ones(len(goals), dtype=bool))
+    overlap = (distance[:n] < radius[:, None] + radius) & outer[:n] & ~np.eye(n, dtype=bool)
+    blocker = np.where(overlap, np.angle(apart[:n]), np.nan)
+    bar = (radius - GRAZE).clip(0.0) ** 2
+    return Circles(n, c, r, bar, distance < r[:, None], outer, blocker, bool(overlap.any()))
