@@ -28,7 +28,7 @@ CLASS_COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9
 """Okabe and Ito's, without the yellow that vanishes on white and the black that is the real hand's."""
 LIKELIHOOD_COLOURS = ListedColormap(mpl.colormaps['viridis'](np.linspace(0.88, 0.0, 256)), name='likelihood')
 LIKELIHOOD_SCALE = Normalize(0.0, 1.0)
-STDDEVS = 2.0
+STDDEVS = 1.0
 """Standard deviations that ellipses and rings stand for."""
 CLASSES = 2 * len(CLASS_COLOURS)
 """Classes told apart by colour and dash; there are no letters and colours for more."""
@@ -39,24 +39,36 @@ NAMED_OBSTACLES = 30
 Bounds = tuple[float, float, float, float]
 
 
-def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds) -> None:
-    """Draw obstacles (disc: mean radius; pale ring: two standard deviations of the radius more) and goals."""
-    for name, centre, radius, stddev in zip(
-        obstacles.ids, obstacles.centre, obstacles.radius, obstacles.radius_stddev, strict=True
-    ):
+def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, named: bool = True) -> None:
+    """Draw obstacles (disc: mean radius; pale ring: a standard deviation of the radius more) and goals.
+
+    named: whether goals are numbered, as labels of ways do.
+    """
+    rows = zip(obstacles.ids, obstacles.centre, obstacles.radius, obstacles.radius_stddev, strict=True)
+    for name, centre, radius, stddev in rows:
         axes.add_patch(Circle(centre, radius + STDDEVS * stddev, facecolor='0.88', edgecolor='0.7', linewidth=0.6))
         axes.add_patch(Circle(centre, radius, facecolor='0.65', edgecolor='0.35', linewidth=0.8))
         if len(obstacles) <= NAMED_OBSTACLES:
             axes.text(*centre, name, ha='center', va='center', fontsize=8)
     for number, goal in enumerate(goals):
         axes.plot(*goal, marker='*', markersize=12, color='black', markerfacecolor='white', zorder=5)
-        axes.annotate(f'goal{number}', goal, xytext=(6, 6), textcoords='offset points', fontsize=8, zorder=6)
-    axes.set(xlim=bounds[:2], ylim=bounds[2:], xlabel='m', ylabel='m')
+        if named:
+            axes.annotate(f'goal{number}', goal, xytext=(6, 6), textcoords='offset points', fontsize=8, zorder=6)
+    axes.set(xlim=bounds[:2], ylim=bounds[2:], xlabel='x [m]', ylabel='y [m]')
     axes.set_aspect('equal')
 
 
+def draw_movement(axes: Any, positions: Array, number: int) -> None:
+    """Draw a movement (m, 2) with an arrow on its way, and its number, counted from 1, near its beginning."""
+    colour, dash = class_style(number)
+    axes.plot(*positions.T, color=colour, linestyle=dash, linewidth=1.8)
+    tail, head = positions[len(positions) * 2 // 3], positions[len(positions) * 3 // 4]
+    axes.annotate('', head, tail, arrowprops={'arrowstyle': '-|>', 'color': colour, 'linewidth': 0.0, 'mutation_scale': 16})
+    tag(axes, positions[len(positions) * (2 + number % 2) // 6], str(number + 1), colour)
+
+
 def draw_ways(axes: Any, ways: Sequence[Way], numbers: Mapping[str, int]) -> None:
-    """Draw ways, the most likely on top, coloured by likelihood, with ellipses of two standard deviations of the position."""
+    """Draw ways, the most likely on top, coloured by likelihood, with ellipses of one standard deviation of the position."""
     for rank, way in reversed(list(enumerate(ways))):
         colour = LIKELIHOOD_COLOURS(LIKELIHOOD_SCALE(way.likelihood))
         for row in np.unique(np.linspace(0, len(way.path) - 1, ELLIPSES_PER_WAY).astype(int)):
@@ -77,18 +89,22 @@ def draw_hand(axes: Any, track: Track, now_ns: int, span: tuple[int, int]) -> No
     axes.plot(*track.positions[before][-1:].T, marker='o', markersize=6, color='black', zorder=6)
 
 
-def draw_likelihoods(axes: Any, moments: Sequence[Moment], numbers: Mapping[str, int], origin_ns: int) -> None:
-    """Draw the likelihood of every numbered class over time; one that is no candidate for a while leaves a gap."""
+def draw_likelihoods(
+    axes: Any, moments: Sequence[Moment], lines: Sequence[Mapping[str, int]], ranks: Mapping[int, int], origin_ns: int
+) -> None:
+    """Draw the likelihood of ways over time; one that is no candidate for a while leaves a gap.
+
+    lines: for every moment, the line of each way by label; ranks: of the lines to draw, which give letter and colour.
+    """
     times = [(moment.stamp_ns - origin_ns) / NANOSECONDS for moment in moments]
-    tables = [{way.label: way.likelihood for way in moment.ways} for moment in moments]
-    for label, number in reversed(list(numbers.items())):
-        values = np.array([table.get(label, np.nan) for table in tables])
-        colour, dash = class_style(number)
-        axes.plot(times, values, color=colour, linestyle=dash, linewidth=1.8, marker='.', markersize=2.5, label=label)
+    tables = [{numbers[way.label]: way.likelihood for way in moment.ways} for moment, numbers in zip(moments, lines, strict=True)]
+    for line, rank in reversed(list(ranks.items())):
+        values = np.array([table.get(line, np.nan) for table in tables])
+        colour, dash = class_style(rank)
+        axes.plot(times, values, color=colour, linestyle=dash, linewidth=1.8, marker='.', markersize=2.5, label=f'line {line}')
         known = np.flatnonzero(np.isfinite(values))
-        if len(known):
-            place = known[(2 * number + 1) * len(known) // (2 * len(numbers))]
-            tag(axes, (times[place], values[place]), ascii_uppercase[number], colour)
+        place = known[(2 * rank + 1) * len(known) // (2 * len(ranks))]
+        tag(axes, (times[place], values[place]), ascii_uppercase[rank], colour)
     axes.set(ylim=(-0.03, 1.03), ylabel='likelihood')
     axes.tick_params(labelbottom=False)
 

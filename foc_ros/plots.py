@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import matplotlib as mpl
@@ -13,18 +13,18 @@ from .drawing import (
     CLASSES,
     STDDEVS,
     Bounds,
-    class_style,
     draw_colour_bar,
     draw_hand,
     draw_legend,
     draw_likelihoods,
+    draw_movement,
     draw_scene,
     draw_speeds,
     draw_ways,
-    tag,
 )
 from .foc.errors import InputError
 from .foc.records import NANOSECONDS, Array, Obstacles, Outcome
+from .lineage import lineages
 from .moments import Moment, Track, Way, ways_of
 
 STYLE = {
@@ -64,27 +64,27 @@ def scene_figure(obstacles: Obstacles, goals: Array, ways: Sequence[Way], bounds
     return figure
 
 
-def track_figure(track: Track, moment: Moment, spans: Sequence[tuple[int, int]], bounds: Bounds) -> Figure:
-    """Return a figure of all movements of a recording in the scene of one moment; spans: start and end [ns] of each."""
+def track_figure(track: Track, obstacles: Obstacles, goals: Array, spans: Sequence[tuple[int, int]], bounds: Bounds) -> Figure:
+    """Return a figure of all movements of a recording, numbered; spans: start and end [ns] of each."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, _scene_height(bounds) + 0.6), layout='constrained')
         axes = figure.subplots()
-        draw_scene(axes, moment.obstacles, moment.goals, bounds)
-        axes.plot(*track.positions.T, color='0.75', linewidth=0.8)
+        draw_scene(axes, obstacles, goals, bounds, named=False)
+        axes.plot(*track.positions.T, color='0.8', linewidth=0.8)
         for number, (start_ns, end_ns) in enumerate(spans):
-            positions = track.positions[track.between(start_ns, end_ns)]
-            colour, dash = class_style(number)
-            axes.plot(*positions.T, color=colour, linestyle=dash, linewidth=1.8)
-            tag(axes, positions[len(positions) * (2 + number % 3) // 6], str(number + 1), colour)
+            draw_movement(axes, track.positions[track.between(start_ns, end_ns)], number)
     return figure
 
 
 def moment_figure(track: Track, moment: Moment, around: Sequence[Moment], span: tuple[int, int], bounds: Bounds) -> Figure:
     """Return one movement at one moment: scene above, then likelihoods and speeds over the whole movement.
 
-    around: the predictions during the movement; span: its start and end [ns].
+    around: the predictions during the movement, the moment among them; span: its start and end [ns].
     """
-    numbers = _numbered(_ranked(moment, around))
+    lines = lineages(around)
+    place = [each.stamp_ns for each in around].index(moment.stamp_ns)
+    ranks = _ranks([lines[place][way.label] for way in moment.ways], around, lines)
+    numbers = {label: ranks[line] for label, line in lines[place].items() if line in ranks}
     origin_ns = int(track.stamps_ns[0])
     now = (moment.stamp_ns - origin_ns) / NANOSECONDS
     with mpl.rc_context(STYLE):
@@ -96,7 +96,7 @@ def moment_figure(track: Track, moment: Moment, around: Sequence[Moment], span: 
         draw_hand(scene, track, moment.stamp_ns, span)
         draw_colour_bar(figure, scene)
         draw_legend(legend, moment.ways, numbers)
-        draw_likelihoods(likelihoods, around, numbers, origin_ns)
+        draw_likelihoods(likelihoods, around, lines, ranks, origin_ns)
         draw_speeds(speeds, track, moment, span, origin_ns)
         for axes in (likelihoods, speeds):
             axes.axvline(now, color='0.4', linewidth=1.0, linestyle=':')
@@ -123,7 +123,7 @@ def save(figure: Figure, file: Path | str) -> None:
     if Path(file).suffix.lower().removeprefix('.') not in known:
         raise InputError('picture file', f'a name that ends in {", ".join("." + each for each in sorted(known))}', str(file))
     try:
-        figure.savefig(file)
+        figure.savefig(file, bbox_inches='tight', pad_inches=0.08)
     except OSError as error:
         raise InputError('picture file', 'a file that can be written', f'{file}: {error.strerror or error}') from error
 
@@ -134,13 +134,14 @@ def _scene_height(bounds: Bounds) -> float:
     return float(np.clip(0.8 * WIDTH_IN * high / wide, 2.0, 7.0))
 
 
-def _ranked(moment: Moment, around: Sequence[Moment]) -> list[str]:
-    """Return the labels of the moment by likelihood, then the others of the movement by the greatest likelihood they reach."""
-    peak: dict[str, float] = {}
-    for way in (way for each in around for way in each.ways):
-        peak[way.label] = max(peak.get(way.label, 0.0), way.likelihood)
-    now = [way.label for way in moment.ways]
-    return now + sorted((label for label in peak if label not in now), key=lambda label: (-peak[label], label))
+def _ranks(now: Sequence[int], around: Sequence[Moment], lines: Sequence[Mapping[str, int]]) -> dict[int, int]:
+    """Return the rank of each line: those of the moment by likelihood, then the others by the greatest likelihood they reach."""
+    peak: dict[int, float] = {}
+    for moment, numbers in zip(around, lines, strict=True):
+        for way in moment.ways:
+            peak[numbers[way.label]] = max(peak.get(numbers[way.label], 0.0), way.likelihood)
+    shown = [*now, *sorted(set(peak) - set(now), key=lambda line: (-peak[line], line))]
+    return {line: rank for rank, line in enumerate(shown[:CLASSES])}
 
 
 def _numbered(labels: Sequence[str]) -> dict[str, int]:

@@ -20,6 +20,9 @@ MOST_PICTURES = 8
 FRACTIONS_OF_ONE = (0.1, 0.3, 0.5, 0.7)
 """Where in its time a movement is shown when it is the only one; of several, each is shown once, at FRACTION."""
 FRACTION = 0.3
+OVERVIEW = (
+    'All movements, numbered. Discs are obstacles, in a ring as wide as the standard deviation of their radius; stars are goals.'
+)
 ONSET_SPEED = 0.05
 """Speed [m/s] above which the pictures take the hand to be moving."""
 
@@ -36,7 +39,7 @@ def write_report(directory: Path, title: str, track: Track, moments: Sequence[Mo
         directory.mkdir(parents=True, exist_ok=True)
         pictures = _write_pictures(directory, track, moments)
         page, numbers = directory / 'index.html', directory / 'predictions.json'
-        page.write_text(page_of(title, pictures, {**summary, **_facts(moments)}, _warnings(moments)), encoding='utf-8')
+        page.write_text(page_of(title, pictures, {**_facts(moments), **summary}, _warnings(moments)), encoding='utf-8')
         numbers.write_text(json.dumps(_numbers(title, track, moments, summary), indent=1, allow_nan=False), encoding='utf-8')
     except OSError as error:
         raise InputError('report directory', 'a directory that can be written', f'{directory}: {error.strerror}') from error
@@ -51,10 +54,10 @@ def _write_pictures(directory: Path, track: Track, moments: Sequence[Moment]) ->
     spans = movements(track, ONSET_SPEED) or [(int(track.stamps_ns[0]), int(track.stamps_ns[-1]))]
     chosen = _chosen(shown, spans)
     ways = [way for _, moment in chosen for way in moment.ways]
-    goals = np.concatenate([moment.goals for moment in shown])
+    goals = np.unique(np.concatenate([moment.goals for moment in shown]), axis=0)
     bounds = plots.bounds_of(shown[0].obstacles, goals, ways, track.positions)
-    pictures = {directory / 'overview.png': 'The recording'}
-    plots.save(plots.track_figure(track, shown[0], spans, bounds), directory / 'overview.png')
+    pictures = {directory / 'overview.png': OVERVIEW}
+    plots.save(plots.track_figure(track, shown[0].obstacles, goals, spans, bounds), directory / 'overview.png')
     for count, (number, moment) in enumerate(chosen):
         start_ns, end_ns = spans[number]
         around = [each for each in moments if start_ns <= each.stamp_ns <= end_ns]
@@ -101,7 +104,7 @@ def _warnings(moments: Sequence[Moment]) -> list[str]:
 def _numbers(title: str, track: Track, moments: Sequence[Moment], summary: Mapping[str, str]) -> dict[str, Any]:
     return {
         'title': title,
-        'summary': {**summary, **_facts(moments)},
+        'summary': {**_facts(moments), **summary},
         'warnings': _warnings(moments),
         'hand_samples': len(track.stamps_ns),
         'predictions': [

@@ -28,33 +28,38 @@ img {{ background: white; border-radius: .4rem; max-width: 100%; }}
 <h1>{title}</h1>
 {warnings}
 <table>{facts}</table>
-<h2>The recording</h2>
-<figure>{overview}<figcaption>All movements, numbered. Discs are obstacles, with the pale ring two standard deviations of
-their radius wide; stars are goals.</figcaption></figure>
-<h2>Predictions</h2>
-<p>Each picture holds one moment: behind the dot the way the hand came (solid), before it the way it took afterwards (dotted),
-which the prediction did not know. The ways that were predicted are coloured by likelihood; their ellipses are two standard
-deviations of the position. Below, over the whole movement: the likelihood of every way (letters as in the scene; the dotted
-line is the moment), and the speed, measured (black) and predicted. In the name of a way, <code>+1</code> says that it passes
-obstacle 1 on the left, <code>-1</code> on the right, seen in the direction of travel.</p>
-<div class="pictures">{pictures}</div>
+{pictures}
 </body>
 </html>
+"""
+PREDICTIONS = """<h2>Predictions</h2>
+<p>Each picture shows one moment of a movement.</p>
+<ul>
+<li>Above, the scene. Black: the hand (dot), where it came from (solid), and where it really went (dotted), which the prediction
+did not know. Ways that were predicted: the darker, the more likely, with ellipses of one standard deviation of the position.</li>
+<li>Letters name the ways. In the label of a way, <code>+1</code> says that it passes obstacle 1 on the left, <code>-1</code> on
+the right, seen in the direction of travel; obstacles that do not matter are left out.</li>
+<li>Below, the whole movement: likelihood of each way, and speed, measured (black) and predicted. The dotted upright is the
+moment above. A line goes on when obstacles are left behind and so drop out of the label of its way.</li>
+</ul>
 """
 
 
 def page_of(title: str, pictures: Mapping[Path, str], facts: Mapping[str, str], warnings: Sequence[str]) -> str:
-    """Return the page; pictures: caption by PNG file, the overview first; facts: table on top; warnings: lines above it."""
+    """Return the page.
+
+    pictures: caption by PNG file, the one of the whole recording first; facts: table on top; warnings: lines above it.
+    """
     figures = [_figure(file, caption) for file, caption in pictures.items()]
+    moments = f'{PREDICTIONS}<div class="pictures">{"".join(figures[1:])}</div>'
     return TEMPLATE.format(
         title=html.escape(title),
         warnings=''.join(f'<p class="warning">{html.escape(text)}</p>' for text in warnings),
         facts=''.join(f'<tr><th>{html.escape(name)}</th><td>{html.escape(text)}</td></tr>' for name, text in facts.items()),
-        overview=figures[0] if figures else '',
-        pictures=''.join(f'<figure>{figure}</figure>' for figure in figures[1:]),
+        pictures=f'<h2>The recording</h2>{figures[0]}{moments}' if figures else '',
     )
 
 
 def _figure(file: Path, caption: str) -> str:
-    data = base64.b64encode(file.read_bytes()).decode('ascii')
-    return f'<img alt="{html.escape(caption)}" src="data:image/png;base64,{data}"><figcaption>{html.escape(caption)}</figcaption>'
+    data, text = base64.b64encode(file.read_bytes()).decode('ascii'), html.escape(caption)
+    return f'<figure><img alt="{text}" src="data:image/png;base64,{data}"><figcaption>{text}</figcaption></figure>'

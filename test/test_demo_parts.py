@@ -1,0 +1,260 @@
+"""The parts of the demo that need no ROS: bookkeeping, display, the node's process, the output directory."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from report_samples import START_NS, prediction
+from rich.console import Console
+
+from foc_ros.bags import TYPESTORE, Item
+from foc_ros.command_line import main
+from foc_ros.conversions.outputs import likelihood_array, prediction_cloud
+from foc_ros.conversions.types import RosbagsTypes
+from foc_ros.demo import command, node_process
+from foc_ros.demo.display import Display
+from foc_ros.demo.ledger import Ledger
+from foc_ros.foc.config import Config
+from foc_ros.foc.errors import InputError
+from foc_ros.foc.records import Prediction
+from foc_ros.input_messages import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.moments import moment_of
+
+TYPES = RosbagsTypes(TYPESTORE)
+STEP_NS = 20_000_000
+
+
+def send_scene(ledger: Ledger) -> None:
+    goals = goal_poses(TYPES, START_NS, 'world', np.array([[0.3, 0.0, 0.1], [0.3, 0.12, 0.1]]))
+    cloud = obstacle_cloud(TYPES, START_NS, 'world', [(0.15, 0.0, 0.1, 0.03, 0.003, 7)])
+    for role, message in (('goals', goals), ('obstacles', cloud)):
+        ledger.sent(Item(role, f'/{role}', START_NS, message, b''), 0.0)
+
+
+def send_hand(ledger: Ledger, number: int, now: float) -> None:
+    stamp_ns = START_NS + number * STEP_NS
+    ledger.sent(Item('hand_pose', '/hand_pose', stamp_ns, hand_pose(TYPES, stamp_ns, 'world', (0.0, 0.0, 0.1)), b''), now)
+
+
+def answer(number: int) -> tuple[object, object, Prediction]:
+    made = prediction(START_NS + number * STEP_NS, np.zeros(2), 0.3 + 0.01 * number)
+    return prediction_cloud(made, 'xy', TYPES), likelihood_array(made, TYPES), made
+
+
+def filled(count: int = 5) -> Ledger:
+    ledger = Ledger(Config())
+    send_scene(ledger)
+    for number in range(count):
+        send_hand(ledger, number, now=0.02 * number)
+        cloud, table, _ = answer(number)
+        ledger.received('prediction', cloud, 0.02 * number + 0.005)
+        ledger.received('likelihoods', table, 0.02 * number + 0.006)
+    return ledger
+
+
+def test_ledger_keeps_every_answer_with_its_scene() -> None:
+    ledger = filled()
+    assert [sample.stamp_ns for sample in ledger.samples] == [START_NS + n * STEP_NS for n in range(5)]
+    assert [moment.stamp_ns for moment in ledger.moments] == [START_NS + n * STEP_NS for n in range(5)]
+    moment = ledger.moments[3]
+    expected = moment_of(answer(3)[2], moment.obstacles, moment.goals)
+    assert [(way.label, way.likelihood) for way in moment.ways] == [(way.label, way.likelihood) for way in expected.ways]
+    assert moment.obstacles.ids == ('7',)
+    np.testing.assert_allclose(moment.goals, [[0.3, 0.0], [0.3, 0.12]])
+    np.testing.assert_allclose(ledger.delays, 0.005)
+
+
+@pytest.mark.parametrize('lost', ['prediction', 'likelihoods'])
+def test_ledger_pairs_on_after_a_loss(lost: str) -> None:
+    ledger = Ledger(Config())
+    send_scene(ledger)
+    for number in range(6):
+        send_hand(ledger, number, now=0.02 * number)
+        cloud, table, _ = answer(number)
+        # the table first: topics come in any order
+        for name, message in (('likelihoods', table), ('prediction', cloud)):
+            if not (number == 2 and name == lost):
+                ledger.received(name, message, 0.02 * number)
+    assert [(moment.stamp_ns - START_NS) // STEP_NS for moment in ledger.moments] == [0, 1, 3, 4, 5]
+
+
+def test_ledger_counts_the_last_second() -> None:
+    ledger = Ledger(Config())
+    send_scene(ledger)
+    for number in range(100):
+        send_hand(ledger, number, now=0.025 * number)
+    assert ledger.hand_rate(0.025 * 99) == 40
+    assert ledger.hand_rate(0.025 * 99 + 2.0) == 0
+
+
+def shown(ledger: Ledger, terminal: bool, times: np.ndarray) -> str:
+    screen = io.StringIO()
+    console = Console(file=screen, force_terminal=terminal, width=110)
+    with Display(ledger, START_NS, 5.0, console) as display:
+        for now in times:
+            display.update(float(now))
+    return screen.getvalue()
+
+
+def test_without_a_terminal_one_plain_line_a_second() -> None:
+    lines = shown(filled(), False, np.arange(0.0, 3.0, 0.01)).splitlines()
+    assert len(lines) == 3
+    assert lines[0].startswith(' 0.1 of 5.0 s   hand 5/s, predictions 5/s, after 5 ms')
+    assert '56 % goal0:-1' in lines[0]
+    assert '34 % goal0:+1' in lines[0]
+    assert '\x1b' not in ''.join(lines)
+
+
+def test_on_a_terminal_a_table() -> None:
+    text = shown(filled(), True, np.array([0.2]))
+    for part in ('likelihood', 'effort', 'eta', 'goal0:-1', '56 %', 'goal1:+1-post', '0.90', 'x 1.15'):
+        assert part in text
+    assert '█' in text
+
+
+@pytest.mark.parametrize('terminal', [False, True])
+def test_nothing_solved_is_shown(terminal: bool) -> None:
+    ledger = Ledger(Config())
+    send_scene(ledger)
+    send_hand(ledger, 0, 0.0)
+    made = Prediction(START_NS, 'world', 0.1, (), None)
+    ledger.received('prediction', prediction_cloud(made, 'xy', TYPES), 0.0)
+    ledger.received('likelihoods', likelihood_array(made, TYPES), 0.0)
+    assert 'no way solved' in shown(ledger, terminal, np.array([1.0]))
+
+
+def test_display_waits_for_the_first_answer() -> None:
+    assert shown(Ledger(Config()), False, np.array([0.0, 2.0])) == ''
+
+
+def test_output_directory_is_made_and_what_a_demo_left_is_replaced(tmp_path: Path) -> None:
+    output = tmp_path / 'new' / 'demo_output'
+    command.prepare(output)
+    for name in ('bag', 'report'):
+        (output / name).mkdir()
+        (output / name / 'old').write_text('')
+    (output / 'notes.txt').write_text('mine')
+    command.prepare(output)
+    assert {file.name for file in output.iterdir()} == {command.MARK, 'notes.txt'}
+
+
+@pytest.mark.parametrize('what', ['directory', 'file'])
+def test_output_directory_with_other_things_is_refused(tmp_path: Path, what: str) -> None:
+    output = tmp_path / 'other'
+    if what == 'directory':
+        (output / 'bag').mkdir(parents=True)
+    else:
+        output.write_text('mine')
+    with pytest.raises(InputError, match='--output'):
+        command.prepare(output)
+    assert (output / 'bag').exists() or output.read_text() == 'mine'
+
+
+def test_without_rclpy_one_line_tells_how_to_get_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(command, 'find_spec', lambda name: None)
+    assert main(['demo', '--output', str(tmp_path / 'out')]) == 2
+    error = capsys.readouterr().err
+    assert error.count('\n') == 1
+    assert 'make setup' in error
+    assert not (tmp_path / 'out').exists()
+
+
+def test_a_domain_in_use_is_not_taken() -> None:
+    start = node_process.free_domain()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(('', 7400 + 250 * start + 10))
+        assert node_process.free_domain() != start
+
+
+def test_environment_is_private(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv('ROS_DISCOVERY_SERVER', 'somewhere:11811')
+    monkeypatch.setenv('ROS_DOMAIN_ID', '0')
+    environment = node_process.private_environment(42, tmp_path)
+    assert environment['ROS_DOMAIN_ID'] == '42'
+    assert environment['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
+    assert environment['ROS_LOG_DIR'] == str(tmp_path)
+    assert 'ROS_DISCOVERY_SERVER' not in environment
+
+
+def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: str) -> node_process.NodeProcess:
+    """Return a process of another program under the node's name."""
+    package = tmp_path / 'foc_ros'
+    package.mkdir()
+    (package / '__init__.py').touch()
+    (package / '__main__.py').write_text(program)
+    monkeypatch.chdir(tmp_path)
+    return node_process.NodeProcess(os.environ | {'PYTHONPATH': str(tmp_path)}, tmp_path / 'log.txt')
+
+
+def until(condition: object, seconds: float = 20.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():  # type: ignore[operator]
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def alive(pid: int) -> bool:
+    try:
+        state = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0]
+    except FileNotFoundError:
+        return False
+    return state != 'Z'
+
+
+def test_a_node_that_dies_is_reported_with_its_words(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    with stand_in(monkeypatch, tmp_path, 'import sys; print("out of"); sys.exit("luck")') as node:
+        until(lambda: not alive(node.pid))
+        with pytest.raises(node_process.NodeDiedError, match=r'exit code 1: out of \| luck|exit code 1: luck \| out of'):
+            until(lambda: node.check() is not None)
+
+
+@pytest.mark.parametrize(
+    'program',
+    [
+        'import time; time.sleep(60)',
+        'import signal, time; signal.signal(15, lambda *_: None); [time.sleep(1) for _ in range(60)]',
+    ],
+)
+def test_the_node_never_survives(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: str) -> None:
+    monkeypatch.setattr(node_process, 'STOP_S', 0.3)
+    with pytest.raises(KeyboardInterrupt), stand_in(monkeypatch, tmp_path, 'print("up", flush=True);' + program) as node:  # noqa: PT012
+        until(lambda: 'up' in (tmp_path / 'log.txt').read_text())
+        node.check()
+        raise KeyboardInterrupt
+    assert not alive(node.pid)
+
+
+@pytest.mark.skipif(sys.platform != 'linux', reason='only Linux ends a child with its parent')
+def test_the_node_does_not_outlive_a_killed_demo(tmp_path: Path) -> None:
+    package = tmp_path / 'stand_in' / 'foc_ros'
+    package.mkdir(parents=True)
+    (package / '__init__.py').touch()
+    (package / '__main__.py').write_text('import time; time.sleep(60)')
+    root = Path(__file__).resolve().parents[1]
+    demo = f"""
+import os, sys, time
+sys.path.insert(0, {str(root)!r})
+from pathlib import Path
+from foc_ros.demo.node_process import NodeProcess
+os.chdir({str(package.parent)!r})
+with NodeProcess(os.environ | {{'PYTHONPATH': {str(package.parent)!r}}}, Path({str(tmp_path / 'log.txt')!r})) as node:
+    print(node.pid, flush=True)
+    time.sleep(60)
+"""
+    with subprocess.Popen([sys.executable, '-c', demo], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        pid = int(process.stdout.readline())
+        assert alive(pid)
+        process.send_signal(signal.SIGKILL)
+    until(lambda: not alive(pid))

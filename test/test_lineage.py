@@ -1,0 +1,72 @@
+"""Lines over time follow a way while its label changes, and never join two ways that go round an obstacle differently."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from foc_ros.foc.records import make_obstacles
+from foc_ros.lineage import lineages, sides_of
+from foc_ros.moments import Moment, Way
+
+IDS = ('1', '12', 'post-2', '+')
+STEP_NS = 20_000_000
+
+
+def moment(number: int, *labels: str, goals: tuple[tuple[float, float], ...] = ((1.0, 0.0), (1.0, 1.0))) -> Moment:
+    obstacles = make_obstacles([[0.1 * i, 0.0] for i in range(len(IDS))], 0.01, ids=IDS)
+    nothing = np.zeros(0)
+    ways = tuple(
+        Way(label, 1.0 / len(labels), 1.0, 1.0, 0.9, nothing, np.zeros((0, 2)), nothing, np.zeros((0, 2, 2))) for label in labels
+    )
+    return Moment(number * STEP_NS, obstacles, np.array(goals), ways, labels[0] if labels else None)
+
+
+@pytest.mark.parametrize(
+    ('label', 'goal', 'sides'),
+    [
+        ('goal0:', 'goal0', {}),
+        ('goal1:+1-12', 'goal1', {'1': '+', '12': '-'}),
+        ('goal0:+12-1', 'goal0', {'12': '+', '1': '-'}),
+        ('goal0:-post-2+1', 'goal0', {'post-2': '-', '1': '+'}),
+        ('goal0:++-1', 'goal0', {'+': '+', '1': '-'}),
+    ],
+)
+def test_labels_are_taken_apart(label: str, goal: str, sides: dict[str, str]) -> None:
+    assert sides_of(label, IDS) == (goal, sides)
+    assert goal + ':' + ''.join(side + name for name, side in sides.items()) == label
+
+
+def test_same_label_same_line() -> None:
+    assert lineages([moment(n, 'goal0:+1', 'goal0:-1') for n in range(3)]) == [{'goal0:+1': 0, 'goal0:-1': 1}] * 3
+
+
+def test_line_goes_on_when_obstacles_drop_out() -> None:
+    lines = lineages([moment(0, 'goal0:+1-12', 'goal0:-1-12'), moment(1, 'goal0:-1', 'goal0:+1'), moment(2, 'goal0:')])
+    assert lines[1] == {'goal0:+1': 0, 'goal0:-1': 1}
+    assert lines[2] == {'goal0:': 1}
+
+
+def test_other_sides_and_other_goals_are_other_lines() -> None:
+    lines = lineages([moment(0, 'goal0:+1'), moment(1, 'goal0:-1', 'goal1:+1')])
+    assert lines == [{'goal0:+1': 0}, {'goal0:-1': 1, 'goal1:+1': 2}]
+
+
+def test_most_shared_sides_win() -> None:
+    lines = lineages([moment(0, 'goal0:+12', 'goal0:+1-12'), moment(1, 'goal0:+1-12-post-2')])
+    assert lines[1] == {'goal0:+1-12-post-2': 1}
+
+
+def test_no_line_splits() -> None:
+    lines = lineages([moment(0, 'goal0:+1'), moment(1, 'goal0:+1+12', 'goal0:+1-12')])
+    assert sorted(lines[1].values()) == [0, 1]
+
+
+def test_a_short_absence_is_bridged_a_long_one_not() -> None:
+    lines = lineages([moment(0, 'goal0:+1'), moment(1), moment(10, 'goal0:+1'), moment(30, 'goal0:+1')])
+    assert [numbers.get('goal0:+1') for numbers in lines] == [0, None, 0, 1]
+
+
+def test_other_goals_begin_anew() -> None:
+    lines = lineages([moment(0, 'goal0:+1'), moment(1, 'goal0:+1', goals=((0.0, 0.0),))])
+    assert [numbers['goal0:+1'] for numbers in lines] == [0, 1]
