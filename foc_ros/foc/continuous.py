@@ -30,7 +30,7 @@ PATIENCE = 2
 """Strides in a row without a larger k after which there is none to be found."""
 CLOSE = 1e-6
 """Relative excess of k over the wanted one at which the root is found."""
-NARROW = 1e-2
+NARROW = 1e-4
 """Bracket in s at which the root is as good as found: k jumps there, because the touching step changes."""
 MAX_TRIALS = 60
 

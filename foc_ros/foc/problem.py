@@ -72,9 +72,9 @@ class Problem(Record):
 
     @cached_property
     def recovery_left(self) -> Array:
-        """Share of the recovery time that is left at steps 1..N, (N,)."""
-        times = self.horizon.dt * np.arange(1, self.horizon.steps + 1)
-        return np.maximum(0.0, 1.0 - times / self.recovery_s)
+        """Share of a missing distance that may still be missing at steps 1..N, (N,): a minimum-jerk way out, from 1 to 0."""
+        s = np.minimum(self.horizon.dt * np.arange(1, self.horizon.steps + 1) / self.recovery_s, 1.0)
+        return 1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
     @cached_property
     def size(self) -> tuple[Array, Array]:

@@ -109,8 +109,8 @@ def half_planes(problem: Problem, guess: Array, tau: float, *, literal: bool = F
 def wanted_distance(problem: Problem, tau: float) -> Array:
     """Distance from each centre that the mean has to keep, (m, 1) or (m, N) [m]: sqrt(E[R^2] + tau).
 
-    Less where the hand is nearer now: what is missing now may be missing still, falling to zero linearly over the recovery time, so
-    that the problem asks for a way out, not for a jump.
+    Less where the hand is nearer now: what is missing now may be missing still, falling to zero over the recovery time as a minimum-jerk
+    movement does, so that the problem asks for a way out, not for a jump.
     """
     reach = np.sqrt(problem.size[0] + tau)[:, None]
     missing = reach - problem.distance_now[:, None]

@@ -1,8 +1,8 @@
 """Sequential QPs: linearise at a guess, solve, linearise at the answer, until it stays.
 
-Each QP cuts off more than the circles do, so every answer is feasible and the cost never rises. Between QPs a few Newton steps
-on the rows that were active jump to where the sequence would creep; they are kept only if they lower the cost too, and the
-sequence ends only by a QP that stays where it was linearised.
+Each QP cuts off more than the circles do, wherever it is linearised, so every answer is feasible. Between QPs a few Newton steps
+on the rows that were active jump to where the sequence would creep, if that lowers the cost too; where they fail, the next
+linearisation is taken further and further ahead. The sequence ends only by a QP that stays where it was linearised.
 """
 
 from __future__ import annotations
@@ -22,6 +22,12 @@ NEAR = 3e-3
 """Largest move of the mean from which Newton steps are tried even if the active rows changed [m]."""
 MAX_QPS = 60
 NEWTON_STEPS = 6
+ALIGNED = 0.99
+"""Cosine between two moves in a row that counts as the same direction."""
+PATIENCE = 6
+"""Moves in the same direction before the sequence is helped on."""
+LARGEST_STRETCH = 15.0
+"""Most moves that the next linearisation is taken ahead."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +44,8 @@ class Converged:
 def converge(problem: Problem, guess: Array, working: WorkingSet, tau: float, lam: float) -> Converged | None:
     """Solve the reformulated problem at (tau, lambda) from a guess (N, 2); None where its rows contradict each other."""
     cost = effort_cost(problem, lam)
-    solves, previous = 0, None
+    solves, creep = 0, _Creep()
+    previous: tuple[bytes, bytes] | None = None
     for _ in range(MAX_QPS):
         solution = solve(clearance_qp(problem, cost, guess, tau), working)
         if solution is None:
@@ -49,12 +56,41 @@ def converge(problem: Problem, guess: Array, working: WorkingSet, tau: float, la
         if move < STAYS:
             return Converged(solution.control, positions, solution, solves, stays=True)
         rows = (working.obstacle.tobytes(), working.step.tobytes())
-        guess = positions
+        better = None
         if len(working) and (rows == previous or move < NEAR):
             better = _newton(problem, positions, solution, tau, cost)
-            guess = positions if better is None else better
+        guess = creep.ahead(positions) if better is None else creep.jumped(better)
         previous = rows
     return Converged(solution.control, positions, solution, solves, stays=False)
+
+
+class _Creep:
+    """Steps ahead of a sequence that creeps: after some moves in the same direction, twice as far each time it goes on."""
+
+    def __init__(self) -> None:
+        self.last: Array | None = None
+        self.direction: Array | None = None
+        self.aligned = 0
+
+    def ahead(self, positions: Array) -> Array:
+        """Return where to linearise next: at the last answer (N, 2), or beyond it."""
+        if self.last is None:
+            self.last = positions
+            return positions
+        direction = positions - self.last
+        aligned = self.direction is not None and _cosine(direction, self.direction) > ALIGNED
+        self.aligned = self.aligned + 1 if aligned else 0
+        self.last, self.direction = positions, direction
+        return positions + min(2.0 ** max(self.aligned - PATIENCE, 0) - 1.0, LARGEST_STRETCH) * direction
+
+    def jumped(self, positions: Array) -> Array:
+        """Forget the creep: the sequence goes on from somewhere else."""
+        self.last, self.direction, self.aligned = positions, None, 0
+        return positions
+
+
+def _cosine(a: Array, b: Array) -> float:
+    return float((a * b).sum() / max(np.linalg.norm(a) * np.linalg.norm(b), 1e-300))
 
 
 def _newton(problem: Problem, positions: Array, solution: QPSolution, tau: float, cost: Cost) -> Array | None:

@@ -1,0 +1,200 @@
+"""What each strategy promises, on scenes of the tests' own."""
+
+import numpy as np
+import pytest
+from reach_helpers import bowed, one_obstacle, random_scene, reach, solved
+
+from foc_ros.foc.algorithm1 import algorithm1
+from foc_ros.foc.assess import assess
+from foc_ros.foc.chance import eta_of_k
+from foc_ros.foc.config import FocConfig
+from foc_ros.foc.dynamics import damped_mass, horizon
+from foc_ros.foc.forward import forward
+from foc_ros.foc.monte_carlo import monte_carlo
+from foc_ros.foc.optimal import surrogate_qp
+from foc_ros.foc.problem import rest_to_goal
+from foc_ros.foc.records import Status, make_obstacles
+from foc_ros.foc.solver import WorkingSet
+from foc_ros.foc.start import cold, warm
+
+BOWED = bowed((0, 0), (0.3, 0), 50, 0.05)
+EVERY = pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
+
+
+@EVERY
+def test_without_obstacles_the_minimum_jerk_reach(strategy):
+    """Least jerk from rest to rest: x = D (10 s^3 - 15 s^4 + 6 s^5), integral of jerk^2 = 720 D^2 / T^5."""
+    solution = solved(reach(make_obstacles(), steps=200), bowed((0, 0), (0.3, 0), 200, 0.0), strategy)
+    assert solution.status is Status.SOLVED
+    assert solution.eta_at is None
+    np.testing.assert_allclose(solution.path, bowed((0, 0), (0.3, 0), 200, 0.0), atol=3e-4)
+    assert solution.effort * solution.dt == pytest.approx(720 * 0.3**2, rel=1e-2)
+
+
+@EVERY
+def test_result_is_consistent_with_itself(strategy):
+    problem = one_obstacle()
+    solution = solved(problem, BOWED, strategy)
+    control = solution.control.T.ravel()
+    assessment = assess(problem, control)
+    assert solution.effort == pytest.approx(control @ control)
+    assert solution.eta == pytest.approx(eta_of_k(assessment.smallest_k))
+    assert solution.eta >= 0.9 - 1e-6
+    assert solution.eta_at is not None
+    identity, step = solution.eta_at
+    assert identity == '0'
+    assert assessment.k[0, step - 1] == assessment.smallest_k
+    np.testing.assert_allclose(solution.path[1:], problem.positions(control), atol=1e-12)
+    np.testing.assert_allclose(solution.mean[0], problem.initial_mean)
+    np.testing.assert_allclose(solution.mean[-1], problem.goal, atol=1e-7)
+    assert solution.costs['effort'] == solution.effort
+    variances = solution.covariance[1:, [0, 1], [0, 1]].sum()
+    assert solution.costs['lambda_variance'] == pytest.approx(solution.lam * variances)
+
+
+def test_low_velocity_is_nearer_and_more_precise_than_high_clearance():
+    slow, wide = (solved(one_obstacle(0.94), BOWED, name) for name in ('lv', 'hc'))
+    assert slow.tau < wide.tau
+    assert slow.lam > wide.lam
+    assert slow.path[:, 1].max() < wide.path[:, 1].max()
+
+
+def test_the_ratio_of_efforts_rises_through_one_with_much_noise_and_stays_near_it_with_little():
+    def ratio(eta, c):
+        slow, wide = (solved(one_obstacle(eta, (c, c)), BOWED, name) for name in ('lv', 'hc'))
+        return slow.effort / wide.effort
+
+    much = [ratio(eta, 0.15) for eta in (0.7, 0.86, 0.9, 0.94)]
+    assert much[0] < 1.0 < much[1] < much[2] < much[3]
+    np.testing.assert_allclose(much, [0.99, 1.16, 1.40, 2.24], rtol=0.06)
+    assert all(0.97 < ratio(eta, 0.05) < 1.04 for eta in (0.7, 0.9, 0.95))
+
+
+@EVERY
+@pytest.mark.parametrize('eta', [0.6, 0.9])
+def test_monte_carlo_keeps_the_guarantee(strategy, eta):
+    generator = np.random.default_rng(11)
+    checked = 0
+    for _ in range(6):
+        obstacles, goal, amplitude = random_scene(generator)
+        problem = reach(obstacles, goal=goal, noise=(0.1, 0.1), eta=eta)
+        solution = solved(problem, bowed((0, 0), goal, 50, amplitude), strategy)
+        if solution.status is not Status.SOLVED:
+            continue
+        sampled = monte_carlo(problem, solution.control.T.ravel(), 2000)
+        assert sampled.step[2] >= eta
+        assert sampled.path[0] <= sampled.step[0]
+        checked += 1
+    assert checked >= 3
+
+
+@pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
+def test_an_unreachable_eta_is_said_with_the_largest_that_is_reached(strategy):
+    solution = solved(one_obstacle(0.999, (0.6, 0.6)), BOWED, strategy)
+    assert solution.status is Status.ETA_UNREACHABLE
+    assert 0 < solution.eta < 0.999
+    assert f'{solution.eta:.2g}'[:3] in solution.message
+    easier = solved(one_obstacle(0.8 * solution.eta, (0.6, 0.6)), BOWED, strategy)
+    assert easier.status is Status.SOLVED
+
+
+@pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal', 'fixed', 'algorithm1'])
+def test_no_way_through_is_infeasible_with_a_path_to_look_at(strategy):
+    wall = make_obstacles([[0.15, 0.02], [0.15, -0.02]], [0.03, 0.03])
+    solution = solved(reach(wall), bowed((0, 0), (0.3, 0), 50, 0.0), strategy)
+    assert solution.status is Status.INFEASIBLE
+    assert solution.eta == 0.0
+    assert np.isfinite(solution.mean).all()
+    assert 'no way' in solution.message
+
+
+@pytest.mark.parametrize('strategy', ['lv', 'optimal'])
+@pytest.mark.parametrize('start', [(0.0, 0.025), (0.0, 0.001)], ids=['in the margin', 'in the obstacle'])
+def test_a_hand_inside_a_margin_gets_out_of_it_in_the_recovery_time(strategy, start):
+    obstacles = make_obstacles([[0.0, 0.0]], [0.02], [0.002], ids=('near',))
+    strict = solved(reach(obstacles, start=start), bowed(start, (0.3, 0), 50, 0.05), strategy)
+    assert strict.status is not Status.SOLVED
+    problem = reach(obstacles, start=start, recovery_s=0.3, noise=(0.05, 0.05))
+    solution = solved(problem, bowed(start, (0.3, 0), 50, 0.05), strategy)
+    assert solution.status is Status.SOLVED
+    assert 'near' in solution.message
+    assert np.hypot(*solution.path[15:].T).min() > 0.02
+
+
+@EVERY
+def test_goal_inside_an_obstacle_is_never_called_solved(strategy):
+    solution = solved(reach(make_obstacles([[0.3, 0.01]], [0.03])), BOWED, strategy)
+    assert solution.status is Status.INFEASIBLE
+    assert solution.eta == 0.0
+
+
+@EVERY
+def test_moving_and_uncertain_centres_are_avoided_where_they_will_be(strategy):
+    crossing = make_obstacles([[0.15, -0.2]], [0.03], [0.002], velocity=[[0.0, 0.4]], centre_covariance=np.eye(2) * 1e-5)
+    problem = reach(crossing, noise=(0.05, 0.05), eta=0.8)
+    solution = solved(problem, bowed((0, 0), (0.3, 0), 50, 0.06), strategy)
+    assert solution.status is Status.SOLVED
+    centre = problem.centres[0]
+    assert np.hypot(*(solution.path[1:] - centre).T).min() > 0.03
+    assert monte_carlo(problem, solution.control.T.ravel(), 4000).step[2] >= 0.8
+
+
+@EVERY
+def test_a_damped_mass_goes_through_the_same_door(strategy):
+    stacked = horizon(damped_mass(0.02, 1.0, 2.0), 50)
+    obstacles = make_obstacles([[0.12, 0.0]], [0.03], [0.003])
+    problem = rest_to_goal(stacked, np.zeros(4), np.array([0.3, 0.0]), obstacles, np.array([0.1, 0.1]), 0.9)
+    solution = forward(problem, cold(BOWED), FocConfig(strategy=strategy))
+    assert solution.status is Status.SOLVED
+    assert solution.mean.shape == (51, 4)
+    assert monte_carlo(problem, solution.control.T.ravel(), 4000).step[2] >= 0.9
+
+
+def test_gradient_of_the_surrogate_rows_is_that_of_finite_differences():
+    generator = np.random.default_rng(12)
+    obstacles, goal, amplitude = random_scene(generator, 3)
+    problem = reach(obstacles, goal=goal, initial_covariance=1e-5 * (np.eye(6) + 0.5))
+    control = solved(problem, bowed((0, 0), goal, 50, amplitude), 'fixed', tau=1e-4).control.T.ravel()
+    step = generator.standard_normal(control.shape) * 1e-3
+    qp = surrogate_qp(problem, control, WorkingSet(), np.zeros(0), 2.0)
+
+    def f(u):
+        return -assessed(problem, u, 2.0)
+
+    offset = problem.positions(control)[None] - problem.centres
+    differences = (f(control + step) - f(control - step)) / 2 / (2 * np.hypot(offset[..., 0], offset[..., 1]))
+    np.testing.assert_allclose(-qp.row_values(step), differences, atol=1e-6 * np.abs(differences).max())
+
+
+def assessed(problem, control, k):
+    """Return -f, the slack of the surrogate, for every obstacle and step."""
+    from foc_ros.foc.chance import variance
+
+    offset = problem.positions(control)[None] - problem.centres
+    var = variance(offset, problem.position_variance(control), problem.size[1], problem.obstacles.centre_covariance)
+    return (offset**2).sum(axis=-1) - problem.size[0][:, None] - k * np.sqrt(var)
+
+
+def test_algorithm1_as_printed_overshoots_what_the_continuous_walk_finds():
+    problem = one_obstacle(0.9)
+    stepped = algorithm1(problem, BOWED[1:], 5e-5, 10.0, 1.0)
+    walked = solved(problem, BOWED, 'lv', growth=10.0)
+    assert stepped.solution is not None
+    effort = stepped.solution.control @ stepped.solution.control
+    if stepped.status is Status.SOLVED:
+        assert effort >= walked.effort * (1 - 1e-6)
+    else:
+        assert 'infeasible' in stepped.message or 'not settled' in stepped.message
+    gentle = algorithm1(problem, BOWED[1:], 5e-5, 1.5, 1.0)
+    assert gentle.status is Status.SOLVED
+    assert assess(problem, gentle.solution.control).eta >= 0.9
+
+
+@EVERY
+def test_a_warm_start_finds_what_a_cold_one_finds(strategy):
+    problem = one_obstacle()
+    first = solved(problem, BOWED, strategy)
+    again = forward(problem, warm(first, 0.0, problem), FocConfig(strategy=strategy))
+    assert again.status is Status.SOLVED
+    assert again.qp_solves < first.qp_solves
+    np.testing.assert_allclose(again.path, first.path, atol=2e-6)
