@@ -1,0 +1,136 @@
+"""The demo end to end: the real node in its own process, fed over DDS, on the beginning of the packaged recording."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from ros_helpers import free_domain, prepare_environment, require_ros
+from rosbags.highlevel import AnyReader
+
+prepare_environment()
+pytest.importorskip('matplotlib', reason='matplotlib is not installed')
+
+ROOT = Path(__file__).resolve().parents[1]
+LAST_S = 2.0
+OUTPUTS = ('/foc/prediction', '/foc/likelihoods', '/foc/path', '/foc/markers')
+STARTED = 'demo with the node in process '
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    require_ros()
+    with free_domain() as number:
+        yield number
+
+
+def counted(bag: Path) -> Counter[str]:
+    """Return how many messages of each topic can be read and decoded."""
+    with AnyReader([bag]) as reader:
+        found: Counter[str] = Counter()
+        for connection, _, raw in reader.messages():
+            reader.deserialize(raw, connection.msgtype)
+            found[connection.topic] += 1
+        assert found.total() == reader.message_count
+    return found
+
+
+def test_end_to_end(domain: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from foc_ros.demo.command import perform
+
+    before = dict(os.environ)
+    assert perform(tmp_path / 'out', last_s=LAST_S, domain=domain) == 0
+    assert dict(os.environ) == before
+    told = capsys.readouterr().out
+    assert 'report/index.html' in told
+    assert ' of 2.0 s   hand ' in told
+    found = counted(tmp_path / 'out' / 'bag')
+    assert (found['/hand_pose'], found['/obstacles'], found['/goals']) == (201, 11, 3)
+    assert found['/foc/prediction'] >= 10
+    assert {found[topic] for topic in OUTPUTS} == {found['/foc/prediction']}
+    numbers = json.loads((tmp_path / 'out' / 'report' / 'predictions.json').read_text(encoding='utf-8'))
+    assert len(numbers['predictions']) == found['/foc/prediction']
+    assert all(each['candidates'] or each['unsolved'] is not None for each in numbers['predictions'])
+    assert any(each['candidates'] for each in numbers['predictions'])
+    assert 'data:image/png;base64,' in (tmp_path / 'out' / 'report' / 'index.html').read_text(encoding='utf-8')
+
+
+def test_the_live_predictions_are_those_of_the_recording(domain: int, tmp_path: Path) -> None:
+    """Every prediction carries the stamp of a hand pose that was sent, each stamp once, in order."""
+    from foc_ros.demo.command import perform
+
+    perform(tmp_path / 'out', last_s=1.0, domain=domain)
+    stamps: dict[str, list[int]] = {'/hand_pose': [], '/foc/prediction': []}
+    with AnyReader([tmp_path / 'out' / 'bag']) as reader:
+        for connection, _, raw in reader.messages():
+            if connection.topic in stamps:
+                stamp = reader.deserialize(raw, connection.msgtype).header.stamp
+                stamps[connection.topic].append(stamp.sec * 10**9 + stamp.nanosec)
+    assert stamps['/foc/prediction']
+    assert set(stamps['/foc/prediction']) <= set(stamps['/hand_pose'])
+    assert stamps['/foc/prediction'] == sorted(set(stamps['/foc/prediction']))
+
+
+def start(domain: int, output: Path) -> tuple[subprocess.Popen[str], int]:
+    """Start a demo of its own and return it with the process id of its node, once the recording plays."""
+    program = f"""
+import sys
+from pathlib import Path
+from foc_ros.demo import command, node_process
+entered = node_process.NodeProcess.__enter__
+def enter(self):
+    node = entered(self)
+    print({STARTED!r} + str(node.pid), flush=True)
+    return node
+node_process.NodeProcess.__enter__ = enter
+sys.exit(command.perform(Path({str(output)!r}), domain={domain}))
+"""
+    demo = subprocess.Popen([sys.executable, '-u', '-c', program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    assert demo.stdout is not None
+    pid = 0
+    for line in demo.stdout:
+        if line.startswith(STARTED):
+            pid = int(line.removeprefix(STARTED))
+        if ' of 20.' in line:
+            return demo, pid
+    demo.kill()
+    raise AssertionError(f'the demo never played: {demo.communicate()}')
+
+
+def gone(pid: int) -> bool:
+    deadline = time.monotonic() + 10.0
+    while time.monotonic() < deadline:
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.02)
+    return False
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_ends_it_cleanly(domain: int, tmp_path: Path, number: int) -> None:
+    demo, node = start(domain, tmp_path / 'out')
+    demo.send_signal(number)
+    told, complaints = demo.communicate(timeout=60)
+    assert (demo.returncode, complaints) == (130, '')
+    assert told.splitlines()[-1].startswith('interrupted')
+    assert gone(node)
+    assert counted(tmp_path / 'out' / 'bag')['/hand_pose'] > 0
+    assert not (tmp_path / 'out' / 'report').exists()
+
+
+def test_a_node_that_dies_is_told(domain: int, tmp_path: Path) -> None:
+    demo, node = start(domain, tmp_path / 'out')
+    os.kill(node, signal.SIGKILL)
+    _, complaints = demo.communicate(timeout=60)
+    assert demo.returncode == 1
+    assert complaints.splitlines() == ['foc_ros demo: the node ended with exit code -9: it printed nothing']
