@@ -71,7 +71,9 @@ class Intake:
 
     def _marker_array(self, message: Any) -> Verdict:
         config = self.pipeline.config
-        updated = self._markers.updated(message, self._now_ns(), config.plane, config.scene.marker_radius_stddev)
+        # markers that came before the working frame was known, and turned out to be in another one, are none of the scene's
+        held = self._markers if self.pipeline.frame_id in (None, self._markers.frame_id) else MarkerScene()
+        updated = held.updated(message, self._now_ns(), config.plane, config.scene.marker_radius_stddev)
         verdict = self._show(updated)
         self._count_dropped(topics.MARKERS, dict(updated.dropped) if verdict.taken else {})
         return verdict

@@ -136,7 +136,7 @@ def test_an_existing_bag_stops_before_anything_is_written(tmp_path: Path, capsys
         ('rows', 'a b,0,0,0\na_b,0,0,0', "recordings 'a b' and 'a_b' would both be written to a_b"),
         ('rows', '"a,0,0,0', 'r.csv: not a CSV table'),
         ('obstacles', 'x_m,y_m\n0,0\n', 'o.csv: row 1: no column radius_m'),
-        ('obstacles', 'x_m,y_m,radius_m\n0,0,-0.1\n', "o.csv: row 2, radius_m: expected a number in [0, 10000], got '-0.1'"),
+        ('obstacles', 'x_m,y_m,radius_m\n0,0,-0.1\n', "radius_m: expected a number in [0, 10000], got '-0.1'"),
         ('obstacles', 'x_m,y_m,radius_m,radius_stddev_m\n0,0,1,-1\n', "stddev_m: expected a number in [0, 10000], got '-1'"),
         ('obstacles', 'x_m,y_m,radius_m,id\n0,0,1,1.5\n', "expected a whole number in [-2147483648, 2147483647], got '1.5'"),
         ('obstacles', 'x_m,y_m,radius_m,id\n0,0,1,3\n0,0,1,3\n', "row 3, column id: expected another id than the rows above"),

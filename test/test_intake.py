@@ -1,0 +1,141 @@
+"""Messages on their way into the pipeline: markers live by the hand's time, what is wrong is counted and changes nothing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_array, pose_stamped
+
+from foc_ros.foc.config import Config, updated
+from foc_ros.foc.pipeline import Pipeline, Verdict
+from foc_ros.intake import Intake
+
+TYPES = message_types('rosbags')
+
+
+@pytest.fixture
+def intake() -> Intake:
+    return Intake(Pipeline(updated(Config(), {'scene.marker_radius_stddev': 0.004})))
+
+
+def move(intake: Intake, seconds: float, frame_id: str = 'world') -> Verdict | None:
+    return intake.take('hand_pose', pose_stamped(TYPES, (0.0, 0.0, 0.2), round(seconds * SECOND), frame_id))
+
+
+def show(intake: Intake, *markers: Any) -> Verdict | None:
+    return intake.take('obstacle_markers', marker_array(TYPES, *markers))
+
+
+def seen(intake: Intake) -> tuple[str, ...]:
+    state = intake.pipeline.hand_state
+    assert state is not None
+    return intake.pipeline.scene.obstacles(state.stamp_ns).ids
+
+
+def test_every_input_reaches_the_pipeline(intake: Intake) -> None:
+    assert move(intake, 1.0) is Verdict.ACCEPTED
+    assert intake.sample is not None and intake.sample.height == 0.2
+    assert intake.take('obstacles', cloud(TYPES, obstacle_table([(0.1, 0.2, 0.0, 0.03)]))) is Verdict.ACCEPTED
+    assert show(intake, marker(TYPES, (0.3, 0.1, 0.0), id=5)) is Verdict.ACCEPTED
+    assert seen(intake) == ('0', 'a/5')
+    assert intake.pipeline.scene.obstacles(SECOND).radius_stddev.tolist() == [0.0, 0.004]
+    assert intake.take('goals', pose_array(TYPES, [(0.3, 0.0, 0.0), (0.3, 0.1, 0.0)])) is Verdict.ACCEPTED
+    assert intake.pipeline.scene.goals.tolist() == [[0.3, 0.0], [0.3, 0.1]]
+    assert intake.take('goal_pose', pose_stamped(TYPES, (0.4, 0.0, 0.0))) is Verdict.ACCEPTED
+    assert intake.pipeline.scene.goals.tolist() == [[0.4, 0.0]]
+    assert intake.counts == {} and intake.last_refusal is None
+
+
+def test_a_marker_is_gone_when_its_life_is_over_by_the_hands_stamp(intake: Intake) -> None:
+    move(intake, 1.0)
+    show(intake, marker(TYPES, id=1, lifetime=0.5), marker(TYPES, id=2))
+    for seconds, expected in ((1.1, ('a/1', 'a/2')), (1.4, ('a/1', 'a/2')), (1.6, ('a/2',))):
+        move(intake, seconds)
+        assert seen(intake) == expected
+
+
+def test_markers_of_two_publishers_with_different_delays_all_count(intake: Intake) -> None:
+    move(intake, 1.0)
+    for name, seconds in (('a', 1.0), ('b', 0.9), ('c', 0.8)):
+        assert show(intake, marker(TYPES, ns=name, stamp_ns=round(seconds * SECOND))) is Verdict.ACCEPTED
+    assert seen(intake) == ('a/0', 'b/0', 'c/0')
+    assert intake.pipeline.scene.parts['markers'].stamp_ns == SECOND
+
+
+def test_deleting_all_markers_is_an_empty_scene(intake: Intake) -> None:
+    move(intake, 1.0)
+    assert show(intake, marker(TYPES, action=3, ns='', frame_id='')) is Verdict.ACCEPTED
+    assert seen(intake) == () and 'markers' in intake.pipeline.scene.parts
+
+
+def test_markers_in_another_frame_do_not_stay_in_the_way(intake: Intake) -> None:
+    """They come first, when any frame may be the working one; the hand then settles on another."""
+    show(intake, marker(TYPES, id=1, frame_id='camera'))
+    move(intake, 1.0)
+    assert intake.counts == {'obstacles_wrong_frame': 1}
+    assert show(intake, marker(TYPES, id=2)) is Verdict.ACCEPTED
+    assert seen(intake) == ('a/2',)
+    assert show(intake, marker(TYPES, id=3, frame_id='camera')) is None
+    assert seen(intake) == ('a/2',) and "expected 'world'" in intake.last_refusal
+
+
+@pytest.mark.parametrize(
+    ('role', 'message', 'kind', 'words'),
+    [
+        (
+            'hand_pose',
+            pose_stamped(TYPES, (float('nan'), 0, 0)),
+            'hand_pose_invalid',
+            'hand_pose: pose.position.x: expected a finite',
+        ),
+        (
+            'goals',
+            pose_array(TYPES, [(0, 0, 0), (0, float('inf'), 0)]),
+            'goals_invalid',
+            'goals: poses[1].position.y: expected a',
+        ),
+        ('goal_pose', pose_stamped(TYPES, (0, 1e9, 0)), 'goal_pose_invalid', 'goal_pose: pose.position.y: expected'),
+        (
+            'obstacles',
+            cloud(TYPES, obstacle_table([(0, 0, 0, -1)])),
+            'obstacles_invalid',
+            'obstacles: radius[0]: expected a number',
+        ),
+        (
+            'obstacle_markers',
+            marker_array(TYPES, marker(TYPES, scale=(-1, 1, 1))),
+            'obstacle_markers_invalid',
+            'scale.x: expected',
+        ),
+    ],
+)
+def test_what_cannot_be_converted_changes_nothing_and_is_counted(
+    intake: Intake, role: str, message: Any, kind: str, words: str
+) -> None:
+    move(intake, 1.0)
+    intake.take('obstacles', cloud(TYPES, obstacle_table([(0.1, 0.2, 0.0, 0.03)])))
+    intake.take('goals', pose_array(TYPES, [(0.3, 0.0, 0.0)]))
+    scene, state = intake.pipeline.scene, intake.pipeline.hand_state
+    assert intake.take(role, message) is None
+    assert intake.pipeline.scene is scene and intake.pipeline.hand_state is state
+    assert intake.counts == {kind: 1} and words in intake.last_refusal
+
+
+def test_rows_that_are_dropped_are_counted(intake: Intake) -> None:
+    rows = obstacle_table([(0.1, 0.2, 0.0, 0.03), (float('nan'), 0, 0, 0.1)])
+    assert intake.take('obstacles', cloud(TYPES, rows)) is Verdict.ACCEPTED
+    show(intake, marker(TYPES, type=1), marker(TYPES, (float('inf'), 0, 0), id=3))
+    assert intake.counts == {
+        'obstacles_dropped_not_finite': 1,
+        'obstacle_markers_dropped_not_a_circle': 1,
+        'obstacle_markers_dropped_not_finite': 1,
+    }
+
+
+def test_what_the_pipeline_refuses_is_told_too(intake: Intake) -> None:
+    move(intake, 1.0)
+    assert move(intake, 1.0) is Verdict.DUPLICATE
+    assert move(intake, 1.1, 'camera') is Verdict.WRONG_FRAME
+    assert intake.counts == {'hand_duplicate': 1, 'hand_wrong_frame': 1}
+    assert intake.last_refusal == intake.pipeline.last_refusal and 'camera' in intake.last_refusal
