@@ -9,55 +9,32 @@ subscription (`Publisher.get_subscription_count()`) and its own subscriptions ha
 from __future__ import annotations
 
 import traceback
-from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseArray, PoseStamped
-from nav_msgs.msg import Path
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSPolicyKind, QoSProfile, QoSReliabilityPolicy
-from rclpy.qos_overriding_options import QoSOverridingOptions
-from sensor_msgs.msg import PointCloud2
-from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool, Trigger
-from visualization_msgs.msg import MarkerArray
 
 from .conversions.diagnostics import diagnostic_array
 from .conversions.outputs import output_messages
 from .conversions.types import RclpyTypes
+from .endpoints import INPUTS, advertise, subscribe, waiting
 from .foc.config import Config, updated
 from .foc.errors import ParameterError
 from .foc.pipeline import Pipeline
 from .intake import Intake
 from .monitor import Monitor
 from .parameters import KNOWN, config_of, declare_all
-from .topics import CLOUD, GOAL, GOALS, HAND, MARKERS
+from .topics import CLOUD, GOAL, GOALS, HAND
 
-HAND_DEPTH, SCENE_DEPTH = 200, 10
-"""Messages kept while a prediction is computed: 0.2 s of hand poses at 1 kHz."""
 THROTTLE_S = 5.0
-
-_INPUTS: dict[str, Any] = {GOALS: PoseArray, GOAL: PoseStamped, CLOUD: PointCloud2, MARKERS: MarkerArray, HAND: PoseStamped}
-"""In the order in which the executor looks at them: the scene before the hand."""
-_OUTPUTS: dict[str, Any] = {'prediction': PointCloud2, 'likelihoods': Float64MultiArray, 'path': Path, 'markers': MarkerArray}
-_WHOLE = (GOALS, GOAL, CLOUD)
+"""Between two log lines of one kind [s]."""
+WHOLE = (GOALS, GOAL, CLOUD)
 """Inputs of which each message says everything: of several waiting, the newest good one holds."""
-
-
-def _qos(reliability: QoSReliabilityPolicy, depth: int) -> QoSProfile:
-    return QoSProfile(
-        reliability=reliability, durability=QoSDurabilityPolicy.VOLATILE, history=QoSHistoryPolicy.KEEP_LAST, depth=depth
-    )
-
-
-def _overridable() -> QoSOverridingOptions:
-    """Let `qos_overrides.<topic>.subscription.durability: transient_local` hear a scene that was published once."""
-    kinds = QoSPolicyKind
-    return QoSOverridingOptions((kinds.HISTORY, kinds.DEPTH, kinds.RELIABILITY, kinds.DURABILITY))
 
 
 class FocNode(Node):
@@ -71,50 +48,25 @@ class FocNode(Node):
         self._monitor = Monitor(self._now_s())
         self._types = RclpyTypes()
         # A logger throttles each of its lines by itself: one per input, so that none silences another.
-        self._loggers = {role: self.get_logger().get_child(role) for role in _INPUTS}
-        self.add_pre_set_parameters_callback(_with_floats)
+        self._loggers = {role: self.get_logger().get_child(role) for role in INPUTS}
+        self.add_pre_set_parameters_callback(self._prepare_parameters)
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._apply_parameters)
-        reliable, best_effort = QoSReliabilityPolicy.RELIABLE, QoSReliabilityPolicy.BEST_EFFORT
-        self._outputs = {
-            name: self.create_publisher(kind, f'~/{name}', _qos(reliable, 10), qos_overriding_options=_overridable())
-            for name, kind in _OUTPUTS.items()
-        }
+        self._outputs = advertise(self)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_service(SetBool, '~/engage', self._engage)
         self.create_service(Trigger, '~/reset', self._reset)
-        self._inputs = {
-            role: self.create_subscription(
-                kind,
-                role,
-                partial(self._receive, role),
-                _qos(best_effort, HAND_DEPTH) if role == HAND else _qos(reliable, SCENE_DEPTH),
-                qos_overriding_options=_overridable(),
-            )
-            for role, kind in _INPUTS.items()
-        }
+        self._inputs = subscribe(self, self._receive)
         self.create_timer(1.0, self._publish_health, clock=self._steady)
 
     def _receive(self, role: str, message: Any) -> None:
         """Take a message and all that wait behind it; predict once, from the newest hand pose."""
-        waiting = [message, *self._waiting(role)]
-        for each in reversed(waiting) if role in _WHOLE else waiting:
-            if self._take(role, each) and role in _WHOLE:
+        messages = [message, *waiting(self._inputs[role])]
+        for each in reversed(messages) if role in WHOLE else messages:
+            if self._take(role, each) and role in WHOLE:
                 break
         if role == HAND and self.pipeline.due:
             self._predict()
-
-    def _waiting(self, role: str) -> list[Any]:
-        """Take what the subscription's queue holds, no more than fits into it."""
-        subscription = self._inputs[role]
-        messages: list[Any] = []
-        with subscription.handle:
-            while len(messages) < HAND_DEPTH:
-                taken = subscription.handle.take_message(subscription.msg_type, False)
-                if taken is None:
-                    break
-                messages.append(taken[0])
-        return messages
 
     def _take(self, role: str, message: Any) -> bool:
         verdict = self.intake.take(role, message)
@@ -168,6 +120,18 @@ class FocNode(Node):
         response.success, response.message = True, 'the movement is forgotten, the scene is kept'
         return response
 
+    def _prepare_parameters(self, changed: list[Parameter]) -> list[Parameter]:
+        """Name the unknown ones, as rclpy does not; read a whole number as a real one where that is wanted."""
+        unknown = [each.name for each in changed if not self.has_parameter(each.name)]
+        if unknown:
+            raise ParameterNotDeclaredException(unknown)
+        return [
+            Parameter(each.name, value=float(each.value))
+            if each.type_ == Parameter.Type.INTEGER and each.name in KNOWN and isinstance(KNOWN[each.name].default, float)
+            else each
+            for each in changed
+        ]
+
     def _check_parameters(self, changed: list[Parameter]) -> SetParametersResult:
         try:
             updated(self.pipeline.config, {each.name: each.value for each in changed if each.name in KNOWN})
@@ -181,13 +145,3 @@ class FocNode(Node):
 
     def _now_s(self) -> float:
         return float(self._steady.now().nanoseconds) * 1e-9
-
-
-def _with_floats(changed: list[Parameter]) -> list[Parameter]:
-    """Read a whole number that is set on a parameter of real numbers as one."""
-    return [
-        Parameter(each.name, value=float(each.value))
-        if each.type_ == Parameter.Type.INTEGER and each.name in KNOWN and isinstance(KNOWN[each.name].default, float)
-        else each
-        for each in changed
-    ]

@@ -38,7 +38,8 @@ class Bench:
         from sensor_msgs.msg import PointCloud2
         from visualization_msgs.msg import MarkerArray
 
-        from foc_ros.node import _OUTPUTS, FocNode
+        from foc_ros.endpoints import OUTPUTS
+        from foc_ros.node import FocNode
 
         parameters = QUICK | RELIABLE_HAND | options.pop('parameters', {})
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
@@ -54,7 +55,7 @@ class Bench:
             'goal_pose': PoseStamped,
         }
         self.publishers = {name: self.player.create_publisher(kind, name, 1000) for name, kind in inputs.items()}
-        self.received = {name: ros.collect(self.player, _OUTPUTS[name], f'foc/{name}') for name in outputs}
+        self.received = {name: ros.collect(self.player, OUTPUTS[name], f'foc/{name}') for name in outputs}
         self.diagnostics = ros.collect(self.player, DiagnosticArray, '/diagnostics')
         ros.spin_until(self._connected, 'publishers and subscriptions find each other')
 

@@ -1,0 +1,236 @@
+"""Bad input, wrong parameters and errors inside: the node says so, publishes nothing wrong, and goes on."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import pytest
+import ros_helpers
+
+ros_helpers.require_ros()
+
+from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped  # noqa: E402
+from node_helpers import QUICK, ROWS, TYPES, Bench, figures, hand_path  # noqa: E402
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParametersAtomically  # noqa: E402
+from ros_helpers import Graph  # noqa: E402
+
+from foc_ros.foc.config import Config, flatten, parameters, updated  # noqa: E402
+
+NAN = math.nan
+BAD_INPUTS = {
+    'hand that is nowhere': (
+        'hand_pose',
+        pose_stamped(TYPES, (NAN, 0, 0), 20 * SECOND),
+        'hand_pose: pose.position.x: expected a finite number',
+    ),
+    'unstamped hand': (
+        'hand_pose',
+        pose_stamped(TYPES, (0, 0, 0), 0),
+        'hand_pose: header.stamp: expected a time after 0, got 0 s',
+    ),
+    'hand in another frame': (
+        'hand_pose',
+        pose_stamped(TYPES, (0, 0, 0), 20 * SECOND, 'camera'),
+        "hand_pose.header.frame_id: expected the working frame 'world', got 'camera'",
+    ),
+    'late hand': ('hand_pose', pose_stamped(TYPES, (0, 0, 0), round(9.9 * SECOND)), 'behind the newest'),
+    'truncated table': ('obstacles', cloud(TYPES, obstacle_table(ROWS), data=b'abc'), 'obstacles: data: expected 16 bytes'),
+    'table without radii': (
+        'obstacles',
+        cloud(TYPES, obstacle_table([(0, 0)], [('x', '<f4'), ('y', '<f4')])),
+        'obstacles: fields: expected',
+    ),
+    'negative radius': (
+        'obstacles',
+        cloud(TYPES, obstacle_table([(0, 0, 0, -1)])),
+        'obstacles: radius[0]: expected a number in [0, 10000] m, got -1',
+    ),
+    'table in another frame': ('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'camera'), "got 'camera'"),
+    'marker of negative size': (
+        'obstacle_markers',
+        marker_array(TYPES, marker(TYPES, scale=(-1, 1, 1))),
+        'obstacle_markers: markers[0].scale.x',
+    ),
+    'goal that is nowhere': (
+        'goals',
+        pose_array(TYPES, [(0, math.inf, 0)]),
+        'goals: poses[0].position.y: expected a finite number [m], got inf',
+    ),
+    'goal in another frame': ('goal_pose', pose_stamped(TYPES, (0, 0, 0), 1, 'camera'), "got 'camera'"),
+}
+
+
+class Log:
+    """Stands in for a logger and keeps the lines."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def warning(self, line: str, **_: Any) -> None:
+        self.lines.append(line)
+
+    error = warning
+
+
+@pytest.mark.parametrize('case', BAD_INPUTS)
+def test_bad_input_is_refused_in_words_and_changes_nothing(ros: Graph, case: str) -> None:
+    role, message, words = BAD_INPUTS[case]
+    bench, poses = Bench(ros), hand_path(4)
+    bench.show_scene()
+    bench.move(poses[:2])
+    bench.wait_for('prediction', 1)
+    log = bench.node._loggers[role] = Log()
+    scene, state = bench.node.pipeline.scene, bench.node.pipeline.hand_state
+    bench.health()
+    bench.hear(role, message)
+    status = bench.health()
+    assert words in figures(status)['last refusal']
+    assert status.level == b'\x01'
+    assert [words in line and re.search(r'\(1 of \d+ refused so far\)', line) is not None for line in log.lines] == [True]
+    assert bench.node.pipeline.scene is scene
+    assert bench.node.pipeline.hand_state is state
+    assert len(bench.received['prediction']) == 1
+    bench.move(poses[2:])
+    bench.wait_for('prediction', 2)
+
+
+def test_rows_left_out_are_told(ros: Graph) -> None:
+    bench = Bench(ros)
+    bench.hear('obstacles', cloud(TYPES, obstacle_table([*ROWS, (NAN, 0, 0, 1)]), 10 * SECOND))
+    status = bench.health()
+    assert status.level == b'\x01'
+    assert 'obstacles_dropped_not_finite 1' in status.message
+
+
+def test_of_several_scenes_waiting_the_newest_good_one_holds(ros: Graph) -> None:
+    bench = Bench(ros)
+    good = [cloud(TYPES, obstacle_table([(x, 0, 0, 0.01)]), 10 * SECOND) for x in (1, 2, 3)]
+    bench.send('obstacles', *good, cloud(TYPES, obstacle_table(ROWS), data=b'abc'))
+    ros.spin_until(lambda: 'cloud' in bench.node.pipeline.scene.parts, 'a scene')
+    assert bench.node.pipeline.scene.obstacles(0).centre[0, 0] == 3.0
+    assert figures(bench.health())['obstacles refused'] == '1 of 2'
+
+
+def test_a_scene_that_is_not_renewed_stops_predictions(ros: Graph) -> None:
+    bench = Bench(ros, parameters={'scene.timeout_s': 0.5})
+    bench.show_scene()
+    bench.move(hand_path(9, rate_hz=10.0))
+    status = bench.health()
+    assert len(bench.received['prediction']) == 6
+    assert status.level == b'\x01'
+    assert re.search(r'no prediction: obstacles are 0\.\d+ s older than the hand pose', status.message)
+
+
+def test_a_silent_hand_is_told(ros: Graph) -> None:
+    bench = Bench(ros, parameters={'estimator.gap_s': 0.05})
+    bench.show_scene()
+    bench.move(hand_path(2))
+    ros.spin_for(0.1)
+    status = bench.health()
+    assert status.level == b'\x01'
+    assert re.match(r'hand_pose silent for \d+\.\d s', status.message)
+
+
+@pytest.mark.parametrize('where', ['predict', 'output_messages'])
+def test_an_error_inside_is_counted_and_told_and_the_node_goes_on(
+    ros: Graph, monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    from foc_ros import node as module
+
+    def broken(*_: Any) -> None:
+        raise ZeroDivisionError('made for this test')
+
+    bench, poses = Bench(ros), hand_path(6)
+    log = Log()
+    monkeypatch.setattr(bench.node, 'get_logger', lambda: log)
+    bench.show_scene()
+    with monkeypatch.context() as patch:
+        patch.setattr(*((bench.node.pipeline, where) if where == 'predict' else (module, where)), broken)
+        bench.move(poses[:3])
+        status = bench.health()
+    assert status.level == b'\x02'
+    assert status.message == '3 internal errors, the last: ZeroDivisionError: made for this test'
+    assert 'Traceback' in log.lines[0]
+    assert not bench.received['prediction']
+    bench.move(poses[3:])
+    bench.wait_for('prediction', 1)
+    bench.health()
+    assert bench.health().level != b'\x02'
+
+
+def request_of(**values: Any) -> Any:
+    from rclpy.parameter import Parameter
+
+    given = [Parameter(name.replace('__', '.'), value=value).to_parameter_msg() for name, value in values.items()]
+    return SetParametersAtomically.Request(parameters=given)
+
+
+def set_on(bench: Bench, **values: Any) -> Any:
+    return bench.ros.call(bench.player, SetParametersAtomically, 'foc/set_parameters_atomically', request_of(**values)).result
+
+
+def test_parameters_are_listed_described_and_read_by_others(ros: Graph) -> None:
+    bench = Bench(ros)
+    names = [parameter.name for parameter in parameters()]
+    listed = ros.call(bench.player, ListParameters, 'foc/list_parameters', ListParameters.Request()).result.names
+    assert set(names) <= set(listed)
+    assert 'qos_overrides./obstacles.subscription.durability' in listed
+    described = ros.call(
+        bench.player, DescribeParameters, 'foc/describe_parameters', DescribeParameters.Request(names=names)
+    ).descriptors
+    assert [each.name for each in described] == names
+    assert all(each.description for each in described)
+    values = ros.call(bench.player, GetParameters, 'foc/get_parameters', GetParameters.Request(names=['foc.eta', 'plane'])).values
+    assert (values[0].double_value, values[1].string_value) == (Config().foc.eta, 'xy')
+
+
+def test_parameters_change_together_and_without_a_missed_prediction(ros: Graph) -> None:
+    bench, poses = Bench(ros), hand_path(20)
+    bench.show_scene()
+    bench.move(poses[:10])
+    assert set_on(bench, foc__eta=0.7, likelihood__beta=1, homotopy__max_candidates=1).successful
+    bench.move(poses[10:])
+    tables = bench.wait_for('likelihoods', 10)
+    assert bench.node.pipeline.config == updated(
+        Config(), QUICK | {'foc.eta': 0.7, 'likelihood.beta': 1.0, 'homotopy.max_candidates': 1}
+    )
+    assert [table.layout.dim[0].size for table in tables] == [2] * 5 + [1] * 5
+    assert isinstance(bench.node.get_parameter('likelihood.beta').value, float)
+
+
+@pytest.mark.parametrize(
+    ('values', 'words'),
+    [
+        ({'foc__eta': 2.0}, 'foc.eta out of range'),
+        ({'foc__eta': NAN}, 'foc.eta out of range'),
+        ({'foc__strategy': 'best'}, "foc.strategy: expected one of lv, hc, optimal, algorithm1, fixed, got 'best'"),
+        ({'foc__steps': 20.5}, 'Wrong parameter type'),
+        ({'plane': 'xz'}, 'read-only parameter: plane'),
+        ({'foc__etta': 0.5}, 'foc.etta'),
+        ({'foc__strategy': None}, 'cannot be undeclared'),
+    ],
+)
+def test_a_refused_value_changes_nothing_and_says_why(ros: Graph, values: dict[str, Any], words: str) -> None:
+    bench = Bench(ros, outputs=[])
+    before = bench.node.pipeline.config
+    result = set_on(bench, rate_hz=25.0, **values)
+    assert not result.successful
+    assert words in result.reason
+    assert bench.node.pipeline.config is before
+    assert {name: bench.node.get_parameter(name).value for name in flatten(before)} == flatten(before)
+
+
+def test_a_storm_of_parameters_leaves_the_node_predicting(ros: Graph) -> None:
+    bench, poses = Bench(ros), hand_path(40)
+    bench.show_scene()
+    client = bench.player.create_client(SetParametersAtomically, 'foc/set_parameters_atomically')
+    ros.spin_until(client.service_is_ready, 'parameter service')
+    futures = []
+    for i, pose in enumerate(poses):
+        futures.append(client.call_async(request_of(foc__eta=0.5 + 0.01 * i if i % 3 else 5.0)))
+        bench.move([pose])
+    ros.spin_until(lambda: all(future.done() for future in futures), 'answers')
+    assert [future.result().result.successful for future in futures] == [bool(i % 3) for i in range(40)]
+    bench.wait_for('prediction', 20)

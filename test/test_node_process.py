@@ -1,0 +1,143 @@
+"""The node as a process: it starts with what it is given or says why not, and ends without an error when it is told to."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import ros_helpers
+
+ros_helpers.require_ros()
+
+from message_helpers import SECOND, cloud, obstacle_table, pose_array  # noqa: E402
+from node_helpers import GOALS, ROWS, TYPES, hand_path  # noqa: E402
+from ros_helpers import Graph  # noqa: E402
+
+ROOT = Path(__file__).parents[1]
+LAUNCHES = {'module': ['-m', 'foc_ros.node_main'], 'command': ['-m', 'foc_ros', 'node']}
+
+
+@contextmanager
+def running(ros: Graph, launch: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    command = [sys.executable, *LAUNCHES[launch], *arguments]
+    pipes = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, 'text': True}
+    with subprocess.Popen(command, cwd=ROOT, env=ros.environment, **pipes) as process:
+        try:
+            yield process
+        finally:
+            if process.poll() is None:
+                process.kill()
+
+
+def ended(process: subprocess.Popen[str], number: signal.Signals) -> tuple[int, str]:
+    """Send a signal; return exit code and what was written to standard error."""
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=30)
+    return process.returncode, errors
+
+
+def feed(ros: Graph, count: int) -> None:
+    """Play a scene and hand poses to the node, and wait until it has predicted."""
+    from geometry_msgs.msg import PoseArray, PoseStamped
+    from sensor_msgs.msg import PointCloud2
+
+    player = ros.node('player')
+    clouds = ros.collect(player, PointCloud2, 'foc/prediction')
+    publishers = [
+        player.create_publisher(*each, 10)
+        for each in ((PointCloud2, 'obstacles'), (PoseArray, 'goals'), (PoseStamped, 'hand_pose'))
+    ]
+    ros.spin_until(lambda: all(each.get_subscription_count() for each in publishers), 'the node', 30.0)
+    publishers[0].publish(cloud(TYPES, obstacle_table(ROWS), 10 * SECOND))
+    publishers[1].publish(pose_array(TYPES, GOALS))
+    for pose in hand_path(count):
+        publishers[2].publish(pose)
+        ros.spin_for(0.01)
+    ros.spin_until(lambda: len(clouds) > 0, 'a prediction of the process')
+
+
+@pytest.mark.parametrize('launch', LAUNCHES)
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_node_at_work_ends_without_an_error(ros: Graph, launch: str, number: signal.Signals) -> None:
+    with running(ros, launch) as process:
+        feed(ros, 60)
+        code, errors = ended(process, number)
+    assert code == 0, errors
+    assert 'Traceback' not in errors
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_node_ends_without_an_error_at_any_moment_of_its_start(ros: Graph, number: signal.Signals) -> None:
+    watcher = ros.node('watcher')
+    with running(ros, 'module') as process:
+        ros.spin_until(lambda: 'foc' in watcher.get_node_names(), 'the node', 30.0)
+        code, errors = ended(process, number)
+    assert (code, errors) == (0, '')
+
+
+def test_two_signals_are_one(ros: Graph) -> None:
+    watcher = ros.node('watcher')
+    with running(ros, 'module') as process:
+        ros.spin_until(lambda: 'foc' in watcher.get_node_names(), 'the node', 30.0)
+        process.send_signal(signal.SIGTERM)
+        code, errors = ended(process, signal.SIGINT)
+    assert (code, errors) == (0, '')
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (['--ros-args', '-p', 'foc.eta:=2.0'], 'foc_node: foc.eta: expected a number in [0, 0.999], got 2.0\n'),
+        (['--ros-args', '-p', 'rate_hz:=fast'], "foc_node: rate_hz: expected a finite number in [0.1, 1000] Hz, got 'fast'\n"),
+        (['--ros-args', '--params-file', '/nowhere/at/all.yaml'], '/nowhere/at/all.yaml'),
+        (['--ros-args', '-p', 'qos_overrides./obstacles.subscription.durability:=eternal'], 'eternal'),
+        (['--ros-args', '--no-such-option'], 'no-such-option'),
+        (['--fast'], 'foc_node: unrecognized arguments: --fast (those of ROS follow --ros-args)\n'),
+    ],
+)
+def test_a_node_that_cannot_start_says_why_in_one_line(ros: Graph, arguments: list[str], words: str) -> None:
+    with running(ros, 'module', *arguments) as process:
+        _, errors = process.communicate(timeout=30)
+    assert process.returncode == 2
+    lines = [line for line in errors.splitlines() if line.startswith('foc_node: ')]
+    assert len(lines) == 1
+    assert words in errors
+    assert 'Traceback' not in errors
+
+
+def test_a_request_that_rclpy_cannot_digest_does_not_end_the_node(ros: Graph) -> None:
+    from rcl_interfaces.msg import Parameter, ParameterValue
+    from rcl_interfaces.srv import GetParameters, SetParameters
+
+    client_node = ros.node('client')
+    with running(ros, 'module') as process:
+        client = client_node.create_client(SetParameters, 'foc/set_parameters')
+        ros.spin_until(client.service_is_ready, 'the node', 30.0)
+        client.call_async(SetParameters.Request(parameters=[Parameter(name='rate_hz', value=ParameterValue(type=99))]))
+        ros.spin_for(0.2)
+        answer = ros.call(client_node, GetParameters, 'foc/get_parameters', GetParameters.Request(names=['rate_hz']))
+        assert answer.values[0].double_value == 50.0
+        assert process.poll() is None
+        code, _ = ended(process, signal.SIGTERM)
+    assert code == 0
+
+
+def test_nothing_is_left_behind(ros: Graph, tmp_path: Path) -> None:
+    watcher = ros.node('watcher')
+    command = [sys.executable, '-m', 'foc_ros.node_main']
+    environment = ros.environment | {'ROS_LOG_DIR': str(tmp_path / 'log'), 'PYTHONPATH': str(ROOT)}
+    with subprocess.Popen(command, cwd=tmp_path, env=environment) as process:
+        ros.spin_until(lambda: 'foc' in watcher.get_node_names(), 'the node', 30.0)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(30) == 0
+    deadline = time.monotonic() + 30
+    while 'foc' in watcher.get_node_names():
+        assert time.monotonic() < deadline
+        ros.executor.spin_once(timeout_sec=0.05)
+    assert [each.name for each in tmp_path.iterdir()] == ['log']
