@@ -107,7 +107,7 @@ def test_the_frame_does_not_matter() -> None:
     assert there.onset_ns == here.onset_ns
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=150)
 @given(
     stddev=st.floats(1e-7, 1.0),
     density=st.floats(1e-6, 1e6),

@@ -6,7 +6,12 @@ Per axis the state is x = (position, velocity, acceleration) driven by white jer
     G(dt) = [[dt^5/20, dt^4/8, dt^3/6], [dt^4/8, dt^3/3, dt^2/2], [dt^3/6, dt^2/2, dt]],
 
 the exact discretisation for any dt, so irregular stamps need no resampling. Both axes are measured equally well, so they share
-one 3 x 3 covariance and one gain.
+one 3 x 3 covariance P and one gain.
+
+The filter works on the lower triangular root L of P = L L'. In time, the columns [A L, q C] are made triangular, where C C' = G(dt).
+A measured position of deviation r sees the first row of L alone, which is (l, 0, 0): with e^2 = l^2 + r^2 the variance of the
+innovation, the gain is L_1 l / e^2 and the first column becomes L_1 r / e, the others stay. So the covariance is symmetric and
+positive whatever the deviations and intervals; an update in Joseph form was not for two samples 1 us apart.
 
 The first sample gives the position. Velocity and acceleration then start at zero with the covariance that a hand at rest would
 have got from the jerk in `gap_s`, the longest time for which the filter believes in an old state.
@@ -33,8 +38,12 @@ ONSET_STDDEVS = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Track(HandState):
-    """A hand state, and what else the estimator remembers: the samples since onset, as far as the effort needs them."""
+    """A hand state, and what else the estimator remembers.
 
+    root (3, 3): lower triangular root of one axis' covariance; effort: the samples since onset, as far as the effort needs them.
+    """
+
+    root: Array = field(default_factory=lambda: np.zeros((3, 3)))
     effort: Effort = field(default_factory=Effort)
 
 
@@ -82,33 +91,36 @@ def gramian(dt: float) -> Array:
     )
 
 
+_UNIT_ROOT = np.linalg.cholesky(gramian(1.0))
+"""C for dt = 1 s; the rows scale with dt^2.5, dt^1.5 and dt^0.5."""
+
+
 def _first(sample: HandSample, config: EstimatorConfig) -> Track:
     """Start from one position."""
-    covariance = config.jerk_density**2 * gramian(config.gap_s)
-    covariance[0] = covariance[:, 0] = (config.position_stddev**2, 0.0, 0.0)
+    root = np.zeros((3, 3))
+    root[0, 0] = config.position_stddev
+    root[1:, 1:] = config.jerk_density * np.linalg.cholesky(gramian(config.gap_s)[1:, 1:])
     mean = np.concatenate([sample.position, np.zeros(4)])
-    return Track(sample.stamp_ns, mean, _both_axes(covariance), sample.height, sample.frame_id)
+    return Track(sample.stamp_ns, mean, _both_axes(root @ root.T), sample.height, sample.frame_id, root=root)
 
 
 def _filtered(state: Track, sample: HandSample, dt: float, config: EstimatorConfig) -> Track:
-    """Predict to the sample's stamp and correct by it, in Joseph form: the covariance stays symmetric and positive."""
-    variance = config.position_stddev**2
-    a = transition(dt)
-    mean = a @ state.mean.reshape(3, 2)
-    covariance = a @ state.covariance[::2, ::2] @ a.T + config.jerk_density**2 * gramian(dt)
-    gain = covariance[:, 0] / (covariance[0, 0] + variance)
+    """Predict to the sample's stamp and correct by its position."""
+    columns = np.hstack([transition(dt) @ state.root, config.jerk_density * dt ** np.array([[2.5], [1.5], [0.5]]) * _UNIT_ROOT])
+    root = np.linalg.qr(columns.T)[1].T
+    deviation = math.hypot(root[0, 0], config.position_stddev)
+    gain = root[:, 0] * (root[0, 0] / deviation / deviation)
+    root[:, 0] *= config.position_stddev / deviation
+    mean = transition(dt) @ state.mean.reshape(3, 2)
     mean = mean + np.outer(gain, sample.position - mean[0])
-    keep = np.eye(3)
-    keep[:, 0] -= gain
-    covariance = keep @ covariance @ keep.T + variance * np.outer(gain, gain)
-    covariance = (covariance + covariance.T) / 2.0
     return replace(
         state,
         stamp_ns=sample.stamp_ns,
         mean=mean.ravel(),
-        covariance=_both_axes(covariance),
+        covariance=_both_axes(root @ root.T),
         height=sample.height,
         frame_id=sample.frame_id,
+        root=root,
     )
 
 
