@@ -32,7 +32,7 @@ STDDEVS = 1.0
 """Standard deviations that ellipses and rings stand for."""
 CLASSES = 2 * len(CLASS_COLOURS)
 """Classes told apart by colour and dash; there are no letters and colours for more."""
-ELLIPSES_PER_WAY = 9
+ELLIPSES_PER_WAY = 8
 NAMED_OBSTACLES = 30
 """Above this many, the obstacles' names would hide the scene."""
 
@@ -73,7 +73,7 @@ def draw_ways(axes: Any, ways: Sequence[Way], numbers: Mapping[str, int]) -> Non
         colour = LIKELIHOOD_COLOURS(LIKELIHOOD_SCALE(way.likelihood))
         for row in np.unique(np.linspace(0, len(way.path) - 1, ELLIPSES_PER_WAY).astype(int)):
             ellipse = stddev_ellipse(way.path[row], way.covariance[row])
-            ellipse.set(facecolor=(*colour[:3], 0.15), edgecolor=(*colour[:3], 0.6), linewidth=0.6, zorder=2)
+            ellipse.set(facecolor=(*colour[:3], 0.1), edgecolor=(*colour[:3], 0.5), linewidth=0.6, zorder=2)
             axes.add_patch(ellipse)
         axes.plot(*way.path.T, color=colour, linewidth=2.2, zorder=3)
         if way.label in numbers:

@@ -93,7 +93,9 @@ def enter(self):
 node_process.NodeProcess.__enter__ = enter
 sys.exit(command.perform(Path({str(output)!r}), domain={domain}))
 """
-    demo = subprocess.Popen([sys.executable, '-u', '-c', program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    demo = subprocess.Popen(
+        [sys.executable, '-u', '-c', program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT
+    )
     assert demo.stdout is not None
     pid = 0
     for line in demo.stdout:

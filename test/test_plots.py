@@ -13,7 +13,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Ellipse
 from report_samples import START_NS, prediction, predictions, samples, scene
 
-from foc_ros.drawing import CLASS_COLOURS, LIKELIHOOD_COLOURS, stddev_ellipse
+from foc_ros.drawing import CLASS_COLOURS, ELLIPSES_PER_WAY, LIKELIHOOD_COLOURS, stddev_ellipse
 from foc_ros.foc.errors import InputError
 from foc_ros.foc.records import make_obstacles
 from foc_ros.moments import moment_of, movements, track_of, ways_of
@@ -68,7 +68,7 @@ def test_scene_holds_every_obstacle_goal_and_way() -> None:
         assert any(np.array_equal(line, way.path) for line in drawn)
     for goal in goals:
         assert any(np.array_equal(line, [goal]) for line in drawn)
-    assert sum(type(patch) is Ellipse for patch in axes.patches) == 9 * len(ways)
+    assert sum(type(patch) is Ellipse for patch in axes.patches) == ELLIPSES_PER_WAY * len(ways)
 
 
 def test_unsolved_outcomes_are_not_drawn() -> None:
