@@ -6,7 +6,7 @@ Shannon form (MacKenzie 1992, doi:10.1207/s15327051hci0701_3), which is never le
     T = a + b log2(D / W + 1).
 
 Operators differ, and so do their tools: by a thumb stick one moves at a third of the speed of the free hand. Once enough of the
-expected duration has gone by for the speed to tell, the time to go is not taken for shorter than the way left takes at that speed.
+expected duration has gone by for the speed to tell, the time to go is no shorter than the way left takes at that speed.
 A minimum-jerk movement that keeps to its time is never held up by this: from 0.3 of its duration on, the way left at its
 present speed takes less than the time left.
 """

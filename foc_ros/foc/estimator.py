@@ -8,7 +8,7 @@ Per axis the state is x = (position, velocity, acceleration) driven by white jer
 the exact discretisation for any dt, so irregular stamps need no resampling. Both axes are measured equally well, so they share
 one 3 x 3 covariance P and one gain.
 
-The filter works on the lower triangular root L of P = L L'. In time, the columns [A L, q C] are made triangular, where C C' = G(dt).
+The filter works on the lower triangular root L of P = L L'. In time, the columns [A L, q C] are made triangular, C C' = G(dt).
 A measured position of deviation r sees the first row of L alone, which is (l, 0, 0): with e^2 = l^2 + r^2 the variance of the
 innovation, the gain is L_1 l / e^2 and the first column becomes L_1 r / e, the others stay. So the covariance is symmetric and
 positive whatever the deviations and intervals; an update in Joseph form was not for two samples 1 us apart.
