@@ -137,7 +137,18 @@ def test_a_guess_on_a_centre_has_a_side_all_the_same():
     np.testing.assert_allclose(np.hypot(normals[..., 0], normals[..., 1]), 1.0)
 
 
-def test_backends_say_none_for_an_infeasible_problem():
+def test_backends_say_so_of_an_infeasible_problem():
     qp = DenseQP(np.eye(2), np.zeros(2), G=np.array([[1.0, 0.0], [-1.0, 0.0]]), g=np.array([1.0, 1.0]))
-    assert solve_piqp(qp) is None
-    assert solve_named(qp, 'piqp') is None
+    assert not solve_piqp(qp).solved
+    assert not solve_named(qp, 'piqp').solved
+
+
+def test_a_problem_on_which_piqp_steps_to_and_fro_is_solved_all_the_same():
+    P = np.array([[1.0, -0.8976, -0.9733], [-0.8976, 1.0, 0.9642], [-0.9733, 0.9642, 1.0]])
+    qp = DenseQP(P, np.array([-0.4239, -1.0, -0.2773]), lower=np.zeros(3))
+    answer = solve_piqp(qp)
+    assert answer.solved
+    gradient = P @ answer.x + qp.c
+    assert answer.x.min() > -1e-8
+    assert gradient.min() > -1e-8
+    assert abs(gradient @ answer.x) < 1e-7

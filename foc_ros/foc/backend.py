@@ -8,8 +8,11 @@ import piqp
 
 from .records import Array
 
-ATTEMPTS = ((1e-10, False), (1e-8, True), (1e-6, True))
-"""Accuracy (absolute and relative, on problems scaled to numbers around 1) and cost scaling asked of PIQP, one after the other."""
+ATTEMPTS = ((1e-10, 0.99, False), (1e-9, 0.9, False), (1e-7, 0.9, True))
+"""Accuracy (absolute and relative, on problems scaled to numbers around 1), share of the way to the boundary that a step may go,
+and cost scaling asked of PIQP, one after the other. With 0.99 it can step to and fro for ever on three variables."""
+MAX_ITERATIONS = 100
+"""Of one attempt; 5 to 15 are usual."""
 
 
 @dataclass(frozen=True)
@@ -25,30 +28,37 @@ class DenseQP:
     lower: Array | None = None
 
 
-def solve_piqp(qp: DenseQP) -> Array | None:
-    """Return the minimiser, or None where PIQP finds none with any of its settings.
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """solved, and the minimiser; or not, and the last iterate, which may prove why."""
 
-    PIQP can call a feasible problem infeasible, or miss an accuracy that rounding does not allow, so a refusal is believed only
-    after further attempts.
+    solved: bool
+    x: Array
+
+
+def solve_piqp(qp: DenseQP) -> Answer:
+    """Solve by PIQP, with other settings if it fails with the first.
+
+    PIQP can call a feasible problem infeasible, or miss an accuracy that rounding does not allow.
     """
     P = np.asfortranarray(qp.P)
     A = None if qp.A is None else np.asfortranarray(qp.A)
     G = None if qp.G is None else np.asfortranarray(qp.G)
-    for accuracy, scale_cost in ATTEMPTS:
+    for accuracy, reach, scale_cost in ATTEMPTS:
         solver = piqp.DenseSolver()
-        solver.settings.eps_abs = solver.settings.eps_rel = accuracy
-        solver.settings.eps_duality_gap_abs = solver.settings.eps_duality_gap_rel = accuracy
-        solver.settings.preconditioner_scale_cost = scale_cost
+        settings = solver.settings
+        settings.eps_abs = settings.eps_rel = settings.eps_duality_gap_abs = settings.eps_duality_gap_rel = accuracy
+        settings.tau, settings.preconditioner_scale_cost, settings.max_iter = reach, scale_cost, MAX_ITERATIONS
         solver.setup(P, qp.c, A, qp.b, G, qp.g, None, qp.lower, None)
         if solver.solve() == piqp.PIQP_SOLVED:
-            return np.array(solver.result.x)
-    return None
+            return Answer(True, np.array(solver.result.x))
+    return Answer(False, np.array(solver.result.x))
 
 
-def solve_named(qp: DenseQP, backend: str) -> Array | None:
-    """Return the minimiser found by a qpsolvers backend such as `daqp` or `quadprog`, None where it finds none."""
+def solve_named(qp: DenseQP, backend: str) -> Answer:
+    """Solve by a qpsolvers backend such as `daqp` or `quadprog`."""
     from qpsolvers import Problem, solve_problem
 
     G, h = (None, None) if qp.G is None or qp.g is None else (-qp.G, -qp.g)
     solution = solve_problem(Problem(qp.P, qp.c, G, h, qp.A, qp.b, qp.lower), solver=backend)
-    return np.asarray(solution.x) if solution.found else None
+    return Answer(bool(solution.found), np.asarray(solution.x) if solution.found else np.zeros_like(qp.c))

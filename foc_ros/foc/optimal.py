@@ -29,8 +29,8 @@ SETTLED = 1e-6
 """Largest move of the mean, relative to the way, at which the sequence has settled."""
 ROUGHLY = 1e-2
 """The same for the rows that leave the growth of Var out."""
-MAX_QPS = 80
-SMALLEST_STEP = 1.0 / 64
+MAX_QPS = 30
+SMALLEST_STEP = 1.0 / 16
 """Smallest share of the way to the wanted k that is tried at once before k is called out of reach."""
 
 

@@ -38,10 +38,10 @@ class Cost:
         inverse = 1.0 / self.hessian
         weighted = self.goal_rows * inverse
         gram = weighted @ self.goal_rows.T
+        gram.flat[:: len(gram) + 1] += self.softness
         # unit diagonal: the goal rows mix metres, metres per second and their like
         scale = 1.0 / np.sqrt(gram.diagonal())
         gram *= scale[:, None] * scale
-        gram.flat[:: len(gram) + 1] += self.softness * scale**2
         values, vectors = np.linalg.eigh(gram)
         root = vectors.T / np.sqrt(np.maximum(values, 1e-14 * values[-1]))[:, None] * scale
         return inverse, root, root @ weighted

@@ -143,7 +143,9 @@ def _newton_step(
     gram = weighted @ rows.T
     scale = 1.0 / np.sqrt(np.diag(gram))
     values, vectors = np.linalg.eigh(gram * scale[:, None] * scale[None, :] + np.diag(soft * scale**2))
-    if np.count_nonzero(values < 0) != k:
+    # rows that say the same twice leave an eigenvalue of zero: they share their multiplier
+    told = np.abs(values) > 1e-11 * np.abs(values).max()
+    if np.count_nonzero(values[told] < 0) != k:
         return None
-    forces = scale * (vectors @ ((vectors.T @ (scale * targets)) / values))
+    forces = scale * (vectors[:, told] @ ((vectors[:, told].T @ (scale * targets)) / values[told]))
     return forces @ weighted, forces[len(goal_rows) : len(goal_rows) + k]

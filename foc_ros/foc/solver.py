@@ -8,6 +8,8 @@ QP with every row.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import Enum
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,8 @@ ELASTICITY = 1e-6
 """Softness of elastic rows, as a share of what a unit multiplier moves them: a lone row gives way by a millionth."""
 IMMOVABLE = 1e-12
 """Share of a row's freedom that the goal leaves it, below which the goal fixes it: the last step's, above all."""
+FARKAS = 1e-4
+"""How little, relative to what is missing, the combination of rows may move that proves a contradiction."""
 NEGLIGIBLE = 1e-7
 """Multiplier that counts as zero, relative to the largest, in units in which every row moves itself by one."""
 
@@ -70,8 +74,10 @@ def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False) -> QPSo
     for solves in range(1, MAX_ROUNDS + 1):
         if len(working):
             answer = _with_rows(qp, working, elastic)
-            if answer is None:
+            if answer is Verdict.CONTRADICTION:
                 return None
+            if answer is Verdict.UNSOLVED:
+                break
             control, multipliers = answer
         violation = qp.limits - qp.row_values(control)
         # rows just solved for are met but for rounding; an elastic row may stay violated
@@ -94,8 +100,17 @@ def _peaks(violation: Array) -> tuple[Index, Index]:
     return obstacle, step
 
 
-def _with_rows(qp: ReachingQP, working: WorkingSet, elastic: bool) -> tuple[Array, Array] | None:
-    """Return control (2N,) and multipliers (k,) for the rows of the working set alone; None where they contradict."""
+class Verdict(Enum):
+    """Why there is no control for a working set: its rows contradict each other, or the solver failed."""
+
+    CONTRADICTION = 'contradiction'
+    UNSOLVED = 'unsolved'
+
+
+def _with_rows(
+    qp: ReachingQP, working: WorkingSet, elastic: bool
+) -> tuple[Array, Array] | Literal[Verdict.CONTRADICTION, Verdict.UNSOLVED]:
+    """Return control (2N,) and multipliers (k,) for the rows of the working set alone."""
     rows = qp.rows(working.obstacle, working.step)
     pressed = qp.cost.pressed(rows)
     missing = qp.limits[working.obstacle, working.step] - rows @ qp.cost.goal_control
@@ -104,7 +119,7 @@ def _with_rows(qp: ReachingQP, working: WorkingSet, elastic: bool) -> tuple[Arra
     fixed = moved < IMMOVABLE * wanted
     if fixed.any():
         if not elastic and (missing[fixed] > TOLERANCE).any():
-            return None
+            return Verdict.CONTRADICTION
         gram[fixed], gram[:, fixed], missing[fixed] = 0.0, 0.0, 0.0
         gram[fixed, fixed] = 1.0
     scale = 1.0 / np.sqrt(gram.diagonal())
@@ -114,9 +129,11 @@ def _with_rows(qp: ReachingQP, working: WorkingSet, elastic: bool) -> tuple[Arra
     if elastic:
         gram.flat[:: len(gram) + 1] += ELASTICITY
     answer = solve_piqp(DenseQP(gram, missing / -size, lower=np.zeros(len(rows))))
-    if answer is None:
-        return None
-    multipliers = _polished(gram, missing / size, answer) * (scale * size)
+    if not answer.solved:
+        # Farkas: a combination y >= 0 of the rows that moves nothing and yet is missing something
+        ray = answer.x / max(float(answer.x.max()), 1e-300)
+        return Verdict.CONTRADICTION if np.abs(gram @ ray).max() < FARKAS * float(missing @ ray) / size else Verdict.UNSOLVED
+    multipliers = _polished(gram, missing / size, answer.x) * (scale * size)
     return qp.cost.goal_control + multipliers @ pressed, multipliers
 
 
@@ -156,8 +173,8 @@ def solve_full(qp: ReachingQP, backend: str = 'piqp') -> QPSolution | None:
         qp.limits.ravel(),
     )
     scaled = solve_piqp(dense) if backend == 'piqp' else solve_named(dense, backend)
-    if scaled is None:
+    if not scaled.solved:
         return None
-    control = unit * scaled
+    control = unit * scaled.x
     active = WorkingSet(*np.nonzero(qp.row_values(control) - qp.limits < 1e-7))
     return QPSolution(control, active, np.full(len(active), np.nan), 1)
