@@ -5,7 +5,8 @@ Colours tell apart without hue: likelihood is viridis from pale to dark, classes
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from string import ascii_uppercase
 from typing import Any
 
@@ -36,7 +37,25 @@ ELLIPSES_PER_WAY = 8
 NAMED_OBSTACLES = 30
 """Above this many, the obstacles' names would hide the scene."""
 
+STYLE = {
+    'font.size': 10,
+    'axes.spines.top': False,
+    'axes.spines.right': False,
+    'axes.grid': True,
+    'grid.color': '0.92',
+    'axes.axisbelow': True,
+    'savefig.dpi': 110,
+}
+
 Bounds = tuple[float, float, float, float]
+"""Limits of x, then of y [m]."""
+
+
+@contextmanager
+def new_figure(width_in: float, height_in: float) -> Iterator[Figure]:
+    """Yield an empty figure of a size [in], to be filled in our style."""
+    with mpl.rc_context(STYLE):
+        yield Figure(figsize=(width_in, height_in), layout='constrained')
 
 
 def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, named: bool = True) -> None:

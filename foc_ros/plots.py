@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
 
 from .drawing import (
     CLASSES,
@@ -21,21 +20,16 @@ from .drawing import (
     draw_scene,
     draw_speeds,
     draw_ways,
+    new_figure,
 )
 from .foc.errors import InputError
 from .foc.records import NANOSECONDS, Array, Obstacles, Outcome
 from .lineage import lineages
 from .moments import Moment, Track, Way, ways_of
 
-STYLE = {
-    'font.size': 10,
-    'axes.spines.top': False,
-    'axes.spines.right': False,
-    'axes.grid': True,
-    'grid.color': '0.92',
-    'axes.axisbelow': True,
-    'savefig.dpi': 110,
-}
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 WIDTH_IN = 6.4
 LINE_IN = 0.2
 """Height of a line of the legend [in]."""
@@ -53,9 +47,8 @@ def plot_outcomes(file: Path | str, obstacles: Obstacles, goals: Array, outcomes
 def scene_figure(obstacles: Obstacles, goals: Array, ways: Sequence[Way], bounds: Bounds) -> Figure:
     """Return a figure of one scene: obstacles, goals, ways coloured by likelihood; letters and a legend name them."""
     numbers = _numbered([way.label for way in ways])
-    with mpl.rc_context(STYLE):
-        heights = [_scene_height(bounds), LINE_IN * max(1, len(ways))]
-        figure = Figure(figsize=(WIDTH_IN, sum(heights) + 0.8), layout='constrained')
+    heights = [_scene_height(bounds), LINE_IN * max(1, len(ways))]
+    with new_figure(WIDTH_IN, sum(heights) + 0.8) as figure:
         scene, legend = figure.subplots(2, 1, height_ratios=heights)
         draw_scene(scene, obstacles, goals, bounds)
         draw_ways(scene, ways, numbers)
@@ -66,8 +59,7 @@ def scene_figure(obstacles: Obstacles, goals: Array, ways: Sequence[Way], bounds
 
 def track_figure(track: Track, obstacles: Obstacles, goals: Array, spans: Sequence[tuple[int, int]], bounds: Bounds) -> Figure:
     """Return a figure of all movements of a recording, numbered; spans: start and end [ns] of each."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH_IN, _scene_height(bounds) + 0.6), layout='constrained')
+    with new_figure(WIDTH_IN, _scene_height(bounds) + 0.6) as figure:
         axes = figure.subplots()
         draw_scene(axes, obstacles, goals, bounds, named=False)
         axes.plot(*track.positions.T, color='0.8', linewidth=0.8)
@@ -87,9 +79,8 @@ def moment_figure(track: Track, moment: Moment, around: Sequence[Moment], span: 
     numbers = {label: ranks[line] for label, line in lines[place].items() if line in ranks}
     origin_ns = int(track.stamps_ns[0])
     now = (moment.stamp_ns - origin_ns) / NANOSECONDS
-    with mpl.rc_context(STYLE):
-        heights = [_scene_height(bounds), LINE_IN * max(1, len(moment.ways)), 2.0, 1.6]
-        figure = Figure(figsize=(WIDTH_IN, sum(heights) + 1.2), layout='constrained')
+    heights = [_scene_height(bounds), LINE_IN * max(1, len(moment.ways)), 2.0, 1.6]
+    with new_figure(WIDTH_IN, sum(heights) + 1.2) as figure:
         scene, legend, likelihoods, speeds = figure.subplots(4, 1, height_ratios=heights)
         draw_scene(scene, moment.obstacles, moment.goals, bounds)
         draw_ways(scene, moment.ways, numbers)

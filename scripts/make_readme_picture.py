@@ -9,15 +9,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from foc_ros.bags import BagReader
-from foc_ros.drawing import draw_colour_bar, draw_hand, draw_legend, draw_scene, draw_ways
+from foc_ros.drawing import draw_colour_bar, draw_hand, draw_legend, draw_scene, draw_ways, new_figure
 from foc_ros.foc.config import Config
 from foc_ros.foc.records import NANOSECONDS, HandSample
 from foc_ros.moments import Moment, Track, moment_of, movements, track_of
-from foc_ros.plots import STYLE, bounds_of, save
+from foc_ros.plots import bounds_of, save
 from foc_ros.replay import Replay
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -49,8 +48,7 @@ def picture(track: Track, moments: list[Moment]) -> Figure:
     numbers = {way.label: number for number, way in enumerate(moment.ways)}
     positions = track.positions[track.between(*span)]
     bounds = bounds_of(moment.obstacles, moment.goals, moment.ways, positions)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.6, 6.6), layout='constrained')
+    with new_figure(7.6, 6.6) as figure:
         scene, legend = figure.subplots(2, 1, height_ratios=[5.6, 0.8])
         draw_scene(scene, moment.obstacles, moment.goals, bounds)
         draw_ways(scene, moment.ways, numbers)

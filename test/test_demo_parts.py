@@ -20,7 +20,7 @@ from foc_ros.bags import TYPESTORE, Item
 from foc_ros.command_line import main
 from foc_ros.conversions.outputs import likelihood_array, prediction_cloud
 from foc_ros.conversions.types import RosbagsTypes
-from foc_ros.demo import command, node_process
+from foc_ros.demo import command, environment, node_process
 from foc_ros.demo.display import Display
 from foc_ros.demo.ledger import Ledger
 from foc_ros.foc.config import Config
@@ -171,20 +171,20 @@ def test_without_rclpy_one_line_tells_how_to_get_it(
 
 
 def test_a_domain_in_use_is_not_taken() -> None:
-    start = node_process.free_domain()
+    start = environment.free_domain()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(('', 7400 + 250 * start + 10))
-        assert node_process.free_domain() != start
+        assert environment.free_domain() != start
 
 
 def test_environment_is_private(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv('ROS_DISCOVERY_SERVER', 'somewhere:11811')
     monkeypatch.setenv('ROS_DOMAIN_ID', '0')
-    environment = node_process.private_environment(42, tmp_path)
-    assert environment['ROS_DOMAIN_ID'] == '42'
-    assert environment['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
-    assert environment['ROS_LOG_DIR'] == str(tmp_path)
-    assert 'ROS_DISCOVERY_SERVER' not in environment
+    made = environment.private_environment(42, tmp_path)
+    assert made['ROS_DOMAIN_ID'] == '42'
+    assert made['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
+    assert made['ROS_LOG_DIR'] == str(tmp_path)
+    assert 'ROS_DISCOVERY_SERVER' not in made
 
 
 def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: str) -> node_process.NodeProcess:

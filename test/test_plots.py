@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +21,7 @@ from foc_ros.foc.records import make_obstacles
 from foc_ros.moments import moment_of, movements, track_of, ways_of
 from foc_ros.plots import bounds_of, moment_figure, plot_outcomes, save, scene_figure
 
+ROOT = Path(__file__).resolve().parents[1]
 PNG = b'\x89PNG\r\n\x1a\n'
 
 
@@ -132,3 +135,19 @@ def test_equal_input_gives_equal_pictures(tmp_path: Path) -> None:
     for name in ('one.png', 'two.png'):
         save(scene_figure(obstacles, goals, ways, bounds_of(obstacles, goals, ways)), tmp_path / name)
     assert (tmp_path / 'one.png').read_bytes() == (tmp_path / 'two.png').read_bytes()
+
+
+@pytest.mark.parametrize('module', ['plots', 'report'])
+def test_without_matplotlib_one_line_tells_how_to_get_it(module: str) -> None:
+    program = f"""
+import sys
+sys.modules['matplotlib'] = None
+from foc_ros.foc.errors import FocError
+try:
+    import foc_ros.{module}
+except FocError as error:
+    print(error)
+"""
+    told = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True, check=True, cwd=ROOT).stdout
+    assert 'pip install' in told
+    assert told.count('\n') == 1

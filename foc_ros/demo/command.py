@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import shutil
 import signal
 import sys
@@ -23,8 +22,9 @@ from foc_ros.foc.errors import FocError, InputError
 from foc_ros.foc.records import NANOSECONDS
 from foc_ros.moments import track_of
 
+from .environment import free_domain, held, private_environment
 from .ledger import Ledger
-from .node_process import NodeDiedError, NodeProcess, free_domain, private_environment
+from .node_process import NodeDiedError, NodeProcess
 
 RECORDING = Path(__file__).resolve().parents[1] / 'recordings' / 'reaching.mcap'
 MARK = '.foc_ros_demo'
@@ -80,7 +80,7 @@ def _play(items: list[Item], bag: BagWriter, ledger: Ledger, domain: int, stoppe
     with tempfile.TemporaryDirectory(prefix='foc_ros_demo_') as logs:
         environment = private_environment(domain, Path(logs))
         with (
-            _environment(environment),
+            held(environment),
             NodeProcess(environment, Path(logs) / 'node.txt') as node,
             Player(items, bag, ledger, domain) as player,
             Display(ledger, items[0].log_ns, duration_s) as display,
@@ -113,18 +113,6 @@ def prepare(output: Path) -> None:
                 shutil.rmtree(output / name)
     except OSError as error:
         raise InputError('--output', 'a directory that can be written', f'{output}: {error.strerror}') from error
-
-
-@contextmanager
-def _environment(values: Mapping[str, str]) -> Iterator[None]:
-    """Hold environment variables for as long as our own ROS context lives."""
-    before = dict(os.environ)
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        os.environ.clear()
-        os.environ.update(before)
 
 
 @contextmanager
