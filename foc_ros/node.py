@@ -2,8 +2,9 @@
 
 The node holds no model and no memory of its own: the pipeline does, driven by the stamps of the messages. So it answers as a
 replay of the same messages does. A player that wants every one of its messages heard waits until each of its publishers has a
-subscription (`Publisher.get_subscription_count()`) and its own subscriptions have a publisher, then sends the scene, waits for
-`/diagnostics` to say that only the hand is missing, and then sends the hand.
+subscription (`Publisher.get_subscription_count()`) and its own subscriptions a publisher, sends the scene, and sends the hand
+only when `/diagnostics` counts the obstacles and goals: what is sent on the hand's best-effort topic before both sides know of
+each other is lost.
 """
 
 from __future__ import annotations

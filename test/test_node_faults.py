@@ -186,6 +186,29 @@ def test_parameters_are_listed_described_and_read_by_others(ros: Graph) -> None:
     assert (values[0].double_value, values[1].string_value) == (Config().foc.eta, 'xy')
 
 
+def test_quality_of_service_is_overridden_topic_by_topic(ros: Graph) -> None:
+    overrides = {
+        'qos_overrides./obstacles.subscription.depth': 3,
+        'qos_overrides./obstacles.subscription.reliability': 'best_effort',
+        'qos_overrides./foc/path.publisher.depth': 2,
+    }
+    bench = Bench(ros, outputs=[], parameters=overrides)
+    found = {
+        name: bench.node.get_parameter(f'qos_overrides./{name}').value
+        for name in (
+            'obstacles.subscription.depth',
+            'goals.subscription.depth',
+            'foc/path.publisher.depth',
+            'foc/markers.publisher.depth',
+        )
+    }
+    assert list(found.values()) == [3, 10, 2, 10]
+    (info,) = bench.player.get_subscriptions_info_by_topic('obstacles')
+    assert info.qos_profile.reliability.name == 'BEST_EFFORT'
+    (info,) = bench.player.get_subscriptions_info_by_topic('goals')
+    assert info.qos_profile.reliability.name == 'RELIABLE'
+
+
 def test_parameters_change_together_and_without_a_missed_prediction(ros: Graph) -> None:
     bench, poses = Bench(ros), hand_path(20)
     bench.show_scene()

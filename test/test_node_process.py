@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 import ros_helpers
@@ -16,7 +17,7 @@ import ros_helpers
 ros_helpers.require_ros()
 
 from message_helpers import SECOND, cloud, obstacle_table, pose_array  # noqa: E402
-from node_helpers import GOALS, ROWS, TYPES, hand_path  # noqa: E402
+from node_helpers import GOALS, ROWS, TYPES, figures, hand_path  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
 ROOT = Path(__file__).parents[1]
@@ -42,24 +43,33 @@ def ended(process: subprocess.Popen[str], number: signal.Signals) -> tuple[int, 
     return process.returncode, errors
 
 
-def feed(ros: Graph, count: int) -> None:
-    """Play a scene and hand poses to the node, and wait until it has predicted."""
+def feed(ros: Graph, count: int) -> list[Any]:
+    """Play a scene and hand poses at 100 Hz to the node, wait until it has predicted, and return its diagnostics to come."""
+    from diagnostic_msgs.msg import DiagnosticArray
     from geometry_msgs.msg import PoseArray, PoseStamped
     from sensor_msgs.msg import PointCloud2
 
     player = ros.node('player')
     clouds = ros.collect(player, PointCloud2, 'foc/prediction')
-    publishers = [
-        player.create_publisher(*each, 10)
-        for each in ((PointCloud2, 'obstacles'), (PoseArray, 'goals'), (PoseStamped, 'hand_pose'))
-    ]
-    ros.spin_until(lambda: all(each.get_subscription_count() for each in publishers), 'the node', 30.0)
-    publishers[0].publish(cloud(TYPES, obstacle_table(ROWS), 10 * SECOND))
-    publishers[1].publish(pose_array(TYPES, GOALS))
+    statuses = ros.collect(player, DiagnosticArray, '/diagnostics')
+    topics = {'obstacles': PointCloud2, 'goals': PoseArray, 'hand_pose': PoseStamped}
+    publishers = {name: player.create_publisher(kind, name, 10) for name, kind in topics.items()}
+    ros.spin_until(lambda: all(each.get_subscription_count() for each in publishers.values()), 'the node', 30.0)
+    publishers['obstacles'].publish(cloud(TYPES, obstacle_table(ROWS), 10 * SECOND))
+    publishers['goals'].publish(pose_array(TYPES, GOALS))
+    ros.spin_until(
+        lambda: figure(statuses, 'obstacles of cloud') == '1' == figure(statuses, 'goals'), 'the scene in the diagnostics'
+    )
     for pose in hand_path(count):
-        publishers[2].publish(pose)
+        publishers['hand_pose'].publish(pose)
         ros.spin_for(0.01)
     ros.spin_until(lambda: len(clouds) > 0, 'a prediction of the process')
+    return statuses
+
+
+def figure(statuses: list[Any], name: str) -> str | None:
+    """Return a figure of the newest diagnostics."""
+    return figures(statuses[-1].status[0]).get(name) if statuses else None
 
 
 @pytest.mark.parametrize('launch', LAUNCHES)
@@ -141,3 +151,11 @@ def test_nothing_is_left_behind(ros: Graph, tmp_path: Path) -> None:
         assert time.monotonic() < deadline
         ros.executor.spin_once(timeout_sec=0.05)
     assert [each.name for each in tmp_path.iterdir()] == ['log']
+
+
+def test_a_node_hears_every_pose_of_a_tracker(ros: Graph) -> None:
+    count = 200
+    with running(ros, 'module', '--ros-args', '-p', 'foc.steps:=20') as process:
+        statuses = feed(ros, count)
+        ros.spin_until(lambda: figure(statuses, 'hand_pose refused') == f'0 of {count}', f'{count} poses in the diagnostics')
+        assert ended(process, signal.SIGTERM)[0] == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -118,8 +119,8 @@ def _check_column(name: str, column: Array, rows: NDArray[np.intp]) -> None:
 
 def _last_of_each(identities: NDArray[Any], rows: NDArray[np.intp]) -> dict[str, int]:
     """Return the last of the given rows for each identity, in the order of the table."""
-    latest = {int(identities[row]): int(row) for row in rows}
-    return {str(identity): row for identity, row in sorted(latest.items(), key=lambda item: item[1])}
+    latest = dict(zip(identities[rows].tolist(), rows.tolist(), strict=True))
+    return {str(identity): row for identity, row in sorted(latest.items(), key=itemgetter(1))}
 
 
 def _obstacles(columns: dict[str, Array], kept: dict[str, int], plane: str) -> Obstacles:
