@@ -112,11 +112,12 @@ def free_tangents(field: Circles, c: Complex, r: Array, tries: Tries) -> tuple[I
     D, w = c[j] - c[i], s_j * r[j] - s_i * r[i]
     square = D.real**2 + D.imag**2
     length = np.sqrt((square - w**2).clip(0.0))
-    u = (length - 1j * w) * D / square.clip(1e-300)
+    here = (square == 0.0) & (r[i] == 0.0) & (r[j] == 0.0)  # a hand at its goal: no way to go is a way too
+    u = np.where(here, 1.0, (length - 1j * w) * D / square.clip(1e-300))
     seen = (c[: field.n] - (c[i] - 1j * (s_i * r[i]) * u)[:, None]) * u.conj()[:, None]
     beyond = seen.real - seen.real.clip(0.0, length[:, None])
     blocked = ((beyond**2 + seen.imag**2 < field.bar) & others).any(axis=1)
-    free = np.flatnonzero((length > 0.0) & ~blocked)
+    free = np.flatnonzero(((length > 0.0) | here) & ~blocked)
     if not field.outer.all():
         outer = np.append(field.outer, True)
         free = free[outer[i[free]] & outer[j[free]]]
