@@ -1,0 +1,66 @@
+"""The documentation names only what exists: files, parameters, commands, tests."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+from foc_ros.command_line import COMMANDS
+from foc_ros.foc.config import parameters
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'doc').glob('**/*.md')])
+TESTS = {
+    f'{file.name}::{node.name}'
+    for file in (ROOT / 'test').glob('test_*.py')
+    for node in ast.walk(ast.parse(file.read_text('utf-8')))
+    if isinstance(node, ast.FunctionDef) and node.name.startswith('test_')
+}
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors that GitHub gives the headings of a page."""
+    headings = re.findall(r'^#+ (.+)$', page.read_text('utf-8'), re.MULTILINE)
+    return {re.sub(r'[^\w -]', '', heading.lower()).replace(' ', '-') for heading in headings}
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r'\]\(([^)\s]+)\)', page.read_text('utf-8')):
+        path, _, anchor = target.partition('#')
+        if '://' in target:
+            continue
+        linked = page.parent / path if path else page
+        assert linked.exists(), f'{page.name}: {target} does not exist'
+        assert not anchor or anchor in anchors(linked), f'{page.name}: {target} has no such heading'
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
+def test_parameters_named_exist(page: Path) -> None:
+    known = {parameter.name for parameter in parameters()}
+    groups = '|'.join(sorted({name.partition('.')[0] for name in known if '.' in name}))
+    for name in re.findall(rf'`((?:{groups})\.\w+)`', page.read_text('utf-8')):
+        assert name in known, f'{page.name}: there is no parameter {name}'
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
+def test_commands_named_exist(page: Path) -> None:
+    for command in re.findall(r'(?:^|[`/ ])foc_ros ([a-z]\w*)', page.read_text('utf-8'), re.MULTILINE):
+        assert command in {*COMMANDS, 'foc_node'}, f'{page.name}: there is no command {command}'
+
+
+def test_every_command_is_documented() -> None:
+    text = (ROOT / 'doc' / 'interfaces.md').read_text('utf-8')
+    for command in COMMANDS:
+        assert re.search(rf'^\| `{command}\b', text, re.MULTILINE), f'doc/interfaces.md does not list {command}'
+
+
+def test_failures_are_tested_as_they_say() -> None:
+    """Every row of doc/failures.md names tests, and they exist."""
+    rows = [line for line in (ROOT / 'doc' / 'failures.md').read_text('utf-8').splitlines() if re.match(r'\| (?!when|-)', line)]
+    assert len(rows) >= 14
+    for row in rows:
+        named = re.findall(r'`(test_\w+\.py::test_\w+)`', row)
+        assert named, f'no test is named in: {row}'
+        assert not set(named) - TESTS, f'no such test: {set(named) - TESTS}'
