@@ -31,10 +31,15 @@ def solve(
 
 
 def well_posed(obstacles: Obstacles, goal, guess, strategy: str) -> Solution:
-    """Solve a scene in which eta is reached with something to spare: at the edge of the reachable, rounding decides."""
+    """Solve a scene in which rounding decides nothing.
+
+    eta is reached with something to spare, and it does not lie in a gap of what the curve of solutions reaches: where the touching
+    step changes, k jumps, and the solution beyond the jump exceeds eta.
+    """
     assume(solve(obstacles, goal, guess, strategy, eta=0.87).status is Status.SOLVED)
     solution = solve(obstacles, goal, guess, strategy)
     assert solution.status is Status.SOLVED
+    assume(solution.lam <= 1.0 or solution.eta < 0.8 + 1e-4)
     return solution
 
 

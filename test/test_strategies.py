@@ -195,7 +195,7 @@ def test_algorithm1_as_printed_overshoots_what_the_continuous_walk_finds():
 
 @EVERY
 def test_a_warm_start_finds_what_a_cold_one_finds(strategy):
-    problem = one_obstacle()
+    problem = one_obstacle(0.86)
     first = solved(problem, BOWED, strategy)
     again = forward(problem, warm(first, 0.0, problem), FocConfig(strategy=strategy))
     assert again.status is Status.SOLVED

@@ -28,7 +28,7 @@ LARGEST_SHARE = 1e6
 """Where the walk ends: a variance weight so many times the effort is all that counts, and k has stopped growing."""
 PATIENCE = 2
 """Strides in a row without a larger k after which there is none to be found."""
-CLOSE = 1e-6
+CLOSE = 1e-5
 """Relative excess of k over the wanted one at which the root is found."""
 NARROW = 1e-4
 """Bracket in s at which the root is as good as found: k jumps there, because the touching step changes."""
@@ -120,17 +120,20 @@ def walk(problem: Problem, start: Start, curve: Curve) -> Walk:
 def _bracket(walker: _Walker, first: Point, wanted: float, stride: float) -> tuple[Point, Point | None]:
     """Return the last point below the wanted k and the first at or above it.
 
-    Both the same where the curve's beginning is enough; no upper one where the wanted k is out of reach: then the best point.
+    Both the same where the first is close enough, or the curve's beginning is enough; no upper one where the wanted k is out of
+    reach: then the best point.
     """
+    if wanted <= first.k <= wanted * (1 + CLOSE):
+        return first, first
     if first.k >= wanted:
         high = first
-        for point in _strides(walker, first, -stride):
+        for point in _strides(walker, first, wanted, -stride):
             if point.k < wanted:
                 return point, high
             high = point
         return high, high
     low, best, since = first, first, 0
-    for point in _strides(walker, first, stride):
+    for point in _strides(walker, first, wanted, stride):
         if point.k >= wanted:
             return low, point
         low, since = point, 0 if point.k > best.k else since + 1
@@ -140,8 +143,8 @@ def _bracket(walker: _Walker, first: Point, wanted: float, stride: float) -> tup
     return best, None
 
 
-def _strides(walker: _Walker, first: Point, stride: float) -> Iterator[Point]:
-    """Yield points further and further along the curve, or back for a negative stride; towards an infeasible end in halves."""
+def _strides(walker: _Walker, first: Point, wanted: float, stride: float) -> Iterator[Point]:
+    """Yield points further and further along the curve, or back for a negative stride; towards an infeasible end in quarters."""
     point, end = first, walker.end if stride > 0 else 0.0
     while point.s != end and abs(stride) > WARM_STRIDE / 2:
         s = min(point.s + stride, end) if stride > 0 else max(point.s + stride, end)
@@ -149,30 +152,39 @@ def _strides(walker: _Walker, first: Point, stride: float) -> Iterator[Point]:
         if further is None:
             stride /= 4
             end = point.s + 3 * stride
-        else:
-            point = further
-            stride = min(4 * abs(stride), STRIDE) * (1 if stride > 0 else -1)
-            yield point
+            continue
+        stride = _next_stride(point, further, wanted, stride)
+        point = further
+        yield point
+
+
+def _next_stride(before: Point, point: Point, wanted: float, stride: float) -> float:
+    """A little farther than where k would be the wanted one if it went on as it does; at most four times the last stride."""
+    largest = min(4 * abs(stride), STRIDE)
+    slope = (point.k - before.k) / (point.s - before.s)
+    length = 1.2 * abs(wanted - point.k) / slope if slope > 0 else largest
+    return math.copysign(min(max(length, WARM_STRIDE), largest), stride)
 
 
 def _root(walker: _Walker, low: Point, high: Point, wanted: float) -> Point:
-    """Illinois iteration on k(s) = wanted between a point below and one at or above; returns one at or above."""
-    below, above = low.k - wanted, high.k - wanted
-    side = 0
+    """Find k(s) = wanted between a point below and one at or above, by Illinois steps; returns one at or above.
+
+    Aims at the middle of what counts as close. Halves the bracket instead where two steps in a row came out on the same side: where k
+    jumps, that is the way to the jump.
+    """
+    aim = wanted * (1 + CLOSE / 2)
+    below, above, side = low.k - aim, high.k - aim, 0
     for _ in range(MAX_TRIALS):
         if high.k <= wanted * (1 + CLOSE) or high.s - low.s < NARROW:
             break
-        s = (low.s * above - high.s * below) / (above - below)
-        nearest = low if s - low.s < high.s - s else high
-        point = walker.beside(s, nearest)
+        s = (low.s + high.s) / 2 if abs(side) > 1 else (low.s * above - high.s * below) / (above - below)
+        point = walker.beside(s, low if s - low.s < high.s - s else high)
         if point is None:
             break
         if point.k >= wanted:
-            high, above = point, max(point.k - wanted, 1e-300)
-            below = below / 2 if side > 0 else below
-            side = 1
+            high, above, side = point, max(point.k - aim, 1e-300), side + 1 if side > 0 else 1
+            below = below / 2 if side > 1 else below
         else:
-            low, below = point, point.k - wanted
-            above = above / 2 if side < 0 else above
-            side = -1
+            low, below, side = point, point.k - aim, side - 1 if side < 0 else -1
+            above = above / 2 if side < -1 else above
     return high
