@@ -83,6 +83,15 @@ def test_noise_is_per_step_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert coarse / fine == pytest.approx(np.sqrt(2), rel=1e-2)
 
 
+def test_an_uncertain_start_shows_and_costs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene = {**SCENE, 'guess': {'amplitude': 0.08}, 'noise': [0.02, 0.02]}
+    (sure,), (unsure,) = (candidates(tmp_path, capsys, {**scene, 'start_stddev': value}) for value in (0.0, 0.01))
+    assert sure['stddev'][0] == [0.0, 0.0]
+    assert unsure['stddev'][0] == pytest.approx([0.01, 0.01])
+    assert unsure['stddev'][-1][0] < 0.005, 'the operator corrects it on the way'
+    assert unsure['effort'] > 1.01 * sure['effort']
+
+
 def test_only_the_class_of_a_guess_is_solved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for amplitude, side in ((0.05, 'left'), (-0.05, 'right')):
         (found,) = candidates(tmp_path, capsys, {**SCENE, 'guess': {'amplitude': amplitude}})
