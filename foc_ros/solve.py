@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def scene_problems(scene: SceneFile) -> list[Problem]:
-    """Return the problem of every goal. Noise is per step as the file says; the start is as uncertain to the operator as to us."""
+    """Return the problem of every goal: noise per step as the file says; the start is as uncertain to the operator as to us."""
     made = [reaching_problem(scene.config, scene.hand, scene.obstacles, goal, scene.duration_s) for goal in scene.goals]
     return [replace(problem, noise=scene.noise, initial_covariance=scene.hand.covariance) for problem in made]
 
