@@ -42,10 +42,14 @@ class Bench:
         from foc_ros.node import FocNode
 
         parameters = QUICK | RELIABLE_HAND | options.pop('parameters', {})
+        ticking = options.pop('ticking', False)
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
         namespace = options.get('namespace', '')
         self.ros = ros
         self.node = ros.add(FocNode(context=ros.context, parameter_overrides=overrides, **options))
+        if not ticking:
+            for timer in self.node.timers:
+                timer.cancel()
         self.player = ros.node(f'player{namespace.replace("/", "_")}', namespace=namespace)
         inputs = {
             'hand_pose': PoseStamped,
@@ -94,10 +98,15 @@ class Bench:
         return self.received[name]
 
     def health(self) -> Any:
-        """Return the next status that the node publishes."""
-        before = len(self.diagnostics)
-        self.ros.spin_until(lambda: len(self.diagnostics) > before, 'diagnostics')
-        return self.diagnostics[-1].status[0]
+        """Return the status of what happened since the last one; the node's own timer is stopped, or it might tell it before."""
+        before = len(self._statuses())
+        self.node._publish_health()
+        self.ros.spin_until(lambda: len(self._statuses()) > before, 'diagnostics')
+        return self._statuses()[-1]
+
+    def _statuses(self) -> list[Any]:
+        own = self.node.get_fully_qualified_name()
+        return [array.status[0] for array in self.diagnostics if array.status[0].hardware_id == own]
 
 
 def figures(status: Any) -> dict[str, str]:
