@@ -63,10 +63,9 @@ class FocNode(Node):
     def _receive(self, role: str, message: Any) -> None:
         """Take a message and all that wait behind it; predict once, from the newest hand pose."""
         messages = [message, *waiting(self._inputs[role])]
-        for each in reversed(messages) if role in WHOLE else messages:
-            if self._take(role, each) and role in WHOLE:
-                break
-        if role == HAND and self.pipeline.due:
+        if role in WHOLE:
+            any(self._take(role, each) for each in reversed(messages))
+        elif any([self._take(role, each) for each in messages]) and role == HAND and self.pipeline.due:
             self._predict()
 
     def _take(self, role: str, message: Any) -> bool:

@@ -105,6 +105,16 @@ def test_a_node_that_cannot_keep_up_predicts_from_the_newest_pose_and_counts_the
     assert int(values['count predictions']) == 2
 
 
+def test_a_pose_that_is_refused_triggers_nothing(ros: Graph) -> None:
+    bench, pose = Bench(ros), hand_path(1)[0]
+    bench.hear('hand_pose', pose)
+    bench.show_scene()
+    assert bench.node.pipeline.due
+    bench.hear('hand_pose', pose)
+    assert figures(bench.health())['count hand_duplicate'] == '1'
+    assert not bench.received['prediction']
+
+
 def test_a_bag_that_loops_starts_anew(ros: Graph) -> None:
     bench, poses = Bench(ros), hand_path(8, rate_hz=10.0)
     bench.show_scene()
