@@ -63,9 +63,12 @@ class FocNode(Node):
     def _receive(self, role: str, message: Any) -> None:
         """Take a message and all that wait behind it; predict once, from the newest hand pose."""
         messages = [message, *waiting(self._inputs[role])]
-        if role in WHOLE:
-            any(self._take(role, each) for each in reversed(messages))
-        elif any([self._take(role, each) for each in messages]) and role == HAND and self.pipeline.due:
+        taken = False
+        for each in reversed(messages) if role in WHOLE else messages:
+            taken = self._take(role, each) or taken
+            if taken and role in WHOLE:
+                break
+        if taken and role == HAND and self.pipeline.due:
             self._predict()
 
     def _take(self, role: str, message: Any) -> bool:
