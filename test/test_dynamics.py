@@ -65,7 +65,12 @@ def test_a_replanning_operator_ends_at_the_goal_and_starts_where_the_hand_is():
 
 @pytest.mark.parametrize(
     ('A', 'B', 'dt'),
-    [(np.eye(3), np.ones((3, 2)), 0.1), (np.eye(4), np.ones((4, 1)), 0.1), (np.eye(4), np.full((4, 2), np.nan), 0.1), (np.eye(4), np.ones((4, 2)), 0.0)],
+    [
+        (np.eye(3), np.ones((3, 2)), 0.1),
+        (np.eye(4), np.ones((4, 1)), 0.1),
+        (np.eye(4), np.full((4, 2), np.nan), 0.1),
+        (np.eye(4), np.ones((4, 2)), 0.0),
+    ],
 )
 def test_a_plant_that_is_none_is_refused(A, B, dt):
     with pytest.raises(InputError, match='plant'):

@@ -33,8 +33,8 @@ def solve(
 def well_posed(obstacles: Obstacles, goal, guess, strategy: str) -> Solution:
     """Solve a scene in which rounding decides nothing.
 
-    eta is reached with something to spare, and it does not lie in a gap of what the curve of solutions reaches: where the touching
-    step changes, k jumps, and the solution beyond the jump exceeds eta.
+    eta is reached with something to spare, and it does not lie in a gap of what the curve of solutions reaches: where the
+    touching step changes, k jumps, and the solution beyond the jump exceeds eta.
     """
     assume(solve(obstacles, goal, guess, strategy, eta=0.87).status is Status.SOLVED)
     solution = solve(obstacles, goal, guess, strategy)

@@ -67,7 +67,7 @@ def test_weights_on_the_mean_are_soft_goal_rows(seed):
 
 @pytest.mark.parametrize('seed', range(10))
 def test_solution_meets_the_optimality_conditions(seed):
-    problem, qp = random_qp(seed)
+    _, qp = random_qp(seed)
     solution = solve(qp, WorkingSet())
     if solution is None:
         return

@@ -1,7 +1,7 @@
 """Strategy `algorithm1`: the paper's algorithm as printed, its loop condition the right way round, for the record.
 
-tau = 0, lambda = 1. Solve the QP, linearise at its mean; while the surrogate is violated tau += delta, lambda *= Delta; end when it
-holds and the cost changes by less than xi. Both grow in leaps, so it overshoots, or leaps over what is feasible.
+tau = 0, lambda = 1. Solve the QP, linearise at its mean; while the surrogate is violated tau += delta, lambda *= Delta; end
+when it holds and the cost changes by less than xi. Both grow in leaps, so it overshoots, or leaps over what is feasible.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from .assess import assess
 from .chance import k_of_eta
+from .deadline import NEVER, Deadline
 from .problem import Problem
 from .qp import clearance_qp, effort_cost
 from .records import Array, Status
@@ -30,7 +31,7 @@ class Stepped:
     iterations: int
 
 
-def algorithm1(problem: Problem, guess: Array, delta: float, growth: float, xi: float) -> Stepped:
+def algorithm1(problem: Problem, guess: Array, delta: float, growth: float, xi: float, deadline: Deadline = NEVER) -> Stepped:
     """Run algorithm 1 from a guess (N, 2) [m] at steps 1..N: delta [m^2], growth Delta, xi [m^2/s^6] on the effort."""
     tau, lam, wanted = 0.0, 1.0, k_of_eta(problem.eta)
     solution: QPSolution | None = None
@@ -38,7 +39,9 @@ def algorithm1(problem: Problem, guess: Array, delta: float, growth: float, xi: 
         before, last = (tau, lam), solution
         if last is not None and assess(problem, last.control).smallest_k < wanted:
             tau, lam = tau + delta, lam * growth
-        solution = solve(clearance_qp(problem, effort_cost(problem, lam), guess, tau, literal=True), last.active if last else WorkingSet())
+        deadline.check()
+        qp = clearance_qp(problem, effort_cost(problem, lam), guess, tau, literal=True)
+        solution = solve(qp, last.active if last else WorkingSet())
         if solution is None:
             message = f'QP {iteration} is infeasible at tau = {tau:.3g}, lambda = {lam:.3g}'
             return Stepped(Status.INFEASIBLE, message, last, *before, iteration)

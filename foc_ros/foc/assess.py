@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .chance import CERTAIN_K, achieved_k, eta_of_k, expectation, k_of_eta, variance
 from .problem import Problem
@@ -13,7 +14,7 @@ from .records import Array
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """k achieved per obstacle and step (m, N), infinite where the hand is still leaving a margin; relaxed: ids of those margins."""
+    """k achieved per obstacle and step (m, N), infinite where the hand is still leaving a margin; relaxed: whose margins."""
 
     k: Array
     relaxed: tuple[str, ...]
@@ -50,7 +51,7 @@ def assess(problem: Problem, control: Array) -> Assessment:
     return Assessment(k, tuple(np.array(problem.obstacles.ids, dtype=object)[inside]))
 
 
-def _inside_now(problem: Problem) -> Array:
+def _inside_now(problem: Problem) -> NDArray[np.bool_]:
     """Whether the hand is now inside the margin of each obstacle, (m,) bool: always False without a recovery time."""
     obstacles = problem.obstacles
     if problem.recovery_s <= 0 or not len(obstacles):
@@ -60,5 +61,5 @@ def _inside_now(problem: Problem) -> Array:
     covariance = np.array([[now[0, 0]], [now[1, 1]], [now[0, 1]]])
     mean = expectation(offset, np.zeros((1, 2)), problem.size[0])
     var = variance(offset, covariance, problem.size[1], obstacles.centre_covariance)
-    inside: Array = achieved_k(mean, np.sqrt(var))[:, 0] < k_of_eta(problem.eta)
+    inside: NDArray[np.bool_] = achieved_k(mean, np.sqrt(var))[:, 0] < k_of_eta(problem.eta)
     return inside

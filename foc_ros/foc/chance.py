@@ -43,15 +43,13 @@ def size_moments(obstacles: Obstacles) -> tuple[Array, Array]:
 def expectation(offset: Array, position_minus_guess: Array, size_mean: Array) -> Array:
     """E[C] (n, N) [m^2]: offset d (n, N, 2), position_minus_guess (N, 2), size_mean E[R^2] (n,)."""
     value: Array = (
-        size_mean[:, None]
-        - np.einsum('jti,jti->jt', offset, offset)
-        - 2 * np.einsum('jti,ti->jt', offset, position_minus_guess)
+        size_mean[:, None] - np.einsum('jti,jti->jt', offset, offset) - 2 * np.einsum('jti,ti->jt', offset, position_minus_guess)
     )
     return value
 
 
 def variance(offset: Array, covariance: Array, size_variance: Array, centre_covariance: Array) -> Array:
-    """Var[C] (n, N) [m^4]: offset d (n, N, 2); covariance of the position, rows xx, yy, xy (3, N); centre_covariance (n, 2, 2)."""
+    """Var[C] (n, N) [m^4]: offset d (n, N, 2); covariance (3, N) of the position, xx, yy, xy; centre_covariance (n, 2, 2)."""
     x, y = offset[..., 0], offset[..., 1]
     xx = covariance[0] + centre_covariance[:, 0, 0, None]
     yy = covariance[1] + centre_covariance[:, 1, 1, None]

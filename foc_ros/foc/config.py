@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, cast
 
 from .errors import ParameterError
 
@@ -125,7 +125,7 @@ class Parameter:
     """One flattened parameter: dotted name, default, bound."""
 
     name: str
-    default: float | int | str
+    default: Any
     bound: Bound
 
 
@@ -134,8 +134,8 @@ def parameters(group: type = Config, prefix: str = '') -> Iterator[Parameter]:
     for item in fields(group):
         if 'bound' in item.metadata:
             yield Parameter(prefix + item.name, item.default, item.metadata['bound'])
-        elif item.default_factory is not MISSING and is_dataclass(item.default_factory):
-            yield from parameters(item.default_factory, f'{prefix}{item.name}.')
+        else:
+            yield from parameters(cast('type', item.default_factory), f'{prefix}{item.name}.')
 
 
 def flatten(config: Config) -> dict[str, float | int | str]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from .assess import Assessment, assess
 from .chance import eta_of_k, k_of_eta
+from .deadline import NEVER, Deadline, OutOfTimeError
 from .problem import Problem
 from .records import Array, Status
 from .sequential import Converged, converge
@@ -86,23 +87,36 @@ class Walk:
 class _Walker:
     """Evaluates points, each from a neighbour's solution, and counts."""
 
-    def __init__(self, problem: Problem, curve: Curve) -> None:
-        self.problem, self.curve, self.end, self.qp_solves = problem, curve, curve.end(problem), 0
+    def __init__(self, problem: Problem, curve: Curve, deadline: Deadline) -> None:
+        self.problem, self.curve, self.end, self.deadline = problem, curve, curve.end(problem), deadline
+        self.qp_solves = 0
+        self.best: Point | None = None
 
     def point(self, s: float, guess: Array, working: WorkingSet) -> Point | None:
-        converged = converge(self.problem, guess, working, *self.curve.at(s))
+        converged = converge(self.problem, guess, working, *self.curve.at(s), self.deadline)
         if converged is None:
             return None
         self.qp_solves += converged.qp_solves
-        return Point(s, converged, assess(self.problem, converged.control))
+        point = Point(s, converged, assess(self.problem, converged.control))
+        self.best = point if self.best is None or point.k > self.best.k else self.best
+        return point
 
     def beside(self, s: float, neighbour: Point) -> Point | None:
         return self.point(s, neighbour.converged.positions, neighbour.converged.solution.active)
 
 
-def walk(problem: Problem, start: Start, curve: Curve) -> Walk:
+def walk(problem: Problem, start: Start, curve: Curve, deadline: Deadline = NEVER) -> Walk:
     """Find the smallest s whose converged solution meets the surrogate; a warm start looks around the s it had."""
-    walker, wanted = _Walker(problem, curve), k_of_eta(problem.eta)
+    walker = _Walker(problem, curve, deadline)
+    try:
+        return _walk(walker, start)
+    except OutOfTimeError:
+        reached = 'nothing' if walker.best is None else f'eta {eta_of_k(walker.best.k):.4g}'
+        return Walk(Status.DEADLINE, f'out of time, with {reached} found', walker.best, walker.qp_solves)
+
+
+def _walk(walker: _Walker, start: Start) -> Walk:
+    problem, curve, wanted = walker.problem, walker.curve, k_of_eta(walker.problem.eta)
     s, stride = (0.0, STRIDE) if start.lam is None else (curve.s_of(start.lam), WARM_STRIDE)
     first = walker.point(s, start.positions, start.active)
     if first is None:
@@ -159,7 +173,7 @@ def _strides(walker: _Walker, first: Point, wanted: float, stride: float) -> Ite
 
 
 def _next_stride(before: Point, point: Point, wanted: float, stride: float) -> float:
-    """A little farther than where k would be the wanted one if it went on as it does; at most four times the last stride."""
+    """Go a little farther than where k would be the wanted one if it went on as it does; at most four times the last stride."""
     largest = min(4 * abs(stride), STRIDE)
     slope = (point.k - before.k) / (point.s - before.s)
     length = 1.2 * abs(wanted - point.k) / slope if slope > 0 else largest
@@ -169,8 +183,8 @@ def _next_stride(before: Point, point: Point, wanted: float, stride: float) -> f
 def _root(walker: _Walker, low: Point, high: Point, wanted: float) -> Point:
     """Find k(s) = wanted between a point below and one at or above, by Illinois steps; returns one at or above.
 
-    Aims at the middle of what counts as close. Halves the bracket instead where two steps in a row came out on the same side: where k
-    jumps, that is the way to the jump.
+    Aims at the middle of what counts as close. Halves the bracket instead where two steps in a row came out on the same
+    side: where k jumps, that is the way to the jump.
     """
     aim = wanted * (1 + CLOSE / 2)
     below, above, side = low.k - aim, high.k - aim, 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from .algorithm1 import algorithm1
 from .assess import Assessment, assess
 from .config import FocConfig
 from .continuous import Curve, walk
+from .deadline import Deadline, OutOfTimeError
 from .noise import state_covariance
 from .optimal import optimise
 from .problem import Problem
@@ -19,6 +20,9 @@ from .records import Array, Solution, Status
 from .sequential import Converged, converge
 from .solver import WorkingSet, solve
 from .start import Start
+
+SHORT_OF_ETA = 1e-5
+"""What a solved one may be short of eta by rounding."""
 
 
 @dataclass(frozen=True)
@@ -35,28 +39,39 @@ class _Ended:
     multipliers: Array
 
 
-def forward(problem: Problem, start: Start, settings: FocConfig) -> Solution:
+def forward(problem: Problem, start: Start, settings: FocConfig, deadline_s: float | None = None) -> Solution:
     """Solve one problem in the class in which it starts.
 
-    Never raises for a problem that has no solution: the status says so, and the mean is then the best effort (the largest eta that
-    the strategy reached, or the smallest violation).
+    deadline_s: time it may take [s], looked at before each QP. Never raises for a problem that has no solution: the status
+    says so, and the mean is then the best effort (the largest eta that the strategy reached, or the smallest violation).
     """
-    began = time.perf_counter()
-    ended = _STRATEGIES[settings.strategy](problem, start, settings)
-    return _solution(problem, ended, assess(problem, ended.control), time.perf_counter() - began)
+    began, deadline = time.perf_counter(), Deadline(deadline_s)
+    try:
+        ended = _STRATEGIES[settings.strategy](problem, start, settings, deadline)
+    except OutOfTimeError:
+        ended = replace(
+            _best_effort(problem, start, 0.0, 1.0, 0), status=Status.DEADLINE, message='out of time, with nothing found'
+        )
+    assessment = assess(problem, ended.control)
+    if ended.status is Status.SOLVED and settings.strategy != 'fixed' and assessment.eta < problem.eta - SHORT_OF_ETA:
+        message = f'the solution achieves eta {assessment.eta:.6g} only'
+        ended = replace(ended, status=Status.ITERATION_LIMIT, message=message)
+    return _solution(problem, ended, assessment, time.perf_counter() - began)
 
 
-def _continuous(problem: Problem, start: Start, settings: FocConfig) -> _Ended:
+def _continuous(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline) -> _Ended:
     delta = settings.lv_delta if settings.strategy == 'lv' else settings.hc_delta
     curve = Curve(delta, settings.growth, settings.lam)
-    walked = walk(problem, start, curve)
+    walked = walk(problem, start, curve, deadline)
+    if walked.status is Status.DEADLINE and walked.point is None:
+        raise OutOfTimeError
     if walked.point is None:
         return _best_effort(problem, start, *curve.at(0.0), walked.qp_solves)
     return _ended(walked.status, walked.message, walked.point.converged, *curve.at(walked.point.s), walked.qp_solves)
 
 
-def _optimal(problem: Problem, start: Start, settings: FocConfig) -> _Ended:
-    optimum = optimise(problem, start)
+def _optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadline) -> _Ended:
+    optimum = optimise(problem, start, deadline)
     if optimum is None:
         return _best_effort(problem, start, 0.0, 0.0, 0)
     return _Ended(
@@ -64,8 +79,9 @@ def _optimal(problem: Problem, start: Start, settings: FocConfig) -> _Ended:
     )
 
 
-def _algorithm1(problem: Problem, start: Start, settings: FocConfig) -> _Ended:
-    stepped = algorithm1(problem, start.positions, settings.algorithm1_delta, settings.algorithm1_growth, settings.algorithm1_xi)
+def _algorithm1(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline) -> _Ended:
+    rates = settings.algorithm1_delta, settings.algorithm1_growth, settings.algorithm1_xi
+    stepped = algorithm1(problem, start.positions, *rates, deadline)
     last = stepped.solution
     if last is None:
         return _best_effort(problem, start, stepped.tau, stepped.lam, stepped.iterations)
@@ -74,8 +90,8 @@ def _algorithm1(problem: Problem, start: Start, settings: FocConfig) -> _Ended:
     )
 
 
-def _fixed(problem: Problem, start: Start, settings: FocConfig) -> _Ended:
-    converged = converge(problem, start.positions, start.active, settings.tau, settings.lam)
+def _fixed(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline) -> _Ended:
+    converged = converge(problem, start.positions, start.active, settings.tau, settings.lam, deadline)
     if converged is None:
         return _best_effort(problem, start, settings.tau, settings.lam, 0)
     status = Status.SOLVED if converged.stays else Status.ITERATION_LIMIT

@@ -18,6 +18,7 @@ import numpy as np
 
 from .assess import assess
 from .chance import eta_of_k, k_of_eta, variance
+from .deadline import NEVER, Deadline, OutOfTimeError
 from .problem import Problem
 from .qp import Cost, ReachingQP, effort_cost, wanted_distance
 from .records import Array, Status
@@ -55,68 +56,83 @@ class _Iterate:
     multipliers: Array
 
 
-def optimise(problem: Problem, start: Start) -> Optimum | None:
+def optimise(problem: Problem, start: Start, deadline: Deadline = NEVER) -> Optimum | None:
     """Find a local minimum from a start; None where even the obstacle rows there contradict each other."""
-    wanted, solves = k_of_eta(problem.eta), 0
-    if start.control is not None and len(start.active):
-        settled, solves = _repeat(problem, _Iterate(start.control, start.active, start.multipliers), wanted, SETTLED, complete=True)
-        if settled is not None:
-            return _optimum(Status.SOLVED, 'solved', settled, solves)
-    free = converge(problem, start.positions, start.active, 0.0, 0.0)
-    if free is None:
+    search = _Search(problem, deadline)
+    try:
+        status, message = search.run(start)
+    except OutOfTimeError:
+        if search.iterate is None:
+            raise
+        status, message = Status.DEADLINE, f'out of time, with eta {eta_of_k(search.reached):.4g} reached'
+    if search.iterate is None:
         return None
-    solves += free.qp_solves
-    iterate = _Iterate(free.control, free.solution.active, free.solution.multipliers)
-    reached = assess(problem, free.control).smallest_k
-    if reached >= wanted:
-        return _optimum(Status.SOLVED, 'solved', iterate, solves)
-    share = 1.0
-    while True:
-        target = min(wanted, reached + share * (wanted - reached)) if share < 1 else wanted
-        settled, qps = _settle(problem, iterate, target)
-        solves += qps
-        if settled is not None:
-            iterate, reached = settled, target
-            if target == wanted:
-                return _optimum(Status.SOLVED, 'solved', iterate, solves)
+    found = search.iterate
+    return Optimum(status, message, found.control, found.active, found.multipliers, search.qp_solves)
+
+
+class _Search:
+    """Raises k from what the least effort gives to what is wanted: at once if that settles, else in smaller steps."""
+
+    def __init__(self, problem: Problem, deadline: Deadline) -> None:
+        self.problem, self.deadline, self.qp_solves = problem, deadline, 0
+        self.wanted, self.reached = k_of_eta(problem.eta), 0.0
+        self.iterate: _Iterate | None = None
+
+    def run(self, start: Start) -> tuple[Status, str]:
+        """Leave the best iterate in `iterate` and the k that it reaches in `reached`; return how it ended."""
+        if start.control is not None and len(start.active):
+            settled = self.repeat(_Iterate(start.control, start.active, start.multipliers), self.wanted, SETTLED, complete=True)
+            if settled is not None:
+                self.iterate, self.reached = settled, self.wanted
+                return Status.SOLVED, 'solved'
+        free = converge(self.problem, start.positions, start.active, 0.0, 0.0, self.deadline)
+        if free is None:
+            return Status.INFEASIBLE, 'no control meets every linearised obstacle row'
+        self.qp_solves += free.qp_solves
+        self.iterate = _Iterate(free.control, free.solution.active, free.solution.multipliers)
+        self.reached = assess(self.problem, free.control).smallest_k
+        if self.reached >= self.wanted:
+            return Status.SOLVED, 'solved'
+        return self.raised(self.iterate)
+
+    def raised(self, iterate: _Iterate) -> tuple[Status, str]:
+        """Raise k from `reached`."""
+        share = 1.0
+        while share >= SMALLEST_STEP:
+            target = self.wanted if share == 1 else self.reached + share * (self.wanted - self.reached)
+            settled = self.settle(iterate, target)
+            if settled is None:
+                share /= 2
+                continue
+            self.iterate, self.reached, iterate = settled, target, settled
+            if target == self.wanted:
+                return Status.SOLVED, 'solved'
             share = min(1.0, 2 * share)
-        elif share > SMALLEST_STEP:
-            share /= 2
-        else:
-            message = f'eta {problem.eta:g} is out of reach: the largest found is {eta_of_k(reached):.4g}'
-            return _optimum(Status.ETA_UNREACHABLE, message, iterate, solves)
+        message = f'eta {self.problem.eta:g} is out of reach: the largest found is {eta_of_k(self.reached):.4g}'
+        return Status.ETA_UNREACHABLE, message
 
+    def settle(self, iterate: _Iterate, k: float) -> _Iterate | None:
+        """Settle the surrogate at k: roughly with the rows that leave the growth of Var out, then with the true ones."""
+        rough = self.repeat(iterate, k, ROUGHLY, complete=False)
+        return None if rough is None else self.repeat(rough, k, SETTLED, complete=True)
 
-def _optimum(status: Status, message: str, iterate: _Iterate, solves: int) -> Optimum:
-    return Optimum(status, message, iterate.control, iterate.active, iterate.multipliers, solves)
-
-
-def _settle(problem: Problem, iterate: _Iterate, k: float) -> tuple[_Iterate | None, int]:
-    """Settle the surrogate at k, roughly with the rows that leave the growth of Var out, then with the true ones.
-
-    None where a QP has no answer or the sequence never settles. Counts its QPs.
-    """
-    rough, first = _repeat(problem, iterate, k, ROUGHLY, complete=False)
-    if rough is None:
-        return None, first
-    settled, second = _repeat(problem, rough, k, SETTLED, complete=True)
-    return settled, first + second
-
-
-def _repeat(problem: Problem, iterate: _Iterate, k: float, tolerance: float, *, complete: bool) -> tuple[_Iterate | None, int]:
-    """Repeat the QP until it moves the mean by less than the tolerance, relative to the way; None if it does not."""
-    solves, scale = 0, float(np.abs(problem.goal[:2] - problem.initial_mean[:2]).max()) or 1.0
-    for _ in range(MAX_QPS):
-        qp = surrogate_qp(problem, iterate.control, iterate.active, iterate.multipliers, k, complete=complete)
-        solution = solve(qp, iterate.active)
-        if solution is None:
-            return None, solves
-        solves += solution.solves
-        moved = np.abs(problem.position_map @ (solution.control - iterate.control)).max()
-        iterate = _Iterate(solution.control, solution.active, solution.multipliers)
-        if moved < tolerance * scale:
-            return iterate, solves
-    return None, solves
+    def repeat(self, iterate: _Iterate, k: float, tolerance: float, *, complete: bool) -> _Iterate | None:
+        """Repeat the QP until it moves the mean by less than the tolerance, relative to the way; None if it does not."""
+        problem = self.problem
+        scale = float(np.abs(problem.goal[:2] - problem.initial_mean[:2]).max()) or 1.0
+        for _ in range(MAX_QPS):
+            self.deadline.check()
+            qp = surrogate_qp(problem, iterate.control, iterate.active, iterate.multipliers, k, complete=complete)
+            solution = solve(qp, iterate.active)
+            if solution is None:
+                return None
+            self.qp_solves += solution.solves
+            moved = np.abs(problem.position_map @ (solution.control - iterate.control)).max()
+            iterate = _Iterate(solution.control, solution.active, solution.multipliers)
+            if moved < tolerance * scale:
+                return iterate
+        return None
 
 
 def surrogate_qp(

@@ -35,20 +35,19 @@ def solve_candidates(
 ) -> list[Outcome]:
     """Solve each candidate and rank them.
 
-    problems: one for every goal; effort_spent: since movement onset [m^2/s^5]; earlier: solutions to start from where there is one
-    of the same label. Returns the solved ones first, most likely first.
+    problems: one for every goal; effort_spent: since movement onset [m^2/s^5]; earlier: solutions to start from where there
+    is one of the same label. Returns the solved ones first, most likely first.
     """
     judged = [_solved(candidate, problems[candidate.goal], settings, effort_spent, earlier) for candidate in candidates]
     return ranked(distinct(judged), beta)
 
 
-def _solved(
-    candidate: Candidate, problem: Problem, settings: FocConfig, effort_spent: float, earlier: Earlier | None
-) -> Outcome:
+def _solved(candidate: Candidate, problem: Problem, settings: FocConfig, effort_spent: float, earlier: Earlier | None) -> Outcome:
     """Solve from the earlier solution; if that gets into what the earlier one was not, from the candidate's own guess."""
     previous = earlier.solutions.get(candidate.label) if earlier else None
     if earlier and previous is not None:
-        outcome = _judged(candidate, problem, forward(problem, warm(previous, earlier.elapsed_s, problem), settings), effort_spent)
+        again = forward(problem, warm(previous, earlier.elapsed_s, problem), settings)
+        outcome = _judged(candidate, problem, again, effort_spent)
         if outcome.solved or outcome.solution.status is previous.status:
             return outcome
     return _judged(candidate, problem, forward(problem, cold(candidate.guess), settings), effort_spent)

@@ -16,8 +16,8 @@ from .likelihood import most_likely
 from .noise import noise_per_step
 from .outcomes import Earlier, solve_candidates
 from .problem import Problem, rest_to_goal
-from .replanning import triple_integrator_error_map
 from .records import NANOSECONDS, Array, HandState, Obstacles, Outcome, Prediction, Solution, Status
+from .replanning import triple_integrator_error_map
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,8 @@ def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal
 def _seen(outcome: Outcome, problem: Problem, hand: HandState) -> Outcome:
     """Add what we do not know of the hand to what its own noise will do.
 
-    The operator knows the hand better than our filter and plans its margins by motor noise alone, so the filter's covariance is no part
-    of the chance constraint; but our prediction is as uncertain as the state it starts from.
+    The operator knows the hand better than our filter and plans its margins by motor noise alone, so the filter's
+    covariance is no part of the chance constraint; but our prediction is as uncertain as the state it starts from.
     """
     carried = problem.error_map @ hand.covariance @ problem.error_map.swapaxes(1, 2)
     return replace(outcome, solution=replace(outcome.solution, covariance=outcome.solution.covariance + carried))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .chance import centres, size_moments
 from .dynamics import Horizon
@@ -19,8 +20,10 @@ class Problem(Record):
     """What the forward optimal control is asked.
 
     horizon: the plant over N steps; initial_mean (n,) and initial_covariance (n, n): the state now; error_map (N + 1, n, n): what
-    an error of the initial state becomes at steps 0..N (`horizon.powers` where nobody corrects it); goal (n,), of which the states
-    in at_goal (n,) bool are reached exactly by the mean; end_weights and way_weights (n,): w of the mean error and variance at the
+    an error of the initial state becomes at steps 0..N (`horizon.powers` where nobody corrects it); goal (n,), of which the
+    states
+    in at_goal (n,) bool are reached exactly by the mean; end_weights and way_weights (n,): w of the mean error and variance
+    at the
     last step and at each step before it; noise (2,): c per step; obstacles: circles now; eta: wanted probability of avoidance per
     obstacle and step; recovery_s: time in which a hand that is inside a margin has to be out of it [s].
     """
@@ -33,7 +36,7 @@ class Problem(Record):
     noise: Array
     obstacles: Obstacles
     eta: float
-    at_goal: Array
+    at_goal: NDArray[np.bool_]
     end_weights: Array
     way_weights: Array
     recovery_s: float = 0.0
@@ -46,7 +49,8 @@ class Problem(Record):
     @cached_property
     def free_covariance(self) -> Array:
         """The part of the state covariance at steps 0..N that the control does not cause, (N + 1, n, n)."""
-        return self.error_map @ self.initial_covariance @ self.error_map.swapaxes(1, 2)
+        carried: Array = self.error_map @ self.initial_covariance @ self.error_map.swapaxes(1, 2)
+        return carried
 
     @cached_property
     def free_variance(self) -> Array:
@@ -74,7 +78,8 @@ class Problem(Record):
     def recovery_left(self) -> Array:
         """Share of a missing distance that may still be missing at steps 1..N, (N,): a minimum-jerk way out, from 1 to 0."""
         s = np.minimum(self.horizon.dt * np.arange(1, self.horizon.steps + 1) / self.recovery_s, 1.0)
-        return 1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+        left: Array = 1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+        return left
 
     @cached_property
     def size(self) -> tuple[Array, Array]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .problem import Problem
 from .records import Array
@@ -17,7 +18,9 @@ from .records import Array
 
 @dataclass(frozen=True, eq=False)
 class Cost:
-    """What is minimised, and the goal: hessian (2N,) > 0; linear (2N,) or None for zero; goal_rows (r, 2N), targets and softness (r,).
+    """What is minimised, and the goal.
+
+    hessian (2N,) > 0; linear (2N,), None for zero; goal_rows (r, 2N) with their targets and softness (r,).
 
     With H diagonal, the control that meets only the goal is known in closed form, and so is P, by which rows M press on it:
     P = H^-1 - H^-1 E'(E H^-1 E' + softness)^-1 E H^-1, E the goal rows.
@@ -77,7 +80,7 @@ class ReachingQP:
         values: Array = np.einsum('jtq,qt->jt', self.coefficients, self.maps @ control)
         return values
 
-    def rows(self, obstacle: Array, step: Array) -> Array:
+    def rows(self, obstacle: NDArray[np.intp], step: NDArray[np.intp]) -> Array:
         """Return obstacle rows (k, 2N) for k pairs of obstacle and step index."""
         rows: Array = np.einsum('kq,qku->ku', self.coefficients[obstacle, step], self.maps[:, step])
         return rows
@@ -92,7 +95,8 @@ def half_planes(problem: Problem, guess: Array, tau: float, *, literal: bool = F
     """Linearise |p - o|^2 >= E[R^2] + tau at a guess (N, 2): unit normals (m, N, 2) and limits (m, N) on normal . (S u) [m].
 
     literal: the paper's E[C] + tau <= 0 divided by 2 |d|; its plane lies (reach^2 + d^2) / (2 d) from the centre, d = |guess -
-    centre|. Otherwise the plane with the same normal that touches the circle: the two agree at a solution, where the constraint is
+    centre|. Otherwise the plane with the same normal that touches the circle: the two agree at a solution, where the
+    constraint is
     active, and the touching one cuts less off before it, so a far obstacle is never in the way. Both stay outside the circle.
     """
     offset = guess - problem.centres
@@ -109,8 +113,8 @@ def half_planes(problem: Problem, guess: Array, tau: float, *, literal: bool = F
 def wanted_distance(problem: Problem, tau: float) -> Array:
     """Distance from each centre that the mean has to keep, (m, 1) or (m, N) [m]: sqrt(E[R^2] + tau).
 
-    Less where the hand is nearer now: what is missing now may be missing still, falling to zero over the recovery time as a minimum-jerk
-    movement does, so that the problem asks for a way out, not for a jump.
+    Less where the hand is nearer now: what is missing now may be missing still, falling to zero over the recovery time as a
+    minimum-jerk movement does, so that the problem asks for a way out, not for a jump.
     """
     reach = np.sqrt(problem.size[0] + tau)[:, None]
     missing = reach - problem.distance_now[:, None]
@@ -121,6 +125,6 @@ def wanted_distance(problem: Problem, tau: float) -> Array:
 
 
 def clearance_qp(problem: Problem, cost: Cost, guess: Array, tau: float, *, literal: bool = False) -> ReachingQP:
-    """Build the paper's reformulated problem (equation 14) at a guess (N, 2): E[C] + tau <= 0 everywhere; cost: with its lambda."""
+    """Build the paper's reformulated problem (equation 14) at a guess (N, 2): E[C] + tau <= 0; its lambda is in the cost."""
     normals, limits = half_planes(problem, guess, tau, literal=literal)
     return ReachingQP(cost, problem.position_map, normals, limits)

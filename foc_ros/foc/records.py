@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, fields
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
@@ -106,12 +106,12 @@ class Obstacles(Record):
 
 
 def make_obstacles(
-    centre: object = (),
-    radius: object = (),
-    radius_stddev: object = 0.0,
+    centre: ArrayLike = (),
+    radius: ArrayLike = (),
+    radius_stddev: ArrayLike = 0.0,
     ids: tuple[str, ...] | None = None,
-    velocity: object = 0.0,
-    centre_covariance: object = 0.0,
+    velocity: ArrayLike = 0.0,
+    centre_covariance: ArrayLike = 0.0,
 ) -> Obstacles:
     """Build :class:`Obstacles` from anything numpy can read; scalars hold for every row, ids default to positions."""
     centres = np.asarray(centre, dtype=float).reshape(-1, 2)
@@ -186,8 +186,7 @@ class Solution(Record):
     @property
     def times(self) -> Array:
         """Seconds from now, (N + 1,) [s]."""
-        times: Array = self.dt * np.arange(len(self.mean))
-        return times
+        return self.dt * np.arange(len(self.mean), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,8 @@
 """What an error of the initial state becomes when the operator corrects it on the way.
 
 The operator sees the hand and moves from where it is: whatever the true state, its plan ends at the goal. With least effort,
-u = -R_N^+ A^N e takes an error e of the state to zero at step N, so that at step t it is (A^t - R_t R_N^+ A^N) e. Without this, the
-estimator's doubt about acceleration would grow with t^2 over the whole horizon, although no hand would act on it.
+u = -R_N^+ A^N e takes an error e of the state to zero at step N, so that at step t it is (A^t - R_t R_N^+ A^N) e. Without
+this, the estimator's doubt about acceleration would grow with t^2 over the whole horizon, although no hand would act on it.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .deadline import NEVER, Deadline
 from .problem import Problem
 from .qp import Cost, clearance_qp, effort_cost, half_planes, wanted_distance
 from .records import Array
@@ -41,27 +42,33 @@ class Converged:
     stays: bool
 
 
-def converge(problem: Problem, guess: Array, working: WorkingSet, tau: float, lam: float) -> Converged | None:
-    """Solve the reformulated problem at (tau, lambda) from a guess (N, 2); None where its rows contradict each other."""
+def converge(
+    problem: Problem, guess: Array, working: WorkingSet, tau: float, lam: float, deadline: Deadline = NEVER
+) -> Converged | None:
+    """Solve the reformulated problem at (tau, lambda) from a guess (N, 2); None where its rows contradict each other.
+
+    Raises OutOfTimeError past the deadline.
+    """
     cost = effort_cost(problem, lam)
     solves, creep = 0, _Creep()
     previous: tuple[bytes, bytes] | None = None
-    for _ in range(MAX_QPS):
+    for count in range(1, MAX_QPS + 1):
+        deadline.check()
         solution = solve(clearance_qp(problem, cost, guess, tau), working)
         if solution is None:
             return None
         solves += solution.solves
         working, positions = solution.active, problem.positions(solution.control)
         move = float(np.abs(positions - guess).max())
-        if move < STAYS:
-            return Converged(solution.control, positions, solution, solves, stays=True)
+        if move < STAYS or count == MAX_QPS:
+            return Converged(solution.control, positions, solution, solves, stays=move < STAYS)
         rows = (working.obstacle.tobytes(), working.step.tobytes())
         better = None
         if len(working) and (rows == previous or move < NEAR):
             better = _newton(problem, positions, solution, tau, cost)
         guess = creep.ahead(positions) if better is None else creep.jumped(better)
         previous = rows
-    return Converged(solution.control, positions, solution, solves, stays=False)
+    raise AssertionError('MAX_QPS is at least 1')
 
 
 class _Creep:

@@ -15,8 +15,8 @@ from .solver import WorkingSet
 class Start:
     """Positions (N, 2) at steps 1..N [m] to linearise at.
 
-    From an earlier solution also its stacked control (2N,), its active rows with their multipliers, and its lambda; lam is None for a
-    cold start, which has none of these.
+    From an earlier solution also its stacked control (2N,), its active rows with their multipliers, and its lambda; lam is
+    None for a cold start, which has none of these.
     """
 
     positions: Array
