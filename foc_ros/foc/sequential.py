@@ -13,7 +13,7 @@ import numpy as np
 
 from .deadline import NEVER, Deadline
 from .problem import Problem
-from .qp import Cost, clearance_qp, effort_cost, half_planes, wanted_distance
+from .qp import Cost, clearance_qp, effort_cost, wanted_distance
 from .records import Array
 from .solver import QPSolution, WorkingSet, solve
 
@@ -103,14 +103,13 @@ def _cosine(a: Array, b: Array) -> float:
 def _newton(problem: Problem, positions: Array, solution: QPSolution, tau: float, cost: Cost) -> Array | None:
     """Newton steps on the Karush-Kuhn-Tucker equations with the active rows held as touching their circles.
 
-    A multiplier y at distance d adds the circle's curvature, -y / d along the tangent, to the Hessian: a goal row of negative
-    softness -d / y. Returns positions (N, 2), or None where the steps leave what they assume: multipliers positive, a minimum
-    (as many negative eigenvalues as curvature rows), all circles clear, cost not above that of `solution`.
+    Returns positions (N, 2), or None where the steps leave what they assume: multipliers positive, a minimum, all circles clear,
+    cost not above that of `solution`.
     """
-    weights, bound = cost.hessian, float(solution.control @ (cost.hessian * solution.control))
+    bound = float(solution.control @ (cost.hessian * solution.control))
     multipliers, last = solution.multipliers, np.inf
     for _ in range(NEWTON_STEPS):
-        step = _newton_step(problem, positions, solution.active, multipliers, tau, weights)
+        step = _newton_step(problem, positions, solution.active, multipliers, tau, cost)
         if step is None:
             return None
         control, multipliers = step
@@ -123,36 +122,37 @@ def _newton(problem: Problem, positions: Array, solution: QPSolution, tau: float
             break
     offset = positions[None] - problem.centres
     clear = (np.hypot(offset[..., 0], offset[..., 1]) - wanted_distance(problem, tau)).min() > -0.1 * STAYS
-    return positions if clear and float(control @ (weights * control)) <= bound * (1 + 1e-12) else None
+    return positions if clear and float(control @ (cost.hessian * control)) <= bound * (1 + 1e-12) else None
 
 
 def _newton_step(
-    problem: Problem, positions: Array, active: WorkingSet, multipliers: Array, tau: float, weights: Array
+    problem: Problem, positions: Array, active: WorkingSet, multipliers: Array, tau: float, cost: Cost
 ) -> tuple[Array, Array] | None:
-    """One step: control (2N,) and multipliers (k,) of the active rows; None where it leads to no minimum."""
-    normals, limits = half_planes(problem, positions, tau)
-    normal = normals[active.obstacle, active.step]
-    tangent = np.stack((-normal[:, 1], normal[:, 0]), axis=1)
-    offset = positions[active.step] - problem.centres[active.obstacle, active.step]
-    maps, free = problem.position_map[:, active.step], problem.free[1:][active.step, :2]
-    goal_rows, goal_targets, softness = problem.goal_rows
-    rows = np.concatenate((goal_rows, *(np.einsum('ki,iku->ku', axis, maps) for axis in (normal, tangent))))
-    targets = np.concatenate(
-        (
-            goal_targets,
-            limits[active.obstacle, active.step],
-            np.einsum('ki,ki->k', tangent, positions[active.step] - free),
-        )
-    )
-    k = len(active)
-    soft = np.concatenate((softness, np.zeros(k), -np.hypot(offset[:, 0], offset[:, 1]) / multipliers))
-    weighted = rows / weights
-    gram = weighted @ rows.T
-    scale = 1.0 / np.sqrt(np.diag(gram))
-    values, vectors = np.linalg.eigh(gram * scale[:, None] * scale[None, :] + np.diag(soft * scale**2))
+    """One step: control (2N,) and multipliers (k,) of the active rows; None where it leads to no minimum.
+
+    A multiplier y at distance d adds the circle's curvature, -y / d along the tangent, to the Hessian: a row of negative softness
+    -d / y beside the normal's row. It is a minimum if there are as many negative eigenvalues as curvature rows.
+    """
+    k, steps = len(active), active.step
+    offset = positions[steps] - problem.centres[active.obstacle, steps]
+    distance = np.hypot(offset[:, 0], offset[:, 1])
+    normal = offset / distance[:, None]
+    axes = np.concatenate((normal, np.stack((-normal[:, 1], normal[:, 0]), axis=1)))
+    both = np.concatenate((steps, steps))
+    rows = axes[:, 0, None] * problem.position_map[0, both] + axes[:, 1, None] * problem.position_map[1, both]
+    wanted = np.broadcast_to(wanted_distance(problem, tau), problem.centres.shape[:2])[active.obstacle, steps]
+    aim = np.concatenate((problem.centres_from_free[active.obstacle, steps], positions[steps] - problem.free[1:][steps, :2]))
+    targets = np.einsum('ki,ki->k', axes, aim)
+    targets[:k] += wanted
+    pressed = cost.pressed(rows)
+    gram = pressed @ rows.T
+    gram.flat[k * (2 * k + 1) :: 2 * k + 1] -= distance / multipliers
+    scale = 1.0 / np.sqrt(np.abs(gram.diagonal()))
+    values, vectors = np.linalg.eigh(gram * scale[:, None] * scale)
     # rows that say the same twice leave an eigenvalue of zero: they share their multiplier
     told = np.abs(values) > 1e-11 * np.abs(values).max()
     if np.count_nonzero(values[told] < 0) != k:
         return None
-    forces = scale * (vectors[:, told] @ ((vectors[:, told].T @ (scale * targets)) / values[told]))
-    return forces @ weighted, forces[len(goal_rows) : len(goal_rows) + k]
+    missing = scale * (targets - rows @ cost.goal_control)
+    forces = scale * (vectors[:, told] @ ((vectors[:, told].T @ missing) / values[told]))
+    return cost.goal_control + forces @ pressed, forces[:k]
