@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from foc_ros.foc.records import Array
 
@@ -21,7 +22,7 @@ class Circles:
     centre (n + g,), complex [m]; radius (n + g,) [m]; bar (n,): square of the distance from each centre that bars a run [m^2];
     held (n + g, n): which centres each circle holds; outer (n + g,): which ones lie in no other circle, of equal ones the
     first; blocker (n, n): direction of the outer circles that overlap with each [rad], NaN for others; overlapping: whether
-    there are any.
+    there are any; cluster: number of the cluster of overlapping circles that each belongs to.
     """
 
     n: int
@@ -32,6 +33,7 @@ class Circles:
     outer: Flags
     blocker: Array
     overlapping: bool
+    cluster: tuple[int, ...]
 
     @property
     def goals(self) -> int:
@@ -48,7 +50,14 @@ def circles(centre: Complex, radius: Array, goals: Complex) -> Circles:
     within = (distance[:n] + radius[:, None] <= radius) & ~np.eye(n, dtype=bool)
     within &= ~(within.T & np.triu(np.ones((n, n), dtype=bool)))
     outer = np.append(~within.any(axis=1), np.ones(len(goals), dtype=bool))
-    overlap = (distance[:n] < radius[:, None] + radius) & outer[:n] & ~np.eye(n, dtype=bool)
+    touching = distance[:n] < radius[:, None] + radius
+    overlap = touching & outer[:n] & ~np.eye(n, dtype=bool)
     blocker = np.where(overlap, np.angle(apart[:n]), np.nan)
     bar = (radius - GRAZE).clip(0.0) ** 2
-    return Circles(n, c, r, bar, distance < r[:, None], outer, blocker, bool(overlap.any()))
+    return Circles(n, c, r, bar, distance < r[:, None], outer, blocker, bool(overlap.any()), _clusters(touching))
+
+
+def _clusters(touching: Flags) -> tuple[int, ...]:
+    if touching.sum() == len(touching):
+        return tuple(range(len(touching)))
+    return tuple(connected_components(touching, directed=False)[1].tolist())

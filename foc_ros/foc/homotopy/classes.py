@@ -8,29 +8,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from foc_ros.foc.records import LEFT, RIGHT, Array
+from foc_ros.foc.records import LEFT, RIGHT
 
+from .circles import GRAZE
 from .crossing import Complex, angle_of
-from .roadmap import roadmap
-from .scene import SMALLEST, Scene
+from .levels import MOST, Level, Levels
+from .scene import Scene
 from .sides import swept_seen
 from .tangents import TURN
 from .taut import taut
-from .ways import Plan, Way, plan, ways
+from .ways import Plan, Way, ways
 
-NEAREST, MOST = 8, 64
-"""Circles in the first roadmap, which doubles, and in the last."""
 FINENESS = 257
 """Points at which a path is compared with circles that its roadmap does not hold."""
-
-
-@dataclass(frozen=True, eq=False)
-class Level:
-    """A plan among some circles: place of each in it by row of the scene's; from which excess other circles may be met."""
-
-    plan: Plan
-    place: dict[int, int]
-    limit: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,32 +34,12 @@ class Found:
     plan: Plan
 
 
-class Levels:
-    """Plans among the circles that matter most, for the goals to which they are equally large; each made when first asked for."""
-
-    def __init__(self, scene: Scene, radius: Array, velocity: complex) -> None:
-        self._scene, self._radius, self._velocity = scene, radius, velocity
-        self._order = np.argsort(scene.excess, kind='stable')
-        self._made: dict[int, Level] = {}
-
-    def __call__(self, size: int) -> Level:
-        """Return the level of the `size` circles that matter most."""
-        if size not in self._made:
-            rows = np.sort(self._order[:size])
-            made = plan(
-                roadmap(self._scene.centre[rows], self._radius[rows], self._scene.goals), self._scene.hand, self._velocity
-            )
-            limit = float(self._scene.excess[self._order[size]]) if size < len(self._order) else np.inf
-            self._made[size] = Level(made, {row: k for k, row in enumerate(rows.tolist())}, limit)
-        return self._made[size]
-
-
 class Classes:
     """The classes to one goal, in the order of their rank; notes: what was decided on the way, as counts by name."""
 
-    def __init__(self, scene: Scene, levels: Levels, goal: int, ids: tuple[str, ...]) -> None:
+    def __init__(self, scene: Scene, levels: Levels, goal: int, ids: tuple[str, ...], states: int) -> None:
         self.notes: Counter[str] = Counter()
-        self._scene, self._levels, self._goal, self._ids = scene, levels, goal, ids
+        self._scene, self._levels, self._goal, self._ids, self._states = scene, levels, goal, ids, states
         self._named: list[int] = sorted(np.flatnonzero(scene.named[goal]).tolist(), key=ids.__getitem__)
         seen = scene.centre[self._named]
         self._turned: list[float] = (angle_of(scene.goals[goal] - seen) - angle_of(scene.hand - seen)).tolist()
@@ -87,33 +57,35 @@ class Classes:
         yield from sorted(equal, key=lambda one: one.rank)
 
     def _by_key(self) -> Iterator[Found]:
-        straight = max(abs(self._scene.goals[self._goal] - self._scene.hand), SMALLEST)
+        straight = abs(self._scene.goals[self._goal] - self._scene.hand)
         given: set[tuple[tuple[str, int], ...]] = set()
-        size, everyone = NEAREST, 1 << len(self._named)
-        while len(given) < everyone:
-            level = self._levels(size)
-            told = tuple(level.place[row] for row in self._named if row in level.place)
-            for way in ways(level.plan, self._goal, told):
+        rows = self._levels.first(self._named)
+        while True:
+            bounded = len(rows) < MOST and not rows.issuperset(self._named)
+            level = self._levels(rows, bounded)
+            told = tuple(level.place[row] for row in self._named if row in rows)
+            clusters = {level.plan.roadmap.circles.cluster[place] for place in told}
+            everyone = 1 << len(clusters) + len(self._named) - len(told)
+            for way in ways(level.plan, self._goal, told, level.limit * straight if bounded else np.inf, self._states):
                 found = self._found(way, level) if way else None
                 if found is None or found.sides in given:
                     self.notes['search_cut'] += way is None
                     continue
-                if found.way.key >= level.limit * straight:
-                    if size < MOST:
-                        break
-                    if self._meets_others(found, level):
-                        self.notes['left_out'] += 1
-                        continue
+                met = self._met(found, level) if found.way.key >= level.limit * straight else []
+                if met and len(rows) < MOST:
+                    rows = rows.union(met)
+                    break
                 given.add(found.sides)
-                yield found
+                if met:
+                    self.notes['left_out'] += 1
+                else:
+                    yield found
                 if len(given) == everyone:
                     return
             else:
-                if len(told) == len(self._named):
+                if not bounded:
                     return
-            if size >= MOST:
-                return
-            size *= 2
+                rows = self._levels.more(rows)
 
     def _found(self, way: Way, level: Level) -> Found | None:
         """Name a way; None for one that winds about an obstacle."""
@@ -126,21 +98,19 @@ class Classes:
             return None
         if len(way.crossings) < len(swept):
             others = [k for k, row in enumerate(self._named) if row not in level.place]
-            for k, angle in zip(
-                others,
-                swept_seen(_line(way, level.plan)[:, None] - self._scene.centre[[self._named[k] for k in others]]),
-                strict=True,
-            ):
+            seen = _line(way, level.plan)[:, None] - self._scene.centre[[self._named[k] for k in others]]
+            for k, angle in zip(others, swept_seen(seen).tolist(), strict=True):
                 swept[k] = angle
         sides = tuple((self._ids[row], LEFT if angle < 0.0 else RIGHT) for row, angle in zip(self._named, swept, strict=True))
         label = f'goal{self._goal}:' + ''.join([('+' if side == LEFT else '-') + identity for identity, side in sides])
         return Found((round(way.key, 9), label), self._goal, sides, way, level.plan)
 
-    def _meets_others(self, found: Found, level: Level) -> bool:
-        """Whether a path meets a circle that its roadmap does not hold."""
-        others = [row for row in range(len(self._ids)) if row not in level.place]
+    def _met(self, found: Found, level: Level) -> list[int]:
+        """Return the circles that a path meets and its roadmap does not hold."""
+        others = np.delete(np.arange(len(self._ids)), list(level.place))
         apart = np.abs(_line(found.way, found.plan)[:, None] - self._scene.centre[others])
-        return bool((apart < self._scene.radius[self._goal, others]).any())
+        met: list[int] = others[(apart < self._scene.radius[self._goal, others] - GRAZE).any(axis=0)].tolist()
+        return met
 
 
 def _line(way: Way, plan: Plan) -> Complex:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import groupby
 
 import numpy as np
 
@@ -28,22 +27,20 @@ def guesses(
     """
     paths: dict[int, Array] = {}
     lengths: dict[int, float] = {}
-    for _, group in groupby(sorted(range(len(chosen)), key=lambda k: id(chosen[k].plan)), key=lambda k: id(chosen[k].plan)):
-        rows = list(group)
-        plan, ways = chosen[rows[0]].plan, [chosen[k].way for k in rows]
-        path = taut(plan, ways)
+    for plan in {id(found.plan): found.plan for found in chosen}.values():
+        rows = [k for k, found in enumerate(chosen) if found.plan is plan]
+        path = taut(plan, [chosen[k].way for k in rows])
         speed = (path.heading[path.first] * velocity.conjugate()).real
         along = progress(path.length, speed, duration_s[[chosen[k].goal for k in rows]], steps)
         for k, points, done, length in zip(rows, path.points(along), along, path.length.tolist(), strict=True):
-            clear = _out_of_margins(scene, chosen[k].goal, points, done)
+            paths[k] = _out_of_margins(scene, chosen[k].goal, points, done).view(float).reshape(-1, 2)
             lengths[k] = length
-            paths[k] = np.stack([clear.real, clear.imag], axis=1)
     return [paths[k] for k in range(len(chosen))], [lengths[k] for k in range(len(chosen))]
 
 
 def _out_of_margins(scene: Scene, goal: int, points: Complex, along: Array) -> Complex:
     """Push points out of the circles that were shrunk to let the hand out and the goal in."""
-    for row in np.flatnonzero(scene.held | scene.near[goal]):
+    for row in (scene.held | scene.near[goal]).nonzero()[0]:
         from_centre = points - scene.centre[row]
         distance = np.abs(from_centre)
         allowed = np.full(len(points), scene.wanted[row])

@@ -11,7 +11,8 @@ from foc_ros.foc.records import Array
 
 from .circles import Circles, circles
 from .crossing import Complex
-from .tangents import Runs, free_tangents, pairs, runs, spokes
+from .tangents import Runs, free_tangents, runs
+from .tries import Ellipse, pairs, spokes
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,24 +31,33 @@ class Roadmap:
 
 def roadmap(centre: Complex, radius: Array, goals: Complex) -> Roadmap:
     """Lay out circles (n,) and goals (g,). The last few are kept: a scene often stands still while the hand moves."""
-    return _roadmap(centre.tobytes(), radius.tobytes(), goals.tobytes())
+    return _kept(centre.tobytes(), radius.tobytes(), goals.tobytes())
 
 
 @lru_cache(maxsize=8)
-def _roadmap(centre: bytes, radius: bytes, goals: bytes) -> Roadmap:
-    field = circles(np.frombuffer(centre, dtype=complex), np.frombuffer(radius), np.frombuffer(goals, dtype=complex))
+def _kept(centre: bytes, radius: bytes, goals: bytes) -> Roadmap:
+    return roadmap_within(np.frombuffer(centre, dtype=complex), np.frombuffer(radius), np.frombuffer(goals, dtype=complex))
+
+
+def roadmap_within(centre: Complex, radius: Array, goals: Complex, ellipse: Ellipse | None = None) -> Roadmap:
+    """Lay out circles and goals with only the runs that an ellipse holds."""
+    field = circles(centre, radius, goals)
     tries = pairs(field.n, field.goals)
-    free, length, u = free_tangents(field, field.centre, field.radius, tries)
+    free, length, u = free_tangents(field, field.centre, field.radius, tries, ellipse)
     i, s_i, j, s_j = (column[free] for column in tries[:4])
     back = np.flatnonzero(j < field.n)
     ends = np.append(i, j[back]), np.append(s_i, -s_j[back]), np.append(j, i[back]), np.append(s_j, -s_i[back])
     made = runs(field, field.centre, field.radius, ends, np.append(length, length[back]), np.append(u, -u[back]))
-    n, goals_n = field.n, field.goals
-    leaving: list[list[list[int]]] = [[[] for _ in range(2 * n)] for _ in range(goals_n)]
+    return Roadmap(field, field.radius.tolist(), made, _departures(field, made))
+
+
+def _departures(field: Circles, made: Runs) -> tuple[tuple[tuple[int, ...], ...], ...]:
+    leaving: list[list[list[int]]] = [[[] for _ in range(2 * field.n)] for _ in range(field.goals)]
+    everywhere = range(field.goals)
     for run, (tail, head) in enumerate(zip(made.tail.tolist(), (made.head >> 1).tolist(), strict=True)):
-        for goal in range(goals_n) if head < n else (head - n,):
+        for goal in everywhere if head < field.n else (head - field.n,):
             leaving[goal][tail].append(run)
-    return Roadmap(field, field.radius.tolist(), made, tuple(tuple(tuple(node) for node in to_goal) for to_goal in leaving))
+    return tuple(tuple(tuple(node) for node in to_goal) for to_goal in leaving)
 
 
 def hand_runs(field: Circles, hand: complex) -> Runs:

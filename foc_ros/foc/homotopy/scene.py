@@ -9,14 +9,16 @@ import numpy as np
 
 from foc_ros.foc.records import Array, Candidate, Obstacles
 
+from .circles import GRAZE
 from .crossing import Complex, Flags
+from .hysteresis import kept_open, strangers
 
 REACH = 2.0
 """An obstacle is out of the way when passing it on its far side alone takes more than this times the straight way."""
-ENTER = 0.005
-"""An obstacle that was in no name to a goal enters it only this much within the bounds [m]: noise does not move it to and fro."""
 SMALLEST = 1e-6
 """Least radius of a circle, least length of a way [m]: a point has no side."""
+POINT = 1e-12
+"""Radius of a circle about the very place of the hand or a goal [m], which bars nothing."""
 TOUCH = 1e-6
 """A circle that holds the hand or a goal shrinks to this part less than its distance."""
 
@@ -46,14 +48,15 @@ class Scene:
 def scene(hand: complex, goals: Complex, obstacles: Obstacles, clearance: float, previous: Sequence[Candidate]) -> Scene:
     """Look at the obstacles from the hand; previous: the candidates of the tick before."""
     centre = obstacles.centre[:, 0] + 1j * obstacles.centre[:, 1]
-    wanted = np.maximum(obstacles.radius + clearance, SMALLEST)
+    wanted = kept_open(obstacles.ids, centre, np.maximum(obstacles.radius + clearance, SMALLEST), clearance, previous)
     from_hand, from_goal = hand - centre, goals[:, None] - centre
     a, b = np.abs(from_hand), np.abs(from_goal)
     held, near = a <= wanted, b <= wanted
-    radius = np.where(held, np.maximum(a * (1.0 - TOUCH), SMALLEST), wanted)
-    radius = np.where(near, np.minimum(np.maximum(b * (1.0 - TOUCH), SMALLEST), radius), radius)
+    radius = np.where(held, np.maximum(a * (1.0 - TOUCH), POINT), wanted)
+    radius = np.where(near, np.minimum(np.maximum(b * (1.0 - TOUCH), POINT), radius), radius)
+    goals = np.where(np.abs(goals - hand) < GRAZE, hand + GRAZE, goals)
     straight = np.maximum(np.abs(goals - hand), SMALLEST)[:, None]
-    named = _named(from_hand, from_goal, a, b, radius, straight, _strangers(obstacles.ids, len(goals), previous))
+    named = _named(from_hand, from_goal, a, b, radius, straight, strangers(obstacles.ids, len(goals), previous))
     excess = (np.maximum(a + b - 2.0 * radius, straight) / straight).min(axis=0, initial=np.inf)
     return Scene(hand, goals, centre, radius, wanted, held, near, np.asarray((b < obstacles.radius).any(axis=1)), named, excess)
 
@@ -72,15 +75,3 @@ def _named(from_hand: Complex, from_goal: Complex, a: Array, b: Array, radius: A
     angle = np.abs(np.angle(from_goal * from_hand.conj()))
     far = np.sqrt(a**2 - radius**2) + np.sqrt(b**2 - radius**2) + radius * (2.0 * np.pi - angle - saved)
     return np.asarray(between & ((angle > saved) | (far <= REACH * straight - slack)))
-
-
-def _strangers(ids: tuple[str, ...], goals: int, previous: Sequence[Candidate]) -> Array:
-    """ENTER for obstacles that were not in the names to a goal that had some (g, n) [m], else 0."""
-    known: dict[int, set[str]] = {}
-    for candidate in previous:
-        known.setdefault(candidate.goal, set()).update(identity for identity, _ in candidate.sides)
-    slack = np.zeros((goals, len(ids)))
-    for goal in range(goals):
-        if goal in known:
-            slack[goal] = [0.0 if identity in known[goal] else ENTER for identity in ids]
-    return slack

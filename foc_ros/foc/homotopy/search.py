@@ -12,10 +12,14 @@ from foc_ros.foc.config import HomotopyConfig
 from foc_ros.foc.errors import SceneError
 from foc_ros.foc.records import Array, Candidate, Obstacles
 
-from .classes import Classes, Levels
+from .classes import Classes
 from .guesses import guesses
+from .levels import Levels
 from .scene import scene
 from .selection import select
+
+STATES, STATES_PER_CANDIDATE = 1000, 300
+"""States that the search for one goal may look at: a few dozen are enough for four candidates, 3 us each."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +58,9 @@ def search(
     hand, velocity = complex(*hand_mean[:2]), complex(*hand_mean[2:4])
     view = scene(hand, goals[:, 0] + 1j * goals[:, 1], obstacles, config.clearance, previous)
     levels = {radius.tobytes(): Levels(view, radius, velocity) for radius in view.radius}
+    states = STATES + STATES_PER_CANDIDATE * config.max_candidates
     reachable = np.flatnonzero(~view.inside).tolist()
-    classes = [Classes(view, levels[view.radius[goal].tobytes()], goal, obstacles.ids) for goal in reachable]
+    classes = [Classes(view, levels[view.radius[goal].tobytes()], goal, obstacles.ids, states) for goal in reachable]
     chosen = select(classes, config.max_candidates, {candidate.label for candidate in previous})
     notes = Counter({'hand_inside': int(view.held.sum()), 'goal_inside': int(view.inside.sum())})
     notes['goal_near'] = int((view.near.any(axis=1) & ~view.inside).sum())

@@ -8,19 +8,20 @@ circle j with D = c_j - c_i and w = s_j r_j - s_i r_i has the length l = sqrt(|D
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from foc_ros.foc.records import Array
 
 from .circles import Circles
-from .crossing import Complex, Counts, Flags, along_circle, straight
+from .crossing import Complex, Counts, along_circle, straight
+from .tries import Ellipse, Index, Tries
 
-Index = NDArray[np.int64]
 TURN = 2.0 * np.pi
+AT_ONCE = 16
+"""Circles that runs are compared with at once; in a crowd most runs meet one of the first."""
 
 
 class Lists(NamedTuple):
@@ -76,51 +77,33 @@ class Runs:
         return Lists(*(getattr(self, name).tolist() for name in Lists._fields))
 
 
-class Tries(NamedTuple):
-    """Runs to try: from circle i in sense s_i to circle j in sense s_j; others (runs, n): the circles that may be in the way."""
+def free_tangents(
+    field: Circles, c: Complex, r: Array, tries: Tries, ellipse: Ellipse | None = None
+) -> tuple[Index, Array, Complex]:
+    """Return which of the runs exist and are free, their lengths [m] and directions; c, r: of circles, goals and perhaps hand.
 
-    i: Index
-    s_i: Index
-    j: Index
-    s_j: Index
-    others: Flags
-
-
-@lru_cache(maxsize=64)
-def pairs(n: int, goals: int) -> Tries:
-    """Return the runs between n circles, in one direction each, and from circles to goals, which are the circles after them."""
-    both = (-1, 1)
-    between = [(i, s, j, t) for i in range(n) for j in range(i + 1, n) for s in both for t in both]
-    return _tries(n, between + [(i, s, n + k, 1) for k in range(goals) for i in range(n) for s in both])
-
-
-@lru_cache(maxsize=64)
-def spokes(n: int, goals: int) -> Tries:
-    """Return the runs from the hand, the circle after the last goal, to circles and goals."""
-    return _tries(n, [(n + goals, 1, j, t) for j in range(n + goals) for t in ((-1, 1) if j < n else (1,))])
-
-
-def _tries(n: int, rows: list[tuple[int, int, int, int]]) -> Tries:
-    i, s_i, j, s_j = np.array(rows, dtype=np.int64).reshape(-1, 4).T.copy()
-    circle = np.arange(n)
-    return Tries(i, s_i, j, s_j, (circle != i[:, None]) & (circle != j[:, None]))
-
-
-def free_tangents(field: Circles, c: Complex, r: Array, tries: Tries) -> tuple[Index, Array, Complex]:
-    """Return which of the runs exist and are free, their lengths [m] and directions; c, r: of circles, goals and perhaps hand."""
+    ellipse: what runs have to stay in, one way or the other.
+    """
     i, s_i, j, s_j, others = tries
     D, w = c[j] - c[i], s_j * r[j] - s_i * r[i]
     square = D.real**2 + D.imag**2
     length = np.sqrt((square - w**2).clip(0.0))
-    here = (square == 0.0) & (r[i] == 0.0) & (r[j] == 0.0)  # a hand at its goal: no way to go is a way too
-    u = np.where(here, 1.0, (length - 1j * w) * D / square.clip(1e-300))
-    seen = (c[: field.n] - (c[i] - 1j * (s_i * r[i]) * u)[:, None]) * u.conj()[:, None]
-    beyond = seen.real - seen.real.clip(0.0, length[:, None])
-    blocked = ((beyond**2 + seen.imag**2 < field.bar) & others).any(axis=1)
-    free = np.flatnonzero(((length > 0.0) | here) & ~blocked)
+    u = (length - 1j * w) * D / square.clip(1e-300)
+    start = c[i] - 1j * (s_i * r[i]) * u
+    wanted = length > 0.0
     if not field.outer.all():
         outer = np.append(field.outer, True)
-        free = free[outer[i[free]] & outer[j[free]]]
+        wanted &= outer[i] & outer[j]
+    if ellipse is not None:
+        end = start + length * u
+        wanted &= ellipse.holds(start, end, length) | ellipse.holds(end, start, length)
+    free = np.flatnonzero(wanted)
+    for first in range(0, field.n, AT_ONCE):
+        part = slice(first, min(first + AT_ONCE, field.n))
+        seen = (c[part] - start[free, None]) * u[free, None].conj()
+        beyond = seen.real - seen.real.clip(0.0, length[free, None])
+        blocked = (beyond**2 + seen.imag**2 < field.bar[part]) & others[free, part]
+        free = free[~blocked.any(axis=1)]
     return free, length[free], u[free]
 
 

@@ -11,7 +11,8 @@ import numpy as np
 from foc_ros.foc.records import Array
 
 from .crossing import Complex
-from .tangents import TURN, Index
+from .tangents import TURN
+from .tries import Index
 from .ways import BACK, Plan, Way
 
 

@@ -26,8 +26,6 @@ BACK = 1e-9
 """An arc may turn back this much [rad]: runs of neighbours that share a tangent follow each other without one."""
 COAST_S = 0.2
 """A path that leaves at an angle p to the velocity v ranks as if |v| (1 - cos p) times this longer: a hand coasts first."""
-STATES = 20_000
-"""States that one search may look at: about 50 ms."""
 
 
 class Way(NamedTuple):
@@ -66,28 +64,24 @@ def plan(roadmap: Roadmap, hand: complex, velocity: complex) -> Plan:
     return Plan(roadmap, start, penalty, roadmap.runs.lists.followed_by(start.lists))
 
 
-def ways(plan: Plan, goal: int, named: tuple[int, ...]) -> Iterator[Way | None]:
-    """Yield the shortest way of each class, shortest first; at the end None if the search was cut at its bound.
+def ways(plan: Plan, goal: int, named: tuple[int, ...], bound: float, states: int) -> Iterator[Way | None]:
+    """Yield the shortest way of each class, shortest first; at the end None if there were too many states.
 
-    goal: its number; named: the circles that tell classes apart. A path that winds about one of them on the way is not
-    followed.
+    goal: its number; named: the circles that tell classes apart; bound: on the key [m]; states: to look at at most. A path that
+    winds about a named circle on the way is not followed.
     """
     n = plan.roadmap.circles.n
     node, departures, radius = 2 * (n + goal) + 1, plan.roadmap.departures[goal], plan.roadmap.radius
     heads, length, leave, reach, clear = plan.table[:5]
-    to_go, crossed, whole = _maze(plan, goal, named)
+    maze = _maze(plan, goal, named)
+    to_go, crossed, whole = maze
     ones = sum(1 << BITS * digit for digit in range(len(named)))
-    fours, eights = 4 * ones, 8 * ones
-    heap = [
-        (key + to_go[run], run, key, BIAS * ones + crossed[run], run, -1)
-        for run, key in enumerate((plan.start.length + plan.penalty).tolist(), len(plan.roadmap.runs.head))
-        if heads[run] < 2 * n or heads[run] == node
-    ]
-    heapify(heap)
+    zero, fours, eights = BIAS * ones, 4 * ones, 8 * ones
+    heap = _first(plan, node, zero, maze)
     met = len(heads)
     trail: list[tuple[int, int]] = []
     seen: set[tuple[int, int]] = set()
-    while heap and len(trail) < STATES:
+    while heap and len(trail) < states:
         _, _, key, signature, run, parent = heappop(heap)
         if (signature, run) in seen:
             continue
@@ -105,10 +99,23 @@ def ways(plan: Plan, goal: int, named: tuple[int, ...]) -> Iterator[Way | None]:
                 after += whole[circle] if anticlockwise else -whole[circle]
             if angle <= free and not (after + ones) & eights and not fours & ~after and (after, following) not in seen:
                 onward = key + radius[circle] * angle + length[following]
-                heappush(heap, (onward + to_go[following], met, onward, after, following, here))
-                met += 1
+                if onward + to_go[following] < bound:
+                    heappush(heap, (onward + to_go[following], met, onward, after, following, here))
+                    met += 1
     if heap:
         yield None
+
+
+def _first(plan: Plan, node: int, zero: int, maze: _Maze) -> list[tuple[float, int, float, int, int, int]]:
+    """Return a heap of the hand's runs to circles and goal: least key of a path, number, key, signature, run, no parent."""
+    heads, first = plan.table.head, len(plan.roadmap.runs.head)
+    heap = [
+        (key + maze.to_go[run], run, key, zero + maze.crossed[run], run, -1)
+        for run, key in enumerate((plan.start.length + plan.penalty).tolist(), first)
+        if heads[run] < 2 * plan.roadmap.circles.n or heads[run] == node
+    ]
+    heapify(heap)
+    return heap
 
 
 def _trace(trail: list[tuple[int, int]]) -> tuple[int, ...]:

@@ -1,0 +1,65 @@
+"""Which circles a roadmap holds: all of a few, the nearest of many, more of them where these cannot settle the answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from foc_ros.foc.records import Array
+
+from .roadmap import roadmap, roadmap_within
+from .scene import Scene
+from .tries import Ellipse
+from .ways import Plan, plan
+
+FEW, MOST = 16, 64
+"""Circles that are always looked at together, and the most that ever are."""
+CLOSE = 1.02
+"""Excess of the circles that many are narrowed down to at first: the best ways through a crowd are nearly straight."""
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A plan among some circles: place of each in it by its row in the scene; limit: excess from which a path may meet others."""
+
+    plan: Plan
+    place: dict[int, int]
+    limit: float
+
+
+class Levels:
+    """Levels for the goals to which the circles are equally large, each made when first asked for."""
+
+    def __init__(self, scene: Scene, radius: Array, velocity: complex) -> None:
+        self._scene, self._radius, self._velocity = scene, radius, velocity
+        self._order: list[int] = np.argsort(scene.excess, kind='stable').tolist()
+        self._made: dict[tuple[frozenset[int], bool], Level] = {}
+
+    def first(self, named: list[int]) -> frozenset[int]:
+        """Return the circles to begin with: all of a few, the named ones of many if they are few, or the close ones."""
+        if len(self._order) <= FEW:
+            return frozenset(self._order)
+        few = frozenset(named).union(self._order[: FEW // 2])
+        close = int((self._scene.excess < CLOSE).sum())
+        return few if len(few) <= FEW else frozenset(self._order[: min(max(close, FEW), MOST)])
+
+    def more(self, rows: frozenset[int]) -> frozenset[int]:
+        """Return twice as many circles, the nearest ones."""
+        return frozenset(self._order[: min(2 * len(rows), MOST)])
+
+    def __call__(self, rows: frozenset[int], bounded: bool) -> Level:
+        """Return the level of some circles; bounded: with only those runs that paths within its limit can take."""
+        if (rows, bounded) not in self._made:
+            self._made[rows, bounded] = self._level(sorted(rows), bounded)
+        return self._made[rows, bounded]
+
+    def _level(self, rows: list[int], bounded: bool) -> Level:
+        scene = self._scene
+        limit = float(np.delete(scene.excess, rows).min(initial=np.inf))
+        if bounded:
+            ellipse = Ellipse(scene.hand, scene.goals, limit * np.abs(scene.goals - scene.hand))
+            made = roadmap_within(scene.centre[rows], self._radius[rows], scene.goals, ellipse)
+        else:
+            made = roadmap(scene.centre[rows], self._radius[rows], scene.goals)
+        return Level(plan(made, scene.hand, self._velocity), {row: k for k, row in enumerate(rows)}, limit)

@@ -1,0 +1,44 @@
+"""The search against brute force over all patterns of sides, on random scenes."""
+
+import numpy as np
+import pytest
+from homotopy_brute_force import shortest_by_pattern
+from homotopy_scenes import CLEARANCE, GOAL, find, patterns, random_scene
+
+K = 6
+TIE = 0.01
+
+
+def compared(seed: int):
+    rng = np.random.default_rng(seed)
+    obstacles = random_scene(rng, int(rng.integers(1, 7)))
+    expected = shortest_by_pattern(np.zeros(2), GOAL, obstacles.centre, obstacles.radius + CLEARANCE)
+    return find(obstacles, k=K), patterns(find(obstacles, k=K), obstacles.ids), expected
+
+
+@pytest.mark.parametrize('batch', range(10))
+def test_the_shortest_classes_are_found_and_none_is_invented(batch):
+    for seed in range(25 * batch, 25 * (batch + 1)):
+        found, ours, expected = compared(seed)
+        assert len(ours) == len(found.candidates) == min(K, len(expected)), f'scene {seed}'
+        assert set(ours) <= set(expected), f'scene {seed}: invented'
+        last = max(ours.values())
+        missed = [pattern for pattern, length in expected.items() if pattern not in ours and length < last * (1 - TIE)]
+        assert not missed, f'scene {seed}: missed {missed}'
+
+
+@pytest.mark.parametrize('batch', range(4))
+def test_lengths_are_those_of_the_shortest_paths(batch):
+    for seed in range(1000 + 25 * batch, 1000 + 25 * (batch + 1)):
+        _, ours, expected = compared(seed)
+        for pattern, length in ours.items():
+            # the brute force's polygons go round the circles, so its arcs are up to 0.6 % longer
+            assert expected[pattern] * (1 - 0.006) <= length <= expected[pattern] * (1 + 1e-6), f'scene {seed}'
+
+
+def test_brute_force_knows_one_circle_in_closed_form():
+    expected = shortest_by_pattern(np.zeros(2), GOAL, np.array([[0.175, 0.0]]), np.array([0.05]))
+    arc = np.pi - 2 * np.arccos(0.05 / 0.175)
+    exact = 2 * np.sqrt(0.175**2 - 0.05**2) + 0.05 * arc
+    assert set(expected) == {(1,), (-1,)}
+    assert expected[(1,)] == pytest.approx(exact, rel=0.006)

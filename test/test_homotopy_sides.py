@@ -1,0 +1,89 @@
+"""The side on which a path really passes an obstacle, by the angle it sweeps."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from foc_ros.foc.errors import SceneError
+from foc_ros.foc.homotopy import path_sides, swept_angles
+from foc_ros.foc.records import LEFT, RIGHT, make_obstacles
+
+CASES = Path(__file__).parents[2] / 'shared' / 'reference' / 'cases.json'
+ABEAM = make_obstacles([[0.5, 0.0]], 0.1, ids=('post',))
+
+
+def bowed(amplitude: float, m: int = 101) -> np.ndarray:
+    share = np.linspace(0.0, 1.0, m)
+    return np.column_stack([share, amplitude * np.sin(np.pi * share)])
+
+
+def test_left_of_the_direction_of_travel_is_left():
+    assert path_sides(bowed(0.3), ABEAM) == {'post': LEFT}
+    assert path_sides(bowed(-0.3), ABEAM) == {'post': RIGHT}
+    assert path_sides(bowed(0.3)[::-1], ABEAM) == {'post': RIGHT}
+
+
+def test_swept_angle_of_a_quarter_circle_and_of_two_turns():
+    angle = np.linspace(0.0, np.pi / 2, 50)
+    assert swept_angles(np.column_stack([np.cos(angle), np.sin(angle)]), np.zeros((1, 2))) == pytest.approx([np.pi / 2])
+    twice = np.column_stack([np.cos(8 * angle), -np.sin(8 * angle)])
+    assert swept_angles(twice, np.array([[0.0, 0.0], [3.0, 0.0]])) == pytest.approx([-4 * np.pi, 0.0])
+
+
+def test_obstacles_behind_and_beyond_are_not_passed():
+    obstacles = make_obstacles([[-0.1, 0.05], [1.2, 0.0], [0.5, 0.0]], 0.05)
+    assert path_sides(bowed(0.3), obstacles) == {'2': LEFT}
+
+
+def test_an_obstacle_behind_is_passed_by_a_path_that_winds_about_it():
+    loop = np.array([[0.0, 0.0], [-0.1, 0.2], [-0.4, 0.1], [-0.3, -0.2], [0.2, -0.3], [1.0, 0.0]])
+    assert path_sides(loop, make_obstacles([[-0.2, 0.0]], 0.05)) == {'0': RIGHT}
+
+
+def test_no_obstacles_no_sides_and_a_path_of_one_point_passes_nothing():
+    assert path_sides(bowed(0.1), make_obstacles()) == {}
+    assert path_sides(np.zeros((1, 2)), ABEAM) == {}
+
+
+def test_moving_obstacle_is_judged_where_it_is_at_the_time():
+    path = bowed(0.0)
+    crossing = np.stack([np.full(101, 0.5), np.linspace(0.4, -0.4, 101) + 0.1], axis=1)[:, None]
+    # half way, when the hand passes, it has come no nearer than 0.1 m to the left
+    assert path_sides(path, ABEAM, crossing) == {'post': RIGHT}
+    assert path_sides(path, ABEAM, crossing - [0.0, 0.2]) == {'post': LEFT}
+
+
+def test_centres_of_another_number_of_points_are_refused():
+    with pytest.raises(SceneError, match='centres: expected one row for each of the 101 points, got 3 rows'):
+        path_sides(bowed(0.1), ABEAM, np.zeros((3, 1, 2)))
+    with pytest.raises(SceneError, match='path: expected points'):
+        path_sides(np.zeros((3, 3)), ABEAM)
+
+
+@settings(max_examples=80, deadline=None, derandomize=True)
+@given(st.floats(-0.9, 0.9), st.floats(-3.0, 3.0), st.floats(0.05, 0.95), st.floats(-0.8, 0.8))
+def test_side_of_a_bowed_path_is_that_of_the_line_above_or_below(amplitude, angle, x, y):
+    path = bowed(amplitude, 400)
+    height = amplitude * np.sin(np.pi * x)
+    if abs(y - height) < 1e-3:
+        return
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    obstacles = make_obstacles([turn @ [x, y]], 0.01)
+    assert path_sides(path @ turn.T, obstacles) == {'0': LEFT if height > y else RIGHT}
+
+
+@pytest.mark.skipif(not CASES.is_file(), reason='optional data ../shared/reference/cases.json is not there')
+def test_sides_of_the_reference_cases():
+    for case in json.loads(CASES.read_text()):
+        share = np.arange(case['steps'] + 1) / case['steps']
+        start, goal = np.array(case['start'], float), np.array(case['goal'], float)
+        way = (goal - start) / np.hypot(*(goal - start))
+        bow = case['guess']['amplitude'] * np.sin(np.pi * share)[:, None] * np.array([-way[1], way[0]])
+        path = start + (share**3 * (10 - 15 * share + 6 * share**2))[:, None] * (goal - start) + bow
+        obstacles = make_obstacles([[o['x'], o['y']] for o in case['obstacles']], [o['radius'] for o in case['obstacles']])
+        real = path_sides(path, obstacles)
+        assert [real[identity] for identity in obstacles.ids] == case['converged_qp']['sides']
