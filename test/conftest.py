@@ -4,12 +4,17 @@ import os
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import settings
 from message_helpers import message_types
 from ros_helpers import Graph, graph, prepare_environment
 
 from foc_ros.conversions.types import MessageTypes
 
 prepare_environment()
+
+# The same examples in every run, and no time limit: a busy machine is no failure.
+settings.register_profile('seeded', derandomize=True, deadline=None)
+settings.load_profile('seeded')
 
 REQUIRE_ROS = os.environ.get('FOC_ROS_REQUIRE_ROS') == '1'
 # Skips that remain skips: they want data that does not come with the sources.
