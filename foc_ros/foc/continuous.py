@@ -15,7 +15,7 @@ from .chance import eta_of_k, k_of_eta
 from .deadline import NEVER, Deadline, OutOfTimeError
 from .problem import Problem
 from .records import Array, Status
-from .sequential import Converged, converge
+from .sequential import Converged, converge, follow
 from .solver import WorkingSet
 from .start import Start
 
@@ -92,17 +92,28 @@ class _Walker:
         self.qp_solves = 0
         self.best: Point | None = None
 
-    def point(self, s: float, guess: Array, working: WorkingSet) -> Point | None:
-        converged = converge(self.problem, guess, working, *self.curve.at(s), self.deadline)
+    def point(self, s: float, guess: Array, working: WorkingSet, *, verified: bool = False) -> Point | None:
+        """Converge at s from a guess (N, 2); verified: by a QP that stays, not by Newton steps."""
+        return self.judged(s, converge(self.problem, guess, working, *self.curve.at(s), self.deadline, verified=verified))
+
+    def beside(self, s: float, neighbour: Point) -> Point | None:
+        """Converge at s from a neighbour: by Newton steps where its active rows stay the same, else by QPs."""
+        followed = follow(self.problem, neighbour.converged, *self.curve.at(s))
+        if followed is not None:
+            return self.judged(s, followed)
+        return self.point(s, neighbour.converged.positions, neighbour.converged.solution.active)
+
+    def verified(self, point: Point) -> Point | None:
+        """Return the same point as a QP has it."""
+        return self.point(point.s, point.converged.positions, point.converged.solution.active, verified=True)
+
+    def judged(self, s: float, converged: Converged | None) -> Point | None:
         if converged is None:
             return None
         self.qp_solves += converged.qp_solves
         point = Point(s, converged, assess(self.problem, converged.control))
         self.best = point if self.best is None or point.k > self.best.k else self.best
         return point
-
-    def beside(self, s: float, neighbour: Point) -> Point | None:
-        return self.point(s, neighbour.converged.positions, neighbour.converged.solution.active)
 
 
 def walk(problem: Problem, start: Start, curve: Curve, deadline: Deadline = NEVER) -> Walk:
@@ -126,7 +137,9 @@ def _walk(walker: _Walker, start: Start) -> Walk:
         message = f'eta {problem.eta:g} is out of reach: the largest on the curve is {eta_of_k(low.k):.4g}, at s = {low.s:.3g}'
         return Walk(Status.ETA_UNREACHABLE, message, low, walker.qp_solves)
     point = high if low is high else _root(walker, low, high, wanted)
-    if not point.converged.stays:
+    checked = walker.verified(point)
+    point = checked if checked is not None and checked.k >= wanted * (1 - CLOSE) else point
+    if checked is not point or not point.converged.stays:
         return Walk(Status.ITERATION_LIMIT, 'the linearisation had not settled when its QPs ran out', point, walker.qp_solves)
     return Walk(Status.SOLVED, 'solved', point, walker.qp_solves)
 
