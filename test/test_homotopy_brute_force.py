@@ -5,18 +5,21 @@ import pytest
 from homotopy_brute_force import shortest_by_pattern
 from homotopy_scenes import CLEARANCE, GOAL, find, patterns, random_scene
 
+from foc_ros.foc.records import make_obstacles
+
 K = 6
 TIE = 0.01
 
 
 def compared(seed: int):
     rng = np.random.default_rng(seed)
-    obstacles = random_scene(rng, int(rng.integers(1, 7)))
+    obstacles = random_scene(rng, int(rng.integers(1, 9)))
     expected = shortest_by_pattern(np.zeros(2), GOAL, obstacles.centre, obstacles.radius + CLEARANCE)
-    return find(obstacles, k=K), patterns(find(obstacles, k=K), obstacles.ids), expected
+    found = find(obstacles, k=K)
+    return found, patterns(found, obstacles.ids), expected
 
 
-@pytest.mark.parametrize('batch', range(10))
+@pytest.mark.parametrize('batch', range(20))
 def test_the_shortest_classes_are_found_and_none_is_invented(batch):
     for seed in range(25 * batch, 25 * (batch + 1)):
         found, ours, expected = compared(seed)
@@ -42,3 +45,12 @@ def test_brute_force_knows_one_circle_in_closed_form():
     exact = 2 * np.sqrt(0.175**2 - 0.05**2) + 0.05 * arc
     assert set(expected) == {(1,), (-1,)}
     assert expected[(1,)] == pytest.approx(exact, rel=0.006)
+
+
+def test_a_way_over_two_circles_and_back_down_between_them_and_a_third():
+    centre = np.array([[0.1866, 0.0914], [0.2434, 0.0164], [0.1862, 0.0495]])
+    radius = np.array([0.0355, 0.029, 0.0346])
+    obstacles = make_obstacles(centre, radius - CLEARANCE)
+    found = patterns(find(obstacles), obstacles.ids)
+    assert found[1, -1, 1] == pytest.approx(0.511, abs=1e-3)
+    assert found.keys() == shortest_by_pattern(np.zeros(2), GOAL, centre, radius).keys()

@@ -56,8 +56,8 @@ class Runs:
 
     tail, head: nodes; node 2 k + (s > 0) is circle k passed in sense s; length [m]; heading, complex of length 1; start, end,
     complex [m]; leave, reach: angles of these on their circles, in [0, 2 pi]; clear: angle by which a path may follow the
-    circle from the end before it meets an overlapping one; crossing (runs, n): of the rays from the centres, by the run, plus
-    by the way to its start and less by the way to its end, each along its circle anticlockwise from angle 0.
+    circle from the end before it meets an overlapping one. Of the rays from the centres, (runs, n): crossing by the run and by
+    the way to its start, along its circle anticlockwise from angle 0; way_in: crossings by the way to its end likewise.
     """
 
     tail: Index
@@ -70,6 +70,7 @@ class Runs:
     reach: Array
     clear: Array
     crossing: Counts
+    way_in: Counts
 
     @cached_property
     def lists(self) -> Lists:
@@ -115,13 +116,13 @@ def runs(field: Circles, c: Complex, r: Array, ends: tuple[Index, Index, Index, 
     leave, reach = np.angle(from_i) % TURN, np.angle(from_j) % TURN
     start_seen, way_out = _seen(field, i, start, from_i)
     end_seen, way_in = _seen(field, j, end, from_j)
-    crossing = way_out + straight(start_seen, end_seen) - way_in
+    crossing = way_out + straight(start_seen, end_seen)
     clear = np.full(len(i), TURN)
     if field.overlapping:
         on = np.flatnonzero(j < field.n)
         ahead = s_j[on, None] * (field.blocker[j[on]] - reach[on, None]) % TURN
         clear[on] = np.fmin(TURN, np.fmin.reduce(ahead, axis=1, initial=TURN))
-    return Runs(2 * i + (s_i > 0), 2 * j + (s_j > 0), length, u, start, end, leave, reach, clear, crossing)
+    return Runs(2 * i + (s_i > 0), 2 * j + (s_j > 0), length, u, start, end, leave, reach, clear, crossing, way_in)
 
 
 def _seen(field: Circles, circle: Index, point: Complex, offset: Complex) -> tuple[Complex, Counts]:

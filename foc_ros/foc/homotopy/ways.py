@@ -50,10 +50,14 @@ class Plan:
 
 
 class _Maze(NamedTuple):
-    """What each step asks for. Per run: least distance left to the goal, crossings; per circle: crossings of a whole turn."""
+    """What each step asks for.
+
+    Per run: to_go: least distance left to the goal [m]; crossed and way_in: its crossings; per circle: those of a whole turn.
+    """
 
     to_go: list[float]
     crossed: list[int]
+    way_in: list[int]
     whole: list[int]
 
 
@@ -74,7 +78,7 @@ def ways(plan: Plan, goal: int, named: tuple[int, ...], bound: float, states: in
     node, departures, radius = 2 * (n + goal) + 1, plan.roadmap.departures[goal], plan.roadmap.radius
     heads, length, leave, reach, clear = plan.table[:5]
     maze = _maze(plan, goal, named)
-    to_go, crossed, whole = maze
+    to_go, crossed, way_in, whole = maze
     ones = sum(1 << BITS * digit for digit in range(len(named)))
     zero, fours, eights = BIAS * ones, 4 * ones, 8 * ones
     heap = _first(plan, node, zero, maze)
@@ -91,9 +95,10 @@ def ways(plan: Plan, goal: int, named: tuple[int, ...], bound: float, states: in
             yield Way(key, _trace(trail), unpacked(signature, len(named)))
             continue
         here, circle, anticlockwise, arrival, free = len(trail) - 1, heads[run] >> 1, heads[run] & 1, reach[run], clear[run]
+        along = signature - way_in[run]
         for following in departures[heads[run]]:
             angle = leave[following] - arrival if anticlockwise else arrival - leave[following]
-            after = signature + crossed[following]
+            after = along + crossed[following]
             if angle < -BACK:
                 angle += TURN
                 after += whole[circle] if anticlockwise else -whole[circle]
@@ -128,10 +133,11 @@ def _trace(trail: list[tuple[int, int]]) -> tuple[int, ...]:
 
 
 def _maze(plan: Plan, goal: int, named: tuple[int, ...]) -> _Maze:
-    to_go, crossed, whole = _inner_maze(plan.roadmap, goal, named)
+    to_go, crossed, way_in, whole = _inner_maze(plan.roadmap, goal, named)
     target = complex(plan.roadmap.circles.centre[plan.roadmap.circles.n + goal])
-    own = [abs(end - target) for end in plan.start.lists.end]
-    return _Maze(to_go + own, crossed + packed(plan.start.crossing[:, named]), whole)
+    start = plan.start
+    own = [abs(end - target) for end in start.lists.end]
+    return _Maze(to_go + own, crossed + packed(start.crossing[:, named]), way_in + packed(start.way_in[:, named]), whole)
 
 
 @lru_cache(maxsize=64)
@@ -140,4 +146,4 @@ def _inner_maze(roadmap: Roadmap, goal: int, named: tuple[int, ...]) -> _Maze:
     circles, runs = roadmap.circles, roadmap.runs
     to_go = np.abs(runs.end - circles.centre[circles.n + goal]).tolist()
     whole = circles.held[: circles.n, named].astype(np.int64)
-    return _Maze(to_go, packed(runs.crossing[:, named]), packed(whole))
+    return _Maze(to_go, packed(runs.crossing[:, named]), packed(runs.way_in[:, named]), packed(whole))
