@@ -16,15 +16,19 @@ from .likelihood import most_likely
 from .noise import noise_per_step
 from .outcomes import Earlier, solve_candidates
 from .problem import Problem, rest_to_goal
-from .records import NANOSECONDS, Array, HandState, Obstacles, Outcome, Prediction, Solution, Status
+from .records import NANOSECONDS, Array, Candidate, HandState, Obstacles, Outcome, Prediction, Solution, Status
 from .replanning import triple_integrator_error_map
 
 
 @dataclass(frozen=True)
 class Memory:
-    """What one prediction hands to the next: the label that was the most likely, and what it solved, by label, at its stamp."""
+    """What one prediction hands to the next.
+
+    most_likely: label; candidates: the ways followed; solutions: by label, found at stamp_ns.
+    """
 
     most_likely: str | None = None
+    candidates: tuple[Candidate, ...] = ()
     solutions: Mapping[str, Solution] = field(default_factory=dict)
     stamp_ns: int = 0
 
@@ -37,7 +41,7 @@ def predict(config: Config, hand: HandState, obstacles: Obstacles, goals: Array,
     began = time.perf_counter()
     durations = [time_to_go(hand, goal, config.duration) for goal in goals]
     problems = [reaching_problem(config, hand, obstacles, *pair) for pair in zip(goals, durations, strict=True)]
-    found = search(hand.mean, goals, obstacles, config.homotopy, durations, config.foc.steps)
+    found = search(hand.mean, goals, obstacles, config.homotopy, durations, config.foc.steps, memory.candidates)
     earlier = Earlier(memory.solutions, (hand.stamp_ns - memory.stamp_ns) / NANOSECONDS)
     outcomes = solve_candidates(found.candidates, problems, config.foc, config.likelihood.beta, hand.effort_spent, earlier)
     outcomes = [_seen(outcome, problems[outcome.candidate.goal], hand) for outcome in outcomes]
@@ -49,7 +53,8 @@ def predict(config: Config, hand: HandState, obstacles: Obstacles, goals: Array,
     seconds = time.perf_counter() - began
     prediction = Prediction(hand.stamp_ns, hand.frame_id, hand.height, tuple(outcomes), best, notes, seconds)
     useful = (outcome for outcome in outcomes if outcome.solution.status in (Status.SOLVED, Status.ETA_UNREACHABLE))
-    return prediction, Memory(best, {outcome.candidate.label: outcome.solution for outcome in useful}, hand.stamp_ns)
+    solutions = {outcome.candidate.label: outcome.solution for outcome in useful}
+    return prediction, Memory(best, found.candidates, solutions, hand.stamp_ns)
 
 
 def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: Array, duration_s: float) -> Problem:
