@@ -61,6 +61,19 @@ def test_a_ring_around_the_hand_has_no_way_through() -> None:
     assert prediction.notes['no_way'] == 1
 
 
+def test_of_ten_thousand_obstacles_those_near_the_way_decide() -> None:
+    near = [[0.1, 0.02], [0.2, -0.02]]
+    angles = np.random.default_rng(7).uniform(0.0, 2.0 * np.pi, 9_998)
+    far = [0.15, 0.0] + np.stack((np.cos(angles), np.sin(angles)), axis=1) * np.linspace(1.0, 3.0, 9_998)[:, None]
+    few, many = predicted(make_obstacles(near, 0.02, 0.001)), predicted(make_obstacles([*near, *far], 0.02, 0.001))
+    assert many.notes['culled'] == 10_000 - CONFIG.scene.max_obstacles
+    assert 'culled' not in few.notes
+    assert [outcome.candidate.label for outcome in many.solved] == [outcome.candidate.label for outcome in few.solved]
+    for one, other in zip(many.solved, few.solved, strict=True):
+        assert one.likelihood == pytest.approx(other.likelihood, rel=1e-6)
+        assert np.abs(one.solution.path - other.solution.path).max() < 1e-6
+
+
 def test_a_hand_at_its_goal_stays_there() -> None:
     (only,) = predicted(make_obstacles([[0.15, 0.0]], [0.03]), np.zeros((1, 2))).solved
     assert abs(only.solution.path).max() < 0.01

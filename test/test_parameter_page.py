@@ -1,6 +1,7 @@
 """doc/parameters.md says what the configuration says."""
 
 import importlib.util
+import re
 from pathlib import Path
 
 from foc_ros.foc.config import parameters
@@ -15,3 +16,10 @@ def test_the_page_is_current() -> None:
     assert script.PAGE.read_text('utf-8') == script.page(), 'run: python scripts/make_parameter_page.py'
     for parameter in parameters():
         assert f'| `{parameter.name}` |' in script.page()
+
+
+def test_every_parameter_is_read_somewhere() -> None:
+    """A setting that nothing reads would be accepted and ignored."""
+    code = ' '.join(file.read_text('utf-8') for file in (ROOT / 'foc_ros').rglob('*.py') if file.name != 'config.py')
+    unread = [parameter.name for parameter in parameters() if not re.search(rf'\.{parameter.name.split(".")[-1]}\b', code)]
+    assert unread == []

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .config import REFERENCE_STEP_S, Config
+from .culling import relevant
 from .duration import time_to_go
 from .dynamics import triple_integrator_horizon
 from .homotopy import search
@@ -40,6 +41,7 @@ def predict(config: Config, hand: HandState, obstacles: Obstacles, goals: Array,
     """
     began = time.perf_counter()
     durations = [time_to_go(hand, goal, config.duration) for goal in goals]
+    given, obstacles = obstacles, relevant(obstacles, hand.mean[:2], goals, max(durations), config.scene.max_obstacles)
     problems = [reaching_problem(config, hand, obstacles, *pair) for pair in zip(goals, durations, strict=True)]
     found = search(hand.mean, goals, obstacles, config.homotopy, durations, config.foc.steps, memory.candidates)
     earlier = Earlier(memory.solutions, (hand.stamp_ns - memory.stamp_ns) / NANOSECONDS)
@@ -48,8 +50,8 @@ def predict(config: Config, hand: HandState, obstacles: Obstacles, goals: Array,
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
     best = most_likely(labels, values, memory.most_likely, config.likelihood.margin)
-    merged = len(found.candidates) - len(outcomes)
-    notes = dict(found.notes) | ({'merged': merged} if merged else {})
+    dropped = {'merged': len(found.candidates) - len(outcomes), 'culled': len(given) - len(obstacles)}
+    notes = dict(found.notes) | {name: count for name, count in dropped.items() if count}
     seconds = time.perf_counter() - began
     prediction = Prediction(hand.stamp_ns, hand.frame_id, hand.height, tuple(outcomes), best, notes, seconds)
     useful = (outcome for outcome in outcomes if outcome.solution.status in (Status.SOLVED, Status.ETA_UNREACHABLE))
