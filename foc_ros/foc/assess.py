@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .chance import CERTAIN_K, achieved_k, eta_of_k, expectation, k_of_eta, variance
+from .chance import CERTAIN_K, achieved_k, eta_of_k, expectation, variance
 from .problem import Problem
 from .records import Array
 
@@ -44,22 +43,8 @@ def assess(problem: Problem, control: Array) -> Assessment:
     mean = expectation(offset, np.zeros(offset.shape[1:]), problem.size[0])
     var = variance(offset, problem.position_variance(control), problem.size[1], problem.obstacles.centre_covariance)
     k = achieved_k(mean, np.sqrt(var))
-    inside = _inside_now(problem)
+    inside = problem.inside_margin
     if inside.any():
         leaving = problem.horizon.dt * np.arange(1, problem.horizon.steps + 1) < problem.recovery_s
         k[np.ix_(inside, leaving)] = np.inf
     return Assessment(k, tuple(np.array(problem.obstacles.ids, dtype=object)[inside]))
-
-
-def _inside_now(problem: Problem) -> NDArray[np.bool_]:
-    """Whether the hand is now inside the margin of each obstacle, (m,) bool: always False without a recovery time."""
-    obstacles = problem.obstacles
-    if problem.recovery_s <= 0 or not len(obstacles):
-        return np.zeros(len(obstacles), dtype=bool)
-    offset = (problem.initial_mean[:2] - obstacles.centre)[:, None, :]
-    now = problem.free_covariance[0]
-    covariance = np.array([[now[0, 0]], [now[1, 1]], [now[0, 1]]])
-    mean = expectation(offset, np.zeros((1, 2)), problem.size[0])
-    var = variance(offset, covariance, problem.size[1], obstacles.centre_covariance)
-    inside: NDArray[np.bool_] = achieved_k(mean, np.sqrt(var))[:, 0] < k_of_eta(problem.eta)
-    return inside

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .chance import centres, size_moments
+from .chance import achieved_k, centres, expectation, k_of_eta, size_moments, variance
 from .dynamics import Horizon
 from .errors import SceneError
 from .noise import position_variance_maps, stacked_noise
@@ -80,6 +80,19 @@ class Problem(Record):
         s = np.minimum(self.horizon.dt * np.arange(1, self.horizon.steps + 1) / self.recovery_s, 1.0)
         left: Array = 1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
         return left
+
+    @cached_property
+    def inside_margin(self) -> NDArray[np.bool_]:
+        """Whether the hand is now inside the margin of each obstacle, (m,): never, without a recovery time."""
+        if self.recovery_s <= 0 or not len(self.obstacles):
+            return np.zeros(len(self.obstacles), dtype=np.bool_)
+        offset = (self.initial_mean[:2] - self.obstacles.centre)[:, None, :]
+        now = self.free_covariance[0]
+        covariance = np.array([[now[0, 0]], [now[1, 1]], [now[0, 1]]])
+        mean = expectation(offset, np.zeros((1, 2)), self.size[0])
+        var = variance(offset, covariance, self.size[1], self.obstacles.centre_covariance)
+        inside: NDArray[np.bool_] = achieved_k(mean, np.sqrt(var))[:, 0] < k_of_eta(self.eta)
+        return inside
 
     @cached_property
     def size(self) -> tuple[Array, Array]:

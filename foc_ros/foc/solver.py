@@ -28,6 +28,8 @@ ELASTICITY = 1e-6
 """Softness of elastic rows, as a share of what a unit multiplier moves them: a lone row gives way by a millionth."""
 IMMOVABLE = 1e-12
 """Share of a row's freedom that the goal leaves it, below which the goal fixes it: the last step's, above all."""
+RESIDUAL = 1e-6
+"""What rows may miss, and rows with a multiplier may have to spare, before the full QP is solved instead; relative."""
 FARKAS = 1e-4
 """How little, relative to what is missing, the combination of rows may move that proves a contradiction."""
 NEGLIGIBLE = 1e-7
@@ -133,7 +135,11 @@ def _with_rows(
         # Farkas: a combination y >= 0 of the rows that moves nothing and yet is missing something
         ray = answer.x / max(float(answer.x.max()), 1e-300)
         return Verdict.CONTRADICTION if np.abs(gram @ ray).max() < FARKAS * float(missing @ ray) / size else Verdict.UNSOLVED
-    multipliers = _polished(gram, missing / size, answer.x) * (scale * size)
+    multipliers = _polished(gram, missing / size, answer.x)
+    left = gram @ multipliers - missing / size
+    if left.min() < -RESIDUAL or np.abs(left * multipliers).max() > RESIDUAL * max(float(multipliers.max()), 1.0):
+        return Verdict.UNSOLVED
+    multipliers *= scale * size
     return qp.cost.goal_control + multipliers @ pressed, multipliers
 
 
