@@ -2,7 +2,7 @@
 
 C = R^2 - |p - o|^2 <= 0 with R ~ N(mu_R, sigma_R^2), and p - o Gaussian. Linearised at a guess p*, with d = p* - mean(o):
 E[C] = mu_R^2 + sigma_R^2 - |d|^2 - 2 d.(mean(p) - p*),  Var[C] = 4 mu_R^2 sigma_R^2 + 2 sigma_R^4 + 4 d' P d,
-P the covariance of p - o. Cantelli: E[C] + k sqrt(Var[C]) <= 0 gives Pr(C <= 0) >= k^2 / (1 + k^2) (paper, equations 7-13).
+P the covariance of p - o. Cantelli: E[C] + k sqrt(Var[C]) <= 0 gives Pr(C <= 0) >= k^2 / (1 + k^2) (paper, equations 8-15).
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ STRATEGIES = ('lv', 'hc', 'optimal', 'algorithm1', 'fixed')
 PLANES = ('xy', 'xz', 'yz')
 DURATION_MODELS = ('fixed', 'fitts')
 REFERENCE_STEP_S = 0.02
-"""Step for which the node's noise is quoted (spec section 1): c is scaled by sqrt(0.02 / dt)."""
+"""Step for which the node's noise is quoted (doc/model.md): c is scaled by sqrt(0.02 / dt)."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ def _p(default: Any, meaning: str, unit: str = '', low: float | None = None, hig
 
 @dataclass(frozen=True)
 class FocConfig:
-    """The forward optimal control (spec sections 1-4)."""
+    """The forward optimal control."""
 
     steps: int = _p(50, 'number of control steps N of the horizon', '', 5, 400)
     eta: float = _p(0.9, 'wanted probability of avoiding each obstacle at each step', '', 0.0, 0.999)
@@ -59,7 +59,7 @@ class FocConfig:
 
 @dataclass(frozen=True)
 class DurationConfig:
-    """How long the movement takes (spec section 8)."""
+    """How long the movement takes."""
 
     model: str = _p('fitts', 'duration of a movement: fixed, or by Fitts law from its distance', choices=DURATION_MODELS)
     fixed_s: float = _p(1.0, 'duration of model fixed', 's', 0.05, 60.0)
@@ -72,7 +72,7 @@ class DurationConfig:
 
 @dataclass(frozen=True)
 class EstimatorConfig:
-    """The Kalman filter of the hand (spec section 8)."""
+    """The Kalman filter of the hand."""
 
     position_stddev: float = _p(0.001, 'standard deviation of a measured position', 'm', 1e-7, 1.0)
     jerk_density: float = _p(5.0, 'root of the spectral density of the jerk that the filter expects', 'm/s^2.5', 1e-6, 1e6)
@@ -82,7 +82,7 @@ class EstimatorConfig:
 
 @dataclass(frozen=True)
 class HomotopyConfig:
-    """Which ways round are considered (spec section 6)."""
+    """Which ways round are considered."""
 
     max_candidates: int = _p(4, 'number of homotopy classes solved, over all goals', '', 1, 64)
     clearance: float = _p(0.005, 'distance from an obstacle that the hand needs: a narrower gap is closed', 'm', 0.0, 1.0)
@@ -90,7 +90,7 @@ class HomotopyConfig:
 
 @dataclass(frozen=True)
 class LikelihoodConfig:
-    """From costs to likelihoods (spec section 7)."""
+    """From costs to likelihoods."""
 
     beta: float = _p(0.5, 'exponent of the cost ratio', '', 0.0, 100.0)
     margin: float = _p(0.05, 'lead in likelihood at which the most likely class changes', '', 0.0, 1.0)

@@ -87,7 +87,7 @@ class ReachingQP:
 
 
 def effort_cost(problem: Problem, lam: float) -> Cost:
-    """Return J_aug: H = 2 (1 + variance weights + lambda sum_t (V_xx + V_yy)) (paper, equation 14), with the problem's goal."""
+    """Return J_aug: H = 2 (1 + variance weights + lambda sum_t (V_xx + V_yy)) (paper, equation 16), with the problem's goal."""
     return Cost(2.0 * (1.0 + problem.weighted_variance + lam * problem.summed_variance), None, *problem.goal_rows)
 
 
@@ -125,6 +125,6 @@ def wanted_distance(problem: Problem, tau: float) -> Array:
 
 
 def clearance_qp(problem: Problem, cost: Cost, guess: Array, tau: float, *, literal: bool = False) -> ReachingQP:
-    """Build the paper's reformulated problem (equation 14) at a guess (N, 2): E[C] + tau <= 0; its lambda is in the cost."""
+    """Build the paper's reformulated problem (equation 16) at a guess (N, 2): E[C] + tau <= 0; its lambda is in the cost."""
     normals, limits = half_planes(problem, guess, tau, literal=literal)
     return ReachingQP(cost, problem.position_map, normals, limits)

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 NANOSECONDS = 1_000_000_000
 LEFT, RIGHT = 1, -1
-"""Side on which a path passes an obstacle, seen in the direction of travel (spec section 4, `sides`)."""
+"""Side on which a path passes an obstacle, seen in the direction of travel."""
 
 
 class Record:
