@@ -17,6 +17,8 @@ from .records import Array, Status
 from .solver import QPSolution, WorkingSet, solve
 
 MAX_ITERATIONS = 500
+LARGEST_LAMBDA = 1e150
+"""Where the loop ends: with delta small and Delta large, lambda leaves the range of double precision before tau is large enough."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +41,9 @@ def algorithm1(problem: Problem, guess: Array, delta: float, growth: float, xi: 
         before, last = (tau, lam), solution
         if last is not None and assess(problem, last.control).smallest_k < wanted:
             tau, lam = tau + delta, lam * growth
+        if lam > LARGEST_LAMBDA:
+            message = f'lambda = {lam:.3g} after {iteration - 1} QPs, and the surrogate is still violated'
+            return Stepped(Status.ITERATION_LIMIT, message, last, *before, iteration - 1)
         deadline.check()
         qp = clearance_qp(problem, effort_cost(problem, lam), guess, tau, literal=True)
         solution = solve(qp, last.active if last else WorkingSet())
