@@ -1,7 +1,7 @@
 """Whatever is called solved keeps its promise: over 200 random feasible reaches, no obstacle is hit at any step too often.
 
-Every count of noisy movements that stay clear is judged by its Wilson interval, at a level at which all counts of this file together
-would raise a false alarm once in a thousand runs.
+Every count of noisy movements that stay clear is judged by its Wilson interval, at a level at which all counts of this file
+together would raise a false alarm once in a thousand runs.
 """
 
 from collections.abc import Callable
@@ -55,7 +55,7 @@ def test_what_is_solved_stays_clear_as_often_as_promised(strategy):
         clear = largest_share_clear(made.problem, solution)
         assert solution.eta >= promised(made, solution, strategy) - 1e-6, f'seed {made.seed}'
         assert clear >= solution.eta, f'seed {made.seed}'
-        # The circle lies within its tangent, and what is left of the constraint is nearly normal: k standard deviations are Phi(k).
+        # The circle lies within its tangent, and the linear constraint is nearly normal: k standard deviations are Phi(k).
         assert clear >= NormalDist().cdf(k_of_eta(solution.eta)), f'seed {made.seed}'
         checked += 1
     assert checked >= least

@@ -18,7 +18,7 @@ from .solver import QPSolution, WorkingSet, solve
 
 MAX_ITERATIONS = 500
 LARGEST_LAMBDA = 1e150
-"""Where the loop ends: with delta small and Delta large, lambda leaves the range of double precision before tau is large enough."""
+"""Where the loop ends: with a large growth, lambda leaves the range of double precision before tau is large enough."""
 
 
 @dataclass(frozen=True, eq=False)
