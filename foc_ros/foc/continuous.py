@@ -98,10 +98,12 @@ class _Walker:
 
     def beside(self, s: float, neighbour: Point) -> Point | None:
         """Converge at s from a neighbour: by Newton steps where its active rows stay the same, else by QPs."""
-        followed = follow(self.problem, neighbour.converged, *self.curve.at(s))
-        if followed is not None:
-            return self.judged(s, followed)
-        return self.point(s, neighbour.converged.positions, neighbour.converged.solution.active)
+        near = neighbour.converged
+        return self.near(s, near.positions, near.solution.active, near.solution.multipliers)
+
+    def near(self, s: float, positions: Array, active: WorkingSet, multipliers: Array) -> Point | None:
+        followed = follow(self.problem, positions, active, multipliers, *self.curve.at(s))
+        return self.point(s, positions, active) if followed is None else self.judged(s, followed)
 
     def verified(self, point: Point) -> Point | None:
         """Return the same point as a QP has it."""
@@ -128,8 +130,10 @@ def walk(problem: Problem, start: Start, curve: Curve, deadline: Deadline = NEVE
 
 def _walk(walker: _Walker, start: Start) -> Walk:
     problem, curve, wanted = walker.problem, walker.curve, k_of_eta(walker.problem.eta)
-    s, stride = (0.0, STRIDE) if start.lam is None else (curve.s_of(start.lam), WARM_STRIDE)
-    first = walker.point(s, start.positions, start.active)
+    if start.lam is None:
+        stride, first = STRIDE, walker.point(0.0, start.positions, start.active)
+    else:
+        stride, first = WARM_STRIDE, walker.near(curve.s_of(start.lam), start.positions, start.active, start.multipliers)
     if first is None:
         return Walk(Status.INFEASIBLE, 'no control meets every linearised obstacle row', None, walker.qp_solves)
     low, high = _bracket(walker, first, wanted, stride)

@@ -83,10 +83,11 @@ def converge(
     raise AssertionError('MAX_QPS is at least 1')
 
 
-def follow(problem: Problem, neighbour: Converged, tau: float, lam: float) -> Converged | None:
-    """Move a solution on to another (tau, lambda) by Newton steps alone; None where its active rows do not stay the same."""
-    active = neighbour.solution.active
-    moved = newton(problem, effort_cost(problem, lam), neighbour.positions, active, neighbour.solution.multipliers, tau)
+def follow(
+    problem: Problem, positions: Array, active: WorkingSet, multipliers: Array, tau: float, lam: float
+) -> Converged | None:
+    """Find the solution near another one, (N, 2), by Newton steps alone; None where its active rows do not stay the same."""
+    moved = newton(problem, effort_cost(problem, lam), positions, active, multipliers, tau)
     return None if moved is None else _touching(moved, active, 0)
 
 
