@@ -12,7 +12,6 @@ from .conversions.diagnostics import ERROR, OK, WARN, Health
 from .foc.pipeline import Pipeline
 from .foc.records import Outcome, Prediction
 from .intake import Intake
-from .topics import HAND
 
 WINDOW = 1000
 """Predictions over which the percentiles are taken."""
@@ -56,18 +55,26 @@ class Monitor:
         self._solve_ms.append(1e3 * prediction.solve_s)
         self._cycle_ms.append(1e3 * (now_s - began_s))
 
+    def withheld(self, kind: str) -> None:
+        """Note that nothing was predicted from a pose that was due."""
+        self._own[f'predict_{kind}'] += 1
+
     def failed(self, error: BaseException) -> None:
         """Note an error that should not happen."""
         self._own['internal_errors'] += 1
         self._error = f'{type(error).__name__}: {error}'
 
-    def health(self, now_s: float, intake: Intake) -> Health:
-        """Return level, message and figures, with everything that the intake and its pipeline counted."""
+    def health(self, now_s: float, intake: Intake, state: str, obstruction: str | None) -> Health:
+        """Return level, message and figures, with everything that the intake and its pipeline counted.
+
+        state: of the managed node; obstruction: why nothing is to be predicted by the clocks.
+        """
         pipeline, seconds = intake.pipeline, max(now_s - self._asked_s, 1e-3)
         totals = Counter(intake.counts) + self._own
         recent = totals - self._before
-        level, message = self._judged(now_s, pipeline, recent)
+        level, message = self._judged(pipeline, recent, state, obstruction)
         values = {
+            'state': state,
             'engaged': str(pipeline.engaged),
             'working frame': pipeline.frame_id if pipeline.frame_id is not None else 'not known yet',
             **_scene_values(pipeline),
@@ -87,20 +94,18 @@ class Monitor:
             entry.received_before = entry.received
         return Health(level, message, values)
 
-    def _judged(self, now_s: float, pipeline: Pipeline, recent: Counter[str]) -> tuple[int, str]:
+    def _judged(self, pipeline: Pipeline, recent: Counter[str], state: str, obstruction: str | None) -> tuple[int, str]:
         if recent['internal_errors']:
             return ERROR, f'{recent["internal_errors"]} internal errors, the last: {self._error}'
+        if state != 'active':
+            return OK, f'{state}: nothing is predicted'
         if not pipeline.engaged:
             return OK, 'disengaged'
         faults = {name: count for name, count in recent.items() if name in FAULTS or not name.startswith(HARMLESS)}
         words = [f'{name} {count}' for name, count in sorted(faults.items())]
-        hand = self._inputs.get(HAND)
-        silence_s = now_s - hand.last_s if hand is not None else 0.0
-        blocked = pipeline.blocked()
+        blocked = pipeline.blocked() or obstruction
         if blocked is not None:
             words.insert(0, f'no prediction: {blocked}')
-        elif silence_s > pipeline.config.estimator.gap_s:
-            words.insert(0, f'hand_pose silent for {silence_s:.1f} s')
         return (WARN, '; '.join(words)) if words else (OK, 'predicting')
 
     def _input_values(self, now_s: float, seconds: float) -> dict[str, str]:

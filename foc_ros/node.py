@@ -1,10 +1,15 @@
 """The ROS 2 node: messages in, predictions out whenever a hand pose is due, health once a second.
 
 The node holds no model and no memory of its own: the pipeline does, driven by the stamps of the messages. So it answers as a
-replay of the same messages does. A player that wants every one of its messages heard waits until each of its publishers has a
-subscription (`Publisher.get_subscription_count()`) and its own subscriptions a publisher, sends the scene, and sends the hand
-only when `/diagnostics` counts the obstacles and goals: what is sent on the hand's best-effort topic before both sides know of
-each other is lost.
+replay of the same messages does. What it adds are clocks: an input that has fallen silent is no input.
+
+It is a managed node. From its configuration on it listens and keeps the scene; it predicts only while it is active, from the
+first hand pose after its activation. With `autostart`, the default, it is active at once.
+
+A player that wants every one of its messages heard waits until each of its publishers has a subscription
+(`Publisher.get_subscription_count()`) and its own subscriptions a publisher, sends the scene, and sends the hand only when
+`/diagnostics` counts the obstacles and goals: what is sent on the hand's best-effort topic before both sides know of each other
+is lost.
 """
 
 from __future__ import annotations
@@ -13,52 +18,112 @@ import traceback
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
-from rclpy.exceptions import ParameterNotDeclaredException
-from rclpy.node import Node
-from rclpy.parameter import Parameter
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from std_srvs.srv import SetBool, Trigger
 
 from .conversions.diagnostics import diagnostic_array
 from .conversions.outputs import output_messages
 from .conversions.types import RclpyTypes
 from .endpoints import INPUTS, advertise, subscribe, waiting
-from .foc.config import Config, updated
-from .foc.errors import ParameterError
-from .foc.pipeline import Pipeline
+from .foc.config import Config
+from .foc.errors import FocError
+from .foc.pipeline import Pipeline, Verdict
+from .freshness import Freshness
 from .intake import Intake
+from .live_parameters import LiveParameters
 from .monitor import Monitor
-from .parameters import KNOWN, config_of, declare_all
+from .parameters import autostart, declare_all
 from .topics import CLOUD, GOAL, GOALS, HAND
+from .transitions import answer_refused_transitions
 
 THROTTLE_S = 5.0
 """Between two log lines of one kind [s]."""
 WHOLE = (GOALS, GOAL, CLOUD)
 """Inputs of which each message says everything: of several waiting, the newest good one holds."""
+SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 
-class FocNode(Node):
-    """Node `foc`. Raises ParameterError where it is started with a parameter out of bounds."""
+class FocNode(LifecycleNode):
+    """Node `foc`. Raises ParameterError where it is started with a parameter out of bounds, FocError where it cannot start."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__('foc', automatically_declare_parameters_from_overrides=True, **options)
-        self.pipeline = Pipeline(declare_all(self, Config()))
-        self.intake = Intake(self.pipeline)
+        self._live = LiveParameters(self, declare_all(self, Config()), self._reconfigure)
+        at_once = autostart(self)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._monitor = Monitor(self._now_s())
         self._types = RclpyTypes()
         # A logger throttles each of its lines by itself: one per input, so that none silences another.
         self._loggers = {role: self.get_logger().get_child(role) for role in INPUTS}
-        self.add_pre_set_parameters_callback(self._prepare_parameters)
-        self.add_on_set_parameters_callback(self._check_parameters)
-        self.add_post_set_parameters_callback(self._apply_parameters)
-        self._outputs = advertise(self)
+        self._state, self._engaged, self._obstacle_to_start = 'unconfigured', True, ''
+        self._inputs: dict[str, Any] = {}
+        self._outputs: dict[str, Any] = {}
+        self._begin()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_service(SetBool, '~/engage', self._engage)
         self.create_service(Trigger, '~/reset', self._reset)
-        self._inputs = subscribe(self, self._receive)
         self.create_timer(1.0, self._publish_health, clock=self._steady)
+        answer_refused_transitions(self)
+        if at_once and (self.trigger_configure() != SUCCESS or self.trigger_activate() != SUCCESS):
+            raise FocError(self._obstacle_to_start)
+
+    def on_configure(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """Begin to listen."""
+        self._begin()
+        try:
+            self._outputs = advertise(self)
+            self._inputs = subscribe(self, self._receive)
+        except Exception as error:
+            self._release()
+            self._obstacle_to_start = ' '.join(str(error).split())
+            self.get_logger().error(f'cannot be configured: {self._obstacle_to_start}')
+            return FAILURE
+        return self._enter('inactive')
+
+    def on_activate(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """Predict from the next hand pose on."""
+        return self._enter('active')
+
+    def on_deactivate(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """Predict no more, but go on listening."""
+        return self._enter('inactive')
+
+    def on_cleanup(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """Forget everything but the parameters."""
+        self._release()
+        self._begin()
+        return self._enter('unconfigured')
+
+    def on_shutdown(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """Let go of the topics, for good."""
+        self._release()
+        return self._enter('finalized')
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Start from the beginning."""
+        return self.on_cleanup(state)
+
+    def _begin(self) -> None:
+        self.pipeline = Pipeline(self._live.config)
+        self.intake, self._freshness, self._monitor = Intake(self.pipeline), Freshness(), Monitor(self._now_s())
+
+    def _release(self) -> None:
+        for subscription in self._inputs.values():
+            self.destroy_subscription(subscription)
+        for publisher in self._outputs.values():
+            self.destroy_publisher(publisher)
+        self._inputs, self._outputs = {}, {}
+
+    def _enter(self, state: str) -> TransitionCallbackReturn:
+        self._state = state
+        self._close_or_open()
+        return SUCCESS
+
+    def _close_or_open(self) -> None:
+        self.pipeline.engage(self._engaged and self._state == 'active')
+
+    def _reconfigure(self, config: Config) -> None:
+        self.pipeline.reconfigure(config)
 
     def _receive(self, role: str, message: Any) -> None:
         """Take a message and all that wait behind it; predict once, from the newest hand pose."""
@@ -72,16 +137,33 @@ class FocNode(Node):
             self._predict()
 
     def _take(self, role: str, message: Any) -> bool:
-        verdict = self.intake.take(role, message)
+        verdict, now_s = self.intake.take(role, message), self._now_s()
         taken = verdict is not None and verdict.taken
-        refused, received = self._monitor.received(role, self._now_s(), taken=taken)
+        refused, received = self._monitor.received(role, now_s, taken=taken)
+        if taken:
+            self._freshness.heard(role, now_s)
+        if verdict is not None and taken and role == HAND:
+            self._note_pose(verdict)
         if not taken:
             text = f'{self.intake.last_refusal} ({refused} of {received} refused so far)'
             self._loggers[role].warning(text, throttle_duration_sec=THROTTLE_S)
         return taken
 
+    def _note_pose(self, verdict: Verdict) -> None:
+        sample, clock_ns = self.intake.sample, self.get_clock().now().nanoseconds
+        assert sample is not None
+        timeout_s = self.pipeline.config.estimator.hand_timeout_s
+        self._freshness.pose(sample.stamp_ns, clock_ns, timeout_s, restarted=verdict.restarted)
+
+    def _obstruction(self) -> tuple[str, str] | None:
+        return self._freshness.obstruction(self._now_s(), self.pipeline.config, self.pipeline.scene.parts)
+
     def _predict(self) -> None:
         began_s = self._now_s()
+        obstruction = self._obstruction()
+        if obstruction is not None:
+            self._monitor.withheld(obstruction[0])
+            return
         try:
             prediction = self.pipeline.predict()
             if prediction is None:
@@ -104,7 +186,9 @@ class FocNode(Node):
         self.get_logger().error(f'internal error: {text}', throttle_duration_sec=THROTTLE_S)
 
     def _publish_health(self) -> None:
-        health = self._monitor.health(self._now_s(), self.intake)
+        obstruction = self._obstruction()
+        words = None if obstruction is None else obstruction[1]
+        health = self._monitor.health(self._now_s(), self.intake, self._state, words)
         name = self.get_fully_qualified_name()
         stamp_ns = self.get_clock().now().nanoseconds
         self._publish(self._diagnostics, diagnostic_array(health, f'{name[1:]}: prediction', name, stamp_ns, self._types))
@@ -114,37 +198,17 @@ class FocNode(Node):
             publisher.publish(message)
 
     def _engage(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        self.pipeline.engage(request.data)
-        response.success, response.message = True, 'engaged' if request.data else 'disengaged'
+        self._engaged = bool(request.data)
+        self._close_or_open()
+        words = 'engaged' if self._engaged else 'disengaged'
+        response.success, response.message = True, words if self._state == 'active' else f'{words}, but {self._state}'
         return response
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self.pipeline.reset()
+        self._freshness.forget()
         response.success, response.message = True, 'the movement is forgotten, the scene is kept'
         return response
-
-    def _prepare_parameters(self, changed: list[Parameter]) -> list[Parameter]:
-        """Name the unknown ones, as rclpy does not; read a whole number as a real one where that is wanted."""
-        unknown = [each.name for each in changed if not self.has_parameter(each.name)]
-        if unknown:
-            raise ParameterNotDeclaredException(unknown)
-        return [
-            Parameter(each.name, value=float(each.value))
-            if each.type_ == Parameter.Type.INTEGER and each.name in KNOWN and isinstance(KNOWN[each.name].default, float)
-            else each
-            for each in changed
-        ]
-
-    def _check_parameters(self, changed: list[Parameter]) -> SetParametersResult:
-        try:
-            updated(self.pipeline.config, {each.name: each.value for each in changed if each.name in KNOWN})
-        except ParameterError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
-
-    def _apply_parameters(self, changed: list[Parameter]) -> None:
-        if any(each.name in KNOWN for each in changed):
-            self.pipeline.reconfigure(config_of(self))
 
     def _now_s(self) -> float:
         return float(self._steady.now().nanoseconds) * 1e-9

@@ -18,8 +18,9 @@ from .foc.errors import ParameterError
 
 NODE_KEYS = ('/**', 'foc', '/foc')
 """Keys of a parameter file under which the node, by its own name, finds its parameters."""
-ROS_OWN = ('use_sim_time', 'start_type_description_service', 'qos_overrides')
-"""Parameters every node has: no business of ours, but they may stand in the same file."""
+AUTOSTART = 'autostart'
+ROS_OWN = ('use_sim_time', 'start_type_description_service', 'qos_overrides', AUTOSTART)
+"""Parameters of the node alone, no business of the predictor; they may stand in the same file."""
 KNOWN = {parameter.name: parameter for parameter in parameters()}
 _WIDTH = 100
 
@@ -116,6 +117,20 @@ def declare_all(node: Any, config: Config) -> Config:
 def config_of(node: Any) -> Config:
     """Return the configuration that a node's declared parameters make."""
     return updated(Config(), {name: node.get_parameter(name).value for name in KNOWN})
+
+
+def autostart(node: Any) -> bool:
+    """Declare the parameter that says whether a managed node activates itself when it is made, and return its value."""
+    from rcl_interfaces.msg import ParameterDescriptor
+
+    given = node.get_parameter(AUTOSTART).value if node.has_parameter(AUTOSTART) else True
+    if not isinstance(given, bool):
+        raise ParameterError(AUTOSTART, 'true or false', repr(given))
+    if node.has_parameter(AUTOSTART):
+        node.undeclare_parameter(AUTOSTART)
+    description = 'configure and activate the node when it starts; false: a manager of lifecycles does'
+    node.declare_parameter(AUTOSTART, given, ParameterDescriptor(description=description, read_only=True), ignore_override=True)
+    return given
 
 
 def _descriptor(parameter: Parameter) -> Any:

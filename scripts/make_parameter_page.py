@@ -14,7 +14,8 @@ Every parameter of the node, of `replay` and of the configuration in Python. Thi
 `foc_ros/foc/config.py` by `scripts/make_parameter_page.py`; `config/foc.yaml` holds the same defaults as a ROS 2 parameter file.
 
 A value outside its range, of the wrong type, or of an unknown name is refused, by name, value and bound, and nothing is changed.
-Read-only parameters are set at the start. In Python, `likelihood.beta` is `Config().likelihood.beta`.
+Read-only parameters are set at the start. The node alone also has `autostart` (true or false, default true, read-only).
+In Python, `likelihood.beta` is `Config().likelihood.beta`.
 """
 
 TABLE = """

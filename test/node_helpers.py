@@ -14,8 +14,8 @@ from foc_ros.conversions.types import RclpyTypes
 TYPES = RclpyTypes()
 ROWS = [(0.15, 0.02, 0.0, 0.03)]
 GOALS = [(0.3, 0.0, 0.0)]
-QUICK = {'foc.steps': 20, 'homotopy.max_candidates': 2}
-"""Parameters with which a prediction takes little time."""
+QUICK = {'foc.steps': 20, 'homotopy.max_candidates': 2, 'scene.timeout_s': 0.0}
+"""Parameters with which a prediction takes little time, and a slow machine is no silent source."""
 RELIABLE_HAND = {'qos_overrides./hand_pose.subscription.reliability': 'reliable'}
 """So that a test can tell when all it published has arrived."""
 
@@ -42,7 +42,7 @@ class Bench:
         from foc_ros.node import FocNode
 
         parameters = QUICK | RELIABLE_HAND | options.pop('parameters', {})
-        ticking = options.pop('ticking', False)
+        ticking, connected = options.pop('ticking', False), options.pop('connected', True)
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
         namespace = options.get('namespace', '')
         self.ros = ros
@@ -61,9 +61,16 @@ class Bench:
         self.publishers = {name: self.player.create_publisher(kind, name, 1000) for name, kind in inputs.items()}
         self.received = {name: ros.collect(self.player, OUTPUTS[name], f'foc/{name}') for name in outputs}
         self.diagnostics = ros.collect(self.player, DiagnosticArray, '/diagnostics')
-        ros.spin_until(self._connected, 'publishers and subscriptions find each other')
+        if connected:
+            self.connect()
+
+    def connect(self) -> None:
+        """Spin until publishers and subscriptions have found each other."""
+        self.ros.spin_until(self._connected, 'publishers and subscriptions')
 
     def _connected(self) -> bool:
+        if set(self.received) - set(self.node._outputs):
+            return False
         heard = all(publisher.get_subscription_count() for publisher in self.publishers.values())
         return heard and all(self.node._outputs[name].get_subscription_count() for name in self.received)
 

@@ -114,23 +114,23 @@ def test_of_several_scenes_waiting_the_newest_good_one_holds(ros: Graph) -> None
 
 
 def test_a_scene_that_is_not_renewed_stops_predictions(ros: Graph) -> None:
-    bench = Bench(ros, parameters={'scene.timeout_s': 0.5})
+    bench = Bench(ros, parameters={'scene.timeout_s': 500.0, 'estimator.gap_s': 60.0, 'rate_hz': 0.1})
     bench.show_scene()
-    bench.move(hand_path(9, rate_hz=10.0))
+    bench.move(pose_stamped(TYPES, (0, 0, 0), (10 + 100 * i) * SECOND) for i in range(9))
     status = bench.health()
     assert len(bench.received['prediction']) == 6
     assert status.level == b'\x01'
-    assert re.search(r'no prediction: obstacles are 0\.\d+ s older than the hand pose', status.message)
+    assert re.search(r'no prediction: obstacles are 800 s older than the hand pose', status.message)
 
 
 def test_a_silent_hand_is_told(ros: Graph) -> None:
-    bench = Bench(ros, parameters={'estimator.gap_s': 0.05})
+    bench = Bench(ros, parameters={'estimator.hand_timeout_s': 0.05})
     bench.show_scene()
     bench.move(hand_path(2))
     ros.spin_for(0.1)
     status = bench.health()
     assert status.level == b'\x01'
-    assert re.match(r'hand_pose silent for \d+\.\d s', status.message)
+    assert re.match(r'no prediction: hand_pose silent for \d+\.\d s', status.message)
 
 
 @pytest.mark.parametrize('where', ['predict', 'output_messages'])

@@ -29,7 +29,19 @@ CONFIGS = {'fixed': CONFIG, 'lv': updated(Config(), {'foc.eta': 0.3, 'foc.steps'
 def node_process(ros: Graph, parameters: str) -> Iterator[subprocess.Popen[str]]:
     """Run the node until the block ends; it must have lived until then, and stop without an error."""
     reliable = 'qos_overrides./hand_pose.subscription.reliability:=reliable'
-    command = [sys.executable, '-m', 'foc_ros', 'node', '--ros-args', '--params-file', parameters, '-p', reliable]
+    command = [
+        sys.executable,
+        '-m',
+        'foc_ros',
+        'node',
+        '--ros-args',
+        '--params-file',
+        parameters,
+        '-p',
+        reliable,
+        '-p',
+        'scene.timeout_s:=0.0',
+    ]
     process = subprocess.Popen(
         command, cwd=ROOT, env=ros.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )

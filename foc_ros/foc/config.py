@@ -78,6 +78,9 @@ class EstimatorConfig:
     jerk_density: float = _p(5.0, 'root of the spectral density of the jerk that the filter expects', 'm/s^2.5', 1e-6, 1e6)
     onset_speed: float = _p(0.05, 'speed above which a movement has begun; it has ended below half of it', 'm/s', 1e-4, 10.0)
     gap_s: float = _p(0.5, 'gap between samples beyond which the filter starts anew', 's', 0.001, 60.0)
+    hand_timeout_s: float = _p(
+        0.5, 'silence of the hand, or age of a pose, in the node beyond which nothing is predicted; 0: never', 's', 0.0, 1e6
+    )
 
 
 @dataclass(frozen=True)
@@ -100,7 +103,13 @@ class LikelihoodConfig:
 class SceneConfig:
     """What is taken from the scene topics."""
 
-    timeout_s: float = _p(2.0, 'age of the obstacles, by stamp, beyond which nothing is predicted; 0: never', 's', 0.0, 1e6)
+    timeout_s: float = _p(
+        2.0,
+        'age of the obstacles, by stamp and in the node by silence, beyond which nothing is predicted; 0: never',
+        's',
+        0.0,
+        1e6,
+    )
     max_obstacles: int = _p(64, 'obstacles considered; beyond it the ones farthest from the way are left out', '', 1, 4096)
     marker_radius_stddev: float = _p(0.0, 'standard deviation of the radius of obstacles that come as markers', 'm', 0.0, 1.0)
 

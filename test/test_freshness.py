@@ -1,0 +1,81 @@
+"""What the node's clocks add: a silent source and an old pose are said, in words with numbers."""
+
+from __future__ import annotations
+
+import pytest
+
+from foc_ros.foc.config import Config, updated
+from foc_ros.foc.records import NANOSECONDS
+from foc_ros.freshness import Freshness
+from foc_ros.topics import CLOUD, HAND, MARKERS
+
+CONFIG = updated(Config(), {'estimator.hand_timeout_s': 0.5, 'scene.timeout_s': 2.0})
+NEVER = updated(Config(), {'estimator.hand_timeout_s': 0.0, 'scene.timeout_s': 0.0})
+BOTH = ('cloud', 'markers')
+
+
+def heard(**times: float) -> Freshness:
+    made = Freshness()
+    for role, time_s in times.items():
+        made.heard(role, time_s)
+    return made
+
+
+def test_what_never_came_is_not_silent() -> None:
+    assert Freshness().obstruction(1e6, CONFIG, ()) is None
+
+
+@pytest.mark.parametrize(
+    ('times', 'words'),
+    [
+        ({HAND: 9.4, CLOUD: 9.0}, 'hand_pose silent for 0.6 s (estimator.hand_timeout_s is 0.5)'),
+        ({HAND: 10.0, CLOUD: 7.9, MARKERS: 10.0}, 'obstacles silent for 2.1 s (scene.timeout_s is 2)'),
+        ({HAND: 10.0, CLOUD: 10.0, MARKERS: 7.0}, 'obstacle_markers silent for 3.0 s (scene.timeout_s is 2)'),
+        ({HAND: 9.6, CLOUD: 8.1, MARKERS: 8.1}, None),
+    ],
+)
+def test_one_silent_input_is_enough(times: dict[str, float], words: str | None) -> None:
+    found = heard(**times).obstruction(10.0, CONFIG, BOTH)
+    assert (found and found[1]) == words
+    assert heard(**times).obstruction(10.0, NEVER, BOTH) is None
+
+
+def test_a_source_that_is_heard_again_is_silent_no_more() -> None:
+    freshness = heard(hand_pose=10.0, obstacles=1.0)
+    assert freshness.obstruction(10.0, CONFIG, ['cloud']) is not None
+    freshness.heard(CLOUD, 10.0)
+    assert freshness.obstruction(10.0, CONFIG, ['cloud']) is None
+
+
+def pose(freshness: Freshness, stamp_s: float, clock_s: float, *, restarted: bool = False) -> str | None:
+    freshness.pose(round(stamp_s * NANOSECONDS), round(clock_s * NANOSECONDS), 0.5, restarted=restarted)
+    found = freshness.obstruction(0.0, CONFIG, ())
+    return found and found[1]
+
+
+def test_poses_of_the_nodes_own_time_are_judged_by_it() -> None:
+    freshness = Freshness()
+    assert pose(freshness, 100.0, 100.1) is None
+    words = 'the hand pose is 0.6 s older than the time of the node (estimator.hand_timeout_s is 0.5)'
+    assert pose(freshness, 100.1, 100.7) == words
+    assert 'newer' in (pose(freshness, 101.3, 100.7) or '')
+    assert pose(freshness, 101.4, 101.4) is None
+    assert freshness.obstruction(0.0, NEVER, ()) is None
+
+
+def test_a_recordings_own_stamps_are_not_judged_until_a_movement_begins_in_the_present() -> None:
+    freshness = Freshness()
+    assert pose(freshness, 10.0, 1e9) is None
+    assert pose(freshness, 1e9, 1e9) is None
+    assert pose(freshness, 10.0, 1e9) is None
+    assert pose(freshness, 1e9, 1e9, restarted=True) is None
+    assert pose(freshness, 10.0, 1e9, restarted=True) is not None
+    freshness.forget()
+    assert pose(freshness, 10.0, 1e9) is None
+
+
+def test_a_clock_that_does_not_run_yet_decides_nothing() -> None:
+    freshness = Freshness()
+    assert pose(freshness, 10.0, 0.0) is None
+    assert pose(freshness, 10.1, 10.1) is None
+    assert pose(freshness, 10.2, 11.2) is not None
