@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable
 from typing import Any
@@ -28,6 +29,7 @@ class Intake:
         self.last_refusal: str | None = None
         self._markers = MarkerScene()
         self._markers_ns = 0
+        self._markers_hold = (-math.inf, math.inf)
         self._counts: Counter[str] = Counter()
         self._takers: dict[str, Callable[[Any], Verdict]] = {
             topics.HAND: self._hand,
@@ -59,7 +61,8 @@ class Intake:
         sample = hand_sample(message, self.pipeline.config.plane)
         self.sample = sample
         verdict = self.pipeline.hand(sample)
-        if verdict.taken and self._markers.next_expiry_ns() is not None:
+        since_ns, until_ns = self._markers_hold
+        if verdict.taken and not since_ns <= sample.stamp_ns < until_ns:
             self._show(self._markers)
         return verdict
 
@@ -90,7 +93,7 @@ class Intake:
         frame_id = markers.frame_id if markers.markers else self.pipeline.frame_id or markers.frame_id
         verdict = self.pipeline.set_obstacles('markers', markers.obstacles(self._now_ns()), stamp_ns, frame_id)
         if verdict.taken:
-            self._markers, self._markers_ns = markers, stamp_ns
+            self._markers, self._markers_ns, self._markers_hold = markers, stamp_ns, markers.unchanged(self._now_ns())
         return verdict
 
     def _goals(self, message: Any) -> Verdict:

@@ -34,7 +34,7 @@ from .intake import Intake
 from .live_parameters import LiveParameters
 from .monitor import Monitor
 from .parameters import autostart, declare_all
-from .topics import CLOUD, GOAL, GOALS, HAND
+from .topics import CLOUD, GOAL, GOALS, HAND, MARKERS
 from .transitions import answer_refused_transitions
 
 THROTTLE_S = 5.0
@@ -126,8 +126,11 @@ class FocNode(LifecycleNode):
         self.pipeline.reconfigure(config)
 
     def _receive(self, role: str, message: Any) -> None:
-        """Take a message and all that wait behind it; predict once, from the newest hand pose."""
-        messages = [message, *waiting(self._inputs[role])]
+        """Take a message and all that wait behind it; predict once, from the newest hand pose.
+
+        Markers are taken one message at a time, each counts and takes its time: the hand is looked at in between.
+        """
+        messages = [message] if role == MARKERS else [message, *waiting(self._inputs[role])]
         taken = False
         for each in reversed(messages) if role in WHOLE else messages:
             taken = self._take(role, each) or taken

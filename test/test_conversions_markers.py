@@ -73,18 +73,19 @@ def test_one_array_is_read_in_order() -> None:
 
 def test_a_lifetime_runs_from_the_stamp() -> None:
     scene = after(marker_array(BAGS, marker(BAGS, id=1, lifetime=0.5, stamp_ns=4 * SECOND), marker(BAGS, id=2)))
-    assert scene.next_expiry_ns() == 4.5 * SECOND
+    assert scene.unchanged(4 * SECOND) == (-math.inf, 4.5 * SECOND)
+    assert scene.unchanged(5 * SECOND) == (4.5 * SECOND, math.inf)
     assert ids(scene, int(4.5 * SECOND) - 1) == ('a/1', 'a/2')
     assert ids(scene, int(4.5 * SECOND)) == ('a/2',)
     later = scene.updated(marker_array(BAGS), 5 * SECOND, 'xy', 0.0)
     assert list(later.markers) == [('a', 2)]
-    assert later.next_expiry_ns() is None
+    assert later.unchanged(5 * SECOND) == (-math.inf, math.inf)
 
 
 def test_an_unstamped_lifetime_runs_from_now_where_that_is_known() -> None:
     message = marker_array(BAGS, marker(BAGS, lifetime=0.5, stamp_ns=0))
-    assert after(message, now_ns=7 * SECOND).next_expiry_ns() == 7.5 * SECOND
-    assert after(message, now_ns=0).next_expiry_ns() is None
+    assert after(message, now_ns=7 * SECOND).unchanged(7 * SECOND) == (-math.inf, 7.5 * SECOND)
+    assert after(message, now_ns=0).unchanged(0) == (-math.inf, math.inf)
     assert after(message).stamp_ns == 0
 
 

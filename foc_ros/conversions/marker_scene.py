@@ -87,9 +87,11 @@ class MarkerScene:
             tuple(_identity(key) for key in held),
         )
 
-    def next_expiry_ns(self) -> int | None:
-        """Return when the next marker's life ends, None where none does."""
-        return min((marker.expires_ns for marker in self.markers.values() if marker.expires_ns is not None), default=None)
+    def unchanged(self, now_ns: int) -> tuple[float, float]:
+        """Return from when on and until when [ns] the markers that live at a time are those that live."""
+        ends = [marker.expires_ns for marker in self.markers.values() if marker.expires_ns is not None]
+        earlier, later = (end for end in ends if end <= now_ns), (end for end in ends if end > now_ns)
+        return max(earlier, default=-math.inf), min(later, default=math.inf)
 
 
 def _alive(marker: HeldMarker, now_ns: int) -> bool:
