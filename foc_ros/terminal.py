@@ -18,7 +18,10 @@ WIDE = 400
 def track(items: Iterable[T], words: str, total: int) -> Iterator[T]:
     """Yield the items, with a bar that says how far they are."""
     console = Console(stderr=True)
-    with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
+    if not console.is_terminal:
+        yield from items
+        return
+    with Progress(console=console, transient=True) as progress:
         yield from progress.track(items, total=total, description=words)
 
 
