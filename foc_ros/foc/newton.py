@@ -13,24 +13,63 @@ import numpy as np
 from .problem import Problem
 from .qp import Cost, wanted_distance
 from .records import Array
-from .solver import WorkingSet
+from .solver import WorkingSet, peaks
 
-EXACT = 1e-9
-"""Largest move of the mean at which the steps end [m]."""
+SETTLED = 1e-5
+"""Largest move of the mean at which the steps end [m]: they converge quadratically, so what is left is 1e-9 or less."""
+CLEAR = 1e-8
+"""Depth in a circle that is rounding [m]."""
 MAX_STEPS = 6
 
 
 @dataclass(frozen=True, eq=False)
 class Touching:
-    """A solution with the given rows active: control (2N,), positions (N, 2) at steps 1..N, multipliers (k,) > 0."""
+    """Where the given rows touch: control (2N,), positions (N, 2) at steps 1..N, active rows, their multipliers (k,)."""
 
     control: Array
     positions: Array
+    active: WorkingSet
     multipliers: Array
 
 
-def newton(problem: Problem, cost: Cost, positions: Array, active: WorkingSet, multipliers: Array, tau: float) -> Touching | None:
-    """Find the solution near positions (N, 2) with these rows active; None where the steps leave what they assume."""
+def newton(
+    problem: Problem, cost: Cost, near: Array, active: WorkingSet, multipliers: Array, tau: float, changes: int = 0
+) -> Touching | None:
+    """Find the solution near positions (N, 2); None where the steps leave what they assume.
+
+    active, multipliers (k,): rows to begin with. changes: how often rows whose multiplier turns negative may be let go, or rows
+    whose circle is entered taken in.
+    """
+    for _ in range(changes + 1):
+        found = _settled(problem, cost, near, active, multipliers, tau)
+        if found is None:
+            return None
+        pressing = found.multipliers > 0
+        if pressing.all():
+            entered = _entered(problem, found, tau)
+            if not len(entered):
+                return found
+            # a new row begins without curvature, so with hardly a multiplier
+            slight = 1e-6 * float(found.multipliers.max(initial=1.0))
+            active = WorkingSet(*(np.concatenate(pair) for pair in zip(found.active.rows, entered.rows, strict=True)))
+            multipliers = np.concatenate((found.multipliers, np.full(len(entered), slight)))
+        else:
+            active, multipliers = found.active.only(pressing), found.multipliers[pressing]
+    return None
+
+
+def _entered(problem: Problem, found: Touching, tau: float) -> WorkingSet:
+    """Return the rows, not yet active, at which a circle is entered deepest."""
+    offset = found.positions[None] - problem.centres
+    depth = wanted_distance(problem, tau) - np.hypot(offset[..., 0], offset[..., 1])
+    depth[found.active.rows] = 0.0
+    return WorkingSet(*peaks(depth, CLEAR)) if depth.max(initial=0.0) > CLEAR else WorkingSet()
+
+
+def _settled(
+    problem: Problem, cost: Cost, positions: Array, active: WorkingSet, multipliers: Array, tau: float
+) -> Touching | None:
+    """Repeat the step until it moves little, or a multiplier turns negative; None where it leads to no minimum, or away."""
     last = np.inf
     for _ in range(MAX_STEPS):
         step = _step(problem, positions, active, multipliers, tau, cost)
@@ -39,14 +78,12 @@ def newton(problem: Problem, cost: Cost, positions: Array, active: WorkingSet, m
         control, multipliers = step
         moved = problem.positions(control)
         move, positions = float(np.abs(moved - positions).max()), moved
-        if move > last or multipliers.min(initial=1.0) <= 0:
+        if move < SETTLED or multipliers.min(initial=1.0) <= 0:
+            return Touching(control, positions, active, multipliers)
+        if move > last:
             return None
         last = move
-        if move < EXACT:
-            break
-    offset = positions[None] - problem.centres
-    clear = (np.hypot(offset[..., 0], offset[..., 1]) - wanted_distance(problem, tau)).min(initial=0.0) > -10 * EXACT
-    return Touching(control, positions, multipliers) if clear and last < 100 * EXACT else None
+    return None
 
 
 def _step(

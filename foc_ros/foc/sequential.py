@@ -23,6 +23,8 @@ STAYS = 1e-7
 NEAR = 3e-3
 """Largest move of the mean from which Newton steps are tried even if the active rows changed [m]."""
 MAX_QPS = 60
+CHANGES = 4
+"""How often the active rows may change while a solution is followed by Newton steps alone."""
 ALIGNED = 0.99
 """Cosine between two moves in a row that counts as the same direction."""
 PATIENCE = 6
@@ -75,7 +77,7 @@ def converge(
             better = newton(problem, cost, positions, working, solution.multipliers, tau)
         if better is not None and _cost(cost, better.control) <= _cost(cost, solution.control) * (1 + 1e-12):
             if not verified:
-                return _touching(better, working, solves)
+                return _touching(better, solves)
             guess = creep.jumped(better.positions)
         else:
             guess = creep.ahead(positions)
@@ -86,13 +88,13 @@ def converge(
 def follow(
     problem: Problem, positions: Array, active: WorkingSet, multipliers: Array, tau: float, lam: float
 ) -> Converged | None:
-    """Find the solution near another one, (N, 2), by Newton steps alone; None where its active rows do not stay the same."""
-    moved = newton(problem, effort_cost(problem, lam), positions, active, multipliers, tau)
-    return None if moved is None else _touching(moved, active, 0)
+    """Find the solution near another one, (N, 2), by Newton steps alone; None where its active rows change too much."""
+    moved = newton(problem, effort_cost(problem, lam), positions, active, multipliers, tau, changes=CHANGES)
+    return None if moved is None else _touching(moved, 0)
 
 
-def _touching(found: Touching, active: WorkingSet, solves: int) -> Converged:
-    solution = QPSolution(found.control, active, found.multipliers, 0)
+def _touching(found: Touching, solves: int) -> Converged:
+    solution = QPSolution(found.control, found.active, found.multipliers, 0)
     return Converged(found.control, found.positions, solution, solves, stays=True)
 
 

@@ -46,6 +46,11 @@ class WorkingSet:
     def __len__(self) -> int:
         return len(self.obstacle)
 
+    @property
+    def rows(self) -> tuple[Index, Index]:
+        """Obstacle and step index, as an index into arrays (m, N)."""
+        return self.obstacle, self.step
+
     def joined(self, obstacle: Index, step: Index, steps: int) -> WorkingSet:
         """Return the set with more rows, each once, in order."""
         flat = np.unique(np.concatenate((self.obstacle * steps + self.step, obstacle * steps + step)))
@@ -89,13 +94,13 @@ def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False) -> QPSo
             return QPSolution(control, working.only(active), multipliers[active], solves)
         if not elastic:
             working = working.only(multipliers > 0)
-        working = working.joined(*_peaks(violation), violation.shape[1])
+        working = working.joined(*peaks(violation, TOLERANCE), violation.shape[1])
     return None if elastic else solve_full(qp)
 
 
-def _peaks(violation: Array) -> tuple[Index, Index]:
-    """Return the worst row of every stretch of violated steps, as obstacle and step index."""
-    peak = violation > TOLERANCE
+def peaks(violation: Array, tolerance: float) -> tuple[Index, Index]:
+    """Return the worst row of every stretch of violated steps (m, N), as obstacle and step index."""
+    peak = violation > tolerance
     peak[:, 1:] &= violation[:, 1:] >= violation[:, :-1]
     peak[:, :-1] &= violation[:, :-1] > violation[:, 1:]
     obstacle, step = np.nonzero(peak)
