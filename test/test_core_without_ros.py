@@ -1,7 +1,9 @@
 """The numeric core knows no ROS, and a recording is replayed where ROS is not installed."""
 
+import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -60,12 +62,14 @@ def test_core_imports_and_predicts_without_ros_and_rosbags() -> None:
     assert result.returncode == 0, result.stderr
 
 
-def test_replay_runs_without_ros() -> None:
-    program = """
+def test_replay_runs_without_ros(tmp_path: Path) -> None:
+    (tmp_path / 'slow.yaml').write_text('/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 10}}', 'utf-8')
+    program = f"""
 from foc_ros.command_line import main
 from importlib.resources import files
-sys.exit(main(['replay', str(files('foc_ros') / 'recordings' / 'reaching.mcap'), '--json']))
+bag = files('foc_ros') / 'recordings' / 'reaching.mcap'
+sys.exit(main(['replay', str(bag), '--params', {str(tmp_path / 'slow.yaml')!r}, '--json']))
 """
     result = run(program)
     assert result.returncode == 0, result.stderr
-    assert '"most_likely"' in result.stdout or '"candidates"' in result.stdout, result.stdout[:500]
+    assert json.loads(result.stdout)['summary']['predictions'] >= 20
