@@ -11,6 +11,9 @@ import yaml
 
 from .foc.errors import RecordingError
 
+MAX_BYTES = 5_000_000
+"""Larger than any scene or parameter file; a YAML of it takes half a minute."""
+
 
 class _StrictLoader(yaml.SafeLoader):
     """Safe YAML in which a key that is given twice is an error, not the last one wins."""
@@ -30,7 +33,11 @@ def read_document(file: Path) -> Any:
     Raises RecordingError with file, place and reason.
     """
     try:
-        text = file.read_text('utf-8')
+        with file.open('rb') as opened:
+            held = opened.read(MAX_BYTES + 1)
+        if len(held) > MAX_BYTES:
+            raise RecordingError(f'{file}: expected at most {MAX_BYTES:,} bytes, got more')
+        text = held.decode('utf-8')
         if file.suffix == '.json':
             return json.loads(text, object_pairs_hook=_once)
         return yaml.load(text, _StrictLoader)  # noqa: S506 (derives from SafeLoader)

@@ -13,6 +13,8 @@ from .foc.errors import RecordingError
 
 FARTHEST_M = 1e4
 """Bound on coordinates and radii [m]: what is beyond is no workspace, but a unit or a column mixed up."""
+MAX_BYTES = 1_000_000_000
+"""A day of motion capture at 200 Hz."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,8 @@ def rows(file: Path, needed: tuple[str, ...]) -> Iterator[Row]:
     fewer cells than the header.
     """
     with _faults(file), file.open(newline='', encoding='utf-8-sig') as stream:
+        if file.stat().st_size > MAX_BYTES:
+            raise RecordingError(f'{file}: expected at most {MAX_BYTES:,} bytes, got {file.stat().st_size:,}')
         reader = csv.reader(stream, strict=True)
         header = [name.strip() for name in next(reader, [])]
         if not header:

@@ -79,7 +79,8 @@ def test_wheel_holds_what_the_program_needs(wheel: zipfile.ZipFile) -> None:
     data = 'foc_ros-0.1.0.data/data/'.replace('0.1.0', foc_ros.__version__)
     assert f'{data}share/ament_index/resource_index/packages/foc_ros' in names
     assert f'{data}share/foc_ros/package.xml' in names
-    assert f'{data}share/foc_ros/config/foc.yaml' in names
+    for name in ('foc.yaml', 'foc.rviz', 'foxglove.json', 'sros2_policy.xml'):
+        assert f'{data}share/foc_ros/config/{name}' in names
     sources = {path.relative_to(ROOT).as_posix() for path in (ROOT / 'foc_ros').rglob('*') if path.suffix in ('.py', '.mcap')}
     assert 'foc_ros/recordings/reaching.mcap' in sources
     assert sources <= names, sources - names

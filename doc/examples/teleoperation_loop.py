@@ -1,0 +1,134 @@
+"""A stand-in for a teleoperation stack: a hand that reaches to and fro, a scene, and a consumer that leans on the prediction.
+
+Run it beside the node: `foc_ros node --ros-args -r hand_pose:=MTMR/measured_cp`. The set point it publishes is the hand's own
+position, moved towards the predicted path by a share of at most MOST. The share grows while predictions are fresh and falls to
+zero as soon as they are not, whatever the reason: the consumer trusts stamps, not the node.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import Pose, PoseArray, PoseStamped
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from rclpy.signals import SignalHandlerOptions
+from rclpy.time import Time
+from sensor_msgs.msg import PointCloud2, PointField
+from std_msgs.msg import Float64
+
+FRAME = 'world'
+GOALS = np.array([[0.0, 0.0, 0.1], [0.3, 0.0, 0.1]])
+REACH_S, PAUSE_S = 1.2, 0.3
+OBSTACLES = np.array([(0.15, 0.01, 0.1, 0.03)], dtype=[(name, '<f4') for name in ('x', 'y', 'z', 'radius')])
+FRESH_S = 0.3
+"""A prediction from an older hand pose counts for nothing."""
+MOST, RISE_PER_S = 0.4, 1.0
+LOOKAHEAD_S = 0.05
+
+
+def hand_at(seconds: float) -> np.ndarray:
+    """Return where the hand is (3,) [m]: minimum-jerk reaches between the goals, in a bow around the obstacle."""
+    turn, rest = divmod(seconds, REACH_S + PAUSE_S)
+    s = min(rest / REACH_S, 1.0)
+    share = 10 * s**3 - 15 * s**4 + 6 * s**5
+    start, end = GOALS[int(turn) % 2], GOALS[(int(turn) + 1) % 2]
+    return start + share * (end - start) + np.array([0.0, 0.06 * np.sin(np.pi * share), 0.0])
+
+
+class TeleoperationLoop(Node):
+    """Publishes MTMR/measured_cp, obstacles and goals; reads foc/prediction; publishes the set point and the share."""
+
+    def __init__(self, context: rclpy.Context) -> None:
+        super().__init__('teleoperation', context=context)
+        self.declare_parameter('obstacles', True)
+        self._began, self._share, self._prediction = time.monotonic(), 0.0, None
+        self._hand = self.create_publisher(PoseStamped, 'MTMR/measured_cp', qos_profile_sensor_data)
+        self._obstacles = self.create_publisher(PointCloud2, 'obstacles', 10)
+        self._goals = self.create_publisher(PoseArray, 'goals', 10)
+        self._set_point = self.create_publisher(PoseStamped, 'PSM1/servo_cp', 10)
+        self._shares = self.create_publisher(Float64, '~/share', 10)
+        self.create_subscription(PointCloud2, 'foc/prediction', self._predicted, 10)
+        self.create_timer(0.01, self._move)
+        self.create_timer(0.1, self._show)
+
+    def _predicted(self, cloud: PointCloud2) -> None:
+        self._prediction = cloud
+
+    def _move(self) -> None:
+        now, position = self.get_clock().now(), hand_at(time.monotonic() - self._began)
+        self._hand.publish(self._pose(now, position))
+        target = self._target(now)
+        step = 0.01 * RISE_PER_S
+        self._share = min(self._share + step, MOST) if target is not None else 0.0
+        self._shares.publish(Float64(data=self._share))
+        blended = position if target is None else position + self._share * (target - position)
+        self._set_point.publish(self._pose(now, blended))
+
+    def _target(self, now: Time) -> np.ndarray | None:
+        """Return where the most likely way is in LOOKAHEAD_S (3,) [m], None without a fresh prediction."""
+        if self._prediction is None:
+            return None
+        age_s = (now - Time.from_msg(self._prediction.header.stamp)).nanoseconds * 1e-9
+        rows = table(self._prediction)
+        rows = rows[rows['candidate'] == 0]
+        if not len(rows) or age_s > FRESH_S:
+            return None
+        row = rows[min(np.searchsorted(rows['t'], age_s + LOOKAHEAD_S), len(rows) - 1)]
+        return np.array([row['x'], row['y'], row['z']], dtype=float)
+
+    def _show(self) -> None:
+        stamp = self.get_clock().now().to_msg()
+        goals = PoseArray()
+        goals.header.stamp, goals.header.frame_id = stamp, FRAME
+        goals.poses = [self._pose(self.get_clock().now(), goal).pose for goal in GOALS]
+        self._goals.publish(goals)
+        if self.get_parameter('obstacles').value:
+            cloud = PointCloud2(height=1, width=len(OBSTACLES), point_step=OBSTACLES.itemsize, row_step=OBSTACLES.nbytes)
+            cloud.header.stamp, cloud.header.frame_id = stamp, FRAME
+            cloud.fields = [
+                PointField(name=name, offset=4 * i, datatype=PointField.FLOAT32, count=1)
+                for i, name in enumerate(OBSTACLES.dtype.names)
+            ]
+            cloud.data = OBSTACLES.tobytes()
+            self._obstacles.publish(cloud)
+
+    def _pose(self, now: Time, position: np.ndarray) -> PoseStamped:
+        message = PoseStamped(pose=Pose())
+        message.header.stamp, message.header.frame_id = now.to_msg(), FRAME
+        point = message.pose.position
+        point.x, point.y, point.z = (float(value) for value in position)
+        return message
+
+
+def table(cloud: PointCloud2) -> np.ndarray:
+    """Return the rows of a prediction as a structured array."""
+    kinds = {PointField.FLOAT32: '<f4', PointField.UINT32: '<u4'}
+    return np.frombuffer(cloud.data, dtype=[(field.name, kinds[field.datatype]) for field in cloud.fields])
+
+
+def main() -> int:
+    """Run until SIGINT or SIGTERM."""
+    stopped: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda number, _: stopped.append(number))
+    context = rclpy.Context()
+    rclpy.init(args=sys.argv, context=context, signal_handler_options=SignalHandlerOptions.NO)
+    executor = SingleThreadedExecutor(context=context)
+    node = TeleoperationLoop(context)
+    executor.add_node(node)
+    while not stopped:
+        executor.spin_once(timeout_sec=0.1)
+    executor.shutdown()
+    node.destroy_node()
+    context.try_shutdown()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,67 @@
+"""What comes from outside is bounded and never run; what is promised of a secured graph is what the node has."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+import ros_helpers
+
+from foc_ros import documents, tables
+from foc_ros.documents import read_document
+from foc_ros.foc.errors import RecordingError
+
+ROOT = Path(__file__).parents[1]
+PERMISSIONS = ROOT / 'config' / 'sros2_policy.xml'
+
+
+def sparse(file: Path, size: int) -> Path:
+    with file.open('wb') as opened:
+        opened.truncate(size)
+    return file
+
+
+def test_a_document_larger_than_any_scene_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match='expected at most 5,000,000 bytes'):
+        read_document(sparse(tmp_path / 'large.yaml', documents.MAX_BYTES + 1))
+
+
+def test_a_table_larger_than_any_recording_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match='expected at most 1,000,000,000 bytes, got 1,000,000,001'):
+        next(tables.rows(sparse(tmp_path / 'large.csv', tables.MAX_BYTES + 1), ('t_s',)))
+
+
+@pytest.mark.parametrize('text', ['!!python/object/apply:os.mkdir [made]', '!!python/name:os.system', '!include other.yaml'])
+def test_a_document_is_data_and_never_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'it.yaml').write_text(text, 'utf-8')
+    with pytest.raises(RecordingError, match='not a YAML file'):
+        read_document(tmp_path / 'it.yaml')
+    assert [each.name for each in tmp_path.iterdir()] == ['it.yaml']
+
+
+def allowed(kind: str, action: str) -> set[str]:
+    profile = ET.parse(PERMISSIONS).getroot().find(".//profile[@node='foc']")
+    groups = [each for each in profile.findall(kind) if each.get(action) == 'ALLOW']
+    return {each.text.strip() for group in groups for each in group}
+
+
+def test_the_permissions_are_what_the_node_has(ros: ros_helpers.Graph) -> None:
+    """Neither less, or it does not run, nor more."""
+    from foc_ros.node import FocNode
+
+    node = ros.add(FocNode(context=ros.context))
+
+    def names(found: list[tuple[str, list[str]]]) -> set[str]:
+        return {name.replace('/foc/', '~/') if name.startswith('/foc/') else name.removeprefix('/') for name, _ in found}
+
+    published = names(node.get_publisher_names_and_types_by_node('foc', '/'))
+    subscribed = names(node.get_subscriber_names_and_types_by_node('foc', '/'))
+    services = names(node.get_service_names_and_types_by_node('foc', '/'))
+    absolute = {'rosout', 'parameter_events', 'diagnostics', 'clock'}
+    assert allowed('topics', 'publish') == {f'/{name}' if name in absolute else name for name in published}
+    # the clock is heard where use_sim_time is set
+    assert allowed('topics', 'subscribe') - {'/clock'} == {f'/{name}' if name in absolute else name for name in subscribed}
+    assert allowed('services', 'reply') == services
+    assert allowed('services', 'request') == set()
