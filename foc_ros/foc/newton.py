@@ -94,20 +94,21 @@ def _step(
     A multiplier y at distance d adds the circle's curvature, -y / d along the tangent, to the Hessian: a row of negative softness
     -d / y beside the normal's row. It is a minimum if there are as many negative eigenvalues as curvature rows.
     """
-    k, steps = len(active), active.step
-    offset = positions[steps] - problem.centres[active.obstacle, steps]
+    k, here = len(active), active.rows
+    if k == 0:
+        return cost.goal_control, multipliers
+    offset = positions[active.step] - problem.centres[here]
     distance = np.hypot(offset[:, 0], offset[:, 1])
-    normal = offset / distance[:, None]
-    axes = np.concatenate((normal, np.stack((-normal[:, 1], normal[:, 0]), axis=1)))
-    both = np.concatenate((steps, steps))
-    rows = axes[:, 0, None] * problem.position_map[0, both] + axes[:, 1, None] * problem.position_map[1, both]
-    wanted = np.broadcast_to(wanted_distance(problem, tau), problem.centres.shape[:2])[active.obstacle, steps]
-    aim = np.concatenate((problem.centres_from_free[active.obstacle, steps], positions[steps] - problem.free[1:][steps, :2]))
-    targets = np.einsum('ki,ki->k', axes, aim)
-    targets[:k] += wanted
+    axes = np.empty((k, 2, 2))  # normal and tangent of each row
+    axes[:, 0] = offset / distance[:, None]
+    axes[:, 1, 0], axes[:, 1, 1] = -axes[:, 0, 1], axes[:, 0, 0]
+    rows = (axes @ problem.horizon.response[active.step, :2]).reshape(2 * k, len(cost.hessian))
+    wanted = wanted_distance(problem, tau)
+    targets = (axes @ problem.centres_from_free[here][..., None]).reshape(2 * k)
+    targets[::2] += wanted[active.obstacle, 0] if wanted.shape[1] == 1 else wanted[here]
     pressed = cost.pressed(rows)
     gram = pressed @ rows.T
-    gram.flat[k * (2 * k + 1) :: 2 * k + 1] -= distance / multipliers
+    gram.flat[2 * k + 1 :: 4 * k + 2] -= distance / multipliers
     scale = 1.0 / np.sqrt(np.abs(gram.diagonal()))
     values, vectors = np.linalg.eigh(gram * scale[:, None] * scale)
     # rows that say the same twice leave an eigenvalue of zero: they share their multiplier
@@ -116,4 +117,4 @@ def _step(
         return None
     missing = scale * (targets - rows @ cost.goal_control)
     forces = scale * (vectors[:, told] @ ((vectors[:, told].T @ missing) / values[told]))
-    return cost.goal_control + forces @ pressed, forces[:k]
+    return cost.goal_control + forces @ pressed, forces[::2]
