@@ -31,6 +31,8 @@ PATIENCE = 2
 """Strides in a row without a larger k after which there is none to be found."""
 CLOSE = 1e-5
 """Relative excess of k over the wanted one at which the root is found."""
+CELL = 0.25
+"""Bracket in s down to which it is halved: k(s) falls back where the touching step changes, and may cross a value twice."""
 NARROW = 1e-4
 """Bracket in s at which the root is as good as found: k jumps there, because the touching step changes."""
 MAX_TRIALS = 60
@@ -175,7 +177,11 @@ def _bracket(walker: _Walker, first: Point, wanted: float, stride: float) -> tup
 
 
 def _strides(walker: _Walker, first: Point, wanted: float, stride: float) -> Iterator[Point]:
-    """Yield points further and further along the curve, or back for a negative stride; towards an infeasible end in quarters."""
+    """Yield points further and further along the curve, or back for a negative stride; towards an infeasible end in quarters.
+
+    Warm ones go by the slope of k. Cold ones go the same way whatever k is wanted, so that more eta never comes out cheaper.
+    """
+    guided = abs(stride) < STRIDE
     point, end = first, walker.end if stride > 0 else 0.0
     while point.s != end and abs(stride) > WARM_STRIDE / 2:
         s = min(point.s + stride, end) if stride > 0 else max(point.s + stride, end)
@@ -184,7 +190,7 @@ def _strides(walker: _Walker, first: Point, wanted: float, stride: float) -> Ite
             stride /= 4
             end = point.s + 3 * stride
             continue
-        stride = _next_stride(point, further, wanted, stride)
+        stride = _next_stride(point, further, wanted, stride) if guided else math.copysign(min(4 * abs(stride), STRIDE), stride)
         point = further
         yield point
 
@@ -200,16 +206,22 @@ def _next_stride(before: Point, point: Point, wanted: float, stride: float) -> f
 def _root(walker: _Walker, low: Point, high: Point, wanted: float) -> Point:
     """Find k(s) = wanted between a point below and one at or above, by Illinois steps; returns one at or above.
 
-    Aims at the middle of what counts as close. Halves the bracket instead where two steps in a row came out on the same
-    side: where k jumps, that is the way to the jump.
+    Comes from below only: of several solutions at the same s, those that are met first as s grows. A wide bracket is halved
+    first, at points that do not depend on the wanted k. Aims at the middle of what counts as close, and halves the bracket
+    again where two steps in a row came out on the same side: where k jumps, that is the way to the jump.
     """
+    while high.s - low.s > CELL:
+        middle = walker.beside((low.s + high.s) / 2, low)
+        if middle is None:
+            break
+        low, high = (low, middle) if middle.k >= wanted else (middle, high)
     aim = wanted * (1 + CLOSE / 2)
     below, above, side = low.k - aim, high.k - aim, 0
     for _ in range(MAX_TRIALS):
         if high.k <= wanted * (1 + CLOSE) or high.s - low.s < NARROW:
             break
         s = (low.s + high.s) / 2 if abs(side) > 1 else (low.s * above - high.s * below) / (above - below)
-        point = walker.beside(s, low if s - low.s < high.s - s else high)
+        point = walker.beside(s, low)
         if point is None:
             break
         if point.k >= wanted:
