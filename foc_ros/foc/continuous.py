@@ -28,7 +28,7 @@ SPAN = 60.0
 LARGEST_SHARE = 1e6
 """Where the walk ends: a variance weight so many times the effort is all that counts, and k has stopped growing."""
 PATIENCE = 2
-"""Strides in a row without a larger k after which there is none to be found."""
+"""Strides in a row without a larger k after which a warm start gives up; a cold one goes to the end, over every dip of k."""
 CLOSE = 1e-5
 """Relative excess of k over the wanted one at which the root is found."""
 CELL = 0.25
@@ -138,7 +138,8 @@ def _walk(walker: _Walker, start: Start) -> Walk:
         stride, first = WARM_STRIDE, walker.near(curve.s_of(start.lam), start.positions, start.active, start.multipliers)
     if first is None:
         return Walk(Status.INFEASIBLE, 'no control meets every linearised obstacle row', None, walker.qp_solves)
-    low, high = _bracket(walker, first, wanted, stride)
+    patience = math.inf if start.lam is None else PATIENCE
+    low, high = _bracket(walker, first, wanted, stride, patience)
     if high is None:
         message = f'eta {problem.eta:g} is out of reach: the largest on the curve is {eta_of_k(low.k):.4g}, at s = {low.s:.3g}'
         return Walk(Status.ETA_UNREACHABLE, message, low, walker.qp_solves)
@@ -150,7 +151,7 @@ def _walk(walker: _Walker, start: Start) -> Walk:
     return Walk(Status.SOLVED, 'solved', point, walker.qp_solves)
 
 
-def _bracket(walker: _Walker, first: Point, wanted: float, stride: float) -> tuple[Point, Point | None]:
+def _bracket(walker: _Walker, first: Point, wanted: float, stride: float, patience: float) -> tuple[Point, Point | None]:
     """Return the last point below the wanted k and the first at or above it.
 
     Both the same where the first is close enough, or the curve's beginning is enough; no upper one where the wanted k is out of
@@ -171,7 +172,7 @@ def _bracket(walker: _Walker, first: Point, wanted: float, stride: float) -> tup
             return low, point
         low, since = point, 0 if point.k > best.k else since + 1
         best = max(best, point, key=lambda p: p.k)
-        if since == PATIENCE:
+        if since == patience:
             break
     return best, None
 

@@ -15,10 +15,10 @@ from .qp import Cost, wanted_distance
 from .records import Array
 from .solver import WorkingSet, peaks
 
-SETTLED = 1e-5
-"""Largest move of the mean at which the steps end [m]: they converge quadratically, so what is left is 1e-9 or less."""
-CLEAR = 1e-8
-"""Depth in a circle that is rounding [m]."""
+SETTLED = 3e-5
+"""Largest move of the mean at which the steps end, relative to the scene: they converge quadratically, so 1e-9 is left."""
+CLEAR = 3e-8
+"""Depth in a circle that is rounding; relative."""
 MAX_STEPS = 6
 
 
@@ -63,7 +63,8 @@ def _entered(problem: Problem, found: Touching, tau: float) -> WorkingSet:
     offset = found.positions[None] - problem.centres
     depth = wanted_distance(problem, tau) - np.hypot(offset[..., 0], offset[..., 1])
     depth[found.active.rows] = 0.0
-    return WorkingSet(*peaks(depth, CLEAR)) if depth.max(initial=0.0) > CLEAR else WorkingSet()
+    rounding = CLEAR * problem.extent
+    return WorkingSet(*peaks(depth, rounding)) if depth.max(initial=0.0) > rounding else WorkingSet()
 
 
 def _settled(
@@ -77,7 +78,7 @@ def _settled(
             return None
         control, multipliers = step
         moved = problem.positions(control)
-        move, positions = float(np.abs(moved - positions).max()), moved
+        move, positions = float(np.abs(moved - positions).max()) / problem.extent, moved
         if move < SETTLED or multipliers.min(initial=1.0) <= 0:
             return Touching(control, positions, active, multipliers)
         if move > last:

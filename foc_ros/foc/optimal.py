@@ -120,7 +120,6 @@ class _Search:
     def repeat(self, iterate: _Iterate, k: float, tolerance: float, *, complete: bool) -> _Iterate | None:
         """Repeat the QP until it moves the mean by less than the tolerance, relative to the way; None if it does not."""
         problem = self.problem
-        scale = float(np.abs(problem.goal[:2] - problem.initial_mean[:2]).max()) or 1.0
         for _ in range(MAX_QPS):
             self.deadline.check()
             qp = surrogate_qp(problem, iterate.control, iterate.active, iterate.multipliers, k, complete=complete)
@@ -130,7 +129,7 @@ class _Search:
             self.qp_solves += solution.solves
             moved = np.abs(problem.position_map @ (solution.control - iterate.control)).max()
             iterate = _Iterate(solution.control, solution.active, solution.multipliers)
-            if moved < tolerance * scale:
+            if moved < tolerance * problem.extent:
                 return iterate
         return None
 

@@ -42,6 +42,12 @@ class Problem(Record):
     recovery_s: float = 0.0
 
     @cached_property
+    def extent(self) -> float:
+        """Size of the scene that tolerances are relative to: the way to the goal, or the largest circle if that is more [m]."""
+        way = self.goal[:2] - self.initial_mean[:2]
+        return max(float(np.hypot(way[0], way[1])), float(self.obstacles.radius.max(initial=0.0)), 1e-6)
+
+    @cached_property
     def free(self) -> Array:
         """Mean state at steps 0..N without control, (N + 1, n)."""
         return self.horizon.powers @ self.initial_mean

@@ -18,10 +18,10 @@ from .qp import Cost, clearance_qp, effort_cost
 from .records import Array
 from .solver import QPSolution, WorkingSet, solve
 
-STAYS = 1e-7
-"""Largest move of the mean that counts as staying [m]."""
-NEAR = 3e-3
-"""Largest move of the mean from which Newton steps are tried even if the active rows changed [m]."""
+STAYS = 3e-7
+"""Largest move of the mean that counts as staying, relative to the scene's extent."""
+NEAR = 0.01
+"""Largest move of the mean from which Newton steps are tried even if the active rows changed; relative."""
 MAX_QPS = 60
 CHANGES = 4
 """How often the active rows may change while a solution is followed by Newton steps alone."""
@@ -68,7 +68,7 @@ def converge(
             return None
         solves += solution.solves
         working, positions = solution.active, problem.positions(solution.control)
-        move = float(np.abs(positions - guess).max())
+        move = float(np.abs(positions - guess).max()) / problem.extent
         if move < STAYS or count == MAX_QPS:
             return Converged(solution.control, positions, solution, solves, stays=move < STAYS)
         rows = (working.obstacle.tobytes(), working.step.tobytes())
