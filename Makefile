@@ -1,5 +1,5 @@
 # make setup [PYTHON=python3.12] [ROS=wheels|system]   a .venv with everything; re-run only when needed
-# make demo | test | lint | pages | clean
+# make demo | test | lint | bench | pages | clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -29,7 +29,7 @@ else
 $(error ROS is wheels or system, got '$(ROS)')
 endif
 
-.PHONY: setup demo test lint pages clean
+.PHONY: setup demo test lint bench pages clean
 
 setup: $(STAMP)
 ifneq ($(origin PYTHON),file)
@@ -52,6 +52,14 @@ lint: $(STAMP)
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# What it compares with is large, and installed only for this. OPTIONS=--quick for a look, --json, --markdown, '--only NAME'
+bench: $(VENV)/.bench
+	$(BIN)/python benchmarks/run.py $(OPTIONS)
+
+$(VENV)/.bench: $(STAMP)
+	$(PIP) install --quiet --editable '.[bench]'
+	touch $@
 
 # What is derived from foc_ros/foc/config.py
 pages: $(STAMP)

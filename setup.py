@@ -44,6 +44,8 @@ setup(
         # rclpy with Fast DDS and the common interfaces as wheels, for machines without a ROS installation
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
         'report': ['matplotlib>=3.6'],
+        # what the benchmark compares with
+        'bench': ['casadi>=3.6', 'cvxpy>=1.4', 'daqp>=0.5', 'matplotlib>=3.6', 'scipy>=1.15'],
         'test': [
             'daqp>=0.5',
             'hypothesis>=6.80',

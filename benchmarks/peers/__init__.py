@@ -1,0 +1,1 @@
+"""What users would take otherwise, one way to a file, each on the identical problem."""

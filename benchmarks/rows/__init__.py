@@ -1,0 +1,1 @@
+"""The rows of the benchmark, by name: each a function of `quick` that measures and returns its result."""
