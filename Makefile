@@ -1,5 +1,6 @@
 # make setup [PYTHON=python3.12] [ROS=wheels|system]   a .venv with everything; re-run only when needed
 # make demo | test | lint | bench | pages | clean
+# make colcon | fuzz | soak | stops   the long checks: colcon build and test, many messages, ten minutes of faults, 200 signals
 
 PYTHON ?= python3
 VENV := .venv
@@ -29,7 +30,7 @@ else
 $(error ROS is wheels or system, got '$(ROS)')
 endif
 
-.PHONY: setup demo test lint bench pages clean
+.PHONY: setup demo test lint bench pages colcon fuzz soak stops clean
 
 setup: $(STAMP)
 ifneq ($(origin PYTHON),file)
@@ -52,6 +53,18 @@ lint: $(STAMP)
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+colcon:
+	PYTHON=$(PYTHON) scripts/colcon_check
+
+fuzz: $(STAMP)
+	FOC_ROS_FUZZ=100000 ROS_PYTHON_CHECK_FIELDS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4 --timeout 3600 test/test_fuzz.py
+
+soak: $(STAMP)
+	$(BIN)/python scripts/soak.py --minutes 10
+
+stops: $(STAMP)
+	$(BIN)/python scripts/stops.py --count 100
 
 # What it compares with is large, and installed only for this. OPTIONS=--quick for a look, --json, --markdown, '--only NAME'
 bench: $(VENV)/.bench

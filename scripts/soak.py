@@ -1,0 +1,233 @@
+"""A node in a process of its own, fed at 100 Hz with faults mixed in: `python scripts/soak.py --minutes 10`.
+
+Exit code 0 where memory stayed flat after the warm-up, no thread or file was left, no good pose was lost, the 99th percentile of
+the cycle did not grow, nothing failed inside, and the node stopped without an error.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from foc_ros.conversions.types import RclpyTypes
+from foc_ros.demo.environment import free_domain, private_environment
+from foc_ros.input_messages import goal_poses, hand_pose, obstacle_cloud
+
+PERIOD_S = 0.01
+REPORT_S = 5.0
+FRAME = 'world'
+GOALS = np.array([[0.3, 0.0, 0.0], [0.3, 0.1, 0.0]])
+ROWS = [(0.15, 0.02, 0.0, 0.03, 0.002, 7), (0.2, 0.08, 0.0, 0.02, 0.002, 8)]
+BAD_POSES = {'nowhere': 'hand_pose_invalid', 'camera': 'hand_wrong_frame', 'again': 'hand_duplicate', 'late': 'hand_late'}
+"""What the node counts a bad pose as; one that comes late just after a reset is a beginning, and none of them."""
+FAULTS = (*BAD_POSES, 'cut', 'negative', 'flip', 'parameter', 'wrong parameter', 'crowd', 'clutch', 'reset')
+WARM_UP, GROWTH, SLOWER = 0.2, 1.05, 2.0
+"""Part of the time that is not judged; growth of memory, and of the 99th percentile, that still passes."""
+
+
+def graph_environment(logs: Path) -> dict[str, str]:
+    """Return the environment of a private ROS graph."""
+    return private_environment(free_domain(), logs)
+
+
+class Player:
+    """Plays hand, scene and faults into whatever node is there. Attributes: sent, poses by kind; health, the newest figures."""
+
+    def __init__(self) -> None:
+        import rclpy
+        from diagnostic_msgs.msg import DiagnosticArray
+        from geometry_msgs.msg import PoseArray, PoseStamped
+        from rcl_interfaces.srv import SetParametersAtomically
+        from rclpy.executors import SingleThreadedExecutor
+        from rclpy.signals import SignalHandlerOptions
+        from sensor_msgs.msg import PointCloud2
+        from std_srvs.srv import SetBool, Trigger
+
+        self._context = rclpy.Context()
+        rclpy.init(args=[], context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = rclpy.create_node('soak', context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        kinds = {'hand_pose': PoseStamped, 'obstacles': PointCloud2, 'goals': PoseArray}
+        self._publishers = {name: self._node.create_publisher(kind, name, 1000) for name, kind in kinds.items()}
+        self._node.create_subscription(PointCloud2, 'foc/prediction', self._predicted, 10)
+        self._node.create_subscription(DiagnosticArray, '/diagnostics', self._judged, 10)
+        self._parameters = self._node.create_client(SetParametersAtomically, 'foc/set_parameters_atomically')
+        self._engage = self._node.create_client(SetBool, 'foc/engage')
+        self._reset = self._node.create_client(Trigger, 'foc/reset')
+        self._types, self._dice = RclpyTypes(), random.Random(1)
+        self._began = self._next = time.monotonic()
+        self._turn = 0
+        self.sent = dict.fromkeys(('good', *BAD_POSES), 0)
+        self.predictions, self.unfit = 0, 0
+        self.health: Mapping[str, str] = {}
+
+    def __enter__(self) -> Player:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._executor.shutdown()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    @property
+    def connected(self) -> bool:
+        """Whether the node hears every input."""
+        return all(publisher.get_subscription_count() for publisher in self._publishers.values())
+
+    def spin(self, seconds: float) -> None:
+        """Listen for a while."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self._executor.spin_once(timeout_sec=max(end - time.monotonic(), 0.0))
+
+    def tick(self, *, faulty: bool = False) -> None:
+        """Send what is due in one period, and listen for the rest of it."""
+        stamp_ns = self._node.get_clock().now().nanoseconds
+        if self._turn % 10 == 0:
+            self._publishers['obstacles'].publish(obstacle_cloud(self._types, stamp_ns, FRAME, ROWS))
+        if self._turn % 50 == 0:
+            self._publishers['goals'].publish(goal_poses(self._types, stamp_ns, FRAME, GOALS))
+        self._pose(stamp_ns)
+        if faulty and self._turn % 20 == 7:
+            self._fault(self._dice.choice(FAULTS), stamp_ns)
+        self._turn += 1
+        self._next = max(self._next + PERIOD_S, time.monotonic() - PERIOD_S)
+        self.spin(max(self._next - time.monotonic(), 0.0))
+
+    def _pose(self, stamp_ns: int, kind: str = 'good', frame: str = FRAME, x: float | None = None) -> None:
+        phase = (time.monotonic() - self._began) % 1.5 / 1.5
+        share = 0.5 - 0.5 * np.cos(2.0 * np.pi * phase)
+        position = np.array([0.28 * share if x is None else x, 0.05 * share, 0.1])
+        self._publishers['hand_pose'].publish(hand_pose(self._types, stamp_ns, frame, position))
+        self.sent[kind] += 1
+
+    def _fault(self, name: str, stamp_ns: int) -> None:
+        from rcl_interfaces.srv import SetParametersAtomically
+        from rclpy.parameter import Parameter
+        from std_srvs.srv import SetBool, Trigger
+
+        if name in BAD_POSES:
+            ns = stamp_ns - (50_000_000 if name == 'late' else 0)
+            x = np.nan if name == 'nowhere' else None
+            self._pose(ns, name, 'camera' if name == 'camera' else FRAME, x)
+        elif name in ('cut', 'negative', 'crowd'):
+            rows = [(0.0, 1.0 + 0.001 * i, 0.0, 0.001, 0.0, i) for i in range(10_000)] if name == 'crowd' else ROWS
+            rows = [(0.0, 0.0, 0.0, -1.0, 0.0, 1)] if name == 'negative' else rows
+            message = obstacle_cloud(self._types, stamp_ns, FRAME, rows)
+            if name == 'cut':
+                message.data = message.data[:-3]
+            self._publishers['obstacles'].publish(message)
+        elif name == 'flip':
+            self._publishers['goals'].publish(goal_poses(self._types, stamp_ns, FRAME, GOALS[::-1]))
+        elif name in ('parameter', 'wrong parameter') and self._parameters.service_is_ready():
+            eta = 5.0 if name == 'wrong parameter' else self._dice.uniform(0.5, 0.9)
+            request = SetParametersAtomically.Request(parameters=[Parameter('foc.eta', value=eta).to_parameter_msg()])
+            self._parameters.call_async(request)
+        elif name == 'clutch' and self._engage.service_is_ready():
+            self._engage.call_async(SetBool.Request(data=False))
+            self._engage.call_async(SetBool.Request(data=True))
+        elif name == 'reset' and self._reset.service_is_ready():
+            self._reset.call_async(Trigger.Request())
+
+    def _predicted(self, cloud: Any) -> None:
+        self.predictions += 1
+        rows = np.frombuffer(cloud.data, dtype=np.uint8).reshape(-1, cloud.point_step)
+        numbers = np.ascontiguousarray(rows[:, :52]).view('<f4')
+        self.unfit += not np.isfinite(numbers).all()
+
+    def _judged(self, array: Any) -> None:
+        self.health = {entry.key: entry.value for entry in array.status[0].values}
+
+
+def measured(pid: int) -> dict[str, float]:
+    """Return resident memory [MB], threads and open files of a process."""
+    lines = Path(f'/proc/{pid}/status').read_text('ascii').splitlines()
+    status = dict(line.split(':', 1) for line in lines)
+    files = len(list(Path(f'/proc/{pid}/fd').iterdir()))
+    return {'memory': int(status['VmRSS'].split()[0]) / 1024.0, 'threads': float(status['Threads']), 'files': float(files)}
+
+
+def soaked(process: subprocess.Popen[str], player: Player, seconds: float) -> list[dict[str, float]]:
+    """Play for a while; return what was measured each REPORT_S."""
+    table, began = [], time.monotonic()
+    due = began + REPORT_S
+    while (now := time.monotonic()) - began < seconds:
+        player.tick(faulty=True)
+        if now >= due:
+            due += REPORT_S
+            p50, _, p99 = player.health.get('cycle time p50, p99 [ms]', '').partition(', ')
+            row = {'time': now - began, **measured(process.pid), 'p50': float(p50 or 'nan'), 'p99': float(p99 or 'nan')}
+            table.append(row)
+            print('  '.join(f'{name} {value:.1f}' for name, value in row.items()), flush=True)
+    return table
+
+
+def heard(player: Player) -> tuple[int, int]:
+    """Return how many poses never arrived, and how many good ones were refused, when the node has told of all that was sent."""
+    total, received = sum(player.sent.values()), 0
+    for _ in range(50):
+        player.spin(0.2)
+        received = int(player.health['hand_pose refused'].split(' of ')[1])
+        if received >= total:
+            break
+    counted = {name: int(player.health.get(f'count {kind}', 0)) for name, kind in BAD_POSES.items()}
+    return total - received, sum(max(count - player.sent[name], 0) for name, count in counted.items())
+
+
+def verdicts(table: list[dict[str, float]], player: Player, lost: int, refused: int) -> dict[str, bool]:
+    """Return what had to hold, in words, and whether it did."""
+    after = [row for row in table if row['time'] >= WARM_UP * table[-1]['time']]
+    third = max(len(after) // 3, 1)
+    start, end = _medians(after[:third]), _medians(after[-third:])
+    return {
+        f'memory {start["memory"]:.1f} to {end["memory"]:.1f} MB': end['memory'] <= GROWTH * start['memory'],
+        f'threads {start["threads"]:.0f} to {end["threads"]:.0f}': end['threads'] <= start['threads'],
+        f'files {start["files"]:.0f} to {end["files"]:.0f}': end['files'] <= start['files'],
+        f'p99 {start["p99"]:.1f} to {end["p99"]:.1f} ms': end['p99'] <= SLOWER * start['p99'],
+        f'{lost} of {sum(player.sent.values())} poses lost, {refused} good ones refused': lost == refused == 0,
+        f'{player.predictions} predictions, {player.unfit} not finite': player.predictions > 0 and not player.unfit,
+        f'internal error: {player.health["last internal error"]}': player.health['last internal error'] == 'none',
+    }
+
+
+def _medians(rows: list[dict[str, float]]) -> dict[str, float]:
+    return {name: statistics.median(row[name] for row in rows) for name in rows[0]}
+
+
+def main() -> int:
+    """Soak a node and say how it went."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument('--minutes', type=float, default=10.0, help='how long (default: %(default)s)')
+    seconds = 60.0 * parser.parse_args().minutes
+    with tempfile.TemporaryDirectory(prefix='foc_ros_soak_') as logs:
+        os.environ.update(graph_environment(Path(logs)))
+        command = [sys.executable, '-m', 'foc_ros.node_main', '--ros-args', '-p', 'homotopy.max_candidates:=2']
+        with Player() as player, subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+            while not player.connected:
+                player.spin(0.1)
+            table = soaked(process, player, seconds)
+            found = verdicts(table, player, *heard(player))
+            process.send_signal(signal.SIGTERM)
+            _, errors = process.communicate(timeout=30)
+    found[f'exit code {process.returncode}'] = process.returncode == 0 and 'Traceback' not in errors
+    for words, right in found.items():
+        print(f'{"holds" if right else "FAILS"}: {words}')
+    return 0 if all(found.values()) else 1
+
+
+if __name__ == '__main__':
+    sys.exit(main())

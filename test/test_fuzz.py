@@ -1,0 +1,123 @@
+"""Any messages in any order: no exception escapes, nothing leaves that is not finite, or without a fresh pose.
+
+FOC_ROS_FUZZ: how many messages, 2,000 by default and 100,000 in `make fuzz`; a twentieth of them go through a live node.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from fuzz_messages import inputs
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from message_helpers import STORE, RosbagsTypes
+from ros_helpers import graph, require_ros
+
+from foc_ros import topics
+from foc_ros.conversions.outputs import output_messages
+from foc_ros.foc.config import Config, updated
+from foc_ros.foc.pipeline import Pipeline
+from foc_ros.intake import Intake
+
+COUNT = int(os.environ.get('FOC_ROS_FUZZ', '2000'))
+LENGTH = 20
+TYPES = RosbagsTypes(STORE)
+CONFIG = updated(Config(), {'foc.steps': 10, 'homotopy.max_candidates': 2, 'rate_hz': 1000.0})
+THOROUGH = settings(
+    max_examples=max(COUNT // LENGTH, 1), suppress_health_check=list(HealthCheck), deadline=None, derandomize=True, database=None
+)
+LIVE = settings(THOROUGH, max_examples=max(COUNT // LENGTH // 20, 1))
+
+
+def numbers(message: Any) -> Iterator[float]:
+    """Yield every number of a message that is an output; of a cloud, those of its rows."""
+    if hasattr(message, 'point_step'):
+        kinds = {7: '<f4', 6: '<u4'}
+        rows = np.frombuffer(bytes(message.data), dtype=[(field.name, kinds[field.datatype]) for field in message.fields])
+        for name in rows.dtype.names or ():
+            yield from rows[name].astype(float).tolist()
+        return
+    if isinstance(message, (int, float)):
+        yield float(message)
+    elif isinstance(message, (list, tuple, np.ndarray)) or hasattr(message, 'typecode'):
+        for each in message:
+            yield from numbers(each)
+    elif hasattr(message, '__slots__') or hasattr(message, '__dataclass_fields__'):
+        names = getattr(message, '__dataclass_fields__', None) or message.get_fields_and_field_types()
+        for name in names:
+            if not name.startswith('__'):
+                yield from numbers(getattr(message, name))
+
+
+@THOROUGH
+@given(st.lists(inputs(TYPES), min_size=LENGTH, max_size=LENGTH))
+def test_any_messages_in_any_order(messages: list[tuple[str, Any]]) -> None:
+    pipeline = Pipeline(CONFIG)
+    intake, fresh = Intake(pipeline), False
+    for role, message in messages:
+        verdict = intake.take(role, message)
+        if role != topics.HAND or verdict is None or not verdict.taken:
+            continue
+        fresh = True
+        prediction = pipeline.predict() if pipeline.due else None
+        if prediction is None:
+            continue
+        assert fresh
+        fresh = False
+        stamp = message.header.stamp
+        assert prediction.stamp_ns == stamp.sec * 1_000_000_000 + stamp.nanosec
+        sent = output_messages(prediction, pipeline.scene.obstacles(prediction.stamp_ns), 'xy', TYPES)
+        assert all(np.isfinite(number) for each in sent.values() for number in numbers(each))
+        assert pipeline.predict() is None, 'predicted twice from one pose'
+
+
+def test_the_messages_lead_to_predictions_and_to_refusals() -> None:
+    """Or the test above would see nothing."""
+    seen: dict[str, int] = {'predicted': 0, 'refused': 0}
+
+    @settings(THOROUGH, max_examples=100)
+    @given(st.lists(inputs(TYPES), min_size=LENGTH, max_size=LENGTH))
+    def look(messages: list[tuple[str, Any]]) -> None:
+        pipeline = Pipeline(CONFIG)
+        intake = Intake(pipeline)
+        for role, message in messages:
+            verdict = intake.take(role, message)
+            seen['refused'] += verdict is None or not verdict.taken
+            seen['predicted'] += pipeline.due and pipeline.predict() is not None
+
+    look()
+    assert seen['predicted'] > 30
+    assert seen['refused'] > 200
+
+
+@pytest.fixture(scope='module')
+def bench() -> Iterator[Any]:
+    require_ros()
+    from node_helpers import Bench
+
+    with graph() as ros:
+        yield Bench(ros, parameters={'foc.steps': 10, 'rate_hz': 1000.0})
+
+
+def test_any_messages_through_a_live_node(bench: Any) -> None:
+    from node_helpers import TYPES as LIVE_TYPES
+
+    @LIVE
+    @given(st.lists(inputs(LIVE_TYPES), min_size=LENGTH, max_size=LENGTH))
+    def play(messages: list[tuple[str, Any]]) -> None:
+        for role, message in messages:
+            before = int(bench.node._monitor._own['predictions'])
+            bench.hear(role, message)
+            made = int(bench.node._monitor._own['predictions']) - before
+            assert made <= (role == topics.HAND), f'{made} predictions from {role}'
+        for received in bench.received.values():
+            assert all(np.isfinite(number) for each in received for number in numbers(each))
+            received.clear()
+        assert not bench.node._monitor._own['internal_errors'], bench.node._monitor._error
+
+    play()
+    assert bench.health().level in (b'\x00', b'\x01')
