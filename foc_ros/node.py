@@ -29,6 +29,7 @@ from .endpoints import INPUTS, advertise, subscribe, waiting
 from .foc.config import Config
 from .foc.errors import FocError
 from .foc.pipeline import Pipeline, Verdict
+from .frames import Frames
 from .freshness import Freshness
 from .intake import Intake
 from .live_parameters import LiveParameters
@@ -58,6 +59,7 @@ class FocNode(LifecycleNode):
         self._state, self._engaged, self._obstacle_to_start = 'unconfigured', True, ''
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
+        self._frames = Frames(self)
         self._begin()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_service(SetBool, '~/engage', self._engage)
@@ -140,7 +142,8 @@ class FocNode(LifecycleNode):
             self._predict()
 
     def _take(self, role: str, message: Any) -> bool:
-        verdict, now_s = self.intake.take(role, message), self._now_s()
+        moved = self._frames.moved(role, message, self.pipeline.frame_id)
+        verdict, now_s = self.intake.take(role, moved), self._now_s()
         taken = verdict is not None and verdict.taken
         refused, received = self._monitor.received(role, now_s, taken=taken)
         if taken:
@@ -148,7 +151,8 @@ class FocNode(LifecycleNode):
         if verdict is not None and taken and role == HAND:
             self._note_pose(verdict)
         if not taken:
-            text = f'{self.intake.last_refusal} ({refused} of {received} refused so far)'
+            reasons = '; '.join(filter(None, [self.intake.last_refusal, self._frames.last_error]))
+            text = f'{reasons} ({refused} of {received} refused so far)'
             self._loggers[role].warning(text, throttle_duration_sec=THROTTLE_S)
         return taken
 
