@@ -40,6 +40,7 @@ def predict(config: Config, hand: HandState, obstacles: Obstacles, goals: Array,
     obstacles: where they are at the hand's stamp; goals (g, 2) [m], g >= 1. The same arguments give the same answer, times apart.
     """
     began = time.perf_counter()
+    hand = _at_rest(hand)
     durations = [time_to_go(hand, goal, config.duration) for goal in goals]
     given, obstacles = obstacles, relevant(obstacles, hand.mean[:2], goals, max(durations), config.scene.max_obstacles)
     problems = [reaching_problem(config, hand, obstacles, *pair) for pair in zip(goals, durations, strict=True)]
@@ -75,6 +76,15 @@ def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal
         goal_weight=foc.goal_weight,
         recovery_s=foc.recovery_s,
     )
+
+
+def _at_rest(hand: HandState) -> HandState:
+    """Take speed and acceleration of a hand that has not begun to move as nothing.
+
+    They are noise: with 1 mm of it at 100 Hz, the efforts of a hand at rest would differ by a factor of three from one sample to
+    the next, and the ways round a symmetric obstacle would swap their ranks 24 times a second.
+    """
+    return hand if hand.onset_ns is not None else replace(hand, mean=np.append(hand.mean[:2], np.zeros(4)))
 
 
 def _seen(outcome: Outcome, problem: Problem, hand: HandState) -> Outcome:
