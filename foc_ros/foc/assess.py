@@ -38,7 +38,7 @@ class Assessment:
 
 
 def assess(problem: Problem, control: Array) -> Assessment:
-    """Evaluate k = -E[C] / sqrt(Var[C]) linearised at the control's own mean (paper, equation 7). control: stacked (2N,)."""
+    """Evaluate k = -E[C] / sqrt(Var[C]) linearised at the control's own mean (paper, equation 8). control: stacked (2N,)."""
     offset = problem.positions(control)[None] - problem.centres
     mean = expectation(offset, np.zeros(offset.shape[1:]), problem.size[0])
     var = variance(offset, problem.position_variance(control), problem.size[1], problem.obstacles.centre_covariance)
