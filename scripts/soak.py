@@ -161,6 +161,16 @@ def measured(pid: int) -> dict[str, float]:
     return {'memory': int(status['VmRSS'].split()[0]) / 1024.0, 'threads': float(status['Threads']), 'files': float(files)}
 
 
+def begun(player: Player) -> None:
+    """Play until the node has heard of us: poses of before may never arrive, and are not counted."""
+    while not player.connected:
+        player.spin(0.1)
+    while 'hand_pose refused' not in player.health:
+        player.tick()
+    player.spin(REPORT_S)
+    player.sent['good'] = int(player.health['hand_pose refused'].split(' of ')[1])
+
+
 def soaked(process: subprocess.Popen[str], player: Player, seconds: float) -> list[dict[str, float]]:
     """Play for a while; return what was measured each REPORT_S."""
     table, began = [], time.monotonic()
@@ -217,8 +227,7 @@ def main() -> int:
         os.environ.update(graph_environment(Path(logs)))
         command = [sys.executable, '-m', 'foc_ros.node_main', '--ros-args', '-p', 'homotopy.max_candidates:=2']
         with Player() as player, subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
-            while not player.connected:
-                player.spin(0.1)
+            begun(player)
             table = soaked(process, player, seconds)
             found = verdicts(table, player, *heard(player))
             process.send_signal(signal.SIGTERM)
