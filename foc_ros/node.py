@@ -32,6 +32,7 @@ from .foc.pipeline import Pipeline, Verdict
 from .frames import Frames
 from .freshness import Freshness
 from .intake import Intake
+from .library_file import load_library
 from .live_parameters import LiveParameters
 from .monitor import Monitor
 from .parameters import autostart, declare_all
@@ -51,6 +52,7 @@ class FocNode(LifecycleNode):
     def __init__(self, **options: Any) -> None:
         super().__init__('foc', automatically_declare_parameters_from_overrides=True, **options)
         self._live = LiveParameters(self, declare_all(self, Config()), self._reconfigure)
+        self._library = load_library(self._live.config.homotopy.library)
         at_once = autostart(self)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._types = RclpyTypes()
@@ -106,7 +108,7 @@ class FocNode(LifecycleNode):
         return self.on_cleanup(state)
 
     def _begin(self) -> None:
-        self.pipeline = Pipeline(self._live.config)
+        self.pipeline = Pipeline(self._live.config, self._library)
         self.intake, self._freshness, self._monitor = Intake(self.pipeline), Freshness(), Monitor(self._now_s())
 
     def _release(self) -> None:

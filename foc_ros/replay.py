@@ -12,6 +12,7 @@ from .foc.pipeline import Pipeline
 from .foc.records import HandSample, Prediction
 from .foc.scene import Scene
 from .intake import Intake
+from .library_file import load_library
 from .topics import HAND
 
 
@@ -30,10 +31,13 @@ class Step:
 
 
 class Replay:
-    """Feeds recorded messages to a pipeline as the node does live; `intake` keeps the counts."""
+    """Feeds recorded messages to a pipeline as the node does live; `intake` keeps the counts.
+
+    Raises RecordingError or InputError where the class library cannot be used.
+    """
 
     def __init__(self, config: Config) -> None:
-        self.pipeline = Pipeline(config)
+        self.pipeline = Pipeline(config, load_library(config.homotopy.library))
         self.intake = Intake(self.pipeline)
 
     def steps(self, items: Iterable[Item]) -> Iterator[Step]:

@@ -18,7 +18,10 @@ from .conversions.outputs import output_messages
 from .conversions.types import RosbagsTypes
 from .foc.config import Config
 from .foc.errors import InputError
+from .foc.library import Way
 from .foc.records import HandSample
+from .learn import Learner
+from .library_file import load_library, save_library
 from .replay import Replay, Step
 from .summary import Summary, facts
 from .terminal import show_table, track
@@ -40,6 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--output', type=Path, metavar='NEW_BAG', help='write inputs and predictions to a new bag')
     parser.add_argument('--report', type=Path, metavar='DIR', help='write a page with pictures')
     parser.add_argument('--params', type=Path, metavar='YAML', help="the node's parameter file")
+    parser.add_argument(
+        '--learn', type=Path, metavar='FILE', help='add the ways demonstrated to a class library, for homotopy.library'
+    )
     parser.add_argument('--json', action='store_true', help='print one JSON object')
     words = 'take an input from a topic, as in hand_pose:=/PSM1/measured_cp (default: by name, else by type)'
     parser.add_argument('--remap', action='append', default=[], metavar='INPUT:=TOPIC', help=words)
@@ -49,10 +55,20 @@ def run(arguments: argparse.Namespace) -> int:
     """Replay; 3 where no prediction has a solved candidate."""
     replayed, summary = Replay(_config(arguments.params)), Summary()
     report = None if arguments.report is None else Report()
+    learner = None if arguments.learn is None else Learner(replayed.pipeline, _known(arguments.learn))
     with TemporaryFile('w+', encoding='utf-8') as answers:
-        sinks: list[Sink] = [summary, *([Answers(answers)] if arguments.json else []), *([report] if report else [])]
+        sinks: list[Sink] = [
+            summary,
+            *([Answers(answers)] if arguments.json else []),
+            *([report] if report else []),
+            *([learner] if learner else []),
+        ]
         duration_s = _play(arguments, replayed, sinks)
         answer = summary.answer(replayed.intake.counts, duration_s)
+        if learner is not None:
+            learner.finish()
+            save_library(arguments.learn, learner.ways)
+            answer['learned'] = learner.learned
         if report is not None:
             report.write(arguments.report, arguments.bag.resolve().name, facts(answer))
         if arguments.json:
@@ -148,6 +164,10 @@ def _config(file: Path | None) -> Config:
     from .parameters import load_parameter_file
 
     return load_parameter_file(file)
+
+
+def _known(file: Path) -> tuple[Way, ...]:
+    return load_library(str(file)) if file.exists() else ()
 
 
 def _chosen(remaps: list[str]) -> dict[str, str]:

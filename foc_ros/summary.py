@@ -63,6 +63,7 @@ def facts(answer: Mapping[str, Any]) -> dict[str, str]:
         'predictions': f'{answer["predictions"]}, {answer["solved"]} with a solved candidate',
         'refused': _listed(answer['refused']),
         'candidates not solved': _listed(answer['failures']),
+        **({'ways learned': str(answer['learned'])} if 'learned' in answer else {}),
         'time per prediction': '-' if times['p50'] is None else f'{times["p50"]:.1f} ms median, {times["p99"]:.1f} ms p99',
     }
 

@@ -89,6 +89,7 @@ class HomotopyConfig:
 
     max_candidates: int = _p(4, 'number of homotopy classes solved, over all goals', '', 1, 64)
     clearance: float = _p(0.005, 'distance from an obstacle that the hand needs: a narrower gap is closed', 'm', 0.0, 1.0)
+    library: str = _p('', 'file of demonstrated ways that replay --learn wrote; empty: none', read_only=True)
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,12 @@ Driven by message time alone: no clock is read, so the same messages give the sa
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from .config import Config
 from .errors import FocError
 from .estimator import Track, update
+from .library import Way
 from .predictor import Memory, predict
 from .records import NANOSECONDS, Array, HandSample, Obstacles, Prediction
 from .refusals import Refusals
@@ -20,12 +23,15 @@ __all__ = ['Pipeline', 'Verdict']
 class Pipeline:
     """Follows the hand, keeps the scene, and predicts when a fresh hand sample is due.
 
+    library: demonstrated ways to recall.
+
     Attributes: config; hand_state, None until a hand sample came; scene; engaged; frame_id, the working frame, None until the
     parameter or the first hand sample fixes it.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, library: Sequence[Way] = ()) -> None:
         self.config = config
+        self._library = tuple(library)
         self.hand_state: Track | None = None
         self.scene = Scene()
         self.engaged = True
@@ -113,7 +119,9 @@ class Pipeline:
         self._fresh, self._predicted_ns = False, self.hand_state.stamp_ns
         obstacles = self.scene.obstacles(self.hand_state.stamp_ns)
         try:
-            prediction, self._memory = predict(self.config, self.hand_state, obstacles, self.scene.goals, self._memory)
+            prediction, self._memory = predict(
+                self.config, self.hand_state, obstacles, self.scene.goals, self._memory, self._library
+            )
         except FocError as error:
             self._refusals.refuse('predict_failed', str(error))
             return None

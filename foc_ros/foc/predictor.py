@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from .culling import relevant
 from .duration import time_to_go
 from .dynamics import triple_integrator_horizon
 from .homotopy import search
+from .library import Way, recall
 from .likelihood import most_likely
 from .noise import noise_per_step
 from .outcomes import Earlier, solve_candidates
@@ -34,10 +35,13 @@ class Memory:
     stamp_ns: int = 0
 
 
-def predict(config: Config, hand: HandState, obstacles: Obstacles, goals: Array, memory: Memory) -> tuple[Prediction, Memory]:
+def predict(
+    config: Config, hand: HandState, obstacles: Obstacles, goals: Array, memory: Memory, library: Sequence[Way] = ()
+) -> tuple[Prediction, Memory]:
     """Predict where a hand goes.
 
-    obstacles: where they are at the hand's stamp; goals (g, 2) [m], g >= 1. The same arguments give the same answer, times apart.
+    obstacles: where they are at the hand's stamp; goals (g, 2) [m], g >= 1; library: ways to recall where they
+    fit. The same arguments give the same answer, times apart.
     """
     began = time.perf_counter()
     hand = _at_rest(hand)
@@ -45,19 +49,21 @@ def predict(config: Config, hand: HandState, obstacles: Obstacles, goals: Array,
     given, obstacles = obstacles, relevant(obstacles, hand.mean[:2], goals, max(durations), config.scene.max_obstacles)
     problems = [reaching_problem(config, hand, obstacles, *pair) for pair in zip(goals, durations, strict=True)]
     found = search(hand.mean, goals, obstacles, config.homotopy, durations, config.foc.steps, memory.candidates)
+    candidates = recall(library, hand, goals, obstacles, config.homotopy, durations, config.foc.steps, found.candidates)
     earlier = Earlier(memory.solutions, (hand.stamp_ns - memory.stamp_ns) / NANOSECONDS)
-    outcomes = solve_candidates(found.candidates, problems, config.foc, config.likelihood.beta, hand.effort_spent, earlier)
+    outcomes = solve_candidates(candidates, problems, config.foc, config.likelihood.beta, hand.effort_spent, earlier)
     outcomes = [_seen(outcome, problems[outcome.candidate.goal], hand) for outcome in outcomes]
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
     best = most_likely(labels, values, memory.most_likely, config.likelihood.margin)
-    dropped = {'merged': len(found.candidates) - len(outcomes), 'culled': len(given) - len(obstacles)}
-    notes = dict(found.notes) | {name: count for name, count in dropped.items() if count}
+    counted = {'merged': len(candidates) - len(outcomes), 'culled': len(given) - len(obstacles)}
+    counted['recalled'] = len(candidates) - len(found.candidates)
+    notes = dict(found.notes) | {name: count for name, count in counted.items() if count}
     seconds = time.perf_counter() - began
     prediction = Prediction(hand.stamp_ns, hand.frame_id, hand.height, tuple(outcomes), best, notes, seconds)
     useful = (outcome for outcome in outcomes if outcome.solution.status in (Status.SOLVED, Status.ETA_UNREACHABLE))
     solutions = {outcome.candidate.label: outcome.solution for outcome in useful}
-    return prediction, Memory(best, found.candidates, solutions, hand.stamp_ns)
+    return prediction, Memory(best, candidates, solutions, hand.stamp_ns)
 
 
 def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: Array, duration_s: float) -> Problem:

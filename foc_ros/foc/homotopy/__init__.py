@@ -1,6 +1,7 @@
 """Ways round: homotopy classes found, named and seeded, and the side on which a path really passes an obstacle."""
 
 from .search import Search, search
+from .shown import named_obstacles, timed
 from .sides import path_sides, swept_angles
 
-__all__ = ['Search', 'path_sides', 'search', 'swept_angles']
+__all__ = ['Search', 'named_obstacles', 'path_sides', 'search', 'swept_angles', 'timed']

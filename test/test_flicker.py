@@ -1,0 +1,46 @@
+"""Ten seconds of a noisy hand before noisy obstacles at 100 Hz: names stand still, and the most likely way does not flicker."""
+
+from itertools import islice, pairwise
+
+import numpy as np
+import pytest
+
+from foc_ros.foc.config import Config, updated
+from foc_ros.foc.pipeline import Pipeline
+from foc_ros.foc.records import HandSample, make_obstacles
+
+PERIOD_NS = 10_000_000
+SAMPLES = 1000
+NOISE = 0.001
+
+
+def predictions(**settings):
+    """Predictions at 100 Hz for a hand at rest before a circle on its straight way, 1 mm of noise on both."""
+    config = updated(Config(), {'rate_hz': 100.0, 'foc.steps': 20, **settings})
+    pipeline, rng = Pipeline(config), np.random.default_rng(11)
+    pipeline.set_goals(np.array([[0.3, 0.0]]), 'world')
+    for tick in range(SAMPLES):
+        stamp_ns = 1_000_000_000 + tick * PERIOD_NS
+        centre = np.array([[0.15, 0.0]]) + rng.normal(0.0, NOISE, 2)
+        pipeline.set_obstacles('cloud', make_obstacles(centre, 0.03, 0.001), stamp_ns, 'world')
+        pipeline.hand(HandSample(stamp_ns, rng.normal(0.0, NOISE, 2), 0.0, 'world'))
+        prediction = pipeline.predict()
+        assert prediction is not None, pipeline.last_refusal
+        yield prediction
+
+
+def changes(values):
+    return sum(a != b for a, b in pairwise(values))
+
+
+@pytest.mark.parametrize('strategy', ['lv', 'hc'])
+def test_a_symmetric_obstacle_does_not_make_the_choice_flicker(strategy):
+    made = list(predictions(**{'foc.strategy': strategy}))
+    assert len(made) == SAMPLES
+    assert all({outcome.candidate.label for outcome in one.solved} == {'goal0:+0', 'goal0:-0'} for one in made)
+    assert changes([one.most_likely for one in made]) <= 1
+
+
+def test_without_a_margin_it_would():
+    made = list(islice(predictions(**{'likelihood.margin': 0.0}), 200))
+    assert changes([one.most_likely for one in made]) > 10
