@@ -18,7 +18,7 @@ from rows.ticking import Ticking, alternating
 from scenes import Reach, clusters, tick_4x8, with_far
 
 SPEED = Path(__file__).resolve().parents[1] / 'doc' / 'images' / 'speed.png'
-TICKS = 24
+TICKS = 16
 CLASSES, FAR, STEPS = (1, 2, 3, 4, 6, 8), (0, 8, 24, 56, 120, 248), (25, 50, 100, 200)
 
 

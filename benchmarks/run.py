@@ -92,8 +92,8 @@ def main() -> int:
     chosen = parser.parse_args()
     rows = []
     for name in chosen.only:
-        print(f'{name} ...', file=sys.stderr, flush=True)
         rows.append(measured(name, chosen.quick))
+        print(*cells(rows[-1]), sep='  ', file=sys.stderr, flush=True)  # a whole run takes minutes
     if chosen.json:
         print(json.dumps(rows, indent=1))
     elif chosen.markdown:

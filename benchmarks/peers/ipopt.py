@@ -1,12 +1,13 @@
 """IPOPT, through CasADi, on the un-linearised problem: least effort subject to the surrogate itself.
 
-Positions and variances are variables of their own, tied to the control by equations: derivatives are then sparse. On the reach
-with three obstacles this took a third of the time of the program in the control alone, and IPOPT's adaptive barrier two thirds of
-the monotone one's.
+Positions and variances are variables of their own, tied to the control by equations: derivatives are then sparse, and it took a
+third of the time of the program in the control alone. Which barrier strategy is the faster depends on the scene: the better one
+is the peer.
 """
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import casadi
@@ -16,7 +17,8 @@ from foc_ros.foc.problem import Problem
 
 from .dense import Array, control_along, dense
 
-OPTIONS = {'print_time': False, 'ipopt.print_level': 0, 'ipopt.sb': 'yes', 'ipopt.mu_strategy': 'adaptive'}
+OPTIONS = {'print_time': False, 'ipopt.print_level': 0, 'ipopt.sb': 'yes'}
+BARRIERS = ('adaptive', 'monotone')
 LENGTH = 0.1
 """Unit of positions [m]."""
 
@@ -24,7 +26,7 @@ LENGTH = 0.1
 class Ipopt:
     """The program of one problem, built and differentiated beforehand; only :meth:`solve` is to be timed."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, barrier: str) -> None:
         self.made, n = dense(problem), problem.horizon.steps
         self.unit = float(np.abs(self.made.b[:2]).max()) * 60.0 / (problem.horizon.dt * n) ** 3
         spread = np.concatenate(tuple(self.made.V)) * self.unit**2
@@ -43,7 +45,7 @@ class Ipopt:
         self.high = np.concatenate((np.full(rows.numel(), np.inf), equal))
         self.smallest = np.concatenate((np.full(4 * n, -np.inf), np.zeros(2 * n)))
         program = {'x': casadi.vertcat(u, q, v), 'f': casadi.dot(u, u) / n, 'g': casadi.vertcat(rows, equations)}
-        self.solver = casadi.nlpsol('peer', 'ipopt', program, OPTIONS)
+        self.solver = casadi.nlpsol('peer', 'ipopt', program, OPTIONS | {'ipopt.mu_strategy': barrier})
 
     def _clear(self, problem: Problem, q: Any, v: Any) -> Any:
         """-(E + k sqrt(Var)), in units of the obstacle's E[R^2], for every obstacle and step: to be >= 0."""
@@ -71,3 +73,15 @@ class Ipopt:
     def iterations(self) -> int:
         """How many the last solve took."""
         return int(self.solver.stats()['iter_count'])
+
+
+def best_ipopt(problem: Problem, guess: Array) -> Ipopt:
+    """Return the program with the barrier strategy that is fastest from a guess (N, 2), of those that end at the least effort."""
+    tried = []
+    for barrier in BARRIERS:
+        peer = Ipopt(problem, barrier)
+        start, began = peer.start(guess), time.perf_counter()
+        converged, effort, _ = peer.solve(start)
+        tried.append((effort if converged else np.inf, time.perf_counter() - began, peer))
+    least = min(effort for effort, _, _ in tried)
+    return min((each for each in tried if each[0] <= 1.02 * least), key=lambda each: each[1])[2]

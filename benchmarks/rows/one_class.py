@@ -72,10 +72,10 @@ def _against_naive(name: str, solver: str, target: Target | None, quick: bool) -
 
 def cold_vs_ipopt(quick: bool) -> Result:
     """Compare strategy optimal with IPOPT on the problem as it is."""
-    from peers.ipopt import Ipopt
+    from peers.ipopt import best_ipopt
 
     repetitions = 2 if quick else 15
-    peer = Ipopt(one_class())
+    peer = best_ipopt(one_class(), GUESS[1:])
     start = peer.start(GUESS[1:])
     times = interleaved({'ours': lambda: _solved(OPTIMAL), 'peer': lambda: peer.solve(start)}, repetitions)
     converged, effort, _ = peer.solve(start)

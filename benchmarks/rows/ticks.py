@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-from measure import median_ms
+from measure import median_ms, replaced
 from results import Result, Target, at_least, at_most
 from scenes import Reach, with_far
 from scenes import tick_4x8 as four_classes
 from scenes import tick_8x16 as eight_classes
 
-from foc_ros.foc.config import updated
-from foc_ros.foc.predictor import Memory, predict, reaching_problem
-from foc_ros.foc.records import Candidate
+from foc_ros.foc import predictor
+from foc_ros.foc.config import FocConfig
+from foc_ros.foc.forward import forward
+from foc_ros.foc.outcomes import solve_candidates
+from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.problem import Problem
+from foc_ros.foc.records import Candidate, Outcome
+from foc_ros.foc.start import cold
 
 from .ticking import Ticking, alternating
 
@@ -32,12 +39,11 @@ def tick_8x16(quick: bool) -> Result:
 
 
 def _against_ipopt(name: str, reach: Reach, what: str, target: Target, quick: bool) -> Result:
-    from peers.ipopt import Ipopt
+    from peers.ipopt import best_ipopt
 
-    repetitions, ticking = (2 if quick else 12), Ticking(reach)
-    candidate = _most_likely(reach)
-    problem = reaching_problem(reach.config, reach.hands[0], reach.obstacles, reach.goals[candidate.goal], 1.0)
-    peer = Ipopt(problem)
+    repetitions, ticking = (2 if quick else 8), Ticking(reach)
+    candidate, problem = _asked(reach)
+    peer = best_ipopt(problem, candidate.guess[1:])
     start = peer.start(candidate.guess[1:])
     converged, effort, _ = peer.solve(start)
     ticks, solves = [], []
@@ -46,7 +52,7 @@ def _against_ipopt(name: str, reach: Reach, what: str, target: Target, quick: bo
         began = time.perf_counter()
         peer.solve(start)
         solves.append(time.perf_counter() - began)
-    least = _optimal_effort(reach, candidate.label)
+    least = forward(problem, cold(candidate.guess), FocConfig(strategy='optimal')).effort
     apart = ticking.far_from_cold()
     ours_ms, peer_ms = median_ms(ticks), median_ms(solves)
     return Result(
@@ -66,16 +72,18 @@ def _against_ipopt(name: str, reach: Reach, what: str, target: Target, quick: bo
     )
 
 
-def _most_likely(reach: Reach) -> Candidate:
-    prediction, _ = predict(reach.config, reach.hands[0], reach.obstacles, reach.goals, Memory())
-    return prediction.solved[0].candidate
+def _asked(reach: Reach) -> tuple[Candidate, Problem]:
+    """Return the most likely class of the first tick and the problem that the predictor solves for it."""
+    asked: list[Sequence[Problem]] = []
 
+    def listening(candidates: Sequence[Candidate], problems: Sequence[Problem], *rest: Any) -> list[Outcome]:
+        asked.append(problems)
+        return solve_candidates(candidates, problems, *rest)
 
-def _optimal_effort(reach: Reach, label: str) -> float:
-    """Return the effort of strategy `optimal` in a class; not a number where it has none."""
-    config = updated(reach.config, {'foc.strategy': 'optimal'})
-    prediction, _ = predict(config, reach.hands[0], reach.obstacles, reach.goals, Memory())
-    return next((each.solution.effort for each in prediction.solved if each.candidate.label == label), np.nan)
+    with replaced(predictor, 'solve_candidates', listening):
+        prediction, _ = predict(reach.config, reach.hands[0], reach.obstacles, reach.goals, Memory())
+    candidate = prediction.solved[0].candidate
+    return candidate, asked[0][candidate.goal]
 
 
 def far_obstacles(quick: bool) -> Result:
