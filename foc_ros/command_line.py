@@ -18,6 +18,7 @@ from .foc.errors import FocError
 COMMANDS = {
     'demo': ('demo', 'play the packaged recording into the node and show what it predicts'),
     'node': ('node_command', 'run the node; what follows goes to ROS: --ros-args -r hand_pose:=/PSM1/measured_cp'),
+    'paper': ('paper', "redo the paper's studies: figures, numbers, a table"),
     'solve': ('solve', 'solve one scene from a YAML or JSON file'),
     'replay': ('replay_command', 'predict from a recording, without ROS and without waiting'),
     'convert': ('convert', 'turn motion capture in CSV tables into bags'),

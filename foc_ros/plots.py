@@ -114,7 +114,9 @@ def save(figure: Figure, file: Path | str) -> None:
     if Path(file).suffix.lower().removeprefix('.') not in known:
         raise InputError('picture file', f'a name that ends in {", ".join("." + each for each in sorted(known))}', str(file))
     try:
-        figure.savefig(file, bbox_inches='tight', pad_inches=0.08)
+        # without its date, a PDF is the same file each time
+        dateless = {'CreationDate': None} if Path(file).suffix.lower() == '.pdf' else None
+        figure.savefig(file, bbox_inches='tight', pad_inches=0.08, metadata=dateless)
     except OSError as error:
         raise InputError('picture file', 'a file that can be written', f'{file}: {error.strerror or error}') from error
 

@@ -1,0 +1,158 @@
+"""The paper redone: its trends are there, the files are the same each time, wrong output is refused."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip('matplotlib', reason='matplotlib is not installed')
+
+from foc_ros.foc.records import Status
+from foc_ros.paper.command import perform
+from foc_ros.paper.numbers import crossings, trends
+from foc_ros.paper.reaching import clearance, path_length, speed
+from foc_ros.paper.studies import PAPER_ETA, QUICK, EffortCurve, RatioCurve, Studies
+
+FILES = {f'study{number}.{suffix}' for number in range(1, 8) for suffix in ('png', 'pdf')} | {'numbers.json', 'table.md'}
+
+
+@pytest.fixture(scope='module')
+def output(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp('paper') / 'new' / 'output'
+
+
+@pytest.fixture(scope='module')
+def found(output: Path) -> Studies:
+    """All studies on the coarse grid, from end to end."""
+    return perform(output, QUICK)
+
+
+def ratio(found: Studies, number: int) -> RatioCurve:
+    """The continuous ratio of a study, solved at every eta."""
+    first = found[number].ratios[0]
+    for curve in (first.over, first.under):
+        assert {each.status for each in curve.solutions} == {Status.SOLVED}, curve.name
+    return first
+
+
+def test_1_lv_is_slow_and_near_hc_goes_wide(found: Studies) -> None:
+    study = found[1]
+    lv, hc = study.shown[0.94]['LV'], study.shown[0.94]['HC']
+    assert clearance(study.scene, lv) < 0.9 * clearance(study.scene, hc)
+    assert speed(lv)[:25].mean() < 0.9 * speed(hc)[:25].mean()
+    assert speed(lv).argmax() > speed(hc).argmax()
+    assert lv.tau < hc.tau and lv.lam > hc.lam
+
+
+def test_2_more_eta_costs_lv_its_spread_and_hc_its_way(found: Studies) -> None:
+    low, high = found[2].shown[0.86], found[2].shown[0.95]
+    narrowed = {name: np.trace(high[name].covariance[25, :2, :2]) / np.trace(low[name].covariance[25, :2, :2]) for name in low}
+    assert narrowed['LV'] < narrowed['HC'] < 1.0
+    for shown in (low, high):
+        assert path_length(shown['LV']) < path_length(shown['HC'])
+
+
+def test_3_ratio_of_strategies_rises_through_1(found: Studies) -> None:
+    curve = ratio(found, 3)
+    assert curve.values[0] < 1.0 < 1.5 < curve.at(0.95)
+    assert len(crossings(curve)) == 1
+    assert np.diff(curve.values[curve.etas >= 0.86]).min() > 0.0
+
+
+def test_4_with_little_noise_it_stays_below_1(found: Studies) -> None:
+    curve = ratio(found, 4)
+    assert curve.values.max() < 1.001
+    assert curve.values[-1] < 0.97
+
+
+def test_5_and_6_ways_cost_the_same_up_to_a_knee_then_the_open_one_less(found: Studies) -> None:
+    lv, hc = ratio(found, 5), ratio(found, 6)
+    for curve in (lv, hc):
+        early = curve.values[curve.etas <= 0.9]
+        assert early.min() > 0.75 and early.max() < 1.33
+        assert curve.at(PAPER_ETA) < early.min()
+    assert np.diff(lv.values[lv.etas >= 0.9])[:-1].max() < 0.0
+    assert lv.at(PAPER_ETA) < 0.55 < hc.at(PAPER_ETA) < 0.8
+
+
+def test_7_optimal_is_cheapest_and_all_keep_eta(found: Studies) -> None:
+    efforts = {curve.name: curve.efforts for curve in found.optimal.efforts}
+    assert np.isfinite(list(efforts.values())).all()
+    for name in ('LV', 'HC'):
+        assert (efforts['optimal'] < 1.001 * efforts[name]).all()
+    for rolled in found.optimal.rolled.values():
+        assert set(rolled) == set(QUICK.rolled)
+        assert all(each.step[2] > eta for eta, each in rolled.items())
+
+
+def test_stepping_is_another_thing(found: Studies) -> None:
+    """The printed growth overshoots: when the loop ends eta is exceeded, and LV costs many times what the smallest s costs."""
+    _, printed, _ = found[3].ratios
+    assert printed.name == 'algorithm 1, Δ = 10'
+    for stepped in (printed.over, printed.under):
+        for eta, each in zip(stepped.etas, stepped.solutions, strict=True):
+            assert each.status is not Status.SOLVED or each.eta >= eta
+    assert printed.at(0.94) > 2 * ratio(found, 3).at(0.93)
+
+
+def test_every_trend_is_judged_and_holds(found: Studies) -> None:
+    judged = trends(found)
+    assert [each.study for each in judged] == [1, 2, 3, 4, 5, 6, 7]
+    assert [each.study for each in judged if not each.holds] == []
+
+
+def test_a_trend_that_is_not_there_is_seen(found: Studies) -> None:
+    """Numbers of H1 and H2 exchanged, and of LV and HC: nothing that is said of them holds any more."""
+    paper = list(found.paper)
+    for row in (2, 3, 4):
+        first = paper[row].ratios[0]
+        turned = RatioCurve(first.name, first.under, first.over)
+        paper[row] = type(paper[row])(**{**vars(paper[row]), 'ratios': (turned, *paper[row].ratios[1:])})
+    judged = trends(Studies(tuple(paper), found.optimal, found.reported))
+    assert {3, 4, 5} <= {each.study for each in judged if not each.holds}
+
+
+def test_crossings() -> None:
+    def curve(*efforts: float) -> EffortCurve:
+        solutions = tuple(type('Solved', (), {'effort': effort, 'status': Status.SOLVED})() for effort in efforts)
+        return EffortCurve('', tuple(0.5 + 0.1 * row for row in range(len(efforts))), solutions)
+
+    assert crossings(RatioCurve('', curve(0.5, 2.0, 8.0), curve(1.0, 1.0, 1.0))) == [pytest.approx(0.55)]
+    assert crossings(RatioCurve('', curve(0.5, 0.9), curve(1.0, 1.0))) == []
+
+
+def test_files_hold_what_was_computed(found: Studies, output: Path) -> None:
+    assert {file.name for file in output.iterdir()} == FILES
+    numbers = json.loads((output / 'numbers.json').read_text('utf-8'))
+    for name, number, paper in (('LV', 5, 0.33), ('HC', 6, 0.67)):
+        pair = numbers['ratio_at_eta_0.9615'][name]
+        assert pair == {'paper': paper, 'ours': pytest.approx(ratio(found, number).at(PAPER_ETA), rel=1e-5)}
+    assert numbers['studies'][2]['ratios'][0]['ratio'] == pytest.approx(list(ratio(found, 3).values), rel=1e-5)
+    lines = (output / 'table.md').read_text('utf-8').splitlines()
+    assert len(lines) == 2 + 7
+    assert f'{ratio(found, 5).at(PAPER_ETA):.2f} at 0.9615' in lines[6] and '0.33 at 0.9615' in lines[6]
+
+
+def test_same_files_each_time(found: Studies, output: Path, tmp_path: Path) -> None:
+    """Figures, too, to the byte: without dates, in the order of the studies."""
+    from foc_ros.paper import figures
+
+    figures.write(found, tmp_path, ('png', 'pdf'))
+    for file in tmp_path.iterdir():
+        assert file.read_bytes() == (output / file.name).read_bytes(), file.name
+
+
+def test_output_that_cannot_be_written_exits_2_before_anything_is_computed(tmp_path: Path) -> None:
+    file = tmp_path / 'file'
+    file.write_text('mine', encoding='utf-8')
+    command = [sys.executable, '-m', 'foc_ros', 'paper', '--output', str(file)]
+    root = Path(__file__).resolve().parents[1]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False, cwd=root)
+    assert (result.returncode, result.stdout) == (2, '')
+    assert result.stderr == f'foc_ros paper: --output: expected a directory that can be written, got {file}: File exists\n'
+    assert file.read_text(encoding='utf-8') == 'mine'
