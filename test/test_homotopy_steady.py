@@ -1,5 +1,8 @@
 """Names and lists of candidates are steady under noise, and the ways through the Avoiding task are all found."""
 
+import csv
+from collections import Counter
+
 import numpy as np
 import pytest
 from homotopy_scenes import AVOIDING, avoiding, find
@@ -76,3 +79,40 @@ def test_all_24_ways_through_the_avoiding_task(line):
     ways = {gaps(one.guess, obstacles) for one in found.candidates}
     assert len(found.candidates) == 24 == len(ways)
     assert all(len(row) == 1 for way in ways for row in way)
+
+
+def tracks(count):
+    """State means (m, 6) along the first recordings of the Avoiding task, with the speed of its differences."""
+    with (AVOIDING / 'recordings.csv').open() as file:
+        rows = list(csv.DictReader(file))
+    for name in list(dict.fromkeys(row['recording'] for row in rows))[:count]:
+        t, x, y = np.array([[float(row[key]) for key in ('t_s', 'x_m', 'y_m')] for row in rows if row['recording'] == name]).T
+        yield np.column_stack([x, y, np.gradient(x, t), np.gradient(y, t)])
+
+
+def named(candidates):
+    return {(one.goal, identity) for one in candidates for identity, _ in one.sides}
+
+
+@pytest.mark.skipif(not AVOIDING.is_dir(), reason='optional data ../shared/data/d3il_avoiding is not there')
+def test_along_the_avoiding_task_the_list_changes_only_when_it_must():
+    """Where the names are the same, what comes in is among the best for itself, what goes is not; nothing changes by itself."""
+    obstacles, goals = avoiding()
+    count = Counter()
+    for track in tracks(6):
+        previous = ()
+        for mean in track:
+            seen = {'goals': goals, 'hand': mean[:2], 'velocity': mean[2:], 'k': 8, 'steps': 20}
+            found = find(obstacles, previous=previous, **seen).candidates
+            fresh = find(obstacles, **seen).candidates
+            labels, before, best = ({one.label for one in each} for each in (found, previous, fresh))
+            count['samples'] += 1
+            if previous and labels != before:
+                count['names' if named(found) != named(previous) else 'ranking'] += 1
+                if named(found) == named(previous) == named(fresh):
+                    assert labels - before <= best
+                    assert not (before - labels) & best
+            again = {one.label for one in find(obstacles, previous=found, **seen).candidates}
+            assert again == labels
+            previous = found
+    assert count['names'] and count['ranking'] < count['samples'] / 5

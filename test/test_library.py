@@ -1,0 +1,168 @@
+"""Demonstrated ways: remembered with what they passed, recalled where the scene is the same, never told wrong."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from foc_ros.foc.config import Config, HomotopyConfig, updated
+from foc_ros.foc.errors import FocError
+from foc_ros.foc.homotopy import path_sides
+from foc_ros.foc.library import MOST, POINTS, demonstrated, recall, same
+from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.records import HandState, make_obstacles
+from foc_ros.library_file import load_library, save_library
+
+OBSTACLES = make_obstacles([[0.15, 0.0], [0.15, 0.06], [0.15, -0.06]], 0.015)
+GOAL = np.array([[0.3, 0.0]])
+
+
+def bow(height, end=(0.3, 0.0)):
+    s = np.linspace(0.0, 1.0, 40)
+    return np.column_stack([s * end[0], s * end[1] + height * np.sin(np.pi * s)])
+
+
+def hand(at=(0.0, 0.0), frame_id='world'):
+    return HandState(1, np.array([*at, 0.0, 0.0, 0.0, 0.0]), np.zeros((6, 6)), frame_id=frame_id)
+
+
+def recalled(way, obstacles=OBSTACLES, goals=GOAL, state=None, found=()):
+    library = way if isinstance(way, list) else [way]
+    return recall(library, state or hand(), np.asarray(goals), obstacles, HomotopyConfig(), [1.0] * len(goals), 50, found)
+
+
+WAY = demonstrated('world', bow(0.1), OBSTACLES)
+
+
+def test_a_way_is_remembered_by_what_it_passed():
+    assert dict(zip(WAY.ids, WAY.sides, strict=True)) == {'0': 1, '1': 1, '2': 1}
+    assert WAY.path.shape == (POINTS, 2)
+    steps = np.hypot(*np.diff(WAY.path, axis=0).T)
+    assert steps.max() == pytest.approx(steps.min(), rel=0.05)
+
+
+def test_a_way_beyond_the_shortest_is_solved_too():
+    config = updated(Config(), {'homotopy.max_candidates': 2})
+    without, _ = predict(config, hand(), OBSTACLES, GOAL, Memory())
+    prediction, memory = predict(config, hand(), OBSTACLES, GOAL, Memory(), [WAY])
+    labels = {one.candidate.label for one in prediction.solved}
+    assert 'goal0:+0+1+2' in labels - {one.candidate.label for one in without.outcomes}
+    assert prediction.notes['recalled'] == 1
+    assert 'goal0:+0+1+2' in {one.label for one in memory.candidates}
+
+
+def test_a_class_that_was_found_is_not_recalled():
+    found = recalled(WAY)
+    assert len(found) == 1
+    assert recalled(WAY, found=found) == found
+
+
+@pytest.mark.parametrize(
+    ('change', 'kept'),
+    [
+        pytest.param({}, True, id='as it was'),
+        pytest.param({'obstacles': OBSTACLES.take([2, 0, 1])}, True, id='reordered'),
+        pytest.param({'obstacles': make_obstacles(OBSTACLES.centre + 0.01, 0.015)}, True, id='moved a little'),
+        pytest.param({'obstacles': make_obstacles(OBSTACLES.centre + 0.03, 0.015)}, False, id='moved'),
+        pytest.param({'obstacles': OBSTACLES.take([0, 1])}, False, id='one is gone'),
+        pytest.param({'obstacles': make_obstacles([*OBSTACLES.centre, [0.15, 0.3]], 0.015)}, True, id='one more elsewhere'),
+        pytest.param({'obstacles': make_obstacles([*OBSTACLES.centre, [0.15, 0.1]], 0.015)}, False, id='one more in the way'),
+        pytest.param({'goals': [[0.31, 0.01]]}, True, id='goal moved a little'),
+        pytest.param({'goals': [[0.35, 0.0]]}, False, id='another goal'),
+        pytest.param({'goals': [[0.35, 0.0], [0.3, 0.0]]}, True, id='second goal'),
+        pytest.param({'state': hand((0.05, 0.06))}, True, id='hand on the way'),
+        pytest.param({'state': hand((0.0, -0.3))}, False, id='hand far away'),
+        pytest.param({'state': hand(frame_id='base')}, False, id='another frame'),
+    ],
+)
+def test_when_a_way_is_recalled(change, kept):
+    assert len(recalled(WAY, **change)) == kept
+
+
+def test_no_more_than_a_few_are_recalled_the_shortest():
+    ways = [demonstrated('world', bow(height), OBSTACLES) for height in (-0.1, 0.03, -0.03, 0.1)]
+    found = recalled(ways)
+    assert [len(one.sides) for one in found] == [3] * MOST
+    assert {one.label for one in found} == {'goal0:+0-1+2', 'goal0:-0-1+2'}
+
+
+def test_the_same_demonstration_is_known_again():
+    assert same(WAY, demonstrated('world', bow(0.11), OBSTACLES.take([1, 2, 0])))
+    assert not same(WAY, demonstrated('world', bow(-0.1), OBSTACLES))
+    assert not same(WAY, demonstrated('world', bow(0.1, (0.35, 0.0)), OBSTACLES))
+
+
+@settings(max_examples=80, deadline=None, derandomize=True)
+@given(
+    st.floats(-0.12, 0.12),
+    st.tuples(st.floats(-0.05, 0.25), st.floats(-0.1, 0.1)),
+    st.tuples(st.floats(-0.013, 0.013), st.floats(-0.013, 0.013)),
+)
+def test_what_is_recalled_passes_as_it_says(height, at, shift):
+    way = demonstrated('world', bow(height), OBSTACLES)
+    goals = GOAL + np.array(shift)
+    for one in recalled(way, goals=goals, state=hand(at)):
+        sides = path_sides(one.guess, OBSTACLES)
+        assert one.sides == tuple((name, sides[name]) for name, _ in one.sides)
+        assert all(side == dict(zip(way.ids, way.sides, strict=True)).get(name, side) for name, side in sides.items())
+        assert one.guess[0] == pytest.approx(at, abs=1e-9)
+        assert one.guess[-1] == pytest.approx(goals[0], abs=1e-9)
+
+
+def test_a_library_is_read_as_it_was_written(tmp_path):
+    file = tmp_path / 'ways.json'
+    save_library(file, [WAY])
+    (read,) = load_library(str(file))
+    assert (read.frame_id, read.ids, read.sides) == (WAY.frame_id, WAY.ids, WAY.sides)
+    np.testing.assert_array_equal(read.path, WAY.path)
+    np.testing.assert_array_equal(read.centre, WAY.centre)
+    assert [one.name for one in tmp_path.iterdir()] == ['ways.json']
+    assert load_library('') == ()
+
+
+def plain(tmp_path):
+    save_library(tmp_path / 'good.json', [WAY])
+    return json.loads((tmp_path / 'good.json').read_text())
+
+
+@pytest.mark.parametrize(
+    ('break_it', 'words'),
+    [
+        (lambda way: way.pop('path'), r'ways\[0\]: expected frame_id, passed and path'),
+        (lambda way: way['path'].pop(), r'ways\[0\].path: expected 65 points'),
+        (lambda way: way['path'].__setitem__(3, [0, float('nan')]), r'ways\[0\].path\[3\]: expected two numbers within 1e\+06 m'),
+        (lambda way: way['path'].__setitem__(3, [0, 10**400]), r'path\[3\]'),
+        (lambda way: way['passed'][1].update(side='up'), r'passed\[1\].side: expected left or right, got .up'),
+        (lambda way: way['passed'][1].update(id=7), r'passed\[1\]: expected id'),
+        (lambda way: way['passed'].append(way['passed'][0]), r'passed: expected each obstacle once'),
+        (lambda way: way.update(frame_id=None), r'frame_id: expected a text'),
+    ],
+)
+def test_a_wrong_library_is_named(tmp_path, break_it, words):
+    document = plain(tmp_path)
+    break_it(document['ways'][0])
+    file = tmp_path / 'bad.json'
+    file.write_text(json.dumps(document))
+    with pytest.raises(FocError, match=words):
+        load_library(str(file))
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        (None, 'cannot be read'),
+        ('', 'not a JSON file'),
+        ('{"ways": 3}', 'a list of at most 1000 ways, got int'),
+        ('[]', 'a list of at most 1000 ways'),
+        (f'{{"ways": [{", ".join(["0"] * 1001)}]}}', 'got 1001 of them'),
+        ('{"ways": []}' + ' ' * 5_000_000, 'expected at most 5,000,000 bytes'),
+    ],
+)
+def test_a_library_that_cannot_be_used(tmp_path, text, words):
+    file = tmp_path / 'ways.json'
+    if text is not None:
+        file.write_text(text)
+    with pytest.raises(FocError, match=words):
+        load_library(str(file))
