@@ -36,7 +36,7 @@ def main() -> None:
     for panel, (label, reaches) in zip(axes, panels.items(), strict=True):
         _draw(panel, label, reaches)
     axes[0].set_ylabel('warm tick [ms]')
-    axes[0].legend(frameon=False)
+    axes[1].legend(frameon=False, loc='upper left')
     figure.savefig(sys.argv[1] if len(sys.argv) > 1 else SPEED, dpi=110)
 
 
