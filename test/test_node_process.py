@@ -105,6 +105,7 @@ def test_two_signals_are_one(ros: Graph) -> None:
     [
         (['--ros-args', '-p', 'foc.eta:=2.0'], 'foc_node: foc.eta: expected a number in [0, 0.999], got 2.0\n'),
         (['--ros-args', '-p', 'rate_hz:=fast'], "foc_node: rate_hz: expected a finite number in [0.1, 1000] Hz, got 'fast'\n"),
+        (['--ros-args', '-p', 'autostart:=maybe'], "foc_node: autostart: expected true or false, got 'maybe'\n"),
         (['--ros-args', '--params-file', '/nowhere/at/all.yaml'], '/nowhere/at/all.yaml'),
         (['--ros-args', '-p', 'qos_overrides./obstacles.subscription.durability:=eternal'], 'eternal'),
         (['--ros-args', '--no-such-option'], 'no-such-option'),

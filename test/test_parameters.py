@@ -205,3 +205,8 @@ def test_an_unknown_parameter_of_a_node_is_warned_of(ros: Graph) -> None:
 def test_names_in_the_file_are_the_names_of_the_node() -> None:
     tree = yaml.safe_load(dump_parameter_file(Config()))['/**']['ros__parameters']
     assert dict(module._leaves(tree)) == flatten(Config())
+
+
+def test_what_is_the_nodes_alone_may_stand_in_the_file(tmp_path: Path) -> None:
+    text = '/**: {ros__parameters: {autostart: false, use_sim_time: true, foc: {eta: 0.7}}}'
+    assert load(tmp_path, text) == updated(Config(), {'foc.eta': 0.7})
