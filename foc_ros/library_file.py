@@ -15,7 +15,7 @@ from .foc.library import POINTS, Way
 from .foc.records import LEFT, RIGHT, Array
 
 SIDES = {'left': LEFT, 'right': RIGHT}
-MOST_WAYS, MOST_OBSTACLES = 1000, 4096
+MOST_WAYS, MOST_OBSTACLES = 500, 4096
 FARTHEST = 1e6
 """Greatest coordinate [m]."""
 
@@ -36,11 +36,16 @@ def load_library(name: str) -> tuple[Way, ...]:
 
 
 def save_library(file: Path, ways: Sequence[Way]) -> None:
-    """Write a library in place of what the file held. Raises RecordingError where it cannot be written."""
-    document = {'ways': [_plain(way) for way in ways[:MOST_WAYS]]}
+    """Write a library in place of what the file held.
+
+    Raises RecordingError where it cannot be written, InputError for too many ways.
+    """
+    if len(ways) > MOST_WAYS:
+        raise InputError(f'{file}: ways', f'at most {MOST_WAYS}', f'{len(ways)} with the new ones')
+    document = {'ways': [_plain(way) for way in ways]}
     unfinished = file.with_name(file.name + '.unfinished')
     try:
-        unfinished.write_text(json.dumps(document, indent=1, allow_nan=False) + '\n', encoding='utf-8')
+        unfinished.write_text(json.dumps(document, allow_nan=False) + '\n', encoding='utf-8')
         unfinished.replace(file)
     except OSError as error:
         unfinished.unlink(missing_ok=True)

@@ -108,6 +108,7 @@ def test_two_signals_are_one(ros: Graph) -> None:
         (['--ros-args', '-p', 'autostart:=maybe'], "foc_node: autostart: expected true or false, got 'maybe'\n"),
         (['--ros-args', '--params-file', '/nowhere/at/all.yaml'], '/nowhere/at/all.yaml'),
         (['--ros-args', '-p', 'qos_overrides./obstacles.subscription.durability:=eternal'], 'eternal'),
+        (['--ros-args', '-p', 'homotopy.library:=/nowhere/ways.json'], 'foc_node: /nowhere/ways.json: cannot be read'),
         (['--ros-args', '--no-such-option'], 'no-such-option'),
         (['--fast'], 'foc_node: unrecognized arguments: --fast (those of ROS follow --ros-args)\n'),
     ],

@@ -21,6 +21,8 @@ ASIDE = 0.1
 """So far may the hand be from the demonstrated path [m]."""
 POINTS = 65
 """Points of a remembered path."""
+DIGITS = 6
+"""A micrometre is exact enough, and keeps the file small."""
 MOST = 2
 """Recalled ways are solved beside the `max_candidates` found ones, at most so many."""
 
@@ -48,11 +50,11 @@ def demonstrated(frame_id: str, path: Array, obstacles: Obstacles) -> Way:
     """Remember a path (m, 2) [m], m >= 2, by POINTS points at equal distances, with the sides that it really took."""
     length = _lengths(path)
     at = np.linspace(0.0, length[-1], POINTS)
-    evenly = np.column_stack([np.interp(at, length, axis) for axis in path.T])
+    evenly = np.column_stack([np.interp(at, length, axis) for axis in path.T]).round(DIGITS)
     sides = path_sides(evenly, obstacles)
     rows = sorted((row for row, identity in enumerate(obstacles.ids) if identity in sides), key=obstacles.ids.__getitem__)
     ids = tuple(obstacles.ids[row] for row in rows)
-    return Way(frame_id, ids, tuple(sides[identity] for identity in ids), obstacles.centre[rows], evenly)
+    return Way(frame_id, ids, tuple(sides[identity] for identity in ids), obstacles.centre[rows].round(DIGITS), evenly)
 
 
 def same(one: Way, other: Way) -> bool:

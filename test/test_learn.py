@@ -1,0 +1,79 @@
+"""replay --learn: a demonstrated reach becomes a way of the library, once, and comes back in the next replay."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bag_helpers import messages, write_bag
+
+from foc_ros.command_line import main
+from foc_ros.foc.library import demonstrated
+from foc_ros.foc.records import make_obstacles
+from foc_ros.library_file import MOST_WAYS, load_library, save_library
+
+PARAMETERS = '/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 20, homotopy.library: "%s"}}'
+
+
+def run(bag: Path, *options: str, library: str = '') -> int:
+    parameters = bag.parent / 'parameters.yaml'
+    parameters.write_text(PARAMETERS % library)
+    return main(['replay', str(bag), '--params', str(parameters), *options])
+
+
+@pytest.fixture
+def bag(tmp_path: Path) -> Path:
+    return write_bag(tmp_path / 'reach', messages(seconds=1.02))
+
+
+def test_a_reach_is_learned_once(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / 'ways.json'
+    assert run(bag, '--learn', str(file), '--json') == 0
+    assert json.loads(capsys.readouterr().out)['summary']['learned'] == 1
+    (way,) = load_library(str(file))
+    held = file.read_text()
+    assert way.ids and np.hypot(*(way.path[-1] - way.path[0])) > 0.1
+    assert run(bag, '--learn', str(file), '--json') == 0
+    assert json.loads(capsys.readouterr().out)['summary']['learned'] == 0
+    assert file.read_text() == held
+    assert run(bag, library=str(file)) == 0
+
+
+def test_a_reach_that_ends_on_its_way_is_not_learned(tmp_path: Path) -> None:
+    bag, file = write_bag(tmp_path / 'short', messages(seconds=0.4)), tmp_path / 'ways.json'
+    assert run(bag, '--learn', str(file)) == 0
+    assert load_library(str(file)) == ()
+
+
+@pytest.mark.parametrize('text', ['{"ways": [{}]}', '{', 'x' * 6_000_000])
+@pytest.mark.parametrize('use', ['learn', 'load'])
+def test_a_library_that_cannot_be_used_is_exit_2_in_one_line(
+    bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], use: str, text: str
+) -> None:
+    file = tmp_path / 'ways.json'
+    file.write_text(text)
+    options = {'learn': (['--learn', str(file)], ''), 'load': ([], str(file))}[use]
+    assert run(bag, *options[0], library=options[1]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ''
+    assert str(file) in captured.err and captured.err.count('\n') == 1
+    assert file.read_text() == text
+
+
+def test_a_place_that_cannot_be_written_is_exit_2_in_one_line(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(bag, '--learn', '/nowhere/ways.json') == 2
+    error = capsys.readouterr().err
+    assert '/nowhere/ways.json: cannot be written' in error and error.count('\n') == 1
+
+
+def test_a_full_library_stays_as_it_was(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / 'ways.json'
+    far = make_obstacles([[0.1, 1.0]], 0.01)
+    ways = [demonstrated('other', np.array([[0.0, 0.1 * k], [0.3, 0.1 * k]]), far) for k in range(MOST_WAYS)]
+    save_library(file, ways)
+    held = file.read_bytes()
+    assert run(bag, '--learn', str(file)) == 2
+    assert 'ways: expected at most 500, got 501 with the new ones' in capsys.readouterr().err
+    assert file.read_bytes() == held
