@@ -24,6 +24,15 @@ STYLES = {'LV': 0, 'HC': 1, 'optimal': 2, 'H1': 3, 'H2': 4}
 RATIO_STYLES = (('black', '-', None), ('#009E73', '', 's'), ('#CC79A7', '', 'o'))
 """Colour, dash and marker: the continuous curve, then what the paper's stepping gives, which is no curve."""
 PAPER_MARK = '#D55E00'
+TICKS: tuple[tuple[float, tuple[float, ...]], ...] = (
+    (0.15, (1.0, 1.05, 1.1, 9.0, 9.5)),
+    (1.2, (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)),
+    (3.5, (1.0, 2.0, 5.0)),
+    (np.inf, (1.0,)),
+)
+"""Round numbers in each decade of an axis, by the decades that it is less wide than."""
+LEAST_SPAN = 1.12
+"""How far from 1 the axis of a ratio goes at least, either way, as a factor."""
 
 
 def write(found: Studies, directory: Path, suffixes: Sequence[str]) -> None:
@@ -46,9 +55,9 @@ def study_figure(study: Study) -> Figure:
             scene, speeds = row.subplots(1, 2, width_ratios=(1.7, 1.0))
             _draw_paths(scene, study.scene, shown, bounds)
             _draw_speeds(speeds, shown, top)
-            scene.set_title(f'η = {eta:g}')
+            scene.text(0.02, 0.97, f'η = {eta:g}', transform=scene.transAxes, va='top', fontsize=11)
         if study.ratios:
-            _draw_ratios(rows[-1].subplots(), study)
+            _draw_ratios(*rows[-1].subplots(1, 2), study)
         figure.suptitle(f'Study {study.number}: {study.title}')
     return figure
 
@@ -105,27 +114,29 @@ def _draw_speeds(axes: Any, shown: Mapping[str, Solution], top: float) -> None:
     axes.legend(frameon=False)
 
 
-def _draw_ratios(axes: Any, study: Study) -> None:
-    """Draw ratios over eta, on a logarithmic scale; 1, where the two cost the same, is marked."""
+def _draw_ratios(alone: Any, beside: Any, study: Study) -> None:
+    """Draw the ratio over eta on logarithmic scales: the continuous one alone, then with what the paper's stepping gives."""
     first = study.ratios[0]
-    axes.axhline(1.0, color='0.5', linewidth=1.0)
-    for ratio, (colour, dash, marker) in zip(study.ratios, RATIO_STYLES, strict=True):
-        axes.plot(
-            ratio.etas, ratio.values, color=colour, linestyle=dash, marker=marker, markersize=4.5, linewidth=2.0, label=ratio.name
-        )
-    if study.number in PAPER_RATIOS:
-        mark = {'color': PAPER_MARK, 'linestyle': '', 'marker': 'X', 'markersize': 9}
-        axes.plot(PAPER_ETA, PAPER_RATIOS[study.number], label='the paper', **mark)
-    axes.set(yscale='log', xlabel='wanted η', ylabel=' / '.join(f'$J_{{{each.name}}}$' for each in (first.over, first.under)))
-    ticks = _ticks(*axes.get_ylim())
-    axes.set_yticks(ticks, [f'{tick:g}' for tick in ticks])
-    axes.minorticks_off()
-    axes.legend(frameon=False)
+    for axes, shown in ((alone, study.ratios[:1]), (beside, study.ratios)):
+        axes.axhline(1.0, color='0.5', linewidth=1.0)
+        for ratio, (colour, dash, marker) in zip(shown, RATIO_STYLES, strict=False):
+            looks = {'color': colour, 'linestyle': dash, 'marker': marker, 'markersize': 4.0, 'linewidth': 1.8}
+            axes.plot(ratio.etas, ratio.values, label=ratio.name, **looks)
+        if study.number in PAPER_RATIOS:
+            mark = {'color': PAPER_MARK, 'linestyle': '', 'marker': 'X', 'markersize': 9}
+            axes.plot(PAPER_ETA, PAPER_RATIOS[study.number], label='the paper', **mark)
+        axes.set(yscale='log', xlabel='wanted η', ylabel=' / '.join(f'$J_{{{each.name}}}$' for each in (first.over, first.under)))
+        low, high = axes.get_ylim()
+        axes.set_ylim(min(low, 1 / LEAST_SPAN), max(high, LEAST_SPAN))
+        ticks = _ticks(*axes.get_ylim())
+        axes.set_yticks(ticks, [f'{tick:g}' for tick in ticks])
+        axes.minorticks_off()
+        axes.legend(frameon=False, fontsize=8, loc='lower left', bbox_to_anchor=(0.0, 1.0), ncols=2)
 
 
 def _ticks(low: float, high: float) -> list[float]:
     """Return round numbers of a logarithmic axis: the narrower it is, the more in each decade."""
     decades = np.log10(high / low)
-    parts = (1.0,) if decades > 3.5 else (1.0, 2.0, 5.0) if decades > 1.2 else (1.0, 1.2, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+    parts = next(parts for widest, parts in TICKS if decades < widest)
     powers = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
     return [tick for power in powers for part in parts if low <= (tick := float(f'{part * 10.0**power:.3g}')) <= high]

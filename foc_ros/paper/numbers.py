@@ -102,7 +102,11 @@ def _falls_less(study: Study, lv: Study) -> Trend:
     ours = f'{early.min():.2f} to {early.max():.2f} up to η = {KNEE:g}, {ratio.at(PAPER_ETA):.2f} at {PAPER_ETA:g}'
     holds = bool(_near_one(early) and lv.ratios[0].at(PAPER_ETA) < ratio.at(PAPER_ETA) < 1)
     return Trend(
-        6, 'J_H1 / J_H2 under HC stays near 1 longer and falls less', f'{PAPER_RATIOS[6]:g} at {PAPER_ETA:g}', ours, holds
+        6,
+        f'J_H1 / J_H2 under HC is near 1 up to η = {KNEE:g} and falls less',
+        f'{PAPER_RATIOS[6]:g} at {PAPER_ETA:g}',
+        ours,
+        holds,
     )
 
 

@@ -130,8 +130,8 @@ class Studies:
 
 def studies(grid: Grid = FULL) -> Iterator[Study | OptimalStudy]:
     """Compute study after study."""
-    yield _strategies_shown(1, 'LV and HC at one eta', (0.94,))
-    yield _strategies_shown(2, 'LV and HC at two etas', (0.86, 0.95))
+    yield _strategies_shown(1, f'strategies LV and HC, c = {NOISE:g}', (0.94,))
+    yield _strategies_shown(2, f'strategies LV and HC, c = {NOISE:g}', (0.86, 0.95))
     yield _strategies_compared(3, NOISE, grid)
     yield _strategies_compared(4, SMALL_NOISE, grid)
     yield _ways_compared(5, 'LV', 'lv', LV_DELTA, grid)
@@ -186,7 +186,7 @@ def _ways_compared(number: int, name: str, strategy: str, delta: float, grid: Gr
         RatioCurve(label, *(_curve(way.name, scene, way, method, etas) for way in scene.ways))
         for label, (method, etas) in methods.items()
     )
-    return Study(number, f'two ways round, strategy {name}', scene, NOISE, shown, ratios)
+    return Study(number, f'two ways round, strategy {name}, c = {NOISE:g}', scene, NOISE, shown, ratios)
 
 
 def _optimal_beside(grid: Grid) -> OptimalStudy:
