@@ -30,7 +30,7 @@ def hand(at=(0.0, 0.0), frame_id='world'):
 
 def recalled(way, obstacles=OBSTACLES, goals=GOAL, state=None, found=()):
     library = way if isinstance(way, list) else [way]
-    return recall(library, state or hand(), np.asarray(goals), obstacles, HomotopyConfig(), [1.0] * len(goals), 50, found)
+    return recall(library, state or hand(), np.asarray(goals), obstacles, HomotopyConfig(), [1.0] * len(goals), 50, found, ())
 
 
 WAY = demonstrated('world', bow(0.1), OBSTACLES)
@@ -166,3 +166,16 @@ def test_a_library_that_cannot_be_used(tmp_path, text, words):
         file.write_text(text)
     with pytest.raises(FocError, match=words):
         load_library(str(file))
+
+
+def test_no_class_comes_twice_while_names_hold_on():
+    """An obstacle at the edge of the names is in or out alike for what is found and for what is recalled."""
+    config = updated(Config(), {'homotopy.max_candidates': 8, 'foc.strategy': 'fixed', 'foc.steps': 20})
+    ways = [demonstrated('world', bow(height), OBSTACLES) for height in (-0.1, 0.03, -0.03, 0.1)]
+    rng, memory = np.random.default_rng(4), Memory()
+    for x in np.linspace(0.14, 0.16, 80):
+        state = hand(rng.normal((x, 0.1), 0.001))
+        _, memory = predict(config, state, OBSTACLES, GOAL, memory, ways)
+        names = {frozenset(identity for identity, _ in one.sides) for one in memory.candidates}
+        assert len(names) == 1
+        assert len({one.label for one in memory.candidates}) == len(memory.candidates)

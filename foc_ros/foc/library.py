@@ -74,18 +74,23 @@ def recall(
     durations_s: Sequence[float],
     steps: int,
     found: Sequence[Candidate],
+    previous: Sequence[Candidate],
 ) -> tuple[Candidate, ...]:
     """Return the found candidates and, among them in the order of their length, at most MOST recalled ones of other classes.
 
-    goals (g, 2) [m]; durations_s: to each goal [s]; steps: N. A recalled path is deformed to the present hand and goal; it is
-    kept only if it still passes every obstacle as it was shown, and runs through none.
+    goals (g, 2) [m]; durations_s: to each goal [s]; steps: N; previous: the candidates of the tick before. A recalled path
+    is deformed to the present hand and goal; it is kept only if it still passes every obstacle as it was shown, and runs
+    through none.
     """
+    if not library:
+        return tuple(found)
+    names = named_obstacles(hand.mean[:2], goals, obstacles, config.clearance, previous)
     labels, recalled = {one.label for one in found}, []
     for way in library:
         if not way.matches(hand.frame_id, obstacles):
             continue
         for goal in np.flatnonzero(np.hypot(*(goals - way.path[-1]).T) <= NEAR).tolist():
-            for one in _deformed(way, hand, goals, goal, obstacles, config, durations_s[goal], steps):
+            for one in _deformed(way, hand, goals, goal, obstacles, sorted(names[goal]), durations_s[goal], steps):
                 if one.label not in labels:
                     labels.add(one.label)
                     recalled.append(one)
@@ -99,11 +104,11 @@ def _deformed(
     goals: Array,
     goal: int,
     obstacles: Obstacles,
-    config: HomotopyConfig,
+    names: Sequence[str],
     duration_s: float,
     steps: int,
 ) -> Iterator[Candidate]:
-    """Yield the rest of a way, from where it is nearest to the hand, moved to the hand and the goal; nothing if it fails."""
+    """Yield the rest of a way, from where it is nearest to the hand, moved to hand and goal; names: who is named."""
     apart = np.hypot(*(way.path - hand.mean[:2]).T)
     nearest = int(apart.argmin())
     if apart[nearest] > ASIDE or nearest == len(way.path) - 1:
@@ -114,7 +119,6 @@ def _deformed(
     length = float(_lengths(rest)[-1])
     guess = timed(rest, hand.mean[2:4], duration_s, steps)
     sides, shown = path_sides(guess, obstacles), dict(zip(way.ids, way.sides, strict=True))
-    names = sorted(named_obstacles(hand.mean[:2], goals, obstacles, config.clearance)[goal])
     if any(name not in sides for name in names) or any(shown.get(name, side) != side for name, side in sides.items()):
         return
     if not _clear(rest, obstacles):

@@ -49,7 +49,8 @@ def predict(
     given, obstacles = obstacles, relevant(obstacles, hand.mean[:2], goals, max(durations), config.scene.max_obstacles)
     problems = [reaching_problem(config, hand, obstacles, *pair) for pair in zip(goals, durations, strict=True)]
     found = search(hand.mean, goals, obstacles, config.homotopy, durations, config.foc.steps, memory.candidates)
-    candidates = recall(library, hand, goals, obstacles, config.homotopy, durations, config.foc.steps, found.candidates)
+    seen = hand, goals, obstacles, config.homotopy, durations, config.foc.steps
+    candidates = recall(library, *seen, found.candidates, memory.candidates)
     earlier = Earlier(memory.solutions, (hand.stamp_ns - memory.stamp_ns) / NANOSECONDS)
     outcomes = solve_candidates(candidates, problems, config.foc, config.likelihood.beta, hand.effort_spent, earlier)
     outcomes = [_seen(outcome, problems[outcome.candidate.goal], hand) for outcome in outcomes]

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from foc_ros.foc.records import Array, Obstacles
+from foc_ros.foc.records import Array, Candidate, Obstacles
 
 from .scene import scene
 from .taut import progress
 
 
-def named_obstacles(hand: Array, goals: Array, obstacles: Obstacles, clearance: float) -> list[set[str]]:
-    """Return who takes part in the names of the ways from a hand (2,) [m] to each goal (g, 2) [m], by id."""
-    view = scene(complex(*hand), goals[:, 0] + 1j * goals[:, 1], obstacles, clearance, ())
+def named_obstacles(
+    hand: Array, goals: Array, obstacles: Obstacles, clearance: float, previous: Sequence[Candidate]
+) -> list[set[str]]:
+    """Return who takes part in the names of the ways from a hand (2,) [m] to each goal (g, 2) [m], by id.
+
+    previous: the candidates of the tick before.
+    """
+    view = scene(complex(*hand), goals[:, 0] + 1j * goals[:, 1], obstacles, clearance, previous)
     return [{obstacles.ids[row] for row in np.flatnonzero(named)} for named in view.named]
 
 
