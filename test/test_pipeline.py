@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from foc_ros.foc import pipeline as module
 from foc_ros.foc.config import Config, updated
 from foc_ros.foc.errors import SceneError
+from foc_ros.foc.library import Way
 from foc_ros.foc.pipeline import Pipeline, Verdict
 from foc_ros.foc.predictor import Memory
 from foc_ros.foc.records import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction, make_obstacles
@@ -26,8 +27,9 @@ class Recorder:
         self.calls: list[tuple[Config, HandState, Obstacles, Array, Memory]] = []
 
     def __call__(
-        self, config: Config, hand: HandState, obstacles: Obstacles, goals: Array, memory: Memory
+        self, config: Config, hand: HandState, obstacles: Obstacles, goals: Array, memory: Memory, library: tuple[Way, ...]
     ) -> tuple[Prediction, Memory]:
+        assert library == ()
         self.calls.append((config, hand, obstacles, goals, memory))
         label = f'call{len(self.calls)}'
         return Prediction(hand.stamp_ns, hand.frame_id, hand.height, (), label), Memory(label)
