@@ -14,9 +14,9 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from foc_ros.foc.records import Status
 from foc_ros.paper.command import perform
-from foc_ros.paper.numbers import crossings, trends
 from foc_ros.paper.reaching import clearance, path_length, speed
 from foc_ros.paper.studies import PAPER_ETA, QUICK, EffortCurve, RatioCurve, Studies
+from foc_ros.paper.trends import crossings, trends
 
 FILES = {f'study{number}.{suffix}' for number in range(1, 8) for suffix in ('png', 'pdf')} | {'numbers.json', 'table.md'}
 

@@ -9,8 +9,9 @@ from pathlib import Path
 from foc_ros.foc.errors import InputError
 from foc_ros.terminal import show_table, track
 
-from .numbers import Trend, as_json, trends
+from .numbers import as_json
 from .studies import COUNT, FULL, Grid, Studies, gathered, studies
+from .trends import Trend, trends
 
 FORMATS = ('png', 'pdf')
 NUMBERS, TABLE = 'numbers.json', 'table.md'

@@ -57,7 +57,8 @@ def study_figure(study: Study) -> Figure:
             _draw_speeds(speeds, shown, top)
             scene.text(0.02, 0.97, f'η = {eta:g}', transform=scene.transAxes, va='top', fontsize=11)
         if study.ratios:
-            _draw_ratios(*rows[-1].subplots(1, 2), study)
+            alone, beside = rows[-1].subplots(1, 2)
+            _draw_ratios(alone, beside, study)
         figure.suptitle(f'Study {study.number}: {study.title}')
     return figure
 
