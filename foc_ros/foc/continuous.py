@@ -143,7 +143,7 @@ def _walk(walker: _Walker, start: Start) -> Walk:
     if high is None:
         message = f'eta {problem.eta:g} is out of reach: the largest on the curve is {eta_of_k(low.k):.4g}, at s = {low.s:.3g}'
         return Walk(Status.ETA_UNREACHABLE, message, low, walker.qp_solves)
-    point = high if low is high else _root(walker, low, high, wanted)
+    point = high if low is high else _root(walker, low, high, wanted, guided=start.lam is not None)
     checked = walker.verified(point)
     point = checked if checked is not None and checked.k >= wanted * (1 - CLOSE) else point
     if checked is not point or not point.converged.stays:
@@ -204,14 +204,15 @@ def _next_stride(before: Point, point: Point, wanted: float, stride: float) -> f
     return math.copysign(min(max(length, WARM_STRIDE), largest), stride)
 
 
-def _root(walker: _Walker, low: Point, high: Point, wanted: float) -> Point:
+def _root(walker: _Walker, low: Point, high: Point, wanted: float, *, guided: bool) -> Point:
     """Find k(s) = wanted between a point below and one at or above, by Illinois steps; returns one at or above.
 
     Comes from below only: of several solutions at the same s, those that are met first as s grows. A wide bracket is halved
-    first, at points that do not depend on the wanted k. Aims at the middle of what counts as close, and halves the bracket
-    again where two steps in a row came out on the same side: where k jumps, that is the way to the jump.
+    first, at points that do not depend on the wanted k. A guided search spares both: it comes from the nearer end. Aims at the
+    middle of what counts as close, and halves the bracket where two steps in a row came out on the same side: where k jumps,
+    that is the way to the jump.
     """
-    while high.s - low.s > CELL:
+    while high.s - low.s > CELL and not guided:
         middle = walker.beside((low.s + high.s) / 2, low)
         if middle is None:
             break
@@ -222,7 +223,7 @@ def _root(walker: _Walker, low: Point, high: Point, wanted: float) -> Point:
         if high.k <= wanted * (1 + CLOSE) or high.s - low.s < NARROW:
             break
         s = (low.s + high.s) / 2 if abs(side) > 1 else (low.s * above - high.s * below) / (above - below)
-        point = walker.beside(s, low)
+        point = walker.beside(s, high if guided and high.s - s < s - low.s else low)
         if point is None:
             break
         if point.k >= wanted:
