@@ -229,3 +229,14 @@ def test_a_deadline_in_the_middle_leaves_the_best_so_far(strategy, monkeypatch):
     assert solution.status is Status.DEADLINE
     assert 0 <= solution.eta < 0.94
     assert f'eta {solution.eta:.4g}' in solution.message
+
+
+@pytest.mark.parametrize('steps', [20, 50])
+def test_optimal_settles_wherever_the_obstacle_lies_between_two_steps(steps):
+    """The touching step slides along the circle with the obstacle's position, and the sequence creeps where it changes."""
+    generator = np.random.default_rng(0)
+    for _ in range(12):
+        centre = np.array([0.15, 0.0]) + generator.normal(0, 0.001, 2)
+        problem = reach(make_obstacles([centre], [0.03], [0.001]), steps=steps, duration=1.2, noise=(0.05, 0.05))
+        solution = solved(problem, bowed((0, 0), (0.3, 0), steps, 0.05), 'optimal')
+        assert solution.status is Status.SOLVED

@@ -31,6 +31,9 @@ SETTLED = 1e-6
 ROUGHLY = 1e-2
 """The same for the rows that leave the growth of Var out."""
 MAX_QPS = 30
+"""Of one search for a minimum with the rows that leave the growth of Var out."""
+MAX_COMPLETE_QPS = 120
+"""The same with the true rows, which near the minimum creep along a circle more often."""
 SMALLEST_STEP = 1.0 / 16
 """Smallest share of the way to the wanted k that is tried at once before k is called out of reach."""
 
@@ -118,9 +121,9 @@ class _Search:
         return None if rough is None else self.repeat(rough, k, SETTLED, complete=True)
 
     def repeat(self, iterate: _Iterate, k: float, tolerance: float, *, complete: bool) -> _Iterate | None:
-        """Repeat the QP until it moves the mean by less than the tolerance, relative to the way; None if it does not."""
+        """Repeat the QP until it moves the mean by less than the tolerance, relative to the scene; None if it does not."""
         problem = self.problem
-        for _ in range(MAX_QPS):
+        for _ in range(MAX_COMPLETE_QPS if complete else MAX_QPS):
             self.deadline.check()
             qp = surrogate_qp(problem, iterate.control, iterate.active, iterate.multipliers, k, complete=complete)
             solution = solve(qp, iterate.active)

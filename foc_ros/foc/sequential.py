@@ -111,7 +111,7 @@ class _Creep:
         self.aligned = 0
 
     def ahead(self, positions: Array) -> Array:
-        """Return where to linearise next: at the last answer (N, 2), or beyond it."""
+        """Return where to linearise next: at the last answer, an array of any shape, or beyond it."""
         if self.last is None:
             self.last = positions
             return positions
