@@ -24,9 +24,9 @@ STRATEGIES: dict[str, tuple[Callable[[VariedReach], dict[str, object]], int]] = 
     'lv': (lambda made: {'strategy': 'lv'}, 140),
     'hc': (lambda made: {'strategy': 'hc'}, 150),
     'optimal': (lambda made: {'strategy': 'optimal'}, REACHES),
-    'algorithm1, growth 10': (lambda made: {'strategy': 'algorithm1'}, 180),
+    'algorithm1, growth 10': (lambda made: {'strategy': 'algorithm1'}, 170),
     'algorithm1, growth 1.5': (lambda made: {'strategy': 'algorithm1', 'algorithm1_growth': 1.5}, 180),
-    'fixed': (lambda made: {'strategy': 'fixed', 'tau': made.tau, 'lam': made.lam}, 120),
+    'fixed': (lambda made: {'strategy': 'fixed', 'tau': made.tau, 'lam': made.lam}, 180),
 }
 """The settings of every strategy, and how many reaches it solves at least: fewer solved would be fewer checked."""
 COMPARISONS = len(STRATEGIES) * REACHES * STEPS * 4
