@@ -25,8 +25,8 @@ STRATEGIES: dict[str, tuple[Callable[[VariedReach], dict[str, object]], int]] = 
     'hc': (lambda made: {'strategy': 'hc'}, 150),
     'optimal': (lambda made: {'strategy': 'optimal'}, REACHES),
     'algorithm1, growth 10': (lambda made: {'strategy': 'algorithm1'}, 170),
-    'algorithm1, growth 1.5': (lambda made: {'strategy': 'algorithm1', 'algorithm1_growth': 1.5}, 180),
-    'fixed': (lambda made: {'strategy': 'fixed', 'tau': made.tau, 'lam': made.lam}, 180),
+    'algorithm1, growth 1.5': (lambda made: {'strategy': 'algorithm1', 'algorithm1_growth': 1.5}, 170),
+    'fixed': (lambda made: {'strategy': 'fixed', 'tau': made.tau, 'lam': made.lam}, 170),
 }
 """The settings of every strategy, and how many reaches it solves at least: fewer solved would be fewer checked."""
 COMPARISONS = len(STRATEGIES) * REACHES * STEPS * 4

@@ -12,6 +12,8 @@ from .records import Array
 ATTEMPTS = ((1e-10, 0.99, False), (1e-9, 0.9, False), (1e-7, 0.9, True))
 """Accuracy (absolute and relative, on problems scaled to numbers around 1), share of the way to the boundary that a step may go,
 and cost scaling asked of PIQP, one after the other. With 0.99 it can step to and fro for ever on three variables."""
+INFEASIBLE = 1e-10
+"""Accuracy of PIQP's own proofs of infeasibility: with its default, 1e-4, rows that hardly give way pass for a contradiction."""
 MAX_ITERATIONS = 100
 """Of one attempt; 5 to 15 are usual."""
 
@@ -50,6 +52,8 @@ def solve_piqp(qp: DenseQP) -> Answer:
         settings = solver.settings
         settings.eps_abs = settings.eps_rel = settings.eps_duality_gap_abs = settings.eps_duality_gap_rel = accuracy
         settings.tau, settings.preconditioner_scale_cost, settings.max_iter = reach, scale_cost, MAX_ITERATIONS
+        if hasattr(settings, 'eps_dual_inf'):  # from 0.7 on
+            settings.eps_dual_inf = settings.eps_primal_inf = INFEASIBLE
         solver.setup(P, qp.c, A, qp.b, G, qp.g, None, qp.lower, None)
         if solver.solve() == piqp.PIQP_SOLVED:
             return Answer(True, np.array(solver.result.x))

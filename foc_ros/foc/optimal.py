@@ -34,6 +34,8 @@ MAX_QPS = 30
 """Of one search for a minimum with the rows that leave the growth of Var out."""
 MAX_COMPLETE_QPS = 120
 """The same with the true rows, which near the minimum creep along a circle more often."""
+DIVERGED = 1e20
+"""Multiplier at which the sequence runs away: the bend that it puts on the cost leaves no digit for anything else."""
 SMALLEST_STEP = 1.0 / 16
 """Smallest share of the way to the wanted k that is tried at once before k is called out of reach."""
 
@@ -127,7 +129,7 @@ class _Search:
             self.deadline.check()
             qp = surrogate_qp(problem, iterate.control, iterate.active, iterate.multipliers, k, complete=complete)
             solution = solve(qp, iterate.active)
-            if solution is None:
+            if solution is None or not solution.multipliers.max(initial=0.0) < DIVERGED:
                 return None
             self.qp_solves += solution.solves
             moved = np.abs(problem.position_map @ (solution.control - iterate.control)).max()

@@ -141,8 +141,8 @@ def _with_rows(
         ray = answer.x / max(float(answer.x.max()), 1e-300)
         return Verdict.CONTRADICTION if np.abs(gram @ ray).max() < FARKAS * float(missing @ ray) / size else Verdict.UNSOLVED
     multipliers = _polished(gram, missing / size, answer.x)
-    left = gram @ multipliers - missing / size
-    if left.min() < -RESIDUAL or np.abs(left * multipliers).max() > RESIDUAL * max(float(multipliers.max()), 1.0):
+    left, largest = gram @ multipliers - missing / size, max(float(multipliers.max()), 1.0)
+    if left.min() < -RESIDUAL * (largest if elastic else 1.0) or np.abs(left * multipliers).max() > RESIDUAL * largest**2:
         return Verdict.UNSOLVED
     multipliers *= scale * size
     return qp.cost.goal_control + multipliers @ pressed, multipliers
