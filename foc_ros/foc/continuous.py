@@ -1,7 +1,8 @@
 """Strategies `lv` and `hc`: the smallest s on a curve of clearance and precision that meets the surrogate.
 
-tau = delta s, lambda = lambda0 growth^s. The paper steps along this curve in whole s (algorithm 1); here s is continuous, so the
-effort is a continuous function of eta, which cost ratios need. A small delta slows down (`lv`), a large one goes wide (`hc`).
+tau = delta s, lambda = lambda0 growth^s. The paper steps along this curve in whole s (algorithm 1); here s is continuous, so that
+the effort follows eta as cost ratios need, but for jumps where another pair of steps comes to touch a circle. A small delta slows
+down (`lv`), a large one goes wide (`hc`).
 """
 
 from __future__ import annotations
