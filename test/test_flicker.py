@@ -33,7 +33,7 @@ def changes(values):
     return sum(a != b for a, b in pairwise(values))
 
 
-@pytest.mark.parametrize('strategy', ['lv', 'hc'])
+@pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
 def test_a_symmetric_obstacle_does_not_make_the_choice_flicker(strategy):
     made = list(predictions(**{'foc.strategy': strategy}))
     assert len(made) == SAMPLES
