@@ -33,6 +33,7 @@ setup(
     zip_safe=False,
     python_requires='>=3.11',
     install_requires=[
+        'numba>=0.58',
         'numpy>=1.23',
         'piqp>=0.6',
         'qpsolvers>=4.3',

@@ -21,7 +21,7 @@ from itertools import product
 import numpy as np
 
 from foc_ros.foc.records import LEFT, RIGHT, Array, Status
-from foc_ros.paper.reaching import Method, PaperScene, Way, solve_way, speed_at_obstacles
+from foc_ros.paper.reaching import Method, PaperScene, Way, solve_way, speed_to_obstacles
 from foc_ros.paper.scenes import NOISE, SMALL_NOISE, STRATEGY_SCENE, WAYS_SCENE
 from foc_ros.paper.studies import PAPER_ETA, PAPER_RATIOS
 
@@ -71,7 +71,7 @@ def strategies_faults(scene: PaperScene) -> Iterator[float]:
     if np.isfinite([*rising, *low]).all():
         yield 10 * np.maximum(-np.diff(rising), 0).sum() + 10 * max(rising[0] + 0.02, 0) + max(0.5 - rising[ETAS.index(0.95)], 0)
         yield 10 * max(low[-1] + 0.05, 0) + 2 * np.maximum(np.diff(low), 0).sum()
-    slow, fast = (speed_at_obstacles(scene, solve_way(scene, way, Method(NOISE, strategy), 0.94)) for strategy in ('lv', 'hc'))
+    slow, fast = (speed_to_obstacles(scene, solve_way(scene, way, Method(NOISE, strategy), 0.94)) for strategy in ('lv', 'hc'))
     yield 3 * max(slow / fast - 0.75, 0)
 
 

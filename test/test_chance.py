@@ -19,7 +19,7 @@ def test_a_violated_surrogate_guarantees_nothing():
 
 
 def test_without_variance_k_is_certain_either_way():
-    np.testing.assert_array_equal(achieved_k(np.array([-1.0, 1.0]), np.zeros(2)), [CERTAIN_K, -CERTAIN_K])
+    np.testing.assert_array_equal(achieved_k(np.array([[-1.0, 1.0]]), np.zeros((1, 2))), [[CERTAIN_K, -CERTAIN_K]])
 
 
 def test_moments_are_those_of_samples_for_correlated_axes_and_uncertain_centres():

@@ -45,7 +45,8 @@ class Ipopt:
         self.high = np.concatenate((np.full(rows.numel(), np.inf), equal))
         self.smallest = np.concatenate((np.full(4 * n, -np.inf), np.zeros(2 * n)))
         program = {'x': casadi.vertcat(u, q, v), 'f': casadi.dot(u, u) / n, 'g': casadi.vertcat(rows, equations)}
-        self.solver = casadi.nlpsol('peer', 'ipopt', program, OPTIONS | {'ipopt.mu_strategy': barrier})
+        options: Any = OPTIONS | {'ipopt.mu_strategy': barrier}
+        self.solver = casadi.nlpsol('peer', 'ipopt', program, options)
 
     def _clear(self, problem: Problem, q: Any, v: Any) -> Any:
         """-(E + k sqrt(Var)), in units of the obstacle's E[R^2], for every obstacle and step: to be >= 0."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .chance import CERTAIN_K, achieved_k, eta_of_k, expectation, variance
+from .chance import CERTAIN_K, eta_of_k, k_at
 from .problem import Problem
 from .records import Array
 
@@ -39,10 +39,13 @@ class Assessment:
 
 def assess(problem: Problem, control: Array) -> Assessment:
     """Evaluate k = -E[C] / sqrt(Var[C]) linearised at the control's own mean (paper, equation 8). control: stacked (2N,)."""
-    offset = problem.positions(control)[None] - problem.centres
-    mean = expectation(offset, np.zeros(offset.shape[1:]), problem.size[0])
-    var = variance(offset, problem.position_variance(control), problem.size[1], problem.obstacles.centre_covariance)
-    k = achieved_k(mean, np.sqrt(var))
+    k = k_at(
+        problem.positions(control),
+        problem.position_variance(control),
+        problem.centres,
+        *problem.size,
+        problem.obstacles.centre_covariance,
+    )
     inside = problem.inside_margin
     if inside.any():
         leaving = problem.horizon.dt * np.arange(1, problem.horizon.steps + 1) < problem.recovery_s

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from .compiled import Matrix, Tensor, Vector, compiled
 from .records import Array, Obstacles
 
 CERTAIN_K = 1e6
@@ -40,26 +41,57 @@ def size_moments(obstacles: Obstacles) -> tuple[Array, Array]:
     return mean2 + var, 4 * mean2 * var + 2 * var**2
 
 
-def expectation(offset: Array, position_minus_guess: Array, size_mean: Array) -> Array:
+@compiled
+def expectation(offset: Tensor, position_minus_guess: Matrix, size_mean: Vector) -> Matrix:
     """E[C] (n, N) [m^2]: offset d (n, N, 2), position_minus_guess (N, 2), size_mean E[R^2] (n,)."""
-    value: Array = (
-        size_mean[:, None] - np.einsum('jti,jti->jt', offset, offset) - 2 * np.einsum('jti,ti->jt', offset, position_minus_guess)
-    )
+    n, steps, _ = offset.shape
+    value = np.empty((n, steps))
+    for j in range(n):
+        for t in range(steps):
+            x, y = offset[j, t, 0], offset[j, t, 1]
+            value[j, t] = size_mean[j] - x * x - y * y - 2 * (x * position_minus_guess[t, 0] + y * position_minus_guess[t, 1])
     return value
 
 
-def variance(offset: Array, covariance: Array, size_variance: Array, centre_covariance: Array) -> Array:
+@compiled
+def variance(offset: Tensor, covariance: Matrix, size_variance: Vector, centre_covariance: Tensor) -> Matrix:
     """Var[C] (n, N) [m^4]: offset d (n, N, 2); covariance (3, N) of the position, xx, yy, xy; centre_covariance (n, 2, 2)."""
-    x, y = offset[..., 0], offset[..., 1]
-    xx = covariance[0] + centre_covariance[:, 0, 0, None]
-    yy = covariance[1] + centre_covariance[:, 1, 1, None]
-    xy = covariance[2] + centre_covariance[:, 0, 1, None]
-    value: Array = size_variance[:, None] + 4 * (x * x * xx + y * y * yy + 2 * x * y * xy)
+    n, steps, _ = offset.shape
+    value = np.empty((n, steps))
+    for j in range(n):
+        for t in range(steps):
+            x, y = offset[j, t, 0], offset[j, t, 1]
+            xx = covariance[0, t] + centre_covariance[j, 0, 0]
+            yy = covariance[1, t] + centre_covariance[j, 1, 1]
+            xy = covariance[2, t] + centre_covariance[j, 0, 1]
+            value[j, t] = size_variance[j] + 4 * (x * x * xx + y * y * yy + 2 * x * y * xy)
     return value
 
 
-def achieved_k(mean: Array, stddev: Array) -> Array:
+@compiled
+def achieved_k(mean: Matrix, variance: Matrix) -> Matrix:
     """k = -E / sqrt(Var), elementwise; +-CERTAIN_K where the variance is zero."""
-    with np.errstate(divide='ignore', invalid='ignore'):
-        k = np.where(stddev > 0, -mean / stddev, np.where(mean <= 0, CERTAIN_K, -CERTAIN_K))
-    return np.clip(k, -CERTAIN_K, CERTAIN_K)
+    n, steps = mean.shape
+    k = np.empty((n, steps))
+    for j in range(n):
+        for t in range(steps):
+            if variance[j, t] > 0:
+                k[j, t] = min(max(-mean[j, t] / np.sqrt(variance[j, t]), -CERTAIN_K), CERTAIN_K)
+            else:
+                k[j, t] = CERTAIN_K if mean[j, t] <= 0 else -CERTAIN_K
+    return k
+
+
+@compiled
+def k_at(
+    positions: Matrix,
+    covariance: Matrix,
+    centres: Tensor,
+    size_mean: Vector,
+    size_variance: Vector,
+    centre_covariance: Tensor,
+) -> Matrix:
+    """k achieved at mean positions (N, 2), linearised there: (n, N). centres (n, N, 2), covariance (3, N) of the position."""
+    offset = np.expand_dims(positions, 0) - centres
+    mean = expectation(offset, np.zeros_like(positions), size_mean)
+    return achieved_k(mean, variance(offset, covariance, size_variance, centre_covariance))

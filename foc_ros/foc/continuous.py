@@ -105,6 +105,7 @@ class _Walker:
         return self.near(s, near.positions, near.solution.active, near.solution.multipliers)
 
     def near(self, s: float, positions: Array, active: WorkingSet, multipliers: Array) -> Point | None:
+        self.deadline.check()
         followed = follow(self.problem, positions, active, multipliers, *self.curve.at(s))
         return self.point(s, positions, active) if followed is None else self.judged(s, followed)
 

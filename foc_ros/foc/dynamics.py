@@ -7,7 +7,7 @@ velocity. Everything downstream works for any such (A, B).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -79,11 +79,25 @@ class Horizon(Record):
         """N."""
         return len(self.response)
 
+    @cached_property
+    def maps(self) -> Array:
+        """What the position at steps 1..N owes to u: x, y and their products xx, yy, xy, (5, N, 2N).
+
+        The first two times u move it; the last three times c^2 u^2 spread it.
+        """
+        x, y = self.response[:, 0], self.response[:, 1]
+        return np.stack((x, y, x * x, y * y, x * y))
+
     @property
     def position(self) -> Array:
         """S: positions at steps 1..N from u, (2, N, 2N)."""
-        position: Array = self.response[:, :2].swapaxes(0, 1)
-        return position
+        return self.maps[:2]
+
+    @cached_property
+    def squared(self) -> tuple[Array, Array]:
+        """Squares of `response`, (n, 2N): of the last step, and summed over the steps before it."""
+        squared = self.response**2
+        return squared[-1], squared[:-1].sum(axis=0)
 
 
 def horizon(plant: Plant, steps: int) -> Horizon:

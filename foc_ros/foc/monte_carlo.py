@@ -56,7 +56,7 @@ def _clear(problem: Problem, control: Array, samples: int, generator: np.random.
     """Whether each roll-out is outside each circle at each step, (samples, m, N) bool."""
     steps, obstacles = problem.horizon.steps, problem.obstacles
     noise = stacked_noise(problem.noise, steps) * np.abs(control) * generator.standard_normal((samples, 2 * steps))
-    positions = problem.positions(control) + np.einsum('atu,su->sta', problem.position_map, noise)
+    positions = problem.positions(control) + np.einsum('atu,su->sta', problem.horizon.position, noise)
     errors = _gaussian(problem.initial_covariance[None], samples, generator)[:, 0]
     positions += np.einsum('tij,sj->sti', problem.error_map[1:, :2], errors)
     radius = obstacles.radius + obstacles.radius_stddev * generator.standard_normal((samples, len(obstacles)))

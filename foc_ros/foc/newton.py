@@ -10,16 +10,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .problem import Problem
-from .qp import Cost, wanted_distance
+from .compiled import Indices, Matrix, Tensor, Vector, compiled
+from .dense import cholesky, combined, lower_solved, upper_solved
+from .problem import Problem, moved
+from .qp import Cost, compliance, wanted_distance
 from .records import Array
 from .solver import WorkingSet, peaks
 
-SETTLED = 3e-5
-"""Largest move of the mean at which the steps end, relative to the scene: they converge quadratically, so 1e-9 is left."""
+SETTLED = 1e-5
+"""Largest move of a contact at which the steps end, relative to the scene: they converge quadratically, so 1e-9 is left."""
 CLEAR = 3e-8
 """Depth in a circle that is rounding; relative."""
-MAX_STEPS = 6
+MAX_STEPS = 8
+WAVERING = 2.0
+"""Growth of the moves from one step to the next at which they are given up."""
+SLIGHT = 1e-3
+"""Least force of a contact that bends the way round its circle, relative to the largest: a negative one would not hold."""
+
+Row = tuple[int, int]
+SHARED = 1e-13
+"""Softness of a contact relative to what it moves itself: contacts that say the same twice share the force."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +50,14 @@ def newton(
     active, multipliers (k,): rows to begin with. changes: how often rows whose multiplier turns negative may be let go, or rows
     whose circle is entered taken in.
     """
+    wanted, let_go = wanted_distance(problem, tau), set[Row]()
     for _ in range(changes + 1):
-        found = _settled(problem, cost, near, active, multipliers, tau)
+        found = _settled(problem, cost, near, active, multipliers, wanted)
         if found is None:
             return None
         pressing = found.multipliers > 0
         if pressing.all():
-            entered = _entered(problem, found, tau)
+            entered = _entered(problem, found, wanted)
             if not len(entered):
                 return found
             # a new row begins without curvature, so with hardly a multiplier
@@ -54,68 +65,206 @@ def newton(
             active = WorkingSet(*(np.concatenate(pair) for pair in zip(found.active.rows, entered.rows, strict=True)))
             multipliers = np.concatenate((found.multipliers, np.full(len(entered), slight)))
         else:
-            active, multipliers = found.active.only(pressing), found.multipliers[pressing]
+            active, multipliers = _rolled(found, let_go, problem.horizon.steps)
     return None
 
 
-def _entered(problem: Problem, found: Touching, tau: float) -> WorkingSet:
+def _rolled(found: Touching, let_go: set[Row], steps: int) -> tuple[WorkingSet, Array]:
+    """Let go rows whose multiplier is negative; where one of two neighbours lets go, the contact rolls on to the step after.
+
+    The two share what the one that stays had: alone it would seldom hold, since the mean cuts the corner between two steps. A
+    row that was let go, and is added to let_go, never comes back.
+    """
+    pairs = zip(found.active.obstacle.tolist(), found.active.step.tolist(), strict=True)
+    given: dict[Row, float] = dict(zip(pairs, found.multipliers.tolist(), strict=True))
+    let_go |= {row for row, value in given.items() if value <= 0}
+    kept = {row: value for row, value in given.items() if row not in let_go}
+    for obstacle, step in sorted(let_go & given.keys()):
+        for ahead in (1, -1):
+            stays, after = (obstacle, step + ahead), (obstacle, step + 2 * ahead)
+            if stays in kept and after not in kept and after not in let_go and 0 <= after[1] < steps:
+                kept[stays] = kept[after] = kept[stays] / 2
+    rows = np.array(sorted(kept), dtype=np.intp).reshape(-1, 2)
+    return WorkingSet(rows[:, 0], rows[:, 1]), np.array([kept[row] for row in sorted(kept)])
+
+
+def _entered(problem: Problem, found: Touching, wanted: Array) -> WorkingSet:
     """Return the rows, not yet active, at which a circle is entered deepest."""
-    offset = found.positions[None] - problem.centres
-    depth = wanted_distance(problem, tau) - np.hypot(offset[..., 0], offset[..., 1])
+    depth = depths(found.positions, problem.centres, wanted)
     depth[found.active.rows] = 0.0
     rounding = CLEAR * problem.extent
     return WorkingSet(*peaks(depth, rounding)) if depth.max(initial=0.0) > rounding else WorkingSet()
 
 
 def _settled(
-    problem: Problem, cost: Cost, positions: Array, active: WorkingSet, multipliers: Array, tau: float
+    problem: Problem, cost: Cost, positions: Array, active: WorkingSet, multipliers: Array, wanted: Array
 ) -> Touching | None:
-    """Repeat the step until it moves little, or a multiplier turns negative; None where it leads to no minimum, or away."""
-    last = np.inf
-    for _ in range(MAX_STEPS):
-        step = _step(problem, positions, active, multipliers, tau, cost)
-        if step is None:
-            return None
-        control, multipliers = step
-        moved = problem.positions(control)
-        move, positions = float(np.abs(moved - positions).max()) / problem.extent, moved
-        if move < SETTLED or multipliers.min(initial=1.0) <= 0:
-            return Touching(control, positions, active, multipliers)
-        if move > last:
-            return None
-        last = move
-    return None
+    """Repeat the step until it moves little; None where it leads to no minimum, or away."""
+    if not len(active):
+        return Touching(cost.goal_control, problem.positions(cost.goal_control), active, multipliers)
+    inverse, _, factor = cost.factors
+    found, control, positions, multipliers = touching(
+        problem.horizon.position,
+        problem.free_position,
+        inverse,
+        factor,
+        cost.goal_control,
+        problem.centres,
+        wanted,
+        active.obstacle,
+        active.step,
+        positions,
+        multipliers,
+        SETTLED * problem.extent,
+    )
+    return Touching(control, positions, active, multipliers) if found else None
 
 
-def _step(
-    problem: Problem, positions: Array, active: WorkingSet, multipliers: Array, tau: float, cost: Cost
-) -> tuple[Array, Array] | None:
-    """One step: control (2N,) and multipliers (k,) of the active rows; None where it leads to no minimum.
+@compiled
+def depths(positions: Matrix, centres: Tensor, wanted: Matrix) -> Matrix:
+    """Return how much nearer than wanted the positions (N, 2) are to each centre, (m, N) [m]."""
+    m, steps, _ = centres.shape
+    depth = np.empty((m, steps))
+    for j in range(m):
+        for t in range(steps):
+            reach = wanted[j, t if wanted.shape[1] > 1 else 0]
+            depth[j, t] = reach - np.hypot(positions[t, 0] - centres[j, t, 0], positions[t, 1] - centres[j, t, 1])
+    return depth
 
-    A multiplier y at distance d adds the circle's curvature, -y / d along the tangent, to the Hessian: a row of negative softness
-    -d / y beside the normal's row. It is a minimum if there are as many negative eigenvalues as curvature rows.
+
+@compiled
+def _between(give: Matrix, axes: Tensor, one: int, other: int) -> Matrix:
+    """Return how far contacts move along one of their axes under a force along another of each, (k, k)."""
+    k = axes.shape[1]
+    moved = np.empty((k, k))
+    for i in range(k):
+        for j in range(k):
+            total = 0.0
+            for a in range(2):
+                for b in range(2):
+                    total += axes[one, i, a] * give[2 * i + a, 2 * j + b] * axes[other, j, b]
+            moved[i, j] = total
+    return moved
+
+
+@compiled
+def _pushed(
+    give: Matrix,
+    rest: Matrix,
+    centres: Tensor,
+    wanted: Matrix,
+    obstacle: Indices,
+    step: Indices,
+    at: Matrix,
+    multipliers: Vector,
+) -> tuple[bool, Matrix, Vector]:
+    """One step of `touching` from contacts at (k, 2): whether it has an answer, forces (1, 2k) in x and y in turn, y (k,)."""
+    k = len(step)
+    axes, distance = np.empty((2, k, 2)), np.empty(k)  # normals, then tangents
+    missing_along, missing_across = np.empty((k, 1)), np.empty(k)
+    for i in range(k):
+        j, t = obstacle[i], step[i]
+        x, y = at[i, 0] - centres[j, t, 0], at[i, 1] - centres[j, t, 1]
+        distance[i] = np.hypot(x, y)
+        x, y = x / distance[i], y / distance[i]
+        axes[0, i, 0], axes[0, i, 1], axes[1, i, 0], axes[1, i, 1] = x, y, -y, x
+        away_x, away_y = centres[j, t, 0] - rest[t, 0], centres[j, t, 1] - rest[t, 1]
+        missing_along[i, 0] = x * away_x + y * away_y + wanted[j, t if wanted.shape[1] > 1 else 0]
+        missing_across[i] = x * away_y - y * away_x
+    A, B, D = _between(give, axes, 0, 0), _between(give, axes, 0, 1), _between(give, axes, 1, 1)
+    unit = np.empty(k)
+    for i in range(k):
+        unit[i] = 1.0 / np.sqrt(A[i, i])
+    for i in range(k):
+        for j in range(k):
+            A[i, j] *= unit[i] * unit[j]
+        A[i, i] += SHARED
+        missing_along[i] *= unit[i]
+        B[i] *= unit[i]
+    normal = cholesky(A, 0.0)
+    eased, along = lower_solved(normal, B), lower_solved(normal, missing_along)[:, 0].copy()
+    stiffness, pull = np.empty((k, k)), np.empty((k, 1))
+    for i in range(k):
+        pull[i, 0] = -missing_across[i]
+        for q in range(k):
+            pull[i, 0] += eased[q, i] * along[q]
+        for j in range(k):
+            stiffness[i, j] = -D[i, j]
+            for q in range(k):
+                stiffness[i, j] += eased[q, i] * eased[q, j]
+        stiffness[i, i] += distance[i] / multipliers[i]
+    for i in range(k):
+        unit_tangent = np.sqrt(multipliers[i] / distance[i])
+        pull[i] *= unit_tangent
+        for j in range(k):
+            stiffness[i, j] *= unit_tangent * np.sqrt(multipliers[j] / distance[j])
+    tangent = cholesky(stiffness, 0.0)
+    across = upper_solved(tangent, lower_solved(tangent, pull)[:, 0].copy())
+    for i in range(k):
+        across[i] *= np.sqrt(multipliers[i] / distance[i])
+        for q in range(k):
+            along[q] -= eased[q, i] * across[i]
+    along = upper_solved(normal, along)
+    forces = np.empty((1, 2 * k))
+    for i in range(k):
+        along[i] *= unit[i]
+        for axis in range(2):
+            forces[0, 2 * i + axis] = axes[0, i, axis] * along[i] + axes[1, i, axis] * across[i]
+    return bool(np.isfinite(forces).all()), forces, along
+
+
+@compiled
+def touching(
+    position: Tensor,
+    free: Matrix,
+    inverse: Vector,
+    factor: Matrix,
+    goal_control: Vector,
+    centres: Tensor,
+    wanted: Matrix,
+    obstacle: Indices,
+    step: Indices,
+    near: Matrix,
+    multipliers: Vector,
+    settled: float,
+) -> tuple[bool, Vector, Matrix, Vector]:
+    """Press the mean against circles until it touches them at the given pairs of obstacle and step.
+
+    The mean gives way like a beam: forces F at the contacts move them by C F, C = S P S' at their steps. A contact at distance d
+    with force y along its normal n turns by f d / y under a force f along its tangent t, so with A = n'Cn, B = n'Ct, D = t'Ct
+        A y + B f = n.(o - rest) + d_wanted,    B' y + (D - d / y_last) f = t.(o - rest).
+    That is a minimum if d / y_last - D + B' A^-1 B > 0: pressed any harder, the mean would slip round the circle.
+
+    free (N, 2): the mean without control; goal_control (2N,): the control without contacts; near (N, 2), multipliers (k,): where
+    to begin; settled [m]: a move of the contacts that ends the steps. Returns whether there is such a minimum, the control, the
+    mean (N, 2) and y (k,).
     """
-    k, here = len(active), active.rows
-    if k == 0:
-        return cost.goal_control, multipliers
-    offset = positions[active.step] - problem.centres[here]
-    distance = np.hypot(offset[:, 0], offset[:, 1])
-    axes = np.empty((k, 2, 2))  # normal and tangent of each row
-    axes[:, 0] = offset / distance[:, None]
-    axes[:, 1, 0], axes[:, 1, 1] = -axes[:, 0, 1], axes[:, 0, 0]
-    rows = (axes @ problem.horizon.response[active.step, :2]).reshape(2 * k, len(cost.hessian))
-    wanted = wanted_distance(problem, tau)
-    targets = (axes @ problem.centres_from_free[here][..., None]).reshape(2 * k)
-    targets[::2] += wanted[active.obstacle, 0] if wanted.shape[1] == 1 else wanted[here]
-    pressed = cost.pressed(rows)
-    gram = pressed @ rows.T
-    gram.flat[2 * k + 1 :: 4 * k + 2] -= distance / multipliers
-    scale = 1.0 / np.sqrt(np.abs(gram.diagonal()))
-    values, vectors = np.linalg.eigh(gram * scale[:, None] * scale)
-    # rows that say the same twice leave an eigenvalue of zero: they share their multiplier
-    told = np.abs(values) > 1e-11 * np.abs(values).max(initial=0.0)
-    if np.count_nonzero(values[told] < 0) != k:
-        return None
-    missing = scale * (targets - rows @ cost.goal_control)
-    forces = scale * (vectors[:, told] @ ((vectors[:, told].T @ missing) / values[told]))
-    return cost.goal_control + forces @ pressed, forces[::2]
+    k = len(step)
+    rows = np.empty((2 * k, len(inverse)))
+    for i in range(k):
+        rows[2 * i], rows[2 * i + 1] = position[0, step[i]], position[1, step[i]]
+    pressed, give = compliance(rows, inverse, factor)
+    rest = moved(position, goal_control, free)
+    at, forces, pressing, last = np.empty((k, 2)), np.zeros((1, 2 * k)), multipliers.copy(), np.inf
+    for i in range(k):
+        at[i] = near[step[i]]
+    for _ in range(MAX_STEPS):
+        pressed_at_least = np.maximum(pressing, SLIGHT * pressing.max())
+        found, forces, pressing = _pushed(give, rest, centres, wanted, obstacle, step, at, pressed_at_least)
+        if not found:
+            break
+        move = 0.0
+        for i in range(k):
+            for axis in range(2):
+                place = rest[step[i], axis]
+                for j in range(2 * k):
+                    place += give[2 * i + axis, j] * forces[0, j]
+                move = max(move, abs(place - at[i, axis]))
+                at[i, axis] = place
+        if move < settled:
+            control = goal_control + combined(forces, pressed)[0]
+            return True, control, moved(position, control, free), pressing
+        if move > WAVERING * last:
+            break
+        last = move
+    return False, goal_control.copy(), rest, pressing

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from .compiled import Tensor, Vector, compiled
+from .dense import row_products
 from .dynamics import Horizon
 from .records import Array
 
@@ -25,14 +27,22 @@ def noise_per_step(noise_at_reference: Array, reference_step: float, dt: float) 
 
 def state_covariance(horizon: Horizon, free: Array, noise: Array, control: Array) -> Array:
     """Return P at steps 0..N, (N + 1, n, n): free part (N + 1, n, n), noise (2,), control stacked (2N,)."""
-    spread = horizon.response * (stacked_noise(noise, horizon.steps) * control)
     covariance = free.copy()
-    covariance[1:] += spread @ spread.swapaxes(1, 2)
+    covariance[1:] += outer_sums(horizon.response, (stacked_noise(noise, horizon.steps) * control) ** 2)
     return covariance
+
+
+@compiled
+def outer_sums(response: Tensor, weights: Vector) -> Tensor:
+    """Return sum_u weights_u r_u r_u' for the columns r_u of every step's response (N, n, 2N): (N, n, n)."""
+    steps, n, _ = response.shape
+    summed = np.empty((steps, n, n))
+    for t in range(steps):
+        summed[t] = row_products(response[t] * weights, response[t])
+    return summed
 
 
 def position_variance_maps(horizon: Horizon, noise: Array) -> Array:
     """Return V (3, N, 2N): variances xx, yy and covariance xy of the position at steps 1..N are V u^2 plus their free part."""
-    x, y = horizon.position
-    squared = stacked_noise(noise, horizon.steps) ** 2
-    return np.stack((x * x, y * y, x * y)) * squared
+    maps: Array = horizon.maps[2:] * stacked_noise(noise, horizon.steps) ** 2
+    return maps

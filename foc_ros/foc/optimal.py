@@ -18,9 +18,10 @@ import numpy as np
 
 from .assess import assess
 from .chance import eta_of_k, k_of_eta, variance
+from .compiled import Matrix, Tensor, Vector, compiled
 from .deadline import NEVER, Deadline, OutOfTimeError
 from .problem import Problem
-from .qp import Cost, ReachingQP, effort_cost, wanted_distance
+from .qp import Cost, ReachingQP, effort_cost, row_values, wanted_distance
 from .records import Array, Status
 from .sequential import converge
 from .solver import WorkingSet, solve
@@ -132,7 +133,7 @@ class _Search:
             if solution is None or not solution.multipliers.max(initial=0.0) < DIVERGED:
                 return None
             self.qp_solves += solution.solves
-            moved = np.abs(problem.position_map @ (solution.control - iterate.control)).max()
+            moved = np.abs(problem.positions(solution.control) - problem.positions(iterate.control)).max()
             iterate = _Iterate(solution.control, solution.active, solution.multipliers)
             if moved < tolerance * problem.extent:
                 return iterate
@@ -146,38 +147,62 @@ def surrogate_qp(
 
     complete: with the derivative of Var by the position.
     """
-    positions, spread = problem.positions(control), problem.position_variance(control)
-    offset = positions[None] - problem.centres
-    distance = np.maximum(np.hypot(offset[..., 0], offset[..., 1]), 1e-9)
-    var = variance(offset, spread, problem.size[1], problem.obstacles.centre_covariance)
-    stddev = np.sqrt(np.maximum(var, 1e-24))
-    x, y = offset[..., 0] / distance, offset[..., 1] / distance
-    pull = 2 * k * distance / stddev  # d sqrt(Var) / d P along the normal, in rows that are distances
-    by_variance = pull[..., None] * np.stack((x * x, y * y, 2 * x * y), axis=-1)
-    by_position = np.stack((x, y), axis=-1)
-    if complete:
-        by_position = by_position - 2 * k / stddev[..., None] * _turned(problem, spread, by_position)
-    slope = np.concatenate((by_position, -by_variance), axis=-1)
-    maps = np.concatenate((problem.position_map, problem.variance_maps * control))
-    reach = wanted_distance(problem, 0.0)
-    value = (distance**2 - reach**2 - k * stddev) / (2 * distance)  # -f / 2 |d|, to be >= 0
-    limits = np.einsum('jtq,qt->jt', slope, maps @ control) - value
-    return ReachingQP(_bent(problem, control, active, multipliers, by_variance), maps, slope, limits)
+    spread, maps = problem.position_variance(control), problem.horizon.maps
+    offset = problem.positions(control)[None] - problem.centres
+    slopes, surplus = linearised(
+        offset,
+        spread,
+        problem.size[1],
+        problem.obstacles.centre_covariance,
+        wanted_distance(problem, 0.0),
+        k,
+        1.0 if complete else 0.0,
+    )
+    weights = np.concatenate((problem.unweighted, np.tile(problem.noise_variance * control, (3, 1))))
+    limits = row_values(maps, weights, slopes, control) - surplus
+    return ReachingQP(_bent(problem, control, active, multipliers, slopes), maps, weights, slopes, limits)
 
 
-def _bent(problem: Problem, control: Array, active: WorkingSet, multipliers: Array, by_variance: Array) -> Cost:
+@compiled
+def linearised(
+    offset: Tensor,
+    covariance: Matrix,
+    size_variance: Vector,
+    centre_covariance: Tensor,
+    wanted: Matrix,
+    k: float,
+    turning: float,
+) -> tuple[Tensor, Matrix]:
+    """Linearise -f / (2 |d|), which is to be >= 0, by position and covariance xx, yy, xy: slopes (m, N, 5), values (m, N) [m].
+
+    offset d (m, N, 2), covariance (3, N) of the position; turning: 1 to count that Var changes with d too, 0 to leave it out.
+    """
+    m, steps, _ = offset.shape
+    slopes, surplus = np.empty((m, steps, 5)), np.empty((m, steps))
+    var = variance(offset, covariance, size_variance, centre_covariance)
+    for j in range(m):
+        for t in range(steps):
+            distance = max(np.hypot(offset[j, t, 0], offset[j, t, 1]), 1e-9)
+            x, y = offset[j, t, 0] / distance, offset[j, t, 1] / distance
+            stddev = np.sqrt(max(var[j, t], 1e-24))
+            xx = covariance[0, t] + centre_covariance[j, 0, 0]
+            yy = covariance[1, t] + centre_covariance[j, 1, 1]
+            xy = covariance[2, t] + centre_covariance[j, 0, 1]
+            turn, pull = 2 * k / stddev * turning, 2 * k * distance / stddev
+            slopes[j, t, 0] = x - turn * (xx * x + xy * y)
+            slopes[j, t, 1] = y - turn * (xy * x + yy * y)
+            slopes[j, t, 2], slopes[j, t, 3], slopes[j, t, 4] = -pull * x * x, -pull * y * y, -2 * pull * x * y
+            reach = wanted[j, t if wanted.shape[1] > 1 else 0]
+            surplus[j, t] = (distance * distance - reach * reach - k * stddev) / (2 * distance)
+    return slopes, surplus
+
+
+def _bent(problem: Problem, control: Array, active: WorkingSet, multipliers: Array, slopes: Array) -> Cost:
     """Return the cost with the curvature of the active rows' standard deviations, about the control."""
     cost = effort_cost(problem, 0.0)
     if not len(active):
         return cost
-    weight = multipliers[:, None] * by_variance[active.obstacle, active.step]
-    bend = np.einsum('kq,qku->u', weight, problem.variance_maps[:, active.step])
+    weight = -multipliers[:, None] * slopes[active.rows][:, 2:]
+    maps = problem.horizon.maps[2:].reshape(-1, len(control))
+    bend = weight.T.ravel() @ maps[(np.arange(3)[:, None] * problem.horizon.steps + active.step).ravel()] * problem.noise_variance
     return replace(cost, hessian=cost.hessian + bend, linear=bend * control)
-
-
-def _turned(problem: Problem, spread: Array, normal: Array) -> Array:
-    """P n for every obstacle and step, (m, N, 2), P the covariance of p - o."""
-    c = problem.obstacles.centre_covariance
-    xx, yy, xy = (spread[i][None] + c[:, a, b, None] for i, (a, b) in enumerate(((0, 0), (1, 1), (0, 1))))
-    x, y = normal[..., 0], normal[..., 1]
-    return np.stack((xx * x + xy * y, xy * x + yy * y), axis=-1)

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .chance import achieved_k, centres, expectation, k_of_eta, size_moments, variance
+from .compiled import Matrix, Tensor, Vector, compiled
+from .dense import values
 from .dynamics import Horizon
 from .errors import SceneError
-from .noise import position_variance_maps, stacked_noise
+from .noise import stacked_noise
 from .records import Array, Obstacles, Record
 
 
@@ -51,6 +53,11 @@ class Problem(Record):
     def free(self) -> Array:
         """Mean state at steps 0..N without control, (N + 1, n)."""
         return self.horizon.powers @ self.initial_mean
+
+    @cached_property
+    def free_position(self) -> Array:
+        """Mean position at steps 1..N without control, (N, 2) [m]."""
+        return self.free[1:, :2].copy()
 
     @cached_property
     def free_covariance(self) -> Array:
@@ -97,7 +104,7 @@ class Problem(Record):
         covariance = np.array([[now[0, 0]], [now[1, 1]], [now[0, 1]]])
         mean = expectation(offset, np.zeros((1, 2)), self.size[0])
         var = variance(offset, covariance, self.size[1], self.obstacles.centre_covariance)
-        inside: NDArray[np.bool_] = achieved_k(mean, np.sqrt(var))[:, 0] < k_of_eta(self.eta)
+        inside: NDArray[np.bool_] = achieved_k(mean, var)[:, 0] < k_of_eta(self.eta)
         return inside
 
     @cached_property
@@ -106,27 +113,28 @@ class Problem(Record):
         return size_moments(self.obstacles)
 
     @cached_property
-    def position_map(self) -> Array:
-        """S (2, N, 2N): positions at steps 1..N from the stacked control."""
-        return np.ascontiguousarray(self.horizon.position)
+    def noise_variance(self) -> Array:
+        """c^2 for every entry of the stacked control, (2N,)."""
+        return stacked_noise(self.noise, self.horizon.steps) ** 2
 
     @cached_property
-    def variance_maps(self) -> Array:
-        """V (3, N, 2N): position variances xx, yy, xy at steps 1..N are free_variance + V u^2."""
-        return position_variance_maps(self.horizon, self.noise)
+    def unweighted(self) -> Array:
+        """Weights of the position's maps in obstacle rows, (2, 2N): one."""
+        return np.ones((2, 2 * self.horizon.steps))
 
     @cached_property
     def summed_variance(self) -> Array:
         """(2N,): sum over steps of the variances of x and y is this times u^2, plus the free part."""
-        summed: Array = self.variance_maps[:2].sum(axis=(0, 1))
+        end, way = self.horizon.squared
+        summed: Array = (end[:2] + way[:2]).sum(axis=0) * self.noise_variance
         return summed
 
     @cached_property
     def weighted_variance(self) -> Array:
         """(2N,): the variance terms of J_X are this times u^2, plus the free part."""
-        squared = self.horizon.response**2 * stacked_noise(self.noise, self.horizon.steps) ** 2
-        ends: Array = self.end_weights @ squared[-1] + self.way_weights @ squared[:-1].sum(axis=0)
-        return ends
+        end, way = self.horizon.squared
+        weighted: Array = (self.end_weights @ end + self.way_weights @ way) * self.noise_variance
+        return weighted
 
     @cached_property
     def goal_rows(self) -> tuple[Array, Array, Array]:
@@ -152,13 +160,29 @@ class Problem(Record):
 
     def positions(self, control: Array) -> Array:
         """Mean positions at steps 1..N from the stacked control, (N, 2) [m]."""
-        positions: Array = self.free[1:, :2] + (self.position_map @ control).T
-        return positions
+        return moved(self.horizon.position, control, self.free_position)
 
     def position_variance(self, control: Array) -> Array:
         """Rows xx, yy, xy of the position covariance at steps 1..N, (3, N) [m^2]."""
-        variance: Array = self.free_variance + self.variance_maps @ control**2
-        return variance
+        return spread(self.horizon.maps, self.noise_variance, control, self.free_variance)
+
+
+@compiled
+def moved(position: Tensor, control: Vector, free: Matrix) -> Matrix:
+    """Return free + S u, (N, 2), for S (2, N, 2N)."""
+    positions = free.copy()
+    for axis in range(2):
+        positions[:, axis] += values(position[axis], control)
+    return positions
+
+
+@compiled
+def spread(maps: Tensor, noise_variance: Vector, control: Vector, free: Matrix) -> Matrix:
+    """Return the rows xx, yy, xy of free + V u^2, (3, N), for `Horizon.maps` (5, N, 2N) and c^2 (2N,)."""
+    weights, variance = noise_variance * control * control, free.copy()
+    for row in range(3):
+        variance[row] += values(maps[2 + row], weights)
+    return variance
 
 
 def rest_to_goal(

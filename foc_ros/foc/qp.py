@@ -1,7 +1,7 @@
 """The quadratic programme of one linearisation, built apart from its solution.
 
 minimise 1/2 u' diag(hessian) u - linear' u + sum_r (goal_rows u - target)_r^2 / (2 softness_r) (an equality where softness is 0)
-subject to sum_q coefficient[j, t, q] maps[q, t] u >= limit[j, t] for every obstacle j and step t.
+subject to sum_q coefficient[j, t, q] (maps[q, t] * weights[q]) u >= limit[j, t] for every obstacle j and step t.
 """
 
 from __future__ import annotations
@@ -12,8 +12,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from .compiled import Indices, Matrix, Tensor, Vector, compiled
+from .dense import cholesky, combined, lower_solved, row_products
 from .problem import Problem
 from .records import Array
+
+SMALLEST_PIVOT = 1e-14
+"""Of the goal rows' own compliance, scaled to a unit diagonal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,57 +38,101 @@ class Cost:
     softness: Array
 
     @cached_property
-    def _factors(self) -> tuple[Array, Array, Array]:
-        """H^-1 (2N,), root L (r, r) of (E H^-1 E' + softness)^-1 = L'L, and L E H^-1 (r, 2N).
-
-        By eigenvalues, kept from zero: a Hessian over many orders of magnitude leaves no Cholesky factor.
-        """
-        inverse = 1.0 / self.hessian
-        weighted = self.goal_rows * inverse
-        gram = weighted @ self.goal_rows.T
-        gram.flat[:: len(gram) + 1] += self.softness
-        # unit diagonal: the goal rows mix metres, metres per second and their like
-        scale = 1.0 / np.sqrt(gram.diagonal())
-        gram *= scale[:, None] * scale
-        values, vectors = np.linalg.eigh(gram)
-        root = vectors.T / np.sqrt(np.maximum(values, 1e-14 * values[-1]))[:, None] * scale
-        return inverse, root, root @ weighted
+    def factors(self) -> tuple[Array, Array, Array]:
+        """H^-1 (2N,), root L (r, r) of (E H^-1 E' + softness)^-1 = L'L, and L E H^-1 (r, 2N)."""
+        return goal_factors(self.hessian, self.goal_rows, self.softness)
 
     @cached_property
     def goal_control(self) -> Array:
         """The minimiser without obstacle rows, (2N,)."""
-        inverse, root, factor = self._factors
+        inverse, root, factor = self.factors
         if self.linear is None:
             control: Array = (root @ self.goal_targets) @ factor
             return control
         free = inverse * self.linear
         return free + (root @ (self.goal_targets - self.goal_rows @ free)) @ factor
 
-    def pressed(self, rows: Array) -> Array:
-        """Return M P for rows M (k, 2N): what each row's multiplier does to the control."""
-        inverse, _, factor = self._factors
-        control: Array = rows * inverse - (rows @ factor.T) @ factor
-        return control
+
+@compiled
+def goal_factors(hessian: Vector, goal_rows: Matrix, softness: Vector) -> tuple[Vector, Matrix, Matrix]:
+    """Return `Cost.factors`. Pivots are kept from zero: a Hessian over many orders of magnitude leaves some without a digit."""
+    r = len(softness)
+    inverse = 1.0 / hessian
+    weighted = goal_rows * inverse
+    gram = row_products(weighted, goal_rows)
+    # unit diagonal: the goal rows mix metres, metres per second and their like
+    scale = np.zeros((r, r))
+    for i in range(r):
+        gram[i, i] += softness[i]
+        scale[i, i] = 1.0 / np.sqrt(gram[i, i])
+    for i in range(r):
+        for j in range(r):
+            gram[i, j] *= scale[i, i] * scale[j, j]
+    root = lower_solved(cholesky(gram, SMALLEST_PIVOT), scale)
+    return inverse, root, combined(root, weighted)
+
+
+@compiled
+def compliance(rows: Matrix, inverse: Vector, factor: Matrix) -> tuple[Matrix, Matrix]:
+    """Return rows M (k, 2N) times P: what their multipliers do to the control (k, 2N), and M P M' (k, k) to the rows' values."""
+    held = row_products(rows, factor)
+    pressed = combined(held, factor)
+    for i in range(rows.shape[0]):
+        for j in range(rows.shape[1]):
+            pressed[i, j] = rows[i, j] * inverse[j] - pressed[i, j]
+    return pressed, row_products(pressed, rows)
 
 
 @dataclass(frozen=True, eq=False)
 class ReachingQP:
-    """A cost and obstacle rows: maps (q, N, 2N), coefficients (m, N, q) and limits (m, N), m obstacles."""
+    """A cost and obstacle rows: maps (q, N, 2N), weights (q, 2N), coefficients (m, N, q) and limits (m, N), m obstacles."""
 
     cost: Cost
     maps: Array
+    weights: Array
     coefficients: Array
     limits: Array
 
     def row_values(self, control: Array) -> Array:
         """Left-hand side of every obstacle row, (m, N)."""
-        values: Array = np.einsum('jtq,qt->jt', self.coefficients, self.maps @ control)
-        return values
+        return row_values(self.maps, self.weights, self.coefficients, control)
 
     def rows(self, obstacle: NDArray[np.intp], step: NDArray[np.intp]) -> Array:
         """Return obstacle rows (k, 2N) for k pairs of obstacle and step index."""
-        rows: Array = np.einsum('kq,qku->ku', self.coefficients[obstacle, step], self.maps[:, step])
-        return rows
+        return gathered(self.maps, self.weights, self.coefficients, obstacle, step)
+
+
+@compiled
+def row_values(maps: Tensor, weights: Matrix, coefficients: Tensor, control: Vector) -> Matrix:
+    """Return the left-hand side of every row, (m, N)."""
+    q, steps, n = maps.shape
+    moved = np.zeros((q, steps))
+    for a in range(q):
+        weighted = weights[a] * control
+        for t in range(steps):
+            total = 0.0
+            for i in range(n):
+                total += maps[a, t, i] * weighted[i]
+            moved[a, t] = total
+    found = np.zeros((coefficients.shape[0], steps))
+    for j in range(coefficients.shape[0]):
+        for t in range(steps):
+            for a in range(q):
+                found[j, t] += coefficients[j, t, a] * moved[a, t]
+    return found
+
+
+@compiled
+def gathered(maps: Tensor, weights: Matrix, coefficients: Tensor, obstacle: Indices, step: Indices) -> Matrix:
+    """Return the rows of k pairs of obstacle and step, (k, 2N)."""
+    q, _, n = maps.shape
+    rows = np.zeros((len(step), n))
+    for i in range(len(step)):
+        for a in range(q):
+            share = coefficients[obstacle[i], step[i], a]
+            for u in range(n):
+                rows[i, u] += share * maps[a, step[i], u] * weights[a, u]
+    return rows
 
 
 def effort_cost(problem: Problem, lam: float) -> Cost:
@@ -99,15 +148,29 @@ def half_planes(problem: Problem, guess: Array, tau: float, *, literal: bool = F
     constraint is
     active, and the touching one cuts less off before it, so a far obstacle is never in the way. Both stay outside the circle.
     """
-    offset = guess - problem.centres
-    distance = np.hypot(offset[..., 0], offset[..., 1])
-    if not distance.all():  # a guess on a centre has no normal: take the left of the y axis
-        offset[distance == 0] = (0.0, 1.0)
-        distance[distance == 0] = 1.0
-    offset /= distance[..., None]
+    normals, distance, limits = normals_at(guess, problem.centres, problem.centres_from_free)
     reach = wanted_distance(problem, tau)
-    clearance = (reach**2 + distance**2) / (2 * distance) if literal else reach
-    return offset, np.einsum('jti,jti->jt', offset, problem.centres_from_free) + clearance
+    return normals, limits + ((reach**2 + distance**2) / (2 * distance) if literal else reach)
+
+
+@compiled
+def normals_at(guess: Matrix, centres: Tensor, centres_from_free: Tensor) -> tuple[Tensor, Matrix, Matrix]:
+    """Return the unit normals (m, N, 2) at a guess, its distances from the centres (m, N), and normal . (centre - free) (m, N).
+
+    A guess on a centre has no normal: take the left of the y axis.
+    """
+    m, steps, _ = centres.shape
+    normals, distances, along = np.empty((m, steps, 2)), np.empty((m, steps)), np.empty((m, steps))
+    for j in range(m):
+        for t in range(steps):
+            x, y = guess[t, 0] - centres[j, t, 0], guess[t, 1] - centres[j, t, 1]
+            distance = np.hypot(x, y)
+            if distance == 0.0:
+                y, distance = 1.0, 1.0
+            normals[j, t, 0], normals[j, t, 1] = x / distance, y / distance
+            distances[j, t] = distance
+            along[j, t] = normals[j, t, 0] * centres_from_free[j, t, 0] + normals[j, t, 1] * centres_from_free[j, t, 1]
+    return normals, distances, along
 
 
 def wanted_distance(problem: Problem, tau: float) -> Array:
@@ -127,4 +190,4 @@ def wanted_distance(problem: Problem, tau: float) -> Array:
 def clearance_qp(problem: Problem, cost: Cost, guess: Array, tau: float, *, literal: bool = False) -> ReachingQP:
     """Build the paper's reformulated problem (equation 16) at a guess (N, 2): E[C] + tau <= 0; its lambda is in the cost."""
     normals, limits = half_planes(problem, guess, tau, literal=literal)
-    return ReachingQP(cost, problem.position_map, normals, limits)
+    return ReachingQP(cost, problem.horizon.position, problem.unweighted, normals, limits)

@@ -24,7 +24,7 @@ class Record:
     def __post_init__(self) -> None:
         for item in fields(self):  # type: ignore[arg-type]
             value = getattr(self, item.name)
-            if isinstance(value, np.ndarray) and value.flags.writeable:
+            if isinstance(value, np.ndarray) and (value.flags.writeable or not value.flags.c_contiguous):
                 value = value.copy()
                 value.flags.writeable = False
                 object.__setattr__(self, item.name, value)

@@ -23,7 +23,7 @@ STAYS = 3e-7
 NEAR = 0.01
 """Largest move of the mean from which Newton steps are tried even if the active rows changed; relative."""
 MAX_QPS = 60
-CHANGES = 4
+CHANGES = 8
 """How often the active rows may change while a solution is followed by Newton steps alone."""
 ALIGNED = 0.99
 """Cosine between two moves in a row that counts as the same direction."""

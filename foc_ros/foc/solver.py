@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .backend import DenseQP, solve_named, solve_piqp
-from .qp import ReachingQP
+from .compiled import Matrix, Vector, compiled
+from .dense import cholesky, lower_solved, upper_solved
+from .qp import ReachingQP, compliance
 from .records import Array
 
 Index = NDArray[np.intp]
@@ -34,6 +36,9 @@ FARKAS = 1e-4
 """How little, relative to what is missing, the combination of rows may move that proves a contradiction."""
 NEGLIGIBLE = 1e-7
 """Multiplier that counts as zero, relative to the largest, in units in which every row moves itself by one."""
+
+SHARP = 1e-10
+"""What the equations of the multipliers that are not zero may be off by when solved for directly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,48 +124,88 @@ def _with_rows(
 ) -> tuple[Array, Array] | Literal[Verdict.CONTRADICTION, Verdict.UNSOLVED]:
     """Return control (2N,) and multipliers (k,) for the rows of the working set alone."""
     rows = qp.rows(working.obstacle, working.step)
-    pressed = qp.cost.pressed(rows)
     missing = qp.limits[working.obstacle, working.step] - rows @ qp.cost.goal_control
-    gram = pressed @ rows.T
-    moved, wanted = gram.diagonal(), (rows**2) @ (1.0 / qp.cost.hessian)
-    fixed = moved < IMMOVABLE * wanted
-    if fixed.any():
-        if not elastic and (missing[fixed] > TOLERANCE).any():
-            return Verdict.CONTRADICTION
-        gram[fixed], gram[:, fixed], missing[fixed] = 0.0, 0.0, 0.0
-        gram[fixed, fixed] = 1.0
-    scale = 1.0 / np.sqrt(gram.diagonal())
-    missing = scale * missing
-    size = max(-float(missing.min()), float(missing.max()), 1e-300)
-    gram *= scale[:, None] * scale
-    if elastic:
-        gram.flat[:: len(gram) + 1] += ELASTICITY
-    answer = solve_piqp(DenseQP(gram, missing / -size, lower=np.zeros(len(rows))))
+    inverse, _, factor = qp.cost.factors
+    pressed, gram, scaled, scale, stuck = range_space(rows, inverse, factor, missing, ELASTICITY if elastic else 0.0)
+    if stuck > TOLERANCE and not elastic:
+        return Verdict.CONTRADICTION
+    size = max(-float(scaled.min()), float(scaled.max()), 1e-300)
+    scaled /= size
+    answer = solve_piqp(DenseQP(gram, -scaled, lower=np.zeros(len(rows))))
     if not answer.solved:
         # Farkas: a combination y >= 0 of the rows that moves nothing and yet is missing something
         ray = answer.x / max(float(answer.x.max()), 1e-300)
-        return Verdict.CONTRADICTION if np.abs(gram @ ray).max() < FARKAS * float(missing @ ray) / size else Verdict.UNSOLVED
-    multipliers = _polished(gram, missing / size, answer.x)
-    left, largest = gram @ multipliers - missing / size, max(float(multipliers.max()), 1.0)
-    if left.min() < -RESIDUAL * (largest if elastic else 1.0) or np.abs(left * multipliers).max() > RESIDUAL * largest**2:
+        return Verdict.CONTRADICTION if np.abs(gram @ ray).max() < FARKAS * float(scaled @ ray) else Verdict.UNSOLVED
+    multipliers, short, slack = sharpened(gram, scaled, answer.x)
+    largest = max(float(multipliers.max()), 1.0)
+    if short > RESIDUAL * (largest if elastic else 1.0) or slack > RESIDUAL * largest**2:
         return Verdict.UNSOLVED
     multipliers *= scale * size
     return qp.cost.goal_control + multipliers @ pressed, multipliers
 
 
-def _polished(gram: Array, missing: Array, answer: Array) -> Array:
-    """Sharpen an interior-point answer: solve for the multipliers that are not zero, if that keeps their signs."""
-    active = np.flatnonzero(answer > NEGLIGIBLE * answer.max(initial=0.0))
-    inner, wanted = gram[active[:, None], active], missing[active]
-    polished = np.zeros_like(answer)
-    polished[active] = answer[active]
-    try:
-        sharp = np.linalg.solve(inner, wanted)
-    except np.linalg.LinAlgError:
-        return polished
-    if len(sharp) and sharp.min() > 0 and np.abs(inner @ sharp - wanted).max() < 1e-10:
-        polished[active] = sharp
-    return polished
+@compiled
+def range_space(
+    rows: Matrix, inverse: Vector, factor: Matrix, missing: Vector, softness: float
+) -> tuple[Matrix, Matrix, Vector, Vector, float]:
+    """Return what the rows' multipliers do, in units in which each row moves itself by one.
+
+    M P (k, 2N); K (k, k), softness added to its diagonal; what is missing (k,); the unit of each multiplier (k,); and the most
+    that is missing in a row which the goal alone decides: such a row has no part in the rest.
+    """
+    pressed, gram = compliance(rows, inverse, factor)
+    k, stuck = len(missing), -np.inf
+    scaled, scale = missing.copy(), np.ones(k)
+    for i in range(k):
+        wanted = 0.0
+        for u in range(rows.shape[1]):
+            wanted += rows[i, u] * rows[i, u] * inverse[u]
+        if gram[i, i] < IMMOVABLE * wanted:
+            stuck = max(stuck, missing[i])
+            gram[i], gram[:, i], scaled[i] = 0.0, 0.0, 0.0
+            gram[i, i] = 1.0
+    for i in range(k):
+        scale[i] = 1.0 / np.sqrt(gram[i, i])
+        scaled[i] *= scale[i]
+    for i in range(k):
+        for j in range(k):
+            gram[i, j] *= scale[i] * scale[j]
+        gram[i, i] += softness
+    return pressed, gram, scaled, scale, stuck
+
+
+@compiled
+def sharpened(gram: Matrix, missing: Vector, answer: Vector) -> tuple[Vector, float, float]:
+    """Sharpen an interior-point answer: solve for the multipliers that are not zero, if that keeps their signs.
+
+    Returns them (k,), the most that a row misses, and the largest product of a multiplier and what its row has to spare.
+    """
+    active = np.flatnonzero(answer > NEGLIGIBLE * max(0.0, answer.max()))
+    n = len(active)
+    inner, wanted = np.empty((n, n)), np.empty((n, 1))
+    multipliers = np.zeros(len(answer))
+    for i in range(n):
+        multipliers[active[i]], wanted[i, 0] = answer[active[i]], missing[active[i]]
+        for j in range(n):
+            inner[i, j] = gram[active[i], active[j]]
+    factor = cholesky(inner, 0.0)
+    sharp = upper_solved(factor, lower_solved(factor, wanted)[:, 0].copy())
+    off = 0.0  # NaN where the rows are not independent: then the answer stays as it is
+    for i in range(n):
+        left = -wanted[i, 0]
+        for j in range(n):
+            left += inner[i, j] * sharp[j]
+        off = max(off, abs(left)) if sharp[i] > 0 else np.inf
+    if off < SHARP:
+        for i in range(n):
+            multipliers[active[i]] = sharp[i]
+    short, slack = 0.0, 0.0
+    for i in range(len(answer)):
+        left = -missing[i]
+        for j in range(len(answer)):
+            left += gram[i, j] * multipliers[j]
+        short, slack = max(short, -left), max(slack, abs(left * multipliers[i]))
+    return multipliers, short, slack
 
 
 def solve_full(qp: ReachingQP, backend: str = 'piqp') -> QPSolution | None:

@@ -48,7 +48,7 @@ def warm(previous: Solution, elapsed_s: float, problem: Problem) -> Start:
     return Start(
         positions,
         control.ravel(),
-        WorkingSet(rows[:, 0], rows[:, 1]),
+        WorkingSet(*np.ascontiguousarray(rows.T)),
         np.array([kept[pair] for pair in sorted(kept)]),
         previous.lam,
     )

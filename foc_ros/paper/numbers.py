@@ -9,7 +9,7 @@ import numpy as np
 
 from foc_ros.foc.records import Solution
 
-from .reaching import PaperScene, clearance, largest_stddev, path_length, speed, speed_at_obstacles
+from .reaching import PaperScene, clearance, largest_stddev, path_length, speed, speed_to_obstacles
 from .studies import PAPER_ETA, PAPER_RATIOS, EffortCurve, Studies, Study
 from .trends import trends
 
@@ -83,7 +83,7 @@ def _solution(scene: PaperScene, solution: Solution) -> dict[str, Any]:
         'path_length': path_length(solution),
         'largest_stddev': largest_stddev(solution),
         'peak_speed': float(speed(solution).max()),
-        'speed_at_obstacles': speed_at_obstacles(scene, solution),
+        'speed_to_obstacles': speed_to_obstacles(scene, solution),
     }
     return {'status': solution.status.value, **{name: _rounded(value) for name, value in values.items()}}
 

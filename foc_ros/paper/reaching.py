@@ -95,10 +95,10 @@ def speed(solution: Solution) -> Array:
     return along
 
 
-def speed_at_obstacles(scene: PaperScene, solution: Solution) -> float:
-    """Return the speed of the mean where it is nearest to the edge of an obstacle [m/s]."""
+def speed_to_obstacles(scene: PaperScene, solution: Solution) -> float:
+    """Return the speed of the mean up to where it is nearest to the edge of an obstacle, over time [m/s]."""
     away = np.linalg.norm(solution.path[:, None] - scene.obstacles.centre[None], axis=-1) - scene.obstacles.radius
-    return float(speed(solution)[away.min(axis=1).argmin()])
+    return float(speed(solution)[: away.min(axis=1).argmin() + 1].mean())
 
 
 def path_length(solution: Solution) -> float:

@@ -1,0 +1,45 @@
+"""Kernels in machine code: plain functions on arrays, compiled by numba where they are defined.
+
+The first import on a machine compiles them, which takes some seconds; numba keeps the result beside the source, or in the user's
+cache directory where that cannot be written. Numba looks only at the file of a kernel, not at those it calls: after a change in
+`dense.py`, `make clean` clears what is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias, TypeVar, cast
+
+import numpy as np
+from numba import njit, types
+from numpy.typing import NDArray
+
+Vector: TypeAlias = NDArray[np.float64]
+Matrix: TypeAlias = NDArray[np.float64]
+Tensor: TypeAlias = NDArray[np.float64]
+Indices: TypeAlias = NDArray[np.intp]
+"""Arguments of kernels: C-contiguous arrays of one, two and three axes, indices of any stride; read-only ones too."""
+
+_TYPES = {
+    'float': types.float64,
+    'int': types.intp,
+    'Vector': types.Array(types.float64, 1, 'C', readonly=True),
+    'Matrix': types.Array(types.float64, 2, 'C', readonly=True),
+    'Tensor': types.Array(types.float64, 3, 'C', readonly=True),
+    'Indices': types.Array(types.intp, 1, 'A', readonly=True),
+}
+REORDERED = {'contract', 'reassoc'}
+"""Freedom of the compiler: sums in another order, fused products. Not that numbers are finite."""
+
+Kernel = TypeVar('Kernel', bound=Callable[..., object])
+
+
+def compiled(kernel: Kernel) -> Kernel:
+    """Compile a function for the types that its annotations name; it never changes its arguments."""
+    signature = tuple(_TYPES[str(kind)] for name, kind in kernel.__annotations__.items() if name != 'return')
+    try:
+        return cast('Kernel', njit(signature, cache=True, fastmath=REORDERED)(kernel))
+    except RuntimeError as error:  # no directory to keep it in: compile in every process
+        if 'cannot cache' not in str(error):
+            raise
+        return cast('Kernel', njit(signature, fastmath=REORDERED)(kernel))
