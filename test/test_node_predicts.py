@@ -230,3 +230,11 @@ def test_diagnostics_come_once_a_second_by_themselves(ros: Graph) -> None:
     ros.spin_until(lambda: len(bench.diagnostics) >= 3, 'three diagnostics')
     stamps_s = [array.header.stamp.sec + 1e-9 * array.header.stamp.nanosec for array in bench.diagnostics[:3]]
     assert stamps_s[2] - stamps_s[0] == pytest.approx(2.0, abs=0.9)
+
+
+def test_diagnostics_come_though_simulated_time_stands_still(ros: Graph) -> None:
+    bench = Bench(ros, outputs=[], ticking=True, parameters={'use_sim_time': True})
+    ros.spin_until(lambda: len(bench.diagnostics) >= 2, 'two diagnostics')
+    assert bench.node.get_clock().now().nanoseconds == 0
+    assert bench.diagnostics[-1].status[0].level == b'\x01'
+    assert 'no hand pose yet' in bench.diagnostics[-1].status[0].message
