@@ -80,5 +80,5 @@ pages: $(STAMP)
 	$(BIN)/python scripts/make_parameter_page.py
 
 clean:
-	rm -rf $(VENV) build dist install log demo_output *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) build dist install log demo_output paper_output *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

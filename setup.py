@@ -21,7 +21,7 @@ setup(
     license='Apache-2.0',
     keywords=['ROS', 'teleoperation', 'motion prediction', 'stochastic optimal control', 'homotopy'],
     packages=find_packages(exclude=['test', 'test.*']),
-    package_data={PACKAGE: ['py.typed', 'recordings/*.mcap']},
+    package_data={PACKAGE: ['py.typed', 'page/*.css', 'page/*.html', 'page/*.js', 'recordings/*.mcap']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (f'share/{PACKAGE}', ['package.xml']),
@@ -44,11 +44,14 @@ setup(
     extras_require={
         # rclpy with Fast DDS and the common interfaces as wheels, for machines without a ROS installation
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
-        'report': ['matplotlib>=3.6'],
+        'report': ['matplotlib>=3.6', 'plotly>=5.24'],
+        # recordings on the workers of a Dask cluster
+        'cluster': ['distributed>=2024.1'],
         # what the benchmark compares with
         'bench': ['casadi>=3.6', 'cvxpy>=1.4', 'daqp>=0.5', 'matplotlib>=3.6', 'scipy>=1.15'],
         'test': [
             'daqp>=0.5',
+            'distributed>=2024.1',
             'hypothesis>=6.80',
             'import-linter>=2.1',
             'mcap>=1.1',
@@ -60,6 +63,7 @@ setup(
             'quadprog>=0.1.11',
             'ruff>=0.8',
             'scipy>=1.9',
+            'selenium>=4.11',
             'setuptools>=70.1',
             'types-PyYAML',
         ],

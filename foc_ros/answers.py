@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .foc.records import LEFT, Array, Outcome, Prediction
+from .foc.records import LEFT, Array, Outcome, Prediction, Solution
 
 
 def candidate_answer(outcome: Outcome) -> dict[str, Any]:
@@ -36,6 +36,34 @@ def candidate_answer(outcome: Outcome) -> dict[str, Any]:
         'mean': table(solution.path),
         'stddev': table(np.sqrt(np.maximum(variances, 0.0))),
     }
+
+
+def solution_account(solution: Solution) -> dict[str, Any]:
+    """Return all the rest of a solution: words, every term of the cost, where eta is attained, what holds it, the whole state.
+
+    Units: those of :class:`Solution`. rows: the active ones; covariance (N + 1, n, n) at steps 0..N; control (N, 2).
+    """
+    held = zip(solution.multipliers, solution.held, strict=True)
+    return {
+        'message': solution.message,
+        'costs': {name: number(value) for name, value in solution.costs.items()},
+        'eta_at': _place(solution.eta_at),
+        'eta_reachable': solution.eta_reachable,
+        'violation': number(solution.violation),
+        'violation_at': _place(solution.violation_at),
+        'rows': [
+            {'obstacle': identity, 'step': step, 'multiplier': number(value), 'tau': number(tau), 'lambda': number(lam)}
+            for (identity, step, value), (tau, lam) in held
+        ],
+        'iterations': solution.iterations,
+        'acceleration': table(solution.mean[:, 4:6]),
+        'control': table(solution.control),
+        'covariance': [table(each) for each in solution.covariance],
+    }
+
+
+def _place(place: tuple[str, int] | None) -> dict[str, Any] | None:
+    return None if place is None else {'obstacle': place[0], 'step': place[1]}
 
 
 def prediction_answer(prediction: Prediction) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from .conversions.types import RosbagsTypes
 from .foc.errors import RecordingError
 from .foc.records import NANOSECONDS, Array
 from .input_messages import goal_poses, hand_pose, obstacle_cloud
-from .tables import rows
+from .tables import Row, rows
 from .terminal import track
 
 FRAME = 'world'
@@ -67,20 +68,29 @@ def run(arguments: argparse.Namespace) -> int:
 
 def read_movements(file: Path) -> list[Movement]:
     """Return the recordings in order of their first rows; within one, time must not run backward."""
-    found: dict[str, list[tuple[float, ...]]] = {}
+    return [movement_of(name, rows_of) for name, rows_of in movement_rows(file).items()]
+
+
+def movement_rows(file: Path) -> dict[str, list[Row]]:
+    """Return the rows of each recording, in order of their first rows; at least one."""
+    found: dict[str, list[Row]] = {}
     for row in rows(file, ('recording', 't_s', 'x_m', 'y_m')):
         if not row.cells['recording']:
             raise row.fault('recording', 'a name')
-        samples = found.setdefault(row.cells['recording'], [])
+        found.setdefault(row.cells['recording'], []).append(row)
+    if not found:
+        raise RecordingError(f'{file}: expected at least one row, got none')
+    return found
+
+
+def movement_of(name: str, table: Iterable[Row]) -> Movement:
+    """Return one recording from its rows; raises RecordingError for a cell out of bounds and for time that runs backward."""
+    samples: list[tuple[float, ...]] = []
+    for row in table:
         bounds = (samples[-1][0], samples[0][0] + LONGEST_S) if samples else (0.0, LATEST_S)
         time = row.number('t_s', *bounds)
         samples.append((time, row.number('x_m'), row.number('y_m'), row.number('z_m', default=0.0)))
-    if not found:
-        raise RecordingError(f'{file}: expected at least one row, got none')
-    return [
-        Movement(name, tuple(EPOCH_NS + round(each[0] * NANOSECONDS) for each in samples), np.array(samples)[:, 1:])
-        for name, samples in found.items()
-    ]
+    return Movement(name, tuple(EPOCH_NS + round(each[0] * NANOSECONDS) for each in samples), np.array(samples)[:, 1:])
 
 
 def read_obstacles(file: Path) -> list[tuple[float, ...]]:
@@ -105,17 +115,22 @@ def read_goals(file: Path) -> Array:
 
 def write_movement(bag: Path, movement: Movement, obstacles: list[tuple[float, ...]], goals: Array | None) -> None:
     """Write one bag: /hand_pose, /obstacles and, where there are any, /goals, in order of their stamps."""
-    types = RosbagsTypes(TYPESTORE)
-    messages: list[tuple[int, str, Any]] = []
-    for stamp_ns in range(movement.stamps_ns[0] - SCENE_LEAD_NS, movement.stamps_ns[-1] + 1, SCENE_PERIOD_NS):
-        messages.append((stamp_ns, '/obstacles', obstacle_cloud(types, stamp_ns, FRAME, obstacles)))
-        if goals is not None:
-            messages.append((stamp_ns, '/goals', goal_poses(types, stamp_ns, FRAME, goals)))
-    for stamp_ns, position in zip(movement.stamps_ns, movement.positions, strict=True):
-        messages.append((stamp_ns, '/hand_pose', hand_pose(types, stamp_ns, FRAME, position)))
     with BagWriter(bag) as writer:
-        for stamp_ns, topic, message in sorted(messages, key=lambda each: each[0]):
+        for stamp_ns, topic, message in messages(movement, obstacles, goals):
             writer.write(topic, message, stamp_ns)
+
+
+def messages(movement: Movement, obstacles: list[tuple[float, ...]], goals: Array | None) -> list[tuple[int, str, Any]]:
+    """Return the messages of a bag as (stamp [ns], topic, message), in order of their stamps."""
+    types = RosbagsTypes(TYPESTORE)
+    made: list[tuple[int, str, Any]] = []
+    for stamp_ns in range(movement.stamps_ns[0] - SCENE_LEAD_NS, movement.stamps_ns[-1] + 1, SCENE_PERIOD_NS):
+        made.append((stamp_ns, '/obstacles', obstacle_cloud(types, stamp_ns, FRAME, obstacles)))
+        if goals is not None:
+            made.append((stamp_ns, '/goals', goal_poses(types, stamp_ns, FRAME, goals)))
+    for stamp_ns, position in zip(movement.stamps_ns, movement.positions, strict=True):
+        made.append((stamp_ns, '/hand_pose', hand_pose(types, stamp_ns, FRAME, position)))
+    return sorted(made, key=lambda each: each[0])
 
 
 def _folders(movements: list[Movement]) -> dict[str, Movement]:

@@ -109,21 +109,22 @@ def draw_hand(axes: Any, track: Track, now_ns: int, span: tuple[int, int]) -> No
 
 
 def draw_likelihoods(
-    axes: Any, moments: Sequence[Moment], lines: Sequence[Mapping[str, int]], ranks: Mapping[int, int], origin_ns: int
+    axes: Any, moments: Sequence[Moment], lines: Sequence[Mapping[str, int]], letters: Mapping[int, int], origin_ns: int
 ) -> None:
     """Draw the likelihood of ways over time; one that is no candidate for a while leaves a gap.
 
-    lines: for every moment, the line of each way by label; ranks: of the lines to draw, which give letter and colour.
+    lines: for every moment, the line of each way by label; letters: number of the letter and colour by line, for those drawn.
     """
     times = [(moment.stamp_ns - origin_ns) / NANOSECONDS for moment in moments]
     tables = [{numbers[way.label]: way.likelihood for way in moment.ways} for moment, numbers in zip(moments, lines, strict=True)]
-    for line, rank in reversed(list(ranks.items())):
+    shown = sorted({line for table in tables for line in table} & set(letters))
+    for rank, line in enumerate(shown):
         values = np.array([table.get(line, np.nan) for table in tables])
-        colour, dash = class_style(rank)
+        colour, dash = class_style(letters[line])
         axes.plot(times, values, color=colour, linestyle=dash, linewidth=1.8, marker='.', markersize=2.5, label=f'line {line}')
         known = np.flatnonzero(np.isfinite(values))
-        place = known[(2 * rank + 1) * len(known) // (2 * len(ranks))]
-        tag(axes, (times[place], values[place]), ascii_uppercase[rank], colour)
+        place = known[(2 * rank + 1) * len(known) // (2 * len(shown))]
+        tag(axes, (times[place], values[place]), ascii_uppercase[letters[line]], colour)
     axes.set(ylim=(-0.03, 1.03), ylabel='likelihood')
     axes.tick_params(labelbottom=False)
 

@@ -7,7 +7,7 @@ A line over time follows the way, not the label.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -50,6 +50,26 @@ def lineages(moments: Sequence[Moment]) -> list[dict[str, int]]:
         numbered.append(numbers)
         before = moment
     return numbered
+
+
+def slots(moments: Sequence[Moment], lines: Sequence[Mapping[str, int]], count: int) -> dict[int, int]:
+    """Return a slot in [0, count), which gives letter and colour, of each line: no two lines of one time share one.
+
+    Lines that begin together take theirs in order of likelihood; the slot that has been free for longest comes first. A line that
+    finds none free has none. lines: as of `lineages`.
+    """
+    last = {line: row for row, numbers in enumerate(lines) for line in numbers.values()}
+    given: dict[int, int] = {}
+    seen: set[int] = set()
+    taken_until = dict.fromkeys(range(count), -1)
+    for row, (moment, numbers) in enumerate(zip(moments, lines, strict=True)):
+        for line in (numbers[way.label] for way in moment.ways):
+            free = [slot for slot, until in taken_until.items() if until < row]
+            if line not in seen and free:
+                given[line] = min(free, key=lambda slot: (taken_until[slot], slot))
+                taken_until[given[line]] = last[line]
+            seen.add(line)
+    return given
 
 
 def _continued(moment: Moment, earlier: dict[int, str]) -> dict[str, int]:

@@ -18,6 +18,8 @@ WINDOW = 1000
 HARMLESS = ('candidate_', 'hand_disengaged', 'hand_duplicate', 'predict_', 'predictions')
 """Beginnings of the counts that are no fault by themselves: what keeps predictions from being made is told in words."""
 FAULTS = ('predict_failed', 'predict_nothing_solved')
+TOLD = ('goal_inside', 'hand_inside', 'no_way')
+"""Notes of a prediction that answers less than was asked for: it is counted as `scene_` and their name."""
 
 
 @dataclass
@@ -52,6 +54,7 @@ class Monitor:
         """Note a prediction, computed and published between two times."""
         self._prediction, self._predicted_s = prediction, now_s
         self._own['predictions'] += 1
+        self._own.update(f'scene_{name}' for name in TOLD if prediction.notes.get(name))
         self._solve_ms.append(1e3 * prediction.solve_s)
         self._cycle_ms.append(1e3 * (now_s - began_s))
 

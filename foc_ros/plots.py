@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,7 +25,6 @@ from .drawing import (
 )
 from .foc.errors import InputError
 from .foc.records import NANOSECONDS, Array, Obstacles, Outcome
-from .lineage import lineages
 from .moments import Moment, Track, Way, ways_of
 
 if TYPE_CHECKING:
@@ -68,15 +68,22 @@ def track_figure(track: Track, obstacles: Obstacles, goals: Array, spans: Sequen
     return figure
 
 
-def moment_figure(track: Track, moment: Moment, around: Sequence[Moment], span: tuple[int, int], bounds: Bounds) -> Figure:
+@dataclass(frozen=True)
+class Around:
+    """The predictions of one movement; lines: number of the line of each way of each, by label; letters: number by line."""
+
+    moments: tuple[Moment, ...]
+    lines: tuple[Mapping[str, int], ...]
+    letters: Mapping[int, int]
+
+
+def moment_figure(track: Track, moment: Moment, around: Around, span: tuple[int, int], bounds: Bounds) -> Figure:
     """Return one movement at one moment: scene above, then likelihoods and speeds over the whole movement.
 
     around: the predictions during the movement, the moment among them; span: its start and end [ns].
     """
-    lines = lineages(around)
-    place = [each.stamp_ns for each in around].index(moment.stamp_ns)
-    ranks = _ranks([lines[place][way.label] for way in moment.ways], around, lines)
-    numbers = {label: ranks[line] for label, line in lines[place].items() if line in ranks}
+    place = [each.stamp_ns for each in around.moments].index(moment.stamp_ns)
+    numbers = {label: around.letters[line] for label, line in around.lines[place].items() if line in around.letters}
     origin_ns = int(track.stamps_ns[0])
     now = (moment.stamp_ns - origin_ns) / NANOSECONDS
     heights = [_scene_height(bounds), LINE_IN * max(1, len(moment.ways)), 2.0, 1.6]
@@ -87,7 +94,7 @@ def moment_figure(track: Track, moment: Moment, around: Sequence[Moment], span: 
         draw_hand(scene, track, moment.stamp_ns, span)
         draw_colour_bar(figure, scene)
         draw_legend(legend, moment.ways, numbers)
-        draw_likelihoods(likelihoods, around, lines, ranks, origin_ns)
+        draw_likelihoods(likelihoods, around.moments, around.lines, around.letters, origin_ns)
         draw_speeds(speeds, track, moment, span, origin_ns)
         for axes in (likelihoods, speeds):
             axes.axvline(now, color='0.4', linewidth=1.0, linestyle=':')
@@ -125,16 +132,6 @@ def _scene_height(bounds: Bounds) -> float:
     """Return the height [in] that a scene needs, with equal axes, beside its colour bar."""
     wide, high = bounds[1] - bounds[0], bounds[3] - bounds[2]
     return float(np.clip(0.8 * WIDTH_IN * high / wide, 2.0, 7.0))
-
-
-def _ranks(now: Sequence[int], around: Sequence[Moment], lines: Sequence[Mapping[str, int]]) -> dict[int, int]:
-    """Return the rank of each line: those of the moment by likelihood, then the others by the greatest likelihood they reach."""
-    peak: dict[int, float] = {}
-    for moment, numbers in zip(around, lines, strict=True):
-        for way in moment.ways:
-            peak[numbers[way.label]] = max(peak.get(numbers[way.label], 0.0), way.likelihood)
-    shown = [*now, *sorted(set(peak) - set(now), key=lambda line: (-peak[line], line))]
-    return {line: rank for rank, line in enumerate(shown[:CLASSES])}
 
 
 def _numbered(labels: Sequence[str]) -> dict[str, int]:

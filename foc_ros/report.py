@@ -1,4 +1,4 @@
-"""A directory that tells of a recording: pictures, one page that holds them all, and the numbers."""
+"""A directory that tells of a recording: one interactive page, pictures for print, and the numbers."""
 
 from __future__ import annotations
 
@@ -11,60 +11,63 @@ from typing import Any
 import numpy as np
 
 from . import plots
+from .drawing import CLASSES
 from .foc.errors import InputError
 from .foc.records import NANOSECONDS
+from .lineage import lineages, slots
 from .moments import Moment, Track, movements
-from .report_page import page_of
+from .report_data import page_data, rounded
+from .report_page import report_page
 
 MOST_PICTURES = 8
 FRACTIONS_OF_ONE = (0.1, 0.3, 0.5, 0.7)
 """Where in its time a movement is shown when it is the only one; of several, each is shown once, at FRACTION."""
 FRACTION = 0.3
-OVERVIEW = (
-    'All movements, numbered. Discs are obstacles, in a ring as wide as the standard deviation of their radius; stars are goals.'
-)
 ONSET_SPEED = 0.05
 """Speed [m/s] above which the pictures take the hand to be moving."""
 
 
 def write_report(directory: Path, title: str, track: Track, moments: Sequence[Moment], summary: Mapping[str, str]) -> list[Path]:
-    """Write pictures, index.html (which holds them, and needs nothing else) and predictions.json; return the files.
+    """Write index.html (which needs nothing else), predictions.json and pictures; return the files.
 
     track: the measured hand; moments: the predictions in order; summary: facts to put on top, in words. Files of those names are
-    replaced. Raises InputError where the directory cannot be written or the hand has no sample.
+    replaced. Raises InputError where the directory cannot be written or the hand has no sample, FocError where plotly is missing.
     """
     if not len(track.stamps_ns):
         raise InputError('report', 'a recording with a hand pose', 'none')
+    spans = movements(track, ONSET_SPEED) or [(int(track.stamps_ns[0]), int(track.stamps_ns[-1]))]
+    html = report_page(title, page_data(track, moments, spans, CLASSES), {**_facts(moments), **summary}, _warnings(moments))
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        pictures = _write_pictures(directory, track, moments)
+        pictures = _write_pictures(directory, track, moments, spans)
         page, numbers = directory / 'index.html', directory / 'predictions.json'
-        page.write_text(page_of(title, pictures, {**_facts(moments), **summary}, _warnings(moments)), encoding='utf-8')
+        page.write_text(html, encoding='utf-8')
         numbers.write_text(json.dumps(_numbers(title, track, moments, summary), indent=1, allow_nan=False), encoding='utf-8')
     except OSError as error:
         raise InputError('report directory', 'a directory that can be written', f'{directory}: {error.strerror}') from error
     return [page, numbers, *pictures]
 
 
-def _write_pictures(directory: Path, track: Track, moments: Sequence[Moment]) -> dict[Path, str]:
-    """Return the caption of every picture by its file; the overview comes first."""
+def _write_pictures(directory: Path, track: Track, moments: Sequence[Moment], spans: Sequence[tuple[int, int]]) -> list[Path]:
+    """Return the files, the overview first."""
     shown = [moment for moment in moments if moment.ways]
     if not shown:
-        return {}
-    spans = movements(track, ONSET_SPEED) or [(int(track.stamps_ns[0]), int(track.stamps_ns[-1]))]
+        return []
+    lines = lineages(moments)
+    letters = slots(moments, lines, CLASSES)
     chosen = _chosen(shown, spans)
     ways = [way for _, moment in chosen for way in moment.ways]
     goals = np.unique(np.concatenate([moment.goals for moment in shown]), axis=0)
     bounds = plots.bounds_of(shown[0].obstacles, goals, ways, track.positions)
-    pictures = {directory / 'overview.png': OVERVIEW}
-    plots.save(plots.track_figure(track, shown[0].obstacles, goals, spans, bounds), directory / 'overview.png')
+    files = [directory / 'overview.png']
+    plots.save(plots.track_figure(track, shown[0].obstacles, goals, spans, bounds), files[0])
     for count, (number, moment) in enumerate(chosen):
         start_ns, end_ns = spans[number]
-        around = [each for each in moments if start_ns <= each.stamp_ns <= end_ns]
-        file = directory / f'moment_{count + 1:02d}.png'
-        plots.save(plots.moment_figure(track, moment, around, spans[number], bounds), file)
-        pictures[file] = f'Movement {number + 1}, {(moment.stamp_ns - start_ns) / NANOSECONDS:.2f} s after its beginning'
-    return pictures
+        rows = [row for row, each in enumerate(moments) if start_ns <= each.stamp_ns <= end_ns]
+        around = plots.Around(tuple(moments[row] for row in rows), tuple(lines[row] for row in rows), letters)
+        files.append(directory / f'moment_{count + 1:02d}.png')
+        plots.save(plots.moment_figure(track, moment, around, spans[number], bounds), files[-1])
+    return files
 
 
 def _chosen(shown: Sequence[Moment], spans: Sequence[tuple[int, int]]) -> list[tuple[int, Moment]]:
@@ -115,11 +118,11 @@ def _numbers(title: str, track: Track, moments: Sequence[Moment], summary: Mappi
                 'candidates': [
                     {
                         'label': way.label,
-                        'likelihood': _rounded(way.likelihood),
-                        'effort': _rounded(way.effort),
-                        'cost_ratio': _rounded(way.cost_ratio),
-                        'eta': _rounded(way.eta),
-                        'end': [_rounded(value) for value in way.path[-1]],
+                        'likelihood': rounded(way.likelihood),
+                        'effort': rounded(way.effort),
+                        'cost_ratio': rounded(way.cost_ratio),
+                        'eta': rounded(way.eta),
+                        'end': [rounded(value) for value in way.path[-1]],
                     }
                     for way in moment.ways
                 ],
@@ -128,8 +131,3 @@ def _numbers(title: str, track: Track, moments: Sequence[Moment], summary: Mappi
             for moment in moments
         ],
     }
-
-
-def _rounded(value: float) -> float | None:
-    """Return six significant digits; None for what JSON has no number for."""
-    return float(f'{value:.6g}') if np.isfinite(value) else None

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from .answers import candidate_answer, table
+from .answers import candidate_answer, solution_account, table
 from .foc.errors import InputError
 from .foc.homotopy import path_sides, search
 from .foc.monte_carlo import monte_carlo
@@ -98,7 +98,7 @@ def _guessed(scene: SceneFile, guess: Array) -> Candidate:
 def _answer(outcome: Outcome, problem: Problem, samples: int | None) -> dict[str, Any]:
     solution = outcome.solution
     answer = candidate_answer(outcome)
-    answer |= {'message': solution.message, 'solve_ms': 1e3 * solution.solve_s, 'velocity': table(solution.mean[:, 2:4])}
+    answer |= {'solve_ms': 1e3 * solution.solve_s, 'velocity': table(solution.mean[:, 2:4])} | solution_account(solution)
     if samples is not None:
         estimate = monte_carlo(problem, solution.control.T.ravel(), samples)
         for name, (share, low, high) in (('mc_step', estimate.step), ('mc_path', estimate.path)):

@@ -2,6 +2,12 @@
 
 Exit code 0 where memory stayed flat after the warm-up, no thread or file was left, no good pose was lost, the 99th percentile of
 the cycle did not grow, nothing failed inside, and the node stopped without an error.
+
+A good pose is lost where the node never heard it, or refused it. What it heard it follows; it predicts from the newest that is
+due, and counts the due ones that it passed over as dropped cycles: those are shown, and not lost.
+
+Other programs of the machine make cycles longer too. So a fixed piece of work is timed all along, and the 99th percentile of the
+cycle is judged by what it grew more than that of the work.
 """
 
 from __future__ import annotations
@@ -33,9 +39,13 @@ GOALS = np.array([[0.3, 0.0, 0.0], [0.3, 0.1, 0.0]])
 ROWS = [(0.15, 0.02, 0.0, 0.03, 0.002, 7), (0.2, 0.08, 0.0, 0.02, 0.002, 8)]
 BAD_POSES = {'nowhere': 'hand_pose_invalid', 'camera': 'hand_wrong_frame', 'again': 'hand_duplicate', 'late': 'hand_late'}
 """What the node counts a bad pose as; one that comes late just after a reset is a beginning, and none of them."""
-FAULTS = (*BAD_POSES, 'cut', 'negative', 'flip', 'parameter', 'wrong parameter', 'crowd', 'clutch', 'reset')
-WARM_UP, GROWTH, SLOWER = 0.2, 1.05, 2.0
+FAULTS = (*BAD_POSES, 'burst', 'cut', 'negative', 'flip', 'parameter', 'wrong parameter', 'crowd', 'clutch', 'reset')
+BURST, BURST_NS = 20, 100_000
+"""Poses that come at once, as after a stall of the network, and what their stamps differ by at least [ns]."""
+WARM_UP, GROWTH, SLOWER = 0.2, 1.05, 1.5
 """Part of the time that is not judged; growth of memory, and of the 99th percentile, that still passes."""
+PROBE_TURNS, PROBE_ROUNDS = 25, 400_000
+"""Periods between two pieces of the fixed work, and how long one is: some milliseconds."""
 
 
 def graph_environment(logs: Path) -> dict[str, str]:
@@ -44,7 +54,10 @@ def graph_environment(logs: Path) -> dict[str, str]:
 
 
 class Player:
-    """Plays hand, scene and faults into whatever node is there. Attributes: sent, poses by kind; health, the newest figures."""
+    """Plays hand, scene and faults into whatever node is there.
+
+    Attributes: sent, poses by kind; health, the newest figures; probes_s, how long the fixed work took each time [s].
+    """
 
     def __init__(self) -> None:
         import rclpy
@@ -52,17 +65,23 @@ class Player:
         from geometry_msgs.msg import PoseArray, PoseStamped
         from rcl_interfaces.srv import SetParametersAtomically
         from rclpy.executors import SingleThreadedExecutor
+        from rclpy.qos import qos_profile_sensor_data
         from rclpy.signals import SignalHandlerOptions
         from sensor_msgs.msg import PointCloud2
         from std_srvs.srv import SetBool, Trigger
 
-        self._context = rclpy.Context()
-        rclpy.init(args=[], context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self._node = rclpy.create_node('soak', context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
+        # A tracker is a program of its own. In one with the scene, large clouds would fill the memory that DDS shares with the
+        # node, and poses, which are sent with best effort, would be lost before they left.
+        self._contexts = [rclpy.Context(), rclpy.Context()]
+        for context in self._contexts:
+            rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
+        names = zip(('soak', 'tracker'), self._contexts, strict=True)
+        self._node, self._tracker = (rclpy.create_node(name, context=context) for name, context in names)
+        self._executor = SingleThreadedExecutor(context=self._contexts[0])
         self._executor.add_node(self._node)
-        kinds = {'hand_pose': PoseStamped, 'obstacles': PointCloud2, 'goals': PoseArray}
-        self._publishers = {name: self._node.create_publisher(kind, name, 1000) for name, kind in kinds.items()}
+        kinds = {'obstacles': PointCloud2, 'goals': PoseArray}
+        self._publishers = {name: self._node.create_publisher(kind, name, 10) for name, kind in kinds.items()}
+        self._publishers['hand_pose'] = self._tracker.create_publisher(PoseStamped, 'hand_pose', qos_profile_sensor_data)
         self._node.create_subscription(PointCloud2, 'foc/prediction', self._predicted, 10)
         self._node.create_subscription(DiagnosticArray, '/diagnostics', self._judged, 10)
         self._parameters = self._node.create_client(SetParametersAtomically, 'foc/set_parameters_atomically')
@@ -70,7 +89,8 @@ class Player:
         self._reset = self._node.create_client(Trigger, 'foc/reset')
         self._types, self._dice = RclpyTypes(), random.Random(1)
         self._began = self._next = time.monotonic()
-        self._turn = 0
+        self._turn, self._stamp_ns = 0, 0
+        self.probes_s: list[float] = []
         self.sent = dict.fromkeys(('good', *BAD_POSES), 0)
         self.predictions, self.unfit = 0, 0
         self.health: Mapping[str, str] = {}
@@ -80,8 +100,9 @@ class Player:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._executor.shutdown()
-        self._node.destroy_node()
-        self._context.try_shutdown()
+        for node, context in zip((self._node, self._tracker), self._contexts, strict=True):
+            node.destroy_node()
+            context.try_shutdown()
 
     @property
     def connected(self) -> bool:
@@ -96,7 +117,7 @@ class Player:
 
     def tick(self, *, faulty: bool = False) -> None:
         """Send what is due in one period, and listen for the rest of it."""
-        stamp_ns = self._node.get_clock().now().nanoseconds
+        stamp_ns = max(self._node.get_clock().now().nanoseconds, self._stamp_ns + BURST_NS)
         if self._turn % 10 == 0:
             self._publishers['obstacles'].publish(obstacle_cloud(self._types, stamp_ns, FRAME, ROWS))
         if self._turn % 50 == 0:
@@ -104,6 +125,8 @@ class Player:
         self._pose(stamp_ns)
         if faulty and self._turn % 20 == 7:
             self._fault(self._dice.choice(FAULTS), stamp_ns)
+        if self._turn % PROBE_TURNS == 3:
+            self._probe()
         self._turn += 1
         self._next = max(self._next + PERIOD_S, time.monotonic() - PERIOD_S)
         self.spin(max(self._next - time.monotonic(), 0.0))
@@ -114,6 +137,12 @@ class Player:
         position = np.array([0.28 * share if x is None else x, 0.05 * share, 0.1])
         self._publishers['hand_pose'].publish(hand_pose(self._types, stamp_ns, frame, position))
         self.sent[kind] += 1
+        self._stamp_ns = max(self._stamp_ns, stamp_ns)
+
+    def _probe(self) -> None:
+        began = time.perf_counter()
+        sum(range(PROBE_ROUNDS))
+        self.probes_s.append(time.perf_counter() - began)
 
     def _fault(self, name: str, stamp_ns: int) -> None:
         from rcl_interfaces.srv import SetParametersAtomically
@@ -124,6 +153,9 @@ class Player:
             ns = stamp_ns - (50_000_000 if name == 'late' else 0)
             x = np.nan if name == 'nowhere' else None
             self._pose(ns, name, 'camera' if name == 'camera' else FRAME, x)
+        elif name == 'burst':
+            for i in range(1, BURST + 1):
+                self._pose(stamp_ns + i * BURST_NS)
         elif name in ('cut', 'negative', 'crowd'):
             rows = [(0.0, 1.0 + 0.001 * i, 0.0, 0.001, 0.0, i) for i in range(10_000)] if name == 'crowd' else ROWS
             rows = [(0.0, 0.0, 0.0, -1.0, 0.0, 1)] if name == 'negative' else rows
@@ -181,6 +213,8 @@ def soaked(process: subprocess.Popen[str], player: Player, seconds: float) -> li
             due += REPORT_S
             p50, _, p99 = player.health.get('cycle time p50, p99 [ms]', '').partition(', ')
             row = {'time': now - began, **measured(process.pid), 'p50': float(p50 or 'nan'), 'p99': float(p99 or 'nan')}
+            row['probe'] = 1e3 * statistics.fmean(player.probes_s)
+            player.probes_s.clear()
             table.append(row)
             print('  '.join(f'{name} {value:.1f}' for name, value in row.items()), flush=True)
     return table
@@ -203,13 +237,18 @@ def verdicts(table: list[dict[str, float]], player: Player, lost: int, refused: 
     after = [row for row in table if row['time'] >= WARM_UP * table[-1]['time']]
     third = max(len(after) // 3, 1)
     start, end = _medians(after[:third]), _medians(after[-third:])
+    others = max(end['probe'] / start['probe'], 1.0)
     return {
         f'memory {start["memory"]:.1f} to {end["memory"]:.1f} MB': end['memory'] <= GROWTH * start['memory'],
         f'threads {start["threads"]:.0f} to {end["threads"]:.0f}': end['threads'] <= start['threads'],
         f'files {start["files"]:.0f} to {end["files"]:.0f}': end['files'] <= start['files'],
-        f'p99 {start["p99"]:.1f} to {end["p99"]:.1f} ms': end['p99'] <= SLOWER * start['p99'],
+        f'p99 {start["p99"]:.1f} to {end["p99"]:.1f} ms, of the fixed work {start["probe"]:.1f} to {end["probe"]:.1f} ms': (
+            end['p99'] <= SLOWER * others * start['p99']
+        ),
         f'{lost} of {sum(player.sent.values())} poses lost, {refused} good ones refused': lost == refused == 0,
-        f'{player.predictions} predictions, {player.unfit} not finite': player.predictions > 0 and not player.unfit,
+        f'{player.predictions} predictions, {player.health["dropped cycles"]} passed over, {player.unfit} not finite': (
+            player.predictions > 0 and not player.unfit
+        ),
         f'internal error: {player.health["last internal error"]}': player.health['last internal error'] == 'none',
     }
 

@@ -17,8 +17,8 @@ settings.register_profile('seeded', derandomize=True, deadline=None)
 settings.load_profile('seeded')
 
 REQUIRE_ROS = os.environ.get('FOC_ROS_REQUIRE_ROS') == '1'
-# Skips that remain skips: they want data that does not come with the sources.
-ALLOWED = ('Skipped: optional data',)
+# Skips that remain skips: they want data that does not come with the sources, or a browser where none is demanded.
+ALLOWED = ('Skipped: optional data', 'Skipped: optional browser')
 
 
 def _fail_if_skipped(report: pytest.TestReport | pytest.CollectReport) -> None:

@@ -13,6 +13,7 @@ from foc_ros.conversions.types import RclpyTypes
 
 TYPES = RclpyTypes()
 ROWS = [(0.15, 0.02, 0.0, 0.03)]
+CROWD = [(0.01 * (i % 100) - 0.35, 0.05 + 0.01 * (i // 100), 0.0, 0.004) for i in range(10_000)]
 GOALS = [(0.3, 0.0, 0.0)]
 QUICK = {'foc.steps': 20, 'homotopy.max_candidates': 2, 'scene.timeout_s': 0.0}
 """Parameters with which a prediction takes little time, and a slow machine is no silent source."""

@@ -64,3 +64,15 @@ def test_failures_are_tested_as_they_say() -> None:
         named = re.findall(r'`(test_\w+\.py::test_\w+)`', row)
         assert named, f'no test is named in: {row}'
         assert not set(named) - TESTS, f'no such test: {set(named) - TESTS}'
+
+
+def test_failures_of_the_node_name_the_level_of_its_diagnostics() -> None:
+    sections = (ROOT / 'doc' / 'failures.md').read_text('utf-8').split('\n## ')[1:]
+    of_the_node = [section for section in sections if not section.startswith('Files')]
+    assert len(of_the_node) == 4
+    for section in of_the_node:
+        header, _, *rows = [line for line in section.splitlines() if line.startswith('|')]
+        assert header == '| when | what happens | level | where you see it | test |'
+        for row in rows:
+            level = row.split(' | ')[2]
+            assert re.match(r'(OK|WARN|ERROR|unchanged|none)\b', level), row

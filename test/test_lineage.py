@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from foc_ros.foc.records import make_obstacles
-from foc_ros.lineage import lineages, sides_of
+from foc_ros.lineage import lineages, sides_of, slots
 from foc_ros.moments import Moment, Way
 
 IDS = ('1', '12', 'post-2', '+')
@@ -70,3 +70,25 @@ def test_a_short_absence_is_bridged_a_long_one_not() -> None:
 def test_other_goals_begin_anew() -> None:
     lines = lineages([moment(0, 'goal0:+1'), moment(1, 'goal0:+1', goals=((0.0, 0.0),))])
     assert [numbers['goal0:+1'] for numbers in lines] == [0, 1]
+
+
+def test_lines_of_one_time_have_different_slots() -> None:
+    """Also with fewer slots than lines, where the least likely of those that begin together go without."""
+    labels = ('goal0:+1', 'goal0:-1', 'goal1:+1', 'goal1:-1', 'goal1:-12')
+    moments = [moment(number, *labels[number % 3 : number % 3 + 3]) for number in range(12)]
+    lines = lineages(moments)
+    for count in (2, 3, 5):
+        given = slots(moments, lines, count)
+        assert set(given.values()) == set(range(count))
+        for numbers in lines:
+            used = [given[line] for line in numbers.values() if line in given]
+            assert len(used) == len(set(used))
+    assert list(slots(moments, lines, 5).values())[:3] == [0, 1, 2]
+    assert len(slots(moments[:1], lines[:1], 2)) == 2
+
+
+def test_a_slot_rests_before_another_line_takes_it() -> None:
+    alone = [moment(number, f'goal{number % 2}:+1') for number in (0, 51, 102, 153)]
+    lines = lineages(alone)
+    assert len({line for numbers in lines for line in numbers.values()}) == 4
+    assert list(slots(alone, lines, 3).values()) == [0, 1, 2, 0]

@@ -12,7 +12,7 @@ import ros_helpers
 ros_helpers.require_ros()
 
 from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped  # noqa: E402
-from node_helpers import QUICK, ROWS, TYPES, Bench, figures, hand_path  # noqa: E402
+from node_helpers import GOALS, QUICK, ROWS, TYPES, Bench, figures, hand_path  # noqa: E402
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParametersAtomically  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
@@ -24,6 +24,11 @@ BAD_INPUTS = {
         'hand_pose',
         pose_stamped(TYPES, (NAN, 0, 0), 20 * SECOND),
         'hand_pose: pose.position.x: expected a finite number',
+    ),
+    'hand infinitely far': (
+        'hand_pose',
+        pose_stamped(TYPES, (0, math.inf, 0), 20 * SECOND),
+        'hand_pose: pose.position.y: expected a finite number',
     ),
     'unstamped hand': (
         'hand_pose',
@@ -48,6 +53,12 @@ BAD_INPUTS = {
         'obstacles: radius[0]: expected a number in [0, 10000] m, got -1',
     ),
     'table in another frame': ('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'camera'), "got 'camera'"),
+    'marker in another frame': (
+        'obstacle_markers',
+        marker_array(TYPES, marker(TYPES, frame_id='camera', stamp_ns=10 * SECOND)),
+        "got 'camera'",
+    ),
+    'late table': ('obstacles', cloud(TYPES, obstacle_table(ROWS), round(9.9 * SECOND)), 'behind the newest'),
     'marker of negative size': (
         'obstacle_markers',
         marker_array(TYPES, marker(TYPES, scale=(-1, 1, 1))),
@@ -102,6 +113,11 @@ def test_rows_left_out_are_told(ros: Graph) -> None:
     status = bench.health()
     assert status.level == b'\x01'
     assert 'obstacles_dropped_not_finite 1' in status.message
+    bench.hear('goals', pose_array(TYPES, GOALS))
+    bench.move(hand_path(2))
+    (table,) = bench.wait_for('likelihoods', 1)
+    assert '0' in table.layout.dim[0].label
+    assert bench.health().level == b'\x00'
 
 
 def test_of_several_scenes_waiting_the_newest_good_one_holds(ros: Graph) -> None:
@@ -257,3 +273,6 @@ def test_a_storm_of_parameters_leaves_the_node_predicting(ros: Graph) -> None:
     ros.spin_until(lambda: all(future.done() for future in futures), 'answers')
     assert [future.result().result.successful for future in futures] == [bool(i % 3) for i in range(40)]
     bench.wait_for('prediction', 20)
+    status = bench.health()
+    assert (status.level, status.message) == (b'\x00', 'predicting')
+    assert figures(status)['hand_pose refused'] == '0 of 40'

@@ -15,12 +15,11 @@ import ros_helpers
 ros_helpers.require_ros()
 
 from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped  # noqa: E402
-from node_helpers import ROWS, TYPES, Bench, figures, hand_path  # noqa: E402
+from node_helpers import CROWD, ROWS, TYPES, Bench, figures, hand_path  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
 OK, WARN = b'\x00', b'\x01'
 ROOT = Path(__file__).parents[1]
-CROWD = [(0.01 * (i % 100) - 0.35, 0.05 + 0.01 * (i // 100), 0.0, 0.004) for i in range(10_000)]
 
 
 def stamps(messages: list[Any]) -> list[int]:
@@ -66,8 +65,9 @@ def test_a_flood_of_obstacles_does_not_starve_the_hand(ros: Graph, topic: str) -
             bench.publishers[topic].publish(flood)
         bench.hear('hand_pose', pose)
     assert len(bench.wait_for('prediction', 10)) == 10
-    values = figures(bench.health())
-    assert values['hand_pose refused'] == '0 of 20'
+    status = bench.health()
+    values = figures(status)
+    assert (status.level, values['hand_pose refused']) == (OK, '0 of 20')
     assert int(values['note culled']) > 1000
 
 
@@ -170,8 +170,9 @@ def test_a_node_that_is_killed_and_started_again(ros: Graph) -> None:
     ros.executor.remove_node(player)
     ros.nodes.remove(player)
     player.destroy_node()
-    with running(ros, 'module') as process:
-        feed(ros, 40)
+    with running(ros, 'module', '--ros-args', '-p', 'rate_hz:=10.0', '-p', 'foc.steps:=20') as process:
+        statuses = feed(ros, 250)
+        assert (OK, 'predicting') in [(each.status[0].level, each.status[0].message) for each in statuses]
         process.send_signal(signal.SIGTERM)
         assert process.wait(30) == 0
 

@@ -99,7 +99,9 @@ def test_a_node_that_cannot_keep_up_predicts_from_the_newest_pose_and_counts_the
     bench.wait_for('prediction', 1)
     bench.send('hand_pose', *poses[1:])
     assert stamps(bench.wait_for('prediction', 2)) == [stamps(poses)[0], stamps(poses)[-1]]
-    values = figures(bench.health())
+    status = bench.health()
+    values = figures(status)
+    assert (status.level, status.message) == (b'\x01', f'hand_superseded {values["dropped cycles"]}')
     assert int(values['dropped cycles']) > 0
     assert values['hand_pose refused'] == '0 of 41'
     assert int(values['count predictions']) == 2
@@ -118,10 +120,15 @@ def test_a_pose_that_is_refused_triggers_nothing(ros: Graph) -> None:
 def test_a_bag_that_loops_starts_anew(ros: Graph) -> None:
     bench, poses = Bench(ros), hand_path(8, rate_hz=10.0)
     bench.show_scene()
-    for _ in range(2):
+    for turn in range(2):
         bench.move(poses)
+        status = bench.health()
+        assert status.level == (b'\x01' if turn else b'\x00'), status.message
     assert stamps(bench.wait_for('prediction', 16)) == stamps(poses) * 2
-    assert figures(bench.health())['count hand_restarted_backward'] == '1'
+    assert (status.message, figures(status)['count hand_restarted_backward']) == ('hand_restarted_backward 1', '1')
+    bench.move(hand_path(9, rate_hz=10.0)[8:])
+    status = bench.health()
+    assert status.level == b'\x00', status.message
 
 
 def test_only_what_is_listened_to_is_made(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -223,3 +230,11 @@ def test_diagnostics_come_once_a_second_by_themselves(ros: Graph) -> None:
     ros.spin_until(lambda: len(bench.diagnostics) >= 3, 'three diagnostics')
     stamps_s = [array.header.stamp.sec + 1e-9 * array.header.stamp.nanosec for array in bench.diagnostics[:3]]
     assert stamps_s[2] - stamps_s[0] == pytest.approx(2.0, abs=0.9)
+
+
+def test_diagnostics_come_though_simulated_time_stands_still(ros: Graph) -> None:
+    bench = Bench(ros, outputs=[], ticking=True, parameters={'use_sim_time': True})
+    ros.spin_until(lambda: len(bench.diagnostics) >= 2, 'two diagnostics')
+    assert bench.node.get_clock().now().nanoseconds == 0
+    assert bench.diagnostics[-1].status[0].level == b'\x01'
+    assert 'no hand pose yet' in bench.diagnostics[-1].status[0].message

@@ -21,12 +21,28 @@ from node_helpers import GOALS, ROWS, TYPES, figures, hand_path  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
 ROOT = Path(__file__).parents[1]
-LAUNCHES = {'module': ['-m', 'foc_ros.node_main'], 'command': ['-m', 'foc_ros', 'node']}
+
+
+def entry_point(name: str) -> str:
+    """Return what `ros2 run` starts where colcon has installed the package, and what pip has installed elsewhere."""
+    from ament_index_python import get_package_prefix
+
+    try:
+        return str(Path(get_package_prefix('foc_ros')) / 'lib' / 'foc_ros' / name)
+    except (LookupError, OSError):
+        return str(Path(sys.executable).with_name(name))
+
+
+LAUNCHES = {
+    'module': [sys.executable, '-m', 'foc_ros.node_main'],
+    'command': [sys.executable, '-m', 'foc_ros', 'node'],
+    'entry point': [entry_point('foc_node')],
+}
 
 
 @contextmanager
 def running(ros: Graph, launch: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    command = [sys.executable, *LAUNCHES[launch], *arguments]
+    command = [*LAUNCHES[launch], *arguments]
     pipes = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, 'text': True}
     with subprocess.Popen(command, cwd=ROOT, env=ros.environment, **pipes) as process:
         try:

@@ -17,7 +17,8 @@ import foc_ros
 from foc_ros.command_line import COMMANDS
 
 ROOT = Path(__file__).parents[1]
-SKIPPED = shutil.ignore_patterns('.*', '__pycache__', 'build', 'dist', 'install', 'log', 'demo_output', '*.egg-info')
+SKIPPED = shutil.ignore_patterns('.*', '__pycache__', 'build', 'dist', 'install', 'log', '*_output', '*.egg-info')
+SOURCES = ('.py', '.mcap', '.css', '.html', '.js')
 
 
 @pytest.fixture(scope='module')
@@ -81,7 +82,7 @@ def test_wheel_holds_what_the_program_needs(wheel: zipfile.ZipFile) -> None:
     assert f'{data}share/foc_ros/package.xml' in names
     for name in ('foc.yaml', 'foc.rviz', 'foxglove.json', 'sros2_policy.xml'):
         assert f'{data}share/foc_ros/config/{name}' in names
-    sources = {path.relative_to(ROOT).as_posix() for path in (ROOT / 'foc_ros').rglob('*') if path.suffix in ('.py', '.mcap')}
+    sources = {path.relative_to(ROOT).as_posix() for path in (ROOT / 'foc_ros').rglob('*') if path.suffix in SOURCES}
     assert 'foc_ros/recordings/reaching.mcap' in sources
     assert sources <= names, sources - names
     assert not [name for name in names if name.startswith(('test', 'scripts', 'benchmarks'))]

@@ -15,11 +15,12 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Ellipse
 from report_samples import START_NS, prediction, predictions, samples, scene
 
-from foc_ros.drawing import CLASS_COLOURS, ELLIPSES_PER_WAY, LIKELIHOOD_COLOURS, stddev_ellipse
+from foc_ros.drawing import CLASS_COLOURS, CLASSES, ELLIPSES_PER_WAY, LIKELIHOOD_COLOURS, stddev_ellipse
 from foc_ros.foc.errors import InputError
 from foc_ros.foc.records import make_obstacles
+from foc_ros.lineage import lineages, slots
 from foc_ros.moments import moment_of, movements, track_of, ways_of
-from foc_ros.plots import bounds_of, moment_figure, plot_outcomes, save, scene_figure
+from foc_ros.plots import Around, bounds_of, moment_figure, plot_outcomes, save, scene_figure
 
 ROOT = Path(__file__).resolve().parents[1]
 PNG = b'\x89PNG\r\n\x1a\n'
@@ -96,7 +97,9 @@ def test_moment_shows_past_and_future_of_the_hand() -> None:
     (span,) = movements(track, 0.05)
     around = [moment_of(each, *scene()) for each in predictions(made) if span[0] <= each.stamp_ns <= span[1]]
     moment = around[len(around) // 3]
-    figure = moment_figure(track, moment, around, span, bounds_of(*scene(), moment.ways))
+    lines = lineages(around)
+    told = Around(tuple(around), tuple(lines), slots(around, lines, CLASSES))
+    figure = moment_figure(track, moment, told, span, bounds_of(*scene(), moment.ways))
     hand = [line for line in figure.axes[0].lines if line.get_color() == 'black' and len(line.get_xdata()) > 1]
     assert [line.get_linestyle() for line in hand] == ['-', ':']
     now = track.positions[track.stamps_ns == moment.stamp_ns][0]

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
+pytest.importorskip('plotly', reason='plotly is not installed')
 
 from report_samples import OBSTACLES, START_NS, prediction, predictions, samples, scene
 
 from foc_ros.foc.errors import InputError
 from foc_ros.foc.records import HandSample, Prediction
 from foc_ros.moments import moment_of, track_of
+from foc_ros.page import plotly_script
 from foc_ros.report import write_report
+from foc_ros.report_data import MOST_SHOWN
 
 
 class Page(HTMLParser):
@@ -34,7 +37,7 @@ class Page(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append((tag, dict(attrs)))
-        if tag not in ('meta', 'img', 'link', 'br'):
+        if tag not in ('meta', 'img', 'input', 'link', 'br'):
             self.open.append(tag)
 
     def handle_endtag(self, tag: str) -> None:
@@ -62,26 +65,69 @@ def test_files_are_there(tmp_path: Path) -> None:
 
 
 def test_page_needs_nothing_else(tmp_path: Path) -> None:
-    files = report(tmp_path)
+    report(tmp_path)
     page = Page(tmp_path / 'index.html')
     for _, attributes in page.tags:
-        assert not {'href', 'srcset', 'action'} & attributes.keys()
-        assert attributes.get('src', 'data:').startswith('data:')
-    source = (tmp_path / 'index.html').read_text(encoding='utf-8')
-    assert 'http' not in source
-    assert 'url(' not in source
-    embedded = [base64.b64decode(attributes['src'].partition(',')[2]) for tag, attributes in page.tags if tag == 'img']
-    assert sorted(embedded) == sorted(file.read_bytes() for file in files if file.suffix == '.png')
+        assert not {'href', 'src', 'srcset', 'action'} & attributes.keys()
+    policy = next(attributes['content'] for _, attributes in page.tags if 'http-equiv' in attributes)
+    assert policy.startswith("default-src 'none'") and 'http' not in policy
+    assert 'Licensed under the MIT license' in (tmp_path / 'index.html').read_text(encoding='utf-8')
     assert ('meta', {'name': 'viewport', 'content': 'width=device-width, initial-scale=1'}) in page.tags
 
 
 def test_text_is_escaped_and_facts_are_shown(tmp_path: Path) -> None:
-    report(tmp_path, title='<script>alert(1)</script>')
+    report(tmp_path, title='<img src=x onerror=alert(1)>')
     page = Page(tmp_path / 'index.html')
-    assert 'script' not in [tag for tag, _ in page.tags]
+    assert 'img' not in [tag for tag, _ in page.tags]
     assert 'some <bag> & more' in page.text
     assert '4.0 ms (median)' in page.text
     assert '38 candidates ended as eta_unreachable' in page.text
+
+
+def test_page_holds_the_likelihoods_of_all_predictions(tmp_path: Path) -> None:
+    report(tmp_path, 2)
+    data = page_data_of(tmp_path)
+    numbers = json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))['predictions']
+    assert data['times'] == pytest.approx([each['t_s'] for each in numbers], abs=1e-4)
+    for row, frame in enumerate(data['frames']):
+        assert frame['at'] == row
+        shares = {}
+        for way in frame['ways']:
+            line = data['lines'][way['line']]
+            shares[data['labels'][way['label']]] = line['share'][row - line['first']]
+        assert shares == {each['label']: each['likelihood'] for each in numbers[row]['candidates']}
+
+
+def test_paths_on_the_page_are_those_predicted(tmp_path: Path) -> None:
+    made = samples()
+    expected = predictions(made)
+    write_report(tmp_path, 'x', track_of(made), [moment_of(each, *scene()) for each in expected], {})
+    data = page_data_of(tmp_path)
+    for frame, known in zip(data['frames'], expected, strict=True):
+        for way, outcome in zip(frame['ways'], known.solved, strict=True):
+            drawn = np.cumsum([way['x'], way['y']], axis=1).T * data['unit']['length']
+            np.testing.assert_allclose(drawn, outcome.solution.path, atol=0.51e-4)
+            spread = np.array(way['ellipses'])[-1, 2:4] * data['unit']['length']
+            wanted = np.sqrt(np.linalg.eigvalsh(outcome.solution.covariance[-1, :2, :2]))[::-1]
+            np.testing.assert_allclose(spread, wanted, atol=0.51e-4)
+
+
+def test_a_long_recording_is_thinned_out_and_says_so(tmp_path: Path) -> None:
+    made = samples(5)
+    moments = [moment_of(each, *scene()) for each in predictions(made, every=1)]
+    write_report(tmp_path, 'x', track_of(made), moments, {})
+    data = page_data_of(tmp_path)
+    assert len(data['times']) == len(moments) == 750 > len(data['frames']) == MOST_SHOWN
+    assert data['frames'][0]['at'] == 0 and data['frames'][-1]['at'] == 749
+    # what does not change is there once
+    assert len(data['scenes']) == len(data['goals']) == 1
+    size = (tmp_path / 'index.html').stat().st_size
+    assert size - len(plotly_script()) < 700 * len(data['frames']) * 3
+
+
+def page_data_of(directory: Path) -> dict[str, Any]:
+    text = (directory / 'index.html').read_text(encoding='utf-8')
+    return json.loads(text.partition('id="report-data">')[2].partition('</script>')[0])
 
 
 def test_numbers_agree_with_the_predictions(tmp_path: Path) -> None:

@@ -143,3 +143,29 @@ def test_wrong_input_is_exit_2_with_one_line(
         code = leaving.code
     assert code == 2
     assert capsys.readouterr() == ('', f'{line}\n')
+
+
+def test_json_gives_the_full_account(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Every term of the cost, the whole state and its covariance, where eta is attained, and what holds the path."""
+    for each in candidates(tmp_path, capsys, {**SCENE, 'start_stddev': 0.001}):
+        assert each['costs']['effort'] == pytest.approx(each['effort']) and each['costs']['lambda_variance'] > 0
+        covariance = np.array(each['covariance'])
+        assert covariance.shape == (51, 6, 6)
+        assert np.allclose(np.sqrt(covariance[:, [0, 1], [0, 1]]), each['stddev'])
+        assert np.linalg.eigvalsh(covariance).min() > -1e-12
+        assert np.shape(each['acceleration']) == (51, 2) and np.shape(each['control']) == (50, 2)
+        assert np.sum(np.square(each['control'])) == pytest.approx(each['effort'])
+        assert each['eta_at']['obstacle'] == '0' and 1 <= each['eta_at']['step'] <= 50
+        assert each['eta_reachable'] is None and each['violation'] == 0 and each['violation_at'] is None
+        assert each['rows'] and all(row['multiplier'] > 0 and row['tau'] == each['tau'] for row in each['rows'])
+        assert each['eta_at']['step'] in [row['step'] for row in each['rows']]
+
+
+def test_json_of_what_could_not_be_solved_says_how_far_it_got(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    far = candidates(tmp_path, capsys, {**SCENE, 'eta': 0.999, 'noise': [0.6, 0.6]}, code=3)
+    assert {each['status'] for each in far} == {'eta_unreachable'}
+    assert all(0 < each['eta_reachable'] == each['eta'] < 0.999 for each in far)
+    walls = [{'x': 0.15, 'y': y, 'radius': 0.03} for y in (-0.02, 0.02)]
+    (shut,) = candidates(tmp_path, capsys, {**SCENE, 'obstacles': walls, 'guess': {'amplitude': 0.0}}, code=3)
+    assert shut['status'] == 'infeasible' and shut['violation'] > 0.005
+    assert shut['violation_at']['obstacle'] in ('0', '1')

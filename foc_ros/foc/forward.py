@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .account import asked_for, costs, shortfall
 from .algorithm1 import algorithm1
 from .assess import Assessment, assess
 from .config import FocConfig
@@ -37,6 +39,7 @@ class _Ended:
     qp_solves: int
     active: WorkingSet
     multipliers: Array
+    iterations: int | None = None
 
 
 def forward(problem: Problem, start: Start, settings: FocConfig, deadline_s: float | None = None) -> Solution:
@@ -56,7 +59,7 @@ def forward(problem: Problem, start: Start, settings: FocConfig, deadline_s: flo
     if ended.status is Status.SOLVED and settings.strategy != 'fixed' and assessment.eta < problem.eta - SHORT_OF_ETA:
         message = f'the solution achieves eta {assessment.eta:.6g} only'
         ended = replace(ended, status=Status.ITERATION_LIMIT, message=message)
-    return _solution(problem, ended, assessment, time.perf_counter() - began)
+    return _solution(problem, ended, assessment, time.perf_counter() - began, optimal=settings.strategy == 'optimal')
 
 
 def _continuous(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline) -> _Ended:
@@ -84,10 +87,9 @@ def _algorithm1(problem: Problem, start: Start, settings: FocConfig, deadline: D
     stepped = algorithm1(problem, start.positions, *rates, deadline)
     last = stepped.solution
     if last is None:
-        return _best_effort(problem, start, stepped.tau, stepped.lam, stepped.iterations)
-    return _Ended(
-        stepped.status, stepped.message, last.control, stepped.tau, stepped.lam, stepped.iterations, last.active, last.multipliers
-    )
+        return _best_effort(problem, start, stepped.tau, stepped.lam, stepped.qp_solves)
+    reached = stepped.tau, stepped.lam, stepped.qp_solves
+    return _Ended(stepped.status, stepped.message, last.control, *reached, last.active, last.multipliers, stepped.iterations)
 
 
 def _fixed(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline) -> _Ended:
@@ -111,6 +113,7 @@ def _best_effort(problem: Problem, start: Start, tau: float, lam: float, qp_solv
         control, active, multipliers = np.zeros(2 * problem.horizon.steps), WorkingSet(), np.zeros(0)
     else:
         control, active, multipliers = elastic.control, elastic.active, elastic.multipliers
+        qp_solves += elastic.solves
     message = 'no way between the obstacles of this class meets the goal: the path shown violates them least'
     return _Ended(Status.INFEASIBLE, message, control, tau, lam, qp_solves, active, multipliers)
 
@@ -118,45 +121,50 @@ def _best_effort(problem: Problem, start: Start, tau: float, lam: float, qp_solv
 _STRATEGIES = {'lv': _continuous, 'hc': _continuous, 'optimal': _optimal, 'algorithm1': _algorithm1, 'fixed': _fixed}
 
 
-def _solution(problem: Problem, ended: _Ended, assessment: Assessment, seconds: float) -> Solution:
+def _solution(problem: Problem, ended: _Ended, assessment: Assessment, seconds: float, *, optimal: bool) -> Solution:
     horizon, ids = problem.horizon, problem.obstacles.ids
     mean = problem.free.copy()
     mean[1:] += horizon.response @ ended.control
     covariance = state_covariance(horizon, problem.free_covariance, problem.noise, ended.control)
-    message = ended.message
-    if assessment.relaxed:
-        message += f'; inside the margin of {", ".join(assessment.relaxed)} now: eta holds from {problem.recovery_s:g} s on'
-    place = assessment.place
+    violation, violated = shortfall(problem, ended.control, ended.tau)
+    held = [(ended.tau, ended.lam)] * len(ended.active)
+    if optimal:
+        held = asked_for(problem, ended.control, ended.active, ended.multipliers, max(assessment.smallest_k, 0.0))
     return Solution(
         status=ended.status,
-        message=message,
+        message=_words(problem, ended, assessment, violation),
         dt=horizon.dt,
         mean=mean,
         covariance=covariance,
         control=ended.control.reshape(2, -1).T,
         effort=float(ended.control @ ended.control),
-        costs=_costs(problem, ended.control, mean, covariance, ended.lam),
+        costs=costs(problem, ended.control, mean, covariance, ended.lam),
         tau=ended.tau,
         lam=ended.lam,
         eta=assessment.eta,
-        eta_at=None if place is None else (ids[place[0]], place[1]),
+        eta_at=_named(ids, assessment.place),
+        eta_reachable=assessment.eta if ended.status is Status.ETA_UNREACHABLE else None,
+        violation=violation,
+        violation_at=_named(ids, violated),
         multipliers=tuple(
             (ids[row], int(step) + 1, float(value))
             for row, step, value in zip(ended.active.obstacle, ended.active.step, ended.multipliers, strict=True)
         ),
+        held=tuple(held),
         qp_solves=ended.qp_solves,
+        iterations=ended.iterations,
         solve_s=seconds,
     )
 
 
-def _costs(problem: Problem, control: Array, mean: Array, covariance: Array, lam: float) -> dict[str, float]:
-    """Every term of J_aug by name: effort, and weighted mean errors, variances and the lambda term."""
-    variances = np.diagonal(covariance, axis1=1, axis2=2)[1:]
-    squared_error = (mean[1:] - problem.goal) ** 2
-    weights = np.concatenate((np.tile(problem.way_weights, (len(variances) - 1, 1)), problem.end_weights[None]))
-    return {
-        'effort': float(control @ control),
-        'mean_error': float((weights * squared_error).sum()),
-        'variance': float((weights * variances).sum()),
-        'lambda_variance': float(lam * variances[:, :2].sum()),
-    }
+def _named(ids: Sequence[str], place: tuple[int, int] | None) -> tuple[str, int] | None:
+    return None if place is None else (ids[place[0]], place[1])
+
+
+def _words(problem: Problem, ended: _Ended, assessment: Assessment, violation: float) -> str:
+    message = ended.message
+    if ended.status is Status.INFEASIBLE and violation > 0:
+        message += f', by up to {violation:.3g} m'
+    if assessment.relaxed:
+        message += f'; inside the margin of {", ".join(assessment.relaxed)} now: eta holds from {problem.recovery_s:g} s on'
+    return message

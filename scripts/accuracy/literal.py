@@ -61,7 +61,7 @@ def text(measured: list[dict[tuple[str, float | None], Solution]]) -> str:
             stepped = '2, walked' if growth is None else f'{growth:g}'
             enough = '' if growth is None else _enough(case, DELTAS[rate], growth)
             cells = _cells(each, DELTAS[rate], enough, solutions[rate, None])
-            rows.append([name, rate, stepped, each.status.value.replace('_', ' '), str(each.qp_solves), *cells])
+            rows.append([name, rate, stepped, each.status.value.replace('_', ' '), str(each.iterations or each.qp_solves), *cells])
             name = ''
     return table(head, rows)
 
@@ -121,7 +121,7 @@ def _draw_steps(axes: Any, delta: float, ends: Sequence[Solution], walk: Solutio
     for number, (growth, end) in enumerate(zip(GROWTHS, ends, strict=True)):
         steps = np.arange(round(end.tau / delta) + 1)
         colour, _ = class_style((1, 4, 3)[number])
-        label = f'Δ = {growth:g}: {end.qp_solves} QPs, η {end.eta:.3f}, effort {end.effort:.1e}'
+        label = f'Δ = {growth:g}: {end.iterations} QPs, η {end.eta:.3f}, effort {end.effort:.1e}'
         axes.plot(1e3 * delta * steps, growth ** steps.astype(float), color=colour, marker='o', markersize=3, label=label)
         axes.plot(1e3 * end.tau, end.lam, marker='s', markersize=8, color=colour, markeredgecolor='black')
     label = f'walked, Δ = 2: η {walk.eta:.3f}, effort {walk.effort:.1e}'

@@ -1,0 +1,122 @@
+"""One recording through the predictor, and what really came beside each prediction."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foc_ros.foc.chance import centres
+from foc_ros.foc.config import Config
+from foc_ros.foc.errors import RecordingError
+from foc_ros.foc.homotopy import swept_angles
+from foc_ros.foc.records import LEFT, NANOSECONDS, RIGHT, Array, HandState, Obstacles, Outcome, Prediction
+from foc_ros.replay import Replay, Step
+
+from .observations import HORIZONS_S, Observation, Observations, Truth, Ways
+from .path import Path
+from .recordings import Recording
+from .rows import axis, lines, rows, to_pass
+
+
+def observe(recording: Recording, config: Config) -> Observations:
+    """Replay a recording; raises RecordingError where it cannot be read or nothing could be predicted in it."""
+    replayed = Replay(config)
+    stamps: list[int] = []
+    path: list[Array] = []
+    made: list[tuple[Step, HandState]] = []
+    for step in replayed.steps(recording.items()):
+        if step.sample is not None:
+            stamps.append(step.sample.stamp_ns)
+            path.append(step.sample.position)
+        if step.prediction is not None and step.prediction.solved:
+            assert replayed.pipeline.hand_state is not None
+            made.append((step, replayed.pipeline.hand_state))
+    if not made:
+        reason = replayed.pipeline.blocked() or replayed.intake.last_refusal or 'no candidate could be solved'
+        raise RecordingError(f'{recording.name}: nothing could be predicted: {reason}')
+    goals = made[-1][0].scene.goals
+    assert goals is not None
+    past = Path(np.array(stamps), np.array(path), goals)
+    each = [_observation(step, hand, past) for step, hand in made if hand.stamp_ns <= past.end_ns]
+    if not each:
+        raise RecordingError(f'{recording.name}: nothing was predicted before its goal was reached')
+    return Observations(recording.name, tuple(each), replayed.intake.counts)
+
+
+def _observation(step: Step, hand: HandState, past: Path) -> Observation:
+    prediction, goals = step.prediction, step.scene.goals
+    assert prediction is not None and goals is not None
+    obstacles = step.scene.obstacles(prediction.stamp_ns)
+    along = axis(past.positions[0], goals)
+    row = rows(obstacles.centre, obstacles.radius, along)
+    since_s = 0.0 if hand.onset_ns is None else (hand.stamp_ns - hand.onset_ns) / NANOSECONDS
+    return Observation(
+        stamp_ns=prediction.stamp_ns,
+        hand=hand.mean,
+        since_s=since_s,
+        centre=obstacles.centre,
+        radius=obstacles.radius,
+        row=row,
+        goals=goals,
+        ways=_ways(prediction, obstacles, hand.effort_spent),
+        most_likely=prediction.most_likely,
+        truth=_truth(prediction.stamp_ns, past, obstacles, row, along),
+    )
+
+
+def _ways(prediction: Prediction, obstacles: Obstacles, spent: float) -> Ways:
+    outcomes = prediction.outcomes
+    solutions = [outcome.solution for outcome in outcomes]
+    steps = [np.minimum(np.rint(np.array(HORIZONS_S) / each.dt).astype(int), len(each.mean) - 1) for each in solutions]
+    named = [[identity in dict(outcome.candidate.sides) for identity in obstacles.ids] for outcome in outcomes]
+    return Ways(
+        labels=tuple(outcome.candidate.label for outcome in outcomes),
+        goal=np.array([outcome.candidate.goal for outcome in outcomes]),
+        solved=np.array([outcome.solved for outcome in outcomes]),
+        spent=spent,
+        to_go=np.array([each.effort * each.dt for each in solutions]),
+        likelihood=np.array([outcome.likelihood for outcome in outcomes]),
+        length=np.array([outcome.candidate.length for outcome in outcomes]),
+        named=np.array(named, dtype=bool).reshape(len(outcomes), len(obstacles)),
+        sides=np.array([_predicted_sides(outcome, obstacles) for outcome in outcomes]),
+        mean=np.array([each.mean[at, :2] for each, at in zip(solutions, steps, strict=True)]),
+        covariance=np.array([each.covariance[at, :2, :2] for each, at in zip(solutions, steps, strict=True)]),
+    )
+
+
+def _predicted_sides(outcome: Outcome, obstacles: Obstacles) -> NDArray[np.int8]:
+    solution = outcome.solution
+    moved = centres(obstacles, solution.dt, len(solution.mean) - 1)
+    where = np.concatenate((obstacles.centre[:, None], moved), axis=1).swapaxes(0, 1)
+    return _sides(solution.path, where)
+
+
+def _sides(path: Array, where: Array) -> NDArray[np.int8]:
+    """Return the sides (n,) of obstacles, where (m, n, 2) [m], on which a path (m, 2) [m] runs: by the angle that it sweeps."""
+    return np.where(swept_angles(path, where) < 0.0, LEFT, RIGHT).astype(np.int8)
+
+
+def _truth(stamp_ns: int, past: Path, obstacles: Obstacles, row: NDArray[np.int64], along: Array) -> Truth:
+    now = past.index(stamp_ns)
+    rest = past.positions[now:]
+    seconds = (past.stamps_ns[now:] - stamp_ns) / NANOSECONDS
+    where = obstacles.centre + seconds[:, None, None] * obstacles.velocity
+    line, place = lines(obstacles.centre @ along, row), past.positions @ along
+    open_rows = to_pass(line, place[now:])
+    return Truth(
+        sides=_sides(rest, where),
+        ahead=open_rows[row],
+        goal=past.goal,
+        positions=past.at(stamp_ns, np.array(HORIZONS_S)),
+        progress=float(past.progress[now]),
+        approach=_approach(line, open_rows, float(place[now]), float(place[0])),
+    )
+
+
+def _approach(line: Array, open_rows: NDArray[np.bool_], here: float, start: float) -> float:
+    """Return the share of the way from the last row, or the start, to the next one."""
+    if not open_rows.any():
+        return float('nan')
+    following = int(np.flatnonzero(open_rows)[0])
+    last = max(start, float(line[following - 1])) if following else start
+    return float(np.clip((here - last) / max(line[following] - last, 1e-9), 0.0, 1.0))

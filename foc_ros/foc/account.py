@@ -1,0 +1,57 @@
+"""The account of a control: every term of its cost, what its active rows ask for, and what it falls short of."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .chance import variance
+from .problem import Problem
+from .qp import wanted_distance
+from .records import Array
+from .solver import WorkingSet
+
+NO_VIOLATION = 1e-7
+"""Shortfall of a distance that is rounding [m]."""
+
+
+def costs(problem: Problem, control: Array, mean: Array, covariance: Array, lam: float) -> dict[str, float]:
+    """Return every term of J_aug by name [m^2/s^6]: effort, weighted mean errors and variances, and the lambda term.
+
+    control (2N,); mean (N + 1, n) and covariance (N + 1, n, n) that follow from it.
+    """
+    variances = np.diagonal(covariance, axis1=1, axis2=2)[1:]
+    squared_error = (mean[1:] - problem.goal) ** 2
+    weights = np.concatenate((np.tile(problem.way_weights, (len(variances) - 1, 1)), problem.end_weights[None]))
+    return {
+        'effort': float(control @ control),
+        'mean_error': float((weights * squared_error).sum()),
+        'variance': float((weights * variances).sum()),
+        'lambda_variance': float(lam * variances[:, :2].sum()),
+    }
+
+
+def shortfall(problem: Problem, control: Array, tau: float) -> tuple[float, tuple[int, int] | None]:
+    """Return by how much the mean comes too near [m], and where: row of the obstacle and step (1..N) of the largest.
+
+    Too near is less than sqrt(E[R^2] + tau) from a centre, or less than a hand that is leaving a margin has to keep; 0 and None
+    where it never is.
+    """
+    distance = np.hypot(*np.moveaxis(problem.positions(control)[None] - problem.centres, -1, 0))
+    missing = wanted_distance(problem, tau) - distance
+    if missing.max(initial=0.0) <= NO_VIOLATION:
+        return 0.0, None
+    row, column = np.unravel_index(int(missing.argmax()), missing.shape)
+    return float(missing[row, column]), (int(row), int(column) + 1)
+
+
+def asked_for(problem: Problem, control: Array, active: WorkingSet, multipliers: Array, k: float) -> list[tuple[float, float]]:
+    """Return the (tau [m^2], lambda [1/s^6]) of each active row of the surrogate at k.
+
+    tau = k sqrt(Var[C]) is what E[C] has to be below zero by; lambda = y k |d| / sqrt(Var[C]), for a row's multiplier y [m/s^6],
+    is what a variance along its normal, at its step, costs.
+    """
+    offset = problem.positions(control)[None] - problem.centres
+    var = variance(offset, problem.position_variance(control), problem.size[1], problem.obstacles.centre_covariance)
+    stddev, distance = np.sqrt(var[active.rows]), np.hypot(*offset[active.rows].T)
+    lams = multipliers * k * distance / np.maximum(stddev, 1e-12)
+    return list(zip((k * stddev).tolist(), lams.tolist(), strict=True))

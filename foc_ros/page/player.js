@@ -1,0 +1,281 @@
+const data = held('report-data');
+const byId = (name) => document.getElementById(name);
+const sums = (steps, unit) => { let sum = 0; return steps.map((step) => unit * (sum += step)); };
+const LENGTH = data.unit.length;
+const SPEED = data.unit.speed;
+const hand = { t: sums(data.hand.t, 1e-3), x: sums(data.hand.x, LENGTH), y: sums(data.hand.y, LENGTH), v: sums(data.hand.v, SPEED) };
+const goals = data.goals.map((places) => places.map(([x, y]) => [LENGTH * x, LENGTH * y]));
+const scenes = data.scenes.map((rows) => rows.map(([name, ...disc]) => [name, ...disc.map((value) => LENGTH * value)]));
+const frameTimes = data.frames.map((frame) => data.times[frame.at]);
+const most = Math.max(...data.frames.map((frame) => frame.ways.length));
+const slotOf = (line) => data.lines[line].slot;
+const letterOf = (line) => (slotOf(line) === null ? '' : String.fromCharCode(65 + slotOf(line)));
+const NAMED_OBSTACLES = 30;
+const state = { frame: 0, from: 0, to: 0, playing: false, focus: null };
+
+const first = (values, least) => { const row = values.findIndex((value) => value >= least); return row < 0 ? values.length : row; };
+const span = () => [frameTimes[state.from], frameTimes[state.to]];
+const shareOf = (line, row) => { const value = data.lines[line].share[row - data.lines[line].first]; return value === undefined ? null : value; };
+
+// The outlines of ellipses [x, y, half axes, angle] as one closed line each, with gaps between them.
+function outlines(ellipses, points = 36) {
+  const x = [];
+  const y = [];
+  for (const [cx, cy, a, b, angle] of ellipses) {
+    const [c, s] = [Math.cos(angle), Math.sin(angle)];
+    for (let k = 0; k <= points; k += 1) {
+      const [u, v] = [a * Math.cos((2 * Math.PI * k) / points), b * Math.sin((2 * Math.PI * k) / points)];
+      x.push(cx + u * c - v * s);
+      y.push(cy + u * s + v * c);
+    }
+    x.push(null);
+    y.push(null);
+  }
+  return { x, y, type: 'scatter', mode: 'lines', hoverinfo: 'skip', connectgaps: false };
+}
+
+const alpha = (colour, share) => colour + Math.round(255 * share).toString(16).padStart(2, '0');
+const faded = (line) => state.focus !== null && state.focus !== line;
+
+function wayTraces(frame, way) {
+  const colour = colourOf(slotOf(way.line));
+  const share = shareOf(way.line, frame.at);
+  const weight = faded(way.line) ? 0.15 : 1;
+  const [x, y] = [sums(way.x, LENGTH), sums(way.y, LENGTH)];
+  const discs = way.ellipses.map(([cx, cy, a, b, angle]) => [LENGTH * cx, LENGTH * cy, LENGTH * a, LENGTH * b, (Math.PI * angle) / 180]);
+  const solid = colour.startsWith('#') && colour.length === 7;
+  const spread = {
+    ...outlines(discs), fill: 'toself', fillcolor: solid ? alpha(colour, weight * (0.02 + 0.1 * share)) : 'rgba(0,0,0,0)',
+    line: { color: colour, width: 1 }, opacity: weight * (0.25 + 0.6 * share), meta: { spread: way.line },
+  };
+  const middle = Math.floor(x.length * (0.45 + 0.12 * (way.line % 3)));
+  const path = {
+    x, y, type: 'scatter', mode: 'lines', line: { color: colour, dash: dashOf(slotOf(way.line)), width: 1.5 + 4 * share },
+    opacity: weight, hoverinfo: 'text', text: plain(`${letterOf(way.line)} ${percent(share)} ${data.labels[way.label]}`), meta: { way: way.line },
+  };
+  const tag = {
+    x: [x[middle]], y: [y[middle]], type: 'scatter', mode: 'markers+text', text: letterOf(way.line), textfont: { size: 11, color: ink('--ink') },
+    marker: { size: 17, color: ink('--page'), line: { color: colour, width: 2 } }, opacity: weight, hoverinfo: 'skip',
+  };
+  return { spread, path, tag };
+}
+
+const nothing = { x: [], y: [], type: 'scatter', mode: 'lines', hoverinfo: 'skip' };
+const filled = (list) => [...list, ...Array(most - list.length).fill(nothing)];
+
+function sceneTraces(frame) {
+  const scene = scenes[frame.scene];
+  const disc = (grow) => scene.map(([, x, y, radius, stddev]) => [x, y, radius + grow * stddev, radius + grow * stddev, 0]);
+  const [from, to] = span();
+  const now = data.times[frame.at];
+  const [begin, middle, end] = [first(hand.t, from), first(hand.t, now + 1e-6), first(hand.t, to + 1e-6)];
+  const part = (low, high, line) => ({
+    x: hand.x.slice(low, high), y: hand.y.slice(low, high), type: 'scatter', mode: 'lines', hoverinfo: 'skip', line: { color: ink('--ink'), ...line },
+  });
+  const drawn = [...frame.ways].reverse().map((way) => wayTraces(frame, way));
+  const places = goals[frame.goals];
+  return [
+    { ...outlines(disc(1)), fill: 'toself', fillcolor: ink('--ring'), line: { color: ink('--disc'), width: 1 } },
+    { ...outlines(disc(0)), fill: 'toself', fillcolor: ink('--disc'), line: { color: ink('--soft'), width: 1 } },
+    ...filled(drawn.map((each) => each.spread)),
+    ...filled(drawn.map((each) => each.path)),
+    part(begin, middle, { width: 3 }),
+    part(Math.max(begin, middle - 1), end, { width: 2, dash: 'dot' }),
+    {
+      x: scene.map(([, x]) => x), y: scene.map(([, , y]) => y), type: 'scatter', mode: 'text', hoverinfo: 'skip', textfont: { size: 11 },
+      text: scene.length > NAMED_OBSTACLES ? [] : scene.map(([name]) => plain(name)),
+    },
+    {
+      x: places.map(([x]) => x), y: places.map(([, y]) => y), type: 'scatter', mode: 'markers+text', hoverinfo: 'skip',
+      text: places.map((_, row) => `goal${row}`), textposition: 'top center', textfont: { size: 11 },
+      marker: { symbol: 'star', size: 13, color: ink('--page'), line: { color: ink('--ink'), width: 1.5 } },
+    },
+    ...filled(drawn.map((each) => each.tag)),
+    { x: hand.x.slice(middle - 1, middle), y: hand.y.slice(middle - 1, middle), type: 'scatter', mode: 'markers', hoverinfo: 'skip', marker: { size: 10, color: ink('--ink') } },
+  ];
+}
+
+const now = () => ({ type: 'line', yref: 'paper', y0: 0, y1: 1, x0: frameTimes[state.frame], x1: frameTimes[state.frame], line: { color: ink('--ink'), width: 1.5, dash: 'dot' } });
+const timeAxis = (title) => ({ range: span(), title: { text: title, standoff: 6 } });
+
+function drawScene() {
+  const [left, right, bottom, top] = data.bounds;
+  const box = byId('scene');
+  const height = Math.min(Math.max((box.clientWidth * (top - bottom)) / (right - left), 240), 0.75 * innerHeight + 80) + 44;
+  Plotly.react(box, sceneTraces(data.frames[state.frame]), looks({
+    height, xaxis: { range: [left, right], title: { text: 'x [m]', standoff: 4 } },
+    yaxis: { range: [bottom, top], title: { text: 'y [m]', standoff: 4 }, scaleanchor: 'x' }, uirevision: 'scene',
+  }), { ...CONFIG, displayModeBar: !TOUCH, modeBarButtons: [['toImage', 'zoom2d', 'pan2d', 'resetScale2d']] });
+}
+
+// A letter on every line, at the middle of the part that is shown.
+function letters() {
+  const [from, to] = span();
+  const places = data.lines.flatMap((line, number) => {
+    const rows = line.share.flatMap((share, row) => {
+      const time = data.times[line.first + row];
+      return share !== null && time >= from && time <= to ? [row] : [];
+    });
+    const row = rows[Math.floor(((number % 4) + 0.5) * rows.length / 4)];
+    return rows.length < 3 || line.slot === null ? [] : [[data.times[line.first + row], line.share[row], number]];
+  });
+  return {
+    x: places.map(([time]) => time), y: places.map(([, share]) => share), type: 'scatter', mode: 'markers+text', hoverinfo: 'skip',
+    text: places.map(([, , number]) => letterOf(number)), textfont: { size: 9, color: ink('--ink') },
+    marker: { size: 13, color: ink('--page'), line: { color: places.map(([, , number]) => colourOf(slotOf(number))), width: 1.5 } },
+  };
+}
+
+function drawLikelihoods() {
+  const lines = data.lines.map((line, number) => ({
+    x: data.times.slice(line.first, line.first + line.share.length), y: line.share, type: 'scatter', mode: 'lines+markers', marker: { size: 3 }, connectgaps: false,
+    line: { color: colourOf(line.slot), dash: dashOf(line.slot), width: 2 }, opacity: faded(number) ? 0.15 : 1, hoverinfo: 'text',
+    text: line.share.map((share) => `${letterOf(number)} ${percent(share)}`), meta: { line: number },
+  }));
+  Plotly.react(byId('likelihoods'), [...lines, letters()], looks({
+    height: 210, xaxis: timeAxis(''), yaxis: { range: [-0.03, 1.03], title: { text: 'likelihood', standoff: 4 } }, shapes: [now()], hovermode: 'closest',
+  }), CONFIG);
+}
+
+function drawSpeeds() {
+  const frame = data.frames[state.frame];
+  const past = first(hand.t, data.times[frame.at] + 1e-6);
+  const measured = { type: 'scatter', mode: 'lines', hoverinfo: 'skip' };
+  const predicted = filled([...frame.ways].reverse().map((way) => ({
+    x: sums(way.t, 1e-3).map((t) => t + data.times[frame.at]), y: sums(way.v, SPEED), type: 'scatter', mode: 'lines', hoverinfo: 'text',
+    text: plain(`${letterOf(way.line)} ${data.labels[way.label]}`), opacity: faded(way.line) ? 0.15 : 1,
+    line: { color: colourOf(slotOf(way.line)), dash: dashOf(slotOf(way.line)), width: 1.2 + 2.5 * shareOf(way.line, frame.at) },
+  })));
+  Plotly.react(byId('speeds'), [
+    ...predicted,
+    { ...measured, x: hand.t, y: hand.v, line: { color: ink('--ink'), width: 1.5, dash: 'dot' } },
+    { ...measured, x: hand.t.slice(0, past), y: hand.v.slice(0, past), line: { color: ink('--ink'), width: 2.5 } },
+  ], looks({ height: 190, xaxis: timeAxis(''), yaxis: { title: { text: 'speed [m/s]', standoff: 4 }, range: [0, topSpeed] }, shapes: [now()] }), CONFIG);
+}
+
+function drawTimes() {
+  const known = data.solve_ms.filter((value) => value !== null).sort((a, b) => a - b);
+  if (!known.length) {
+    byId('times-part').hidden = true;
+    return;
+  }
+  const most99 = known[Math.min(known.length - 1, Math.floor(0.99 * known.length))];
+  Plotly.react(byId('times'), [{ x: data.times, y: data.solve_ms, type: 'scatter', mode: 'markers', marker: { size: 4, color: ink('--soft') }, hoverinfo: 'x+y' }], looks({
+    height: 160, xaxis: timeAxis('time [s]'), yaxis: { title: { text: 'solve [ms]', standoff: 4 }, range: [0, 1.25 * most99] }, shapes: [now()],
+  }), CONFIG);
+}
+
+const percent = (share) => (share === null ? '' : `${(100 * share).toFixed(share < 0.0095 ? 1 : 0)} %`);
+
+function cell(row, text, kind = '') {
+  const made = row.insertCell();
+  made.textContent = text;
+  made.className = kind;
+  return made;
+}
+
+function fillTable() {
+  const frame = data.frames[state.frame];
+  const body = byId('ways').tBodies[0];
+  body.replaceChildren();
+  for (const way of frame.ways) {
+    const share = shareOf(way.line, frame.at);
+    const row = body.insertRow();
+    row.dataset.line = way.line;
+    row.dataset.share = share;
+    row.classList.toggle('faded', faded(way.line));
+    row.addEventListener('click', () => { state.focus = state.focus === way.line ? null : way.line; drawLikelihoods(); show(state.frame); });
+    const letter = document.createElement('span');
+    letter.className = 'letter';
+    letter.textContent = letterOf(way.line);
+    letter.style.borderColor = colourOf(slotOf(way.line));
+    cell(row, '').append(letter);
+    cell(row, percent(share), 'number');
+    const bar = document.createElement('span');
+    bar.className = 'bar';
+    const filling = document.createElement('i');
+    filling.style.cssText = `width: ${100 * share}%; background: ${colourOf(slotOf(way.line))}`;
+    bar.append(filling);
+    cell(row, '').append(bar);
+    cell(row, data.labels[way.label]);
+    cell(row, way.ratio === null ? '' : way.ratio.toFixed(2), 'number');
+    cell(row, way.eta === null ? '' : way.eta.toFixed(3), 'number');
+  }
+  for (const [label, status] of frame.lost) {
+    const row = body.insertRow();
+    cell(row, '✕');
+    const told = cell(row, `${data.labels[label]}: ${data.labels[status].replace(/_/g, ' ')}`);
+    told.colSpan = 5;
+  }
+}
+
+function show(frame) {
+  state.frame = Math.min(Math.max(frame, state.from), state.to);
+  const time = frameTimes[state.frame];
+  byId('time').value = state.frame;
+  byId('clock').textContent = `${time.toFixed(2)} s`;
+  drawScene();
+  drawSpeeds();
+  fillTable();
+  for (const name of ['likelihoods', 'times']) {
+    if (byId(name).data) { Plotly.relayout(byId(name), { 'shapes[0].x0': time, 'shapes[0].x1': time }); }
+  }
+}
+
+function choose(movement) {
+  const [from, to] = movement < 0 ? [-Infinity, Infinity] : data.movements[movement];
+  const inside = frameTimes.flatMap((time, row) => (time >= from && time <= to ? [row] : []));
+  [state.from, state.to] = inside.length ? [inside[0], inside[inside.length - 1]] : [0, frameTimes.length - 1];
+  state.focus = null;
+  [byId('time').min, byId('time').max] = [state.from, state.to];
+  state.frame = state.from;
+  drawAll();
+}
+
+function drawAll() {
+  drawLikelihoods();
+  drawTimes();
+  show(state.frame);
+}
+
+function play() {
+  state.playing = !state.playing;
+  byId('play').textContent = state.playing ? '❚❚' : '▶';
+  byId('play').setAttribute('aria-label', state.playing ? 'pause' : 'play');
+  if (!state.playing) { return; }
+  if (state.frame >= state.to) { show(state.from); }
+  let [before, time] = [null, frameTimes[state.frame]];
+  const step = (stamp) => {
+    if (!state.playing) { return; }
+    time += before === null ? 0 : (Number(byId('pace').value) * (stamp - before)) / 1000;
+    before = stamp;
+    let next = state.frame;
+    while (next < state.to && frameTimes[next + 1] <= time) { next += 1; }
+    if (next !== state.frame) { show(next); }
+    if (state.frame >= state.to) { play(); } else { requestAnimationFrame(step); }
+  };
+  requestAnimationFrame(step);
+}
+
+const topSpeed = 1.15 * Math.max(0.01, ...hand.v, ...data.frames.map((frame) => (frame.ways.length ? Math.max(...sums(frame.ways[0].v, SPEED)) : 0)));
+if (data.frames.length < data.times.length) {
+  byId('decimated').textContent = `The slider stops at ${data.frames.length} of the ${data.times.length} predictions; the likelihoods are drawn of all. `;
+}
+const choice = byId('movement');
+data.movements.forEach((_, row) => choice.add(new Option(`movement ${row + 1}`, row)));
+choice.add(new Option('whole recording', -1));
+choice.hidden = data.movements.length < 2;
+choice.addEventListener('change', () => choose(Number(choice.value)));
+byId('play').addEventListener('click', play);
+byId('time').addEventListener('input', () => { if (state.playing) { play(); } show(Number(byId('time').value)); });
+choose(data.movements.length > 1 ? 0 : -1);
+for (const name of ['likelihoods', 'speeds', 'times']) {
+  if (byId(name).data) {
+    byId(name).on('plotly_click', ({ points }) => {
+      const row = first(frameTimes, points[0].x);
+      show(Math.min(row, state.to));
+    });
+  }
+}
+redraws.push(drawAll);
+document.body.dataset.ready = 'yes';

@@ -1,0 +1,116 @@
+"""Inputs at rates that a node has to bear, in real time and to a node in a process of its own: what comes out, and the level."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable
+from typing import Any
+
+import ros_helpers
+
+ros_helpers.require_ros()
+
+from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
+from geometry_msgs.msg import PoseArray, PoseStamped  # noqa: E402
+from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped  # noqa: E402
+from node_helpers import CROWD, GOALS, ROWS, TYPES, figures  # noqa: E402
+from ros_helpers import Graph  # noqa: E402
+from sensor_msgs.msg import PointCloud2  # noqa: E402
+from test_node_process import running  # noqa: E402
+
+OK, WARN = b'\x00', b'\x01'
+LIGHT = ['foc.steps:=20', 'homotopy.max_candidates:=1', 'rate_hz:=10.0', 'scene.timeout_s:=0.0', 'estimator.hand_timeout_s:=10.0']
+RELIABLE = 'qos_overrides./hand_pose.subscription.reliability:=reliable'
+
+
+class Feeder:
+    """Plays hand poses and clouds to a node at given rates. Attributes: clouds, health: what came back; sent: poses."""
+
+    def __init__(self, ros: Graph) -> None:
+        self.ros, player = ros, ros.node('player')
+        self.clouds = ros.collect(player, PointCloud2, 'foc/prediction')
+        self.health = ros.collect(player, DiagnosticArray, '/diagnostics')
+        kinds = {'obstacles': PointCloud2, 'goals': PoseArray, 'hand_pose': PoseStamped}
+        self.publishers = {name: player.create_publisher(kind, name, 1000) for name, kind in kinds.items()}
+        self.sent = 0
+
+    def connect(self) -> None:
+        self.ros.spin_until(lambda: all(each.get_subscription_count() for each in self.publishers.values()), 'the node', 30.0)
+        self.publishers['obstacles'].publish(cloud(TYPES, obstacle_table(ROWS), 10 * SECOND))
+        self.publishers['goals'].publish(pose_array(TYPES, GOALS))
+        self.ros.spin_until(lambda: self.figure('goals') == '1' == self.figure('obstacles of cloud'), 'the scene')
+
+    def figure(self, name: str) -> str | None:
+        return figures(self.health[-1].status[0]).get(name) if self.health else None
+
+    def play(self, seconds: float, pose_hz: float, tick: Callable[[int], Any] = lambda _: None) -> None:
+        """Send what is due every 10 ms, poses as many as that takes; `tick(i)` in each."""
+        began, ticks = time.monotonic(), round(100 * seconds)
+        for i in range(ticks):
+            tick(i)
+            while self.sent < pose_hz * 0.01 * (i + 1):
+                stamp_ns = 10 * SECOND + round(self.sent / pose_hz * SECOND)
+                self.publishers['hand_pose'].publish(pose_stamped(TYPES, (1e-3 * (self.sent % 2), 0.0, 0.1), stamp_ns))
+                self.sent += 1
+            self.ros.spin_for(max(began + 0.01 * (i + 1) - time.monotonic(), 0.001))
+
+    def all_heard(self) -> bool:
+        return self.figure('hand_pose refused') == f'0 of {self.sent}'
+
+
+def stamps(clouds: list[Any]) -> list[int]:
+    return [each.header.stamp.sec * SECOND + each.header.stamp.nanosec for each in clouds]
+
+
+def parameters(*given: str) -> list[str]:
+    return ['--ros-args', *(word for each in given for word in ('-p', each))]
+
+
+def test_ten_thousand_obstacles_at_50_hz(ros: Graph) -> None:
+    """Each of the poses is heard, predictions go on being made from the newest, and nothing is wrong with that."""
+    feeder, flood = Feeder(ros), cloud(TYPES, obstacle_table(CROWD), 10 * SECOND)
+    with running(ros, 'module', *parameters(*LIGHT, RELIABLE)) as process:
+        feeder.connect()
+        feeder.play(3.0, 100.0, lambda i: i % 2 or feeder.publishers['obstacles'].publish(flood))
+        ros.spin_until(feeder.all_heard, f'{feeder.sent} poses in the diagnostics')
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(30) == 0
+    assert stamps(feeder.clouds) == sorted(set(stamps(feeder.clouds)))
+    assert len(feeder.clouds) > 5
+    assert (feeder.figure('obstacles of cloud'), feeder.figure('count internal_errors')) == ('10000', None)
+    assert int(feeder.figure('note culled') or 0) > 9000
+    levels = {(each.status[0].level, each.status[0].message) for each in feeder.health}
+    assert (OK, 'predicting') in levels, levels
+
+
+def test_poses_at_1_khz(ros: Graph) -> None:
+    feeder = Feeder(ros)
+    with running(ros, 'module', *parameters(*LIGHT, RELIABLE)) as process:
+        feeder.connect()
+        feeder.play(2.0, 1000.0)
+        ros.spin_until(feeder.all_heard, f'{feeder.sent} poses in the diagnostics')
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(30) == 0
+    assert feeder.sent == 2000
+    found = stamps(feeder.clouds)
+    assert found == sorted(set(found))
+    assert len(found) + int(feeder.figure('dropped cycles') or 0) >= 15
+    levels = {(each.status[0].level, each.status[0].message) for each in feeder.health}
+    assert (OK, 'predicting') in levels, levels
+
+
+def test_bad_poses_at_1_khz_are_few_lines_in_the_log(ros: Graph) -> None:
+    feeder, nowhere = Feeder(ros), pose_stamped(TYPES, (float('nan'), 0.0, 0.0), 10 * SECOND)
+    with running(ros, 'module', *parameters(*LIGHT, RELIABLE)) as process:
+        feeder.connect()
+        feeder.play(2.0, 0.0, lambda _: [feeder.publishers['hand_pose'].publish(nowhere) for _ in range(10)])
+        ros.spin_until(lambda: feeder.figure('hand_pose refused') == '2000 of 2000', 'all poses in the diagnostics')
+        process.send_signal(signal.SIGTERM)
+        _, errors = process.communicate(timeout=30)
+    assert process.returncode == 0
+    lines = [line for line in errors.splitlines() if 'expected a finite number' in line]
+    assert 1 <= len(lines) <= 5, f'{len(lines)} lines'
+    assert '(1 of 1 refused so far)' in lines[0]
+    assert WARN in {each.status[0].level for each in feeder.health}
+    assert feeder.clouds == []

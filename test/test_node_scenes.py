@@ -1,0 +1,87 @@
+"""Scenes at the edge of what can be predicted, through the live node: what comes out, and the level of the diagnostics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+import ros_helpers
+
+ros_helpers.require_ros()
+
+from message_helpers import SECOND, cloud, obstacle_table, pose_array  # noqa: E402
+from node_helpers import CROWD, GOALS, ROWS, TYPES, Bench, figures, hand_path  # noqa: E402
+from ros_helpers import Graph  # noqa: E402
+
+OK, WARN = b'\x00', b'\x01'
+RING = [(0.1 * np.cos(angle), 0.1 * np.sin(angle), 0.0, 0.02) for angle in np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)]
+
+
+@dataclass
+class Case:
+    """A scene; how many candidates come out, at least and at most; level and words of the diagnostics."""
+
+    rows: list[tuple[float, ...]]
+    candidates: tuple[int, int]
+    level: bytes
+    words: str
+    goals: list[tuple[float, ...]] = field(default_factory=lambda: list(GOALS))
+    parameters: dict[str, Any] = field(default_factory=dict)
+
+
+CASES = {
+    'empty scene': Case([], (1, 1), OK, 'predicting'),
+    'hand deep inside an obstacle': Case([(0.01, 0.0, 0.0, 0.03)], (0, 0), WARN, 'predict_nothing_solved 1; scene_hand_inside 1'),
+    'hand just inside an obstacle': Case([(0.0, 0.028, 0.0, 0.03)], (1, 2), WARN, 'scene_hand_inside 1'),
+    'goal inside an obstacle': Case([(0.3, 0.01, 0.0, 0.03)], (0, 0), WARN, 'predict_nothing_solved 1; scene_goal_inside 1'),
+    'one goal of two inside': Case(
+        [(0.3, 0.01, 0.0, 0.03)], (1, 2), WARN, 'scene_goal_inside 1', goals=[(0.3, 0.0, 0.0), (0.0, 0.3, 0.0)]
+    ),
+    'no way through': Case(RING, (0, 0), WARN, 'predict_nothing_solved 1; scene_no_way 1'),
+    'ten thousand obstacles': Case(CROWD, (1, 2), OK, 'predicting'),
+    'eta out of reach': Case(
+        ROWS, (0, 0), WARN, 'predict_nothing_solved 1', parameters={'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0}
+    ),
+    'hand at its goal': Case([(0.15, 0.0, 0.0, 0.03)], (1, 1), OK, 'predicting', goals=[(0.0, 0.0, 0.0)]),
+}
+
+
+@pytest.mark.parametrize('name', CASES)
+def test_what_comes_out_of_a_scene_at_the_edge_and_the_level(ros: Graph, name: str) -> None:
+    case = CASES[name]
+    bench = Bench(ros, parameters=case.parameters)
+    bench.hear('obstacles', cloud(TYPES, obstacle_table(case.rows), 10 * SECOND))
+    bench.hear('goals', pose_array(TYPES, case.goals))
+    bench.health()
+    (pose,) = hand_path(1)
+    bench.move([pose])
+    (table,), (path,), (cloud_out,) = (bench.wait_for(each, 1) for each in ('likelihoods', 'path', 'prediction'))
+    count = table.layout.dim[0].size
+    fewest, most = case.candidates
+    assert fewest <= count <= most
+    assert cloud_out.width == count * 21
+    assert len(path.poses) == (21 if count else 0)
+    assert {cloud_out.header.stamp.sec, path.header.stamp.sec} == {pose.header.stamp.sec}
+    rows = np.array(table.data).reshape(-1, 4)
+    assert np.isfinite(rows).all()
+    assert rows[:, 0].sum() == pytest.approx(1.0 if count else 0.0)
+    assert (rows[:, 3] >= bench.node.pipeline.config.foc.eta - 1e-5).all()
+    status = bench.health()
+    assert (status.level, status.message) == (case.level, case.words)
+    told = [value for key, value in figures(status).items() if key.startswith('candidate ')]
+    assert len([value for value in told if value.startswith('solved')]) == count
+
+
+def test_what_is_wrong_is_told_as_long_as_it_lasts_and_no_longer(ros: Graph) -> None:
+    bench, poses = Bench(ros), hand_path(8)
+    bench.show_scene(rows=[(0.01, 0.0, 0.0, 0.03)])
+    bench.move(poses[:4])
+    assert bench.health().level == WARN
+    bench.show_scene()
+    bench.move(poses[4:])
+    bench.health()
+    bench.move(hand_path(2, start_s=10.08))
+    status = bench.health()
+    assert (status.level, status.message) == (OK, 'predicting')

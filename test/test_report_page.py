@@ -1,0 +1,123 @@
+"""The report's page in a browser: it moves, and what it draws is what the numbers say; broken on purpose, the check fails."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip('matplotlib', reason='matplotlib is not installed')
+pytest.importorskip('plotly', reason='plotly is not installed')
+
+from browser_helpers import check_report, chromium, screenshot, show
+from report_samples import predictions, samples, scene
+
+from foc_ros.moments import moment_of, track_of
+from foc_ros.report import write_report
+from foc_ros.report_data import MOST_SHOWN
+
+HOSTILE = '</script><img src=x onerror=alert(1)><b>&amp;'
+
+
+@pytest.fixture(scope='module')
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    with chromium(tmp_path_factory.mktemp('profile')) as opened:
+        yield opened
+
+
+@pytest.fixture(scope='module')
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made, directory = samples(2), tmp_path_factory.mktemp('report')
+    write_report(
+        directory, HOSTILE, track_of(made), [moment_of(each, *scene()) for each in predictions(made)], {HOSTILE: HOSTILE}
+    )
+    return directory
+
+
+def test_the_page_shows_the_numbers(browser: Any, report: Path) -> None:
+    check_report(browser, report)
+
+
+def test_text_stays_text(browser: Any, report: Path) -> None:
+    show(browser, report / 'index.html')
+    assert browser.title == HOSTILE
+    assert browser.find_elements('tag name', 'img') == []
+    assert browser.find_element('css selector', 'h1').text == HOSTILE
+
+
+@pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
+def test_a_phone_shows_all_of_it(browser: Any, report: Path, tmp_path: Path, dark: bool) -> None:
+    """Nothing is wider than a screen of 390 px; dark and light come from the system and can be changed."""
+    assert show(browser, report / 'index.html', 390, 844, dark) == []
+    assert browser.execute_script('return document.documentElement.scrollWidth') == 390
+    pages = [browser.execute_script('return getComputedStyle(document.body).backgroundColor')]
+    picture = screenshot(browser)
+    assert picture.startswith(b'\x89PNG') and len(picture) > 20_000
+    browser.find_element('id', 'theme').click()
+    pages.append(browser.execute_script('return getComputedStyle(document.body).backgroundColor'))
+    assert pages == (['rgb(20, 24, 28)', 'rgb(255, 255, 255)'] if dark else ['rgb(255, 255, 255)', 'rgb(20, 24, 28)'])
+
+
+def test_it_plays_to_the_end_of_a_movement(browser: Any, report: Path) -> None:
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    show(browser, report / 'index.html')
+    browser.execute_script("document.getElementById('pace').value = '4'; document.getElementById('play').click();")
+    ended = "const time = document.getElementById('time'); return time.value === time.max && time.max !== time.min;"
+    WebDriverWait(browser, 60).until(lambda opened: opened.execute_script(ended))
+    assert browser.find_element('id', 'play').text == '▶'
+
+
+def test_a_long_recording_says_where_the_slider_stops(browser: Any, tmp_path: Path) -> None:
+    made = samples(5)
+    write_report(tmp_path, 'x', track_of(made), [moment_of(each, *scene()) for each in predictions(made, every=1)], {})
+    check_report(browser, tmp_path)
+    assert f'{MOST_SHOWN} of the 750 predictions' in browser.find_element('id', 'decimated').text
+
+
+def test_a_way_can_be_seen_alone(browser: Any, report: Path) -> None:
+    show(browser, report / 'index.html')
+    row = browser.find_element('css selector', '#ways tr[data-line]')
+    browser.execute_script('arguments[0].click()', row)
+    assert len(browser.find_elements('css selector', '#ways tr.faded')) == 2
+
+
+def changed(report: Path, copy: Path, old: str, new: str) -> Path:
+    """Return a copy of a report with one thing in its page another."""
+    page = (report / 'index.html').read_text(encoding='utf-8')
+    assert old in page
+    (copy / 'index.html').write_text(page.replace(old, new, 1), encoding='utf-8')
+    (copy / 'predictions.json').write_bytes((report / 'predictions.json').read_bytes())
+    return copy
+
+
+@pytest.mark.parametrize(
+    ('old', 'new'),
+    [
+        ("byId('time').addEventListener('input'", "byId('time').addEventListener('never'"),
+        ('y: line.share, type', 'y: line.share.map((share) => share * 0.99), type'),
+        ('x: data.times.slice(line.first, line', 'x: data.times.slice(line.first + 1, 1 + line'),
+        ("cell(row, percent(share), 'number')", "cell(row, percent(share / 2), 'number')"),
+        ('cell(row, data.labels[way.label])', 'cell(row, data.labels[0])'),
+        ('const hand = { t:', 'const hand = {{ t:'),
+        ('drawn.map((each) => each.path)', 'drawn.map(() => nothing)'),
+        ('</body>', '<script src="https://foc-ros.invalid/x.js"></script></body>'),
+    ],
+    ids=['slider', 'likelihoods', 'times', 'percent', 'labels', 'syntax', 'paths', 'network'],
+)
+def test_a_broken_page_is_found_out(browser: Any, report: Path, tmp_path: Path, old: str, new: str) -> None:
+    broken = changed(report, tmp_path, old, new)
+    with pytest.raises(AssertionError):
+        check_report(browser, broken)
+
+
+def test_numbers_of_another_recording_are_found_out(browser: Any, report: Path, tmp_path: Path) -> None:
+    copy = changed(report, tmp_path, '</body>', '</body>')
+    numbers = json.loads((copy / 'predictions.json').read_text(encoding='utf-8'))
+    numbers['predictions'][20]['candidates'][1]['likelihood'] += 0.01
+    (copy / 'predictions.json').write_text(json.dumps(numbers), encoding='utf-8')
+    with pytest.raises(AssertionError):
+        check_report(browser, copy)

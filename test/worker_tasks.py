@@ -1,0 +1,37 @@
+"""What worker processes are given to do in tests: importable by name."""
+
+import os
+import signal
+import time
+
+from foc_ros.foc.errors import InputError
+
+
+def squared(number: int) -> int:
+    time.sleep(0.02 * (number % 3))
+    return number**2
+
+
+def deadly(number: int) -> int:
+    """Kill the worker at 3 and 5, as the kernel does where memory runs out."""
+    if number in (3, 5):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return squared(number)
+
+
+def faulty(number: int) -> int:
+    if number == 1:
+        raise InputError('number', 'another than 1', number)
+    if number == 2:
+        raise KeyError('two')
+    return number
+
+
+def worker_pid(number: int) -> int:
+    time.sleep(0.1)
+    return os.getpid()
+
+
+def sleepy(seconds: float) -> float:
+    time.sleep(seconds)
+    return seconds
