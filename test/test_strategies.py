@@ -198,7 +198,7 @@ def test_algorithm1_as_printed_overshoots_what_the_continuous_walk_finds():
 def test_a_warm_start_finds_what_a_cold_one_finds(strategy):
     problem = one_obstacle(0.86)
     first = solved(problem, BOWED, strategy)
-    again = forward(problem, warm(first, 0.0, problem), FocConfig(strategy=strategy))
+    again = forward(problem, warm(first, problem), FocConfig(strategy=strategy))
     assert again.status is Status.SOLVED
     assert again.qp_solves < first.qp_solves
     np.testing.assert_allclose(again.path, first.path, atol=2e-6)

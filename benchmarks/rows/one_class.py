@@ -97,13 +97,13 @@ def cold_vs_ipopt(quick: bool) -> Result:
 
 def warm_vs_cold(quick: bool) -> Result:
     """Measure the next tick at 100 Hz of the same class against the same one from the guess."""
-    repetitions, elapsed = (4 if quick else 40), 0.01
+    repetitions = 4 if quick else 40
     before = _solved(LV)
     moved = one_class(initial_mean=np.concatenate((before.mean[0, :2] + 1e-4, [0.01, 0.004], np.zeros(2))))
 
     def next_tick() -> Solution:
         problem = replace(moved)
-        return forward(problem, warm(before, elapsed, problem), LV)
+        return forward(problem, warm(before, problem), LV)
 
     times = interleaved({'ours': next_tick, 'peer': lambda: _solved(LV, replace(moved))}, repetitions)
     warmed, fresh = next_tick(), _solved(LV, moved)

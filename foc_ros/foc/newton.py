@@ -54,7 +54,11 @@ def newton(
     for _ in range(changes + 1):
         found = _settled(problem, cost, near, active, multipliers, wanted)
         if found is None:
-            return None
+            beside = _straddling(active, multipliers, depths(near, problem.centres, wanted), let_go)
+            if beside is None:
+                return None
+            active, multipliers = beside
+            continue
         pressing = found.multipliers > 0
         if pressing.all():
             entered = _entered(problem, found, wanted)
@@ -84,8 +88,29 @@ def _rolled(found: Touching, let_go: set[Row], steps: int) -> tuple[WorkingSet, 
             stays, after = (obstacle, step + ahead), (obstacle, step + 2 * ahead)
             if stays in kept and after not in kept and after not in let_go and 0 <= after[1] < steps:
                 kept[stays] = kept[after] = kept[stays] / 2
-    rows = np.array(sorted(kept), dtype=np.intp).reshape(-1, 2)
-    return WorkingSet(rows[:, 0], rows[:, 1]), np.array([kept[row] for row in sorted(kept)])
+    return _listed(kept)
+
+
+def _straddling(active: WorkingSet, multipliers: Array, depth: Array, let_go: set[Row]) -> tuple[WorkingSet, Array] | None:
+    """Let contacts at a single step share their force with the neighbour that is nearer to the circle; None where there is none.
+
+    What cannot hold at one step holds at two, with the circle bulging between them. depth (m, N): how far circles are entered.
+    """
+    pairs = zip(active.obstacle.tolist(), active.step.tolist(), strict=True)
+    given: dict[Row, float] = dict(zip(pairs, multipliers.tolist(), strict=True))
+    kept = dict(given)
+    for obstacle, step in given:
+        beside = [(obstacle, step + ahead) for ahead in (-1, 1) if 0 <= step + ahead < depth.shape[1]]
+        if given.keys().isdisjoint(beside) and (free := [row for row in beside if row not in let_go]):
+            nearer = max(free, key=lambda row: depth[row])
+            kept[obstacle, step] = kept[nearer] = given[obstacle, step] / 2
+    return _listed(kept) if kept.keys() != given.keys() else None
+
+
+def _listed(forces: dict[Row, float]) -> tuple[WorkingSet, Array]:
+    """Return contacts with their forces as a working set, in order."""
+    rows = np.array(sorted(forces), dtype=np.intp).reshape(-1, 2)
+    return WorkingSet(rows[:, 0], rows[:, 1]), np.array([forces[row] for row in sorted(forces)])
 
 
 def _entered(problem: Problem, found: Touching, wanted: Array) -> WorkingSet:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,36 +17,30 @@ from .records import Candidate, Outcome, Solution, Status
 from .start import cold, warm
 
 
-@dataclass(frozen=True, eq=False)
-class Earlier:
-    """Solutions by label that were found elapsed_s [s] ago."""
-
-    solutions: Mapping[str, Solution] = field(default_factory=dict)
-    elapsed_s: float = 0.0
-
-
 def solve_candidates(
     candidates: Sequence[Candidate],
     problems: Sequence[Problem],
     settings: FocConfig,
     beta: float,
     effort_spent: float = 0.0,
-    earlier: Earlier | None = None,
+    earlier: Mapping[str, Solution] | None = None,
 ) -> list[Outcome]:
     """Solve each candidate and rank them.
 
     problems: one for every goal; effort_spent: since movement onset [m^2/s^5]; earlier: solutions to start from where there
     is one of the same label. Returns the solved ones first, most likely first.
     """
-    judged = [_solved(candidate, problems[candidate.goal], settings, effort_spent, earlier) for candidate in candidates]
+    found = earlier or {}
+    judged = [_solved(each, problems[each.goal], settings, effort_spent, found.get(each.label)) for each in candidates]
     return ranked(distinct(judged), beta)
 
 
-def _solved(candidate: Candidate, problem: Problem, settings: FocConfig, effort_spent: float, earlier: Earlier | None) -> Outcome:
+def _solved(
+    candidate: Candidate, problem: Problem, settings: FocConfig, effort_spent: float, previous: Solution | None
+) -> Outcome:
     """Solve from the earlier solution; if that gets into what the earlier one was not, from the candidate's own guess."""
-    previous = earlier.solutions.get(candidate.label) if earlier else None
-    if earlier and previous is not None:
-        again = forward(problem, warm(previous, earlier.elapsed_s, problem), settings)
+    if previous is not None:
+        again = forward(problem, warm(previous, problem), settings)
         outcome = _judged(candidate, problem, again, effort_spent)
         if outcome.solved or outcome.solution.status is previous.status:
             return outcome

@@ -16,9 +16,9 @@ from .homotopy import search
 from .library import Way, recall
 from .likelihood import most_likely
 from .noise import noise_per_step
-from .outcomes import Earlier, solve_candidates
+from .outcomes import solve_candidates
 from .problem import Problem, rest_to_goal
-from .records import NANOSECONDS, Array, Candidate, HandState, Obstacles, Outcome, Prediction, Solution, Status
+from .records import Array, Candidate, HandState, Obstacles, Outcome, Prediction, Solution, Status
 from .replanning import triple_integrator_error_map
 
 
@@ -26,13 +26,12 @@ from .replanning import triple_integrator_error_map
 class Memory:
     """What one prediction hands to the next.
 
-    most_likely: label; candidates: the ways followed; solutions: by label, found at stamp_ns.
+    most_likely: label; candidates: the ways followed; solutions: by label.
     """
 
     most_likely: str | None = None
     candidates: tuple[Candidate, ...] = ()
     solutions: Mapping[str, Solution] = field(default_factory=dict)
-    stamp_ns: int = 0
 
 
 def predict(
@@ -51,8 +50,7 @@ def predict(
     found = search(hand.mean, goals, obstacles, config.homotopy, durations, config.foc.steps, memory.candidates)
     seen = hand, goals, obstacles, config.homotopy, durations, config.foc.steps
     candidates = recall(library, *seen, found.candidates, memory.candidates)
-    earlier = Earlier(memory.solutions, (hand.stamp_ns - memory.stamp_ns) / NANOSECONDS)
-    outcomes = solve_candidates(candidates, problems, config.foc, config.likelihood.beta, hand.effort_spent, earlier)
+    outcomes = solve_candidates(candidates, problems, config.foc, config.likelihood.beta, hand.effort_spent, memory.solutions)
     outcomes = [_seen(outcome, problems[outcome.candidate.goal], hand) for outcome in outcomes]
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
@@ -64,7 +62,7 @@ def predict(
     prediction = Prediction(hand.stamp_ns, hand.frame_id, hand.height, tuple(outcomes), best, notes, seconds)
     useful = (outcome for outcome in outcomes if outcome.solution.status in (Status.SOLVED, Status.ETA_UNREACHABLE))
     solutions = {outcome.candidate.label: outcome.solution for outcome in useful}
-    return prediction, Memory(best, candidates, solutions, hand.stamp_ns)
+    return prediction, Memory(best, candidates, solutions)
 
 
 def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: Array, duration_s: float) -> Problem:

@@ -31,13 +31,18 @@ def cold(guess: Array) -> Start:
     return Start(np.asarray(guess, dtype=float)[1:])
 
 
-def warm(previous: Solution, elapsed_s: float, problem: Problem) -> Start:
-    """Start at a solution found elapsed_s [s] ago, read off at the new steps; past its end it rests at its goal."""
+def warm(previous: Solution, problem: Problem) -> Start:
+    """Start at an earlier solution, read off at the new steps so that both reach their goal at the same time.
+
+    Before its beginning the hand is where it began, after its end it rests at its goal.
+    """
     steps, dt = problem.horizon.steps, problem.horizon.dt
+    elapsed_s = previous.dt * len(previous.control) - dt * steps
     times = elapsed_s + dt * np.arange(1, steps + 1)
     positions = np.stack([np.interp(times, previous.times, axis) for axis in previous.path.T], axis=1)
-    held = ((times - dt) / previous.dt).astype(np.intp)
-    control = np.where(held < len(previous.control), previous.control[np.minimum(held, len(previous.control) - 1)].T, 0.0)
+    held = np.floor((times - dt / 2) / previous.dt).astype(np.intp)
+    inside = (held >= 0) & (held < len(previous.control))
+    control = np.where(inside, previous.control[np.where(inside, held, 0)].T, 0.0)
     row = {identity: index for index, identity in enumerate(problem.obstacles.ids)}
     kept: dict[tuple[int, int], float] = {}
     for identity, step, value in previous.multipliers:

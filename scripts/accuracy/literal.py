@@ -61,7 +61,9 @@ def text(measured: list[dict[tuple[str, float | None], Solution]]) -> str:
             stepped = '2, walked' if growth is None else f'{growth:g}'
             enough = '' if growth is None else _enough(case, DELTAS[rate], growth)
             cells = _cells(each, DELTAS[rate], enough, solutions[rate, None])
-            rows.append([name, rate, stepped, each.status.value.replace('_', ' '), str(each.iterations or each.qp_solves), *cells])
+            rows.append(
+                [name, rate, stepped, each.status.value.replace('_', ' '), str(each.iterations or each.qp_solves), *cells]
+            )
             name = ''
     return table(head, rows)
 
