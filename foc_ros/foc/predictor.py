@@ -52,7 +52,7 @@ def predict(
     seen = hand, goals, obstacles, config.homotopy, durations, config.foc.steps
     candidates = recall(library, *seen, found.candidates, memory.candidates)
     earlier = Earlier(memory.solutions, (hand.stamp_ns - memory.stamp_ns) / NANOSECONDS)
-    outcomes = solve_candidates(candidates, problems, config.foc, config.likelihood.beta, hand.effort_spent, earlier)
+    outcomes = solve_candidates(candidates, problems, config.foc, config.likelihood, hand.effort_spent, earlier)
     outcomes = [_seen(outcome, problems[outcome.candidate.goal], hand) for outcome in outcomes]
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
