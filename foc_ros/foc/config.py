@@ -45,6 +45,13 @@ class FocConfig:
     strategy: str = _p('lv', 'how clearance and precision are traded', choices=STRATEGIES)
     noise_x: float = _p(0.05, 'noise per unit of jerk along the first axis of the plane, at a step of 0.02 s', '', 0.0, 2.0)
     noise_y: float = _p(0.05, 'the same along the second axis', '', 0.0, 2.0)
+    process_noise: float = _p(
+        0.0,
+        'root of the spectral density of jerk beside any plan: widens what is predicted, no part of the chance constraint',
+        'm/s^2.5',
+        0.0,
+        1e3,
+    )
     lv_delta: float = _p(5e-5, 'tau per unit of s for strategy lv', 'm^2', 0.0, 1.0)
     hc_delta: float = _p(1e-4, 'tau per unit of s for strategy hc', 'm^2', 0.0, 1.0)
     growth: float = _p(2.0, 'factor on lambda per unit of s (Delta)', '', 1.0001, 1e6)
