@@ -100,7 +100,7 @@ def _warnings(moments: Sequence[Moment]) -> list[str]:
     statuses = Counter(status for moment in moments for _, status in moment.unsolved)
     warnings = [] if moments else ['There is no prediction.']
     warnings += [f'In {empty} of {len(moments)} predictions no candidate could be solved.'] if empty else []
-    warnings += [f'{count} candidates ended as {status}.' for status, count in sorted(statuses.items())]
+    warnings += [f'{count} candidate{"s" if count > 1 else ""} ended as {status}.' for status, count in sorted(statuses.items())]
     return warnings
 
 

@@ -24,6 +24,8 @@ MOST_HAND = 4000
 """Hand samples that are drawn."""
 PATH_POINTS, ELLIPSES = 26, 8
 MARGIN = 0.06
+RARE = (0.5, 99.5)
+"""Percentiles of the paths' coordinates that the scene is drawn to: one wild prediction shall not make all others small."""
 Kept = TypeVar('Kept', bound=Hashable)
 
 
@@ -137,16 +139,14 @@ def _hand(track: Track, origin_ns: int) -> dict[str, Any]:
 
 
 def _bounds(track: Track, moments: Sequence[Moment]) -> list[float]:
-    """Return limits of x, then of y [m], that hold hand, paths, goals and obstacles; ellipses may reach beyond."""
+    """Return limits of x, then of y [m], that hold hand, goals, obstacles and nearly all of the paths."""
     points = [track.positions]
     for moment in moments:
         reach = (moment.obstacles.radius + moment.obstacles.radius_stddev)[:, None]
-        points += [
-            moment.goals,
-            moment.obstacles.centre - reach,
-            moment.obstacles.centre + reach,
-            *(way.path for way in moment.ways),
-        ]
+        points += [moment.goals, moment.obstacles.centre - reach, moment.obstacles.centre + reach]
+    paths = [way.path for moment in moments for way in moment.ways]
+    if paths:
+        points.append(np.percentile(np.concatenate(paths), RARE, axis=0))
     everything = np.concatenate(points)
     low, high = everything.min(axis=0), everything.max(axis=0)
     margin = MARGIN * max(*(high - low), 0.05)

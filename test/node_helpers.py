@@ -15,7 +15,7 @@ TYPES = RclpyTypes()
 ROWS = [(0.15, 0.02, 0.0, 0.03)]
 CROWD = [(0.01 * (i % 100) - 0.35, 0.05 + 0.01 * (i // 100), 0.0, 0.004) for i in range(10_000)]
 GOALS = [(0.3, 0.0, 0.0)]
-QUICK = {'foc.steps': 20, 'homotopy.max_candidates': 2, 'scene.timeout_s': 0.0}
+QUICK = {'foc.steps': 20, 'homotopy.max_candidates': 2, 'scene.timeout_s': 0.0, 'estimator.hand_timeout_s': 0.0}
 """Parameters with which a prediction takes little time, and a slow machine is no silent source."""
 RELIABLE_HAND = {'qos_overrides./hand_pose.subscription.reliability': 'reliable'}
 """So that a test can tell when all it published has arrived."""

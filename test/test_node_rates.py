@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import time
 from collections.abc import Callable
@@ -55,6 +56,17 @@ class Feeder:
                 self.sent += 1
             self.ros.spin_for(max(began + 0.01 * (i + 1) - time.monotonic(), 0.001))
 
+    def complaints(self) -> list[str]:
+        """Return what diagnostics said since the first prediction, but for OK and the poses that a slow machine passes over."""
+        told = [each.status[0] for each in self.health if 'count predictions' in figures(each.status[0])]
+        assert told
+        return [
+            f'{each.level}: {each.message}'
+            for each in told
+            if (each.level, each.message) != (OK, 'predicting')
+            and not (each.level == WARN and re.fullmatch(r'hand_superseded \d+', each.message))
+        ]
+
     def all_heard(self) -> bool:
         return self.figure('hand_pose refused') == f'0 of {self.sent}'
 
@@ -80,8 +92,7 @@ def test_ten_thousand_obstacles_at_50_hz(ros: Graph) -> None:
     assert len(feeder.clouds) > 5
     assert (feeder.figure('obstacles of cloud'), feeder.figure('count internal_errors')) == ('10000', None)
     assert int(feeder.figure('note culled') or 0) > 9000
-    levels = {(each.status[0].level, each.status[0].message) for each in feeder.health}
-    assert (OK, 'predicting') in levels, levels
+    assert feeder.complaints() == []
 
 
 def test_poses_at_1_khz(ros: Graph) -> None:
@@ -96,8 +107,7 @@ def test_poses_at_1_khz(ros: Graph) -> None:
     found = stamps(feeder.clouds)
     assert found == sorted(set(found))
     assert len(found) + int(feeder.figure('dropped cycles') or 0) >= 15
-    levels = {(each.status[0].level, each.status[0].message) for each in feeder.health}
-    assert (OK, 'predicting') in levels, levels
+    assert feeder.complaints() == []
 
 
 def test_bad_poses_at_1_khz_are_few_lines_in_the_log(ros: Graph) -> None:

@@ -1,9 +1,11 @@
-"""The README's picture is there, and its script draws the moment it says."""
+"""The README's pictures are there, and their scripts draw what they say."""
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
+import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -17,21 +19,41 @@ from foc_ros.moments import moment_of, movements, track_of
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def test_the_picture_is_in_the_readme() -> None:
-    assert '](doc/images/scene.png)' in (ROOT / 'README.md').read_text(encoding='utf-8')
-    assert (ROOT / 'doc' / 'images' / 'scene.png').read_bytes().startswith(b'\x89PNG\r\n\x1a\n')
+def script(name: str) -> ModuleType:
+    """Import a file of scripts/, which is no package."""
+    sys.path.insert(0, str(ROOT / 'scripts'))
+    try:
+        return importlib.import_module(name)
+    finally:
+        sys.path.remove(str(ROOT / 'scripts'))
+
+
+@pytest.mark.parametrize(('name', 'start'), [('scene.png', b'\x89PNG\r\n\x1a\n'), ('demo.gif', b'GIF89a')])
+def test_the_pictures_are_in_the_readme(name: str, start: bytes) -> None:
+    assert f'](doc/images/{name})' in (ROOT / 'README.md').read_text(encoding='utf-8')
+    picture = (ROOT / 'doc' / 'images' / name).read_bytes()
+    assert picture.startswith(start)
+    assert len(picture) < 2_000_000
+
+
+def test_the_moving_picture_goes_through_a_movement(tmp_path: Path) -> None:
+    moving = script('make_demo_animation')
+    made = samples(1)
+    drawn = list(moving.pictures(track_of(made), [moment_of(each, *scene()) for each in predictions(made)], (0,)))
+    assert 10 < len(drawn) <= moving.PICTURES
+    lengths = [len(figure.axes[1].lines[0].get_xdata()) for figure, _ in drawn]
+    assert all(np.diff(lengths) > 0)
+    moving.save(drawn[:3], tmp_path / 'demo.gif')
+    assert (tmp_path / 'demo.gif').read_bytes().startswith(b'GIF89a')
 
 
 def test_the_script_draws_the_beginning_of_its_movement() -> None:
-    spec = importlib.util.spec_from_file_location('make_readme_picture', ROOT / 'scripts' / 'make_readme_picture.py')
-    assert spec is not None and spec.loader is not None
-    script = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(script)
-    made = samples(script.MOVEMENT)
+    still = script('make_readme_picture')
+    made = samples(still.MOVEMENT)
     track, moments = track_of(made), [moment_of(each, *scene()) for each in predictions(made, every=2)]
-    start_ns = movements(track, 0.05)[script.MOVEMENT - 1][0]
-    shown = min(moments, key=lambda each: abs(each.stamp_ns - start_ns - script.AFTER_S * 1e9))
-    drawn = [line.get_xydata() for line in script.picture(track, moments).axes[0].lines]
+    start_ns = movements(track, 0.05)[still.MOVEMENT - 1][0]
+    shown = min(moments, key=lambda each: abs(each.stamp_ns - start_ns - still.AFTER_S * 1e9))
+    drawn = [line.get_xydata() for line in still.picture(track, moments).axes[0].lines]
     for way in shown.ways:
         assert any(np.array_equal(line, way.path) for line in drawn)
     # the hand's past, its future, and where it is

@@ -98,8 +98,8 @@ def changed(report: Path, copy: Path, old: str, new: str) -> Path:
     ('old', 'new'),
     [
         ("byId('time').addEventListener('input'", "byId('time').addEventListener('never'"),
-        ('y: line.share, type', 'y: line.share.map((share) => share * 0.99), type'),
-        ('x: data.times.slice(line.first, line', 'x: data.times.slice(line.first + 1, 1 + line'),
+        ('y: share, type', 'y: share.map((value) => value * 0.99), type'),
+        ('times: data.times.slice(begin, end)', 'times: data.times.slice(begin + 1, end + 1)'),
         ("cell(row, percent(share), 'number')", "cell(row, percent(share / 2), 'number')"),
         ('cell(row, data.labels[way.label])', 'cell(row, data.labels[0])'),
         ('const hand = { t:', 'const hand = {{ t:'),

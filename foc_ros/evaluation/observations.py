@@ -10,10 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from foc_ros.foc.partings import Partings
 from foc_ros.foc.records import Array, Record
 
-HORIZONS_S = (0.25, 0.5, 1.0)
+TIMES_S = tuple(0.125 * step for step in range(1, 9))
 """Times ahead at which predicted positions are compared with the true ones [s]."""
+HORIZONS_S = (0.25, 0.5, 1.0)
+"""Those of them that are reported."""
 
 Bools = NDArray[np.bool_]
 Sides = NDArray[np.int8]
@@ -25,9 +28,9 @@ class Ways(Record):
 
     labels; goal (k,): row of the goals; solved (k,); spent [m^2/s^5]: effort since onset, the same for all; to_go (k,)
     [m^2/s^5]: effort through each; likelihood (k,): as published, 0 unless solved; length (k,) [m]: of the shortest path in its
-    class; named (k, n): whether the obstacle is in the candidate's name; sides (k, n): LEFT or RIGHT, the side of each of the n
-    obstacles on which the predicted path runs; mean (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2]: of the position
-    at `HORIZONS_S`.
+    class; time_s (k,): to its goal; named (k, n): whether the obstacle is in the candidate's name; sides (k, n): LEFT or RIGHT,
+    on which the predicted path passes each of the n obstacles; mean (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2]: of the
+    position at `TIMES_S`; partings: when they part.
     """
 
     labels: tuple[str, ...]
@@ -37,10 +40,12 @@ class Ways(Record):
     to_go: Array
     likelihood: Array
     length: Array
+    time_s: Array
     named: Bools
     sides: Sides
     mean: Array
     covariance: Array
+    partings: Partings
 
     def __len__(self) -> int:
         return len(self.labels)
@@ -52,7 +57,7 @@ class Truth(Record):
 
     sides (n,): LEFT or RIGHT, the side of each obstacle on which the rest of the path runs; ahead (n,): whether the row of the
     obstacle is still to be passed; goal: row of the goal where the recording ends, None where it ends at none; positions (h, 2)
-    [m]: at `HORIZONS_S`, nan beyond the end; progress in [0, 1]: share of the way that lies behind; approach in [0, 1]: share of
+    [m]: at `TIMES_S`, nan beyond the end; progress in [0, 1]: share of the way that lies behind; approach in [0, 1]: share of
     the way from the last row, or the start, to the next one, nan where none is to come.
     """
 
@@ -68,16 +73,17 @@ class Truth(Record):
 class Observation(Record):
     """One prediction: at stamp_ns, from a hand whose mean is hand (6,), its movement since_s old (0 at rest) [s].
 
-    centre (n, 2) and radius (n,) [m]: the obstacles at that stamp; row (n,): the row of obstacles that each is in, 0 first;
-    goals (g, 2) [m]; most_likely: the label that leads after hysteresis.
+    ids, centre (n, 2) [m]: of the obstacles at that stamp; row (n,): the row of obstacles that each is in, 0 first; along (2,):
+    the unit vector on which rows are ordered; goals (g, 2) [m]; most_likely: the label that leads after hysteresis.
     """
 
     stamp_ns: int
     hand: Array
     since_s: float
+    ids: tuple[str, ...]
     centre: Array
-    radius: Array
     row: NDArray[np.int64]
+    along: Array
     goals: Array
     ways: Ways
     most_likely: str | None

@@ -9,10 +9,11 @@ from foc_ros.foc.chance import centres
 from foc_ros.foc.config import Config
 from foc_ros.foc.errors import RecordingError
 from foc_ros.foc.homotopy import swept_angles
+from foc_ros.foc.partings import partings
 from foc_ros.foc.records import LEFT, NANOSECONDS, RIGHT, Array, HandState, Obstacles, Outcome, Prediction
 from foc_ros.replay import Replay, Step
 
-from .observations import HORIZONS_S, Observation, Observations, Truth, Ways
+from .observations import TIMES_S, Observation, Observations, Truth, Ways
 from .path import Path
 from .recordings import Recording
 from .rows import axis, lines, rows, to_pass
@@ -54,9 +55,10 @@ def _observation(step: Step, hand: HandState, past: Path) -> Observation:
         stamp_ns=prediction.stamp_ns,
         hand=hand.mean,
         since_s=since_s,
+        ids=obstacles.ids,
         centre=obstacles.centre,
-        radius=obstacles.radius,
         row=row,
+        along=along,
         goals=goals,
         ways=_ways(prediction, obstacles, hand.effort_spent),
         most_likely=prediction.most_likely,
@@ -67,7 +69,7 @@ def _observation(step: Step, hand: HandState, past: Path) -> Observation:
 def _ways(prediction: Prediction, obstacles: Obstacles, spent: float) -> Ways:
     outcomes = prediction.outcomes
     solutions = [outcome.solution for outcome in outcomes]
-    steps = [np.minimum(np.rint(np.array(HORIZONS_S) / each.dt).astype(int), len(each.mean) - 1) for each in solutions]
+    steps = [np.minimum(np.rint(np.array(TIMES_S) / each.dt).astype(int), len(each.mean) - 1) for each in solutions]
     named = [[identity in dict(outcome.candidate.sides) for identity in obstacles.ids] for outcome in outcomes]
     return Ways(
         labels=tuple(outcome.candidate.label for outcome in outcomes),
@@ -77,10 +79,12 @@ def _ways(prediction: Prediction, obstacles: Obstacles, spent: float) -> Ways:
         to_go=np.array([each.effort * each.dt for each in solutions]),
         likelihood=np.array([outcome.likelihood for outcome in outcomes]),
         length=np.array([outcome.candidate.length for outcome in outcomes]),
+        time_s=np.array([each.times[-1] for each in solutions]),
         named=np.array(named, dtype=bool).reshape(len(outcomes), len(obstacles)),
         sides=np.array([_predicted_sides(outcome, obstacles) for outcome in outcomes]),
         mean=np.array([each.mean[at, :2] for each, at in zip(solutions, steps, strict=True)]),
         covariance=np.array([each.covariance[at, :2, :2] for each, at in zip(solutions, steps, strict=True)]),
+        partings=partings(outcomes, obstacles),
     )
 
 
@@ -107,16 +111,21 @@ def _truth(stamp_ns: int, past: Path, obstacles: Obstacles, row: NDArray[np.int6
         sides=_sides(rest, where),
         ahead=open_rows[row],
         goal=past.goal,
-        positions=past.at(stamp_ns, np.array(HORIZONS_S)),
+        positions=past.at(stamp_ns, np.array(TIMES_S)),
         progress=float(past.progress[now]),
-        approach=_approach(line, open_rows, float(place[now]), float(place[0])),
+        approach=_approach(line, past, place, now),
     )
 
 
-def _approach(line: Array, open_rows: NDArray[np.bool_], here: float, start: float) -> float:
-    """Return the share of the way from the last row, or the start, to the next one."""
-    if not open_rows.any():
+def _approach(line: Array, past: Path, place: Array, now: int) -> float:
+    """Return the share of the way from the last row, or the start, to the next one, that lies behind.
+
+    line (r,) [m]: where the rows stand; place (m,) [m]: where the hand was, both along the way.
+    """
+    passed = [int(np.flatnonzero(place < each)[-1]) + 1 for each in line if to_pass(np.array([each]), place)[0]]
+    following = min((each for each in passed if each > now), default=None)
+    if following is None:
         return float('nan')
-    following = int(np.flatnonzero(open_rows)[0])
-    last = max(start, float(line[following - 1])) if following else start
-    return float(np.clip((here - last) / max(line[following] - last, 1e-9), 0.0, 1.0))
+    last = max((each for each in passed if each <= now), default=0)
+    way = past.travelled[following] - past.travelled[last]
+    return float((past.travelled[now] - past.travelled[last]) / way) if way > 0.0 else 0.0

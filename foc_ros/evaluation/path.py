@@ -15,15 +15,16 @@ class Path:
     """A recorded path, of a movement that ends where it is nearest to the goal that it reached.
 
     Attributes: stamps_ns (m,), positions (m, 2) [m]; goal: row of the goal reached, None where none was; end_ns: when the
-    movement ends; progress (m,): share of the movement's way that lies behind.
+    movement ends; travelled (m,): way that lies behind [m]; progress (m,): its share of the movement's way.
     """
 
     def __init__(self, stamps_ns: NDArray[np.int64], positions: Array, goals: Array) -> None:
         self.stamps_ns, self.positions = stamps_ns, positions
         self.goal, end = reached(positions, goals)
         self.end_ns = int(stamps_ns[end])
-        travelled = _travelled(positions)
-        self.progress = np.minimum(travelled / travelled[end], 1.0) if travelled[end] > 0.0 else np.zeros(len(travelled))
+        self.travelled = _travelled(positions)
+        whole = self.travelled[end]
+        self.progress = np.minimum(self.travelled / whole, 1.0) if whole > 0.0 else np.zeros(len(positions))
 
     def at(self, stamp_ns: int, seconds: Array) -> Array:
         """Return the positions (h, 2) [m] some seconds after a stamp, nan beyond the end."""

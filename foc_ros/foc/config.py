@@ -45,6 +45,13 @@ class FocConfig:
     strategy: str = _p('lv', 'how clearance and precision are traded', choices=STRATEGIES)
     noise_x: float = _p(0.05, 'noise per unit of jerk along the first axis of the plane, at a step of 0.02 s', '', 0.0, 2.0)
     noise_y: float = _p(0.05, 'the same along the second axis', '', 0.0, 2.0)
+    process_noise: float = _p(
+        0.0,
+        'root of the spectral density of jerk beside any plan: widens what is predicted, no part of the chance constraint',
+        'm/s^2.5',
+        0.0,
+        1e3,
+    )
     lv_delta: float = _p(5e-5, 'tau per unit of s for strategy lv', 'm^2', 0.0, 1.0)
     hc_delta: float = _p(1e-4, 'tau per unit of s for strategy hc', 'm^2', 0.0, 1.0)
     growth: float = _p(2.0, 'factor on lambda per unit of s (Delta)', '', 1.0001, 1e6)
@@ -97,6 +104,15 @@ class LikelihoodConfig:
     """From costs to likelihoods."""
 
     beta: float = _p(0.5, 'exponent of the cost ratio', '', 0.0, 100.0)
+    spent_share: float = _p(1.0, 'share of the effort spent since onset that is part of every cost', '', 0.0, 1.0)
+    base_effort: float = _p(0.0, 'effort that is part of every cost: differences far below it tell little', 'm^2/s^5', 0.0, 1e9)
+    lookahead_s: float = _p(
+        0.0,
+        'mean time that the operator looks ahead: beta fades with the time until a choice; 0: without end',
+        's',
+        0.0,
+        60.0,
+    )
     margin: float = _p(0.05, 'lead in likelihood at which the most likely class changes', '', 0.0, 1.0)
 
 

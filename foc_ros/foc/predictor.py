@@ -19,7 +19,7 @@ from .noise import noise_per_step
 from .outcomes import Earlier, solve_candidates
 from .problem import Problem, rest_to_goal
 from .records import NANOSECONDS, Array, Candidate, HandState, Obstacles, Outcome, Prediction, Solution, Status
-from .replanning import triple_integrator_error_map
+from .replanning import triple_integrator_error_map, triple_integrator_process_covariance
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ def predict(
     seen = hand, goals, obstacles, config.homotopy, durations, config.foc.steps
     candidates = recall(library, *seen, found.candidates, memory.candidates)
     earlier = Earlier(memory.solutions, (hand.stamp_ns - memory.stamp_ns) / NANOSECONDS)
-    outcomes = solve_candidates(candidates, problems, config.foc, config.likelihood.beta, hand.effort_spent, earlier)
-    outcomes = [_seen(outcome, problems[outcome.candidate.goal], hand) for outcome in outcomes]
+    outcomes = solve_candidates(candidates, problems, config.foc, config.likelihood, hand.effort_spent, earlier)
+    outcomes = [_seen(outcome, problems[outcome.candidate.goal], hand, config.foc.process_noise) for outcome in outcomes]
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
     best = most_likely(labels, values, memory.most_likely, config.likelihood.margin)
@@ -94,11 +94,14 @@ def _at_rest(hand: HandState) -> HandState:
     return hand if hand.onset_ns is not None else replace(hand, mean=np.append(hand.mean[:2], np.zeros(4)))
 
 
-def _seen(outcome: Outcome, problem: Problem, hand: HandState) -> Outcome:
-    """Add what we do not know of the hand to what its own noise will do.
+def _seen(outcome: Outcome, problem: Problem, hand: HandState, process_noise: float) -> Outcome:
+    """Add what we do not know of the hand, and jerk beside its plan, to what its own noise will do.
 
     The operator knows the hand better than our filter and plans its margins by motor noise alone, so the filter's
     covariance is no part of the chance constraint; but our prediction is as uncertain as the state it starts from.
     """
     carried = problem.error_map @ hand.covariance @ problem.error_map.swapaxes(1, 2)
+    if process_noise > 0.0:
+        horizon = problem.horizon
+        carried = carried + process_noise**2 * triple_integrator_process_covariance(horizon.dt, horizon.steps)
     return replace(outcome, solution=replace(outcome.solution, covariance=outcome.solution.covariance + carried))

@@ -11,6 +11,7 @@ const most = Math.max(...data.frames.map((frame) => frame.ways.length));
 const slotOf = (line) => data.lines[line].slot;
 const letterOf = (line) => (slotOf(line) === null ? '' : String.fromCharCode(65 + slotOf(line)));
 const NAMED_OBSTACLES = 30;
+const MOST_MARKS = 3000;
 const state = { frame: 0, from: 0, to: 0, playing: false, focus: null };
 
 const first = (values, least) => { const row = values.findIndex((value) => value >= least); return row < 0 ? values.length : row; };
@@ -108,16 +109,22 @@ function drawScene() {
   }), { ...CONFIG, displayModeBar: !TOUCH, modeBarButtons: [['toImage', 'zoom2d', 'pan2d', 'resetScale2d']] });
 }
 
-// A letter on every line, at the middle of the part that is shown.
-function letters() {
-  const [from, to] = span();
-  const places = data.lines.flatMap((line, number) => {
-    const rows = line.share.flatMap((share, row) => {
-      const time = data.times[line.first + row];
-      return share !== null && time >= from && time <= to ? [row] : [];
-    });
-    const row = rows[Math.floor(((number % 4) + 0.5) * rows.length / 4)];
-    return rows.length < 3 || line.slot === null ? [] : [[data.times[line.first + row], line.share[row], number]];
+// The parts of all lines that are in the span shown: what is beyond would cost time to draw and not be seen.
+function shownLines() {
+  const [from, to] = [first(data.times, span()[0]), first(data.times, span()[1] + 1e-9)];
+  return data.lines.flatMap((line, number) => {
+    const [begin, end] = [Math.max(from, line.first), Math.min(to, line.first + line.share.length)];
+    const share = line.share.slice(begin - line.first, end - line.first);
+    return begin < end && share.some((value) => value !== null) ? [{ number, times: data.times.slice(begin, end), share }] : [];
+  });
+}
+
+// A letter on every line that is long enough for one.
+function letters(lines) {
+  const places = lines.flatMap(({ number, times, share }) => {
+    const known = share.flatMap((value, row) => (value === null ? [] : [row]));
+    const row = known[Math.floor((((number % 4) + 0.5) * known.length) / 4)];
+    return known.length < 3 || slotOf(number) === null ? [] : [[times[row], share[row], number]];
   });
   return {
     x: places.map(([time]) => time), y: places.map(([, share]) => share), type: 'scatter', mode: 'markers+text', hoverinfo: 'skip',
@@ -127,19 +134,21 @@ function letters() {
 }
 
 function drawLikelihoods() {
-  const lines = data.lines.map((line, number) => ({
-    x: data.times.slice(line.first, line.first + line.share.length), y: line.share, type: 'scatter', mode: 'lines+markers', marker: { size: 3 }, connectgaps: false,
-    line: { color: colourOf(line.slot), dash: dashOf(line.slot), width: 2 }, opacity: faded(number) ? 0.15 : 1, hoverinfo: 'text',
-    text: line.share.map((share) => `${letterOf(number)} ${percent(share)}`), meta: { line: number },
+  const lines = shownLines();
+  const marks = lines.reduce((sum, { share }) => sum + share.length, 0) <= MOST_MARKS;
+  const traces = lines.map(({ number, times, share }) => ({
+    x: times, y: share, type: 'scatter', mode: marks ? 'lines+markers' : 'lines', marker: { size: 3 }, connectgaps: false, hoverinfo: 'text',
+    line: { color: colourOf(slotOf(number)), dash: dashOf(slotOf(number)), width: 2 }, opacity: faded(number) ? 0.15 : 1,
+    text: share.map((value) => `${letterOf(number)} ${percent(value)}`), meta: { line: number },
   }));
-  Plotly.react(byId('likelihoods'), [...lines, letters()], looks({
+  Plotly.react(byId('likelihoods'), [...traces, letters(lines)], looks({
     height: 210, xaxis: timeAxis(''), yaxis: { range: [-0.03, 1.03], title: { text: 'likelihood', standoff: 4 } }, shapes: [now()], hovermode: 'closest',
   }), CONFIG);
 }
 
 function drawSpeeds() {
   const frame = data.frames[state.frame];
-  const past = first(hand.t, data.times[frame.at] + 1e-6);
+  const [from, past, to] = [span()[0], data.times[frame.at], span()[1]].map((time, row) => first(hand.t, time + (row ? 1e-6 : 0)));
   const measured = { type: 'scatter', mode: 'lines', hoverinfo: 'skip' };
   const predicted = filled([...frame.ways].reverse().map((way) => ({
     x: sums(way.t, 1e-3).map((t) => t + data.times[frame.at]), y: sums(way.v, SPEED), type: 'scatter', mode: 'lines', hoverinfo: 'text',
@@ -148,8 +157,8 @@ function drawSpeeds() {
   })));
   Plotly.react(byId('speeds'), [
     ...predicted,
-    { ...measured, x: hand.t, y: hand.v, line: { color: ink('--ink'), width: 1.5, dash: 'dot' } },
-    { ...measured, x: hand.t.slice(0, past), y: hand.v.slice(0, past), line: { color: ink('--ink'), width: 2.5 } },
+    { ...measured, x: hand.t.slice(from, to), y: hand.v.slice(from, to), line: { color: ink('--ink'), width: 1.5, dash: 'dot' } },
+    { ...measured, x: hand.t.slice(from, past), y: hand.v.slice(from, past), line: { color: ink('--ink'), width: 2.5 } },
   ], looks({ height: 190, xaxis: timeAxis(''), yaxis: { title: { text: 'speed [m/s]', standoff: 4 }, range: [0, topSpeed] }, shapes: [now()] }), CONFIG);
 }
 

@@ -1,0 +1,49 @@
+"""Jerk that nobody planned widens what is predicted, and nothing else."""
+
+import numpy as np
+from numpy.testing import assert_allclose, assert_array_equal
+
+from foc_ros.foc.config import Config, updated
+from foc_ros.foc.dynamics import horizon, triple_integrator
+from foc_ros.foc.estimator import gramian
+from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.records import HandState, make_obstacles
+from foc_ros.foc.replanning import replanned_error_map, triple_integrator_process_covariance
+
+
+def test_it_begins_as_the_filter_expects_and_ends_near_the_goal() -> None:
+    dt, steps = 0.08, 50
+    covariance = triple_integrator_process_covariance(dt, steps)
+    assert_array_equal(covariance[0], 0.0)
+    assert_allclose(covariance[1], np.kron(gramian(dt), np.eye(2)))
+    assert_allclose(covariance[3, 0, 0], (3 * dt) ** 5 / 20, rtol=0.15)
+    assert np.sqrt(covariance[-1, 0, 0]) < 0.01 * np.sqrt(covariance[:, 0, 0].max())
+    assert_allclose(covariance[:, 0, 1], 0.0, atol=1e-15)
+    assert_allclose(covariance[:, 0, 0], covariance[:, 1, 1])
+
+
+def test_it_is_what_a_hand_that_replans_at_each_step_does() -> None:
+    steps, dt, draws = 12, 0.1, 20_000
+    plant, noise = triple_integrator(dt), np.random.default_rng(3)
+    root = np.linalg.cholesky(np.kron(gramian(dt), np.eye(2)))
+    error = np.zeros((draws, 6))
+    expected = triple_integrator_process_covariance(dt, steps)
+    for step in range(steps):
+        if steps - step < 3:  # too few to bring every state to the goal
+            break
+        error = error @ replanned_error_map(horizon(plant, steps - step))[1].T
+        error = error + noise.standard_normal((draws, 6)) @ root.T
+        assert_allclose(error.var(axis=0), np.diag(expected[step + 1]), rtol=0.05)
+
+
+def test_predictions_widen_and_means_and_likelihoods_stay() -> None:
+    hand = HandState(0, np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2))
+    scene = make_obstacles([[0.15, 0.01]], 0.03), np.array([[0.3, 0.0]])
+    narrow = predict(Config(), hand, *scene, Memory())[0]
+    wide = predict(updated(Config(), {'foc.process_noise': 2.0}), hand, *scene, Memory())[0]
+    assert len(narrow.solved) == len(wide.solved) == 2
+    for before, after in zip(narrow.outcomes, wide.outcomes, strict=True):
+        assert_array_equal(before.solution.mean, after.solution.mean)
+        assert before.likelihood == after.likelihood
+        added = after.solution.covariance - before.solution.covariance
+        assert_allclose(added, 4.0 * triple_integrator_process_covariance(before.solution.dt, 50), atol=1e-15)
