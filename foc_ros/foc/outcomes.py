@@ -31,32 +31,16 @@ def solve_candidates(
     problems: one for every goal; effort_spent: since movement onset [m^2/s^5]; earlier: solutions to start from where there
     is one of the same label. Returns the solved ones first, most likely first.
     """
-<<<<<<< HEAD
-    found = earlier or {}
-    judged = [_solved(each, problems[each.goal], settings, effort_spent, found.get(each.label)) for each in candidates]
-    return ranked(distinct(judged), beta)
-
-
-def _solved(
-    candidate: Candidate, problem: Problem, settings: FocConfig, effort_spent: float, previous: Solution | None
-) -> Outcome:
-    """Solve from the earlier solution; if that gets into what the earlier one was not, from the candidate's own guess."""
-    if previous is not None:
-        again = forward(problem, warm(previous, problem), settings)
-        outcome = _judged(candidate, problem, again, effort_spent)
-=======
-    shared = shared_cost(effort_spent, likelihood)
-    judged = [_solved(candidate, problems[candidate.goal], settings, shared, earlier) for candidate in candidates]
+    shared, found = shared_cost(effort_spent, likelihood), earlier or {}
+    judged = [_solved(each, problems[each.goal], settings, shared, found.get(each.label)) for each in candidates]
     return ranked(distinct(judged), likelihood, problems[0].obstacles if problems else make_obstacles())
 
 
-def _solved(candidate: Candidate, problem: Problem, settings: FocConfig, shared: float, earlier: Earlier | None) -> Outcome:
+def _solved(candidate: Candidate, problem: Problem, settings: FocConfig, shared: float, previous: Solution | None) -> Outcome:
     """Solve from the earlier solution; if that gets into what the earlier one was not, from the candidate's own guess."""
-    previous = earlier.solutions.get(candidate.label) if earlier else None
-    if earlier and previous is not None:
-        again = forward(problem, warm(previous, earlier.elapsed_s, problem), settings)
+    if previous is not None:
+        again = forward(problem, warm(previous, problem), settings)
         outcome = _judged(candidate, problem, again, shared)
->>>>>>> main
         if outcome.solved or outcome.solution.status is previous.status:
             return outcome
     return _judged(candidate, problem, forward(problem, cold(candidate.guess), settings), shared)

@@ -18,13 +18,8 @@ from .likelihood import most_likely
 from .noise import noise_per_step
 from .outcomes import solve_candidates
 from .problem import Problem, rest_to_goal
-<<<<<<< HEAD
 from .records import Array, Candidate, HandState, Obstacles, Outcome, Prediction, Solution, Status
-from .replanning import triple_integrator_error_map
-=======
-from .records import NANOSECONDS, Array, Candidate, HandState, Obstacles, Outcome, Prediction, Solution, Status
 from .replanning import triple_integrator_error_map, triple_integrator_process_covariance
->>>>>>> main
 
 
 @dataclass(frozen=True)
@@ -55,14 +50,8 @@ def predict(
     found = search(hand.mean, goals, obstacles, config.homotopy, durations, config.foc.steps, memory.candidates)
     seen = hand, goals, obstacles, config.homotopy, durations, config.foc.steps
     candidates = recall(library, *seen, found.candidates, memory.candidates)
-<<<<<<< HEAD
-    outcomes = solve_candidates(candidates, problems, config.foc, config.likelihood.beta, hand.effort_spent, memory.solutions)
-    outcomes = [_seen(outcome, problems[outcome.candidate.goal], hand) for outcome in outcomes]
-=======
-    earlier = Earlier(memory.solutions, (hand.stamp_ns - memory.stamp_ns) / NANOSECONDS)
-    outcomes = solve_candidates(candidates, problems, config.foc, config.likelihood, hand.effort_spent, earlier)
+    outcomes = solve_candidates(candidates, problems, config.foc, config.likelihood, hand.effort_spent, memory.solutions)
     outcomes = [_seen(outcome, problems[outcome.candidate.goal], hand, config.foc.process_noise) for outcome in outcomes]
->>>>>>> main
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
     best = most_likely(labels, values, memory.most_likely, config.likelihood.margin)
