@@ -21,6 +21,8 @@ COMMANDS = {
     'paper': ('paper', "redo the paper's studies: figures, numbers, a table"),
     'solve': ('solve', 'solve one scene from a YAML or JSON file'),
     'replay': ('replay_command', 'predict from a recording, without ROS and without waiting'),
+    'fit': ('fitting', 'find the parameters that explain recordings best'),
+    'evaluate': ('evaluation', 'judge predictions by recordings of people, beside simple baselines'),
     'convert': ('convert', 'turn motion capture in CSV tables into bags'),
 }
 """Module and purpose of every command; a module exposes `add_arguments(parser)` and `run(arguments)`, the exit code."""

@@ -7,6 +7,7 @@ from typing import TypeVar
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import Progress
 from rich.table import Table
 
@@ -27,7 +28,7 @@ def track(items: Iterable[T], words: str, total: int) -> Iterator[T]:
 
 def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:
     """Print a table on standard output, as wide as it needs to be."""
-    made = Table(title=title, title_justify='left', box=SIMPLE_HEAD, pad_edge=False)
+    made = Table(title=None if title is None else escape(title), title_justify='left', box=SIMPLE_HEAD, pad_edge=False)
     for column in columns:
         made.add_column(column, no_wrap=True)
     for row in rows:

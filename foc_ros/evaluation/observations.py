@@ -29,7 +29,7 @@ class Ways(Record):
     labels; goal (k,): row of the goals; solved (k,); spent [m^2/s^5]: effort since onset, the same for all; to_go (k,)
     [m^2/s^5]: effort through each; likelihood (k,): as published, 0 unless solved; length (k,) [m]: of the shortest path in its
     class; time_s (k,): to its goal; named (k, n): whether the obstacle is in the candidate's name; sides (k, n): LEFT or RIGHT,
-    on which the predicted path passes each of the n obstacles; mean (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2]: of the
+    on which it passes each of the n obstacles; mean (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2]: of the
     position at `TIMES_S`; partings: when they part.
     """
 

@@ -89,10 +89,13 @@ def _ways(prediction: Prediction, obstacles: Obstacles, spent: float) -> Ways:
 
 
 def _predicted_sides(outcome: Outcome, obstacles: Obstacles) -> NDArray[np.int8]:
+    """Return the sides (n,) on which a candidate runs: those in its name where it could not be solved, else its path's own."""
     solution = outcome.solution
     moved = centres(obstacles, solution.dt, len(solution.mean) - 1)
     where = np.concatenate((obstacles.centre[:, None], moved), axis=1).swapaxes(0, 1)
-    return _sides(solution.path, where)
+    sides = _sides(solution.path, where)
+    named = {} if outcome.solved else dict(outcome.candidate.sides)
+    return np.array([named.get(identity, side) for identity, side in zip(obstacles.ids, sides, strict=True)], dtype=np.int8)
 
 
 def _sides(path: Array, where: Array) -> NDArray[np.int8]:

@@ -45,11 +45,18 @@ class Question(Record):
     is_open: NDArray[np.bool_]
     truth: int
 
+    @property
+    def unlisted(self) -> int:
+        """Number of open answers that no candidate gives and that did not come true."""
+        return max(self.open - int(self.is_open.sum()), 0)
+
 
 def relevant(recording: Observations) -> frozenset[str]:
     """Return the obstacles that matter in a recording: those in the name of any candidate."""
-    named = ((each.ids, each.ways.named.any(axis=0)) for each in recording.each)
-    return frozenset(identity for ids, row in named for identity, is_named in zip(ids, row, strict=True) if is_named)
+    found: set[str] = set()
+    for each in recording.each:
+        found.update(each.ids[row] for row in np.flatnonzero(each.ways.named.any(axis=0)))
+    return frozenset(found)
 
 
 def question(name: str, seen: Observation, obstacles: frozenset[str]) -> Question | None:

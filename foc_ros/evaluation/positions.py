@@ -1,0 +1,77 @@
+"""How far predicted positions are from the true ones, and how many of these the predicted ellipses hold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from foc_ros.foc.records import Array
+
+from .minimum_jerk import straight_effort, straight_positions
+from .observations import HORIZONS_S, TIMES_S, Observation, Observations
+
+LEVELS = (0.5, 0.9)
+"""Probabilities of the ellipses."""
+TIMES = np.array(TIMES_S)
+EXACT = 1e-18
+"""Variance of a position that is known [m^2]: a nanometre's."""
+
+
+def position_scores(recordings: Sequence[Observations]) -> dict[str, Any]:
+    """Return average and final displacement errors [m] by predictor and horizon, and the share inside the ellipses.
+
+    The average is over the times up to the horizon; a horizon counts where the recording goes on until then.
+    """
+    seen = [each for recording in recordings for each in recording.each]
+    true = np.array([each.truth.positions for each in seen])
+    predicted = {
+        'most likely': np.array([each.ways.mean[_leading(each)] for each in seen]),
+        'likelihood-weighted': np.array([np.tensordot(each.ways.likelihood, each.ways.mean, 1) for each in seen]),
+        'constant velocity': np.array([_going_on(each) for each in seen]),
+        'straight minimum jerk': np.array(
+            [straight_positions(each, int(straight_effort(each).argmin()), TIMES) for each in seen]
+        ),
+    }
+    return {
+        'displacement_m': {name: _errors(positions, true) for name, positions in predicted.items()},
+        'inside': {f'{level:g}': _by_horizon(_inside(seen, true, level)) for level in LEVELS},
+    }
+
+
+def _errors(positions: Array, true: Array) -> dict[str, dict[str, float | None]]:
+    apart = np.hypot(*(positions - true).transpose(2, 0, 1))
+    average = np.cumsum(apart, axis=1) / np.arange(1, len(TIMES) + 1)
+    return {'average': _by_horizon(average), 'final': _by_horizon(apart)}
+
+
+def _by_horizon(values: Array) -> dict[str, float | None]:
+    """Return the mean (m, h) over predictions at each of the horizons; nan does not count."""
+    at = {f'{horizon:g}': values[:, TIMES_S.index(horizon)] for horizon in HORIZONS_S}
+    return {name: float(np.nanmean(each)) if np.isfinite(each).any() else None for name, each in at.items()}
+
+
+def _inside(seen: Sequence[Observation], true: Array, level: float) -> Array:
+    """Return 1 where the ellipse of the most likely way holds the true position, 0 where not, nan where there is none."""
+    chosen = [_leading(each) for each in seen]
+    mean = np.array([each.ways.mean[row] for each, row in zip(seen, chosen, strict=True)])
+    covariance = np.array([each.ways.covariance[row] for each, row in zip(seen, chosen, strict=True)])
+    missing = true - mean
+    squared = (missing * np.linalg.solve(covariance + EXACT * np.eye(2), missing[..., None])[..., 0]).sum(axis=-1)
+    # chi-square of two degrees of freedom
+    return np.where(np.isfinite(squared), (squared <= -2.0 * np.log(1.0 - level)).astype(float), np.nan)
+
+
+def _leading(seen: Observation) -> int:
+    """Return the row of the most likely way, as published."""
+    return seen.ways.labels.index(seen.most_likely) if seen.most_likely else int(seen.ways.likelihood.argmax())
+
+
+def _going_on(seen: Observation) -> Array:
+    velocity = seen.hand[2:4] if seen.since_s > 0.0 else np.zeros(2)
+    return np.asarray(seen.hand[:2] + TIMES[:, None] * velocity)
+
+
+def _straight(seen: Observation) -> Array:
+    return straight_positions(seen, int(straight_effort(seen).argmin()), TIMES)
