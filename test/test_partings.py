@@ -53,11 +53,9 @@ def test_an_obstacle_that_both_pass_alike_or_leave_behind_parts_nothing() -> Non
     assert found.way.tolist() == [0, 0]
 
 
-def test_ways_to_different_goals_part_when_they_are_half_as_far_apart() -> None:
-    found = partings(
-        [outcome([(0.0, 0.0), (1.0, 1.0)], 0), outcome([(0.0, 0.0), (1.0, -1.0)], 1, duration_s=1.0)], make_obstacles()
-    )
-    np.testing.assert_allclose(found.after_s, [[np.inf, 0.5], [0.5, np.inf]])
+def test_the_same_way_to_different_goals_never_parts() -> None:
+    found = partings([outcome([(0.0, 0.0), (1.0, 1.0)], 0), outcome([(0.0, 0.0), (1.0, -1.0)], 1)], make_obstacles())
+    assert np.isinf(found.after_s).all()
     assert found.way.tolist() == [0, 0]
 
 
@@ -90,9 +88,15 @@ def test_of_two_choices_the_near_one_goes_by_cost_and_the_far_one_is_open() -> N
     np.testing.assert_allclose(p, near / near.sum(), rtol=1e-12)
 
 
-def test_a_way_round_counts_once_however_many_goals_it_leads_to() -> None:
-    parted = Partings(np.where(np.eye(3, dtype=bool), np.inf, 1e6), np.array([0, 0, 2]))
-    np.testing.assert_allclose(likelihoods(COSTS, ahead(1.0), parted), [0.25, 0.25, 0.5])
+def test_goals_of_one_way_share_it_by_their_costs() -> None:
+    after_s = np.array([[np.inf, np.inf, 1e6], [np.inf, np.inf, 1e6], [1e6, 1e6, np.inf]])
+    p = likelihoods(COSTS, ahead(1.0), Partings(after_s, np.array([0, 0, 2])))
+    np.testing.assert_allclose(p, [0.5 * 0.8, 0.5 * 0.2, 0.5])
+
+
+def test_looking_ahead_without_end_is_the_plain_rule() -> None:
+    parted = Partings(np.array([[np.inf, np.inf, 2.0], [np.inf, np.inf, 2.0], [2.0, 2.0, np.inf]]), np.array([0, 0, 2]))
+    np.testing.assert_allclose(likelihoods(COSTS, ahead(1e9), parted), likelihoods(COSTS, ahead(0.0)), rtol=1e-6)
 
 
 def test_without_a_lookahead_partings_do_not_matter() -> None:
@@ -105,6 +109,6 @@ def test_extreme_costs_do_not_overflow() -> None:
     np.testing.assert_allclose(p, [1.0, 0.0, 0.0])
 
 
-def test_shared_cost_is_the_base_and_a_share_of_what_was_spent() -> None:
+def test_shared_cost_is_a_share_of_what_was_spent() -> None:
     assert shared_cost(3.0, LikelihoodConfig()) == 3.0
-    assert shared_cost(3.0, LikelihoodConfig(spent_share=0.5, base_effort=2.0)) == 3.5
+    assert shared_cost(3.0, LikelihoodConfig(spent_share=0.5)) == 1.5

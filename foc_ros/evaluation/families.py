@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import product
 
@@ -19,9 +20,7 @@ from .questions import Question
 PUBLISHED, REFITTED, UNIFORM = 'foc', 'foc, held out', 'uniform'
 CONFIDENCES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 POWERS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
-BASES = (0.0, 0.1, 0.3, 1.0)
-"""Base efforts tried, in parts of the median effort to go."""
-LOOKAHEADS_S = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
+LOOKAHEADS_S = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4)
 RATES = tuple(float(rate) for rate in np.geomspace(0.01, 100.0, 25))
 """Inverse temperatures tried, in parts of one over the median effort to go."""
 
@@ -31,7 +30,7 @@ def families(recordings: Sequence[Observations], published: LikelihoodConfig) ->
     effort = float(np.median([seen.ways.to_go[seen.ways.solved].min() for each in recordings for seen in each.each]))
     return (
         Family(PUBLISHED, (None,), _published),
-        Family(REFITTED, power_rules(effort, published), _power_rule),
+        Family(REFITTED, power_rules(published), _power_rule),
         Family(UNIFORM, (None,), _uniform),
         Family('constant velocity', CONFIDENCES, partial(_guess, forecasts.constant_velocity)),
         Family('nearest gap', CONFIDENCES, partial(_guess, forecasts.nearest_gap)),
@@ -41,12 +40,12 @@ def families(recordings: Sequence[Observations], published: LikelihoodConfig) ->
     )
 
 
-def power_rules(effort: float, published: LikelihoodConfig) -> tuple[LikelihoodConfig, ...]:
-    """Return the parameters of the likelihood that are tried; effort [m^2/s^5]: the unit of the base efforts."""
-    plain = [LikelihoodConfig(beta=beta, margin=published.margin) for beta in POWERS]
+def power_rules(published: LikelihoodConfig) -> tuple[LikelihoodConfig, ...]:
+    """Return the parameters of the likelihood that are tried: the plain rule, and looking ahead."""
+    plain = [replace(published, beta=beta, spent_share=share, lookahead_s=0.0) for beta, share in product(POWERS, (1.0, 0.0))]
     ahead = [
-        LikelihoodConfig(beta=beta, spent_share=0.0, base_effort=base * effort, lookahead_s=seconds, margin=published.margin)
-        for beta, base, seconds in product(POWERS[1:], BASES, LOOKAHEADS_S)
+        replace(published, beta=beta, spent_share=share, lookahead_s=seconds)
+        for beta, share, seconds in product(POWERS, (1.0, 0.0), LOOKAHEADS_S)
     ]
     return (*plain, *ahead)
 

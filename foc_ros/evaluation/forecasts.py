@@ -14,7 +14,6 @@ import numpy as np
 
 from foc_ros.foc.config import LikelihoodConfig
 from foc_ros.foc.likelihood import likelihoods, shared_cost
-from foc_ros.foc.partings import Partings
 from foc_ros.foc.records import LEFT, RIGHT, Array, Record
 
 from .minimum_jerk import straight_effort
@@ -81,7 +80,7 @@ def published(seen: Observation) -> Array:
 def power_rule(seen: Observation, config: LikelihoodConfig) -> Array:
     """Return what the node would publish with other parameters of the likelihood."""
     solved, ways = np.flatnonzero(seen.ways.solved), seen.ways
-    partings = Partings(ways.partings.after_s[np.ix_(solved, solved)], ways.partings.way[solved])
+    partings = ways.partings.take(solved)
     return _with_unknown(seen, likelihoods(shared_cost(ways.spent, config) + ways.to_go[solved], config, partings))
 
 

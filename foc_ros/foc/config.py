@@ -105,7 +105,6 @@ class LikelihoodConfig:
 
     beta: float = _p(0.5, 'exponent of the cost ratio', '', 0.0, 100.0)
     spent_share: float = _p(1.0, 'share of the effort spent since onset that is part of every cost', '', 0.0, 1.0)
-    base_effort: float = _p(0.0, 'effort that is part of every cost: differences far below it tell little', 'm^2/s^5', 0.0, 1e9)
     lookahead_s: float = _p(
         0.0,
         'mean time that the operator looks ahead: beta fades with the time until a choice; 0: without end',

@@ -4,18 +4,16 @@
 
 which, unlike the usual exponential of cost differences, does not change with the unit of effort or the scale of the scene.
 
-J_i = J_0 + w J_spent + J_to_go,i is the effort to go through class i and what all share: w of the effort spent since onset
-(`likelihood.spent_share`), and a constant (`likelihood.base_effort`). The larger J_0, the more the rule becomes the
-exponential of differences: (1 + J / J_0)^-beta -> exp(-beta J / J_0).
+J_i is the effort to go through class i, and what all share: a part of the effort spent since onset (`likelihood.spent_share`).
 
 People weigh what is near, and leave far choices open. Where `likelihood.lookahead_s` is set, they look ahead by a time h that is
-exponentially distributed with that mean. Ways that part later than h, S_i(h) = {j: tau_ij > h}, then look the same, and are worth
-the mean over them,
+exponentially distributed with that mean. A way round W, with all goals to which it leads, is worth V_W = sum_{i in W} J_i^-beta.
+Ways that part from W later than h, S_W(h) = {W': tau_WW' > h}, look the same as W, and are worth their mean:
 
-    u_i = E_h[log mean_{j in S_i(h)} J_j^-beta],  p_i = q_i exp(u_i) / sum_j q_j exp(u_j),
+    p_W = exp(u_W) / sum_W' exp(u_W'),  u_W = E_h[log mean_{W' in S_W(h)} V_W'],  and within W  p_i = p_W J_i^-beta / V_W.
 
-with means weighted by q_j = 1 / (number of goals to which the way of j leads): a way round counts once. So a choice that lies tau
-ahead is made with the exponent beta exp(-tau / lookahead_s): by the cost ratio when it is near, evenly when it is far.
+So a choice that lies tau ahead is made with the exponent beta exp(-tau / lookahead_s): by the ratio of costs when it is near,
+evenly when it is far. Looking ahead without end, h is infinite, and p_i is as above.
 """
 
 from __future__ import annotations
@@ -35,7 +33,7 @@ COST_FLOOR = 1e-9
 
 def shared_cost(effort_spent: float, config: LikelihoodConfig) -> float:
     """Return the part of the cost [m^2/s^5] that all classes share, of a movement that has taken effort_spent [m^2/s^5]."""
-    return config.base_effort + config.spent_share * effort_spent
+    return config.spent_share * effort_spent
 
 
 def likelihoods(costs: Array, config: LikelihoodConfig, partings: Partings | None = None) -> Array:
@@ -59,16 +57,20 @@ def likelihoods(costs: Array, config: LikelihoodConfig, partings: Partings | Non
 
 
 def _looking_ahead(logs: Array, partings: Partings, lookahead_s: float) -> Array:
-    """Return log(q_i) + E_h[log of the q-weighted mean of exp(logs) over those not parted from i by h], (k,)."""
-    weight = 1.0 / np.bincount(partings.way)[partings.way]
-    order = np.argsort(partings.after_s, axis=1, kind='stable')
+    """Return u_W + log(J_i^-beta / V_W) of each class, (k,), from the logarithms of J_i^-beta."""
+    numbers, way = np.unique(partings.way, return_inverse=True)
+    worth = np.full(len(numbers), -np.inf)
+    np.logaddexp.at(worth, way, logs)
+    after_s = np.full((len(numbers), len(numbers)), np.inf)
+    np.minimum.at(after_s, (way[:, None], way), partings.after_s)
+    order = np.argsort(after_s, axis=1, kind='stable')
     # Column m: of those from rank m on, which are what has not parted while h lies between the partings of ranks m - 1 and m.
-    total = np.logaddexp.accumulate((logs + np.log(weight))[order][:, ::-1], axis=1)[:, ::-1]
-    mean = total - np.log(np.cumsum(weight[order][:, ::-1], axis=1)[:, ::-1])
-    later = np.exp(-np.take_along_axis(partings.after_s, order, axis=1) / lookahead_s)
+    total = np.logaddexp.accumulate(worth[order][:, ::-1], axis=1)[:, ::-1]
+    mean = total - np.log(np.arange(len(numbers), 0, -1))
+    later = np.exp(-np.take_along_axis(after_s, order, axis=1) / lookahead_s)
     chance = -np.diff(later, axis=1, prepend=1.0)
-    ahead: Array = np.log(weight) + (chance * mean).sum(axis=1)
-    return ahead
+    weighed: Array = ((chance * mean).sum(axis=1) - worth)[way] + logs
+    return weighed
 
 
 def most_likely(labels: Sequence[str], likelihoods: Array, previous: str | None, margin: float) -> str | None:

@@ -17,20 +17,23 @@ from .records import Array, Obstacles, Outcome, Record
 class Partings(Record):
     """How k ways part.
 
-    after_s (k, k): seconds from now until two of them part, infinite where they never do, as on the diagonal; way (k,): ways with
-    the same number pass all obstacles on the same sides, though they may lead to different goals.
+    after_s (k, k): seconds from now until two of them part, infinite where they never do, as on the diagonal; way (k,): those
+    with the same number pass all obstacles on the same sides, though they may lead to different goals.
     """
 
     after_s: Array
     way: NDArray[np.intp]
+
+    def take(self, rows: NDArray[np.intp]) -> Partings:
+        """Return how some of the ways part."""
+        return Partings(self.after_s[np.ix_(rows, rows)], self.way[rows])
 
 
 def partings(outcomes: Sequence[Outcome], obstacles: Obstacles) -> Partings:
     """Return how the mean paths of outcomes part; obstacles: where they are now.
 
     Two paths from one hand pass an obstacle on different sides where the angles that they sweep about it differ by more than half
-    a turn. They part at the first obstacle of which that is true, when the first of them is nearest to it. Paths that
-    pass all obstacles on the same sides to different goals part when they are half as far apart as these.
+    a turn. They part at the first obstacle of which that is true, when the first of them is nearest to it.
     """
     if not outcomes:
         return Partings(np.zeros((0, 0)), np.zeros(0, dtype=np.intp))
@@ -38,8 +41,7 @@ def partings(outcomes: Sequence[Outcome], obstacles: Obstacles) -> Partings:
     swept, passing = np.array([each[0] for each in seen]), np.array([each[1] for each in seen])
     aside = np.abs(swept[:, None] - swept) > np.pi
     after_s = np.where(aside, np.minimum(passing[:, None], passing), np.inf).min(axis=2, initial=np.inf)
-    alike = np.isinf(after_s)
-    return Partings(np.where(alike, _to_goals(outcomes), after_s), alike.argmax(axis=1))
+    return Partings(after_s, np.isinf(after_s).argmax(axis=1))
 
 
 def _seen(outcome: Outcome, obstacles: Obstacles) -> tuple[Array, Array]:
@@ -49,13 +51,3 @@ def _seen(outcome: Outcome, obstacles: Obstacles) -> tuple[Array, Array]:
     where = np.concatenate((obstacles.centre[:, None], moved), axis=1).swapaxes(0, 1)
     apart = solution.path[:, None] - where
     return swept_angles(solution.path, where), solution.times[(apart**2).sum(axis=2).argmin(axis=0)]
-
-
-def _to_goals(outcomes: Sequence[Outcome]) -> Array:
-    """Return when (k, k) [s] paths to different goals are half as far apart as these; infinite for the same goal."""
-    path = np.array([outcome.solution.path for outcome in outcomes])
-    duration = np.array([outcome.solution.times[-1] for outcome in outcomes])
-    apart = np.hypot(*(path[:, None] - path).transpose(3, 0, 1, 2))
-    goal = np.array([outcome.candidate.goal for outcome in outcomes])
-    share = (2.0 * apart >= apart[..., -1:]).argmax(axis=2) / (path.shape[1] - 1)
-    return np.where(goal[:, None] != goal, share * np.minimum(duration[:, None], duration), np.inf)
