@@ -23,7 +23,13 @@ from .start import Start
 STRIDE = 4.0
 """First look along the curve, in s: lambda grows by 16 from one to the next."""
 WARM_STRIDE = 0.25
-"""First look around the s of a warm start."""
+"""The longest first look around the s of a warm start."""
+SHORTEST = 2.0**-10
+"""The shortest one, and the stride at which an end that is infeasible counts as reached."""
+USUAL_SLOPE = 0.3
+"""What k usually gains per unit of s: a first look goes as far as this says, for want of anything better."""
+OVERSHOOT = 1.2
+"""How much farther a look goes than to where k is expected to be the wanted one."""
 SPAN = 60.0
 """The largest s in any case: without noise, say, when lambda weighs nothing."""
 LARGEST_SHARE = 1e6
@@ -137,7 +143,9 @@ def _walk(walker: _Walker, start: Start) -> Walk:
     if start.lam is None:
         stride, first = STRIDE, walker.point(0.0, start.positions, start.active)
     else:
-        stride, first = WARM_STRIDE, walker.near(curve.s_of(start.lam), start.positions, start.active, start.multipliers)
+        first = walker.near(curve.s_of(start.lam), start.positions, start.active, start.multipliers)
+        ahead = 0.0 if first is None else OVERSHOOT * abs(wanted - first.k) / USUAL_SLOPE
+        stride = min(max(ahead, SHORTEST), WARM_STRIDE)
     if first is None:
         return Walk(Status.INFEASIBLE, 'no control meets every linearised obstacle row', None, walker.qp_solves)
     patience = math.inf if start.lam is None else PATIENCE
@@ -186,7 +194,8 @@ def _strides(walker: _Walker, first: Point, wanted: float, stride: float) -> Ite
     """
     guided = abs(stride) < STRIDE
     point, end = first, walker.end if stride > 0 else 0.0
-    while point.s != end and abs(stride) > WARM_STRIDE / 2:
+    shortest = min(abs(stride), WARM_STRIDE) / 2
+    while point.s != end and abs(stride) > shortest:
         s = min(point.s + stride, end) if stride > 0 else max(point.s + stride, end)
         further = walker.beside(s, point)
         if further is None:
@@ -202,8 +211,8 @@ def _next_stride(before: Point, point: Point, wanted: float, stride: float) -> f
     """Go a little farther than where k would be the wanted one if it went on as it does; at most four times the last stride."""
     largest = min(4 * abs(stride), STRIDE)
     slope = (point.k - before.k) / (point.s - before.s)
-    length = 1.2 * abs(wanted - point.k) / slope if slope > 0 else largest
-    return math.copysign(min(max(length, WARM_STRIDE), largest), stride)
+    length = OVERSHOOT * abs(wanted - point.k) / slope if slope > 0 else largest
+    return math.copysign(min(max(length, SHORTEST), largest), stride)
 
 
 def _root(walker: _Walker, low: Point, high: Point, wanted: float, *, guided: bool) -> Point:
