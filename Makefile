@@ -1,5 +1,5 @@
 # make setup [PYTHON=python3.12] [ROS=wheels|system]   a .venv with everything; re-run only when needed
-# make demo | test | lint | bench | pages | clean
+# make demo | test | lint | doc | bench | pages | clean
 # make colcon | fuzz | soak | stops   the long checks: colcon build and test, many messages, ten minutes of faults, 200 signals
 
 PYTHON ?= python3
@@ -30,7 +30,7 @@ else
 $(error ROS is wheels or system, got '$(ROS)')
 endif
 
-.PHONY: setup demo test lint bench pages colcon fuzz soak stops clean
+.PHONY: setup demo test lint doc bench pages colcon fuzz soak stops clean
 
 setup: $(STAMP)
 ifneq ($(origin PYTHON),file)
@@ -65,6 +65,14 @@ soak: $(STAMP)
 
 stops: $(STAMP)
 	$(BIN)/python scripts/stops.py --count 100
+
+# build/doc/index.html; what Sphinx warns of, such as a link that leads nowhere, fails
+doc: $(VENV)/.doc
+	$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --quiet --fresh-env doc build/doc
+
+$(VENV)/.doc: $(STAMP)
+	$(PIP) install --quiet --editable '.[doc]'
+	touch $@
 
 # What it compares with is large, and installed only for this. OPTIONS=--quick for a look, --json, --markdown, '--only NAME'
 bench: $(VENV)/.bench

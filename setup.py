@@ -40,6 +40,7 @@ setup(
         'PyYAML>=6.0',
         'rich>=13.0',
         'rosbags>=0.10',
+        'scipy>=1.9',
     ],
     extras_require={
         # rclpy with Fast DDS and the common interfaces as wheels, for machines without a ROS installation
@@ -47,6 +48,8 @@ setup(
         'report': ['matplotlib>=3.6', 'plotly>=5.24'],
         # recordings on the workers of a Dask cluster
         'cluster': ['distributed>=2024.1'],
+        # the documentation as a web site
+        'doc': ['furo>=2024.8', 'myst-parser>=4', 'sphinx>=8'],
         # what the benchmark compares with
         'bench': ['casadi>=3.6', 'cvxpy>=1.4', 'daqp>=0.5', 'matplotlib>=3.6', 'scipy>=1.15'],
         'test': [

@@ -1,4 +1,4 @@
-"""The README's pictures are there, and their scripts draw what they say."""
+"""The pictures of README and concepts are there, and their scripts draw what they say; so are the tables of the examples."""
 
 from __future__ import annotations
 
@@ -58,3 +58,21 @@ def test_the_script_draws_the_beginning_of_its_movement() -> None:
         assert any(np.array_equal(line, way.path) for line in drawn)
     # the hand's past, its future, and where it is
     assert sum(np.isin(line[:, 0], track.positions[:, 0]).all() for line in drawn) >= 3
+
+
+@pytest.mark.parametrize('name', ['noise', 'surrogate', 'strategies', 'classes', 'likelihood'])
+def test_concepts_have_their_pictures(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    concepts = script('make_concept_pictures')
+    monkeypatch.setattr(concepts, 'SAMPLES', 500)
+    figure = concepts.PARTS[name]()
+    assert all(axes.has_data() or axes.texts for axes in figure.axes)
+    assert f'](images/concept_{name}.png)' in (ROOT / 'doc' / 'concepts.md').read_text(encoding='utf-8')
+    assert (ROOT / 'doc' / 'images' / f'concept_{name}.png').exists()
+
+
+def test_example_tables_are_those_of_the_script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tables = script('make_example_tables')
+    monkeypatch.setattr(sys, 'argv', ['make_example_tables.py', str(tmp_path)])
+    tables.main()
+    for file in tmp_path.iterdir():
+        assert file.read_bytes() == (ROOT / 'doc' / 'examples' / file.name).read_bytes(), file.name

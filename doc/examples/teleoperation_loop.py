@@ -1,12 +1,13 @@
 """A stand-in for a teleoperation stack: a hand that reaches to and fro, a scene, and a consumer that leans on the prediction.
 
-Run it beside the node: `foc_ros node --ros-args -r hand_pose:=MTMR/measured_cp`. The set point it publishes is the hand's own
-position, moved towards the predicted path by a share of at most MOST. The share grows while predictions are fresh and falls to
-zero as soon as they are not, whatever the reason: the consumer trusts stamps, not the node.
+Run it beside the node: `foc_ros node --ros-args -r hand_pose:=MTMR/measured_cp`; with `--seconds 20` it ends by itself. The set
+point it publishes is the hand's own position, moved towards the predicted path by a share of at most MOST. The share grows while
+predictions are fresh and falls to zero as soon as they are not, whatever the reason: the consumer trusts stamps, not the node.
 """
 
 from __future__ import annotations
 
+import argparse
 import signal
 import sys
 import time
@@ -19,6 +20,7 @@ from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
+from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Float64
 
@@ -56,6 +58,7 @@ class TeleoperationLoop(Node):
         self.create_subscription(PointCloud2, 'foc/prediction', self._predicted, 10)
         self.create_timer(0.01, self._move)
         self.create_timer(0.1, self._show)
+        self.create_timer(1.0, self._tell)
 
     def _predicted(self, cloud: PointCloud2) -> None:
         self._prediction = cloud
@@ -81,6 +84,9 @@ class TeleoperationLoop(Node):
             return None
         row = rows[min(np.searchsorted(rows['t'], age_s + LOOKAHEAD_S), len(rows) - 1)]
         return np.array([row['x'], row['y'], row['z']], dtype=float)
+
+    def _tell(self) -> None:
+        print(f'{time.monotonic() - self._began:4.0f} s: leaning on the prediction by {self._share:.0%}', flush=True)
 
     def _show(self) -> None:
         stamp = self.get_clock().now().to_msg()
@@ -113,7 +119,10 @@ def table(cloud: PointCloud2) -> np.ndarray:
 
 
 def main() -> int:
-    """Run until SIGINT or SIGTERM."""
+    """Run until SIGINT or SIGTERM, or for so many seconds."""
+    parser = argparse.ArgumentParser(description='A teleoperation stack in small.')
+    parser.add_argument('--seconds', type=float, default=float('inf'))
+    until = time.monotonic() + parser.parse_args(remove_ros_args(sys.argv)[1:]).seconds
     stopped: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: stopped.append(number))
@@ -122,7 +131,7 @@ def main() -> int:
     executor = SingleThreadedExecutor(context=context)
     node = TeleoperationLoop(context)
     executor.add_node(node)
-    while not stopped:
+    while not stopped and time.monotonic() < until:
         executor.spin_once(timeout_sec=0.1)
     executor.shutdown()
     node.destroy_node()

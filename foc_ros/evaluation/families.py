@@ -36,7 +36,7 @@ def families(recordings: Sequence[Observations], published: LikelihoodConfig) ->
         Family('nearest gap', CONFIDENCES, partial(_guess, forecasts.nearest_gap)),
         Family('shortest path', CONFIDENCES, partial(_guess, forecasts.shortest_path)),
         Family('Boltzmann', tuple(rate / effort for rate in RATES), _boltzmann),
-        Family('straight minimum jerk', POWERS, forecasts.straight_minimum_jerk),
+        Family('straight minimum jerk', tuple(product(POWERS, CONFIDENCES)), _straight),
     )
 
 
@@ -64,6 +64,10 @@ def _power_rule(seen: Observation, asked: Question, config: LikelihoodConfig) ->
 
 def _boltzmann(seen: Observation, asked: Question, rate: float) -> Forecast:
     return forecasts.of_shares(forecasts.boltzmann(seen, rate), asked)
+
+
+def _straight(seen: Observation, asked: Question, setting: tuple[float, float]) -> Forecast:
+    return forecasts.straight_minimum_jerk(seen, asked, *setting)
 
 
 def _guess(guess: forecasts.Guess, seen: Observation, asked: Question, confidence: float) -> Forecast:

@@ -133,8 +133,11 @@ def _toward(goals: Array, velocity: Array) -> int:
     return int((goals @ velocity / np.maximum(np.hypot(*goals.T), 1e-12)).argmax())
 
 
-def straight_minimum_jerk(seen: Observation, question: Question, beta: float) -> Forecast:
-    """Weigh straight movements to the goals by the ratios of their efforts; each answers as its straight line does."""
+def straight_minimum_jerk(seen: Observation, question: Question, beta: float, confidence: float) -> Forecast:
+    """Weigh straight movements to the goals by the ratios of their efforts; each answers as its straight line does.
+
+    confidence: in the whole of it, in [0, 1 - DOUBT].
+    """
     shares = likelihoods(straight_effort(seen), LikelihoodConfig(beta=beta))
     ways = seen.goals - seen.hand[:2]
     given = [(goal,) if question.name == GOAL else _straight(seen, question, way) for goal, way in enumerate(ways)]
@@ -142,4 +145,4 @@ def straight_minimum_jerk(seen: Observation, question: Question, beta: float) ->
     for share, answer in zip(shares, given, strict=True):
         if answer in question.answers:
             total[question.answers.index(answer)] += share
-    return _with_rest(total, question, DOUBT)
+    return _with_rest(total, question, 1.0 - confidence)

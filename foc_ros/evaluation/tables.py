@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from .questions import GAP, GOAL, WAY
@@ -74,7 +74,7 @@ def _facts(answer: Mapping[str, Any]) -> Table:
 def _setting(setting: Any) -> str:
     if isinstance(setting, Mapping):
         return ', '.join(f'{name} {value:g}' for name, value in setting.items())
-    return f'{setting:.4g}'
+    return ', '.join(f'{value:.4g}' for value in setting) if isinstance(setting, Sequence) else f'{setting:.4g}'
 
 
 def number(value: float | None, digits: int) -> str:

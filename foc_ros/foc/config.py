@@ -84,6 +84,13 @@ class EstimatorConfig:
     position_stddev: float = _p(0.001, 'standard deviation of a measured position', 'm', 1e-7, 1.0)
     jerk_density: float = _p(5.0, 'root of the spectral density of the jerk that the filter expects', 'm/s^2.5', 1e-6, 1e6)
     onset_speed: float = _p(0.05, 'speed above which a movement has begun; it has ended below half of it', 'm/s', 1e-4, 10.0)
+    acceleration_time_s: float = _p(
+        0.0,
+        'time in which an acceleration fades: predictions start at the speed it leads to; 0: with the acceleration',
+        's',
+        0.0,
+        10.0,
+    )
     gap_s: float = _p(0.5, 'gap between samples beyond which the filter starts anew', 's', 0.001, 60.0)
     hand_timeout_s: float = _p(
         0.5, 'silence of the hand, or age of a pose, in the node beyond which nothing is predicted; 0: never', 's', 0.0, 1e6

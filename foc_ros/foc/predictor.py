@@ -43,7 +43,7 @@ def predict(
     fit. The same arguments give the same answer, times apart.
     """
     began = time.perf_counter()
-    hand = _at_rest(hand)
+    hand = _start(hand, config.estimator.acceleration_time_s)
     durations = [time_to_go(hand, goal, config.duration) for goal in goals]
     given, obstacles = obstacles, relevant(obstacles, hand.mean[:2], goals, max(durations), config.scene.max_obstacles)
     problems = [reaching_problem(config, hand, obstacles, *pair) for pair in zip(goals, durations, strict=True)]
@@ -83,13 +83,22 @@ def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal
     )
 
 
-def _at_rest(hand: HandState) -> HandState:
-    """Take speed and acceleration of a hand that has not begun to move as nothing.
+def _start(hand: HandState, acceleration_time_s: float) -> HandState:
+    """Return the state that a prediction starts from.
 
-    They are noise: with 1 mm of it at 100 Hz, the efforts of a hand at rest would differ by a factor of three from one sample to
-    the next, and the ways round a symmetric obstacle would swap their ranks 24 times a second.
+    Speed and acceleration of a hand that has not begun to move are taken as nothing. They are noise: with 1 mm of it at 100 Hz,
+    the efforts of a hand at rest would differ by a factor of three from one sample to the next, and the ways round a symmetric
+    obstacle would swap their ranks 24 times a second.
+
+    An acceleration a that fades as exp(-t / tau) leads from the speed v to v + tau a. Where the operator commands speed, as with
+    a thumb stick, that is soon, and a plan that starts from v + tau a without acceleration is nearer to what comes.
     """
-    return hand if hand.onset_ns is not None else replace(hand, mean=np.append(hand.mean[:2], np.zeros(4)))
+    if hand.onset_ns is None:
+        return replace(hand, mean=np.append(hand.mean[:2], np.zeros(4)))
+    if not acceleration_time_s:
+        return hand
+    settled = hand.mean[2:4] + acceleration_time_s * hand.mean[4:]
+    return replace(hand, mean=np.concatenate([hand.mean[:2], settled, np.zeros(2)]))
 
 
 def _seen(outcome: Outcome, problem: Problem, hand: HandState, process_noise: float) -> Outcome:

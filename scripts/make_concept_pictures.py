@@ -1,0 +1,192 @@
+#!/usr/bin/env python3
+"""Make the pictures of doc/concepts.md: noise, surrogate, strategies, classes, likelihood; all solved by the program.
+
+python scripts/make_concept_pictures.py [DIRECTORY]
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from foc_ros.drawing import class_style, draw_legend, draw_scene, draw_ways, new_figure, stddev_ellipse, tag
+from foc_ros.foc.config import FocConfig, LikelihoodConfig
+from foc_ros.foc.dynamics import triple_integrator_horizon
+from foc_ros.foc.forward import forward
+from foc_ros.foc.likelihood import likelihoods
+from foc_ros.foc.monte_carlo import monte_carlo
+from foc_ros.foc.noise import noise_per_step, stacked_noise
+from foc_ros.foc.problem import Problem, rest_to_goal
+from foc_ros.foc.records import Array, Obstacles, Solution, make_obstacles
+from foc_ros.foc.start import cold
+from foc_ros.guess import guess_path
+from foc_ros.moments import ways_of
+from foc_ros.paper.reaching import Method, solve_way
+from foc_ros.paper.scenes import NOISE as PAPER_NOISE
+from foc_ros.paper.scenes import STRATEGY_SCENE
+from foc_ros.plots import bounds_of, save
+from foc_ros.scene_file import load_scene
+from foc_ros.solve import scene_problems, solve_scene
+
+PICTURES = Path(__file__).resolve().parents[1] / 'doc' / 'images'
+SCENE = Path(__file__).resolve().parents[1] / 'doc' / 'examples' / 'scene.yaml'
+STEPS, GOAL = 50, np.array([0.3, 0.0])
+NOISE, REFERENCE_S = 0.1, 0.02
+"""c for a step of so long [s]."""
+NOTHING = make_obstacles()
+CIRCLE = make_obstacles([[0.15, -0.01]], 0.03, 0.003)
+SLANTED = np.array([0.3, 0.12])
+"""A goal that takes effort on both axes."""
+SAMPLES = 20_000
+
+
+def reach(
+    seconds: float, obstacles: Obstacles, eta: float = 0.9, strategy: str = 'optimal', goal: Array = GOAL
+) -> tuple[Problem, Solution]:
+    """Return a reach from rest to rest at a goal, past the obstacles on the left, and its problem."""
+    horizon = triple_integrator_horizon(seconds / STEPS, STEPS)
+    c = noise_per_step(np.full(2, NOISE), REFERENCE_S, horizon.dt)
+    problem = rest_to_goal(horizon, np.zeros(6), goal, obstacles, c, eta)
+    return problem, forward(problem, cold(guess_path(np.zeros(2), goal, STEPS, 0.05)), FocConfig(strategy=strategy))
+
+
+def rolled(problem: Problem, solution: Solution, count: int) -> Array:
+    """Return noisy movements under the control of a solution, (count, N, 2) [m]."""
+    control = solution.control.T.ravel()
+    draws = np.random.default_rng(0).standard_normal((count, control.size))
+    noise = stacked_noise(problem.noise, STEPS) * np.abs(control) * draws
+    movements: Array = problem.positions(control) + np.einsum('atu,su->sta', problem.horizon.position, noise)
+    return movements
+
+
+def noise() -> Figure:
+    """Return two reaches, quick and slow: noise grows with effort."""
+    with new_figure(8.6, 3.4) as figure:
+        paths, spread = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
+        for number, (seconds, shift) in enumerate(((0.5, 0.05), (1.2, -0.05))):
+            colour, _ = class_style(number)
+            problem, solution = reach(seconds, NOTHING, goal=SLANTED)
+            up = np.array([0.0, shift])
+            for movement in rolled(problem, solution, 30):
+                paths.plot(*(movement + up).T, color=colour, linewidth=0.5, alpha=0.35)
+            paths.plot(*(solution.path + up).T, color=colour, linewidth=2.2)
+            for row in range(5, STEPS + 1, 5):
+                _ellipse(paths, solution, row, colour, up)
+            paths.annotate(f'in {seconds:g} s', (0.0, shift), xytext=(-4, 16), textcoords='offset points', color=colour)
+            deviation = 1e3 * np.sqrt(solution.covariance[:, 0, 0])
+            spread.plot(solution.times, deviation, color=colour, linewidth=2.2, label=f'in {seconds:g} s')
+        paths.set(xlabel='x [m]', ylabel='y [m]')
+        paths.set_aspect('equal', adjustable='datalim')
+        spread.set(xlabel='time [s]', ylabel='standard deviation of x [mm]', ylim=(0.0, None))
+        spread.legend(frameon=False)
+    return figure
+
+
+def surrogate() -> Figure:
+    """Return paths for more and more eta, and how often noisy movements really stay clear."""
+    with new_figure(8.6, 3.4) as figure:
+        paths, shares = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
+        draw_scene(paths, CIRCLE, GOAL[None], (-0.02, 0.32, -0.07, 0.12), named=False)
+        for number, eta in enumerate((0.5, 0.8, 0.95)):
+            colour, dash = class_style(number)
+            _, solution = reach(1.0, CIRCLE, eta)
+            paths.plot(*solution.path.T, color=colour, linestyle=dash, linewidth=2.0, label=f'η = {eta:g}')
+            _ellipse(paths, solution, STEPS // 2, colour)
+        paths.legend(frameon=False, loc='upper left', ncols=3)
+        etas = np.array([0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95])
+        clear = [_clear(eta) for eta in etas]
+        shares.plot(etas, clear, marker='o', color=class_style(2)[0], label='share of movements\nclear at the worst step')
+        shares.plot((0.5, 1.0), (0.5, 1.0), color='0.4', linestyle='--', label='what was asked for')
+        shares.set(xlabel='wanted η', ylabel='share', ylim=(0.48, 1.02))
+        shares.legend(frameon=False, loc='lower right')
+    return figure
+
+
+def strategies() -> Figure:
+    """Return the same scene by three strategies: paths and speeds."""
+    with new_figure(8.6, 3.4) as figure:
+        paths, speeds = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
+        scene = STRATEGY_SCENE
+        draw_scene(paths, scene.obstacles, scene.goal[None], (-0.02, 0.32, -0.06, 0.14), named=False)
+        for number, name in enumerate(('lv', 'hc', 'optimal')):
+            colour, dash = class_style(number)
+            solution = solve_way(scene, scene.ways[0], Method(PAPER_NOISE, name), 0.94)
+            paths.plot(*solution.path.T, color=colour, linestyle=dash, linewidth=2.0)
+            for row in range(5, STEPS, 8):
+                _ellipse(paths, solution, row, colour)
+            speed = np.linalg.norm(solution.mean[:, 2:4], axis=1)
+            speeds.plot(solution.times, speed, color=colour, linewidth=2.0, label=f'{name}, effort {solution.effort:,.0f}')
+        speeds.set(xlabel='time [s]', ylabel='speed [m/s]', ylim=(0.0, 1.5))
+        speeds.legend(frameon=False, loc='upper left', fontsize=8)
+    return figure
+
+
+def classes() -> Figure:
+    """Return the ways that the search finds through the scene of the examples, solved."""
+    scene = load_scene(SCENE)
+    ways = ways_of(solve_scene(scene, scene_problems(scene)))
+    letters = {way.label: number for number, way in enumerate(ways)}
+    with new_figure(7.4, 5.6) as figure:
+        axes, legend = figure.subplots(2, 1, height_ratios=(5.0, 0.2 * len(ways)))
+        draw_scene(axes, scene.obstacles, scene.goals, bounds_of(scene.obstacles, scene.goals, ways))
+        draw_ways(axes, ways, letters)
+        axes.plot(*scene.hand.mean[:2], marker='o', color='black')
+        draw_legend(legend, ways, letters)
+    return figure
+
+
+def likelihood() -> Figure:
+    """Return what cost ratios mean for likelihoods, by beta."""
+    costs = np.array([1.0, 1.3, 2.0, 4.0])
+    with new_figure(8.6, 3.2) as figure:
+        shares, pair = figure.subplots(1, 2)
+        for number, beta in enumerate((0.5, 1.0, 2.0)):
+            colour, dash = class_style(number)
+            config = LikelihoodConfig(beta=beta)
+            places = np.arange(len(costs)) + 0.27 * (number - 1)
+            shares.bar(places, likelihoods(costs, config), 0.25, color=colour, label=f'β = {beta:g}')
+            ratios = np.geomspace(1.0, 10.0, 60)
+            first = [likelihoods(np.array([1.0, ratio]), config)[0] for ratio in ratios]
+            pair.plot(ratios, first, color=colour, linestyle=dash, linewidth=2.0)
+            tag(pair, (ratios[40], first[40]), f'{beta:g}', colour)
+        shares.set_xticks(range(len(costs)), [f'{cost:g}' for cost in costs])
+        shares.set(xlabel='cost of a way, as a multiple of the best one', ylabel='likelihood')
+        shares.legend(frameon=False)
+        pair.set(xscale='log', xlabel='cost of the other way, of two', ylabel='likelihood of the cheaper one', ylim=(0.48, 1.02))
+        pair.set_xticks([1, 2, 5, 10], ['1', '2', '5', '10'])
+        pair.minorticks_off()
+    return figure
+
+
+PARTS: dict[str, Callable[[], Figure]] = {
+    'noise': noise,
+    'surrogate': surrogate,
+    'strategies': strategies,
+    'classes': classes,
+    'likelihood': likelihood,
+}
+
+
+def _clear(eta: float) -> float:
+    problem, solution = reach(1.0, CIRCLE, eta)
+    return monte_carlo(problem, solution.control.T.ravel(), SAMPLES).step[0]
+
+
+def _ellipse(axes: Any, solution: Solution, row: int, colour: str, shift: Array | float = 0.0) -> None:
+    ellipse = stddev_ellipse(solution.path[row] + shift, solution.covariance[row, :2, :2])
+    ellipse.set(facecolor='none', edgecolor=colour, linewidth=0.9, alpha=0.8, zorder=3)
+    axes.add_patch(ellipse)
+
+
+if __name__ == '__main__':
+    parser = argparse.ArgumentParser(description='Make the pictures of doc/concepts.md.')
+    parser.add_argument('directory', nargs='?', type=Path, default=PICTURES)
+    directory = parser.parse_args().directory
+    directory.mkdir(parents=True, exist_ok=True)
+    for name, made in PARTS.items():
+        save(made(), directory / f'concept_{name}.png')

@@ -1,0 +1,69 @@
+#!/usr/bin/env python3
+"""Make doc/examples/*.csv: two movements of the packaged recording as motion-capture tables, for `convert`.
+
+python scripts/make_example_tables.py [DIRECTORY]
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from foc_ros.bags import BagReader
+from foc_ros.foc.config import Config
+from foc_ros.foc.pipeline import Pipeline
+from foc_ros.foc.records import NANOSECONDS, Array, HandSample, Obstacles
+from foc_ros.intake import Intake
+from foc_ros.moments import Track, movements, track_of
+
+ROOT = Path(__file__).resolve().parents[1]
+RECORDING, EXAMPLES = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap', ROOT / 'doc' / 'examples'
+MOVEMENTS = (4, 6)
+"""Which movements of the recording, counted from 0."""
+LEAD_NS, EVERY = 200_000_000, 2
+"""How long before a movement its table begins, and of how many samples one is kept: 50 a second."""
+
+
+def main() -> None:
+    """Write recordings.csv, obstacles.csv and goals.csv into the directory of the command line."""
+    parser = argparse.ArgumentParser(description='Make the tables of doc/examples.')
+    parser.add_argument('directory', nargs='?', type=Path, default=EXAMPLES)
+    directory = parser.parse_args().directory
+    track, obstacles, goals = read()
+    spans = movements(track, Config().estimator.onset_speed)
+    samples = []
+    for name, number in zip('ab', MOVEMENTS, strict=True):
+        begin_ns, end_ns = spans[number][0] - LEAD_NS, spans[number][1]
+        rows = track.between(begin_ns, end_ns)
+        for stamp, (x, y) in list(zip(track.stamps_ns[rows], track.positions[rows], strict=True))[::EVERY]:
+            samples.append((name, f'{(stamp - begin_ns) / NANOSECONDS:.3f}', f'{x:.4f}', f'{y:.4f}'))
+    discs = zip(obstacles.ids, obstacles.centre, obstacles.radius, obstacles.radius_stddev, strict=True)
+    circles = [(name, *(f'{value:.4f}' for value in (*centre, radius, stddev))) for name, centre, radius, stddev in discs]
+    _write(directory / 'recordings.csv', ('recording', 't_s', 'x_m', 'y_m'), samples)
+    _write(directory / 'obstacles.csv', ('id', 'x_m', 'y_m', 'radius_m', 'radius_stddev_m'), circles)
+    _write(directory / 'goals.csv', ('x_m', 'y_m'), [tuple(f'{value:.4f}' for value in goal) for goal in goals])
+
+
+def read() -> tuple[Track, Obstacles, Array]:
+    """Return the hand, the obstacles and the goals of the recording, as the node takes its messages."""
+    intake = Intake(Pipeline(Config()))
+    samples: list[HandSample] = []
+    with BagReader(RECORDING) as reader:
+        for item in reader:
+            intake.take(item.role, item.message)
+            if intake.sample is not None and (not samples or intake.sample is not samples[-1]):
+                samples.append(intake.sample)
+    scene = intake.pipeline.scene
+    assert scene.goals is not None
+    return track_of(samples), scene.obstacles(samples[-1].stamp_ns), scene.goals
+
+
+def _write(file: Path, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    with file.open('w', newline='', encoding='utf-8') as stream:
+        csv.writer(stream, lineterminator='\n').writerows([columns, *rows])
+
+
+if __name__ == '__main__':
+    main()

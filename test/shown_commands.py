@@ -1,0 +1,81 @@
+"""The command lines that the documentation shows, and the ones of them that a test cannot run, each with its reason.
+
+The rule: every line of a block marked `console`, in README, CONTRIBUTING and doc/, is run as it stands, page by page and in
+order, unless it is listed in NOT_RUN. Lines of ENDLESS run until they are interrupted. A line that is listed and no longer shown
+is an error, too.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted([ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *(ROOT / 'doc').glob('*.md')])
+
+ROOT, ROOT_OR_NETWORK = 'wants root', 'wants root or the network'
+ROS = 'wants the commands of a ROS installation'
+BY_CI = '.ci/run runs it'
+LONG = 'takes minutes'
+SHELL = 'the test has the program on its path already'
+NOT_RUN = {
+    # README
+    'make setup': BY_CI,
+    'make demo': 'test_demo.py plays the recording, and this would take another half a minute',
+    'echo "yaml file://$PWD/src/foc_ros/rosdep/foc_ros.yaml" | sudo tee /etc/ros/rosdep/sources.list.d/10-foc_ros.list': ROOT,
+    'rosdep update && rosdep install --from-paths src --ignore-src': ROOT_OR_NETWORK,
+    'colcon build --packages-select foc_ros': 'scripts/colcon_check runs it',
+    'source install/setup.bash': 'scripts/colcon_check runs it',
+    'ros2 run foc_ros foc_node --ros-args -r hand_pose:=/MTMR/measured_cp -r obstacles:=/perception/obstacles '
+    '--params-file install/foc_ros/share/foc_ros/config/foc.yaml': 'scripts/colcon_check starts what this starts',
+    'python3 -m venv venv && . venv/bin/activate': ROOT_OR_NETWORK,
+    "pip install '.[ros,report]'": ROOT_OR_NETWORK,
+    'export AMENT_PREFIX_PATH=$VIRTUAL_ENV': SHELL,
+    # start
+    '. .venv/bin/activate': SHELL,
+    # beside_a_stack
+    "ros2 service call /foc/engage std_srvs/srv/SetBool '{data: false}'": f'{ROS}; test_beside_a_stack.py makes the same calls',
+    "ros2 service call /foc/engage std_srvs/srv/SetBool '{data: true}'": f'{ROS}; test_beside_a_stack.py makes the same calls',
+    'ros2 param set /teleoperation obstacles false': f'{ROS}; test_beside_a_stack.py makes the same calls',
+    'ros2 param set /teleoperation obstacles true': f'{ROS}; test_beside_a_stack.py makes the same calls',
+    # security
+    'ros2 security create_keystore keystore': ROS,
+    'ros2 security create_enclave keystore /foc': ROS,
+    'ros2 security create_permission keystore /foc sros2_policy.xml': ROS,
+    'export ROS_SECURITY_KEYSTORE=$PWD/keystore ROS_SECURITY_ENABLE=true ROS_SECURITY_STRATEGY=Enforce': ROS,
+    'ros2 run foc_ros foc_node --ros-args --enclave /foc': ROS,
+    # measuring
+    '.venv/bin/python scripts/make_accuracy_figures.py': f'{LONG}; test_accuracy_page.py runs its parts',
+    'foc_ros paper --output paper_output': 'takes half a minute; test_paper.py does the same on a coarser grid',
+    # CONTRIBUTING
+    'make test': BY_CI,
+    'make lint': BY_CI,
+    'make doc': BY_CI,
+    'make bench': LONG,
+    'make colcon': BY_CI,
+    'make fuzz': LONG,
+    'make soak': LONG,
+    'make stops': LONG,
+    '.ci/run': 'runs this test',
+}
+ENDLESS = (
+    'foc_ros node --ros-args -r hand_pose:=/MTMR/measured_cp',
+    'foc_ros node --ros-args -r hand_pose:=/MTMR/measured_cp -r obstacles:=/perception/obstacles -p plane:=xz',
+    'python doc/examples/teleoperation_loop.py',
+)
+
+
+def commands(page: Path) -> Iterator[str]:
+    """Yield the command lines of a page: continued ones as one, comments left out."""
+    for block in re.findall(r'^```console\n(.*?)^```', page.read_text('utf-8'), re.MULTILINE | re.DOTALL):
+        for line in re.sub(r'\s*\\\n\s*', ' ', block).splitlines():
+            command = re.sub(r'(^|\s+)#.*$', '', line).strip()
+            if command:
+                yield command
+
+
+def other_shell_blocks(page: Path) -> list[str]:
+    """Return the kinds of blocks of a page that might hold commands and escape the rule."""
+    kinds = re.findall(r'^```([^\n`]*)\n(?:.*?)^```', page.read_text('utf-8'), re.MULTILINE | re.DOTALL)
+    return [kind for kind in kinds if kind not in ('console', 'yaml', 'text', '{toctree}')]
