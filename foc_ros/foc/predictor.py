@@ -10,7 +10,7 @@ import numpy as np
 
 from .config import REFERENCE_STEP_S, Config
 from .culling import relevant
-from .duration import time_to_go
+from .duration import times_to_go
 from .dynamics import triple_integrator_horizon
 from .homotopy import search
 from .library import Way, recall
@@ -44,7 +44,7 @@ def predict(
     """
     began = time.perf_counter()
     hand = _start(hand, config.estimator.acceleration_time_s)
-    durations = [time_to_go(hand, goal, config.duration) for goal in goals]
+    durations = times_to_go(hand, goals, config.duration)
     given, obstacles = obstacles, relevant(obstacles, hand.mean[:2], goals, max(durations), config.scene.max_obstacles)
     problems = [reaching_problem(config, hand, obstacles, *pair) for pair in zip(goals, durations, strict=True)]
     found = search(hand.mean, goals, obstacles, config.homotopy, durations, config.foc.steps, memory.candidates)
