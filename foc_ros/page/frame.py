@@ -63,6 +63,11 @@ def picture(file: Path, caption: str) -> str:
     return f'<figure><img alt="{text}" src="data:image/png;base64,{data}"><figcaption>{text}</figcaption></figure>'
 
 
+def pictures(figures: Iterable[str]) -> str:
+    """Return figures beside one another, as many as the screen has room for."""
+    return f'<div class="pictures">{"".join(figures)}</div>'
+
+
 def data_script(name: str, value: Any) -> str:
     """Return a value as JSON inside a page: no character in it can end the script or begin another tag."""
     text = json.dumps(value, allow_nan=False, separators=(',', ':'))
