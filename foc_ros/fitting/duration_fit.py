@@ -22,6 +22,12 @@ from .demonstrations import Demonstration
 from .estimates import Estimate, bounded
 from .resampling import CENTRAL, RESAMPLES, SEED
 
+CONSTANTS = {
+    'fixed': {'duration.fixed_s': 1.0},
+    'fitts': {'duration.fitts_a_s': 1.0, 'duration.fitts_b_s': 1.0},
+    'cost_of_time': {'duration.time_cost': -6.0},
+}
+"""By model, the constants that make durations longer, each with its power in a factor on all durations (`time_cost`)."""
 NARROW_BITS = 0.5
 """Standard deviation of the index of difficulty below which intercept and slope are not told apart [bit]."""
 FACTORS = tuple(2.0 ** (np.arange(-10, 11) / 4.0))
@@ -74,12 +80,12 @@ def fit_duration(demonstrations: Sequence[Demonstration], config: Config) -> tup
     times = TimesToGo(demonstrations, config)
     if not times.samples:
         return {}, ['duration: no recording has a movement that ends near a goal; its parameters are kept']
-    names = ('duration.fixed_s',) if config.duration.model == 'fixed' else ('duration.fitts_a_s', 'duration.fitts_b_s')
+    names, powers = tuple(CONSTANTS[config.duration.model]), np.array(list(CONSTANTS[config.duration.model].values()))
     given = np.array([getattr(config.duration, name.partition('.')[2]) for name in names])
-    errors = np.array([times.errors(_changed(config.duration, names, given * factor)) for factor in FACTORS])
+    errors = np.array([times.errors(_changed(config.duration, names, given * factor**powers)) for factor in FACTORS])
     best = _finer(errors)
     how, warnings = 'time to go', []
-    value = given * best
+    value = given * best**powers
     if len(names) == 2 and times.difficulties(config.duration.target_width).std() > NARROW_BITS:
         value = _both(times, config.duration, names, value)
     elif len(names) == 2:
@@ -90,10 +96,11 @@ def fit_duration(demonstrations: Sequence[Demonstration], config: Config) -> tup
         )
     spread = _resampled(errors) / best
     low, high = np.percentile(spread, CENTRAL)
-    return {
-        name: Estimate(name, bounded(name, each), each * min(low, 1.0), each * max(high, 1.0), how)
-        for name, each in zip(names, value.tolist(), strict=True)
-    }, warnings
+    found = {}
+    for name, each, power in zip(names, value.tolist(), powers, strict=True):
+        ends = sorted((each * min(low, 1.0) ** power, each * max(high, 1.0) ** power))
+        found[name] = Estimate(name, bounded(name, each), float(ends[0]), float(ends[1]), how)
+    return found, warnings
 
 
 def _finer(errors: Array) -> float:

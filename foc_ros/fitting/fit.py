@@ -35,7 +35,7 @@ SEARCHED = 16
 FEWEST = 3
 """Recordings below which there is no cross-validation."""
 VALUES = {
-    DURATION: ('duration.fixed_s', 'duration.fitts_a_s', 'duration.fitts_b_s'),
+    DURATION: ('duration.fixed_s', 'duration.fitts_a_s', 'duration.fitts_b_s', 'duration.time_cost'),
     ACCELERATION: ('estimator.acceleration_time_s',),
     NOISE: ('foc.noise_x', 'foc.noise_y'),
     ETA: ('foc.eta',),

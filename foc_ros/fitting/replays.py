@@ -26,6 +26,7 @@ from foc_ros.foc.records import Array
 from foc_ros.terminal import track
 
 from .densities import PROCESS_NOISES, log_densities
+from .duration_fit import CONSTANTS
 from .estimates import bounded
 
 Key = tuple[str, int]
@@ -105,19 +106,19 @@ def _best(rows: Mapping[Key, Array]) -> dict[Key, float]:
 def levels(kind: str, config: Config) -> list[Config]:
     """Return the configurations that are tried beside one."""
     if kind == DURATION:
-        names = ['duration.fixed_s'] if config.duration.model == 'fixed' else ['duration.fitts_a_s', 'duration.fitts_b_s']
-        return [_scaled(config, names, factor) for factor in LEVELS[kind]]
+        return [_scaled(config, CONSTANTS[config.duration.model], factor) for factor in LEVELS[kind]]
     if kind == NOISE:
-        return [_scaled(config, ['foc.noise_x', 'foc.noise_y'], factor) for factor in LEVELS[kind]]
+        return [_scaled(config, {'foc.noise_x': 1.0, 'foc.noise_y': 1.0}, factor) for factor in LEVELS[kind]]
     name = {ACCELERATION: 'estimator.acceleration_time_s', ETA: 'foc.eta'}[kind]
     return [changed for value in LEVELS[kind] if (changed := updated(config, {name: value})) != config]
 
 
-def _scaled(config: Config, names: Sequence[str], factor: float) -> Config:
+def _scaled(config: Config, powers: Mapping[str, float], factor: float) -> Config:
+    """Multiply each of the parameters by its power of a factor."""
     values = {}
-    for name in names:
+    for name, power in powers.items():
         group, _, leaf = name.partition('.')
-        values[name] = bounded(name, factor * getattr(getattr(config, group), leaf))
+        values[name] = bounded(name, factor**power * getattr(getattr(config, group), leaf))
     return updated(config, values)
 
 
