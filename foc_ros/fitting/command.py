@@ -32,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--output', type=Path, metavar='YAML', required=True, help='parameter file to write')
     parser.add_argument('--params', type=Path, metavar='FILE', help='parameter file to start from, and to take the rest from')
     parser.add_argument('--json', action='store_true', help='print one JSON object')
+    parser.add_argument('--report', type=Path, metavar='DIR', help='write a page with plots')
     add_worker_arguments(parser)
 
 
@@ -39,6 +40,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Fit, write and show; 2 where a recording could not be used, and the others were."""
     config = Config() if arguments.params is None else load_parameter_file(arguments.params)
     _check_output(arguments.output)
+    if arguments.report is not None and arguments.report.is_file():
+        raise InputError('--report', 'a folder', arguments.report)
     recordings = find_recordings(arguments.data)
     with workers(arguments) as executor:
         found = fit(recordings, config, executor)
@@ -47,6 +50,11 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.output.write_text(text, encoding='utf-8')
     except OSError as error:
         raise InputError('--output', 'a file that can be written', f'{arguments.output}: {error.strerror}') from error
+    if arguments.report is not None:
+        from .report import write_report
+
+        title = arguments.data.resolve().name
+        write_report(arguments.report, title, _answer(found, config, arguments.output), SCORES)
     if arguments.json:
         print(json.dumps(_answer(found, config, arguments.output), allow_nan=False))
     else:
