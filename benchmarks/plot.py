@@ -13,9 +13,11 @@ os.environ.update(dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from rows.ticking import Ticking, alternating
 from scenes import Reach, clusters, tick_4x8, with_far
+
+from foc_ros.drawing import new_figure
+from foc_ros.plots import save
 
 SPEED = Path(__file__).resolve().parents[1] / 'doc' / 'images' / 'speed.png'
 TICKS = 16
@@ -31,13 +33,13 @@ def main() -> None:
         'obstacles (8 near, the rest far; 4 classes)': {8 + n: _with(base, n) for n in FAR},
         'steps N (4 classes, 8 obstacles)': {n: base.changed({'foc.steps': n}) for n in STEPS},
     }
-    figure = Figure(figsize=(11, 3.6), layout='constrained')
-    axes: list[Axes] = list(figure.subplots(1, 3, sharey=True))
-    for panel, (label, reaches) in zip(axes, panels.items(), strict=True):
-        _draw(panel, label, reaches)
-    axes[0].set_ylabel('warm tick [ms]')
-    axes[1].legend(frameon=False, loc='upper left')
-    figure.savefig(sys.argv[1] if len(sys.argv) > 1 else SPEED, dpi=110)
+    with new_figure(11.0, 3.6) as figure:
+        axes: list[Axes] = list(figure.subplots(1, 3, sharey=True))
+        for panel, (label, reaches) in zip(axes, panels.items(), strict=True):
+            _draw(panel, label, reaches)
+        axes[0].set_ylabel('warm tick [ms]')
+        axes[1].legend(frameon=False, loc='upper left')
+    save(figure, sys.argv[1] if len(sys.argv) > 1 else SPEED)
 
 
 def _with(reach: Reach, far: int) -> Reach:
@@ -52,7 +54,6 @@ def _draw(panel: Axes, label: str, reaches: dict[int, Reach]) -> None:
     panel.axhline(4.0, color='0.4', linestyle=':', label='4 ms')
     panel.set_xlabel(label)
     panel.set_yscale('log')
-    panel.grid(which='both', alpha=0.2)
 
 
 if __name__ == '__main__':

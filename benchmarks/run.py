@@ -1,6 +1,6 @@
 """The benchmark: every row a ratio of medians within one run, peers on the identical problem, answers compared.
 
-    python benchmarks/run.py [--json | --markdown] [--only NAME ...] [--quick]
+    python benchmarks/run.py [--json | --markdown] [--report FILE] [--only NAME ...] [--quick]
 
 Each row is measured in a process of its own, with one thread for BLAS and OpenMP, ours and the peer in turn.
 """
@@ -19,6 +19,8 @@ from typing import Any
 from catalogue import ROWS
 from rich.console import Console
 from rich.table import Table
+
+from foc_ros import page
 
 HERE = Path(__file__).resolve().parent
 ONE_THREAD = dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'), '1')
@@ -61,6 +63,18 @@ def table(rows: Iterable[Row]) -> Table:
     return made
 
 
+def report(rows: Iterable[Row]) -> str:
+    """Return the rows as a page in the look of all reports, with what each compares."""
+    rows = list(rows)
+    compared = [(row['name'], f'{row["ours"]}, against: {row["peer"]}', row['agreement']) for row in rows if 'error' not in row]
+    body = (
+        page.table(HEADINGS, map(cells, rows))
+        + '<h2>What is compared</h2>'
+        + page.table(('row', 'of what', 'agreement'), compared)
+    )
+    return page.page_of('Benchmark', body, [f'{row["name"]}: {row["error"]}' for row in rows if 'error' in row])
+
+
 def markdown(rows: Iterable[Row]) -> str:
     """Return the rows as a table for doc/speed.md, and below it what each compares."""
     rows = list(rows)
@@ -89,11 +103,14 @@ def main() -> int:
     shown.add_argument('--markdown', action='store_true', help='print the table of doc/speed.md')
     parser.add_argument('--only', nargs='+', choices=ROWS, default=list(ROWS), metavar='NAME', help=', '.join(ROWS))
     parser.add_argument('--quick', action='store_true', help='few repetitions, 5 s of the node: to see that it works')
+    parser.add_argument('--report', type=Path, metavar='FILE', help='write an HTML page')
     chosen = parser.parse_args()
     rows = []
     for name in chosen.only:
         rows.append(measured(name, chosen.quick))
         print(*cells(rows[-1]), sep='  ', file=sys.stderr, flush=True)  # a whole run takes minutes
+    if chosen.report is not None:
+        chosen.report.write_text(report(rows), encoding='utf-8')
     if chosen.json:
         print(json.dumps(rows, indent=1))
     elif chosen.markdown:

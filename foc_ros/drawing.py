@@ -22,6 +22,7 @@ try:
     from matplotlib.colors import ListedColormap, Normalize
     from matplotlib.figure import Figure
     from matplotlib.patches import Circle, Ellipse
+    from matplotlib.rcsetup import cycler
 except ImportError as error:
     raise FocError("pictures need matplotlib: install python3-matplotlib, or pip install 'foc_ros[report]'") from error
 
@@ -44,6 +45,7 @@ STYLE = {
     'axes.grid': True,
     'grid.color': '0.92',
     'axes.axisbelow': True,
+    'axes.prop_cycle': cycler('color', CLASS_COLOURS),
     'savefig.dpi': 110,
 }
 

@@ -81,7 +81,9 @@ def _moved_cloud(message: Any, rotation: Array, shift: Array) -> Any:
     layout = np.dtype({'names': list(fields), 'formats': formats, 'offsets': offsets, 'itemsize': message.point_step})
     rows = np.frombuffer(bytearray(bytes(message.data)), dtype=layout)
     for names, offset in ((('x', 'y', 'z'), shift), (('vx', 'vy', 'vz'), np.zeros(3))):
-        if all(name in fields for name in names):
+        if not all(name in fields for name in names):
+            continue
+        with np.errstate(invalid='ignore', over='ignore'):  # rows that are not finite are left out where the cloud is read
             moved = np.stack([rows[name].astype(float) for name in names], axis=-1) @ rotation.T + offset
             for name, column in zip(names, moved.T, strict=True):
                 rows[name] = column

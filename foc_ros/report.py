@@ -36,7 +36,7 @@ def write_report(directory: Path, title: str, track: Track, moments: Sequence[Mo
     if not len(track.stamps_ns):
         raise InputError('report', 'a recording with a hand pose', 'none')
     spans = movements(track, ONSET_SPEED) or [(int(track.stamps_ns[0]), int(track.stamps_ns[-1]))]
-    html = report_page(title, page_data(track, moments, spans, CLASSES), {**_facts(moments), **summary}, _warnings(moments))
+    html = report_page(title, page_data(track, moments, spans), {**_facts(moments), **summary}, _warnings(moments))
     try:
         directory.mkdir(parents=True, exist_ok=True)
         pictures = _write_pictures(directory, track, moments, spans)

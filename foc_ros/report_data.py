@@ -12,6 +12,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from .drawing import CLASS_COLOURS, CLASSES
 from .foc.records import NANOSECONDS, Array
 from .lineage import lineages, slots
 from .moments import Moment, Track, Way
@@ -45,8 +46,8 @@ class Rows(Generic[Kept]):
         return list(self._rows)
 
 
-def page_data(track: Track, moments: Sequence[Moment], spans: Sequence[tuple[int, int]], classes: int) -> dict[str, Any]:
-    """Return what the page draws; spans: start and end [ns] of the movements; classes: how many can be told apart.
+def page_data(track: Track, moments: Sequence[Moment], spans: Sequence[tuple[int, int]]) -> dict[str, Any]:
+    """Return what the page draws; spans: start and end [ns] of the movements.
 
     times [s] from the first hand sample on, of every prediction, with its solve_ms and the likelihoods of every line: a way as
     it goes on from one prediction to the next, `first` and `share` of it, and the `slot` that gives letter and colour.
@@ -58,10 +59,11 @@ def page_data(track: Track, moments: Sequence[Moment], spans: Sequence[tuple[int
     frames = [_frame(row, moments[row], lines[row], scenes, goals, labels) for row in shown.tolist()]
     return {
         'unit': {'length': LENGTH, 'speed': SPEED},
+        'colours': CLASS_COLOURS,
         'bounds': _bounds(track, moments),
         'times': [_seconds(moment.stamp_ns, origin_ns) for moment in moments],
         'solve_ms': [None if moment.solve_s is None else round(1e3 * moment.solve_s, 2) for moment in moments],
-        'lines': _lines(moments, lines, slots(moments, lines, classes)),
+        'lines': _lines(moments, lines, slots(moments, lines, CLASSES)),
         'movements': [[_seconds(stamp, origin_ns) for stamp in span] for span in spans],
         'hand': _hand(track, origin_ns),
         'scenes': [json.loads(scene) for scene in scenes.values],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .page import data_script, own_part, own_script, page_of, plotly_script, table
+from .page import data_script, own_part, own_scripts, page_of, plotly_script, table
 
 
 def report_page(title: str, data: Mapping[str, Any], facts: Mapping[str, str], warnings: Sequence[str]) -> str:
@@ -13,5 +13,5 @@ def report_page(title: str, data: Mapping[str, Any], facts: Mapping[str, str], w
     told = '<h2>The recording</h2>' + table((), facts.items())
     if not data['frames']:
         return page_of(title, told, warnings)
-    scripts = data_script('report-data', data) + plotly_script() + own_script('player.js')
+    scripts = data_script('report-data', data) + plotly_script() + own_scripts('charts.js', 'player.js')
     return page_of(title, own_part('player.html') + told + scripts, warnings)

@@ -86,7 +86,7 @@ def solve_scene(scene: SceneFile, problems: Sequence[Problem]) -> list[Outcome]:
         candidates = search(
             scene.hand.mean, scene.goals, scene.obstacles, config.homotopy, durations, config.foc.steps
         ).candidates
-    return solve_candidates(candidates, problems, config.foc, config.likelihood)
+    return solve_candidates(candidates, [problems[each.goal] for each in candidates], config.foc, config.likelihood)
 
 
 def _guessed(scene: SceneFile, guess: Array) -> Candidate:

@@ -9,7 +9,8 @@ is where each climb ended, with its score: |log| distances of effort ratios from
 strategies: one way past one to three circles. J_LV / J_HC is below 1 at the first eta and above 1 from 0.94 on, and rises, for
 c = 0.15; for c = 0.05 it is never above 1, and below it at the last eta; and at eta 0.94 LV passes slower than HC.
 ways: two ways round the same circle, one of them between it and others. J_H1 / J_H2 is 1 up to eta 0.9, for LV and HC; at 0.9615
-it is 0.33 for LV and 0.67 for HC; it falls in between. For HC the distance counts half: the paper stresses LV.
+it is 0.33 for LV and 0.67 for HC; it falls in between; and there the other circles make the second way dearer, as its being
+cluttered should. For HC the distances count half: the paper stresses LV.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ STRIDES = np.array([0.012, 0.012, 0.004, 0.0006])
 LOW, HIGH = np.array([0.04, -0.2, 0.012, 0.001]), np.array([0.24, 0.2, 0.04, 0.005])
 ALIKE = 1.25
 """Factor within which two ways should cost the same up to eta 0.9."""
+CROWDED = 1.25
+"""Factor by which the other circles should make the second way dearer at PAPER_ETA."""
 UNSOLVED = 3.0
 """What an eta adds to the score at which a ratio is not known."""
 PATIENCE = 12
@@ -102,9 +105,19 @@ def ways_faults(scene: PaperScene) -> Iterator[float]:
             yield weight * abs(ratio) + 10 * max(abs(ratio) - np.log(ALIKE), 0.0)
         elif eta == PAPER_ETA:
             yield 2 * weight * abs(ratio - np.log(PAPER_RATIOS[number]))
+    for strategy, weight in (('lv', 1.0), ('hc', 0.5)):
+        yield 4 * weight * max(np.log(CROWDED) - crowding(scene, second, Method(NOISE, strategy)), 0.0)
     for strategy in ('lv', 'hc'):
         late = np.array([found[strategy, eta] for eta in ETAS if eta >= 0.9])
         yield 2 * float(np.maximum(np.diff(late), 0).sum()) if np.isfinite(late).all() else 0.0
+
+
+def crowding(scene: PaperScene, way: Way, method: Method) -> float:
+    """Return the logarithm of what the circles after the first multiply a way's effort by at PAPER_ETA; 0 if unsolved."""
+    alone = PaperScene(scene.goal_x, scene.circles[:1], (Way(way.name, way.amplitude, way.sides[:1]),))
+    efforts = [solve_way(each, each_way, method, PAPER_ETA) for each, each_way in ((scene, way), (alone, alone.ways[0]))]
+    solved = all(each.status is Status.SOLVED for each in efforts)
+    return float(np.log(efforts[0].effort / efforts[1].effort)) if solved else 0.0
 
 
 def score(faults: Iterable[float], bound: float) -> float:

@@ -29,12 +29,15 @@ def test_a_row_tells_its_times_their_ratio_and_whether_the_answers_agree():
 
 def test_a_row_that_cannot_be_measured_says_why(tmp_path):
     (tmp_path / 'casadi.py').write_text("raise ImportError('no such peer here')\n")
-    done = run('--json', '--only', 'cold_vs_ipopt', PYTHONPATH=str(tmp_path))
+    done = run('--json', '--report', str(tmp_path / 'page.html'), '--only', 'cold_vs_ipopt', PYTHONPATH=str(tmp_path))
     assert done.returncode == 1
     (row,) = json.loads(done.stdout)
     assert row['name'] == 'cold_vs_ipopt'
     assert row['error'] == 'ImportError: no such peer here'
     assert (row['agree'], row['met'], row['ratio']) == (False, False, None)
+    page = (tmp_path / 'page.html').read_text(encoding='utf-8')
+    assert '<p class="warning">cold_vs_ipopt: ImportError: no such peer here</p>' in page
+    assert '<tr><th>cold_vs_ipopt</th>' in page
 
 
 def test_an_unknown_row_is_refused():

@@ -98,6 +98,14 @@ def test_rows_that_are_not_finite_are_left_out_and_counted(types: MessageTypes, 
     assert scene.dropped == {'not_finite': 1}
 
 
+@pytest.mark.parametrize('order', ['<', '>'])
+def test_a_signalling_nan_is_left_out_without_a_warning(order: str) -> None:
+    table = np.zeros(2, dtype=[(name, f'{order}f4') for name in ('x', 'y', 'z', 'radius')])
+    table['x'].view(f'{order}u4')[1] = 0x7FA00000
+    scene = cloud_obstacles(cloud(BAGS, table), 'xy')
+    assert (scene.obstacles.ids, scene.dropped) == (('0',), {'not_finite': 1})
+
+
 def test_a_scene_of_which_no_row_is_finite_is_empty_and_says_so() -> None:
     scene = cloud_obstacles(cloud(BAGS, obstacle_table([(math.nan, 0, 0, 1)] * 4)), 'xy')
     assert len(scene.obstacles) == 0

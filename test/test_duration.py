@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foc_ros.foc.config import DurationConfig
-from foc_ros.foc.duration import movement_time, time_to_go
+from foc_ros.foc.duration import movement_time, time_to_go, times_to_go
 from foc_ros.foc.records import NANOSECONDS, HandState
 
 FITTS = DurationConfig(
@@ -85,3 +85,12 @@ def test_the_frame_does_not_matter() -> None:
         onset_position=turn @ state.onset_position + shift,
     )
     assert time_to_go(moved, turn @ GOAL + shift, FITTS) == pytest.approx(time_to_go(state, GOAL, FITTS), rel=1e-12)
+
+
+def test_of_several_goals_the_one_that_the_speed_fits_best_tells_how_slow_the_operator_is() -> None:
+    """Near one goal and slow, the hand gets no more time for the others than for this one."""
+    goals = np.array([[0.3, 0.0], [-0.3, 0.0]])
+    near = times_to_go(hand(0.28, onset=0.0, since_s=1.3, speed=0.1), goals, FIXED)
+    assert near == pytest.approx([0.3, 0.3])
+    late = times_to_go(hand(0.2, onset=0.0, since_s=3.0, speed=0.05), goals, FIXED)
+    assert late == pytest.approx([2.0, 2.0])

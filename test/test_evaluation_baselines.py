@@ -107,7 +107,7 @@ def test_every_family_forecasts_every_setting() -> None:
     recording = recorded(observation(ways([[L], [R]], to_go=[1.0, 3.0])))
     pairs = asked(recording)
     compared = families([recording], LikelihoodConfig())
-    assert len({family.name for family in compared}) == len(compared) == 8
+    assert len({family.name for family in compared}) == len(compared) == 9
     for family in compared:
         logs = log_likelihoods(pairs, family)
         assert logs.shape == (len(family.settings),) and np.isfinite(logs).all() and (logs <= 0.0).all()

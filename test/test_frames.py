@@ -78,6 +78,20 @@ def test_every_input_is_moved_into_the_working_frame(ros: Graph) -> None:
 
 
 @pytest.mark.usefixtures('tf2')
+def test_rows_that_are_not_finite_are_left_out_of_a_scene_that_is_moved(ros: Graph) -> None:
+    bench = Bench(ros)
+    bench.show_scene()
+    bench.move(hand_path(1))
+    table = obstacle_table([(0.2, 0.3, 0.0, 0.05), (np.inf, 0.0, 0.0, 0.05), (3e38, 3e38, 0.0, 0.05), (0.0, 0.0, 0.0, 0.05)])
+    table['y'].view('<u4')[3] = 0x7FA00000  # a signalling NaN
+    bench.hear('obstacles', cloud(TYPES, table, 10 * SECOND, 'camera'))
+    assert 'expected a number in [-10000, 10000] m' in figures(bench.health())['last refusal']
+    bench.hear('obstacles', cloud(TYPES, table[[0, 1, 3]], 10 * SECOND, 'camera'))
+    np.testing.assert_allclose(seen(bench), [[0.7, 0.2]])
+    assert figures(bench.health())['count obstacles_dropped_not_finite'] == '2'
+
+
+@pytest.mark.usefixtures('tf2')
 def test_a_frame_that_tf2_does_not_know_is_refused_with_both_names(ros: Graph) -> None:
     bench = Bench(ros)
     bench.show_scene()

@@ -100,7 +100,8 @@ def test_ros2_run_knows_every_command(wheel: zipfile.ZipFile) -> None:
 @pytest.mark.parametrize('command', sorted(path.name for path in (ROOT / 'scripts' / 'ros2_run').iterdir()))
 def test_ros2_run_starts_the_command(command: str) -> None:
     script = ROOT / 'scripts' / 'ros2_run' / command
-    paths = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get('PYTHONPATH')])])
+    under_test = str(Path(foc_ros.__file__).parents[1])
+    paths = os.pathsep.join([under_test, *filter(None, [os.environ.get('PYTHONPATH')])])
     result = subprocess.run(
         [sys.executable, script, '--help'],
         capture_output=True,

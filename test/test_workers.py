@@ -1,8 +1,11 @@
 """Recordings in parallel: the same results whoever computes them, and a dead worker costs one recording."""
 
 import argparse
+import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 import worker_tasks
@@ -57,6 +60,22 @@ def test_left_by_an_exception_the_workers_are_killed() -> None:
     with pytest.raises(KeyboardInterrupt):
         _interrupted()
     assert time.monotonic() - began < 30.0
+
+
+def test_workers_end_with_a_parent_that_is_killed() -> None:
+    script = """if __name__ == '__main__':
+        import worker_tasks
+        from foc_ros.evaluation.lanes import Lanes
+        lanes = Lanes(1)
+        print(lanes.submit(worker_tasks.worker_pid, 0).result(), flush=True)
+        lanes.submit(worker_tasks.sleepy, 60.0).result()"""
+    with subprocess.Popen([sys.executable, '-c', script], cwd=Path(__file__).parent, stdout=subprocess.PIPE, text=True) as parent:
+        worker = int(parent.stdout.readline())
+        parent.kill()
+    deadline = time.monotonic() + 30.0
+    while Path(f'/proc/{worker}').exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not Path(f'/proc/{worker}').exists()
 
 
 def _interrupted() -> None:

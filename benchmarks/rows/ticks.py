@@ -74,16 +74,16 @@ def _against_ipopt(name: str, reach: Reach, what: str, target: Target, quick: bo
 
 def _asked(reach: Reach) -> tuple[Candidate, Problem]:
     """Return the most likely class of the first tick and the problem that the predictor solves for it."""
-    asked: list[Sequence[Problem]] = []
+    asked: dict[str, Problem] = {}
 
     def listening(candidates: Sequence[Candidate], problems: Sequence[Problem], *rest: Any) -> list[Outcome]:
-        asked.append(problems)
+        asked.update({each.label: problem for each, problem in zip(candidates, problems, strict=True)})
         return solve_candidates(candidates, problems, *rest)
 
     with replaced(predictor, 'solve_candidates', listening):
         prediction, _ = predict(reach.config, reach.hands[0], reach.obstacles, reach.goals, Memory())
     candidate = prediction.solved[0].candidate
-    return candidate, asked[0][candidate.goal]
+    return candidate, asked[candidate.label]
 
 
 def far_obstacles(quick: bool) -> Result:

@@ -106,7 +106,8 @@ def _columns(table: NDArray[np.void]) -> dict[str, Array]:
     """Return every column of numbers (n,) as float64; optional ones that are absent are 0."""
     given = table.dtype.names or ()
     zeros = np.zeros(len(table))
-    return {name: table[name].astype(float) if name in given else zeros for name in (*REQUIRED, *OPTIONAL)}
+    with np.errstate(invalid='ignore'):  # a signalling NaN is a NaN like others; its row is left out later
+        return {name: table[name].astype(float) if name in given else zeros for name in (*REQUIRED, *OPTIONAL)}
 
 
 def _check_column(name: str, column: Array, rows: NDArray[np.intp]) -> None:

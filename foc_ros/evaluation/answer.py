@@ -34,7 +34,10 @@ def answer_of(
             name: {predictor: summary(judged) for predictor, judged in by_predictor.items()}
             for name, by_predictor in evaluation.judged.items()
         },
-        'settings': {name: _plain(setting) for name, setting in evaluation.settings.items()},
+        'settings': {
+            question: {name: _plain(setting) for name, setting in by_predictor.items()}
+            for question, by_predictor in evaluation.settings.items()
+        },
         'positions': dict(evaluation.positions),
         'parameters': flatten(config),
     }

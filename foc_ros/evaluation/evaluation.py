@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from foc_ros.foc.config import LikelihoodConfig
 from foc_ros.foc.errors import RecordingError
@@ -15,24 +16,27 @@ from foc_ros.foc.records import Array
 from foc_ros.terminal import track
 
 from .families import families
-from .heldout import Family, asked, chosen, log_likelihoods
+from .heldout import Family, asked_about, chosen, log_likelihoods
 from .observations import Observation, Observations
 from .positions import position_scores
-from .questions import GAP, QUESTIONS, Question, question, relevant
+from .questions import GAP, GOAL, WAY, Question
 from .scores import Judged, judge
 from .workers import Failure, run
+
+FITTED_TO = {WAY: WAY, GAP: WAY, GOAL: GOAL}
+"""The question whose answers a predictor's setting is chosen by, for each question that it is judged by."""
 
 
 @dataclass(frozen=True)
 class Evaluation:
     """How all predictors did.
 
-    judged: by question, then by predictor; settings: by predictor, the one that is best on all recordings; positions: scores of
-    predicted positions.
+    judged: by question, then by predictor; settings: by question that they are fitted to, then by predictor, those that are
+    best on all recordings; positions: scores of predicted positions.
     """
 
     judged: Mapping[str, Mapping[str, Judged]]
-    settings: Mapping[str, Any]
+    settings: Mapping[str, Mapping[str, Any]]
     positions: Mapping[str, Any]
 
 
@@ -42,41 +46,38 @@ def evaluate(recordings: Sequence[Observations], published: LikelihoodConfig, ex
     tables = tabulated(recordings, compared, executor)
     names = [recording.name for recording in recordings]
     judged: dict[str, dict[str, Judged]] = {}
-    for name in QUESTIONS:
-        pairs = [(number, *pair) for number, recording in enumerate(recordings) for pair in _about(recording, name)]
+    for name, fitted_to in FITTED_TO.items():
+        pairs = [(number, *pair) for number, recording in enumerate(recordings) for pair in asked_about(recording, name)]
         if pairs:
-            judged[name] = {family.name: _judged(family, tables[family.name], names, pairs) for family in compared}
-    best = {family.name: family.settings[int(tables[family.name].sum(axis=0).argmax())] for family in compared}
-    return Evaluation(judged, best, position_scores(recordings))
+            judged[name] = {
+                family.name: _judged(family, chosen(tables[fitted_to, family.name], names), pairs) for family in compared
+            }
+    settings = {
+        name: {family.name: family.settings[int(tables[name, family.name].sum(axis=0).argmax())] for family in compared}
+        for name in (WAY, GOAL)
+        if name in judged
+    }
+    return Evaluation(judged, settings, position_scores(recordings))
 
 
-def tabulated(recordings: Sequence[Observations], compared: Sequence[Family], executor: Executor) -> dict[str, Array]:
-    """Return the log-likelihood of each recording (r) with each setting (s) of every family, (r, s) by its name."""
+def tabulated(recordings: Sequence[Observations], compared: Sequence[Family], executor: Executor) -> dict[tuple[str, str], Array]:
+    """Return the log-likelihood of each recording (r) with each setting (s) of every family, (r, s) by question and name."""
     items = [(recording.name, (recording, tuple(compared))) for recording in recordings]
-    rows: list[dict[str, Array]] = []
+    rows: list[dict[tuple[str, str], Array]] = []
     for name, row in track(run(_row, items, executor), 'compare', len(items)):
         if isinstance(row, Failure):
             raise RecordingError(f'{name}: {row.reason}')
         rows.append(row)
-    return {family.name: np.array([row[family.name] for row in rows]) for family in compared}
+    return {key: np.array([row[key] for row in rows]) for key in rows[0]}
 
 
-def _row(item: tuple[Observations, tuple[Family, ...]]) -> dict[str, Array]:
+def _row(item: tuple[Observations, tuple[Family, ...]]) -> dict[tuple[str, str], Array]:
     recording, compared = item
-    pairs = asked(recording)
-    return {family.name: log_likelihoods(pairs, family) for family in compared}
+    pairs = {name: asked_about(recording, name) for name in (WAY, GOAL)}
+    return {(name, family.name): log_likelihoods(pairs[name], family) for name in pairs for family in compared}
 
 
-def _about(recording: Observations, name: str) -> Iterator[tuple[Observation, Question]]:
-    matters = relevant(recording)
-    for seen in recording.each:
-        found = question(name, seen, matters)
-        if found is not None:
-            yield seen, found
-
-
-def _judged(family: Family, table: Array, names: Sequence[str], pairs: Sequence[tuple[int, Observation, Question]]) -> Judged:
-    places = chosen(table, names)
+def _judged(family: Family, places: NDArray[np.intp], pairs: Sequence[tuple[int, Observation, Question]]) -> Judged:
     return judge(
         [
             (

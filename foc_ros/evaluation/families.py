@@ -17,7 +17,7 @@ from .heldout import Family
 from .observations import Observation, Observations
 from .questions import Question
 
-PUBLISHED, REFITTED, UNIFORM = 'foc', 'foc, held out', 'uniform'
+PUBLISHED, REFITTED, PLAIN, UNIFORM = 'foc', 'foc, held out', 'foc, plain rule', 'uniform'
 CONFIDENCES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 POWERS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 LOOKAHEADS_S = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4)
@@ -31,6 +31,7 @@ def families(recordings: Sequence[Observations], published: LikelihoodConfig) ->
     return (
         Family(PUBLISHED, (None,), _published),
         Family(REFITTED, power_rules(published), _power_rule),
+        Family(PLAIN, plain_rules(published), _power_rule),
         Family(UNIFORM, (None,), _uniform),
         Family('constant velocity', CONFIDENCES, partial(_guess, forecasts.constant_velocity)),
         Family('nearest gap', CONFIDENCES, partial(_guess, forecasts.nearest_gap)),
@@ -40,14 +41,17 @@ def families(recordings: Sequence[Observations], published: LikelihoodConfig) ->
     )
 
 
+def plain_rules(published: LikelihoodConfig) -> tuple[LikelihoodConfig, ...]:
+    """Return the exponents that are tried for ratios of whole costs, effort spent and to go, all choices alike."""
+    return tuple(replace(published, beta=beta, spent_share=1.0, lookahead_s=0.0) for beta in POWERS)
+
+
 def power_rules(published: LikelihoodConfig) -> tuple[LikelihoodConfig, ...]:
-    """Return the parameters of the likelihood that are tried: the plain rule, and looking ahead."""
-    plain = [replace(published, beta=beta, spent_share=share, lookahead_s=0.0) for beta, share in product(POWERS, (1.0, 0.0))]
-    ahead = [
+    """Return the parameters of the likelihood that are tried: the plain rules, and looking ahead."""
+    return tuple(
         replace(published, beta=beta, spent_share=share, lookahead_s=seconds)
-        for beta, share, seconds in product(POWERS, (1.0, 0.0), LOOKAHEADS_S)
-    ]
-    return (*plain, *ahead)
+        for seconds, beta, share in product((0.0, *LOOKAHEADS_S), POWERS, (1.0, 0.0))
+    )
 
 
 def _published(seen: Observation, asked: Question, _: None) -> Forecast:

@@ -32,15 +32,19 @@ class Family:
     forecast: Callable[[Observation, Question, Any], Forecast]
 
 
-def asked(recording: Observations) -> list[tuple[Observation, Question]]:
-    """Return what parameters are fitted to: the ways asked about; in a scene where none ever is, the goals."""
+Pairs = list[tuple[Observation, Question]]
+
+
+def asked(recording: Observations) -> Pairs:
+    """Return what one set of parameters is fitted to: the ways asked about; in a scene where none ever is, the goals."""
+    return asked_about(recording, WAY) or asked_about(recording, GOAL)
+
+
+def asked_about(recording: Observations, name: str) -> Pairs:
+    """Return a question with each prediction that it can be put to."""
     matters = relevant(recording)
-    for name in (WAY, GOAL):
-        pairs = [(seen, question(name, seen, matters)) for seen in recording.each]
-        found = [(seen, each) for seen, each in pairs if each is not None]
-        if found:
-            return found
-    return []
+    pairs = ((seen, question(name, seen, matters)) for seen in recording.each)
+    return [(seen, each) for seen, each in pairs if each is not None]
 
 
 def log_likelihoods(pairs: Sequence[tuple[Observation, Question]], family: Family) -> Array:

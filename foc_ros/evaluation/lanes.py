@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import suppress
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from types import TracebackType
 from typing import Any, ParamSpec, TypeVar
 
@@ -64,10 +64,23 @@ class Lanes(Executor):
         return result
 
     def _worker(self) -> tuple[ProcessPoolExecutor, int]:
-        """Start a process; an interrupt from the terminal is for its parent, which then ends it."""
+        """Start a process."""
         # spawned: a fork of a process with threads may hang, and would inherit what this one has computed so far
-        pool = ProcessPoolExecutor(1, get_context('spawn'), signal.signal, (signal.SIGINT, signal.SIG_IGN))
+        pool = ProcessPoolExecutor(1, get_context('spawn'), _begin)
         self._pools.append(pool)
         pid = pool.submit(os.getpid).result()
         self._pids.add(pid)
         return pool, pid
+
+
+def _begin() -> None:
+    """Make a worker of this process: an interrupt from the terminal is its parent's affair, and it ends with its parent."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)

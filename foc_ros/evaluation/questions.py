@@ -22,7 +22,6 @@ from foc_ros.foc.records import LEFT, Record
 from .observations import Observation, Observations
 
 WAY, GAP, GOAL = 'way', 'gap', 'goal'
-QUESTIONS = (WAY, GAP, GOAL)
 
 Answer = tuple[int, ...]
 """Sides of the obstacles asked about, LEFT or RIGHT, in their order; or the row of a goal."""

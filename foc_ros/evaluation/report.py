@@ -9,7 +9,7 @@ from typing import Any
 
 from foc_ros.drawing import new_figure
 from foc_ros.foc.errors import InputError
-from foc_ros.page import page_of, picture, table
+from foc_ros.page import page_of, picture, pictures, table
 from foc_ros.plots import save
 
 from .families import PUBLISHED, REFITTED, UNIFORM
@@ -29,12 +29,12 @@ ABOUT = {
 def write_report(directory: Path, title: str, answer: Mapping[str, Any]) -> None:
     """Write the page; raises InputError where that cannot be done."""
     with TemporaryDirectory() as scratch:
-        pictures = [_picture(Path(scratch), name, draw, words, answer) for name, draw, words in _wanted(answer)]
+        shown = [_picture(Path(scratch), name, draw, words, answer) for name, draw, words in _wanted(answer)]
     tabular = ''.join(f'<h2>{title}</h2>{table(columns, rows)}' for title, columns, rows in tables(answer))
     warnings = [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        (directory / PAGE).write_text(page_of(f'Evaluation: {title}', ''.join(pictures) + tabular, warnings), encoding='utf-8')
+        (directory / PAGE).write_text(page_of(f'Evaluation: {title}', pictures(shown) + tabular, warnings), encoding='utf-8')
     except OSError as error:
         raise InputError('--report', 'a folder that can be written', f'{directory}: {error.strerror}') from error
 

@@ -66,7 +66,12 @@ def _facts(answer: Mapping[str, Any]) -> Table:
     rows: list[tuple[str, ...]] = [
         ('recordings', f'{answer["recordings"]}, {len(answer["failed"])} failed'),
         ('predictions', str(answer['predictions'])),
-        *((f'best setting: {name}', _setting(setting)) for name, setting in answer['settings'].items() if setting is not None),
+        *(
+            (f'best for {question}: {name}', _setting(setting))
+            for question, by_predictor in answer['settings'].items()
+            for name, setting in by_predictor.items()
+            if setting is not None
+        ),
     ]
     return '', ('', ''), rows
 

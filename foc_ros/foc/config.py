@@ -15,7 +15,7 @@ from .errors import ParameterError
 
 STRATEGIES = ('lv', 'hc', 'optimal', 'algorithm1', 'fixed')
 PLANES = ('xy', 'xz', 'yz')
-DURATION_MODELS = ('fixed', 'fitts')
+DURATION_MODELS = ('fixed', 'fitts', 'cost_of_time')
 REFERENCE_STEP_S = 0.02
 """Step for which the node's noise is quoted (doc/model.md): c is scaled by sqrt(0.02 / dt)."""
 
@@ -68,11 +68,14 @@ class FocConfig:
 class DurationConfig:
     """How long the movement takes."""
 
-    model: str = _p('fitts', 'duration of a movement: fixed, or by Fitts law from its distance', choices=DURATION_MODELS)
+    model: str = _p(
+        'fitts', 'duration of a movement: fixed, by Fitts law, or what is best where time has a cost', choices=DURATION_MODELS
+    )
     fixed_s: float = _p(1.0, 'duration of model fixed', 's', 0.05, 60.0)
     fitts_a_s: float = _p(0.2, 'intercept of Fitts law', 's', 0.0, 60.0)
     fitts_b_s: float = _p(0.25, 'slope of Fitts law, per bit', 's', 0.0, 60.0)
     target_width: float = _p(0.02, 'target width of Fitts law', 'm', 1e-4, 10.0)
+    time_cost: float = _p(100.0, 'cost of time of model cost_of_time: a longer way takes longer', 'm^2/s^6', 1e-9, 1e9)
     min_time_to_go_s: float = _p(0.3, 'floor of the time to go', 's', 0.01, 60.0)
     max_time_to_go_s: float = _p(10.0, 'ceiling of the time to go', 's', 0.05, 120.0)
 

@@ -28,11 +28,14 @@ def solve_candidates(
 ) -> list[Outcome]:
     """Solve each candidate and rank them.
 
-    problems: one for every goal; effort_spent: since movement onset [m^2/s^5]; earlier: solutions to start from where there
+    problems: one for every candidate; effort_spent: since movement onset [m^2/s^5]; earlier: solutions to start from where there
     is one of the same label. Returns the solved ones first, most likely first.
     """
     shared, found = shared_cost(effort_spent, likelihood), earlier or {}
-    judged = [_solved(each, problems[each.goal], settings, shared, found.get(each.label)) for each in candidates]
+    judged = [
+        _solved(each, problem, settings, shared, found.get(each.label))
+        for each, problem in zip(candidates, problems, strict=True)
+    ]
     return ranked(distinct(judged), likelihood, problems[0].obstacles if problems else make_obstacles())
 
 

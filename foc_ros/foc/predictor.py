@@ -10,7 +10,7 @@ import numpy as np
 
 from .config import REFERENCE_STEP_S, Config
 from .culling import relevant
-from .duration import time_to_go
+from .duration import times_to_go, way_times
 from .dynamics import triple_integrator_horizon
 from .homotopy import search
 from .library import Way, recall
@@ -44,14 +44,16 @@ def predict(
     """
     began = time.perf_counter()
     hand = _start(hand, config.estimator.acceleration_time_s)
-    durations = [time_to_go(hand, goal, config.duration) for goal in goals]
+    durations = times_to_go(hand, goals, config.duration)
     given, obstacles = obstacles, relevant(obstacles, hand.mean[:2], goals, max(durations), config.scene.max_obstacles)
-    problems = [reaching_problem(config, hand, obstacles, *pair) for pair in zip(goals, durations, strict=True)]
     found = search(hand.mean, goals, obstacles, config.homotopy, durations, config.foc.steps, memory.candidates)
     seen = hand, goals, obstacles, config.homotopy, durations, config.foc.steps
     candidates = recall(library, *seen, found.candidates, memory.candidates)
-    outcomes = solve_candidates(candidates, problems, config.foc, config.likelihood, hand.effort_spent, memory.solutions)
-    outcomes = [_seen(outcome, problems[outcome.candidate.goal], hand, config.foc.process_noise) for outcome in outcomes]
+    problems = way_problems(config, hand, obstacles, goals, candidates, durations)
+    outcomes = solve_candidates(
+        candidates, list(problems.values()), config.foc, config.likelihood, hand.effort_spent, memory.solutions
+    )
+    outcomes = [_seen(outcome, problems[outcome.candidate.label], hand, config.foc.process_noise) for outcome in outcomes]
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
     best = most_likely(labels, values, memory.most_likely, config.likelihood.margin)
@@ -63,6 +65,21 @@ def predict(
     useful = (outcome for outcome in outcomes if outcome.solution.status in (Status.SOLVED, Status.ETA_UNREACHABLE))
     solutions = {outcome.candidate.label: outcome.solution for outcome in useful}
     return prediction, Memory(best, candidates, solutions)
+
+
+def way_problems(
+    config: Config,
+    hand: HandState,
+    obstacles: Obstacles,
+    goals: Array,
+    candidates: Sequence[Candidate],
+    goal_times: Sequence[float],
+) -> dict[str, Problem]:
+    """Return the problem of each candidate by its label; candidates of one goal and duration share theirs."""
+    times = way_times(hand, candidates, goal_times, config.duration)
+    kinds = [(candidate.goal, duration_s) for candidate, duration_s in zip(candidates, times, strict=True)]
+    made = {kind: reaching_problem(config, hand, obstacles, goals[kind[0]], kind[1]) for kind in dict.fromkeys(kinds)}
+    return {candidate.label: made[kind] for candidate, kind in zip(candidates, kinds, strict=True)}
 
 
 def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: Array, duration_s: float) -> Problem:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import base64
 import html
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -63,14 +63,9 @@ def picture(file: Path, caption: str) -> str:
     return f'<figure><img alt="{text}" src="data:image/png;base64,{data}"><figcaption>{text}</figcaption></figure>'
 
 
-def chart(name: str, traces: Sequence[Mapping[str, Any]], layout: Mapping[str, Any], caption: str) -> str:
-    """Return an interactive chart; traces and layout are plotly's, name is unique on the page, colours come from the frame.
-
-    A trace that gives `meta: {"class": n}` gets the colour of class n. The page needs `plotly_script` before it.
-    """
-    text = html.escape(caption)
-    held = data_script(f'{name}-data', {'traces': list(traces), 'layout': dict(layout)})
-    return f'{held}<figure><div class="chart" id="{html.escape(name)}"></div><figcaption>{text}</figcaption></figure>'
+def pictures(figures: Iterable[str]) -> str:
+    """Return figures beside one another, as many as the screen has room for."""
+    return f'<div class="pictures">{"".join(figures)}</div>'
 
 
 def data_script(name: str, value: Any) -> str:
@@ -86,9 +81,10 @@ def own_part(name: str) -> str:
     return _read(name)
 
 
-def own_script(name: str) -> str:
-    """Return a script of this folder, which runs after the frame's own."""
-    return f'<script>\ndocument.addEventListener("DOMContentLoaded", () => {{\n{_read(name)}}});\n</script>'
+def own_scripts(*names: str) -> str:
+    """Return scripts of this folder as one, which runs after the frame's own."""
+    text = '\n'.join(_read(name) for name in names)
+    return f'<script>\ndocument.addEventListener("DOMContentLoaded", () => {{\n{text}}});\n</script>'
 
 
 def plotly_script() -> str:

@@ -1,4 +1,3 @@
-const data = held('report-data');
 const byId = (name) => document.getElementById(name);
 const sums = (steps, unit) => { let sum = 0; return steps.map((step) => unit * (sum += step)); };
 const LENGTH = data.unit.length;

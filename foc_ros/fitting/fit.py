@@ -1,0 +1,209 @@
+"""All parameters in turn: what needs no prediction first, then what needs replays, then what one replay tells of the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from foc_ros.evaluation.heldout import chosen
+from foc_ros.evaluation.observations import Observations
+from foc_ros.evaluation.recordings import Recording
+from foc_ros.evaluation.workers import Failure, run
+from foc_ros.foc.config import Config, LikelihoodConfig, updated
+from foc_ros.foc.errors import RecordingError
+from foc_ros.terminal import track
+
+from . import choices
+from .demonstrations import Demonstration, demonstration
+from .duration_fit import fit_duration
+from .estimates import Estimate, applied, bounded
+from .estimator_fit import fit_estimator
+from .plans import Reach, reach
+from .recovery import fit_plans
+from .replays import ACCELERATION, DURATION, ETA, NOISE, Foretold, compared, levels, observed, scored
+from .resampling import CENTRAL, RESAMPLES, SEED
+
+PREDICTIONS = 10
+"""About as many predictions are made in each recording: neighbours tell the same."""
+SEARCHED = 16
+"""Recordings that are replayed for each setting of the predictor; the rest only for the last."""
+FEWEST = 3
+"""Recordings below which there is no cross-validation."""
+VALUES = {
+    DURATION: ('duration.fixed_s', 'duration.fitts_a_s', 'duration.fitts_b_s', 'duration.time_cost'),
+    ACCELERATION: ('estimator.acceleration_time_s',),
+    NOISE: ('foc.noise_x', 'foc.noise_y'),
+    ETA: ('foc.eta',),
+}
+
+
+@dataclass
+class Fit:
+    """What was found: config; estimates by name; warnings in words; failed recordings with reasons; scores as plain values."""
+
+    config: Config
+    recordings: int = 0
+    estimates: dict[str, Estimate] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+    failed: dict[str, str] = field(default_factory=dict)
+    scores: dict[str, Any] = field(default_factory=dict)
+
+    def take(self, found: tuple[Mapping[str, Estimate], Sequence[str]]) -> None:
+        """Take estimates into the configuration, and warnings."""
+        self.estimates.update(found[0])
+        self.warnings.extend(found[1])
+        self.config = applied(self.config, found[0])
+
+
+def fit(recordings: Mapping[str, Recording], config: Config, executor: Executor) -> Fit:
+    """Fit everything to recordings; raises RecordingError where none can be used."""
+    found = Fit(config)
+    demonstrations = _read(recordings, found, executor)
+    usable = {each.name: recordings[each.name] for each in demonstrations}
+    found.take(fit_estimator(demonstrations, found.config))
+    found.take(fit_duration(demonstrations, found.config))
+    if config.foc.strategy == 'fixed':
+        found.take(fit_plans(_reaches(demonstrations, found), found.config))
+    thin = _thin(demonstrations, config)
+    some = dict(list(usable.items())[:: -(-len(usable) // SEARCHED)])
+    if any(len(each.obstacles) for each in demonstrations):
+        kinds = [DURATION, ACCELERATION, NOISE, *([] if config.foc.strategy == 'fixed' else [ETA])]
+    else:
+        kinds = [DURATION, ACCELERATION]
+        found.warnings.append(
+            'foc.eta, foc.noise_x, foc.noise_y: no recording has an obstacle, and without one neither margins nor '
+            'what widens them can be told: they are kept'
+        )
+    foretold: dict[Config, Foretold] = {}
+    for kind in kinds:
+        _search(kind, some, found, thin, executor, foretold)
+    _choose(usable, found, thin, executor)
+    return found
+
+
+def _read(recordings: Mapping[str, Recording], found: Fit, executor: Executor) -> list[Demonstration]:
+    read = []
+    items = list(recordings.items())
+    for name, result in track(run(partial(demonstration, config=found.config), items, executor), 'read', len(items)):
+        if isinstance(result, Failure):
+            found.failed[name] = result.reason
+        else:
+            read.append(result)
+    if not read:
+        raise RecordingError(f'no recording can be used: {"; ".join(f"{name}: {why}" for name, why in found.failed.items())}')
+    found.recordings = len(read)
+    return read
+
+
+def _reaches(demonstrations: Sequence[Demonstration], found: Fit) -> list[Reach]:
+    reaches = []
+    for each in demonstrations:
+        try:
+            reaches.append(reach(each, found.config))
+        except RecordingError as error:
+            found.failed[each.name] = str(error)
+    if not reaches:
+        raise RecordingError(f'no movement reaches a goal: {"; ".join(found.failed.values())}')
+    return reaches
+
+
+def _thin(demonstrations: Sequence[Demonstration], config: Config) -> dict[str, float]:
+    """Return the rate at which the recordings are replayed, as changed parameters."""
+    duration_s = float(np.median([each.times[-1] for each in demonstrations]))
+    return {'rate_hz': bounded('rate_hz', min(config.rate_hz, PREDICTIONS / max(duration_s, 1e-3)))}
+
+
+def _search(
+    kind: str,
+    recordings: Mapping[str, Recording],
+    found: Fit,
+    thin: Mapping[str, float],
+    executor: Executor,
+    foretold: dict[Config, Foretold],
+) -> None:
+    """Try other values of one kind and take the best; foretold: what is known of settings, and is added to."""
+    settings = [found.config, *levels(kind, found.config)]
+    for number, setting in enumerate(settings, 1):
+        if setting not in foretold:
+            words = f'{kind} {number}/{len(settings)}'
+            foretold[setting] = scored(observed(recordings, updated(setting, thin), executor, words)[0], setting)
+    scores = compared([foretold[setting] for setting in settings], list(recordings))
+    best = settings[int(scores.mean(axis=1).argmax())]
+    draws, n = np.random.default_rng(SEED), scores.shape[1]
+    drawn = [settings[int(scores[:, draws.integers(n, size=n)].mean(axis=1).argmax())] for _ in range(RESAMPLES)]
+    for name in VALUES[kind]:
+        value, tried = _value(best, name), {_value(setting, name) for setting in settings}
+        if len(tried) == 1:
+            continue
+        low, high = np.percentile([_value(setting, name) for setting in drawn], CENTRAL)
+        before = found.estimates.get(name)
+        how = 'positions and ways foretold' if before is None else f'{before.how}, then positions and ways foretold'
+        found.estimates[name] = Estimate(name, value, float(low), float(high), how)
+        if (low, high) == (min(tried), max(tried)):
+            found.warnings.append(f'{name}: from {low:.3g} to {high:.3g}, all that was tried, resampled recordings agree as well')
+    found.config = best
+
+
+def _value(config: Config, name: str) -> float:
+    group, _, leaf = name.partition('.')
+    return float(getattr(getattr(config, group), leaf))
+
+
+def _choose(recordings: Mapping[str, Recording], found: Fit, thin: Mapping[str, float], executor: Executor) -> None:
+    """Fit the likelihood and the process noise to one replay, and score them held out."""
+    observations, failed = observed(recordings, updated(found.config, thin), executor, 'replay')
+    found.failed.update(failed)
+    if not observations:
+        raise RecordingError(f'nothing could be predicted: {"; ".join(failed.values())}')
+    table, names = choices.choice_table(observations, found.config, executor), [each.name for each in observations]
+    steps = found.config.foc.steps
+    if np.isnan(table.values).all():
+        found.warnings.append(
+            'likelihood.beta: no recording has an obstacle to pass on one of two sides, or a second goal: it is kept'
+        )
+    else:
+        found.warnings.extend(choices.unheard(observations))
+        columns = choices.plain_or_ahead(table, names)
+        found.take(choices.likelihood_estimates(table, columns))
+        found.scores.update(_choice_scores(table, columns, observations))
+    densities = choices.density_table(observations, found.config.likelihood, steps)
+    noise = choices.process_noise_estimate(densities)
+    found.take(({noise.name: noise}, []))
+    found.scores.update(_position_scores(densities, noise.value, found.config.likelihood, observations, steps))
+    if len(observations) < FEWEST:
+        found.warnings.append(f'cross-validation: {len(observations)} recordings are too few, {FEWEST} are needed')
+
+
+def _choice_scores(table: choices.Table, columns: Sequence[int], observations: Sequence[Observations]) -> dict[str, Any]:
+    names, took = [each.name for each in observations], choices.classes(observations)
+    scores = {
+        'uniform': choices.uniform(observations),
+        'as given': table.values[:, 0],
+        'fitted': table.values[:, table.best(columns)],
+    }
+    if len(names) >= FEWEST:
+        scores['without the recording'] = table.held_out(columns, names)
+        if len(set(took)) > 1:
+            scores['without its way'] = table.held_out(columns, took)
+    return {'ways': {name: float(np.nanmean(values)) for name, values in scores.items()}}
+
+
+def _position_scores(
+    table: choices.Table, noise: float, likelihood: LikelihoodConfig, observations: Sequence[Observations], steps: int
+) -> dict[str, Any]:
+    names, columns, n = [each.name for each in observations], list(range(len(table.settings))), len(observations)
+    scores = {'without process noise': table.values[:, 0], 'fitted': table.values[:, table.best(columns)]}
+    noises = {'without process noise': np.zeros(n), 'fitted': np.full(n, noise)}
+    if n >= FEWEST:
+        scores['without the recording'] = table.held_out(columns, names)
+        picked = chosen(np.nan_to_num(table.values), names)
+        noises['without the recording'] = np.array(table.settings, dtype=float)[picked]
+    return {
+        'positions': {name: float(np.nanmean(values)) for name, values in scores.items()},
+        'inside_90': {name: choices.coverage(observations, likelihood, each, steps) for name, each in noises.items()},
+    }

@@ -1,0 +1,125 @@
+"""Parameters of the predictor itself, by replays: each setting replays the recordings, and what it foretold is scored.
+
+The score of a setting is the mean over the recordings of two log-likelihoods: of the way really taken, among the ways, and of the
+true positions 0.25, 0.5 and 1 s ahead, under the mixture of the candidates. Both are proper: no setting gains by claiming more or
+less than it knows. In both, what needs no replay is at its own best for each setting: the exponent beta, the process noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from foc_ros.evaluation.families import POWERS
+from foc_ros.evaluation.forecasts import of_shares, power_rule
+from foc_ros.evaluation.heldout import asked
+from foc_ros.evaluation.observations import Observations
+from foc_ros.evaluation.observe import observe
+from foc_ros.evaluation.recordings import Recording
+from foc_ros.evaluation.workers import Failure, run
+from foc_ros.foc.config import Config, LikelihoodConfig, updated
+from foc_ros.foc.records import Array
+from foc_ros.terminal import track
+
+from .densities import PROCESS_NOISES, log_densities
+from .duration_fit import CONSTANTS
+from .estimates import bounded
+
+Key = tuple[str, int]
+"""A prediction: recording and stamp [ns]."""
+DURATION, ACCELERATION, NOISE, ETA = 'duration', 'acceleration', 'noise', 'eta'
+LEVELS = {DURATION: (0.8, 1.25, 1.6, 2.0), ACCELERATION: (0.0, 0.1, 0.3), NOISE: (0.5, 2.0), ETA: (0.7, 0.5, 0.95)}
+"""What is tried in turn: factors on durations and noise, values of the others."""
+
+
+@dataclass(frozen=True)
+class Foretold:
+    """The scores of one setting by prediction: of ways and positions, rows of log-likelihoods over what needs no replay."""
+
+    ways: Mapping[Key, Array]
+    positions: Mapping[Key, Array]
+
+
+def observed(
+    recordings: Mapping[str, Recording], config: Config, executor: Executor, words: str
+) -> tuple[list[Observations], dict[str, str]]:
+    """Replay recordings without process noise; return the observations, and why others gave none, by name."""
+    plain = updated(config, {'foc.process_noise': 0.0})
+    results = run(partial(observe, config=plain), list(recordings.items()), executor)
+    seen: list[Observations] = []
+    failed: dict[str, str] = {}
+    for name, result in track(results, words, len(recordings)):
+        if isinstance(result, Failure):
+            failed[name] = result.reason
+        else:
+            seen.append(result)
+    return seen, failed
+
+
+def scored(observations: Sequence[Observations], config: Config) -> Foretold:
+    """Score what one setting foretold."""
+    rules = [replace(LikelihoodConfig(), beta=beta) for beta in POWERS]
+    ways, positions = {}, {}
+    for recording in observations:
+        for seen, question in asked(recording):
+            ways[recording.name, seen.stamp_ns] = np.log(
+                [of_shares(power_rule(seen, rule), question).true(question) for rule in rules]
+            )
+        for seen in recording.each:
+            row = log_densities(seen, seen.ways.likelihood, config.foc.steps)
+            if row is not None:
+                positions[recording.name, seen.stamp_ns] = row
+    return Foretold(ways, positions)
+
+
+def compared(settings: Sequence[Foretold], names: Sequence[str]) -> Array:
+    """Return the score of each setting in each recording, (s, n) [nat].
+
+    A prediction that a setting could not make counts as the worst of those that others made in its place.
+    """
+    total = np.zeros((len(settings), len(names)))
+    for table in ([each.ways for each in settings], [each.positions for each in settings]):
+        best = [_best(each) for each in table]
+        worst: dict[Key, float] = {}
+        for each in best:
+            for key, value in each.items():
+                worst[key] = min(value, worst.get(key, value))
+        for place, name in enumerate(names):
+            keys = [key for key in worst if key[0] == name]
+            if keys:
+                total[:, place] += [np.mean([each.get(key, worst[key]) for key in keys]) for each in best]
+    return total
+
+
+def _best(rows: Mapping[Key, Array]) -> dict[Key, float]:
+    """Return the log-likelihoods at what is best for all of them together."""
+    if not rows:
+        return {}
+    place = int(np.sum(list(rows.values()), axis=0).argmax())
+    return {key: float(row[place]) for key, row in rows.items()}
+
+
+def levels(kind: str, config: Config) -> list[Config]:
+    """Return the configurations that are tried beside one."""
+    if kind == DURATION:
+        return [_scaled(config, CONSTANTS[config.duration.model], factor) for factor in LEVELS[kind]]
+    if kind == NOISE:
+        return [_scaled(config, {'foc.noise_x': 1.0, 'foc.noise_y': 1.0}, factor) for factor in LEVELS[kind]]
+    name = {ACCELERATION: 'estimator.acceleration_time_s', ETA: 'foc.eta'}[kind]
+    return [changed for value in LEVELS[kind] if (changed := updated(config, {name: value})) != config]
+
+
+def _scaled(config: Config, powers: Mapping[str, float], factor: float) -> Config:
+    """Multiply each of the parameters by its power of a factor."""
+    values = {}
+    for name, power in powers.items():
+        group, _, leaf = name.partition('.')
+        values[name] = bounded(name, factor**power * getattr(getattr(config, group), leaf))
+    return updated(config, values)
+
+
+__all__ = ['ACCELERATION', 'DURATION', 'ETA', 'NOISE', 'PROCESS_NOISES', 'Foretold', 'compared', 'levels', 'observed', 'scored']

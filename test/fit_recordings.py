@@ -1,0 +1,47 @@
+"""Recordings of a made-up operator, for the tests of `fit`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from foc_ros.fitting.demonstrations import Demonstration
+from foc_ros.foc.records import Obstacles
+
+OBSTACLE = (0.15, 0.0, 0.03)
+GOALS = np.array([[0.3, -0.1], [0.3, 0.0], [0.3, 0.1]])
+
+
+def reach(goal: np.ndarray, bow: float, duration_s: float, hz: float, rng: np.random.Generator, noise: float) -> np.ndarray:
+    """A minimum-jerk reach from the origin, bowed to the left, with rests of 0.1 s: rows of time and noisy position."""
+    times = np.arange(-0.1, duration_s + 0.1, 1.0 / hz)
+    share = np.clip(times / duration_s, 0.0, 1.0)
+    done = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    left = np.array([-goal[1], goal[0]]) / np.hypot(*goal)
+    path = done[:, None] * goal + bow * np.sin(np.pi * done)[:, None] * left
+    return np.column_stack([times + 0.1, path + rng.normal(0.0, noise, path.shape)])
+
+
+def write_tables(folder: Path, count: int = 6, obstacle: bool = True, hz: float = 50.0, noise: float = 5e-4) -> Path:
+    """Write recordings past one obstacle, left and right in turn; or to three goals in turn, without any."""
+    rng = np.random.default_rng(7)
+    folder.mkdir(parents=True, exist_ok=True)
+    lines = ['recording,t_s,x_m,y_m']
+    for number in range(count):
+        goal = GOALS[1] if obstacle else GOALS[number % 3]
+        bow = (0.06 if number % 2 else -0.06) if obstacle else 0.01 * rng.standard_normal()
+        rows = reach(goal, bow, 1.2 + 0.1 * rng.standard_normal(), hz, rng, noise)
+        lines += [f'r{number},{t:.4f},{x:.6f},{y:.6f}' for t, x, y in rows]
+    (folder / 'recordings.csv').write_text('\n'.join(lines) + '\n')
+    used = GOALS[1:2] if obstacle else GOALS
+    (folder / 'goals.csv').write_text('x_m,y_m\n' + ''.join(f'{x},{y}\n' for x, y in used))
+    if obstacle:
+        x, y, radius = OBSTACLE
+        (folder / 'obstacles.csv').write_text(f'x_m,y_m,radius_m\n{x},{y},{radius}\n')
+    return folder
+
+
+def demonstration(name: str, times: np.ndarray, positions: np.ndarray, obstacles: Obstacles, goals: np.ndarray) -> Demonstration:
+    """A demonstration from its samples."""
+    return Demonstration(name, np.round(times * 1e9).astype(np.int64), positions, obstacles, goals)

@@ -1,0 +1,139 @@
+"""The command `evaluate`: kinds of data, failures by name, workers, JSON, page."""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from evaluation_samples import reach, write_tables
+
+from foc_ros.command_line import main
+
+ASIDE = {'left': 0.06, 'right': -0.06, 'left too': 0.05}
+OBSTACLE = [(0.15, 0.0, 0.03)]
+GOAL = [(0.3, 0.0)]
+
+
+@pytest.fixture(autouse=True)
+def at_hand(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Work is done in this process, where it is not the processes that are tested: to start one takes a second."""
+    if 'workers' not in request.fixturenames:
+        monkeypatch.setattr('foc_ros.evaluation.command.workers', lambda _: ThreadPoolExecutor(1))
+
+
+@pytest.fixture
+def tables(tmp_path: Path) -> Path:
+    """Three reaches round one obstacle."""
+    return write_tables(tmp_path / 'data', {name: reach(aside, GOAL[0]) for name, aside in ASIDE.items()}, GOAL, OBSTACLE)
+
+
+def run(data: Path, *options: str) -> int:
+    return main(['evaluate', str(data), '--params', str(data / 'parameters.yaml'), '--workers', '1', *options])
+
+
+def answer(data: Path, capsys: pytest.CaptureFixture[str], *options: str, code: int = 0) -> dict:
+    assert run(data, '--json', *options) == code
+    return json.loads(capsys.readouterr().out)
+
+
+def test_reaches_round_an_obstacle(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(tables, capsys)
+    assert found['recordings'] == 3 and found['failed'] == {} and found['predictions'] >= 12
+    assert set(found['questions']) == {'way', 'gap'}
+    way = found['questions']['way']
+    assert way['uniform']['gain'] == 0.0 and way['uniform']['log_likelihood'] == pytest.approx(np.log(0.5))
+    # a bent reach tells early on which side it will pass
+    assert way['foc']['gain'] > 0.1 and way['constant velocity']['gain'] > 0.0
+    assert sum(each['predictions'] for each in way['foc']['by_tenth']) == way['foc']['predictions']
+    assert sum(each['count'] for each in way['foc']['reliability']) == way['foc']['predictions']
+    assert found['parameters']['foc.steps'] == 20
+
+
+def test_reaches_without_obstacles_are_asked_for_their_goal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    goals = [(0.3, 0.0), (0.0, 0.3), (-0.3, 0.0)]
+    data = write_tables(tmp_path / 'free', {f'to{i}': reach(0.0, goal) for i, goal in enumerate(goals)}, goals)
+    found = answer(data, capsys)
+    assert set(found['questions']) == {'goal'}
+    goal = found['questions']['goal']['foc']
+    assert goal['uniform'] == pytest.approx(-np.log(3.0))
+    assert goal['by_tenth'][9]['right'] == 1.0 and goal['gain'] > 0.2
+
+
+@pytest.mark.parametrize('workers', ['2'])
+def test_the_number_of_workers_does_not_matter(tables: Path, capsys: pytest.CaptureFixture[str], workers: str) -> None:
+    assert answer(tables, capsys) == answer(tables, capsys, '--workers', workers)
+
+
+def test_bags_are_judged_as_their_tables(tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bags = tmp_path / 'bags'
+    csv = [str(tables / name) for name in ('recordings.csv', 'obstacles.csv', 'goals.csv')]
+    assert main(['convert', csv[0], '--obstacles', csv[1], '--goals', csv[2], '--output', str(bags)]) == 0
+    capsys.readouterr()
+    (bags / 'parameters.yaml').write_text((tables / 'parameters.yaml').read_text())
+    whole = answer(bags, capsys)
+    expected = answer(tables, capsys)
+    # bags come by name, the rows of a table as they are
+    for question, by_predictor in expected['questions'].items():
+        for predictor, scores in by_predictor.items():
+            assert whole['questions'][question][predictor]['log_likelihood'] == pytest.approx(scores['log_likelihood'])
+    assert main(['evaluate', str(bags / 'left'), '--workers', '1', '--params', str(bags / 'parameters.yaml')]) == 0
+
+
+def test_a_bad_recording_fails_by_its_name_and_the_others_are_judged(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with (tables / 'recordings.csv').open('a') as file:
+        file.write('broken,0.0,0.0,0.0\nbroken,0.1,nan,0.0\nbackward,1.0,0.0,0.0\nbackward,0.5,0.1,0.0\nshort,0.0,0.0,0.0\n')
+    assert run(tables, '--json') == 2
+    captured = capsys.readouterr()
+    found = json.loads(captured.out)
+    assert found['recordings'] == 3 or 'short' not in found['failed']
+    assert {'broken', 'backward'} <= set(found['failed'])
+    assert 'column x_m' in found['failed']['broken'] and 'column t_s' in found['failed']['backward']
+    assert 'foc_ros evaluate: broken: ' in captured.err
+
+
+def test_where_nothing_can_be_judged_the_exit_code_is_3(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data = write_tables(tmp_path / 'none', {'blocked': reach(0.0, (0.3, 0.0))}, [(0.3, 0.0)], [(0.3, 0.0, 0.05)])
+    assert run(data) == 3
+    captured = capsys.readouterr()
+    assert captured.out == '' and 'blocked: nothing could be predicted' in captured.err
+
+
+@pytest.mark.parametrize(
+    ('change', 'words'),
+    [
+        (lambda data: (data / 'goals.csv').unlink(), 'goals.csv: cannot be read'),
+        (lambda data: (data / 'recordings.csv').unlink(), 'expected bags, or recordings.csv with goals.csv'),
+        (lambda data: (data / 'obstacles.csv').write_text('x_m,y_m\n'), 'no column radius_m'),
+        (lambda data: (data / 'recordings.csv').write_text('recording,t_s,x_m,y_m\n'), 'expected at least one row'),
+        (lambda data: (data / 'parameters.yaml').write_text('/**: {ros__parameters: {foc.eta: 2.0}}'), 'foc.eta'),
+    ],
+)
+def test_data_that_cannot_be_used_is_one_line_and_exit_2(tables: Path, capsys, change, words: str) -> None:
+    change(tables)
+    assert run(tables) == 2
+    captured = capsys.readouterr()
+    assert captured.out == '' and words in captured.err and captured.err.count('\n') == 1
+
+
+def test_a_label_that_is_not_the_way_taken_is_told(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # along x, low x is on neither side; by convention the left counts as high
+    labels = {'left': 1, 'right': 0, 'left too': 0}
+    (tables / 'labels.csv').write_text('recording,gap\n' + ''.join(f'{name},{gap}\n' for name, gap in labels.items()))
+    found = answer(tables, capsys)
+    assert found['labels_not_taken'] == {'left too': 'label 0, path 1'}
+
+
+def test_the_report_is_one_page(tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(tables, '--report', str(tmp_path / 'report')) == 0
+    page = (tmp_path / 'report' / 'evaluation.html').read_text('utf-8')
+    assert page.count('<img') == 4 and 'constant velocity' in page
+    out = capsys.readouterr().out
+    assert 'log-likelihood above uniform [nat]' in out and 'foc, held out' in out
+
+
+def test_a_report_that_cannot_be_written_is_refused_before_the_work(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(tables, '--report', str(tables / 'goals.csv')) == 2
+    assert '--report: expected a folder' in capsys.readouterr().err

@@ -1,0 +1,138 @@
+"""`fit` from the command line: recordings in, a parameter file out that the node takes as it is."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import ros_helpers
+from bag_helpers import write_bag
+from fit_recordings import write_tables
+
+from foc_ros.command_line import main
+from foc_ros.fitting import fit as fitting
+from foc_ros.fitting import replays
+from foc_ros.foc.config import Config, flatten, updated
+from foc_ros.parameters import dump_parameter_file, load_parameter_file
+
+QUICK = {'foc.steps': 15, 'homotopy.max_candidates': 2, 'duration.fitts_a_s': 0.3}
+
+
+@pytest.fixture(autouse=True)
+def few_predictions(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fitting, 'PREDICTIONS', 3)
+    levels = {replays.DURATION: (1.25,), replays.ACCELERATION: (0.1,), replays.NOISE: (0.5,), replays.ETA: (0.7,)}
+    monkeypatch.setattr(replays, 'LEVELS', levels)
+
+
+def _fit(folder: Path, capsys: pytest.CaptureFixture[str], *arguments: str, **parameters: Any) -> tuple[dict[str, Any], Config]:
+    given, output = folder.parent / 'given.yaml', folder.parent / 'fitted.yaml'
+    given.write_text(dump_parameter_file(updated(Config(), {**QUICK, **parameters})))
+    code = main(['fit', str(folder), '--output', str(output), '--params', str(given), '--workers', '1', '--json', *arguments])
+    printed = capsys.readouterr()
+    assert code == (2 if 'bad: ' in printed.err else 0), printed.err
+    return json.loads(printed.out), load_parameter_file(output)
+
+
+@pytest.fixture(scope='module')
+def past_an_obstacle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_tables(tmp_path_factory.mktemp('fit') / 'data')
+
+
+def test_everything_is_fitted_and_written_for_the_node(past_an_obstacle: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    answer, config = _fit(past_an_obstacle, capsys)
+    assert answer['recordings'] == 6 and answer['failed'] == {}
+    values = flatten(config)
+    fitted = {'estimator.position_stddev', 'estimator.jerk_density', 'duration.fitts_a_s', 'duration.fitts_b_s'}
+    fitted |= {'foc.noise_x', 'foc.noise_y', 'foc.eta', 'foc.process_noise', 'likelihood.beta', 'likelihood.lookahead_s'}
+    assert fitted <= set(answer['parameters'])
+    for name, each in answer['parameters'].items():
+        assert values[name] == each['value']
+        assert each['interval'][0] <= each['value'] * 1.01 and each['value'] <= each['interval'][1] * 1.01, name
+    unfitted = {name: value for name, value in values.items() if name not in answer['parameters']}
+    assert unfitted == {name: value for name, value in flatten(updated(Config(), QUICK)).items() if name in unfitted}
+    assert answer['parameters']['estimator.position_stddev']['value'] == pytest.approx(5e-4, rel=0.2)
+    ways = answer['scores']['ways']
+    assert ways['fitted'] >= ways['without the recording'] and ways['fitted'] > ways['uniform']
+    assert set(ways) == {'uniform', 'as given', 'fitted', 'without the recording', 'without its way'}
+    assert 0.5 < answer['scores']['inside_90']['fitted'] <= 1.0
+    assert answer['node'][0].startswith('python -m foc_ros node ')
+    _node_comes_up(answer['node'][0], config)
+    assert any('too alike to tell intercept and slope apart' in words for words in answer['warnings'])
+
+
+def test_without_obstacles_goals_are_told_apart_and_margins_are_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    answer, config = _fit(write_tables(tmp_path / 'data', obstacle=False), capsys, **{'homotopy.max_candidates': 3})
+    assert not {'foc.eta', 'foc.noise_x', 'foc.noise_y'} & set(answer['parameters'])
+    assert (config.foc.eta, config.foc.noise_x) == (Config().foc.eta, Config().foc.noise_x)
+    assert any('foc.eta, foc.noise_x, foc.noise_y: no recording has an obstacle' in words for words in answer['warnings'])
+    assert answer['scores']['ways']['fitted'] > answer['scores']['ways']['uniform'] + 0.1
+
+
+def test_strategy_fixed_has_its_tau_and_lambda_fitted(past_an_obstacle: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    answer, config = _fit(past_an_obstacle, capsys, **{'foc.strategy': 'fixed', 'foc.tau': 1e-4})
+    assert {'foc.tau', 'foc.lam'} <= set(answer['parameters'])
+    assert 'foc.eta' not in answer['parameters']
+    # made with a bow of 60 mm: the plan nearest to it keeps as far away
+    assert config.foc.tau > 5e-4
+
+
+def test_one_bag_and_a_broken_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_bag(tmp_path / 'bags' / 'good')
+    (tmp_path / 'bags' / 'bad').mkdir()
+    (tmp_path / 'bags' / 'bad' / 'bad.mcap').write_bytes(b'nothing')
+    answer, _ = _fit(tmp_path / 'bags', capsys, **{'foc.strategy': 'hc'})
+    assert answer['recordings'] == 1 and set(answer['failed']) == {'bad'}
+    assert any(words.startswith('cross-validation: 1 recordings are too few') for words in answer['warnings'])
+
+
+def test_words_for_people(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag, given, output = write_bag(tmp_path / 'bag'), tmp_path / 'given.yaml', tmp_path / 'out.yaml'
+    given.write_text(dump_parameter_file(updated(Config(), {**QUICK, 'foc.strategy': 'hc'})))
+    assert main(['fit', str(bag), '--output', str(output), '--params', str(given), '--workers', '1']) == 0
+    words = capsys.readouterr().out
+    assert 'likelihood of the way taken' in words and 'note: ' in words
+    assert f'python -m foc_ros node --ros-args --params-file {output}' in words
+
+
+def _node_comes_up(printed: str, config: Config) -> None:
+    """Run the command as printed, and ask the node for its parameters."""
+    ros_helpers.require_ros()
+    from rcl_interfaces.srv import GetParameters
+
+    command = [sys.executable, *shlex.split(printed)[1:]]
+    names = ['foc.eta', 'foc.process_noise', 'estimator.jerk_density', 'likelihood.beta']
+    with ros_helpers.graph() as ros, subprocess.Popen(command, env=ros.environment, cwd=Path(__file__).parents[1]) as process:
+        try:
+            client = ros.node('asker').create_client(GetParameters, '/foc/get_parameters')
+            ros.spin_until(client.service_is_ready, 'the node', 30.0)
+            future = client.call_async(GetParameters.Request(names=names))
+            ros.spin_until(future.done, 'its parameters', 30.0)
+        finally:
+            process.terminate()
+            process.wait(30.0)
+    assert [each.double_value for each in future.result().values] == [flatten(config)[name] for name in names]
+    assert process.returncode == 0
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'expected'),
+    [
+        (['nowhere'], 'nowhere: no such file or directory'),
+        (['.', '--output', 'nowhere/out.yaml'], '--output: expected a file in a directory that exists'),
+        (['.', '--params', 'nowhere.yaml'], 'nowhere.yaml: cannot be read'),
+    ],
+)
+def test_wrong_input_ends_in_one_line(
+    arguments: list[str], expected: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(['fit', '--output', 'out.yaml', *arguments]) == 2
+    error = capsys.readouterr().err
+    assert expected in error and error.count('\n') == 1
+    assert not (tmp_path / 'out.yaml').exists()

@@ -1,0 +1,56 @@
+"""Tau and lambda are found again in movements that were planned with them, and it is said where they cannot be."""
+
+import numpy as np
+import pytest
+from fit_recordings import demonstration
+
+from foc_ros.fitting.plans import planned, positions_at, reach
+from foc_ros.fitting.recovery import fit_plans
+from foc_ros.fitting.trials import CONFIG, demonstrations, trial
+from foc_ros.foc.config import Config, FocConfig
+from foc_ros.foc.errors import RecordingError
+from foc_ros.foc.records import make_obstacles
+
+
+@pytest.mark.parametrize('seed', [1, 2, 3])
+def test_recovered_from_mean_trajectories_with_1_mm_of_sensor_noise(seed: int) -> None:
+    made = trial(seed, repeats=1)
+    assert made.movements >= 4
+    assert made.recovered, (made.found.tau / made.tau, made.found.lam / made.lam)
+    assert 0.7e-3 < made.found.stddev < 2.5e-3
+    low, high = np.exp(made.found.local.interval())
+    assert low[0] <= made.found.tau * 1.001 and high[0] >= made.found.tau * 0.999
+    assert made.found.local.undetermined == []
+
+
+def test_without_an_obstacle_tau_is_not_told_and_lambda_is() -> None:
+    config = Config(foc=FocConfig(strategy='fixed', noise_x=0.1, noise_y=0.1))
+    goal, times, rng = np.array([[0.3, 0.0]]), np.arange(0.0, 1.001, 0.01), np.random.default_rng(5)
+    empty = reach(demonstration('a', times, times[:, None] * goal, make_obstacles(), goal), config)
+    solution = planned(empty, 0.0, 3e6, config)
+    assert solution is not None
+    seen = [positions_at(solution, times) + rng.normal(0.0, 1e-3, (len(times), 2)) for _ in range(4)]
+    reaches = [reach(demonstration(f'{k}', times, each, make_obstacles(), goal), config) for k, each in enumerate(seen)]
+    estimates, warnings = fit_plans(reaches, config)
+    assert 1 / 1.2 < estimates['foc.lam'].value / 3e6 < 1.2
+    assert any('foc.tau: the movements do not tell it' in words and 'clearance' in words for words in warnings)
+    assert not any(words.startswith('foc.lam: the movements do not tell it') for words in warnings)
+    assert any('lambda times the square of the noise' in words for words in warnings)
+
+
+def test_positions_between_the_steps_are_those_of_constant_jerk() -> None:
+    config = CONFIG
+    solution = planned(reach(demonstrations(1e-3, 1e6, np.random.default_rng(1), 1)[0], config), 1e-3, 1e6, config)
+    assert solution is not None
+    np.testing.assert_allclose(positions_at(solution, solution.times), solution.path, atol=1e-12)
+    fine = np.linspace(0.0, 1.0, 20001)
+    jerk = np.diff(positions_at(solution, fine), 3, axis=0) / (fine[1] - fine[0]) ** 3
+    middle = (np.arange(config.foc.steps) * 400) + 200
+    np.testing.assert_allclose(jerk[middle], solution.control, atol=0.05 * np.abs(solution.control).max())
+
+
+def test_a_movement_that_reaches_no_goal_is_refused() -> None:
+    times = np.arange(0.0, 1.0, 0.02)
+    short = demonstration('short', times, times[:, None] * np.array([0.1, 0.0]), make_obstacles(), np.array([[0.3, 0.0]]))
+    with pytest.raises(RecordingError, match=r'short: ends 0.202 m from the nearest goal, not within 0.05 m'):
+        reach(short, Config())
