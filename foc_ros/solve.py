@@ -14,7 +14,7 @@ from .answers import candidate_answer, solution_account, table
 from .foc.errors import InputError
 from .foc.homotopy import path_sides, search
 from .foc.monte_carlo import monte_carlo
-from .foc.outcomes import solve_candidates
+from .foc.outcomes import ranked, solve_candidates
 from .foc.predictor import reaching_problem
 from .foc.problem import Problem
 from .foc.records import LEFT, Array, Candidate, Outcome
@@ -86,7 +86,8 @@ def solve_scene(scene: SceneFile, problems: Sequence[Problem]) -> list[Outcome]:
         candidates = search(
             scene.hand.mean, scene.goals, scene.obstacles, config.homotopy, durations, config.foc.steps
         ).candidates
-    return solve_candidates(candidates, [problems[each.goal] for each in candidates], config.foc, config.likelihood)
+    outcomes = solve_candidates(candidates, [problems[each.goal] for each in candidates], config.foc, config.likelihood)
+    return ranked(outcomes, config.likelihood, scene.obstacles)
 
 
 def _guessed(scene: SceneFile, guess: Array) -> Candidate:

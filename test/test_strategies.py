@@ -10,7 +10,7 @@ from foc_ros.foc.algorithm1 import algorithm1
 from foc_ros.foc.assess import assess
 from foc_ros.foc.chance import eta_of_k
 from foc_ros.foc.config import FocConfig
-from foc_ros.foc.deadline import OutOfTimeError
+from foc_ros.foc.deadline import Deadline, OutOfTimeError
 from foc_ros.foc.dynamics import damped_mass, horizon
 from foc_ros.foc.forward import forward
 from foc_ros.foc.monte_carlo import monte_carlo
@@ -207,11 +207,11 @@ def test_a_warm_start_finds_what_a_cold_one_finds(strategy):
 @pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal', 'fixed', 'algorithm1'])
 def test_a_deadline_ends_the_search_and_one_that_is_not_reached_changes_nothing(strategy):
     problem, settings = one_obstacle(0.94), FocConfig(strategy=strategy, algorithm1_growth=1.5)
-    late = forward(problem, cold(BOWED), settings, deadline_s=0.0)
+    late = forward(problem, cold(BOWED), settings, Deadline(0.0))
     assert late.status is Status.DEADLINE
     assert 'out of time' in late.message
     assert np.isfinite(late.mean).all()
-    free, ample = forward(problem, cold(BOWED), settings), forward(problem, cold(BOWED), settings, deadline_s=1e3)
+    free, ample = forward(problem, cold(BOWED), settings), forward(problem, cold(BOWED), settings, Deadline(1e3))
     assert ample.status is free.status is Status.SOLVED
     np.testing.assert_array_equal(ample.mean, free.mean)
 

@@ -145,6 +145,7 @@ class Config:
     """All parameters of the predictor."""
 
     rate_hz: float = _p(50.0, 'predictions per second of message time', 'Hz', 0.1, 1000.0)
+    budget_s: float = _p(0.0, 'time of a prediction, beyond which ways are told as out of time; 0: no limit', 's', 0.0, 60.0)
     plane: str = _p('xy', 'task plane of the working frame', choices=PLANES, read_only=True)
     frame_id: str = _p('', 'working frame; empty: the frame of the first hand pose', read_only=True)
     foc: FocConfig = field(default_factory=FocConfig)

@@ -10,10 +10,13 @@ class OutOfTimeError(Exception):
 
 
 class Deadline:
-    """Passes `seconds` after it is made; never for None. A result that comes in time does not depend on it."""
+    """Passes `seconds` after it is made, or after `began`; never for None. A result that comes in time does not depend on it.
 
-    def __init__(self, seconds: float | None = None) -> None:
-        self.at = None if seconds is None else time.perf_counter() + seconds
+    began: by time.perf_counter() [s].
+    """
+
+    def __init__(self, seconds: float | None = None, began: float | None = None) -> None:
+        self.at = None if seconds is None else (time.perf_counter() if began is None else began) + seconds
 
     def check(self) -> None:
         """Raise OutOfTimeError once the deadline has passed."""

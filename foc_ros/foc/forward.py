@@ -13,7 +13,7 @@ from .algorithm1 import algorithm1
 from .assess import Assessment, assess
 from .config import FocConfig
 from .continuous import Curve, walk
-from .deadline import Deadline, OutOfTimeError
+from .deadline import NEVER, Deadline, OutOfTimeError
 from .noise import state_covariance
 from .optimal import optimise
 from .problem import Problem
@@ -42,19 +42,18 @@ class _Ended:
     iterations: int | None = None
 
 
-def forward(problem: Problem, start: Start, settings: FocConfig, deadline_s: float | None = None) -> Solution:
+def forward(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline = NEVER) -> Solution:
     """Solve one problem in the class in which it starts.
 
-    deadline_s: time it may take [s], looked at before each QP. Never raises for a problem that has no solution: the status
+    deadline: looked at before each QP. Never raises for a problem that has no solution: the status
     says so, and the mean is then the best effort (the largest eta that the strategy reached, or the smallest violation).
     """
-    began, deadline = time.perf_counter(), Deadline(deadline_s)
+    began = time.perf_counter()
     try:
         ended = _STRATEGIES[settings.strategy](problem, start, settings, deadline)
     except OutOfTimeError:
-        ended = replace(
-            _best_effort(problem, start, 0.0, 1.0, 0), status=Status.DEADLINE, message='out of time, with nothing found'
-        )
+        control, message = effort_cost(problem, 0.0).goal_control, 'out of time: the movement shown looks at no obstacle'
+        ended = _Ended(Status.DEADLINE, message, control, 0.0, 0.0, 0, WorkingSet(), np.zeros(0))
     assessment = assess(problem, ended.control)
     if ended.status is Status.SOLVED and settings.strategy != 'fixed' and assessment.eta < problem.eta - SHORT_OF_ETA:
         message = f'the solution achieves eta {assessment.eta:.6g} only'

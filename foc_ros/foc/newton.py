@@ -50,6 +50,7 @@ def newton(
     active, multipliers (k,): rows to begin with. changes: how often rows whose multiplier turns negative may be let go, or rows
     whose circle is entered taken in.
     """
+    near, multipliers = np.ascontiguousarray(near, dtype=float), np.ascontiguousarray(multipliers, dtype=float)
     wanted, let_go = wanted_distance(problem, tau), set[Row]()
     for _ in range(changes + 1):
         found = _settled(problem, cost, near, active, multipliers, wanted)

@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from .chance import centres
 from .config import FocConfig, LikelihoodConfig
+from .deadline import NEVER, Deadline
 from .forward import forward
 from .homotopy import path_sides
 from .likelihood import likelihoods, shared_cost
 from .partings import partings
 from .problem import Problem
-from .records import Candidate, Obstacles, Outcome, Solution, Status, make_obstacles
+from .records import Candidate, Obstacles, Outcome, Solution, Status
 from .start import cold, warm
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """What was found before, by label: solutions to start from, and likelihoods, by which what comes first is chosen."""
+
+    solutions: Mapping[str, Solution] = field(default_factory=dict)
+    likelihoods: Mapping[str, float] = field(default_factory=dict)
+
+
+NOTHING = Earlier()
 
 
 def solve_candidates(
@@ -24,29 +36,30 @@ def solve_candidates(
     settings: FocConfig,
     likelihood: LikelihoodConfig,
     effort_spent: float = 0.0,
-    earlier: Mapping[str, Solution] | None = None,
+    earlier: Earlier = NOTHING,
+    deadline: Deadline = NEVER,
 ) -> list[Outcome]:
-    """Solve each candidate and rank them.
+    """Solve each candidate, the likeliest of last time first, until the deadline; those that had no time have that status.
 
-    problems: one for every candidate; effort_spent: since movement onset [m^2/s^5]; earlier: solutions to start from where there
-    is one of the same label. Returns the solved ones first, most likely first.
+    problems: one for every candidate; effort_spent: since movement onset [m^2/s^5]. Returns them in the order of the candidates.
     """
-    shared, found = shared_cost(effort_spent, likelihood), earlier or {}
-    judged = [
-        _solved(each, problem, settings, shared, found.get(each.label))
-        for each, problem in zip(candidates, problems, strict=True)
-    ]
-    return ranked(distinct(judged), likelihood, problems[0].obstacles if problems else make_obstacles())
+    shared, found = shared_cost(effort_spent, likelihood), {}
+    for row in sorted(range(len(candidates)), key=lambda row: -earlier.likelihoods.get(candidates[row].label, 0.0)):
+        previous = earlier.solutions.get(candidates[row].label)
+        found[row] = _solved(candidates[row], problems[row], settings, shared, previous, deadline)
+    return [found[row] for row in range(len(candidates))]
 
 
-def _solved(candidate: Candidate, problem: Problem, settings: FocConfig, shared: float, previous: Solution | None) -> Outcome:
+def _solved(
+    candidate: Candidate, problem: Problem, settings: FocConfig, shared: float, previous: Solution | None, deadline: Deadline
+) -> Outcome:
     """Solve from the earlier solution; if that gets into what the earlier one was not, from the candidate's own guess."""
     if previous is not None:
-        again = forward(problem, warm(previous, problem), settings)
+        again = forward(problem, warm(previous, problem), settings, deadline)
         outcome = _judged(candidate, problem, again, shared)
-        if outcome.solved or outcome.solution.status is previous.status:
+        if outcome.solved or outcome.solution.status in (previous.status, Status.DEADLINE):
             return outcome
-    return _judged(candidate, problem, forward(problem, cold(candidate.guess), settings), shared)
+    return _judged(candidate, problem, forward(problem, cold(candidate.guess), settings, deadline), shared)
 
 
 def _judged(candidate: Candidate, problem: Problem, solution: Solution, shared: float) -> Outcome:
@@ -70,7 +83,8 @@ def _class(outcome: Outcome) -> tuple[int, frozenset[tuple[str, int]]]:
 
 
 def ranked(outcomes: Sequence[Outcome], likelihood: LikelihoodConfig, obstacles: Obstacles) -> list[Outcome]:
-    """Give the solved ones their likelihoods and put the most likely first; the others follow in their order, at 0."""
+    """Give the solved ones, each way once, their likelihoods, the most likely first; the others follow in their order, at 0."""
+    outcomes = distinct(outcomes)
     solved = [outcome for outcome in outcomes if outcome.solved]
     parted = partings(solved, obstacles) if likelihood.lookahead_s > 0.0 else None
     shares = likelihoods(np.array([outcome.cost for outcome in solved]), likelihood, parted)

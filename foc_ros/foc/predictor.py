@@ -10,28 +10,35 @@ import numpy as np
 
 from .config import REFERENCE_STEP_S, Config
 from .culling import relevant
+from .deadline import Deadline
 from .duration import times_to_go, way_times
 from .dynamics import triple_integrator_horizon
 from .homotopy import search
 from .library import Way, recall
 from .likelihood import most_likely
 from .noise import noise_per_step
-from .outcomes import solve_candidates
+from .outcomes import NOTHING, Earlier, ranked, solve_candidates
 from .problem import Problem, rest_to_goal
-from .records import Array, Candidate, HandState, Obstacles, Outcome, Prediction, Solution, Status
+from .records import NANOSECONDS, Array, Candidate, HandState, Obstacles, Outcome, Prediction, Solution, Status
 from .replanning import triple_integrator_error_map, triple_integrator_process_covariance
+
+RETRY = 25
+"""Predictions for which a way that slid into another class is only followed there."""
 
 
 @dataclass(frozen=True)
 class Memory:
     """What one prediction hands to the next.
 
-    most_likely: label; candidates: the ways followed; solutions: by label.
+    most_likely: label; candidates: the ways followed; earlier: their solutions and likelihoods; solved_ns: when each was last
+    solved, by label; slid: for how many predictions in a row each has been in another class.
     """
 
     most_likely: str | None = None
     candidates: tuple[Candidate, ...] = ()
-    solutions: Mapping[str, Solution] = field(default_factory=dict)
+    earlier: Earlier = NOTHING
+    solved_ns: Mapping[str, int] = field(default_factory=dict)
+    slid: Mapping[str, int] = field(default_factory=dict)
 
 
 def predict(
@@ -50,9 +57,12 @@ def predict(
     seen = hand, goals, obstacles, config.homotopy, durations, config.foc.steps
     candidates = recall(library, *seen, found.candidates, memory.candidates)
     problems = way_problems(config, hand, obstacles, goals, candidates, durations)
-    outcomes = solve_candidates(
-        candidates, list(problems.values()), config.foc, config.likelihood, hand.effort_spent, memory.solutions
+    deadline = Deadline(config.budget_s or None, began)
+    tried = solve_candidates(
+        candidates, list(problems.values()), config.foc, config.likelihood, hand.effort_spent, memory.earlier, deadline
     )
+    tried = [_aged(outcome, hand.stamp_ns, memory) for outcome in tried]
+    outcomes = ranked(tried, config.likelihood, obstacles)
     outcomes = [_seen(outcome, problems[outcome.candidate.label], hand, config.foc.process_noise) for outcome in outcomes]
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
@@ -62,9 +72,38 @@ def predict(
     notes = dict(found.notes) | {name: count for name, count in counted.items() if count}
     seconds = time.perf_counter() - began
     prediction = Prediction(hand.stamp_ns, hand.frame_id, hand.height, tuple(outcomes), best, notes, seconds)
-    useful = (outcome for outcome in outcomes if outcome.solution.status in (Status.SOLVED, Status.ETA_UNREACHABLE))
-    solutions = {outcome.candidate.label: outcome.solution for outcome in useful}
-    return prediction, Memory(best, candidates, solutions)
+    return prediction, _remembered(prediction, candidates, tried, memory)
+
+
+def _remembered(prediction: Prediction, candidates: tuple[Candidate, ...], tried: Sequence[Outcome], memory: Memory) -> Memory:
+    """Keep what the next prediction can start from.
+
+    A way that had no time keeps what it had. One that slid into another class is followed there, which costs little, and begun
+    anew from its own guess every RETRY predictions.
+    """
+    last, solutions, slid = memory.earlier.solutions, dict[str, Solution](), dict[str, int]()
+    for outcome in tried:
+        label, status = outcome.candidate.label, outcome.solution.status
+        if status is Status.DEADLINE and label in last:
+            solutions[label] = last[label]
+        elif status in (Status.SOLVED, Status.ETA_UNREACHABLE):
+            solutions[label] = outcome.solution
+        elif status is Status.LEFT_CLASS and memory.slid.get(label, 0) < RETRY:
+            solutions[label], slid[label] = outcome.solution, memory.slid.get(label, 0) + 1
+    likelihoods = {outcome.candidate.label: outcome.likelihood for outcome in prediction.outcomes}
+    labels = {candidate.label for candidate in candidates}
+    solved = {label: stamp for label, stamp in memory.solved_ns.items() if label in labels}
+    solved |= {outcome.candidate.label: prediction.stamp_ns for outcome in prediction.solved}
+    return Memory(prediction.most_likely, candidates, Earlier(solutions, likelihoods), solved, slid)
+
+
+def _aged(outcome: Outcome, stamp_ns: int, memory: Memory) -> Outcome:
+    """Say of a way that had no time when it was last solved: how likely it is, nobody knows."""
+    if outcome.solution.status is not Status.DEADLINE:
+        return outcome
+    solved_ns = memory.solved_ns.get(outcome.candidate.label)
+    age = 'never solved yet' if solved_ns is None else f'last solved {(stamp_ns - solved_ns) / NANOSECONDS:.3g} s ago'
+    return replace(outcome, solution=replace(outcome.solution, message=f'{outcome.solution.message}; {age}'))
 
 
 def way_problems(

@@ -160,11 +160,11 @@ class Problem(Record):
 
     def positions(self, control: Array) -> Array:
         """Mean positions at steps 1..N from the stacked control, (N, 2) [m]."""
-        return moved(self.horizon.position, control, self.free_position)
+        return moved(self.horizon.position, np.ascontiguousarray(control, dtype=float), self.free_position)
 
     def position_variance(self, control: Array) -> Array:
         """Rows xx, yy, xy of the position covariance at steps 1..N, (3, N) [m^2]."""
-        return spread(self.horizon.maps, self.noise_variance, control, self.free_variance)
+        return spread(self.horizon.maps, self.noise_variance, np.ascontiguousarray(control, dtype=float), self.free_variance)
 
 
 @compiled

@@ -148,7 +148,7 @@ def half_planes(problem: Problem, guess: Array, tau: float, *, literal: bool = F
     constraint is
     active, and the touching one cuts less off before it, so a far obstacle is never in the way. Both stay outside the circle.
     """
-    normals, distance, limits = normals_at(guess, problem.centres, problem.centres_from_free)
+    normals, distance, limits = normals_at(np.ascontiguousarray(guess, dtype=float), problem.centres, problem.centres_from_free)
     reach = wanted_distance(problem, tau)
     return normals, limits + ((reach**2 + distance**2) / (2 * distance) if literal else reach)
 

@@ -1,0 +1,82 @@
+"""A time for each prediction: what does not fit in is told as out of time, with its age, and never as unlikely."""
+
+import numpy as np
+import pytest
+
+from foc_ros.foc.config import Config, updated
+from foc_ros.foc.deadline import OutOfTimeError
+from foc_ros.foc.estimator import update
+from foc_ros.foc.outcomes import Earlier
+from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.records import HandSample, Status, make_obstacles
+
+OBSTACLES = make_obstacles([[0.12, 0.01], [0.2, -0.03]], [0.02, 0.02], 0.001)
+GOALS = np.array([[0.3, 0.0]])
+CONFIG = updated(Config(), {'foc.steps': 20})
+HANDS = [
+    update(None, HandSample(1_000_000_000 + 20_000_000 * tick, np.array([1e-4 * tick, 0.0])), CONFIG.estimator).state
+    for tick in range(3)
+]
+
+
+def predicted(tick: int, memory: Memory, budget_s: float = 0.0):
+    return predict(updated(CONFIG, {'budget_s': budget_s}), HANDS[tick], OBSTACLES, GOALS, memory)
+
+
+def statuses(prediction) -> list[Status]:
+    return [outcome.solution.status for outcome in prediction.outcomes]
+
+
+def test_a_budget_that_is_not_reached_changes_nothing():
+    (free, memory), (ample, other) = predicted(0, Memory()), predicted(0, Memory(), 60.0)
+    for one, two in ((free, ample), (predicted(1, memory)[0], predicted(1, other, 60.0)[0])):
+        assert one.most_likely == two.most_likely
+        for a, b in zip(one.outcomes, two.outcomes, strict=True):
+            assert (a.candidate.label, a.likelihood) == (b.candidate.label, b.likelihood)
+            np.testing.assert_array_equal(a.solution.mean, b.solution.mean)
+
+
+def test_no_time_at_all_is_an_empty_answer_and_forgets_nothing():
+    before, memory = predicted(0, Memory())
+    assert len(before.solved) > 1
+    late, memory = predicted(1, memory, 1e-9)
+    assert set(statuses(late)) == {Status.DEADLINE}
+    assert late.most_likely is None
+    assert all(np.isfinite(outcome.solution.mean).all() for outcome in late.outcomes)
+    told = {each.candidate.label: each.solution.message for each in late.outcomes}
+    assert all('out of time' in message for message in told.values())
+    assert all('last solved 0.02 s ago' in told[each.candidate.label] for each in before.solved)
+    after, _ = predicted(2, memory)
+    assert [each.candidate.label for each in after.solved] == [each.candidate.label for each in before.solved]
+    assert max(each.solution.qp_solves for each in after.solved) <= 3, 'warm, from before the late one'
+
+
+def test_a_way_that_never_had_time_says_so():
+    assert 'never solved yet' in predicted(0, Memory(), 1e-9)[0].outcomes[0].solution.message
+
+
+@pytest.mark.parametrize('turned', [False, True])
+def test_the_likeliest_of_last_time_comes_first(monkeypatch, turned):
+    before, memory = predicted(0, Memory())
+    wanted = before.solved[-1 if turned else 0].candidate.label
+    likelihoods = {each.candidate.label: float(each.candidate.label == wanted) for each in before.outcomes}
+    memory = Memory(memory.most_likely, memory.candidates, Earlier(memory.earlier.solutions, likelihoods), memory.solved_ns)
+    asked = []
+
+    def forward_with_time_for_one(problem, start, settings, deadline):
+        asked.append(problem)
+        if len(asked) > 1:
+            monkeypatch.setattr('foc_ros.foc.deadline.Deadline.check', out_of_time)
+        return real(problem, start, settings, deadline)
+
+    def out_of_time(_):
+        raise OutOfTimeError
+
+    from foc_ros.foc import outcomes
+
+    real = outcomes.forward
+    monkeypatch.setattr(outcomes, 'forward', forward_with_time_for_one)
+    late, _ = predicted(1, memory, 60.0)
+    assert [each.candidate.label for each in late.solved] == [wanted]
+    assert late.solved[0].likelihood == 1.0, 'likelihoods are of what was solved; the others are unknown'
+    assert statuses(late)[1:] == [Status.DEADLINE] * (len(late.outcomes) - 1)
