@@ -12,6 +12,8 @@ from foc_ros.foc.problem import Problem
 from .dense import Array, Dense, dense
 
 LIMIT = 500
+SETTINGS = {'piqp': {'eps_primal_inf': 1e-10, 'eps_dual_inf': 1e-10}}
+"""With its default, 1e-4, PIQP from 0.7 on calls the later QPs of the loop infeasible."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +57,9 @@ def solve_step(problem: Problem, made: Dense, guess: Array, tau: float, lam: flo
     apart = (offset**2).sum(axis=2) + 2 * (offset * (made.free - guess)).sum(axis=2)
     h = (apart - size[:, None] - tau).ravel()
     unit = 1 / np.sqrt(P.diagonal())  # without this scaling the interior-point solvers fail for large lambda
-    scaled = solve_qp(np.eye(len(unit)), np.zeros(len(unit)), G * unit, h, made.E * unit, made.b, solver=solver)
+    scaled = solve_qp(
+        np.eye(len(unit)), np.zeros(len(unit)), G * unit, h, made.E * unit, made.b, solver=solver, **SETTINGS.get(solver, {})
+    )
     return None if scaled is None else unit * np.asarray(scaled)
 
 

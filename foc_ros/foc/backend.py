@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,16 +49,33 @@ def solve_piqp(qp: DenseQP) -> Answer:
     A = None if qp.A is None else np.asfortranarray(qp.A)
     G = None if qp.G is None else np.asfortranarray(qp.G)
     for accuracy, reach, scale_cost in ATTEMPTS:
-        solver = piqp.DenseSolver()
+        solver = _solver(accuracy, reach, scale_cost)
+        solver.setup(P, qp.c, A, qp.b, G, qp.g, None, qp.lower, None)
+        if solver.solve() == piqp.PIQP_SOLVED:
+            return Answer(True, np.array(solver.result.x))
+    return Answer(False, np.array(solver.result.x))
+
+
+class _Made(threading.local):
+    """Solvers that this thread has made: each setup begins anew, and only the settings stay."""
+
+    def __init__(self) -> None:
+        self.solvers: dict[tuple[float, float, bool], piqp.DenseSolver] = {}
+
+
+_MADE = _Made()
+
+
+def _solver(accuracy: float, reach: float, scale_cost: bool) -> piqp.DenseSolver:
+    kept = _MADE.solvers
+    if (accuracy, reach, scale_cost) not in kept:
+        solver = kept[accuracy, reach, scale_cost] = piqp.DenseSolver()
         settings = solver.settings
         settings.eps_abs = settings.eps_rel = settings.eps_duality_gap_abs = settings.eps_duality_gap_rel = accuracy
         settings.tau, settings.preconditioner_scale_cost, settings.max_iter = reach, scale_cost, MAX_ITERATIONS
         if hasattr(settings, 'eps_dual_inf'):  # from 0.7 on
             settings.eps_dual_inf = settings.eps_primal_inf = INFEASIBLE
-        solver.setup(P, qp.c, A, qp.b, G, qp.g, None, qp.lower, None)
-        if solver.solve() == piqp.PIQP_SOLVED:
-            return Answer(True, np.array(solver.result.x))
-    return Answer(False, np.array(solver.result.x))
+    return kept[accuracy, reach, scale_cost]
 
 
 def solve_named(qp: DenseQP, backend: str) -> Answer:

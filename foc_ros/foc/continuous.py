@@ -35,7 +35,8 @@ SPAN = 60.0
 LARGEST_SHARE = 1e6
 """Where the walk ends: a variance weight so many times the effort is all that counts, and k has stopped growing."""
 PATIENCE = 2
-"""Strides in a row without a larger k after which a warm start gives up; a cold one goes to the end, over every dip of k."""
+"""Strides in a row, no shorter than `WARM_STRIDE`, without a larger k after which a warm start gives up: k has dips where the
+touching step changes. A cold one goes to the end, over every dip."""
 CLOSE = 1e-5
 """Relative excess of k over the wanted one at which the root is found."""
 CELL = 0.25
@@ -180,7 +181,8 @@ def _bracket(walker: _Walker, first: Point, wanted: float, stride: float, patien
     for point in _strides(walker, first, wanted, stride):
         if point.k >= wanted:
             return low, point
-        low, since = point, 0 if point.k > best.k else since + 1
+        since = 0 if point.k > best.k else since + (point.s - low.s >= WARM_STRIDE)
+        low = point
         best = max(best, point, key=lambda p: p.k)
         if since == patience:
             break
@@ -194,7 +196,7 @@ def _strides(walker: _Walker, first: Point, wanted: float, stride: float) -> Ite
     """
     guided = abs(stride) < STRIDE
     point, end = first, walker.end if stride > 0 else 0.0
-    shortest = min(abs(stride), WARM_STRIDE) / 2
+    shortest = (SHORTEST if guided else WARM_STRIDE) / 2
     while point.s != end and abs(stride) > shortest:
         s = min(point.s + stride, end) if stride > 0 else max(point.s + stride, end)
         further = walker.beside(s, point)

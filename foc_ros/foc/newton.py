@@ -117,9 +117,7 @@ def _listed(forces: dict[Row, float]) -> tuple[WorkingSet, Array]:
 def _entered(problem: Problem, found: Touching, wanted: Array) -> WorkingSet:
     """Return the rows, not yet active, at which a circle is entered deepest."""
     depth = depths(found.positions, problem.centres, wanted)
-    depth[found.active.rows] = 0.0
-    rounding = CLEAR * problem.extent
-    return WorkingSet(*peaks(depth, rounding)) if depth.max(initial=0.0) > rounding else WorkingSet()
+    return WorkingSet(*peaks(depth, *found.active.rows, CLEAR * problem.extent))
 
 
 def _settled(
@@ -288,6 +286,10 @@ def touching(
                 move = max(move, abs(place - at[i, axis]))
                 at[i, axis] = place
         if move < settled:
+            for i in range(k):  # round to the other side of a circle is another way
+                x, y = centres[obstacle[i], step[i], 0], centres[obstacle[i], step[i], 1]
+                if (at[i, 0] - x) * (near[step[i], 0] - x) + (at[i, 1] - y) * (near[step[i], 1] - y) < 0:
+                    return False, goal_control.copy(), rest, pressing
             control = goal_control + combined(forces, pressed)[0]
             return True, control, moved(position, control, free), pressing
         if move > WAVERING * last:

@@ -12,7 +12,7 @@ solution is a minimum of the problem as it stands.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -158,7 +158,8 @@ def surrogate_qp(
         k,
         1.0 if complete else 0.0,
     )
-    weights = np.concatenate((problem.unweighted, np.tile(problem.noise_variance * control, (3, 1))))
+    weights = np.ones((5, len(control)))
+    weights[2:] = problem.noise_variance * control
     limits = row_values(maps, weights, slopes, control) - surplus
     return ReachingQP(_bent(problem, control, active, multipliers, slopes), maps, weights, slopes, limits)
 
@@ -199,10 +200,9 @@ def linearised(
 
 def _bent(problem: Problem, control: Array, active: WorkingSet, multipliers: Array, slopes: Array) -> Cost:
     """Return the cost with the curvature of the active rows' standard deviations, about the control."""
-    cost = effort_cost(problem, 0.0)
     if not len(active):
-        return cost
+        return effort_cost(problem, 0.0)
     weight = -multipliers[:, None] * slopes[active.rows][:, 2:]
     maps = problem.horizon.maps[2:].reshape(-1, len(control))
     bend = weight.T.ravel() @ maps[(np.arange(3)[:, None] * problem.horizon.steps + active.step).ravel()] * problem.noise_variance
-    return replace(cost, hessian=cost.hessian + bend, linear=bend * control)
+    return Cost(2.0 * (1.0 + problem.weighted_variance) + bend, bend * control, *problem.goal_rows)

@@ -22,7 +22,7 @@ from .problem import Problem, rest_to_goal
 from .records import NANOSECONDS, Array, Candidate, HandState, Obstacles, Outcome, Prediction, Solution, Status
 from .replanning import triple_integrator_error_map, triple_integrator_process_covariance
 
-RETRY = 25
+RETRY = 5
 """Predictions for which a way that slid into another class is only followed there."""
 
 

@@ -1,0 +1,57 @@
+"""Predictions one after the other in one process, memory watched: `python scripts/memory.py --ticks 100000`.
+
+A hand goes to and fro among obstacles, so that ways and durations change all the time. Exit code 0 where the resident memory
+never grew by more than a twentieth after the first tenth of the ticks.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+from rich.progress import track
+
+from foc_ros.foc.config import Config, updated
+from foc_ros.foc.pipeline import Pipeline
+from foc_ros.foc.records import HandSample, make_obstacles
+
+WARM_UP, GROWTH = 0.1, 1.05
+CONFIG = updated(Config(), {'foc.steps': 30, 'rate_hz': 100.0, 'scene.timeout_s': 0.0})
+OBSTACLES = make_obstacles([[0.12, 0.01], [0.2, -0.03], [0.15, 0.06]], [0.02, 0.015, 0.02], 0.001)
+GOALS = np.array([[0.3, 0.0], [0.28, 0.1]])
+
+
+def resident_mb() -> float:
+    """Return the memory of this process that is resident [MB]."""
+    pages = int(Path('/proc/self/statm').read_text().split()[1])
+    return pages * os.sysconf('SC_PAGE_SIZE') / 1e6
+
+
+def main() -> int:
+    """Predict and watch."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--ticks', type=int, default=100_000, metavar='N', help='predictions (default: 100000)')
+    ticks = parser.parse_args().ticks
+    pipeline = Pipeline(CONFIG)
+    pipeline.set_obstacles('cloud', OBSTACLES, None, 'world')
+    pipeline.set_goals(GOALS, 'world')
+    generator, seen, predictions = np.random.default_rng(1), [], 0
+    for tick in track(range(ticks), description='ticks'):
+        phase = 2 * np.pi * tick / 700
+        place = np.array([0.14 - 0.14 * np.cos(phase), 0.02 * np.sin(3.1 * phase)]) + generator.normal(0, 2e-4, 2)
+        pipeline.hand(HandSample(1_000_000_000 + 10_000_000 * tick, place, 0.0, 'world'))
+        predictions += pipeline.due and pipeline.predict() is not None
+        if tick >= WARM_UP * ticks and tick % max(ticks // 50, 1) == 0:
+            seen.append(resident_mb())
+    growth = max(seen) / seen[0]
+    print(
+        f'{predictions} predictions of {ticks} ticks; {seen[0]:.0f} MB after the first tenth, {max(seen):.0f} MB at most: x {growth:.3f}'
+    )
+    return int(growth > GROWTH or predictions < 0.9 * ticks)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
