@@ -72,7 +72,8 @@ def fit(recordings: Mapping[str, Recording], config: Config, executor: Executor)
     thin = _thin(demonstrations, config)
     some = dict(list(usable.items())[:: -(-len(usable) // SEARCHED)])
     if any(len(each.obstacles) for each in demonstrations):
-        kinds = [DURATION, ACCELERATION, NOISE, *([] if config.foc.strategy == 'fixed' else [ETA])]
+        # with strategy `fixed` eta has no effect, and lambda was found for the noise as it is
+        kinds = [DURATION, ACCELERATION, *([] if config.foc.strategy == 'fixed' else [NOISE, ETA])]
     else:
         kinds = [DURATION, ACCELERATION]
         found.warnings.append(
