@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -26,7 +24,7 @@ def fit_followed(demonstrations: Sequence[Demonstration], config: Config) -> tup
     words = [f'{NAME}: {open_ways} ways are open in a recording, {followed} are followed'] if open_ways > followed else []
     if followed == config.homotopy.max_candidates:
         return {}, words
-    return {NAME: Estimate(NAME, followed, math.nan, math.nan, 'ways and goals open in the recordings')}, words
+    return {NAME: Estimate(NAME, followed, followed, followed, 'ways and goals open in the recordings')}, words
 
 
 def ways(demonstration: Demonstration) -> int:
