@@ -14,16 +14,17 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *(ROOT / 'doc').glob('*.md')])
 
-ROOT, ROOT_OR_NETWORK = 'wants root', 'wants root or the network'
+NEEDS_ROOT, ROOT_OR_NETWORK = 'wants root', 'wants root or the network'
 ROS = 'wants the commands of a ROS installation'
 BY_CI = '.ci/run runs it'
 LONG = 'takes minutes'
+FIT = 'takes minutes; test_fit.py and test_evaluate.py do it with few predictions'
 SHELL = 'the test has the program on its path already'
 NOT_RUN = {
     # README
     'make setup': BY_CI,
     'make demo': 'test_demo.py plays the recording, and this would take another half a minute',
-    'echo "yaml file://$PWD/src/foc_ros/rosdep/foc_ros.yaml" | sudo tee /etc/ros/rosdep/sources.list.d/10-foc_ros.list': ROOT,
+    'echo "yaml file://$PWD/src/foc_ros/rosdep/foc_ros.yaml" | sudo tee /etc/ros/rosdep/sources.list.d/10-foc_ros.list': NEEDS_ROOT,
     'rosdep update && rosdep install --from-paths src --ignore-src': ROOT_OR_NETWORK,
     'colcon build --packages-select foc_ros': 'scripts/colcon_check runs it',
     'source install/setup.bash': 'scripts/colcon_check runs it',
@@ -32,6 +33,11 @@ NOT_RUN = {
     'python3 -m venv venv && . venv/bin/activate': ROOT_OR_NETWORK,
     "pip install '.[ros,report]'": ROOT_OR_NETWORK,
     'export AMENT_PREFIX_PATH=$VIRTUAL_ENV': SHELL,
+    'foc_ros fit recordings --output operator.yaml': FIT,
+    # calibration
+    'foc_ros fit recordings --params foc.yaml --output operator.yaml': FIT,
+    'foc_ros evaluate recordings --params operator.yaml --report report': FIT,
+    'foc_ros node --ros-args --params-file operator.yaml': 'test_fit.py starts the node with what was fitted',
     # start
     '. .venv/bin/activate': SHELL,
     # beside_a_stack

@@ -19,7 +19,7 @@ from .questions import Question
 
 PUBLISHED, REFITTED, PLAIN, UNIFORM = 'foc', 'foc, held out', 'foc, plain rule', 'uniform'
 CONFIDENCES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
-POWERS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
+POWERS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
 LOOKAHEADS_S = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4)
 RATES = tuple(float(rate) for rate in np.geomspace(0.01, 100.0, 25))
 """Inverse temperatures tried, in parts of one over the median effort to go."""

@@ -66,9 +66,11 @@ def _by_tenth(name: str) -> Draw:
         for predictor, scores in answer['questions'][name].items():
             if predictor != UNIFORM:
                 heights = [each[value] if each[value] is not None else float('nan') for each in scores['by_tenth']]
-                thick = 2.5 if predictor in (PUBLISHED, REFITTED) else 1.0
-                axes.plot([tenth + 0.5 for tenth in range(TENTHS)], heights, marker='.', linewidth=thick, label=predictor)
+                ours = predictor in (PUBLISHED, REFITTED)
+                look = {'linewidth': 2.5} if ours else {'linewidth': 1.0, 'linestyle': '--'}
+                axes.plot(range(1, TENTHS + 1), heights, marker='.', label=predictor, **look)
         axes.set_xlabel('tenth of the way')
+        axes.set_xticks(range(1, TENTHS + 1))
         axes.set_ylabel(RIGHT.split(':')[0] if name == GAP else 'log-likelihood above uniform [nat]')
         axes.axhline(0.0, color='0.4', linewidth=0.8)
         axes.legend(fontsize='small')

@@ -23,6 +23,7 @@ from .demonstrations import Demonstration, demonstration
 from .duration_fit import fit_duration
 from .estimates import Estimate, applied, bounded
 from .estimator_fit import fit_estimator
+from .followed import fit_followed
 from .plans import Reach, reach
 from .recovery import fit_plans
 from .replays import ACCELERATION, DURATION, ETA, NOISE, Foretold, compared, levels, observed, scored
@@ -67,12 +68,14 @@ def fit(recordings: Mapping[str, Recording], config: Config, executor: Executor)
     usable = {each.name: recordings[each.name] for each in demonstrations}
     found.take(fit_estimator(demonstrations, found.config))
     found.take(fit_duration(demonstrations, found.config))
+    found.take(fit_followed(demonstrations, found.config))
     if config.foc.strategy == 'fixed':
         found.take(fit_plans(_reaches(demonstrations, found), found.config))
     thin = _thin(demonstrations, config)
     some = dict(list(usable.items())[:: -(-len(usable) // SEARCHED)])
     if any(len(each.obstacles) for each in demonstrations):
-        kinds = [DURATION, ACCELERATION, NOISE, *([] if config.foc.strategy == 'fixed' else [ETA])]
+        # with strategy `fixed` eta has no effect, and lambda was found for the noise as it is
+        kinds = [DURATION, ACCELERATION, *([] if config.foc.strategy == 'fixed' else [NOISE, ETA])]
     else:
         kinds = [DURATION, ACCELERATION]
         found.warnings.append(

@@ -34,7 +34,9 @@ STARTS = 2
 """Searches, from the best places: a class that is left and a row that becomes active make valleys of their own."""
 MOST_STEPS = 30
 OUTLIER_STDDEVS = 3.0
-"""Residuals beyond this many `estimator.position_stddev` count less: a plan near a change of class follows its noisy start."""
+"""Residuals beyond this many standard deviations count less: a plan near a change of class follows its noisy start."""
+MAD_STDDEVS = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
 BEYOND = 3.0
 """How far beyond these the search may go, in the logarithms."""
 STEP = 1e-3
@@ -69,7 +71,9 @@ def recover(reaches: Sequence[Reach], config: Config) -> Recovered:
     few = reaches[:: max(len(reaches) // FEW, 1)][:FEW]
     scale = OUTLIER_STDDEVS * config.estimator.position_stddev
     grid = np.log([(tau, lam) for tau in TAUS for lam in LAMBDAS])
-    rough = [_loss(np.concatenate([_residual(each, logs, config) for each in few]) / scale) for logs in grid]
+    left = [np.concatenate([_residual(each, logs, config) for each in few]) for logs in grid]
+    rough = [_loss(each / scale) for each in left]
+    scale = max(scale, OUTLIER_STDDEVS * MAD_STDDEVS * float(np.median(np.abs(left[int(np.argmin(rough))]))))
     low, high = grid.min(axis=0) - BEYOND, grid.max(axis=0) + BEYOND
     searches = [
         least_squares(residuals, grid[k], bounds=(low, high), diff_step=STEP, loss='cauchy', f_scale=scale, max_nfev=MOST_STEPS)

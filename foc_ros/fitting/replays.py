@@ -32,7 +32,7 @@ from .estimates import bounded
 Key = tuple[str, int]
 """A prediction: recording and stamp [ns]."""
 DURATION, ACCELERATION, NOISE, ETA = 'duration', 'acceleration', 'noise', 'eta'
-LEVELS = {DURATION: (0.8, 1.25, 1.6, 2.0), ACCELERATION: (0.0, 0.1, 0.3), NOISE: (0.5, 2.0), ETA: (0.7, 0.5, 0.95)}
+LEVELS = {DURATION: (0.8, 1.25, 1.6, 2.0), ACCELERATION: (0.0, 0.1, 0.3), NOISE: (0.06, 0.25, 2.0), ETA: (0.7, 0.5, 0.95)}
 """What is tried in turn: factors on durations and noise, values of the others."""
 
 

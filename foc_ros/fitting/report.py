@@ -63,6 +63,9 @@ def _picture(parameters: Mapping[str, Any]) -> str:
         axes.axvline(1.0, color='0.4', linewidth=1.0)
         axes.set_yticks(range(len(drawn)), list(drawn))
         axes.set(xscale='log', xlabel='fitted / given', ylim=(len(drawn) - 0.4, -0.6))
+        for formatted in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
+            formatted('{x:g}')
+        axes.tick_params(axis='x', which='minor', labelsize=7)
     with TemporaryDirectory() as scratch:
         file = Path(scratch) / 'fit.png'
         save(figure, file)
