@@ -47,9 +47,8 @@ def main() -> int:
         if tick >= WARM_UP * ticks and tick % max(ticks // 50, 1) == 0:
             seen.append(resident_mb())
     growth = max(seen) / seen[0]
-    print(
-        f'{predictions} predictions of {ticks} ticks; {seen[0]:.0f} MB after the first tenth, {max(seen):.0f} MB at most: x {growth:.3f}'
-    )
+    print(f'{predictions} predictions of {ticks} ticks')
+    print(f'{seen[0]:.0f} MB after the first tenth, {max(seen):.0f} MB at most: x {growth:.3f}')
     return int(growth > GROWTH or predictions < 0.9 * ticks)
 
 
