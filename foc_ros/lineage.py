@@ -52,11 +52,11 @@ def lineages(moments: Sequence[Moment]) -> list[dict[str, int]]:
     return numbered
 
 
-def slots(moments: Sequence[Moment], lines: Sequence[Mapping[str, int]], count: int) -> dict[int, int]:
+def slots(moments: Sequence[Moment], lines: Sequence[Mapping[str, int]], count: int, colours: int) -> dict[int, int]:
     """Return a slot in [0, count), which gives letter and colour, of each line: no two lines of one time share one.
 
-    Lines that begin together take theirs in order of likelihood; the slot that has been free for longest comes first. A line that
-    finds none free has none. lines: as of `lineages`.
+    Lines that begin together take theirs in order of likelihood. First come slots of a colour (slot modulo colours) that no line
+    of that time has, then those that have been free for longest. A line that finds none free has none. lines: as of `lineages`.
     """
     last = {line: row for row, numbers in enumerate(lines) for line in numbers.values()}
     given: dict[int, int] = {}
@@ -66,7 +66,8 @@ def slots(moments: Sequence[Moment], lines: Sequence[Mapping[str, int]], count: 
         for line in (numbers[way.label] for way in moment.ways):
             free = [slot for slot, until in taken_until.items() if until < row]
             if line not in seen and free:
-                given[line] = min(free, key=lambda slot: (taken_until[slot], slot))
+                used = {slot % colours for slot, until in taken_until.items() if until >= row}
+                given[line] = min(free, key=lambda slot: (slot % colours in used, taken_until[slot], slot))
                 taken_until[given[line]] = last[line]
             seen.add(line)
     return given

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from . import plots
-from .drawing import CLASSES
+from .drawing import CLASS_COLOURS, CLASSES
 from .foc.errors import InputError
 from .foc.records import NANOSECONDS
 from .lineage import lineages, slots
@@ -54,7 +54,7 @@ def _write_pictures(directory: Path, track: Track, moments: Sequence[Moment], sp
     if not shown:
         return []
     lines = lineages(moments)
-    letters = slots(moments, lines, CLASSES)
+    letters = slots(moments, lines, CLASSES, len(CLASS_COLOURS))
     chosen = _chosen(shown, spans)
     ways = [way for _, moment in chosen for way in moment.ways]
     goals = np.unique(np.concatenate([moment.goals for moment in shown]), axis=0)

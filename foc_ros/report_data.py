@@ -63,7 +63,7 @@ def page_data(track: Track, moments: Sequence[Moment], spans: Sequence[tuple[int
         'bounds': _bounds(track, moments),
         'times': [_seconds(moment.stamp_ns, origin_ns) for moment in moments],
         'solve_ms': [None if moment.solve_s is None else round(1e3 * moment.solve_s, 2) for moment in moments],
-        'lines': _lines(moments, lines, slots(moments, lines, CLASSES)),
+        'lines': _lines(moments, lines, slots(moments, lines, CLASSES, len(CLASS_COLOURS))),
         'movements': [[_seconds(stamp, origin_ns) for stamp in span] for span in spans],
         'hand': _hand(track, origin_ns),
         'scenes': [json.loads(scene) for scene in scenes.values],

@@ -16,7 +16,7 @@ from make_readme_picture import replayed
 from matplotlib.figure import Figure
 from PIL import Image
 
-from foc_ros.drawing import CLASSES, draw_hand, draw_likelihoods, draw_scene, draw_ways, new_figure
+from foc_ros.drawing import CLASS_COLOURS, CLASSES, draw_hand, draw_likelihoods, draw_scene, draw_ways, new_figure
 from foc_ros.foc.config import Config
 from foc_ros.foc.records import NANOSECONDS
 from foc_ros.lineage import lineages, slots
@@ -47,7 +47,7 @@ def pictures(track: Track, moments: list[Moment], chosen: tuple[int, ...] = MOVE
     for start_ns, end_ns in (spans[number] for number in chosen):
         inside = [moment for moment in moments if start_ns <= moment.stamp_ns <= end_ns and moment.ways]
         lines = lineages(inside)
-        letters = slots(inside, lines, CLASSES)
+        letters = slots(inside, lines, CLASSES, len(CLASS_COLOURS))
         rows = np.unique(np.linspace(0, len(inside) - 1, PICTURES).round().astype(int))
         for row in rows:
             moment, seconds = inside[row], [(stamp - start_ns) / NANOSECONDS for stamp in (start_ns, end_ns)]

@@ -78,17 +78,27 @@ def test_lines_of_one_time_have_different_slots() -> None:
     moments = [moment(number, *labels[number % 3 : number % 3 + 3]) for number in range(12)]
     lines = lineages(moments)
     for count in (2, 3, 5):
-        given = slots(moments, lines, count)
+        given = slots(moments, lines, count, count)
         assert set(given.values()) == set(range(count))
         for numbers in lines:
             used = [given[line] for line in numbers.values() if line in given]
             assert len(used) == len(set(used))
-    assert list(slots(moments, lines, 5).values())[:3] == [0, 1, 2]
-    assert len(slots(moments[:1], lines[:1], 2)) == 2
+    assert list(slots(moments, lines, 5, 5).values())[:3] == [0, 1, 2]
+    assert len(slots(moments[:1], lines[:1], 2, 2)) == 2
 
 
 def test_a_slot_rests_before_another_line_takes_it() -> None:
     alone = [moment(number, f'goal{number % 2}:+1') for number in (0, 51, 102, 153)]
     lines = lineages(alone)
     assert len({line for numbers in lines for line in numbers.values()}) == 4
-    assert list(slots(alone, lines, 3).values()) == [0, 1, 2, 0]
+    assert list(slots(alone, lines, 3, 3).values()) == [0, 1, 2, 0]
+
+
+def test_lines_of_one_time_share_no_colour_while_there_are_others() -> None:
+    labels = ('goal0:+1', 'goal1:+1', 'goal2:+1', 'goal3:+1')
+    moments = [moment(0, *labels[:2]), moment(1, labels[0]), moment(2, labels[0], labels[2]), moment(3, *labels)]
+    lines = lineages(moments)
+    given = slots(moments, lines, 6, 3)
+    assert [given[line] for line in lines[2].values()] == [0, 2]
+    assert len({given[line] % 3 for line in list(lines[3].values())[:3]}) == 3
+    assert len({given[line] for line in lines[3].values()}) == 4

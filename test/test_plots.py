@@ -98,7 +98,7 @@ def test_moment_shows_past_and_future_of_the_hand() -> None:
     around = [moment_of(each, *scene()) for each in predictions(made) if span[0] <= each.stamp_ns <= span[1]]
     moment = around[len(around) // 3]
     lines = lineages(around)
-    told = Around(tuple(around), tuple(lines), slots(around, lines, CLASSES))
+    told = Around(tuple(around), tuple(lines), slots(around, lines, CLASSES, len(CLASS_COLOURS)))
     figure = moment_figure(track, moment, told, span, bounds_of(*scene(), moment.ways))
     hand = [line for line in figure.axes[0].lines if line.get_color() == 'black' and len(line.get_xdata()) > 1]
     assert [line.get_linestyle() for line in hand] == ['-', ':']
