@@ -40,6 +40,7 @@ endif
 $(STAMP): setup.py setup.cfg pyproject.toml
 	@test -e $@ || $(PYTHON) -m venv --clear $(VENV_OPTIONS) $(VENV) || { echo 'make: no venv in $(PYTHON); on Debian and Ubuntu: apt install python3-venv' >&2; exit 1; }
 	$(PIP) install --quiet --editable '.[$(EXTRAS)]'
+	$(BIN)/python -c 'import foc_ros.foc.pipeline'  # compiles the solver's kernels, which takes some seconds once
 	touch $@
 
 demo: $(STAMP)

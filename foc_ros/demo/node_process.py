@@ -6,6 +6,7 @@ import ctypes
 import signal
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 from types import TracebackType
 
@@ -31,6 +32,7 @@ class NodeProcess:
         self._log = log
 
     def __enter__(self) -> NodeProcess:
+        import_module('foc_ros.foc.pipeline')  # compiles the kernels where nobody waits for a node to answer
         with self._log.open('wb') as log:
             self._process = subprocess.Popen(
                 [sys.executable, '-m', 'foc_ros', 'node'],
