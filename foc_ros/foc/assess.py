@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -18,7 +19,7 @@ class Assessment:
     k: Array
     relaxed: tuple[str, ...]
 
-    @property
+    @cached_property
     def smallest_k(self) -> float:
         """The k that holds everywhere; CERTAIN_K where there is no obstacle."""
         return min(float(self.k.min(initial=CERTAIN_K)), CERTAIN_K)
