@@ -33,6 +33,7 @@ NOT_RUN = {
     'python3 -m venv venv && . venv/bin/activate': ROOT_OR_NETWORK,
     "pip install '.[ros,report]'": ROOT_OR_NETWORK,
     'export AMENT_PREFIX_PATH=$VIRTUAL_ENV': SHELL,
+    'foc_ros evaluate bags --report evaluation': FIT,
     'foc_ros fit recordings --output operator.yaml': FIT,
     # calibration
     'foc_ros fit recordings --params foc.yaml --output operator.yaml': FIT,
