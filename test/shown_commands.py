@@ -14,7 +14,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *(ROOT / 'doc').glob('*.md')])
 
-NEEDS_ROOT, ROOT_OR_NETWORK = 'wants root', 'wants root or the network'
+SUDO, ROOT_OR_NETWORK = 'wants root', 'wants root or the network'
 ROS = 'wants the commands of a ROS installation'
 BY_CI = '.ci/run runs it'
 LONG = 'takes minutes'
@@ -24,7 +24,7 @@ NOT_RUN = {
     # README
     'make setup': BY_CI,
     'make demo': 'test_demo.py plays the recording, and this would take another half a minute',
-    'echo "yaml file://$PWD/src/foc_ros/rosdep/foc_ros.yaml" | sudo tee /etc/ros/rosdep/sources.list.d/10-foc_ros.list': NEEDS_ROOT,
+    'echo "yaml file://$PWD/src/foc_ros/rosdep/foc_ros.yaml" | sudo tee /etc/ros/rosdep/sources.list.d/10-foc_ros.list': SUDO,
     'rosdep update && rosdep install --from-paths src --ignore-src': ROOT_OR_NETWORK,
     'colcon build --packages-select foc_ros': 'scripts/colcon_check runs it',
     'source install/setup.bash': 'scripts/colcon_check runs it',

@@ -20,6 +20,8 @@ pytest.importorskip('plotly', reason='plotly is not installed')
 RUN = {page: [line for line in commands(page) if line not in NOT_RUN] for page in PAGES}
 PATIENCE_S = 6
 """How long a line that runs until it is interrupted is left running."""
+PAGE_S = 280
+"""A page takes half a minute; this is for a machine that is busy with other things."""
 WANT_ROS = ('foc_ros node', 'teleoperation_loop')
 
 
@@ -39,6 +41,7 @@ def test_no_block_escapes_the_rule(page: Path) -> None:
     assert other_shell_blocks(page) == []
 
 
+@pytest.mark.timeout(PAGE_S + 20)
 @pytest.mark.parametrize('page', [page for page in PAGES if RUN[page]], ids=lambda page: page.name)
 def test_commands_work_as_shown(page: Path, tmp_path: Path) -> None:
     """In a clone, where the README's files lie that a user would bring."""
@@ -77,7 +80,7 @@ def shell(clone: Path, lines: list[str]) -> subprocess.CompletedProcess[str]:
     with free_domain() as domain:
         environment = os.environ | {'PATH': path, 'ROS_LOG_DIR': str(clone / 'log'), 'ROS_DOMAIN_ID': str(domain)}
         return subprocess.run(
-            ['bash', '-c', script], cwd=clone, env=environment, capture_output=True, text=True, timeout=110, check=False
+            ['bash', '-c', script], cwd=clone, env=environment, capture_output=True, text=True, timeout=PAGE_S, check=False
         )
 
 
