@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from evaluation_samples import reach, write_tables
 
-from foc_ros.bags import BagReader
-from foc_ros.convert import read_goals, read_movements, read_obstacles, write_movement
+from foc_ros.bags import TYPESTORE, BagReader, Item
+from foc_ros.conversions.types import RosbagsTypes
+from foc_ros.convert import EPOCH_NS, read_goals, read_movements, read_obstacles, write_movement
 from foc_ros.evaluation.forecasts import power_rule
 from foc_ros.evaluation.observations import Observations
 from foc_ros.evaluation.observe import observe
@@ -18,6 +19,7 @@ from foc_ros.evaluation.questions import GAP, GOAL, WAY, question, relevant
 from foc_ros.evaluation.recordings import BagRecording, find_recordings
 from foc_ros.foc.config import Config, updated
 from foc_ros.foc.records import LEFT
+from foc_ros.input_messages import goal_poses
 from foc_ros.replay import Replay
 
 FAST = {'rate_hz': 4.0, 'foc.steps': 20, 'foc.strategy': 'fixed', 'foc.tau': 1e-4, 'foc.lam': 0.0, 'homotopy.max_candidates': 6}
@@ -84,3 +86,20 @@ def test_the_truth_is_the_path_s_own(data: Path) -> None:
 
 def test_the_same_recording_gives_the_same_observations(data: Path) -> None:
     assert pickle.dumps(seen(data, PLAIN)) == pickle.dumps(seen(data, PLAIN))
+
+
+def test_where_goals_change_on_the_way_nothing_is_said_of_the_earlier_ones(data: Path) -> None:
+    class Changing:
+        name = 'changing'
+
+        def items(self):
+            """Three goals half way; the two from before come back with the tables' next message of them."""
+            goals = goal_poses(RosbagsTypes(TYPESTORE), EPOCH_NS, 'world', np.array([(0.1 * k, 0.3, 0.0) for k in range(3)]))
+            for item in find_recordings(data)['one'].items():
+                yield item
+                if item.role == 'hand_pose' and EPOCH_NS + 600_000_000 < item.log_ns < EPOCH_NS + 700_000_000:
+                    yield Item('goals', '/goals', item.log_ns, goals, b'')
+
+    recording = observe(Changing(), PLAIN)
+    assert {len(each.goals) for each in recording.each} == {2, 3}
+    assert all(each.truth.goal == (0 if len(each.goals) == 2 else None) for each in recording.each)

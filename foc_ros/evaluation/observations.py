@@ -56,9 +56,9 @@ class Truth(Record):
     """What the hand really did after one prediction.
 
     sides (n,): LEFT or RIGHT, the side of each obstacle on which the rest of the path runs; ahead (n,): whether the row of the
-    obstacle is still to be passed; goal: row of the goal where the recording ends, None where it ends at none; positions (h, 2)
-    [m]: at `TIMES_S`, nan beyond the end; progress in [0, 1]: share of the way that lies behind; approach in [0, 1]: share of
-    the way from the last row, or the start, to the next one, nan where none is to come.
+    obstacle is still to be passed; goal: row of the goal where the recording ends, None where it ends at none, or at one that was
+    not there yet; positions (h, 2) [m]: at `TIMES_S`, nan beyond the end; progress in [0, 1]: share of the way that lies behind;
+    approach in [0, 1]: share of the way from the last row, or the start, to the next one, nan where none is to come.
     """
 
     sides: Sides

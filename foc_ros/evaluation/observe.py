@@ -62,7 +62,7 @@ def _observation(step: Step, hand: HandState, past: Path) -> Observation:
         goals=goals,
         ways=_ways(prediction, obstacles, hand.effort_spent),
         most_likely=prediction.most_likely,
-        truth=_truth(prediction.stamp_ns, past, obstacles, row, along),
+        truth=_truth(prediction.stamp_ns, past, obstacles, row, along, goals),
     )
 
 
@@ -103,7 +103,7 @@ def _sides(path: Array, where: Array) -> NDArray[np.int8]:
     return np.where(swept_angles(path, where) < 0.0, LEFT, RIGHT).astype(np.int8)
 
 
-def _truth(stamp_ns: int, past: Path, obstacles: Obstacles, row: NDArray[np.int64], along: Array) -> Truth:
+def _truth(stamp_ns: int, past: Path, obstacles: Obstacles, row: NDArray[np.int64], along: Array, goals: Array) -> Truth:
     now = past.index(stamp_ns)
     rest = past.positions[now:]
     seconds = (past.stamps_ns[now:] - stamp_ns) / NANOSECONDS
@@ -113,7 +113,8 @@ def _truth(stamp_ns: int, past: Path, obstacles: Obstacles, row: NDArray[np.int6
     return Truth(
         sides=_sides(rest, where),
         ahead=open_rows[row],
-        goal=past.goal,
+        # goals that were other ones then say nothing of those at the end
+        goal=past.goal if np.array_equal(goals, past.goals) else None,
         positions=past.at(stamp_ns, np.array(TIMES_S)),
         progress=float(past.progress[now]),
         approach=_approach(line, past, place, now),

@@ -14,12 +14,12 @@ SHARE_OF_STEP = 0.02
 class Path:
     """A recorded path, of a movement that ends where it is nearest to the goal that it reached.
 
-    Attributes: stamps_ns (m,), positions (m, 2) [m]; goal: row of the goal reached, None where none was; end_ns: when the
-    movement ends; travelled (m,): way that lies behind [m]; progress (m,): its share of the movement's way.
+    Attributes: stamps_ns (m,), positions (m, 2) [m], goals (g, 2) [m]; goal: row of the goal reached, None where none was;
+    end_ns: when the movement ends; travelled (m,): way that lies behind [m]; progress (m,): its share of the movement's way.
     """
 
     def __init__(self, stamps_ns: NDArray[np.int64], positions: Array, goals: Array) -> None:
-        self.stamps_ns, self.positions = stamps_ns, positions
+        self.stamps_ns, self.positions, self.goals = stamps_ns, positions, goals
         self.goal, end = reached(positions, goals)
         self.end_ns = int(stamps_ns[end])
         self.travelled = _travelled(positions)
