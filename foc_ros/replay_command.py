@@ -136,6 +136,7 @@ class Report:
     """What the report's pictures are made of."""
 
     def __init__(self) -> None:
+        from . import report  # noqa: F401 (a missing library is told before the work, not after it)
         from .moments import Moment, moment_of
 
         self._moment_of = moment_of

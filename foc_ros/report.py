@@ -31,7 +31,7 @@ def write_report(directory: Path, title: str, track: Track, moments: Sequence[Mo
     """Write index.html (which needs nothing else), predictions.json and pictures; return the files.
 
     track: the measured hand; moments: the predictions in order; summary: facts to put on top, in words. Files of those names are
-    replaced. Raises InputError where the directory cannot be written or the hand has no sample, FocError where plotly is missing.
+    replaced. Raises InputError where the directory cannot be written or the hand has no sample.
     """
     if not len(track.stamps_ns):
         raise InputError('report', 'a recording with a hand pose', 'none')

@@ -140,11 +140,13 @@ def test_equal_input_gives_equal_pictures(tmp_path: Path) -> None:
     assert (tmp_path / 'one.png').read_bytes() == (tmp_path / 'two.png').read_bytes()
 
 
-@pytest.mark.parametrize('module', ['plots', 'report'])
-def test_without_matplotlib_one_line_tells_how_to_get_it(module: str) -> None:
+@pytest.mark.parametrize(('missing', 'module'), [('matplotlib', 'plots'), ('matplotlib', 'report'), ('plotly', 'report')])
+def test_a_missing_library_is_told_in_one_line_with_how_to_get_it(missing: str, module: str) -> None:
     program = f"""
-import sys
-sys.modules['matplotlib'] = None
+import importlib.util, sys
+sys.modules['{missing}'] = None
+find_spec = importlib.util.find_spec
+importlib.util.find_spec = lambda name, *rest: None if name == '{missing}' else find_spec(name, *rest)
 from foc_ros.foc.errors import FocError
 try:
     import foc_ros.{module}

@@ -12,8 +12,6 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from foc_ros.foc.errors import FocError
-
 HERE = Path(__file__).parent
 TEMPLATE = """<!DOCTYPE html>
 <html lang="en">
@@ -88,11 +86,9 @@ def own_scripts(*names: str) -> str:
 
 
 def plotly_script() -> str:
-    """Return the plotting library with its licence header. Raises FocError where it is not installed."""
-    try:
-        from plotly.offline import get_plotlyjs
-    except ImportError as error:
-        raise FocError("pages need plotly: install python3-plotly, or pip install 'foc_ros[report]'") from error
+    """Return the plotting library, which has to be installed, with its licence header."""
+    from plotly.offline import get_plotlyjs
+
     return f'<script>{get_plotlyjs()}</script>'
 
 
