@@ -125,7 +125,7 @@ class _Search:
 
     def repeat(self, iterate: _Iterate, k: float, tolerance: float, *, complete: bool) -> _Iterate | None:
         """Repeat the QP until it moves the mean by less than the tolerance, relative to the scene; None if it does not."""
-        problem = self.problem
+        problem, positions = self.problem, self.problem.positions(iterate.control)
         for _ in range(MAX_COMPLETE_QPS if complete else MAX_QPS):
             self.deadline.check()
             qp = surrogate_qp(problem, iterate.control, iterate.active, iterate.multipliers, k, complete=complete)
@@ -133,9 +133,9 @@ class _Search:
             if solution is None or not solution.multipliers.max(initial=0.0) < DIVERGED:
                 return None
             self.qp_solves += solution.solves
-            moved = np.abs(problem.positions(solution.control) - problem.positions(iterate.control)).max()
+            before, positions = positions, problem.positions(solution.control)
             iterate = _Iterate(solution.control, solution.active, solution.multipliers)
-            if moved < tolerance * problem.extent:
+            if np.abs(positions - before).max() < tolerance * problem.extent:
                 return iterate
         return None
 

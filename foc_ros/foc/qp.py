@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiled import Indices, Matrix, Tensor, Vector, compiled
-from .dense import cholesky, combined, lower_solved, row_products
+from .dense import cholesky, combined, lower_solved, row_products, values
 from .problem import Problem
 from .records import Array
 
@@ -47,10 +47,9 @@ class Cost:
         """The minimiser without obstacle rows, (2N,)."""
         inverse, root, factor = self.factors
         if self.linear is None:
-            control: Array = (root @ self.goal_targets) @ factor
-            return control
+            return to_goal(root, factor, self.goal_targets)
         free = inverse * self.linear
-        return free + (root @ (self.goal_targets - self.goal_rows @ free)) @ factor
+        return free + to_goal(root, factor, self.goal_targets - self.goal_rows @ free)
 
 
 @compiled
@@ -70,6 +69,13 @@ def goal_factors(hessian: Vector, goal_rows: Matrix, softness: Vector) -> tuple[
             gram[i, j] *= scale[i, i] * scale[j, j]
     root = lower_solved(cholesky(gram, SMALLEST_PIVOT), scale)
     return inverse, root, combined(root, weighted)
+
+
+@compiled
+def to_goal(root: Matrix, factor: Matrix, missing: Vector) -> Vector:
+    """Return the least control (2N,) that makes up for what the goal rows are missing (r,)."""
+    control: Vector = combined(np.expand_dims(values(root, missing), 0), factor)[0]
+    return control
 
 
 @compiled
@@ -180,8 +186,10 @@ def wanted_distance(problem: Problem, tau: float) -> Array:
     minimum-jerk movement does, so that the problem asks for a way out, not for a jump.
     """
     reach = np.sqrt(problem.size[0] + tau)[:, None]
+    if problem.recovery_s <= 0:
+        return reach
     missing = reach - problem.distance_now[:, None]
-    if problem.recovery_s <= 0 or missing.max(initial=0.0) <= 0:
+    if missing.max(initial=0.0) <= 0:
         return reach
     distance: Array = reach - np.maximum(missing, 0.0) * problem.recovery_left
     return distance
