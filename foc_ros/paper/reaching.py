@@ -17,6 +17,8 @@ from foc_ros.foc.start import cold
 from foc_ros.guess import guess_path
 
 STEPS, DURATION_S = 50, 1.0
+EQUALLY_NEAR = 1e-6
+"""Difference of two distances that is none [m]."""
 HORIZON = triple_integrator_horizon(DURATION_S / STEPS, STEPS)
 
 
@@ -98,7 +100,9 @@ def speed(solution: Solution) -> Array:
 def speed_to_obstacles(scene: PaperScene, solution: Solution) -> float:
     """Return the speed of the mean up to where it is nearest to the edge of an obstacle, over time [m/s]."""
     away = np.linalg.norm(solution.path[:, None] - scene.obstacles.centre[None], axis=-1) - scene.obstacles.radius
-    return float(speed(solution)[: away.min(axis=1).argmin() + 1].mean())
+    nearest = away.min(axis=1)
+    last = np.flatnonzero(nearest < nearest.min() + EQUALLY_NEAR)[-1]  # the mean often touches a circle at two steps
+    return float(speed(solution)[: last + 1].mean())
 
 
 def path_length(solution: Solution) -> float:
