@@ -109,14 +109,12 @@ def _node_comes_up(printed: str, config: Config) -> None:
     names = ['foc.eta', 'foc.process_noise', 'estimator.jerk_density', 'likelihood.beta']
     with ros_helpers.graph() as ros, subprocess.Popen(command, env=ros.environment, cwd=Path(__file__).parents[1]) as process:
         try:
-            client = ros.node('asker').create_client(GetParameters, '/foc/get_parameters')
-            ros.spin_until(client.service_is_ready, 'the node', 30.0)
-            future = client.call_async(GetParameters.Request(names=names))
-            ros.spin_until(future.done, 'its parameters', 30.0)
+            request = GetParameters.Request(names=names)
+            values = ros.call(ros.node('asker'), GetParameters, '/foc/get_parameters', request, 30.0).values
         finally:
             process.terminate()
             process.wait(30.0)
-    assert [each.double_value for each in future.result().values] == [flatten(config)[name] for name in names]
+    assert [each.double_value for each in values] == [flatten(config)[name] for name in names]
     assert process.returncode == 0
 
 
