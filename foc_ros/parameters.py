@@ -25,6 +25,11 @@ KNOWN = {parameter.name: parameter for parameter in parameters()}
 _WIDTH = 100
 
 
+def given_config(file: Path | None) -> Config:
+    """Return the configuration of a parameter file that may be given, or the default one; raises as `load_parameter_file`."""
+    return Config() if file is None else load_parameter_file(file)
+
+
 def load_parameter_file(path: Path | str) -> Config:
     """Return the configuration of a ROS 2 parameter file; what is not in it keeps its default.
 

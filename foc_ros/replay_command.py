@@ -16,12 +16,12 @@ from .answers import prediction_answer
 from .bags import TYPESTORE, BagReader, BagWriter
 from .conversions.outputs import output_messages
 from .conversions.types import RosbagsTypes
-from .foc.config import Config
 from .foc.errors import InputError
 from .foc.library import Way
 from .foc.records import HandSample
 from .learn import Learner
 from .library_file import load_library, save_library
+from .parameters import given_config
 from .replay import Replay, Step
 from .summary import Summary, facts
 from .terminal import show_table, track
@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Replay; 3 where no prediction has a solved candidate."""
-    replayed, summary = Replay(_config(arguments.params)), Summary()
+    replayed, summary = Replay(given_config(arguments.params)), Summary()
     report = None if arguments.report is None else Report()
     learner = None if arguments.learn is None else Learner(replayed.pipeline, _known(arguments.learn))
     with TemporaryFile('w+', encoding='utf-8') as answers:
@@ -157,14 +157,6 @@ class Report:
         from .report import write_report
 
         write_report(directory, title, track_of(self._samples), self._moments, words)
-
-
-def _config(file: Path | None) -> Config:
-    if file is None:
-        return Config()
-    from .parameters import load_parameter_file
-
-    return load_parameter_file(file)
 
 
 def _known(file: Path) -> tuple[Way, ...]:

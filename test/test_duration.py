@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foc_ros.foc.config import DurationConfig
-from foc_ros.foc.duration import movement_time, time_to_go, times_to_go
+from foc_ros.foc.duration import movement_time, times_to_go
 from foc_ros.foc.records import NANOSECONDS, HandState
 
 FITTS = DurationConfig(
@@ -25,6 +25,10 @@ def hand(x: float, onset: float | None = None, since_s: float = 0.0, speed: floa
     if onset is None:
         return HandState(stamp, mean, np.eye(6))
     return HandState(stamp, mean, np.eye(6), onset_ns=stamp - round(since_s * 1e9), onset_position=np.array([onset, 0.0]))
+
+
+def time_to_go(state: HandState, goal: np.ndarray, config: DurationConfig) -> float:
+    return times_to_go(state, goal[None], config)[0]
 
 
 def test_fitts_law_at_whole_bits() -> None:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from foc_ros.foc.dynamics import damped_mass, horizon, triple_integrator
-from foc_ros.foc.noise import noise_per_step, position_variance_maps, state_covariance
+from foc_ros.foc.noise import noise_per_step, stacked_noise, state_covariance
+from foc_ros.foc.problem import spread
 
 PLANTS = pytest.mark.parametrize('plant', [triple_integrator(0.03), damped_mass(0.04, 1.5, 4.0)], ids=['jerk', 'force'])
 
@@ -34,7 +35,7 @@ def test_position_variance_is_diagonal_in_the_squared_control(plant):
     stacked, noise = horizon(plant, 15), np.array([0.3, 0.1])
     control = generator.standard_normal(30)
     full = state_covariance(stacked, np.zeros((16, len(plant.A), len(plant.A))), noise, control)[1:]
-    xx, yy, xy = position_variance_maps(stacked, noise) @ control**2
+    xx, yy, xy = spread(stacked.maps, stacked_noise(noise, 15) ** 2, control, np.zeros((3, 15)))
     np.testing.assert_allclose([xx, yy, xy], [full[:, 0, 0], full[:, 1, 1], full[:, 0, 1]], atol=1e-15)
 
 

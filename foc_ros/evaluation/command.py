@@ -9,20 +9,17 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from foc_ros.foc.config import Config
 from foc_ros.foc.errors import InputError
-from foc_ros.parameters import load_parameter_file
-from foc_ros.terminal import show_table, track
+from foc_ros.parameters import given_config
+from foc_ros.terminal import show_table
 
 from .answer import answer_of
 from .evaluation import evaluate
 from .labels import check_labels
-from .observations import Observations
 from .observe import observe
 from .recordings import find_recordings
 from .tables import tables
-from .workers import Failure, add_worker_arguments, workers
-from .workers import run as run_all
+from .workers import add_worker_arguments, collected, workers
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,19 +34,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Evaluate; 2 where a recording failed, 3 where all did."""
-    config = Config() if arguments.params is None else load_parameter_file(arguments.params)
+    config = given_config(arguments.params)
     if arguments.report is not None and arguments.report.is_file():
         raise InputError('--report', 'a folder', arguments.report)
     found = find_recordings(arguments.data)
-    recordings: list[Observations] = []
-    failed: dict[str, str] = {}
     with workers(arguments) as executor:
-        replayed = run_all(partial(observe, config=config), list(found.items()), executor)
-        for name, result in track(replayed, 'replay', len(found)):
-            if isinstance(result, Failure):
-                failed[name] = result.reason
-            else:
-                recordings.append(result)
+        recordings, failed = collected(partial(observe, config=config), list(found.items()), executor, 'replay')
         for name, reason in failed.items():
             print(f'foc_ros evaluate: {name}: {reason}', file=sys.stderr)
         if not recordings:

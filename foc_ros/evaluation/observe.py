@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.foc.chance import centres
+from foc_ros.foc.chance import courses
 from foc_ros.foc.config import Config
 from foc_ros.foc.errors import RecordingError
 from foc_ros.foc.homotopy import swept_angles
@@ -91,9 +91,7 @@ def _ways(prediction: Prediction, obstacles: Obstacles, spent: float) -> Ways:
 def _predicted_sides(outcome: Outcome, obstacles: Obstacles) -> NDArray[np.int8]:
     """Return the sides (n,) on which a candidate runs: those in its name where it could not be solved, else its path's own."""
     solution = outcome.solution
-    moved = centres(obstacles, solution.dt, len(solution.mean) - 1)
-    where = np.concatenate((obstacles.centre[:, None], moved), axis=1).swapaxes(0, 1)
-    sides = _sides(solution.path, where)
+    sides = _sides(solution.path, courses(obstacles, solution.dt, len(solution.mean) - 1))
     named = {} if outcome.solved else dict(outcome.candidate.sides)
     return np.array([named.get(identity, side) for identity, side in zip(obstacles.ids, sides, strict=True)], dtype=np.int8)
 

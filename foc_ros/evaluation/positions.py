@@ -30,9 +30,7 @@ def position_scores(recordings: Sequence[Observations]) -> dict[str, Any]:
         'most likely': np.array([each.ways.mean[_leading(each)] for each in seen]),
         'likelihood-weighted': np.array([np.tensordot(each.ways.likelihood, each.ways.mean, 1) for each in seen]),
         'constant velocity': np.array([_going_on(each) for each in seen]),
-        'straight minimum jerk': np.array(
-            [straight_positions(each, int(straight_effort(each).argmin()), TIMES) for each in seen]
-        ),
+        'straight minimum jerk': np.array([_straight(each) for each in seen]),
     }
     return {
         'displacement_m': {name: _errors(positions, true) for name, positions in predicted.items()},
@@ -57,9 +55,15 @@ def _inside(seen: Sequence[Observation], true: Array, level: float) -> Array:
     chosen = [_leading(each) for each in seen]
     mean = np.array([each.ways.mean[row] for each, row in zip(seen, chosen, strict=True)])
     covariance = np.array([each.ways.covariance[row] for each, row in zip(seen, chosen, strict=True)])
-    missing = true - mean
-    squared = (missing * np.linalg.solve(covariance + EXACT * np.eye(2), missing[..., None])[..., 0]).sum(axis=-1)
-    # chi-square of two degrees of freedom
+    return held(true - mean, covariance, level)
+
+
+def held(away: Array, covariance: Array, level: float) -> Array:
+    """Return 1 where the ellipse of a probability holds a point, 0 where not, nan where there is none.
+
+    away (..., 2) [m] from its middle, covariance (..., 2, 2): by the chi-square of two degrees of freedom.
+    """
+    squared = (away * np.linalg.solve(covariance + EXACT * np.eye(2), away[..., None])[..., 0]).sum(axis=-1)
     return np.where(np.isfinite(squared), (squared <= -2.0 * np.log(1.0 - level)).astype(float), np.nan)
 
 

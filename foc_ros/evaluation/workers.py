@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from foc_ros.foc.errors import FocError, InputError, RecordingError
+from foc_ros.terminal import track
 
 from .cluster import Cluster
 from .lanes import Lanes
@@ -53,6 +54,20 @@ def run(function: Callable[[T], R], items: Sequence[tuple[str, T]], executor: Ex
     finally:
         for future in futures:
             future.cancel()
+
+
+def collected(
+    function: Callable[[T], R], items: Sequence[tuple[str, T]], executor: Executor, words: str
+) -> tuple[list[R], dict[str, str]]:
+    """Run with a progress bar of these words; return the results in the items' order, and why other items have none, by name."""
+    results: list[R] = []
+    failed: dict[str, str] = {}
+    for name, result in track(run(function, items, executor), words, len(items)):
+        if isinstance(result, Failure):
+            failed[name] = result.reason
+        else:
+            results.append(result)
+    return results, failed
 
 
 def guarded(function: Callable[[T], R], item: T) -> R | Failure:

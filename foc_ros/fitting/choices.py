@@ -27,7 +27,7 @@ from foc_ros.terminal import track
 
 from .densities import PROCESS_NOISES, inside, log_densities
 from .estimates import Estimate
-from .resampling import CENTRAL, RESAMPLES, SEED
+from .resampling import CENTRAL, resamples
 
 MARGIN_NAT = 0.02
 """By how much per prediction the likelihood that looks ahead has to be better, held out."""
@@ -58,9 +58,7 @@ class Table:
 
     def resampled(self, columns: Sequence[int]) -> list[int]:
         """Return the best setting of each resample of the recordings."""
-        draws, n = np.random.default_rng(SEED), len(self.values)
-        counts = draws.multinomial(n, np.full(n, 1.0 / n), RESAMPLES)
-        return [columns[place] for place in (counts @ np.nan_to_num(self.values[:, columns])).argmax(axis=1)]
+        return [columns[place] for place in (resamples(len(self.values)) @ np.nan_to_num(self.values[:, columns])).argmax(axis=1)]
 
 
 def choice_table(observations: Sequence[Observations], config: Config, executor: Executor) -> Table:

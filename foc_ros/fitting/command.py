@@ -12,7 +12,7 @@ from foc_ros.evaluation.recordings import find_recordings
 from foc_ros.evaluation.workers import add_worker_arguments, workers
 from foc_ros.foc.config import Config, flatten
 from foc_ros.foc.errors import InputError
-from foc_ros.parameters import dump_parameter_file, load_parameter_file
+from foc_ros.parameters import dump_parameter_file, given_config
 from foc_ros.terminal import show_table
 
 from .estimates import as_json
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fit, write and show; 2 where a recording could not be used, and the others were."""
-    config = Config() if arguments.params is None else load_parameter_file(arguments.params)
+    config = given_config(arguments.params)
     _check_output(arguments.output)
     if arguments.report is not None and arguments.report.is_file():
         raise InputError('--report', 'a folder', arguments.report)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from foc_ros.evaluation.observations import HORIZONS_S, TIMES_S, Observation
-from foc_ros.evaluation.positions import EXACT
+from foc_ros.evaluation.positions import EXACT, held
 from foc_ros.foc.records import Array
 from foc_ros.foc.replanning import triple_integrator_process_covariance
 
@@ -46,11 +46,8 @@ def log_densities(seen: Observation, shares: Array, steps: int) -> Array | None:
 def inside(seen: Observation, row: int, process_noise: float, steps: int, level: float) -> Array:
     """Return 1 where the ellipse of a candidate holds the true position at `TIMES_S`, 0 where not, nan beyond the end, (h,)."""
     variance = process_noise**2 * _process_variance(float(seen.ways.time_s[row]), steps)
-    covariance = seen.ways.covariance[row] + (variance[:, None, None] + EXACT) * np.eye(2)
-    away = seen.truth.positions - seen.ways.mean[row]
-    squared = (away * np.linalg.solve(covariance, away[..., None])[..., 0]).sum(axis=-1)
-    held = (squared <= -2.0 * np.log(1.0 - level)).astype(float)
-    return np.where(np.isfinite(squared), held, np.nan)
+    covariance = seen.ways.covariance[row] + variance[:, None, None] * np.eye(2)
+    return held(seen.truth.positions - seen.ways.mean[row], covariance, level)
 
 
 def _process_variance(time_s: float, steps: int) -> Array:

@@ -13,10 +13,9 @@ import numpy as np
 from foc_ros.evaluation.heldout import chosen
 from foc_ros.evaluation.observations import Observations
 from foc_ros.evaluation.recordings import Recording
-from foc_ros.evaluation.workers import Failure, run
-from foc_ros.foc.config import Config, LikelihoodConfig, updated
+from foc_ros.evaluation.workers import collected
+from foc_ros.foc.config import Config, LikelihoodConfig, flatten, updated
 from foc_ros.foc.errors import RecordingError
-from foc_ros.terminal import track
 
 from . import choices
 from .demonstrations import Demonstration, demonstration
@@ -90,13 +89,8 @@ def fit(recordings: Mapping[str, Recording], config: Config, executor: Executor)
 
 
 def _read(recordings: Mapping[str, Recording], found: Fit, executor: Executor) -> list[Demonstration]:
-    read = []
-    items = list(recordings.items())
-    for name, result in track(run(partial(demonstration, config=found.config), items, executor), 'read', len(items)):
-        if isinstance(result, Failure):
-            found.failed[name] = result.reason
-        else:
-            read.append(result)
+    read, failed = collected(partial(demonstration, config=found.config), list(recordings.items()), executor, 'read')
+    found.failed.update(failed)
     if not read:
         raise RecordingError(f'no recording can be used: {"; ".join(f"{name}: {why}" for name, why in found.failed.items())}')
     found.recordings = len(read)
@@ -153,8 +147,7 @@ def _search(
 
 
 def _value(config: Config, name: str) -> float:
-    group, _, leaf = name.partition('.')
-    return float(getattr(getattr(config, group), leaf))
+    return float(flatten(config)[name])
 
 
 def _choose(recordings: Mapping[str, Recording], found: Fit, thin: Mapping[str, float], executor: Executor) -> None:

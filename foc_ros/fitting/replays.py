@@ -20,12 +20,11 @@ from foc_ros.evaluation.heldout import asked
 from foc_ros.evaluation.observations import Observations
 from foc_ros.evaluation.observe import observe
 from foc_ros.evaluation.recordings import Recording
-from foc_ros.evaluation.workers import Failure, run
-from foc_ros.foc.config import Config, LikelihoodConfig, updated
+from foc_ros.evaluation.workers import collected
+from foc_ros.foc.config import Config, LikelihoodConfig, flatten, updated
 from foc_ros.foc.records import Array
-from foc_ros.terminal import track
 
-from .densities import PROCESS_NOISES, log_densities
+from .densities import log_densities
 from .duration_fit import CONSTANTS
 from .estimates import bounded
 
@@ -49,15 +48,7 @@ def observed(
 ) -> tuple[list[Observations], dict[str, str]]:
     """Replay recordings without process noise; return the observations, and why others gave none, by name."""
     plain = updated(config, {'foc.process_noise': 0.0})
-    results = run(partial(observe, config=plain), list(recordings.items()), executor)
-    seen: list[Observations] = []
-    failed: dict[str, str] = {}
-    for name, result in track(results, words, len(recordings)):
-        if isinstance(result, Failure):
-            failed[name] = result.reason
-        else:
-            seen.append(result)
-    return seen, failed
+    return collected(partial(observe, config=plain), list(recordings.items()), executor, words)
 
 
 def scored(observations: Sequence[Observations], config: Config) -> Foretold:
@@ -115,11 +106,5 @@ def levels(kind: str, config: Config) -> list[Config]:
 
 def _scaled(config: Config, powers: Mapping[str, float], factor: float) -> Config:
     """Multiply each of the parameters by its power of a factor."""
-    values = {}
-    for name, power in powers.items():
-        group, _, leaf = name.partition('.')
-        values[name] = bounded(name, factor**power * getattr(getattr(config, group), leaf))
-    return updated(config, values)
-
-
-__all__ = ['ACCELERATION', 'DURATION', 'ETA', 'NOISE', 'PROCESS_NOISES', 'Foretold', 'compared', 'levels', 'observed', 'scored']
+    before = flatten(config)
+    return updated(config, {name: bounded(name, factor**power * float(before[name])) for name, power in powers.items()})

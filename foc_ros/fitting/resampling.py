@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from foc_ros.foc.records import Array, Record
 
@@ -33,6 +34,11 @@ RIDGE = 1e-3
 
 PerRecording = Callable[[Array], Array]
 """Log-likelihood of each recording (n,) [nat] at parameters (p,)."""
+
+
+def resamples(n: int) -> NDArray[np.int64]:
+    """Return how often each of n recordings is drawn in every resample, (RESAMPLES, n)."""
+    return np.random.default_rng(SEED).multinomial(n, np.full(n, 1.0 / n), RESAMPLES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +61,7 @@ class Quadratic(Record):
 
     def resampled(self) -> Array:
         """Return the maximum of each resample, (RESAMPLES, p)."""
-        draws, n = np.random.default_rng(SEED), len(self.gradient)
-        counts = draws.multinomial(n, np.full(n, 1.0 / n), RESAMPLES).astype(float)
-        return np.array([self.moved(each) for each in counts])
+        return np.array([self.moved(each) for each in resamples(len(self.gradient)).astype(float)])
 
     def interval(self) -> tuple[Array, Array]:
         """Return the bootstrap's interval of 95 %, low and high (p,)."""

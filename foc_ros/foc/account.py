@@ -6,7 +6,7 @@ import numpy as np
 
 from .chance import variance
 from .problem import Problem
-from .qp import wanted_distance
+from .qp import depths, wanted_distance
 from .records import Array
 from .solver import WorkingSet
 
@@ -36,8 +36,7 @@ def shortfall(problem: Problem, control: Array, tau: float) -> tuple[float, tupl
     Too near is less than sqrt(E[R^2] + tau) from a centre, or less than a hand that is leaving a margin has to keep; 0 and None
     where it never is.
     """
-    distance = np.hypot(*np.moveaxis(problem.positions(control)[None] - problem.centres, -1, 0))
-    missing = wanted_distance(problem, tau) - distance
+    missing = depths(problem.positions(control), problem.centres, wanted_distance(problem, tau))
     if missing.max(initial=0.0) <= NO_VIOLATION:
         return 0.0, None
     row, column = np.unravel_index(int(missing.argmax()), missing.shape)

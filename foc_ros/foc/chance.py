@@ -35,6 +35,12 @@ def centres(obstacles: Obstacles, dt: float, steps: int) -> Array:
     return moved
 
 
+def courses(obstacles: Obstacles, dt: float, steps: int) -> Array:
+    """Mean centres now and at steps 1..N, step by step, (N + 1, n, 2) [m]."""
+    course: Array = np.concatenate((obstacles.centre[:, None], centres(obstacles, dt, steps)), axis=1).swapaxes(0, 1)
+    return course
+
+
 def size_moments(obstacles: Obstacles) -> tuple[Array, Array]:
     """E[R^2] and Var[R^2], each (n,) [m^2, m^4]."""
     mean2, var = obstacles.radius**2, obstacles.radius_stddev**2

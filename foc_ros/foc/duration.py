@@ -90,8 +90,3 @@ def times_to_go(hand: HandState, goals: Array, config: DurationConfig) -> list[f
         slower = max(1.0, min(told, default=1.0))
         expected = [slower * lasts - since_s for lasts in whole]
     return [min(max(each, config.min_time_to_go_s), config.max_time_to_go_s) for each in expected]
-
-
-def time_to_go(hand: HandState, goal: Array, config: DurationConfig) -> float:
-    """Return the same for the only goal, (2,) [m]."""
-    return times_to_go(hand, goal[None], config)[0]

@@ -13,9 +13,9 @@ import numpy as np
 from .compiled import Indices, Matrix, Tensor, Vector, compiled
 from .dense import cholesky, combined, lower_solved, upper_solved
 from .problem import Problem, moved
-from .qp import Cost, compliance, wanted_distance
+from .qp import Cost, compliance, depths, wanted_distance
 from .records import Array
-from .solver import WorkingSet, peaks
+from .solver import Row, WorkingSet, forces_of, peaks, rows_of
 
 SETTLED = 1e-5
 """Largest move of a contact at which the steps end, relative to the scene: they converge quadratically, so 1e-9 is left."""
@@ -26,8 +26,6 @@ WAVERING = 2.0
 """Growth of the moves from one step to the next at which they are given up."""
 SLIGHT = 1e-3
 """Least force of a contact that bends the way round its circle, relative to the largest: a negative one would not hold."""
-
-Row = tuple[int, int]
 SHARED = 1e-13
 """Softness of a contact relative to what it moves itself: contacts that say the same twice share the force."""
 
@@ -80,8 +78,7 @@ def _rolled(found: Touching, let_go: set[Row], steps: int) -> tuple[WorkingSet, 
     The two share what the one that stays had: alone it would seldom hold, since the mean cuts the corner between two steps. A
     row that was let go, and is added to let_go, never comes back.
     """
-    pairs = zip(found.active.obstacle.tolist(), found.active.step.tolist(), strict=True)
-    given: dict[Row, float] = dict(zip(pairs, found.multipliers.tolist(), strict=True))
+    given = forces_of(found.active, found.multipliers)
     let_go |= {row for row, value in given.items() if value <= 0}
     kept = {row: value for row, value in given.items() if row not in let_go}
     for obstacle, step in sorted(let_go & given.keys()):
@@ -89,7 +86,7 @@ def _rolled(found: Touching, let_go: set[Row], steps: int) -> tuple[WorkingSet, 
             stays, after = (obstacle, step + ahead), (obstacle, step + 2 * ahead)
             if stays in kept and after not in kept and after not in let_go and 0 <= after[1] < steps:
                 kept[stays] = kept[after] = kept[stays] / 2
-    return _listed(kept)
+    return rows_of(kept)
 
 
 def _straddling(active: WorkingSet, multipliers: Array, depth: Array, let_go: set[Row]) -> tuple[WorkingSet, Array] | None:
@@ -97,21 +94,14 @@ def _straddling(active: WorkingSet, multipliers: Array, depth: Array, let_go: se
 
     What cannot hold at one step holds at two, with the circle bulging between them. depth (m, N): how far circles are entered.
     """
-    pairs = zip(active.obstacle.tolist(), active.step.tolist(), strict=True)
-    given: dict[Row, float] = dict(zip(pairs, multipliers.tolist(), strict=True))
+    given = forces_of(active, multipliers)
     kept = dict(given)
     for obstacle, step in given:
         beside = [(obstacle, step + ahead) for ahead in (-1, 1) if 0 <= step + ahead < depth.shape[1]]
         if given.keys().isdisjoint(beside) and (free := [row for row in beside if row not in let_go]):
             nearer = max(free, key=lambda row: depth[row])
             kept[obstacle, step] = kept[nearer] = given[obstacle, step] / 2
-    return _listed(kept) if kept.keys() != given.keys() else None
-
-
-def _listed(forces: dict[Row, float]) -> tuple[WorkingSet, Array]:
-    """Return contacts with their forces as a working set, in order."""
-    rows = np.array(sorted(forces), dtype=np.intp).reshape(-1, 2)
-    return WorkingSet(rows[:, 0], rows[:, 1]), np.array([forces[row] for row in sorted(forces)])
+    return rows_of(kept) if kept.keys() != given.keys() else None
 
 
 def _entered(problem: Problem, found: Touching, wanted: Array) -> WorkingSet:
@@ -142,18 +132,6 @@ def _settled(
         SETTLED * problem.extent,
     )
     return Touching(control, positions, active, multipliers) if found else None
-
-
-@compiled
-def depths(positions: Matrix, centres: Tensor, wanted: Matrix) -> Matrix:
-    """Return how much nearer than wanted the positions (N, 2) are to each centre, (m, N) [m]."""
-    m, steps, _ = centres.shape
-    depth = np.empty((m, steps))
-    for j in range(m):
-        for t in range(steps):
-            reach = wanted[j, t if wanted.shape[1] > 1 else 0]
-            depth[j, t] = reach - np.hypot(positions[t, 0] - centres[j, t, 0], positions[t, 1] - centres[j, t, 1])
-    return depth
 
 
 @compiled

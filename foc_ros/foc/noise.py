@@ -40,9 +40,3 @@ def outer_sums(response: Tensor, weights: Vector) -> Tensor:
     for t in range(steps):
         summed[t] = row_products(response[t] * weights, response[t])
     return summed
-
-
-def position_variance_maps(horizon: Horizon, noise: Array) -> Array:
-    """Return V (3, N, 2N): variances xx, yy and covariance xy of the position at steps 1..N are V u^2 plus their free part."""
-    maps: Array = horizon.maps[2:] * stacked_noise(noise, horizon.steps) ** 2
-    return maps

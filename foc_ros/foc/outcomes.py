@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .chance import centres
 from .config import FocConfig, LikelihoodConfig
 from .deadline import NEVER, Deadline
 from .forward import forward
@@ -64,9 +63,7 @@ def _solved(
 
 def _judged(candidate: Candidate, problem: Problem, solution: Solution, shared: float) -> Outcome:
     """Find the class it is really in; costs are integrals of squared jerk, shared and to go, so that durations compare."""
-    moved = centres(problem.obstacles, solution.dt, problem.horizon.steps)
-    where = np.concatenate((problem.obstacles.centre[:, None], moved), axis=1).swapaxes(0, 1)
-    sides = path_sides(solution.path, problem.obstacles, where)
+    sides = path_sides(solution.path, problem.obstacles, problem.courses)
     if solution.status is Status.SOLVED and any(sides.get(identity, side) != side for identity, side in candidate.sides):
         solution = replace(solution, status=Status.LEFT_CLASS, message='the solution slid into another class')
     return Outcome(candidate, solution, sides, shared + solution.effort * solution.dt, 0.0)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .chance import centres
+from .chance import courses
 from .homotopy import swept_angles
 from .records import Array, Obstacles, Outcome, Record
 
@@ -47,7 +47,6 @@ def partings(outcomes: Sequence[Outcome], obstacles: Obstacles) -> Partings:
 def _seen(outcome: Outcome, obstacles: Obstacles) -> tuple[Array, Array]:
     """Return the angle (n,) [rad] that the mean path sweeps about each obstacle, and when (n,) [s] it is nearest to it."""
     solution = outcome.solution
-    moved = centres(obstacles, solution.dt, len(solution.mean) - 1)
-    where = np.concatenate((obstacles.centre[:, None], moved), axis=1).swapaxes(0, 1)
+    where = courses(obstacles, solution.dt, len(solution.mean) - 1)
     apart = solution.path[:, None] - where
     return swept_angles(solution.path, where), solution.times[(apart**2).sum(axis=2).argmin(axis=0)]

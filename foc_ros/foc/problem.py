@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .chance import achieved_k, centres, expectation, k_of_eta, size_moments, variance
+from .chance import centres, courses, k_at, k_of_eta, size_moments
 from .compiled import Matrix, Tensor, Vector, compiled
 from .dense import values
 from .dynamics import Horizon
@@ -77,6 +77,11 @@ class Problem(Record):
         return centres(self.obstacles, self.horizon.dt, self.horizon.steps)
 
     @cached_property
+    def courses(self) -> Array:
+        """Mean centres of the obstacles at steps 0..N, step by step, (N + 1, m, 2) [m]."""
+        return courses(self.obstacles, self.horizon.dt, self.horizon.steps)
+
+    @cached_property
     def centres_from_free(self) -> Array:
         """The same, less the mean position without control, (m, N, 2) [m]."""
         return self.centres - self.free[1:, :2]
@@ -99,12 +104,12 @@ class Problem(Record):
         """Whether the hand is now inside the margin of each obstacle, (m,): never, without a recovery time."""
         if self.recovery_s <= 0 or not len(self.obstacles):
             return np.zeros(len(self.obstacles), dtype=np.bool_)
-        offset = (self.initial_mean[:2] - self.obstacles.centre)[:, None, :]
         now = self.free_covariance[0]
         covariance = np.array([[now[0, 0]], [now[1, 1]], [now[0, 1]]])
-        mean = expectation(offset, np.zeros((1, 2)), self.size[0])
-        var = variance(offset, covariance, self.size[1], self.obstacles.centre_covariance)
-        inside: NDArray[np.bool_] = achieved_k(mean, var)[:, 0] < k_of_eta(self.eta)
+        here, centre = self.initial_mean[None, :2], self.obstacles.centre[:, None]
+        inside: NDArray[np.bool_] = k_at(here, covariance, centre, *self.size, self.obstacles.centre_covariance)[:, 0] < k_of_eta(
+            self.eta
+        )
         return inside
 
     @cached_property

@@ -195,6 +195,18 @@ def wanted_distance(problem: Problem, tau: float) -> Array:
     return distance
 
 
+@compiled
+def depths(positions: Matrix, centres: Tensor, wanted: Matrix) -> Matrix:
+    """Return how much nearer than wanted the positions (N, 2) are to each centre, (m, N) [m]."""
+    m, steps, _ = centres.shape
+    depth = np.empty((m, steps))
+    for j in range(m):
+        for t in range(steps):
+            reach = wanted[j, t if wanted.shape[1] > 1 else 0]
+            depth[j, t] = reach - np.hypot(positions[t, 0] - centres[j, t, 0], positions[t, 1] - centres[j, t, 1])
+    return depth
+
+
 def clearance_qp(problem: Problem, cost: Cost, guess: Array, tau: float, *, literal: bool = False) -> ReachingQP:
     """Build the paper's reformulated problem (equation 16) at a guess (N, 2): E[C] + tau <= 0; its lambda is in the cost."""
     normals, limits = half_planes(problem, guess, tau, literal=literal)

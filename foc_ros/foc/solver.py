@@ -36,7 +36,6 @@ FARKAS = 1e-4
 """How little, relative to what is missing, the combination of rows may move that proves a contradiction."""
 NEGLIGIBLE = 1e-7
 """Multiplier that counts as zero, relative to the largest, in units in which every row moves itself by one."""
-
 SHARP = 1e-10
 """What the equations of the multipliers that are not zero may be off by when solved for directly."""
 
@@ -64,6 +63,21 @@ class WorkingSet:
     def only(self, keep: NDArray[np.bool_]) -> WorkingSet:
         """Return the set of the rows to keep (k,)."""
         return WorkingSet(self.obstacle[keep], self.step[keep])
+
+
+Row = tuple[int, int]
+"""Obstacle and step index."""
+
+
+def forces_of(rows: WorkingSet, multipliers: Array) -> dict[Row, float]:
+    """Return the multiplier (k,) of each row."""
+    return dict(zip(zip(rows.obstacle.tolist(), rows.step.tolist(), strict=True), multipliers.tolist(), strict=True))
+
+
+def rows_of(forces: dict[Row, float]) -> tuple[WorkingSet, Array]:
+    """Return the rows with their multipliers (k,), in order."""
+    rows = np.array(sorted(forces), dtype=np.intp).reshape(-1, 2)
+    return WorkingSet(rows[:, 0], rows[:, 1]), np.array([forces[row] for row in sorted(forces)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +211,7 @@ def sharpened(gram: Matrix, missing: Vector, answer: Vector) -> tuple[Vector, fl
             inner[i, j] = gram[active[i], active[j]]
     factor = cholesky(inner, 0.0)
     sharp = upper_solved(factor, lower_solved(factor, wanted)[:, 0].copy())
-    off = 0.0  # NaN where the rows are not independent: then the answer stays as it is
+    off = 0.0  # infinite where a sign is lost, or the rows are not independent: then the answer stays as it is
     for i in range(n):
         left = -wanted[i, 0]
         for j in range(n):

@@ -8,7 +8,7 @@ import numpy as np
 
 from .problem import Problem
 from .records import Array, Solution
-from .solver import WorkingSet
+from .solver import Row, WorkingSet, rows_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,16 +44,9 @@ def warm(previous: Solution, problem: Problem) -> Start:
     inside = (held >= 0) & (held < len(previous.control))
     control = np.where(inside, previous.control[np.where(inside, held, 0)].T, 0.0)
     row = {identity: index for index, identity in enumerate(problem.obstacles.ids)}
-    kept: dict[tuple[int, int], float] = {}
+    kept: dict[Row, float] = {}
     for identity, step, value in previous.multipliers:
         moved = round((step * previous.dt - elapsed_s) / dt)
         if identity in row and 1 <= moved <= steps:
             kept[row[identity], moved - 1] = kept.get((row[identity], moved - 1), 0.0) + value
-    rows = np.array(sorted(kept), dtype=np.intp).reshape(-1, 2)
-    return Start(
-        positions,
-        control.ravel(),
-        WorkingSet(*np.ascontiguousarray(rows.T)),
-        np.array([kept[pair] for pair in sorted(kept)]),
-        previous.lam,
-    )
+    return Start(positions, control.ravel(), *rows_of(kept), previous.lam)
