@@ -62,7 +62,7 @@ def solution_account(solution: Solution) -> dict[str, Any]:
     }
 
 
-def _place(place: tuple[str, int] | None) -> dict[str, Any] | None:
+def _place(place: tuple[str, float] | None) -> dict[str, Any] | None:
     return None if place is None else {'obstacle': place[0], 'step': place[1]}
 
 

@@ -66,7 +66,7 @@ def test_multipliers_of_optimal_are_what_a_metre_of_distance_costs():
     assert middle.status is Status.SOLVED
     distance = np.hypot(*(middle.path - [0.12, 0.0]).T)
     rows = zip(middle.multipliers, middle.held, strict=True)
-    predicted = sum(value * tau / k / (2 * distance[at]) for (_, at, value), (tau, _) in rows)
+    predicted = sum(value * tau / k / (2 * distance[int(at)]) for (_, at, value), (tau, _) in rows)
     assert predicted == pytest.approx((more.effort - less.effort) / (2 * step), rel=2e-3)
 
 
@@ -82,7 +82,7 @@ def test_the_rows_of_optimal_have_a_tau_and_a_lambda_each():
     assert middle.held
     kept = np.sum((middle.path - [0.12, 0.0]) ** 2, axis=1) - (0.03**2 + 0.003**2)
     for (_, at, _), (tau, lam) in zip(middle.multipliers, middle.held, strict=True):
-        assert tau == pytest.approx(kept[at], rel=1e-3)
+        assert tau == pytest.approx(kept[int(at)], rel=1e-3)
         assert lam > 0
     assert (middle.tau, middle.lam) == (0.0, 0.0)
     assert sum(lam for _, lam in middle.held) == pytest.approx((more.effort - less.effort) / (2 * variance), rel=1e-2)

@@ -1,55 +1,93 @@
-"""Newton steps end where sequential QPs end, wherever the contacts roll to on the way."""
+"""Newton steps end where sequential QPs end, and contacts slide from one step to the next."""
 
 import numpy as np
 import pytest
-from reach_helpers import bowed, one_obstacle
+from reach_helpers import bowed, make_obstacles, one_obstacle, reach
 
-from foc_ros.foc.newton import newton
+from foc_ros.foc.contacts import Contacts
+from foc_ros.foc.newton import held, joined, slid, stays
 from foc_ros.foc.qp import effort_cost
-from foc_ros.foc.sequential import CHANGES, converge, follow
+from foc_ros.foc.sequential import converge
 from foc_ros.foc.solver import WorkingSet
 
 TAU, LAM = 5e-4, 1e4
 BOWED = bowed((0.0, 0.0), (0.3, 0.0), 50, 0.06)
 
 
-@pytest.mark.parametrize('factor', [0.25, 2.0, 16.0, 64.0])
-def test_following_ends_where_the_qps_end(factor):
-    """With more weight on precision the contact rolls to later steps."""
+def rough(problem, lam=LAM):
+    """Return what the QPs end with, and its rows as contacts."""
+    here = converge(problem, BOWED[1:], WorkingSet(), TAU, lam)
+    return here, Contacts.at_steps(here.solution.active, here.solution.multipliers)
+
+
+@pytest.mark.parametrize('factor', [0.5, 1.0, 2.0])
+def test_held_at_its_steps_it_ends_where_the_qps_end(factor):
     problem = one_obstacle(0.9)
-    here = converge(problem, BOWED[1:], WorkingSet(), TAU, LAM)
-    followed = follow(problem, here.positions, here.solution.active, here.solution.multipliers, TAU, factor * LAM)
-    assert followed is not None
-    qps = converge(problem, followed.positions, followed.solution.active, TAU, factor * LAM)
-    assert qps.qp_solves == 1
-    np.testing.assert_allclose(followed.positions, qps.positions, atol=1e-7)
-    np.testing.assert_array_equal(followed.solution.active.step, qps.solution.active.step)
-    np.testing.assert_allclose(followed.solution.multipliers, qps.solution.multipliers, rtol=1e-3)
+    here, contacts = rough(problem)
+    control, found = held(problem, effort_cost(problem, factor * LAM), here.control, contacts, TAU)
+    there, expected = rough(problem, factor * LAM)
+    np.testing.assert_allclose(problem.positions(control), there.positions, atol=1e-7)
+    np.testing.assert_array_equal(found.time, expected.time)
+    np.testing.assert_allclose(found.force, expected.force, rtol=1e-3)
 
 
-def test_the_contact_rolls_on():
-    """Otherwise the test above shows nothing of it."""
+def test_a_contact_that_cannot_hold_at_its_step_holds_where_it_slides():
+    """Held at one step, the mean would slip past it to either side; two steps straddle the place where one contact is enough."""
     problem = one_obstacle(0.9)
-    here = converge(problem, BOWED[1:], WorkingSet(), TAU, LAM)
-    there = follow(problem, here.positions, here.solution.active, here.solution.multipliers, TAU, 64 * LAM)
-    assert there.solution.active.step.min() > here.solution.active.step.min()
+    here, contacts = rough(problem)
+    assert len(contacts) == 2
+    alone = Contacts(contacts.obstacle[:1], contacts.time[:1], contacts.force.sum(keepdims=True))
+    cost = effort_cost(problem, LAM)
+    assert held(problem, cost, here.control, alone, TAU) is None
+    control, found = slid(problem, cost, here.control, joined(problem, contacts), TAU)
+    assert len(found) == 1
+    assert contacts.time[0] < found.time[0] < contacts.time[1]
+    assert np.abs(problem.positions(control) - here.positions).max() < 1e-3
+    assert stays(problem, cost, control, found, TAU)
+    assert not stays(problem, effort_cost(problem, 2 * LAM), control, found, TAU)
 
 
-def test_a_contact_that_cannot_hold_is_no_solution():
-    """Alone at one step, where the mean would slip round the circle to either side."""
+@pytest.mark.parametrize('factor', [2.0**-6, 2.0**6])
+def test_with_more_weight_on_precision_the_contact_slides_to_later_times(factor):
     problem = one_obstacle(0.9)
-    here = converge(problem, BOWED[1:], WorkingSet(), TAU, LAM)
-    assert len(here.solution.active) == 2
-    alone = here.solution.active.only(np.array([True, False]))
-    force = here.solution.multipliers.sum()[None]
-    assert newton(problem, effort_cost(problem, LAM), here.positions, alone, force, TAU) is None
+    here, contacts = rough(problem)
+    control, first = slid(problem, effort_cost(problem, LAM), here.control, joined(problem, contacts), TAU)
+    _, last = slid(problem, effort_cost(problem, factor * LAM), control, first, TAU)
+    assert (last.time[0] > first.time[0]) == (factor > 1)
+    fresh, rows = rough(problem, factor * LAM)
+    _, again = slid(problem, effort_cost(problem, factor * LAM), fresh.control, joined(problem, rows), TAU)
+    assert last.time[0] == pytest.approx(again.time[0], abs=1e-5)
 
 
-def test_a_contact_said_twice_shares_its_force():
+def test_the_mean_is_the_least_that_keeps_clear_at_every_time():
+    """Moved a little in any direction that keeps the contact, the cost rises by the square of it only."""
     problem = one_obstacle(0.9)
-    here = converge(problem, BOWED[1:], WorkingSet(), TAU, LAM)
-    rows, forces = here.solution.active, here.solution.multipliers
-    twice = WorkingSet(np.repeat(rows.obstacle, 2), np.repeat(rows.step, 2))
-    found = newton(problem, effort_cost(problem, LAM), here.positions, twice, np.repeat(forces, 2) / 2, TAU, CHANGES)
-    np.testing.assert_allclose(found.positions, here.positions, atol=1e-8)
-    np.testing.assert_allclose(found.multipliers.reshape(-1, 2), (forces[:, None] / 2).repeat(2, axis=1), rtol=1e-2)
+    here, contacts = rough(problem)
+    cost = effort_cost(problem, LAM)
+    least, _ = slid(problem, cost, here.control, joined(problem, contacts), TAU)
+    value = least @ (cost.hessian * least)
+    assert here.control @ (cost.hessian * here.control) < value, 'rows at the steps alone let the mean cut the corner'
+    finer, _ = slid(problem, cost, least + 1e-3 * np.sin(np.arange(len(least))), joined(problem, contacts), TAU)
+    np.testing.assert_allclose(finer, least, atol=1e-6 * np.abs(least).max())
+
+
+def test_the_same_circle_twice_is_touched_once():
+    twice = make_obstacles([[0.12, 0.0]] * 2, [0.03] * 2, [0.003] * 2)
+    problem = reach(twice, eta=0.9)
+    here, contacts = rough(problem)
+    once, alone = rough(one_obstacle(0.9))
+    control, found = slid(problem, effort_cost(problem, LAM), here.control, joined(problem, contacts), TAU)
+    expected, single = slid(one_obstacle(0.9), effort_cost(problem, LAM), once.control, joined(one_obstacle(0.9), alone), TAU)
+    assert len(found) == len(single) == 1
+    np.testing.assert_allclose(control, expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_where_two_circles_leave_no_gap_there_is_no_way_between_two_steps_either():
+    """Rows at the steps let the mean leap through the gap of 1 mm less than nothing."""
+    shut = make_obstacles([[0.122, 0.03], [0.122, -0.03]], [0.0305, 0.0305], [0.0, 0.0])
+    problem = reach(shut, noise=(0.0, 0.0), steps=10)
+    straight = bowed((0.0, 0.0), (0.3, 0.0), 10, 0.0)
+    leaps = converge(problem, straight[1:], WorkingSet(), 0.0, 0.0)
+    assert leaps is not None
+    contacts = joined(problem, Contacts.at_steps(leaps.solution.active, leaps.solution.multipliers))
+    assert slid(problem, effort_cost(problem, 0.0), leaps.control, contacts, 0.0) is None

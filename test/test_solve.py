@@ -158,7 +158,7 @@ def test_json_gives_the_full_account(tmp_path: Path, capsys: pytest.CaptureFixtu
         assert each['eta_at']['obstacle'] == '0' and 1 <= each['eta_at']['step'] <= 50
         assert each['eta_reachable'] is None and each['violation'] == 0 and each['violation_at'] is None
         assert each['rows'] and all(row['multiplier'] > 0 and row['tau'] == each['tau'] for row in each['rows'])
-        assert each['eta_at']['step'] in [row['step'] for row in each['rows']]
+        assert min(abs(each['eta_at']['step'] - row['step']) for row in each['rows']) < 0.5
 
 
 def test_json_of_what_could_not_be_solved_says_how_far_it_got(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

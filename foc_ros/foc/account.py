@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from .chance import variance
+from .contacts import Contacts
 from .problem import Problem
 from .qp import depths, wanted_distance
 from .records import Array
-from .solver import WorkingSet
 
 NO_VIOLATION = 1e-7
 """Shortfall of a distance that is rounding [m]."""
@@ -43,14 +43,15 @@ def shortfall(problem: Problem, control: Array, tau: float) -> tuple[float, tupl
     return float(missing[row, column]), (int(row), int(column) + 1)
 
 
-def asked_for(problem: Problem, control: Array, active: WorkingSet, multipliers: Array, k: float) -> list[tuple[float, float]]:
-    """Return the (tau [m^2], lambda [1/s^6]) of each active row of the surrogate at k.
+def asked_for(problem: Problem, control: Array, contacts: Contacts, k: float) -> list[tuple[float, float]]:
+    """Return the (tau [m^2], lambda [1/s^6]) of each contact, all at steps, that holds the surrogate at k.
 
-    tau = k sqrt(Var[C]) is what E[C] has to be below zero by; lambda = y k |d| / sqrt(Var[C]), for a row's multiplier y [m/s^6],
+    tau = k sqrt(Var[C]) is what E[C] has to be below zero by; lambda = y k |d| / sqrt(Var[C]), for a contact's force y [m/s^6],
     is what a variance along its normal, at its step, costs.
     """
     offset = problem.positions(control)[None] - problem.centres
     var = variance(offset, problem.position_variance(control), problem.size[1], problem.obstacles.centre_covariance)
-    stddev, distance = np.sqrt(var[active.rows]), np.hypot(*offset[active.rows].T)
-    lams = multipliers * k * distance / np.maximum(stddev, 1e-12)
+    rows = contacts.obstacle, np.rint(contacts.time).astype(np.intp) - 1
+    stddev, distance = np.sqrt(var[rows]), np.hypot(*offset[rows].T)
+    lams = contacts.force * k * distance / np.maximum(stddev, 1e-12)
     return list(zip((k * stddev).tolist(), lams.tolist(), strict=True))

@@ -14,28 +14,36 @@ from .records import Array
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """k achieved per obstacle and step (m, N), infinite where the hand is still leaving a margin; relaxed: whose margins."""
+    """k achieved per obstacle and step (m, N), infinite where the hand is still leaving a margin; relaxed: whose margins.
+
+    between: the smallest k between the steps, with its obstacle row and time in steps, where it was looked for and is smaller.
+    """
 
     k: Array
     relaxed: tuple[str, ...]
+    between: tuple[float, int, float] | None = None
 
     @cached_property
     def smallest_k(self) -> float:
         """The k that holds everywhere; CERTAIN_K where there is no obstacle."""
+        if self.between is not None:
+            return self.between[0]
         return min(float(self.k.min(initial=CERTAIN_K)), CERTAIN_K)
 
     @property
     def eta(self) -> float:
-        """The eta that holds for every obstacle and step."""
+        """The eta that holds everywhere."""
         return eta_of_k(self.smallest_k)
 
     @property
-    def place(self) -> tuple[int, int] | None:
-        """Obstacle row and step (1..N) where eta is attained; None without obstacles."""
+    def place(self) -> tuple[int, float] | None:
+        """Obstacle row and time in steps where eta is attained; None without obstacles."""
+        if self.between is not None:
+            return self.between[1:]
         if self.k.size == 0:
             return None
         row, column = np.unravel_index(int(self.k.argmin()), self.k.shape)
-        return int(row), int(column) + 1
+        return int(row), int(column) + 1.0
 
 
 def assess(problem: Problem, control: Array) -> Assessment:

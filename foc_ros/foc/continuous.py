@@ -1,8 +1,9 @@
 """Strategies `lv` and `hc`: the smallest s on a curve of clearance and precision that meets the surrogate.
 
 tau = delta s, lambda = lambda0 growth^s. The paper steps along this curve in whole s (algorithm 1); here s is continuous, so that
-the effort follows eta as cost ratios need, but for jumps where another pair of steps comes to touch a circle. A small delta slows
-down (`lv`), a large one goes wide (`hc`).
+the effort follows eta as cost ratios need. For that the clearance is kept between the steps too: a contact with a circle then
+slides on along it as the hand slows down, where rows at the steps would make it jump from one pair of steps to the next. A small
+delta slows down (`lv`), a large one goes wide (`hc`).
 """
 
 from __future__ import annotations
@@ -11,12 +12,15 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from .assess import Assessment, assess
 from .chance import eta_of_k, k_of_eta
+from .contacts import Contacts
 from .deadline import NEVER, Deadline, OutOfTimeError
+from .least_k import assess_between
+from .newton import joined, slid, stays
 from .problem import Problem
+from .qp import effort_cost
 from .records import Array, Status
-from .sequential import Converged, converge, follow
+from .sequential import converge
 from .solver import WorkingSet
 from .start import Start
 
@@ -72,16 +76,12 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """One converged solution on the curve."""
+    """One converged solution on the curve: control (2N,), the contacts that hold it, the k that it achieves."""
 
     s: float
-    converged: Converged
-    assessment: Assessment
-
-    @property
-    def k(self) -> float:
-        """The k that holds at every obstacle and step."""
-        return self.assessment.smallest_k
+    control: Array
+    contacts: Contacts
+    k: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,31 +102,42 @@ class _Walker:
         self.qp_solves = 0
         self.best: Point | None = None
 
-    def point(self, s: float, guess: Array, working: WorkingSet, *, verified: bool = False) -> Point | None:
-        """Converge at s from a guess (N, 2); verified: by a QP that stays, not by Newton steps."""
-        return self.judged(s, converge(self.problem, guess, working, *self.curve.at(s), self.deadline, verified=verified))
+    def point(self, s: float, guess: Array, working: WorkingSet) -> Point | None:
+        """Converge at s from a guess (N, 2): by QPs with rows at the steps, then between them."""
+        tau, lam = self.curve.at(s)
+        rough = converge(self.problem, guess, working, tau, lam, self.deadline, verified=False)
+        if rough is None:
+            return None
+        self.qp_solves += rough.qp_solves
+        contacts = Contacts.at_steps(rough.solution.active, rough.solution.multipliers)
+        return self.settled(s, rough.control, joined(self.problem, contacts))
 
     def beside(self, s: float, neighbour: Point) -> Point | None:
-        """Converge at s from a neighbour: by Newton steps where its active rows stay the same, else by QPs."""
-        near = neighbour.converged
-        return self.near(s, near.positions, near.solution.active, near.solution.multipliers)
+        """Converge at s from a neighbour."""
+        return self.near(s, neighbour.control, neighbour.contacts)
 
-    def near(self, s: float, positions: Array, active: WorkingSet, multipliers: Array) -> Point | None:
+    def near(self, s: float, control: Array, contacts: Contacts) -> Point | None:
+        """Converge at s from a control (2N,) and its contacts: by Newton steps, else by QPs."""
         self.deadline.check()
-        followed = follow(self.problem, positions, active, multipliers, *self.curve.at(s))
-        return self.point(s, positions, active) if followed is None else self.judged(s, followed)
+        point = self.settled(s, control, contacts)
+        if point is not None:
+            return point
+        return self.point(s, self.problem.positions(control), contacts.rows(self.problem.horizon.steps)[0])
 
-    def verified(self, point: Point) -> Point | None:
-        """Return the same point as a QP has it."""
-        return self.point(point.s, point.converged.positions, point.converged.solution.active, verified=True)
-
-    def judged(self, s: float, converged: Converged | None) -> Point | None:
-        if converged is None:
+    def settled(self, s: float, control: Array, contacts: Contacts) -> Point | None:
+        tau, lam = self.curve.at(s)
+        found = slid(self.problem, effort_cost(self.problem, lam), control, contacts, tau)
+        if found is None:
             return None
-        self.qp_solves += converged.qp_solves
-        point = Point(s, converged, assess(self.problem, converged.control))
+        point = Point(s, *found, assess_between(self.problem, found[0]).smallest_k)
         self.best = point if self.best is None or point.k > self.best.k else self.best
         return point
+
+    def verified(self, point: Point) -> bool:
+        """Whether the QP linearised at a point has the same solution."""
+        self.qp_solves += 1
+        tau, lam = self.curve.at(point.s)
+        return stays(self.problem, effort_cost(self.problem, lam), point.control, point.contacts, tau)
 
 
 def walk(problem: Problem, start: Start, curve: Curve, deadline: Deadline = NEVER) -> Walk:
@@ -141,24 +152,22 @@ def walk(problem: Problem, start: Start, curve: Curve, deadline: Deadline = NEVE
 
 def _walk(walker: _Walker, start: Start) -> Walk:
     problem, curve, wanted = walker.problem, walker.curve, k_of_eta(walker.problem.eta)
-    if start.lam is None:
-        stride, first = STRIDE, walker.point(0.0, start.positions, start.active)
+    if start.control is None or start.lam is None:
+        stride, first = STRIDE, walker.point(0.0, start.positions, WorkingSet())
     else:
-        first = walker.near(curve.s_of(start.lam), start.positions, start.active, start.multipliers)
+        first = walker.near(curve.s_of(start.lam), start.control, joined(problem, start.contacts))
         ahead = 0.0 if first is None else OVERSHOOT * abs(wanted - first.k) / USUAL_SLOPE
         stride = min(max(ahead, SHORTEST), WARM_STRIDE)
     if first is None:
-        return Walk(Status.INFEASIBLE, 'no control meets every linearised obstacle row', None, walker.qp_solves)
+        return Walk(Status.INFEASIBLE, 'no way between the obstacles keeps clear of them', None, walker.qp_solves)
     patience = math.inf if start.lam is None else PATIENCE
     low, high = _bracket(walker, first, wanted, stride, patience)
     if high is None:
         message = f'eta {problem.eta:g} is out of reach: the largest on the curve is {eta_of_k(low.k):.4g}, at s = {low.s:.3g}'
         return Walk(Status.ETA_UNREACHABLE, message, low, walker.qp_solves)
     point = high if low is high else _root(walker, low, high, wanted, guided=start.lam is not None)
-    checked = walker.verified(point)
-    point = checked if checked is not None and checked.k >= wanted * (1 - CLOSE) else point
-    if checked is not point or not point.converged.stays:
-        return Walk(Status.ITERATION_LIMIT, 'the linearisation had not settled when its QPs ran out', point, walker.qp_solves)
+    if not walker.verified(point):
+        return Walk(Status.ITERATION_LIMIT, 'the QP linearised at the solution has another one', point, walker.qp_solves)
     return Walk(Status.SOLVED, 'solved', point, walker.qp_solves)
 
 

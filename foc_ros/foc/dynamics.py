@@ -94,6 +94,14 @@ class Horizon(Record):
         return self.maps[:2]
 
     @cached_property
+    def motion(self) -> Array:
+        """Position and velocity per step, x, y, vx, vy at steps 0..N, that the position owes to u, (4, N + 1, 2N)."""
+        motion = np.zeros((4, self.steps + 1, self.response.shape[-1]))
+        motion[:, 1:] = self.response[:, :4].swapaxes(0, 1)
+        motion[2:] *= self.dt
+        return motion
+
+    @cached_property
     def squared(self) -> tuple[Array, Array]:
         """Squares of `response`, (n, 2N): of the last step, and summed over the steps before it."""
         squared = self.response**2

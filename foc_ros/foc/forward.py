@@ -12,14 +12,16 @@ from .account import asked_for, costs, shortfall
 from .algorithm1 import algorithm1
 from .assess import Assessment, assess
 from .config import FocConfig
+from .contacts import Contacts
 from .continuous import Curve, walk
 from .deadline import NEVER, Deadline, OutOfTimeError
+from .least_k import assess_between
 from .noise import state_covariance
 from .optimal import optimise
 from .problem import Problem
 from .qp import clearance_qp, effort_cost
 from .records import Array, Solution, Status
-from .sequential import Converged, converge
+from .sequential import converge
 from .solver import WorkingSet, solve
 from .start import Start
 
@@ -37,8 +39,7 @@ class _Ended:
     tau: float
     lam: float
     qp_solves: int
-    active: WorkingSet
-    multipliers: Array
+    contacts: Contacts
     iterations: int | None = None
 
 
@@ -53,8 +54,9 @@ def forward(problem: Problem, start: Start, settings: FocConfig, deadline: Deadl
         ended = _STRATEGIES[settings.strategy](problem, start, settings, deadline)
     except OutOfTimeError:
         control, message = effort_cost(problem, 0.0).goal_control, 'out of time: the movement shown looks at no obstacle'
-        ended = _Ended(Status.DEADLINE, message, control, 0.0, 0.0, 0, WorkingSet(), np.zeros(0))
-    assessment = assess(problem, ended.control)
+        ended = _Ended(Status.DEADLINE, message, control, 0.0, 0.0, 0, Contacts())
+    continuous = _STRATEGIES[settings.strategy] is _continuous
+    assessment = assess_between(problem, ended.control) if continuous else assess(problem, ended.control)
     if ended.status is Status.SOLVED and settings.strategy != 'fixed' and assessment.eta < problem.eta - SHORT_OF_ETA:
         message = f'the solution achieves eta {assessment.eta:.6g} only'
         ended = replace(ended, status=Status.ITERATION_LIMIT, message=message)
@@ -69,16 +71,16 @@ def _continuous(problem: Problem, start: Start, settings: FocConfig, deadline: D
         raise OutOfTimeError
     if walked.point is None:
         return _best_effort(problem, start, *curve.at(0.0), walked.qp_solves)
-    return _ended(walked.status, walked.message, walked.point.converged, *curve.at(walked.point.s), walked.qp_solves)
+    point = walked.point
+    return _Ended(walked.status, walked.message, point.control, *curve.at(point.s), walked.qp_solves, point.contacts)
 
 
 def _optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadline) -> _Ended:
     optimum = optimise(problem, start, deadline)
     if optimum is None:
         return _best_effort(problem, start, 0.0, 0.0, 0)
-    return _Ended(
-        optimum.status, optimum.message, optimum.control, 0.0, 0.0, optimum.qp_solves, optimum.active, optimum.multipliers
-    )
+    contacts = Contacts.at_steps(optimum.active, optimum.multipliers)
+    return _Ended(optimum.status, optimum.message, optimum.control, 0.0, 0.0, optimum.qp_solves, contacts)
 
 
 def _algorithm1(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline) -> _Ended:
@@ -88,33 +90,31 @@ def _algorithm1(problem: Problem, start: Start, settings: FocConfig, deadline: D
     if last is None:
         return _best_effort(problem, start, stepped.tau, stepped.lam, stepped.qp_solves)
     reached = stepped.tau, stepped.lam, stepped.qp_solves
-    return _Ended(stepped.status, stepped.message, last.control, *reached, last.active, last.multipliers, stepped.iterations)
+    contacts = Contacts.at_steps(last.active, last.multipliers)
+    return _Ended(stepped.status, stepped.message, last.control, *reached, contacts, stepped.iterations)
 
 
 def _fixed(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline) -> _Ended:
-    converged = converge(problem, start.positions, start.active, settings.tau, settings.lam, deadline)
+    working, _ = start.contacts.rows(problem.horizon.steps)
+    converged = converge(problem, start.positions, working, settings.tau, settings.lam, deadline)
     if converged is None:
         return _best_effort(problem, start, settings.tau, settings.lam, 0)
     status = Status.SOLVED if converged.stays else Status.ITERATION_LIMIT
     message = 'solved' if converged.stays else 'the linearisation had not settled when its QPs ran out'
-    return _ended(status, message, converged, settings.tau, settings.lam, converged.qp_solves)
-
-
-def _ended(status: Status, message: str, converged: Converged, tau: float, lam: float, qp_solves: int) -> _Ended:
-    solution = converged.solution
-    return _Ended(status, message, converged.control, tau, lam, qp_solves, solution.active, solution.multipliers)
+    contacts = Contacts.at_steps(converged.solution.active, converged.solution.multipliers)
+    return _Ended(status, message, converged.control, settings.tau, settings.lam, converged.qp_solves, contacts)
 
 
 def _best_effort(problem: Problem, start: Start, tau: float, lam: float, qp_solves: int) -> _Ended:
     """Let the contradicting rows share the violation, at the start: what the hand can do where nothing meets them all."""
     elastic = solve(clearance_qp(problem, effort_cost(problem, lam), start.positions, tau), WorkingSet(), elastic=True)
     if elastic is None:
-        control, active, multipliers = np.zeros(2 * problem.horizon.steps), WorkingSet(), np.zeros(0)
+        control, contacts = np.zeros(2 * problem.horizon.steps), Contacts()
     else:
-        control, active, multipliers = elastic.control, elastic.active, elastic.multipliers
+        control, contacts = elastic.control, Contacts.at_steps(elastic.active, elastic.multipliers)
         qp_solves += elastic.solves
     message = 'no way between the obstacles of this class meets the goal: the path shown violates them least'
-    return _Ended(Status.INFEASIBLE, message, control, tau, lam, qp_solves, active, multipliers)
+    return _Ended(Status.INFEASIBLE, message, control, tau, lam, qp_solves, contacts)
 
 
 _STRATEGIES = {'lv': _continuous, 'hc': _continuous, 'optimal': _optimal, 'algorithm1': _algorithm1, 'fixed': _fixed}
@@ -126,9 +126,9 @@ def _solution(problem: Problem, ended: _Ended, assessment: Assessment, seconds: 
     mean[1:] += horizon.response @ ended.control
     covariance = state_covariance(horizon, problem.free_covariance, problem.noise, ended.control)
     violation, violated = shortfall(problem, ended.control, ended.tau)
-    held = [(ended.tau, ended.lam)] * len(ended.active)
+    held = [(ended.tau, ended.lam)] * len(ended.contacts)
     if optimal:
-        held = asked_for(problem, ended.control, ended.active, ended.multipliers, max(assessment.smallest_k, 0.0))
+        held = asked_for(problem, ended.control, ended.contacts, max(assessment.smallest_k, 0.0))
     return Solution(
         status=ended.status,
         message=_words(problem, ended, assessment, violation),
@@ -146,8 +146,8 @@ def _solution(problem: Problem, ended: _Ended, assessment: Assessment, seconds: 
         violation=violation,
         violation_at=_named(ids, violated),
         multipliers=tuple(
-            (ids[row], int(step) + 1, float(value))
-            for row, step, value in zip(ended.active.obstacle, ended.active.step, ended.multipliers, strict=True)
+            (ids[row], float(time), float(force))
+            for row, time, force in zip(ended.contacts.obstacle, ended.contacts.time, ended.contacts.force, strict=True)
         ),
         held=tuple(held),
         qp_solves=ended.qp_solves,
@@ -156,7 +156,7 @@ def _solution(problem: Problem, ended: _Ended, assessment: Assessment, seconds: 
     )
 
 
-def _named(ids: Sequence[str], place: tuple[int, int] | None) -> tuple[str, int] | None:
+def _named(ids: Sequence[str], place: tuple[int, float] | None) -> tuple[str, float] | None:
     return None if place is None else (ids[place[0]], place[1])
 
 

@@ -87,12 +87,13 @@ class _Search:
 
     def run(self, start: Start) -> tuple[Status, str]:
         """Leave the best iterate in `iterate` and the k that it reaches in `reached`; return how it ended."""
-        if start.control is not None and len(start.active):
-            settled = self.repeat(_Iterate(start.control, start.active, start.multipliers), self.wanted, SETTLED, complete=True)
+        active, multipliers = start.contacts.rows(self.problem.horizon.steps)
+        if start.control is not None and len(active):
+            settled = self.repeat(_Iterate(start.control, active, multipliers), self.wanted, SETTLED, complete=True)
             if settled is not None:
                 self.iterate, self.reached = settled, self.wanted
                 return Status.SOLVED, 'solved'
-        free = converge(self.problem, start.positions, start.active, 0.0, 0.0, self.deadline, verified=False)
+        free = converge(self.problem, start.positions, active, 0.0, 0.0, self.deadline, verified=False)
         if free is None:
             return Status.INFEASIBLE, 'no control meets every linearised obstacle row'
         self.qp_solves += free.qp_solves

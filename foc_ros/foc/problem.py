@@ -16,6 +16,9 @@ from .errors import SceneError
 from .noise import stacked_noise
 from .records import Array, Obstacles, Record
 
+ALIKE = 1e-6
+"""Difference between two circles, relative to the scene, at which they count as the same."""
+
 
 @dataclass(frozen=True, eq=False)
 class Problem(Record):
@@ -60,6 +63,24 @@ class Problem(Record):
         return self.free[1:, :2].copy()
 
     @cached_property
+    def free_course(self) -> Array:
+        """Mean position and velocity per step without control, x, y, vx, vy at steps 0..N, (4, N + 1) [m]."""
+        scale = np.array([1.0, 1.0, self.horizon.dt, self.horizon.dt])
+        return np.ascontiguousarray(self.free[:, :4].T * scale[:, None])
+
+    @cached_property
+    def error_course(self) -> Array:
+        """What an error of the initial state becomes in position and velocity per step, at steps 0..N, (4, N + 1, n)."""
+        scale = np.array([1.0, 1.0, self.horizon.dt, self.horizon.dt])
+        return np.ascontiguousarray(self.error_map[:, :4].swapaxes(0, 1) * scale[:, None, None])
+
+    @cached_property
+    def drift(self) -> Array:
+        """How far each centre moves in a step, (m, 2) [m]."""
+        drift: Array = self.obstacles.velocity * self.horizon.dt
+        return drift
+
+    @cached_property
     def free_covariance(self) -> Array:
         """The part of the state covariance at steps 0..N that the control does not cause, (N + 1, n, n)."""
         carried: Array = self.error_map @ self.initial_covariance @ self.error_map.swapaxes(1, 2)
@@ -80,6 +101,14 @@ class Problem(Record):
     def courses(self) -> Array:
         """Mean centres of the obstacles at steps 0..N, step by step, (N + 1, m, 2) [m]."""
         return courses(self.obstacles, self.horizon.dt, self.horizon.steps)
+
+    @cached_property
+    def first_alike(self) -> NDArray[np.intp]:
+        """For each obstacle the first one that is the same circle, (m,): a mean that touches both is held by one of them."""
+        circle = np.column_stack((self.obstacles.centre, self.obstacles.velocity * self.horizon.dt, np.sqrt(self.size[0])))
+        alike = np.abs(circle[:, None] - circle).max(axis=2, initial=0.0) < ALIKE * self.extent
+        first: NDArray[np.intp] = alike.argmax(axis=1) if len(circle) else np.zeros(0, dtype=np.intp)
+        return first
 
     @cached_property
     def centres_from_free(self) -> Array:

@@ -195,6 +195,14 @@ def wanted_distance(problem: Problem, tau: float) -> Array:
     return distance
 
 
+def margins(problem: Problem, tau: float) -> tuple[Array, Array, float]:
+    """Return the same as functions of time, `between.kept`: reach (m,) and what of it is missing now (m,) [m], pace [1/step]."""
+    reach: Array = np.sqrt(problem.size[0] + tau)
+    if problem.recovery_s <= 0:
+        return reach, np.zeros(len(reach)), 0.0
+    return reach, reach - problem.distance_now, problem.horizon.dt / problem.recovery_s
+
+
 @compiled
 def depths(positions: Matrix, centres: Tensor, wanted: Matrix) -> Matrix:
     """Return how much nearer than wanted the positions (N, 2) are to each centre, (m, N) [m]."""

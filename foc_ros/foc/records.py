@@ -161,13 +161,14 @@ class Solution(Record):
     by name [m^2/s^6]; tau [m^2] and lam (lambda [1/s^6]): where on the curve, or as given; 0 in `optimal`, which has one of each
     for every row.
 
-    eta: achieved, the smallest over obstacles and steps; eta_at: (obstacle id, step) where. eta_reachable: the largest that was
-    found, where the wanted one is out of reach, else None. violation: by how much the mean comes nearer to a centre than
-    sqrt(E[R^2] + tau) [m], 0 where it never does; violation_at: (obstacle id, step) where.
+    eta: achieved, the smallest over obstacles and steps, for `lv` and `hc` between the steps too; eta_at: (obstacle id, step)
+    where, with fractions of a step. eta_reachable: the largest that was found, where the wanted one is out of reach, else None.
+    violation: by how much the mean comes nearer to a centre than sqrt(E[R^2] + tau) [m], 0 where it never does; violation_at:
+    (obstacle id, step) where.
 
-    multipliers: (obstacle id, step, value) of the active rows, by how much J_aug would grow for each metre more of distance that
-    the row asks for [m/s^6]; held: what each of them asks for, tau [m^2] and lambda [1/s^6]. qp_solves: QPs solved; iterations:
-    of the loop of `algorithm1`, None in the others; solve_s: wall time [s].
+    multipliers: (obstacle id, step, value) of the contacts that hold the mean off, in `lv` and `hc` with fractions of a step: by
+    how much J_aug would grow for each metre more of distance asked for [m/s^6]; held: what each of them asks for, tau [m^2] and
+    lambda [1/s^6]. qp_solves: QPs solved; iterations: of the loop of `algorithm1`, None in the others; solve_s: wall time [s].
     """
 
     status: Status
@@ -181,11 +182,11 @@ class Solution(Record):
     tau: float
     lam: float
     eta: float
-    eta_at: tuple[str, int] | None = None
+    eta_at: tuple[str, float] | None = None
     eta_reachable: float | None = None
     violation: float = 0.0
-    violation_at: tuple[str, int] | None = None
-    multipliers: tuple[tuple[str, int, float], ...] = ()
+    violation_at: tuple[str, float] | None = None
+    multipliers: tuple[tuple[str, float, float], ...] = ()
     held: tuple[tuple[float, float], ...] = ()
     qp_solves: int = 0
     iterations: int | None = None

@@ -11,20 +11,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .contacts import Contacts
 from .deadline import NEVER, Deadline
-from .newton import Touching, newton
+from .newton import STAYS, held
 from .problem import Problem
 from .qp import Cost, clearance_qp, effort_cost
 from .records import Array
 from .solver import QPSolution, WorkingSet, solve
 
-STAYS = 3e-7
-"""Largest move of the mean that counts as staying, relative to the scene's extent."""
 NEAR = 0.01
 """Largest move of the mean from which Newton steps are tried even if the active rows changed; relative."""
 MAX_QPS = 60
-CHANGES = 8
-"""How often the active rows may change while a solution is followed by Newton steps alone."""
 ALIGNED = 0.99
 """Cosine between two moves in a row that counts as the same direction."""
 PATIENCE = 6
@@ -74,28 +71,17 @@ def converge(
         rows = (working.obstacle.tobytes(), working.step.tobytes())
         better = None
         if len(working) and (rows == previous or move < NEAR):
-            better = newton(problem, cost, positions, working, solution.multipliers, tau)
-        if better is not None and _cost(cost, better.control) <= _cost(cost, solution.control) * (1 + 1e-12):
+            better = held(problem, cost, solution.control, Contacts.at_steps(working, solution.multipliers), tau)
+        if better is not None and _cost(cost, better[0]) <= _cost(cost, solution.control) * (1 + 1e-12):
+            control, contacts = better
+            positions = problem.positions(control)
             if not verified:
-                return _touching(better, solves)
-            guess = creep.jumped(better.positions)
+                return Converged(control, positions, QPSolution(control, working, contacts.force, 0), solves, stays=True)
+            guess = creep.jumped(positions)
         else:
             guess = creep.ahead(positions)
         previous = rows
     raise AssertionError('MAX_QPS is at least 1')
-
-
-def follow(
-    problem: Problem, positions: Array, active: WorkingSet, multipliers: Array, tau: float, lam: float
-) -> Converged | None:
-    """Find the solution near another one, (N, 2), by Newton steps alone; None where its active rows change too much."""
-    moved = newton(problem, effort_cost(problem, lam), positions, active, multipliers, tau, changes=CHANGES)
-    return None if moved is None else _touching(moved, 0)
-
-
-def _touching(found: Touching, solves: int) -> Converged:
-    solution = QPSolution(found.control, found.active, found.multipliers, 0)
-    return Converged(found.control, found.positions, solution, solves, stays=True)
 
 
 def _cost(cost: Cost, control: Array) -> float:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from .backend import DenseQP, solve_named, solve_piqp
 from .compiled import Indices, Matrix, Vector, compiled
 from .dense import cholesky, lower_solved, upper_solved
-from .qp import ReachingQP, compliance
+from .qp import Cost, ReachingQP, compliance
 from .records import Array
 
 Index = NDArray[np.intp]
@@ -65,21 +65,6 @@ class WorkingSet:
         return WorkingSet(self.obstacle[keep], self.step[keep])
 
 
-Row = tuple[int, int]
-"""Obstacle and step index."""
-
-
-def forces_of(rows: WorkingSet, multipliers: Array) -> dict[Row, float]:
-    """Return the multiplier (k,) of each row."""
-    return dict(zip(zip(rows.obstacle.tolist(), rows.step.tolist(), strict=True), multipliers.tolist(), strict=True))
-
-
-def rows_of(forces: dict[Row, float]) -> tuple[WorkingSet, Array]:
-    """Return the rows with their multipliers (k,), in order."""
-    rows = np.array(sorted(forces), dtype=np.intp).reshape(-1, 2)
-    return WorkingSet(rows[:, 0], rows[:, 1]), np.array([forces[row] for row in sorted(forces)])
-
-
 @dataclass(frozen=True, eq=False)
 class QPSolution:
     """control (2N,); active: the rows with a positive multiplier; multipliers (k,) of those; solves: QPs it took."""
@@ -99,7 +84,8 @@ def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False) -> QPSo
     control, multipliers = qp.cost.goal_control, np.zeros(0)
     for solves in range(1, MAX_ROUNDS + 1):
         if len(working):
-            answer = _with_rows(qp, working, elastic)
+            rows = qp.rows(working.obstacle, working.step)
+            answer = with_rows(qp.cost, rows, qp.limits[working.rows], elastic=elastic)
             if answer is Verdict.CONTRADICTION:
                 return None
             if answer is Verdict.UNSOLVED:
@@ -140,13 +126,12 @@ class Verdict(Enum):
     UNSOLVED = 'unsolved'
 
 
-def _with_rows(
-    qp: ReachingQP, working: WorkingSet, elastic: bool
+def with_rows(
+    cost: Cost, rows: Array, limits: Array, *, elastic: bool = False
 ) -> tuple[Array, Array] | Literal[Verdict.CONTRADICTION, Verdict.UNSOLVED]:
-    """Return control (2N,) and multipliers (k,) for the rows of the working set alone."""
-    rows = qp.rows(working.obstacle, working.step)
-    missing = qp.limits[working.obstacle, working.step] - rows @ qp.cost.goal_control
-    inverse, _, factor = qp.cost.factors
+    """Return control (2N,) and multipliers (k,) >= 0 of the least cost with rows (k, 2N) u >= limits (k,)."""
+    missing = limits - rows @ cost.goal_control
+    inverse, _, factor = cost.factors
     pressed, gram, scaled, scale, stuck = range_space(rows, inverse, factor, missing, ELASTICITY if elastic else 0.0)
     if stuck > TOLERANCE and not elastic:
         return Verdict.CONTRADICTION
@@ -162,7 +147,7 @@ def _with_rows(
     if short > RESIDUAL * (largest if elastic else 1.0) or slack > RESIDUAL * largest**2:
         return Verdict.UNSOLVED
     multipliers *= scale * size
-    return qp.cost.goal_control + multipliers @ pressed, multipliers
+    return cost.goal_control + multipliers @ pressed, multipliers
 
 
 @compiled

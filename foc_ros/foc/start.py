@@ -6,23 +6,22 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .contacts import Contacts
 from .problem import Problem
 from .records import Array, Solution
-from .solver import Row, WorkingSet, rows_of
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
     """Positions (N, 2) at steps 1..N [m] to linearise at.
 
-    From an earlier solution also its stacked control (2N,), its active rows with their multipliers, and its lambda; lam is
-    None for a cold start, which has none of these.
+    From an earlier solution also its stacked control (2N,), its contacts, and its lambda; lam is None for a cold start, which has
+    none of these.
     """
 
     positions: Array
     control: Array | None = None
-    active: WorkingSet = field(default_factory=WorkingSet)
-    multipliers: Array = field(default_factory=lambda: np.zeros(0))
+    contacts: Contacts = field(default_factory=Contacts)
     lam: float | None = None
 
 
@@ -44,9 +43,11 @@ def warm(previous: Solution, problem: Problem) -> Start:
     inside = (held >= 0) & (held < len(previous.control))
     control = np.where(inside, previous.control[np.where(inside, held, 0)].T, 0.0)
     row = {identity: index for index, identity in enumerate(problem.obstacles.ids)}
-    kept: dict[Row, float] = {}
-    for identity, step, value in previous.multipliers:
-        moved = round((step * previous.dt - elapsed_s) / dt)
-        if identity in row and 1 <= moved <= steps:
-            kept[row[identity], moved - 1] = kept.get((row[identity], moved - 1), 0.0) + value
-    return Start(positions, control.ravel(), *rows_of(kept), previous.lam)
+    kept = [
+        (row[identity], moved, force)
+        for identity, time, force in previous.multipliers
+        if identity in row and 1 <= (moved := (time * previous.dt - elapsed_s) / dt) <= steps
+    ]
+    table = np.array(kept, dtype=float).reshape(-1, 3)
+    contacts = Contacts(table[:, 0].astype(np.intp), table[:, 1].copy(), table[:, 2].copy())
+    return Start(positions, control.ravel(), contacts, previous.lam)

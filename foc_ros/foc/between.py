@@ -1,0 +1,165 @@
+"""The mean between two steps: the cubic through their positions and velocities, exact for the triple integrator.
+
+Times are in steps from now, 0..N, fractions allowed; velocities are per step. With t = floor(time), a = time - t,
+p(time) = (2a^3 - 3a^2 + 1) p_t + (a^3 - 2a^2 + a) v_t + (3a^2 - 2a^3) p_(t+1) + (a^3 - a^2) v_(t+1).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .compiled import Matrix, Tensor, Vector, compiled
+
+ROOT_STEPS = 40
+"""Newton steps, or halvings, to the moment of closest approach within a step; five are usual."""
+ROOT_CLOSE = 1e-12
+"""In steps."""
+
+
+@compiled
+def blend(a: float, order: int) -> Vector:
+    """Return the weights (4,) of p_t, v_t, p_(t+1), v_(t+1) in the position, or its first or second derivative by time."""
+    weight = np.empty(4)
+    if order == 0:
+        weight[0], weight[1] = 2 * a**3 - 3 * a**2 + 1, a**3 - 2 * a**2 + a
+        weight[3] = a**3 - a**2
+    elif order == 1:
+        weight[0], weight[1] = 6 * a**2 - 6 * a, 3 * a**2 - 4 * a + 1
+        weight[3] = 3 * a**2 - 2 * a
+    else:
+        weight[0], weight[1] = 12 * a - 6, 6 * a - 4
+        weight[3] = 6 * a - 2
+    weight[2] = (1.0 if order == 0 else 0.0) - weight[0]
+    return weight
+
+
+@compiled
+def place(course: Matrix, time: float, order: int) -> Vector:
+    """Return the position (2,), or its derivative, on a course (4, N + 1) of x, y and their velocities at steps 0..N."""
+    t = min(int(time), course.shape[1] - 2)
+    weight, point = blend(time - t, order), np.empty(2)
+    for axis in range(2):
+        point[axis] = (
+            weight[0] * course[axis, t]
+            + weight[1] * course[2 + axis, t]
+            + weight[2] * course[axis, t + 1]
+            + weight[3] * course[2 + axis, t + 1]
+        )
+    return point
+
+
+@compiled
+def place_row(motion: Tensor, time: float, order: int, x: float, y: float) -> Vector:
+    """Return what the control (2N,) adds to x p_x + y p_y, or its derivative; motion (4, N + 1, 2N) gives the course from it."""
+    t = min(int(time), motion.shape[1] - 2)
+    weight, direction = blend(time - t, order), (x, y)
+    row = np.zeros(motion.shape[2])
+    for axis in range(2):
+        for u in range(len(row)):
+            row[u] += direction[axis] * (
+                weight[0] * motion[axis, t, u]
+                + weight[1] * motion[2 + axis, t, u]
+                + weight[2] * motion[axis, t + 1, u]
+                + weight[3] * motion[2 + axis, t + 1, u]
+            )
+    return row
+
+
+@compiled
+def course_of(motion: Tensor, free: Matrix, control: Vector) -> Matrix:
+    """Return the course (4, N + 1) of a control (2N,); free (4, N + 1): without it."""
+    course = free.copy()
+    for q in range(4):
+        for t in range(1, course.shape[1]):
+            total = 0.0
+            for u in range(len(control)):
+                total += motion[q, t, u] * control[u]
+            course[q, t] += total
+    return course
+
+
+@compiled
+def kept(reach: float, missing: float, pace: float, time: float) -> tuple[float, float, float]:
+    """Return the distance to be kept from a centre at a time, and its first and second derivative.
+
+    reach [m], less what was missing of it at first [m] and still is: a minimum-jerk movement over 1 / pace steps takes it to 0.
+    """
+    s = time * pace
+    if missing <= 0.0 or s >= 1.0:
+        return reach, 0.0, 0.0
+    left = 1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    rate, bend = 30.0 * s**2 * (1.0 - s) ** 2, 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
+    return reach - missing * left, missing * rate * pace, missing * bend * pace**2
+
+
+@compiled
+def spared(
+    course: Matrix, centre: Vector, drift: Vector, reach: float, missing: float, pace: float, time: float
+) -> tuple[float, float]:
+    """Return how much farther than wanted the mean is from a circle's centre at a time [m], and the rate of that per step."""
+    p, v = place(course, time, 0), place(course, time, 1)
+    x, y = p[0] - centre[0] - time * drift[0], p[1] - centre[1] - time * drift[1]
+    distance = max(np.hypot(x, y), 1e-12)
+    wanted, faster, _ = kept(reach, missing, pace, time)
+    return distance - wanted, (x * (v[0] - drift[0]) + y * (v[1] - drift[1])) / distance - faster
+
+
+@compiled
+def _closest(
+    course: Matrix,
+    centre: Vector,
+    drift: Vector,
+    reach: float,
+    missing: float,
+    pace: float,
+    begin: float,
+    rate_begin: float,
+    rate_end: float,
+) -> float:
+    """Return the time within the step from `begin` at which the rate passes zero: regula falsi, halved where it is slow."""
+    low, high, below, above = begin, begin + 1.0, rate_begin, rate_end
+    time = begin
+    for i in range(ROOT_STEPS):
+        time = (low + high) / 2 if i % 3 == 2 else (low * above - high * below) / (above - below)
+        _, rate = spared(course, centre, drift, reach, missing, pace, time)
+        if rate < 0.0:
+            low, below = time, rate
+        else:
+            high, above = time, rate
+        if high - low < ROOT_CLOSE or abs(rate) < ROOT_CLOSE * (above - below + 1e-9):
+            break
+    return time
+
+
+@compiled
+def entered(
+    course: Matrix, centre: Matrix, drift: Matrix, reach: Vector, missing: Vector, pace: float, tolerance: float
+) -> Matrix:
+    """Return the moments of closest approach (q, 2) at which the mean is too near: row of the circle, time in steps.
+
+    centre (m, 2) at step 0 and drift (m, 2) per step, of m circles; reach, missing (m,), pace: `kept`. From step 1 on: the hand
+    cannot be elsewhere before. Between two steps an approach is found where the distance to spare falls at the first and grows at
+    the second.
+    """
+    m, last = len(reach), course.shape[1] - 1
+    found, count = np.empty((m * (last + 1), 2)), 0
+    for j in range(m):
+        spare_before, rate_before = 0.0, 0.0
+        for t in range(1, last + 1):
+            spare, rate = spared(course, centre[j], drift[j], reach[j], missing[j], pace, float(t))
+            time = -1.0
+            if t == 1 and rate >= 0.0:
+                time = 1.0
+            elif t > 1 and rate_before < 0.0 <= rate:
+                travelled = abs(rate_before) + abs(rate)
+                if min(spare, spare_before) < travelled:
+                    time = _closest(course, centre[j], drift[j], reach[j], missing[j], pace, t - 1.0, rate_before, rate)
+            if t == last and rate < 0.0:
+                time = float(last)
+            if time > 0.0:
+                nearest, _ = spared(course, centre[j], drift[j], reach[j], missing[j], pace, time)
+                if nearest < -tolerance:
+                    found[count, 0], found[count, 1] = j, time
+                    count += 1
+            spare_before, rate_before = spare, rate
+    return found[:count].copy()

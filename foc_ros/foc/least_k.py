@@ -1,0 +1,136 @@
+"""The smallest k between the steps: it changes smoothly where the smallest at the steps moves on from one step to the next."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .assess import Assessment, assess
+from .between import course_of, place, place_row
+from .chance import CERTAIN_K
+from .compiled import Matrix, Tensor, Vector, compiled
+from .problem import Problem
+from .records import Array
+
+PARABOLAS = 8
+VERTEX = 1e-4
+"""How near in steps, to the lowest so far, the next lowest is not worth looking at: k is flat there."""
+MUCH_MORE = 0.5
+"""By how much of 1 + k a step's k may be above the smallest that the smallest between the steps is looked for beside it."""
+
+
+def assess_between(problem: Problem, control: Array) -> Assessment:
+    """Assess a control (2N,) at the steps and between them."""
+    assessment = assess(problem, control)
+    if not assessment.k.size:
+        return assessment
+    smallest, row, time = least_between(
+        np.ascontiguousarray(assessment.k),
+        problem.horizon.motion,
+        problem.free_course,
+        problem.error_course,
+        problem.initial_covariance,
+        problem.noise_variance,
+        np.ascontiguousarray(control, dtype=float),
+        problem.obstacles.centre,
+        problem.drift,
+        *problem.size,
+        problem.obstacles.centre_covariance,
+    )
+    return replace(assessment, between=(smallest, row, time)) if row >= 0 else assessment
+
+
+@compiled
+def _k_at_time(
+    motion: Tensor,
+    course: Matrix,
+    error_course: Tensor,
+    initial_covariance: Matrix,
+    control_variance: Vector,
+    centre: Vector,
+    size_mean: float,
+    size_variance: float,
+    centre_covariance: Matrix,
+    time: float,
+) -> float:
+    """Return k for one circle, its centre (2,) where it is at a time, from what the course's position owes to each control."""
+    at = place(course, time, 0)
+    x, y = at[0] - centre[0], at[1] - centre[1]
+    # the variance of the distance's square along d is that of d.p: one row for both axes
+    row = place_row(motion, time, 0, x, y)
+    var = x * x * centre_covariance[0, 0] + 2 * x * y * centre_covariance[0, 1] + y * y * centre_covariance[1, 1]
+    for u in range(len(row)):
+        var += row[u] * row[u] * control_variance[u]
+    carried = place_row(error_course, time, 0, x, y)
+    for i in range(len(carried)):
+        for j in range(len(carried)):
+            var += carried[i] * initial_covariance[i, j] * carried[j]
+    total = size_variance + 4 * var
+    expected = size_mean - x * x - y * y
+    if total > 0:
+        return float(min(max(-expected / np.sqrt(total), -CERTAIN_K), CERTAIN_K))
+    return CERTAIN_K if expected <= 0 else -CERTAIN_K
+
+
+@compiled
+def least_between(
+    k_at_steps: Matrix,
+    motion: Tensor,
+    free: Matrix,
+    error_course: Tensor,
+    initial_covariance: Matrix,
+    noise_variance: Vector,
+    control: Vector,
+    centre: Matrix,
+    drift: Matrix,
+    size_mean: Vector,
+    size_variance: Vector,
+    centre_covariance: Tensor,
+) -> tuple[float, int, float]:
+    """Return the smallest k between the steps, its circle and time, from k (m, N) at them; -1 where none is below those.
+
+    Beside a step with a small k it is the vertex of the parabola through three times, closer and closer.
+    """
+    m, steps = k_at_steps.shape
+    course, control_variance = course_of(motion, free, control), noise_variance * control * control
+    least = min(k_at_steps.min(), CERTAIN_K)
+    row, moment, near = -1, 0.0, least + MUCH_MORE * (1.0 + abs(least))
+    for j in range(m):
+        for t in range(1, steps - 1):
+            ka, kb, kc = k_at_steps[j, t - 1], k_at_steps[j, t], k_at_steps[j, t + 1]
+            if not (kb <= ka and kb < kc and kb < near and ka < CERTAIN_K and kc < CERTAIN_K):
+                continue
+            a, b, c = float(t), t + 1.0, t + 2.0
+            for _ in range(PARABOLAS):
+                bend = (b - a) * (kb - kc) - (b - c) * (kb - ka)
+                if bend == 0.0:
+                    break
+                time = b - 0.5 * ((b - a) ** 2 * (kb - kc) - (b - c) ** 2 * (kb - ka)) / bend
+                if not a < time < c or abs(time - b) < VERTEX:
+                    break
+                k = _k_at_time(
+                    motion,
+                    course,
+                    error_course,
+                    initial_covariance,
+                    control_variance,
+                    centre[j] + time * drift[j],
+                    size_mean[j],
+                    size_variance[j],
+                    centre_covariance[j],
+                    time,
+                )
+                if k <= kb:
+                    if time < b:
+                        c, kc = b, kb
+                    else:
+                        a, ka = b, kb
+                    b, kb = time, k
+                elif time < b:
+                    a, ka = time, k
+                else:
+                    c, kc = time, k
+            if kb < least:
+                least, row, moment = kb, j, b
+    return float(least), row, moment
