@@ -17,7 +17,7 @@ BOWED = bowed((0.0, 0.0), (0.3, 0.0), 50, 0.06)
 def rough(problem, lam=LAM):
     """Return what the QPs end with, and its rows as contacts."""
     here = converge(problem, BOWED[1:], WorkingSet(), TAU, lam)
-    return here, Contacts.at_steps(here.solution.active, here.solution.multipliers)
+    return here, here.contacts
 
 
 @pytest.mark.parametrize('factor', [0.5, 1.0, 2.0])
@@ -89,5 +89,5 @@ def test_where_two_circles_leave_no_gap_there_is_no_way_between_two_steps_either
     straight = bowed((0.0, 0.0), (0.3, 0.0), 10, 0.0)
     leaps = converge(problem, straight[1:], WorkingSet(), 0.0, 0.0)
     assert leaps is not None
-    contacts = joined(problem, Contacts.at_steps(leaps.solution.active, leaps.solution.multipliers))
+    contacts = joined(problem, leaps.contacts)
     assert slid(problem, effort_cost(problem, 0.0), leaps.control, contacts, 0.0) is None

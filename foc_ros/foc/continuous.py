@@ -12,15 +12,17 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from .chance import eta_of_k, k_of_eta
 from .contacts import Contacts
 from .deadline import NEVER, Deadline, OutOfTimeError
 from .least_k import assess_between
-from .newton import joined, slid, stays
+from .newton import joined, leapt, slid, stays
 from .problem import Problem
-from .qp import effort_cost
+from .qp import NO_TIMES, effort_cost
 from .records import Array, Status
-from .sequential import converge
+from .sequential import Converged, converge
 from .solver import WorkingSet
 from .start import Start
 
@@ -48,6 +50,8 @@ CELL = 0.25
 NARROW = 1e-4
 """Bracket in s at which the root is as good as found: k jumps there, because the touching step changes."""
 MAX_TRIALS = 60
+LEAPS = 8
+"""How often more times are added for a mean that leaps over circles between the steps."""
 
 
 @dataclass(frozen=True)
@@ -105,12 +109,22 @@ class _Walker:
     def point(self, s: float, guess: Array, working: WorkingSet) -> Point | None:
         """Converge at s from a guess (N, 2): by QPs with rows at the steps, then between them."""
         tau, lam = self.curve.at(s)
-        rough = converge(self.problem, guess, working, tau, lam, self.deadline, verified=False)
-        if rough is None:
-            return None
-        self.qp_solves += rough.qp_solves
-        contacts = Contacts.at_steps(rough.solution.active, rough.solution.multipliers)
-        return self.settled(s, rough.control, joined(self.problem, contacts))
+        rough = self.rough(guess, working, tau, lam)
+        return None if rough is None else self.settled(s, rough.control, joined(self.problem, rough.contacts))
+
+    def rough(self, guess: Array, working: WorkingSet, tau: float, lam: float) -> Converged | None:
+        """Converge by QPs with rows at the steps, and at more times where the mean would leap over a circle between them."""
+        between = NO_TIMES
+        for _ in range(LEAPS):
+            rough = converge(self.problem, guess, working, tau, lam, self.deadline, verified=False, between=between)
+            if rough is None:
+                return None
+            self.qp_solves += rough.qp_solves
+            leaps = leapt(self.problem, rough.control, tau)
+            if not len(leaps):
+                break
+            between, working = np.union1d(between, leaps), rough.active.within(self.problem.horizon.steps)
+        return rough
 
     def beside(self, s: float, neighbour: Point) -> Point | None:
         """Converge at s from a neighbour."""

@@ -101,8 +101,7 @@ def _fixed(problem: Problem, start: Start, settings: FocConfig, deadline: Deadli
         return _best_effort(problem, start, settings.tau, settings.lam, 0)
     status = Status.SOLVED if converged.stays else Status.ITERATION_LIMIT
     message = 'solved' if converged.stays else 'the linearisation had not settled when its QPs ran out'
-    contacts = Contacts.at_steps(converged.solution.active, converged.solution.multipliers)
-    return _Ended(status, message, converged.control, settings.tau, settings.lam, converged.qp_solves, contacts)
+    return _Ended(status, message, converged.control, settings.tau, settings.lam, converged.qp_solves, converged.contacts)
 
 
 def _best_effort(problem: Problem, start: Start, tau: float, lam: float, qp_solves: int) -> _Ended:

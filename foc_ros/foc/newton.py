@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .between import course_of, entered
+from .between import course_of, entered, place
 from .contacts import Contacts
 from .problem import Problem
-from .qp import Cost, depths, margins, wanted_distance
+from .qp import NO_TIMES, Cost, depths, margins, wanted_distance
 from .records import Array
 from .solver import Verdict, with_rows
 from .touching import half_planes_between, touching
@@ -22,6 +22,8 @@ STAYS = 3e-7
 """Largest move of the mean that counts as staying, relative to the scene's extent."""
 CLEAR = 3e-8
 """Depth in a circle that is rounding; relative."""
+LEAP = 0.2
+"""Depth in a circle between two steps, relative to the smallest, from which on the mean may be on the wrong side of it."""
 CHANGES = 8
 """How often contacts may be let go or found anew."""
 NEW = 1e-6
@@ -42,12 +44,23 @@ def joined(problem: Problem, contacts: Contacts) -> Contacts:
     return Contacts(problem.first_alike[contacts.obstacle], contacts.time, contacts.force).merged()
 
 
+def leapt(problem: Problem, control: Array, tau: float) -> Array:
+    """Return the times at which the mean of a control (2N,) is much too near a circle between the steps."""
+    reach, missing, pace = margins(problem, tau)
+    if not len(reach):
+        return NO_TIMES
+    course = course_of(problem.horizon.motion, problem.free_course, np.ascontiguousarray(control))
+    much = LEAP * float(reach.min())
+    times: Array = entered(course, problem.obstacles.centre, problem.drift, reach, missing, pace, much)[:, 1]
+    return times
+
+
 def slid(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: float) -> tuple[Array, Contacts] | None:
     """Find the solution near a control (2N,) that keeps out of circles between the steps too; None where there is none.
 
     contacts: to begin with; they slide, those that pull are let go, and where circles are entered there are new ones.
     """
-    margin = margins(problem, tau)
+    margin, sides = margins(problem, tau), course_of(problem.horizon.motion, problem.free_course, np.ascontiguousarray(control))
     for _ in range(CHANGES + 1):
         found = _touched(problem, cost, control, contacts, tau, sliding=True)
         if found is None:
@@ -59,9 +72,18 @@ def slid(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: 
         course = course_of(problem.horizon.motion, problem.free_course, control)
         new = entered(course, problem.obstacles.centre, problem.drift, *margin, CLEAR * problem.extent)
         if not len(new):
-            return control, contacts
+            return (control, contacts) if _same_sides(problem, sides, course, contacts) else None
         contacts = contacts.joined(new[:, 0].astype(np.intp), new[:, 1], NEW * float(contacts.force.max(initial=1.0)))
     return None
+
+
+def _same_sides(problem: Problem, before: Array, after: Array, contacts: Contacts) -> bool:
+    """Whether two courses (4, N + 1) pass the circles of the contacts on the same side, when the second touches them."""
+    for obstacle, time in zip(contacts.obstacle, contacts.time, strict=True):
+        centre = problem.obstacles.centre[obstacle] + time * problem.drift[obstacle]
+        if (place(before, time, 0) - centre) @ (place(after, time, 0) - centre) < 0:
+            return False
+    return True
 
 
 def stays(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: float) -> bool:

@@ -97,7 +97,7 @@ class _Search:
         if free is None:
             return Status.INFEASIBLE, 'no control meets every linearised obstacle row'
         self.qp_solves += free.qp_solves
-        self.iterate = _Iterate(free.control, free.solution.active, free.solution.multipliers)
+        self.iterate = _Iterate(free.control, free.active, free.contacts.force)
         self.reached = assess(self.problem, free.control).smallest_k
         if self.reached >= self.wanted:
             return Status.SOLVED, 'solved'

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from .between import kept, place, place_row
 from .compiled import Indices, Matrix, Tensor, Vector, compiled
 from .dense import cholesky, combined, lower_solved, row_products, values
 from .problem import Problem
@@ -215,7 +216,37 @@ def depths(positions: Matrix, centres: Tensor, wanted: Matrix) -> Matrix:
     return depth
 
 
-def clearance_qp(problem: Problem, cost: Cost, guess: Array, tau: float, *, literal: bool = False) -> ReachingQP:
-    """Build the paper's reformulated problem (equation 16) at a guess (N, 2): E[C] + tau <= 0; its lambda is in the cost."""
+NO_TIMES = np.zeros(0)
+
+
+def clearance_qp(
+    problem: Problem, cost: Cost, guess: Array, tau: float, *, literal: bool = False, between: Array = NO_TIMES
+) -> ReachingQP:
+    """Build the paper's reformulated problem (equation 16) at a guess (N, 2): E[C] + tau <= 0; its lambda is in the cost.
+
+    between (e,): times in steps at which the rows hold besides the steps; they follow those, as if they were steps N+1..N+e.
+    """
     normals, limits = half_planes(problem, guess, tau, literal=literal)
-    return ReachingQP(cost, problem.horizon.position, problem.unweighted, normals, limits)
+    if not len(between):
+        return ReachingQP(cost, problem.horizon.position, problem.unweighted, normals, limits)
+    more_maps, more_normals, more_limits = _half_planes_at(problem, guess, tau, between)
+    return ReachingQP(
+        cost,
+        np.concatenate((problem.horizon.position, more_maps), axis=1),
+        problem.unweighted,
+        np.concatenate((normals, more_normals), axis=1),
+        np.concatenate((limits, more_limits), axis=1),
+    )
+
+
+def _half_planes_at(problem: Problem, guess: Array, tau: float, times: Array) -> tuple[Array, Array, Array]:
+    """Return the position's maps (2, e, 2N), and `half_planes` of a guess (N, 2), straight between the steps, at times (e,)."""
+    maps = np.array([[place_row(problem.horizon.motion, time, 0, x, y) for time in times] for x, y in ((1.0, 0.0), (0.0, 1.0))])
+    free = np.array([place(problem.free_course, time, 0) for time in times])
+    centres = problem.obstacles.centre[:, None] + times[:, None] * problem.drift[:, None]
+    path = np.concatenate((problem.initial_mean[None, :2], guess))
+    there = np.stack([np.interp(times, np.arange(len(path)), axis) for axis in path.T], axis=1)
+    normals, _, limits = normals_at(there, centres, centres - free)
+    reach, missing, pace = margins(problem, tau)
+    wanted = [[kept(*circle, pace, time)[0] for time in times] for circle in zip(reach, missing, strict=True)]
+    return maps, normals, limits + np.array(wanted).reshape(limits.shape)

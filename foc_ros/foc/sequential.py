@@ -15,9 +15,9 @@ from .contacts import Contacts
 from .deadline import NEVER, Deadline
 from .newton import STAYS, held
 from .problem import Problem
-from .qp import Cost, clearance_qp, effort_cost
+from .qp import NO_TIMES, Cost, clearance_qp, effort_cost
 from .records import Array
-from .solver import QPSolution, WorkingSet, solve
+from .solver import WorkingSet, solve
 
 NEAR = 0.01
 """Largest move of the mean from which Newton steps are tried even if the active rows changed; relative."""
@@ -36,7 +36,8 @@ class Converged:
 
     control: Array
     positions: Array
-    solution: QPSolution
+    active: WorkingSet
+    contacts: Contacts
     qp_solves: int
     stays: bool
 
@@ -50,33 +51,37 @@ def converge(
     deadline: Deadline = NEVER,
     *,
     verified: bool = True,
+    between: Array = NO_TIMES,
 ) -> Converged | None:
     """Solve the reformulated problem at (tau, lambda) from a guess (N, 2); None where its rows contradict each other.
 
-    verified: end by a QP that stays, not by Newton steps. Raises OutOfTimeError past the deadline.
+    verified: end by a QP that stays, not by Newton steps. between (e,): `clearance_qp`. Raises OutOfTimeError past the deadline.
     """
+    times = np.concatenate((np.arange(1.0, problem.horizon.steps + 1.0), between))
     cost = effort_cost(problem, lam)
     solves, creep = 0, _Creep()
     previous: tuple[bytes, bytes] | None = None
     for count in range(1, MAX_QPS + 1):
         deadline.check()
-        solution = solve(clearance_qp(problem, cost, guess, tau), working)
+        solution = solve(clearance_qp(problem, cost, guess, tau, between=between), working)
         if solution is None:
             return None
         solves += solution.solves
         working, positions = solution.active, problem.positions(solution.control)
         move = float(np.abs(positions - guess).max()) / problem.extent
         if move < STAYS or count == MAX_QPS:
-            return Converged(solution.control, positions, solution, solves, stays=move < STAYS)
+            contacts = Contacts(working.obstacle, times[working.step], solution.multipliers)
+            return Converged(solution.control, positions, working, contacts, solves, stays=move < STAYS)
         rows = (working.obstacle.tobytes(), working.step.tobytes())
         better = None
         if len(working) and (rows == previous or move < NEAR):
-            better = held(problem, cost, solution.control, Contacts.at_steps(working, solution.multipliers), tau)
+            contacts = Contacts(working.obstacle, times[working.step], solution.multipliers)
+            better = held(problem, cost, solution.control, contacts, tau)
         if better is not None and _cost(cost, better[0]) <= _cost(cost, solution.control) * (1 + 1e-12):
             control, contacts = better
             positions = problem.positions(control)
             if not verified:
-                return Converged(control, positions, QPSolution(control, working, contacts.force, 0), solves, stays=True)
+                return Converged(control, positions, working, contacts, solves, stays=True)
             guess = creep.jumped(positions)
         else:
             guess = creep.ahead(positions)

@@ -60,6 +60,10 @@ class WorkingSet:
         flat = np.unique(np.concatenate((self.obstacle * steps + self.step, obstacle * steps + step)))
         return WorkingSet(*np.divmod(flat, steps))
 
+    def within(self, steps: int) -> WorkingSet:
+        """Return the rows at the first so many steps."""
+        return self.only(self.step < steps)
+
     def only(self, keep: NDArray[np.bool_]) -> WorkingSet:
         """Return the set of the rows to keep (k,)."""
         return WorkingSet(self.obstacle[keep], self.step[keep])

@@ -148,7 +148,7 @@ def touching(
     motion (4, N + 1, 2N), free (4, N + 1): the course, as in `between`; centre, drift, reach, short, pace: the circles, as
     there; obstacle, begin, force (k,): the contacts; near (2N,): where to begin; sliding: 1, or 0 for contacts held in time;
     settled [m]: a move of the contacts that ends the steps. Returns whether there is such a minimum, the control, times (k,)
-    and forces (k,).
+    and forces (k,); where some turn out to pull, at once, with control and times as they were to begin with.
     """
     k, end = len(obstacle), float(motion.shape[1] - 1)
     control, time, pressing, last = near.copy(), begin.copy(), force.copy(), np.inf
@@ -185,6 +185,10 @@ def touching(
         found, weights, pressing = _pushed(give, missing, bend, distance, at_least, slides)
         if not found:
             break
+        if pressing.min() < 0.0:
+            kept_force = force.copy()
+            kept_force[pressing.argmin()] = pressing.min()
+            return True, near.copy(), begin.copy(), kept_force
         before = control
         control = goal_control + combined(weights, pressed)[0]
         moved, move = values(rows, control - before), 0.0
