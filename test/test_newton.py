@@ -39,7 +39,7 @@ def test_a_contact_that_cannot_hold_at_its_step_holds_where_it_slides():
     alone = Contacts(contacts.obstacle[:1], contacts.time[:1], contacts.force.sum(keepdims=True))
     cost = effort_cost(problem, LAM)
     assert held(problem, cost, here.control, alone, TAU) is None
-    control, found = slid(problem, cost, here.control, joined(problem, contacts), TAU)
+    control, found = slid(problem, here.control, joined(problem, contacts), TAU, LAM)
     assert len(found) == 1
     assert contacts.time[0] < found.time[0] < contacts.time[1]
     assert np.abs(problem.positions(control) - here.positions).max() < 1e-3
@@ -51,11 +51,11 @@ def test_a_contact_that_cannot_hold_at_its_step_holds_where_it_slides():
 def test_with_more_weight_on_precision_the_contact_slides_to_later_times(factor):
     problem = one_obstacle(0.9)
     here, contacts = rough(problem)
-    control, first = slid(problem, effort_cost(problem, LAM), here.control, joined(problem, contacts), TAU)
-    _, last = slid(problem, effort_cost(problem, factor * LAM), control, first, TAU)
+    control, first = slid(problem, here.control, joined(problem, contacts), TAU, LAM)
+    _, last = slid(problem, control, first, TAU, factor * LAM)
     assert (last.time[0] > first.time[0]) == (factor > 1)
     fresh, rows = rough(problem, factor * LAM)
-    _, again = slid(problem, effort_cost(problem, factor * LAM), fresh.control, joined(problem, rows), TAU)
+    _, again = slid(problem, fresh.control, joined(problem, rows), TAU, factor * LAM)
     assert last.time[0] == pytest.approx(again.time[0], abs=1e-5)
 
 
@@ -64,10 +64,10 @@ def test_the_mean_is_the_least_that_keeps_clear_at_every_time():
     problem = one_obstacle(0.9)
     here, contacts = rough(problem)
     cost = effort_cost(problem, LAM)
-    least, _ = slid(problem, cost, here.control, joined(problem, contacts), TAU)
+    least, _ = slid(problem, here.control, joined(problem, contacts), TAU, LAM)
     value = least @ (cost.hessian * least)
     assert here.control @ (cost.hessian * here.control) < value, 'rows at the steps alone let the mean cut the corner'
-    finer, _ = slid(problem, cost, least + 1e-3 * np.sin(np.arange(len(least))), joined(problem, contacts), TAU)
+    finer, _ = slid(problem, least + 1e-3 * np.sin(np.arange(len(least))), joined(problem, contacts), TAU, LAM)
     np.testing.assert_allclose(finer, least, atol=1e-6 * np.abs(least).max())
 
 
@@ -76,8 +76,8 @@ def test_the_same_circle_twice_is_touched_once():
     problem = reach(twice, eta=0.9)
     here, contacts = rough(problem)
     once, alone = rough(one_obstacle(0.9))
-    control, found = slid(problem, effort_cost(problem, LAM), here.control, joined(problem, contacts), TAU)
-    expected, single = slid(one_obstacle(0.9), effort_cost(problem, LAM), once.control, joined(one_obstacle(0.9), alone), TAU)
+    control, found = slid(problem, here.control, joined(problem, contacts), TAU, LAM)
+    expected, single = slid(one_obstacle(0.9), once.control, joined(one_obstacle(0.9), alone), TAU, LAM)
     assert len(found) == len(single) == 1
     np.testing.assert_allclose(control, expected, atol=1e-6 * np.abs(expected).max())
 
@@ -90,4 +90,4 @@ def test_where_two_circles_leave_no_gap_there_is_no_way_between_two_steps_either
     leaps = converge(problem, straight[1:], WorkingSet(), 0.0, 0.0)
     assert leaps is not None
     contacts = joined(problem, leaps.contacts)
-    assert slid(problem, effort_cost(problem, 0.0), leaps.control, contacts, 0.0) is None
+    assert slid(problem, leaps.control, contacts, 0.0, 0.0) is None

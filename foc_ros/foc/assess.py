@@ -55,8 +55,5 @@ def assess(problem: Problem, control: Array) -> Assessment:
         *problem.size,
         problem.obstacles.centre_covariance,
     )
-    inside = problem.inside_margin
-    if inside.any():
-        leaving = problem.horizon.dt * np.arange(1, problem.horizon.steps + 1) < problem.recovery_s
-        k[np.ix_(inside, leaving)] = np.inf
-    return Assessment(k, tuple(np.array(problem.obstacles.ids, dtype=object)[inside]))
+    k[np.arange(1, problem.horizon.steps + 1) < problem.leaving[:, None]] = np.inf
+    return Assessment(k, tuple(np.array(problem.obstacles.ids, dtype=object)[problem.inside_margin]))

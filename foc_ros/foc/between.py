@@ -66,6 +66,37 @@ def place_row(motion: Tensor, time: float, order: int, x: float, y: float) -> Ve
 
 
 @compiled
+def around(motion: Tensor, free: Matrix, control: Vector, t: int) -> Matrix:
+    """Return the course of a control (2N,) at steps t and t + 1 only, (4, 2)."""
+    course = np.empty((4, 2))
+    for q in range(4):
+        for i in range(2):
+            total = free[q, t + i]
+            for u in range(len(control)):
+                total += motion[q, t + i, u] * control[u]
+            course[q, i] = total
+    return course
+
+
+@compiled
+def contact_rows(motion: Tensor, time: float, x: float, y: float, turn: float) -> Matrix:
+    """Return what the control adds at a time, (3, 2N): to n.p; to n.v + turn t.p; to t.p. n = (x, y), t = (-y, x)."""
+    step = min(int(time), motion.shape[1] - 2)
+    p, v = blend(time - step, 0), blend(time - step, 1)
+    rows = np.empty((3, motion.shape[2]))
+    for u in range(motion.shape[2]):
+        xa, va = motion[0, step, u], motion[2, step, u]
+        xb, vb = motion[0, step + 1, u], motion[2, step + 1, u]
+        ya, wa = motion[1, step, u], motion[3, step, u]
+        yb, wb = motion[1, step + 1, u], motion[3, step + 1, u]
+        px, py = p[0] * xa + p[1] * va + p[2] * xb + p[3] * vb, p[0] * ya + p[1] * wa + p[2] * yb + p[3] * wb
+        vx, vy = v[0] * xa + v[1] * va + v[2] * xb + v[3] * vb, v[0] * ya + v[1] * wa + v[2] * yb + v[3] * wb
+        along, across = x * px + y * py, x * py - y * px
+        rows[0, u], rows[1, u], rows[2, u] = along, x * vx + y * vy + turn * across, across
+    return rows
+
+
+@compiled
 def course_of(motion: Tensor, free: Matrix, control: Vector) -> Matrix:
     """Return the course (4, N + 1) of a control (2N,); free (4, N + 1): without it."""
     course = free.copy()

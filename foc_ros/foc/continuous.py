@@ -17,7 +17,7 @@ import numpy as np
 from .chance import eta_of_k, k_of_eta
 from .contacts import Contacts
 from .deadline import NEVER, Deadline, OutOfTimeError
-from .least_k import assess_between
+from .least_k import smallest_k
 from .newton import joined, leapt, slid, stays
 from .problem import Problem
 from .qp import NO_TIMES, effort_cost
@@ -139,11 +139,10 @@ class _Walker:
         return self.point(s, self.problem.positions(control), contacts.rows(self.problem.horizon.steps)[0])
 
     def settled(self, s: float, control: Array, contacts: Contacts) -> Point | None:
-        tau, lam = self.curve.at(s)
-        found = slid(self.problem, effort_cost(self.problem, lam), control, contacts, tau)
+        found = slid(self.problem, control, contacts, *self.curve.at(s))
         if found is None:
             return None
-        point = Point(s, *found, assess_between(self.problem, found[0]).smallest_k)
+        point = Point(s, *found, smallest_k(self.problem, found[0]))
         self.best = point if self.best is None or point.k > self.best.k else self.best
         return point
 

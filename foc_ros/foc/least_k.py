@@ -8,9 +8,9 @@ import numpy as np
 
 from .assess import Assessment, assess
 from .between import course_of, place, place_row
-from .chance import CERTAIN_K
+from .chance import CERTAIN_K, k_at
 from .compiled import Matrix, Tensor, Vector, compiled
-from .problem import Problem
+from .problem import Problem, spread
 from .records import Array
 
 PARABOLAS = 8
@@ -25,20 +25,31 @@ def assess_between(problem: Problem, control: Array) -> Assessment:
     assessment = assess(problem, control)
     if not assessment.k.size:
         return assessment
-    smallest, row, time = least_between(
-        np.ascontiguousarray(assessment.k),
+    return replace(assessment, between=_smallest(problem, control))
+
+
+def smallest_k(problem: Problem, control: Array) -> float:
+    """Return the k that holds everywhere, at the steps and between them: `assess_between`'s, without the rest."""
+    return _smallest(problem, control)[0] if len(problem.obstacles) else CERTAIN_K
+
+
+def _smallest(problem: Problem, control: Array) -> tuple[float, int, float]:
+    return least_k(
         problem.horizon.motion,
+        problem.horizon.maps,
         problem.free_course,
+        problem.free_variance,
         problem.error_course,
         problem.initial_covariance,
         problem.noise_variance,
         np.ascontiguousarray(control, dtype=float),
         problem.obstacles.centre,
         problem.drift,
+        problem.centres,
         *problem.size,
         problem.obstacles.centre_covariance,
+        problem.leaving,
     )
-    return replace(assessment, between=(smallest, row, time)) if row >= 0 else assessment
 
 
 @compiled
@@ -74,28 +85,41 @@ def _k_at_time(
 
 
 @compiled
-def least_between(
-    k_at_steps: Matrix,
+def least_k(
     motion: Tensor,
+    maps: Tensor,
     free: Matrix,
+    free_variance: Matrix,
     error_course: Tensor,
     initial_covariance: Matrix,
     noise_variance: Vector,
     control: Vector,
     centre: Matrix,
     drift: Matrix,
+    centres: Tensor,
     size_mean: Vector,
     size_variance: Vector,
     centre_covariance: Tensor,
+    leaving: Vector,
 ) -> tuple[float, int, float]:
-    """Return the smallest k between the steps, its circle and time, from k (m, N) at them; -1 where none is below those.
+    """Return the smallest k of a control (2N,), its circle and its time in steps.
 
-    Beside a step with a small k it is the vertex of the parabola through three times, closer and closer.
+    Where a step's k is smaller than its neighbours', the smallest is looked for beside it: at the vertex of the parabola through
+    three times, closer and closer. leaving (m,): steps from now in which a circle does not count.
     """
-    m, steps = k_at_steps.shape
     course, control_variance = course_of(motion, free, control), noise_variance * control * control
-    least = min(k_at_steps.min(), CERTAIN_K)
-    row, moment, near = -1, 0.0, least + MUCH_MORE * (1.0 + abs(least))
+    positions = np.ascontiguousarray(course[:2, 1:].T)
+    covariance = spread(maps, noise_variance, control, free_variance)
+    k_at_steps = k_at(positions, covariance, centres, size_mean, size_variance, centre_covariance)
+    m, steps = k_at_steps.shape
+    least, row, moment = np.inf, 0, 1.0
+    for j in range(m):
+        for t in range(steps):
+            if t + 1.0 < leaving[j]:
+                k_at_steps[j, t] = np.inf
+            elif k_at_steps[j, t] < least:
+                least, row, moment = k_at_steps[j, t], j, t + 1.0
+    near = least + MUCH_MORE * (1.0 + abs(least))
     for j in range(m):
         for t in range(1, steps - 1):
             ka, kb, kc = k_at_steps[j, t - 1], k_at_steps[j, t], k_at_steps[j, t + 1]
@@ -133,4 +157,4 @@ def least_between(
                     c, kc = time, k
             if kb < least:
                 least, row, moment = kb, j, b
-    return float(least), row, moment
+    return min(least, CERTAIN_K), row, moment

@@ -142,6 +142,11 @@ class Problem(Record):
         return inside
 
     @cached_property
+    def leaving(self) -> Array:
+        """Steps from now in which each obstacle does not count, because the hand is still leaving its margin, (m,)."""
+        return np.where(self.inside_margin, self.recovery_s / self.horizon.dt, 0.0)
+
+    @cached_property
     def size(self) -> tuple[Array, Array]:
         """E[R^2] and Var[R^2] of each obstacle, (m,) each [m^2, m^4]."""
         return size_moments(self.obstacles)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .between import course_of, kept, place, place_row
+from .between import around, contact_rows, course_of, kept, place, place_row
 from .compiled import Indices, Matrix, Tensor, Vector, compiled
 from .dense import cholesky, combined, lower_solved, row_products, upper_solved, values
 from .qp import compliance
@@ -157,11 +157,13 @@ def touching(
     distance, bend, passing = np.empty(k), np.empty(k), np.empty(k)
     slides = np.empty(k, np.intp)
     for count in range(MAX_STEPS):
-        course, flat = course_of(motion, free, control), False
+        flat = False
         for i in range(k):
             j, s = obstacle[i], time[i]
             wanted, faster, harder = kept(reach[j], short[j], pace, s)
-            at, velocity, acceleration = place(course, s, 0), place(course, s, 1), place(course, s, 2)
+            t = min(int(s), motion.shape[1] - 2)
+            course = around(motion, free, control, t)
+            at, velocity, acceleration = place(course, s - t, 0), place(course, s - t, 1), place(course, s - t, 2)
             x, y = at[0] - centre[j, 0] - s * drift[j, 0], at[1] - centre[j, 1] - s * drift[j, 1]
             distance[i] = np.hypot(x, y)
             x, y = x / distance[i], y / distance[i]
@@ -173,9 +175,7 @@ def touching(
             bend[i] = x * acceleration[0] + y * acceleration[1] + past - harder
             if slides[i] == 1 and bend[i] < FLAT * past + TINY:
                 bend[i], flat = FLAT * past + TINY, True
-            rows[i] = place_row(motion, s, 0, x, y)
-            rows[2 * k + i] = place_row(motion, s, 0, -y, x)
-            rows[k + i] = place_row(motion, s, 1, x, y) + passing[i] / distance[i] * rows[2 * k + i]
+            rows[i::k] = contact_rows(motion, s, x, y, passing[i] / distance[i])
             missing[i, 0], missing[k + i, 0], missing[2 * k + i, 0] = wanted - distance[i], -rate, 0.0
         if count == 0:
             first[:] = normal

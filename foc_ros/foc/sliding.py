@@ -1,0 +1,101 @@
+"""Contacts that come and go, in machine code: what is let go, what is touched anew, and when that has come to an end."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .between import course_of, entered, place
+from .compiled import Indices, Matrix, Tensor, Vector, compiled
+from .qp import goal_factors, to_goal
+from .touching import touching
+
+SETTLED = 1e-5
+"""Largest move of a contact at which the steps end, relative to the scene: they converge quadratically, so 1e-9 is left."""
+CLEAR = 3e-8
+"""Depth in a circle that is rounding; relative."""
+CHANGES = 8
+"""How often contacts may be let go or found anew."""
+NEW = 1e-6
+"""Force at which a new contact begins, relative to the largest: hardly any curvature."""
+
+
+@compiled
+def _same_sides(before: Matrix, after: Matrix, centre: Matrix, drift: Matrix, obstacle: Indices, time: Vector) -> bool:
+    """Whether two courses (4, N + 1) pass the circles of contacts (k,) on the same side, when they are touched."""
+    for j, s in zip(obstacle, time):  # noqa: B905 (numba knows no strict)
+        p, q, along = place(before, s, 0), place(after, s, 0), 0.0
+        for axis in range(2):
+            middle = centre[j, axis] + s * drift[j, axis]
+            along += (p[axis] - middle) * (q[axis] - middle)
+        if along < 0.0:
+            return False
+    return True
+
+
+@compiled
+def slide(
+    motion: Tensor,
+    free: Matrix,
+    centre: Matrix,
+    drift: Matrix,
+    reach: Vector,
+    short: Vector,
+    pace: float,
+    weighted_variance: Vector,
+    summed_variance: Vector,
+    lam: float,
+    goal_rows: Matrix,
+    goal_targets: Vector,
+    softness: Vector,
+    obstacle: Indices,
+    time: Vector,
+    force: Vector,
+    near: Vector,
+    extent: float,
+) -> tuple[bool, Vector, Indices, Vector, Vector]:
+    """Find the least cost `qp.effort_cost` near a control (2N,) that keeps clear of every circle at every time.
+
+    From contacts (k,) to begin with, which slide: those that pull are let go, and where a circle is entered there is a new one.
+    motion ... pace: as in `touching`; extent: of the scene [m]. Returns whether there is one with every contact on the side where
+    the first control passes its circle; the control, and its contacts' obstacles, times and forces.
+    """
+    inverse, root, factor = goal_factors(2.0 * (1.0 + weighted_variance + lam * summed_variance), goal_rows, softness)
+    goal_control = to_goal(root, factor, goal_targets)
+    before, control = course_of(motion, free, near), near.copy()
+    obstacle, time, force = obstacle.copy(), time.copy(), force.copy()
+    for _ in range(CHANGES + 1):
+        if len(force):
+            found, control, time, force = touching(
+                motion,
+                free,
+                inverse,
+                factor,
+                goal_control,
+                centre,
+                drift,
+                reach,
+                short,
+                pace,
+                obstacle,
+                time,
+                force,
+                control,
+                1,
+                SETTLED * extent,
+            )
+            if not found:
+                break
+        else:
+            control = goal_control.copy()
+        pushing = np.flatnonzero(force > 0.0)
+        if len(pushing) < len(force):
+            obstacle, time, force = obstacle[pushing], time[pushing], force[pushing]
+            continue
+        after = course_of(motion, free, control)
+        new = entered(after, centre, drift, reach, short, pace, CLEAR * extent)
+        if len(new) == 0:
+            return _same_sides(before, after, centre, drift, obstacle, time), control, obstacle, time, force
+        slight = NEW * (force.max() if len(force) else 1.0)
+        obstacle = np.concatenate((obstacle, new[:, 0].astype(np.intp)))
+        time, force = np.concatenate((time, new[:, 1])), np.concatenate((force, np.full(len(new), slight)))
+    return False, control, obstacle, time, force
