@@ -19,7 +19,9 @@ from .scene import scene
 from .selection import select
 
 STATES, STATES_PER_CANDIDATE = 1000, 300
-"""States that the search for one goal may look at: a few dozen are enough for four candidates, 3 us each."""
+"""States that the search for one goal may look at: a few dozen are enough for four candidates."""
+WAYS_PER_CANDIDATE = 2
+"""Ways that are looked for at first: some beyond the candidates tell that no more are short enough."""
 
 
 @dataclass(frozen=True)
@@ -60,15 +62,15 @@ def search(
     levels = {radius.tobytes(): Levels(view, radius, velocity) for radius in view.radius}
     states = STATES + STATES_PER_CANDIDATE * config.max_candidates
     reachable = np.flatnonzero(~view.inside).tolist()
-    classes = [Classes(view, levels[view.radius[goal].tobytes()], goal, obstacles.ids, states) for goal in reachable]
+    usual = WAYS_PER_CANDIDATE * config.max_candidates
+    classes = [Classes(view, levels[view.radius[goal].tobytes()], goal, obstacles.ids, states, usual) for goal in reachable]
     chosen = select(classes, config.max_candidates, {candidate.label for candidate in previous})
     notes = Counter({'hand_inside': int(view.held.sum()), 'goal_inside': int(view.inside.sum())})
     notes['goal_near'] = int((view.near.any(axis=1) & ~view.inside).sum())
     for to_goal in classes:
         notes.update(to_goal.notes)
-    paths, lengths = guesses(view, velocity, chosen, np.array(duration_s), steps)
     candidates = tuple(
         Candidate(one.rank[1], one.goal, one.sides, path, length)
-        for one, path, length in zip(chosen, paths, lengths, strict=True)
+        for one, (path, length) in zip(chosen, guesses(view, velocity, chosen, duration_s, steps), strict=True)
     )
     return Search(candidates, {name: count for name, count in notes.items() if count})
