@@ -63,7 +63,8 @@ def predict(
     )
     tried = [_aged(outcome, hand.stamp_ns, memory) for outcome in tried]
     outcomes = ranked(tried, config.likelihood, obstacles)
-    outcomes = [_seen(outcome, problems[outcome.candidate.label], hand, config.foc.process_noise) for outcome in outcomes]
+    unsure = {problem: _doubt(problem, hand, config.foc.process_noise) for problem in problems.values()}
+    outcomes = [_seen(outcome, unsure[problems[outcome.candidate.label]]) for outcome in outcomes]
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
     best = most_likely(labels, values, memory.most_likely, config.likelihood.margin)
@@ -157,14 +158,19 @@ def _start(hand: HandState, acceleration_time_s: float) -> HandState:
     return replace(hand, mean=np.concatenate([hand.mean[:2], settled, np.zeros(2)]))
 
 
-def _seen(outcome: Outcome, problem: Problem, hand: HandState, process_noise: float) -> Outcome:
-    """Add what we do not know of the hand, and jerk beside its plan, to what its own noise will do.
+def _doubt(problem: Problem, hand: HandState, process_noise: float) -> Array:
+    """Return the covariance at steps 0..N, (N + 1, 6, 6), of what we do not know of the hand, and of jerk beside its plan.
 
     The operator knows the hand better than our filter and plans its margins by motor noise alone, so the filter's
     covariance is no part of the chance constraint; but our prediction is as uncertain as the state it starts from.
     """
-    carried = problem.error_map @ hand.covariance @ problem.error_map.swapaxes(1, 2)
+    carried: Array = problem.error_map @ hand.covariance @ problem.error_map.swapaxes(1, 2)
     if process_noise > 0.0:
         horizon = problem.horizon
         carried = carried + process_noise**2 * triple_integrator_process_covariance(horizon.dt, horizon.steps)
-    return replace(outcome, solution=replace(outcome.solution, covariance=outcome.solution.covariance + carried))
+    return carried
+
+
+def _seen(outcome: Outcome, doubt: Array) -> Outcome:
+    """Add a doubt (N + 1, 6, 6) to what the hand's own noise will do."""
+    return replace(outcome, solution=replace(outcome.solution, covariance=outcome.solution.covariance + doubt))
