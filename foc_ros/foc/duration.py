@@ -11,7 +11,8 @@ A minimum-jerk movement that keeps to its time is never held up by this: from 0.
 present speed takes less than the time left.
 
 Model `cost_of_time` gives every way round the duration of least effort plus `time_cost` times duration (`time_cost`), so that
-going round takes longer; it needs no clock, and knows slow operators by their speed as it is.
+going round takes longer; it needs no clock, and knows slow operators by their speed as it is. What is least is what ways are
+compared by: the time that a way takes is part of its cost (`time_price`).
 
 Of several goals at most one is where the hand is going. The speed makes the operator as slow as the goal that it fits best says,
 and all expected durations longer by the same factor. (Were each goal's own judged by the speed, a hand that slows down at one
@@ -52,6 +53,11 @@ def way_times(
     if config.model != 'cost_of_time':
         return [goal_times[candidate.goal] for candidate in candidates]
     return [_least_cost(hand, each.length, _heading(each.guess), config) for each in candidates]
+
+
+def time_price(config: DurationConfig) -> float:
+    """Return what a second costs beside effort [m^2/s^6]: nothing, but with model `cost_of_time`."""
+    return config.time_cost if config.model == 'cost_of_time' else 0.0
 
 
 def _heading(guess: Array) -> Array:

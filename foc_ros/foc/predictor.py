@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .config import REFERENCE_STEP_S, Config
+from .config import REFERENCE_STEP_S, Config, DurationConfig
 from .culling import relevant
 from .deadline import Deadline
-from .duration import times_to_go, way_times
+from .duration import time_price, times_to_go, way_times
 from .dynamics import triple_integrator_horizon
 from .homotopy import search
 from .library import Way, recall
@@ -61,7 +61,7 @@ def predict(
     tried = solve_candidates(
         candidates, list(problems.values()), config.foc, config.likelihood, hand.effort_spent, memory.earlier, deadline
     )
-    tried = [_aged(outcome, hand.stamp_ns, memory) for outcome in tried]
+    tried = [_priced(_aged(outcome, hand.stamp_ns, memory), config.duration) for outcome in tried]
     outcomes = ranked(tried, config.likelihood, obstacles)
     unsure = {problem: _doubt(problem, hand, config.foc.process_noise) for problem in problems.values()}
     outcomes = [_seen(outcome, unsure[problems[outcome.candidate.label]]) for outcome in outcomes]
@@ -105,6 +105,11 @@ def _aged(outcome: Outcome, stamp_ns: int, memory: Memory) -> Outcome:
     solved_ns = memory.solved_ns.get(outcome.candidate.label)
     age = 'never solved yet' if solved_ns is None else f'last solved {(stamp_ns - solved_ns) / NANOSECONDS:.3g} s ago'
     return replace(outcome, solution=replace(outcome.solution, message=f'{outcome.solution.message}; {age}'))
+
+
+def _priced(outcome: Outcome, config: DurationConfig) -> Outcome:
+    """Add what the time to go costs."""
+    return replace(outcome, cost=outcome.cost + time_price(config) * float(outcome.solution.times[-1]))
 
 
 def way_problems(

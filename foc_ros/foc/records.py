@@ -205,7 +205,8 @@ class Solution(Record):
 class Outcome:
     """One candidate with its solution; sides: side of every obstacle its path really passes, by id.
 
-    cost: effort to go and what all classes share, as effort spent since onset [m^2/s^5]; likelihood in [0, 1]: 0 unless solved.
+    cost: effort to go, what its time costs, and what all classes share, as effort spent since onset [m^2/s^5]; likelihood in
+    [0, 1]: 0 unless solved.
     """
 
     candidate: Candidate
