@@ -16,6 +16,8 @@ from .errors import ParameterError
 STRATEGIES = ('lv', 'hc', 'optimal', 'algorithm1', 'fixed')
 PLANES = ('xy', 'xz', 'yz')
 DURATION_MODELS = ('fixed', 'fitts', 'cost_of_time')
+MOST_CANDIDATES = 64
+"""Most homotopy classes that are ever solved in one prediction."""
 REFERENCE_STEP_S = 0.02
 """Step for which the node's noise is quoted (doc/model.md): c is scaled by sqrt(0.02 / dt)."""
 
@@ -104,7 +106,7 @@ class EstimatorConfig:
 class HomotopyConfig:
     """Which ways round are considered."""
 
-    max_candidates: int = _p(4, 'number of homotopy classes solved, over all goals', '', 1, 64)
+    max_candidates: int = _p(4, 'number of homotopy classes solved, over all goals; at least one to each', '', 1, MOST_CANDIDATES)
     clearance: float = _p(0.005, 'distance from an obstacle that the hand needs: a narrower gap is closed', 'm', 0.0, 1.0)
     library: str = _p('', 'file of demonstrated ways that replay --learn wrote; empty: none', read_only=True)
 

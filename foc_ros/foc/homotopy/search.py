@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from foc_ros.foc.config import HomotopyConfig
+from foc_ros.foc.config import MOST_CANDIDATES, HomotopyConfig
 from foc_ros.foc.errors import SceneError
 from foc_ros.foc.records import Array, Candidate, Obstacles
 
@@ -48,6 +48,8 @@ def search(
 ) -> Search:
     """Find the best config.max_candidates classes between the hand and the goals.
 
+    Of more goals it is one to each, up to `MOST_CANDIDATES`.
+
     hand_mean (6,): state mean, SI units; goals (g, 2) [m]; duration_s: time to go to each goal [s]; steps: N of the guesses;
     previous: the candidates of the tick before, which stay where others are not clearly better. Obstacles are circles of radius
     + config.clearance: what their size is uncertain by is left to the chance constraint, which weighs it by eta. Raises
@@ -64,7 +66,9 @@ def search(
     reachable = np.flatnonzero(~view.inside).tolist()
     usual = WAYS_PER_CANDIDATE * config.max_candidates
     classes = [Classes(view, levels[view.radius[goal].tobytes()], goal, obstacles.ids, states, usual) for goal in reachable]
-    chosen = select(classes, config.max_candidates, {candidate.label for candidate in previous})
+    # a goal without a candidate could never be foretold
+    count = max(config.max_candidates, min(len(classes), MOST_CANDIDATES))
+    chosen = select(classes, count, {candidate.label for candidate in previous})
     notes = Counter({'hand_inside': int(view.held.sum()), 'goal_inside': int(view.inside.sum())})
     notes['goal_near'] = int((view.near.any(axis=1) & ~view.inside).sum())
     for to_goal in classes:
