@@ -16,6 +16,7 @@ from .errors import ParameterError
 STRATEGIES = ('lv', 'hc', 'optimal', 'algorithm1', 'fixed')
 PLANES = ('xy', 'xz', 'yz')
 DURATION_MODELS = ('fixed', 'fitts', 'cost_of_time')
+ARRIVALS = ('rest', 'passing')
 MOST_CANDIDATES = 64
 """Most homotopy classes that are ever solved in one prediction."""
 REFERENCE_STEP_S = 0.02
@@ -68,7 +69,7 @@ class FocConfig:
 
 @dataclass(frozen=True)
 class DurationConfig:
-    """How long the movement takes."""
+    """How long the movement takes, and how it ends."""
 
     model: str = _p(
         'fitts', 'duration of a movement: fixed, by Fitts law, or what is best where time has a cost', choices=DURATION_MODELS
@@ -79,6 +80,7 @@ class DurationConfig:
     target_width: float = _p(0.02, 'target width of Fitts law', 'm', 1e-4, 10.0)
     time_cost: float = _p(100.0, 'cost of time of model cost_of_time: a longer way takes longer', 'm^2/s^6', 1e-9, 1e9)
     min_time_to_go_s: float = _p(0.3, 'floor of the time to go', 's', 0.01, 60.0)
+    arrival: str = _p('rest', 'how the hand comes to its goal: to rest, or passing it at any speed', choices=ARRIVALS)
     max_time_to_go_s: float = _p(10.0, 'ceiling of the time to go', 's', 0.05, 120.0)
 
 

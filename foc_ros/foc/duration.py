@@ -46,6 +46,11 @@ def movement_time(distance: float, config: DurationConfig) -> float:
     return config.fitts_a_s + config.fitts_b_s * math.log2(distance / config.target_width + 1.0)
 
 
+def is_passing(config: DurationConfig) -> bool:
+    """Tell whether the hand passes its goal, at any velocity, instead of coming to rest there."""
+    return config.arrival == 'passing'
+
+
 def way_times(
     hand: HandState, candidates: Sequence[Candidate], goal_times: Sequence[float], config: DurationConfig
 ) -> list[float]:
@@ -68,7 +73,8 @@ def _heading(guess: Array) -> Array:
 
 def _least_cost(hand: HandState, length: float, heading: Array, config: DurationConfig) -> float:
     speed, acceleration = float(hand.mean[2:4] @ heading), float(hand.mean[4:6] @ heading)
-    return least_cost_time(length, speed, acceleration, config.time_cost, config.min_time_to_go_s, config.max_time_to_go_s)
+    bounds = config.min_time_to_go_s, config.max_time_to_go_s
+    return least_cost_time(length, speed, acceleration, config.time_cost, *bounds, is_passing(config))
 
 
 def times_to_go(hand: HandState, goals: Array, config: DurationConfig) -> list[float]:

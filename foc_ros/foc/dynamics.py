@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import InputError
 from .records import Array, Record
@@ -152,3 +153,8 @@ def triple_integrator_horizon(dt: float, steps: int) -> Horizon:
     powers, response = unit.powers * (scale[:, None] / scale[None, :]), unit.response * (dt**3 * scale)[None, :, None]
     response.flags.writeable = False  # so that the record takes it as it is: it is large
     return _Scaled(powers, response, dt, unit)
+
+
+def states_at_goal(n: int, passing: bool = False) -> NDArray[np.bool_]:
+    """Tell which of n states the goal fixes, (n,): all, as at rest; or, where the hand only passes it, all but the velocity."""
+    return np.array([not (passing and 2 <= state < 4) for state in range(n)])

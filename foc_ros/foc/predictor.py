@@ -11,7 +11,7 @@ import numpy as np
 from .config import REFERENCE_STEP_S, Config, DurationConfig
 from .culling import relevant
 from .deadline import Deadline
-from .duration import time_price, times_to_go, way_times
+from .duration import is_passing, time_price, times_to_go, way_times
 from .dynamics import triple_integrator_horizon
 from .homotopy import search
 from .library import Way, recall
@@ -63,7 +63,7 @@ def predict(
     )
     tried = [_priced(_aged(outcome, hand.stamp_ns, memory), config.duration) for outcome in tried]
     outcomes = ranked(tried, config.likelihood, obstacles)
-    unsure = {problem: _doubt(problem, hand, config.foc.process_noise) for problem in problems.values()}
+    unsure = {problem: _doubt(problem, hand, config) for problem in problems.values()}
     outcomes = [_seen(outcome, unsure[problems[outcome.candidate.label]]) for outcome in outcomes]
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
@@ -129,7 +129,7 @@ def way_problems(
 
 def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: Array, duration_s: float) -> Problem:
     """Build the problem of one goal (2,) [m], to be reached in duration_s [s]."""
-    foc = config.foc
+    foc, passing = config.foc, is_passing(config.duration)
     dt = duration_s / foc.steps
     horizon = triple_integrator_horizon(dt, foc.steps)
     return rest_to_goal(
@@ -139,9 +139,10 @@ def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal
         obstacles,
         noise_per_step(np.array([foc.noise_x, foc.noise_y]), REFERENCE_STEP_S, dt),
         foc.eta,
-        error_map=triple_integrator_error_map(dt, foc.steps),
+        error_map=triple_integrator_error_map(dt, foc.steps, passing),
         goal_weight=foc.goal_weight,
         recovery_s=foc.recovery_s,
+        passing=passing,
     )
 
 
@@ -163,16 +164,17 @@ def _start(hand: HandState, acceleration_time_s: float) -> HandState:
     return replace(hand, mean=np.concatenate([hand.mean[:2], settled, np.zeros(2)]))
 
 
-def _doubt(problem: Problem, hand: HandState, process_noise: float) -> Array:
+def _doubt(problem: Problem, hand: HandState, config: Config) -> Array:
     """Return the covariance at steps 0..N, (N + 1, 6, 6), of what we do not know of the hand, and of jerk beside its plan.
 
     The operator knows the hand better than our filter and plans its margins by motor noise alone, so the filter's
     covariance is no part of the chance constraint; but our prediction is as uncertain as the state it starts from.
     """
     carried: Array = problem.error_map @ hand.covariance @ problem.error_map.swapaxes(1, 2)
-    if process_noise > 0.0:
-        horizon = problem.horizon
-        carried = carried + process_noise**2 * triple_integrator_process_covariance(horizon.dt, horizon.steps)
+    if config.foc.process_noise > 0.0:
+        horizon, passing = problem.horizon, is_passing(config.duration)
+        added = triple_integrator_process_covariance(horizon.dt, horizon.steps, passing)
+        carried = carried + config.foc.process_noise**2 * added
     return carried
 
 
