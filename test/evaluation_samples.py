@@ -13,7 +13,7 @@ from foc_ros.foc.records import LEFT, RIGHT
 H = len(TIMES_S)
 
 
-def ways(sides, goal=None, likelihood=None, to_go=None, solved=None) -> Ways:
+def ways(sides, goal=None, likelihood=None, to_go=None, solved=None, price=0.0) -> Ways:
     """Candidates that pass obstacles on sides (k, n); each its own way, all parting now."""
     k, n = np.shape(sides)
     solved = np.ones(k, dtype=bool) if solved is None else np.array(solved)
@@ -26,6 +26,7 @@ def ways(sides, goal=None, likelihood=None, to_go=None, solved=None) -> Ways:
         to_go=np.ones(k) if to_go is None else np.array(to_go, dtype=float),
         likelihood=even if likelihood is None else np.array(likelihood, dtype=float),
         length=np.arange(1.0, k + 1.0),
+        price=price,
         time_s=np.ones(k),
         named=np.ones((k, n), dtype=bool),
         sides=np.array(sides, dtype=np.int8).reshape(k, n),

@@ -18,7 +18,7 @@ from foc_ros.evaluation.forecasts import (
     straight_minimum_jerk,
 )
 from foc_ros.evaluation.heldout import asked, log_likelihoods
-from foc_ros.evaluation.minimum_jerk import straight_effort, straight_positions
+from foc_ros.evaluation.minimum_jerk import straight_cost, straight_positions
 from foc_ros.evaluation.observations import TIMES_S
 from foc_ros.evaluation.questions import GOAL, WAY, question
 from foc_ros.foc.config import LikelihoodConfig
@@ -74,7 +74,7 @@ def reaching(hand=(0.0,) * 6, time_s=2.0, **more):
 
 
 def test_straight_minimum_jerk_from_rest_has_the_known_effort_and_path() -> None:
-    np.testing.assert_allclose(straight_effort(reaching()), [720.0 / 2.0**5, 720.0 * 4.0 / 2.0**5])
+    np.testing.assert_allclose(straight_cost(reaching()), [720.0 / 2.0**5, 720.0 * 4.0 / 2.0**5])
     s = np.array([0.5, 1.0])
     expected = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
     np.testing.assert_allclose(straight_positions(reaching(), 0, 2.0 * s)[:, 0], expected)
@@ -87,15 +87,18 @@ def test_straight_minimum_jerk_from_any_state_has_the_effort_of_its_own_jerk() -
     for goal in (0, 1):
         path = straight_positions(seen, goal, t)
         jerk = np.gradient(np.gradient(np.gradient(path, t, axis=0), t, axis=0), t, axis=0)[5:-5]
-        assert (jerk**2).sum() * t[1] == pytest.approx(straight_effort(seen)[goal], rel=0.02)
+        assert (jerk**2).sum() * t[1] == pytest.approx(straight_cost(seen)[goal], rel=0.02)
         np.testing.assert_allclose(path[-1], seen.goals[goal], atol=1e-9)
         np.testing.assert_allclose((path[1] - path[0]) / t[1], [0.5, 0.3], atol=1e-2)
 
 
+def test_where_time_has_a_price_it_is_part_of_the_cost_of_a_straight_movement() -> None:
+    priced = replace(reaching(), ways=replace(reaching().ways, price=7.0))
+    np.testing.assert_allclose(straight_cost(priced), straight_cost(reaching()) + 7.0 * 2.0)
+
+
 def test_the_speed_of_a_hand_at_rest_is_noise_to_minimum_jerk_too() -> None:
-    np.testing.assert_allclose(
-        straight_effort(reaching((0.0, 0.0, 1.0, 1.0, 9.0, 9.0), since_s=0.0)), straight_effort(reaching())
-    )
+    np.testing.assert_allclose(straight_cost(reaching((0.0, 0.0, 1.0, 1.0, 9.0, 9.0), since_s=0.0)), straight_cost(reaching()))
 
 
 def test_straight_minimum_jerk_weighs_goals_by_the_ratio_of_efforts() -> None:

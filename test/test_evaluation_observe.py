@@ -25,6 +25,7 @@ from foc_ros.replay import Replay
 FAST = {'rate_hz': 4.0, 'foc.steps': 20, 'foc.strategy': 'fixed', 'foc.tau': 1e-4, 'foc.lam': 0.0, 'homotopy.max_candidates': 6}
 PLAIN = updated(Config(), FAST)
 AHEAD = updated(PLAIN, {'likelihood.beta': 3.0, 'likelihood.spent_share': 0.3, 'likelihood.lookahead_s': 0.4})
+PRICED = updated(PLAIN, {'duration.model': 'cost_of_time', 'duration.time_cost': 50.0})
 OBSTACLES = [(0.12, 0.0, 0.02), (0.22, 0.03, 0.02)]
 GOALS = [(0.32, 0.05), (0.32, -0.05)]
 
@@ -38,7 +39,7 @@ def seen(data: Path, config: Config) -> Observations:
     return observe(find_recordings(data)['one'], config)
 
 
-@pytest.mark.parametrize('config', [PLAIN, AHEAD])
+@pytest.mark.parametrize('config', [PLAIN, AHEAD, PRICED])
 def test_the_likelihoods_published_follow_from_the_observations(data: Path, config: Config) -> None:
     recording = seen(data, config)
     assert len(recording.each) >= 4

@@ -176,11 +176,13 @@ def test_the_guess_neither_turns_back_nor_overshoots(velocity):
     assert (np.diff(x) >= 0).all() and x[-1] == pytest.approx(0.35)
 
 
-def test_each_goal_comes_in_while_there_is_room():
+def test_each_goal_comes_in_and_of_very_many_the_nearest():
     obstacles = make_obstacles([[0.05, 0.01], [0.1, -0.01], [0.1, 0.03]], 0.01)
     goals = [[0.2, 0.0], [0.6, 0.1], [0.6, -0.3]]
     assert {one.goal for one in find(obstacles, goals=goals, k=3).candidates} == {0, 1, 2}
-    assert {one.goal for one in find(obstacles, goals=goals, k=2).candidates} == {0, 1}
+    assert [one.goal for one in find(obstacles, goals=goals, k=2).candidates] == [0, 1, 2]
+    many = [[0.2 + 0.001 * i, 0.0] for i in range(70)]
+    assert [one.goal for one in find(obstacles, goals=many, k=2).candidates] == list(range(64))
 
 
 def test_three_hundred_obstacles_end_within_the_bound_on_states():

@@ -80,3 +80,16 @@ def test_going_round_takes_longer_and_with_the_other_models_as_long() -> None:
             assert lasts[long] / lasts[short] == pytest.approx((long / short) ** (1 / 3), rel=0.01)
         else:
             assert lasts[long] == lasts[short]
+
+
+def test_time_is_part_of_the_cost_where_it_has_a_price() -> None:
+    scene = make_obstacles([[0.15, 0.03]], 0.05), np.array([[0.3, 0.0]])
+    for model, price in (('cost_of_time', 100.0), ('fitts', 0.0), ('fixed', 0.0)):
+        config = updated(Config(), {'duration.model': model, 'duration.time_cost': 100.0})
+        solved = predict(config, AT_REST, *scene, Memory())[0].solved
+        assert len(solved) == 2
+        for each in solved:
+            solution = each.solution
+            assert each.cost == pytest.approx(solution.effort * solution.dt + price * solution.times[-1])
+        ratio = (solved[1].cost / solved[0].cost) ** config.likelihood.beta
+        assert solved[0].likelihood / solved[1].likelihood == pytest.approx(ratio)

@@ -16,7 +16,7 @@ from foc_ros.foc.config import LikelihoodConfig
 from foc_ros.foc.likelihood import likelihoods, shared_cost
 from foc_ros.foc.records import LEFT, RIGHT, Array, Record
 
-from .minimum_jerk import straight_effort
+from .minimum_jerk import straight_cost
 from .observations import Observation
 from .questions import GOAL, Answer, Question
 
@@ -138,7 +138,7 @@ def straight_minimum_jerk(seen: Observation, question: Question, beta: float, co
 
     confidence: in the whole of it, in [0, 1 - DOUBT].
     """
-    shares = likelihoods(straight_effort(seen), LikelihoodConfig(beta=beta))
+    shares = likelihoods(straight_cost(seen), LikelihoodConfig(beta=beta))
     ways = seen.goals - seen.hand[:2]
     given = [(goal,) if question.name == GOAL else _straight(seen, question, way) for goal, way in enumerate(ways)]
     total = np.zeros(len(question.answers))

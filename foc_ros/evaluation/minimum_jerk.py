@@ -16,13 +16,13 @@ from foc_ros.foc.records import Array
 from .observations import Observation
 
 
-def straight_effort(seen: Observation) -> Array:
-    """Return the effort [m^2/s^5], the integral of squared jerk, of the movement to each goal, (g,)."""
+def straight_cost(seen: Observation) -> Array:
+    """Return the cost [m^2/s^5] of the movement to each goal, (g,): the integral of squared jerk, and what its time costs."""
     (alpha, beta, gamma), T = _jerk(seen)
     effort = (
         gamma**2 * T + beta * gamma * T**2 + (beta**2 + alpha * gamma) * T**3 / 3 + alpha * beta * T**4 / 4 + alpha**2 * T**5 / 20
     )
-    return np.asarray(effort.sum(axis=1))
+    return np.asarray(effort.sum(axis=1) + seen.ways.price * T[:, 0])
 
 
 def straight_positions(seen: Observation, goal: int, seconds: Array) -> Array:

@@ -27,10 +27,10 @@ class Ways(Record):
     """The k candidates of one prediction.
 
     labels; goal (k,): row of the goals; solved (k,); spent [m^2/s^5]: effort since onset, the same for all; to_go (k,)
-    [m^2/s^5]: effort through each; likelihood (k,): as published, 0 unless solved; length (k,) [m]: of the shortest path in its
-    class; time_s (k,): to its goal; named (k, n): whether the obstacle is in the candidate's name; sides (k, n): LEFT or RIGHT,
-    on which it passes each of the n obstacles; mean (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2]: of the
-    position at `TIMES_S`; partings: when they part.
+    [m^2/s^5]: effort through each and what its time costs; likelihood (k,): as published, 0 unless solved; length (k,) [m]: of
+    the shortest path in its class; price [m^2/s^6]: of time; time_s (k,): to its goal; named (k, n): whether the obstacle is in
+    the candidate's name; sides (k, n): LEFT or RIGHT, on which it passes each of the n obstacles; mean (k, h, 2) [m] and
+    covariance (k, h, 2, 2) [m^2]: of the position at `TIMES_S`; partings: when they part.
     """
 
     labels: tuple[str, ...]
@@ -40,6 +40,7 @@ class Ways(Record):
     to_go: Array
     likelihood: Array
     length: Array
+    price: float
     time_s: Array
     named: Bools
     sides: Sides

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from foc_ros.foc.chance import courses
 from foc_ros.foc.config import Config
+from foc_ros.foc.duration import time_price
 from foc_ros.foc.errors import RecordingError
 from foc_ros.foc.homotopy import swept_angles
 from foc_ros.foc.partings import partings
@@ -38,13 +39,13 @@ def observe(recording: Recording, config: Config) -> Observations:
     goals = made[-1][0].scene.goals
     assert goals is not None
     past = Path(np.array(stamps), np.array(path), goals)
-    each = [_observation(step, hand, past) for step, hand in made if hand.stamp_ns <= past.end_ns]
+    each = [_observation(step, hand, past, time_price(config.duration)) for step, hand in made if hand.stamp_ns <= past.end_ns]
     if not each:
         raise RecordingError(f'{recording.name}: nothing was predicted before its goal was reached')
     return Observations(recording.name, tuple(each), replayed.intake.counts)
 
 
-def _observation(step: Step, hand: HandState, past: Path) -> Observation:
+def _observation(step: Step, hand: HandState, past: Path, price: float) -> Observation:
     prediction, goals = step.prediction, step.scene.goals
     assert prediction is not None and goals is not None
     obstacles = step.scene.obstacles(prediction.stamp_ns)
@@ -60,13 +61,13 @@ def _observation(step: Step, hand: HandState, past: Path) -> Observation:
         row=row,
         along=along,
         goals=goals,
-        ways=_ways(prediction, obstacles, hand.effort_spent),
+        ways=_ways(prediction, obstacles, hand.effort_spent, price),
         most_likely=prediction.most_likely,
         truth=_truth(prediction.stamp_ns, past, obstacles, row, along, goals),
     )
 
 
-def _ways(prediction: Prediction, obstacles: Obstacles, spent: float) -> Ways:
+def _ways(prediction: Prediction, obstacles: Obstacles, spent: float, price: float) -> Ways:
     outcomes = prediction.outcomes
     solutions = [outcome.solution for outcome in outcomes]
     steps = [np.minimum(np.rint(np.array(TIMES_S) / each.dt).astype(int), len(each.mean) - 1) for each in solutions]
@@ -76,9 +77,10 @@ def _ways(prediction: Prediction, obstacles: Obstacles, spent: float) -> Ways:
         goal=np.array([outcome.candidate.goal for outcome in outcomes]),
         solved=np.array([outcome.solved for outcome in outcomes]),
         spent=spent,
-        to_go=np.array([each.effort * each.dt for each in solutions]),
+        to_go=np.array([each.effort * each.dt + price * each.times[-1] for each in solutions]),
         likelihood=np.array([outcome.likelihood for outcome in outcomes]),
         length=np.array([outcome.candidate.length for outcome in outcomes]),
+        price=price,
         time_s=np.array([each.times[-1] for each in solutions]),
         named=np.array(named, dtype=bool).reshape(len(outcomes), len(obstacles)),
         sides=np.array([_predicted_sides(outcome, obstacles) for outcome in outcomes]),

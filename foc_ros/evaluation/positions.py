@@ -9,7 +9,7 @@ import numpy as np
 
 from foc_ros.foc.records import Array
 
-from .minimum_jerk import straight_effort, straight_positions
+from .minimum_jerk import straight_cost, straight_positions
 from .observations import HORIZONS_S, TIMES_S, Observation, Observations
 
 LEVELS = (0.5, 0.9)
@@ -78,4 +78,4 @@ def _going_on(seen: Observation) -> Array:
 
 
 def _straight(seen: Observation) -> Array:
-    return straight_positions(seen, int(straight_effort(seen).argmin()), TIMES)
+    return straight_positions(seen, int(straight_cost(seen).argmin()), TIMES)

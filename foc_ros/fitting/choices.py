@@ -84,11 +84,11 @@ def _row(recording: Observations, family: Family) -> Array:
     return log_likelihoods(pairs, family) / len(pairs) if pairs else np.full(len(family.settings), np.nan)
 
 
-def density_table(observations: Sequence[Observations], likelihood: LikelihoodConfig, steps: int) -> Table:
+def density_table(observations: Sequence[Observations], config: Config) -> Table:
     """Try every process noise on every recording."""
     rows = []
     for recording in observations:
-        each = [log_densities(seen, power_rule(seen, likelihood), steps) for seen in recording.each]
+        each = [log_densities(seen, power_rule(seen, config.likelihood), config) for seen in recording.each]
         known = [row for row in each if row is not None]
         rows.append(np.mean(known, axis=0) if known else np.full(len(PROCESS_NOISES), np.nan))
     return Table(np.array(rows), PROCESS_NOISES)
@@ -160,14 +160,14 @@ def process_noise_estimate(table: Table) -> Estimate:
     return Estimate('foc.process_noise', value, float(low), float(high), 'density of true positions')
 
 
-def coverage(observations: Sequence[Observations], likelihood: LikelihoodConfig, noise: Array, steps: int) -> float | None:
+def coverage(observations: Sequence[Observations], config: Config, noise: Array) -> float | None:
     """Return the share of true positions that the 90 % ellipse of the likeliest way holds after 0.5 s.
 
     noise (n,): process noise for each recording, so that each can be judged by one that it had no part in.
     """
     place = TIMES_S.index(HORIZON_S)
     held = [
-        inside(seen, int(power_rule(seen, likelihood).argmax()), float(each), steps, LEVEL)[place]
+        inside(seen, int(power_rule(seen, config.likelihood).argmax()), float(each), config, LEVEL)[place]
         for recording, each in zip(observations, noise, strict=True)
         for seen in recording.each
     ]

@@ -6,6 +6,8 @@ import numpy as np
 
 from foc_ros.evaluation.observations import HORIZONS_S, TIMES_S, Observation
 from foc_ros.evaluation.positions import EXACT, held
+from foc_ros.foc.config import Config
+from foc_ros.foc.duration import is_passing
 from foc_ros.foc.records import Array
 from foc_ros.foc.replanning import triple_integrator_process_covariance
 
@@ -17,10 +19,10 @@ FURTHEST = -30.0
 _PLACES = [TIMES_S.index(horizon) for horizon in HORIZONS_S]
 
 
-def log_densities(seen: Observation, shares: Array, steps: int) -> Array | None:
+def log_densities(seen: Observation, shares: Array, config: Config) -> Array | None:
     """Return the log-density of the true positions, mean over the horizons, for each of `PROCESS_NOISES`, (q,) [nat, metres].
 
-    shares (k,): of the candidates; steps: of the horizon that they were predicted over, without process noise. None where the
+    shares (k,): of the candidates; config: that they were predicted with, but for the process noise. None where the
     movement ends before the first horizon.
     """
     true = seen.truth.positions[_PLACES]
@@ -31,7 +33,7 @@ def log_densities(seen: Observation, shares: Array, steps: int) -> Array | None:
     places = np.array(_PLACES)[known]
     away = true[known] - seen.ways.mean[np.ix_(weighed, places)]
     base = seen.ways.covariance[np.ix_(weighed, places)] + EXACT * np.eye(2)
-    added = np.array([_process_variance(float(seen.ways.time_s[row]), steps)[places] for row in weighed])
+    added = np.array([_process_variance(float(seen.ways.time_s[row]), config)[places] for row in weighed])
     squared = np.square(PROCESS_NOISES)[:, None, None]
     xx, yy, xy = base[..., 0, 0] + squared * added, base[..., 1, 1] + squared * added, base[..., 0, 1]
     determinant = xx * yy - xy**2
@@ -43,16 +45,17 @@ def log_densities(seen: Observation, shares: Array, steps: int) -> Array | None:
     return density
 
 
-def inside(seen: Observation, row: int, process_noise: float, steps: int, level: float) -> Array:
+def inside(seen: Observation, row: int, process_noise: float, config: Config, level: float) -> Array:
     """Return 1 where the ellipse of a candidate holds the true position at `TIMES_S`, 0 where not, nan beyond the end, (h,)."""
-    variance = process_noise**2 * _process_variance(float(seen.ways.time_s[row]), steps)
+    variance = process_noise**2 * _process_variance(float(seen.ways.time_s[row]), config)
     covariance = seen.ways.covariance[row] + variance[:, None, None] * np.eye(2)
     return held(seen.truth.positions - seen.ways.mean[row], covariance, level)
 
 
-def _process_variance(time_s: float, steps: int) -> Array:
+def _process_variance(time_s: float, config: Config) -> Array:
     """Return the variance of a position at `TIMES_S` that process noise of unit density causes, (h,); none beyond the goal."""
+    steps = config.foc.steps
     dt = time_s / steps
     places = np.minimum(np.rint(np.array(TIMES_S) / dt).astype(int), steps)
-    variance: Array = triple_integrator_process_covariance(dt, steps)[places, 0, 0]
+    variance: Array = triple_integrator_process_covariance(dt, steps, is_passing(config.duration))[places, 0, 0]
     return variance

@@ -14,7 +14,7 @@ from foc_ros.evaluation.heldout import chosen
 from foc_ros.evaluation.observations import Observations
 from foc_ros.evaluation.recordings import Recording
 from foc_ros.evaluation.workers import collected
-from foc_ros.foc.config import Config, LikelihoodConfig, flatten, updated
+from foc_ros.foc.config import Config, flatten, updated
 from foc_ros.foc.errors import RecordingError
 
 from . import choices
@@ -157,7 +157,6 @@ def _choose(recordings: Mapping[str, Recording], found: Fit, thin: Mapping[str, 
     if not observations:
         raise RecordingError(f'nothing could be predicted: {"; ".join(failed.values())}')
     table, names = choices.choice_table(observations, found.config, executor), [each.name for each in observations]
-    steps = found.config.foc.steps
     if np.isnan(table.values).all():
         found.warnings.append(
             'likelihood.beta: no recording has an obstacle to pass on one of two sides, or a second goal: it is kept'
@@ -167,10 +166,10 @@ def _choose(recordings: Mapping[str, Recording], found: Fit, thin: Mapping[str, 
         columns = choices.plain_or_ahead(table, names)
         found.take(choices.likelihood_estimates(table, columns))
         found.scores.update(_choice_scores(table, columns, observations))
-    densities = choices.density_table(observations, found.config.likelihood, steps)
+    densities = choices.density_table(observations, found.config)
     noise = choices.process_noise_estimate(densities)
     found.take(({noise.name: noise}, []))
-    found.scores.update(_position_scores(densities, noise.value, found.config.likelihood, observations, steps))
+    found.scores.update(_position_scores(densities, noise.value, found.config, observations))
     if len(observations) < FEWEST:
         found.warnings.append(f'cross-validation: {len(observations)} recordings are too few, {FEWEST} are needed')
 
@@ -189,9 +188,7 @@ def _choice_scores(table: choices.Table, columns: Sequence[int], observations: S
     return {'ways': {name: float(np.nanmean(values)) for name, values in scores.items()}}
 
 
-def _position_scores(
-    table: choices.Table, noise: float, likelihood: LikelihoodConfig, observations: Sequence[Observations], steps: int
-) -> dict[str, Any]:
+def _position_scores(table: choices.Table, noise: float, config: Config, observations: Sequence[Observations]) -> dict[str, Any]:
     names, columns, n = [each.name for each in observations], list(range(len(table.settings))), len(observations)
     scores = {'without process noise': table.values[:, 0], 'fitted': table.values[:, table.best(columns)]}
     noises = {'without process noise': np.zeros(n), 'fitted': np.full(n, noise)}
@@ -201,5 +198,5 @@ def _position_scores(
         noises['without the recording'] = np.array(table.settings, dtype=float)[picked]
     return {
         'positions': {name: float(np.nanmean(values)) for name, values in scores.items()},
-        'inside_90': {name: choices.coverage(observations, likelihood, each, steps) for name, each in noises.items()},
+        'inside_90': {name: choices.coverage(observations, config, each) for name, each in noises.items()},
     }

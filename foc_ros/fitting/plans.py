@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from foc_ros.foc.config import REFERENCE_STEP_S, Config
+from foc_ros.foc.duration import is_passing
 from foc_ros.foc.dynamics import triple_integrator_horizon
 from foc_ros.foc.errors import RecordingError
 from foc_ros.foc.forward import forward
@@ -56,6 +57,7 @@ def reach(demonstration: Demonstration, config: Config) -> Reach:
         demonstration.obstacles,
         noise_per_step(np.array([config.foc.noise_x, config.foc.noise_y]), REFERENCE_STEP_S, dt),
         config.foc.eta,
+        passing=is_passing(config.duration),
     )
     guess = np.column_stack([np.interp(dt * np.arange(steps + 1), times, axis) for axis in demonstration.positions.T])
     return Reach(demonstration.name, times, demonstration.positions, problem, cold(guess))

@@ -61,7 +61,7 @@ def scored(observations: Sequence[Observations], config: Config) -> Foretold:
                 [of_shares(power_rule(seen, rule), question).true(question) for rule in rules]
             )
         for seen in recording.each:
-            row = log_densities(seen, seen.ways.likelihood, config.foc.steps)
+            row = log_densities(seen, seen.ways.likelihood, config)
             if row is not None:
                 positions[recording.name, seen.stamp_ns] = row
     return Foretold(ways, positions)

@@ -18,15 +18,27 @@ Vector: TypeAlias = NDArray[np.float64]
 Matrix: TypeAlias = NDArray[np.float64]
 Tensor: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.intp]
-"""Arguments of kernels: C-contiguous arrays of one, two and three axes, indices of any stride; read-only ones too."""
+Table: TypeAlias = NDArray[np.intp]
+Points: TypeAlias = NDArray[np.complex128]
+PointTable: TypeAlias = NDArray[np.complex128]
+Flags: TypeAlias = NDArray[np.bool_]
+FlagTable: TypeAlias = NDArray[np.bool_]
+"""Arguments of kernels: C-contiguous arrays, tables of two axes, a tensor of three, indices of any stride; read-only ones too."""
 
 _TYPES = {
     'float': types.float64,
     'int': types.intp,
+    'bool': types.boolean,
+    'complex': types.complex128,
     'Vector': types.Array(types.float64, 1, 'C', readonly=True),
     'Matrix': types.Array(types.float64, 2, 'C', readonly=True),
     'Tensor': types.Array(types.float64, 3, 'C', readonly=True),
     'Indices': types.Array(types.intp, 1, 'A', readonly=True),
+    'Table': types.Array(types.intp, 2, 'C', readonly=True),
+    'Points': types.Array(types.complex128, 1, 'C', readonly=True),
+    'PointTable': types.Array(types.complex128, 2, 'C', readonly=True),
+    'Flags': types.Array(types.boolean, 1, 'C', readonly=True),
+    'FlagTable': types.Array(types.boolean, 2, 'C', readonly=True),
 }
 REORDERED = {'contract', 'reassoc'}
 """Freedom of the compiler: sums in another order, fused products. Not that numbers are finite."""
@@ -36,10 +48,19 @@ Kernel = TypeVar('Kernel', bound=Callable[..., object])
 
 def compiled(kernel: Kernel) -> Kernel:
     """Compile a function for the types that its annotations name; it never changes its arguments."""
+    return _compiled(kernel, REORDERED)
+
+
+def compiled_exactly(kernel: Kernel) -> Kernel:
+    """Compile one whose signs and ties decide: every product and sum is rounded as it stands, so that a b - b a is zero."""
+    return _compiled(kernel, set())
+
+
+def _compiled(kernel: Kernel, freedom: set[str]) -> Kernel:
     signature = tuple(_TYPES[str(kind)] for name, kind in kernel.__annotations__.items() if name != 'return')
     try:
-        return cast('Kernel', njit(signature, cache=True, fastmath=REORDERED)(kernel))
+        return cast('Kernel', njit(signature, cache=True, fastmath=freedom)(kernel))
     except RuntimeError as error:  # no directory to keep it in: compile in every process
         if 'cannot cache' not in str(error):
             raise
-        return cast('Kernel', njit(signature, fastmath=REORDERED)(kernel))
+        return cast('Kernel', njit(signature, fastmath=freedom)(kernel))

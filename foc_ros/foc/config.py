@@ -16,6 +16,9 @@ from .errors import ParameterError
 STRATEGIES = ('lv', 'hc', 'optimal', 'algorithm1', 'fixed')
 PLANES = ('xy', 'xz', 'yz')
 DURATION_MODELS = ('fixed', 'fitts', 'cost_of_time')
+ARRIVALS = ('rest', 'passing')
+MOST_CANDIDATES = 64
+"""Most homotopy classes that are ever solved in one prediction."""
 REFERENCE_STEP_S = 0.02
 """Step for which the node's noise is quoted (doc/model.md): c is scaled by sqrt(0.02 / dt)."""
 
@@ -66,7 +69,7 @@ class FocConfig:
 
 @dataclass(frozen=True)
 class DurationConfig:
-    """How long the movement takes."""
+    """How long the movement takes, and how it ends."""
 
     model: str = _p(
         'fitts', 'duration of a movement: fixed, by Fitts law, or what is best where time has a cost', choices=DURATION_MODELS
@@ -77,6 +80,7 @@ class DurationConfig:
     target_width: float = _p(0.02, 'target width of Fitts law', 'm', 1e-4, 10.0)
     time_cost: float = _p(100.0, 'cost of time of model cost_of_time: a longer way takes longer', 'm^2/s^6', 1e-9, 1e9)
     min_time_to_go_s: float = _p(0.3, 'floor of the time to go', 's', 0.01, 60.0)
+    arrival: str = _p('rest', 'how the hand comes to its goal: to rest, or passing it at any speed', choices=ARRIVALS)
     max_time_to_go_s: float = _p(10.0, 'ceiling of the time to go', 's', 0.05, 120.0)
 
 
@@ -104,7 +108,7 @@ class EstimatorConfig:
 class HomotopyConfig:
     """Which ways round are considered."""
 
-    max_candidates: int = _p(4, 'number of homotopy classes solved, over all goals', '', 1, 64)
+    max_candidates: int = _p(4, 'number of homotopy classes solved, over all goals; at least one to each', '', 1, MOST_CANDIDATES)
     clearance: float = _p(0.005, 'distance from an obstacle that the hand needs: a narrower gap is closed', 'm', 0.0, 1.0)
     library: str = _p('', 'file of demonstrated ways that replay --learn wrote; empty: none', read_only=True)
 

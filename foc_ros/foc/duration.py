@@ -11,7 +11,8 @@ A minimum-jerk movement that keeps to its time is never held up by this: from 0.
 present speed takes less than the time left.
 
 Model `cost_of_time` gives every way round the duration of least effort plus `time_cost` times duration (`time_cost`), so that
-going round takes longer; it needs no clock, and knows slow operators by their speed as it is.
+going round takes longer; it needs no clock, and knows slow operators by their speed as it is. What is least is what ways are
+compared by: the time that a way takes is part of its cost (`time_price`).
 
 Of several goals at most one is where the hand is going. The speed makes the operator as slow as the goal that it fits best says,
 and all expected durations longer by the same factor. (Were each goal's own judged by the speed, a hand that slows down at one
@@ -45,6 +46,11 @@ def movement_time(distance: float, config: DurationConfig) -> float:
     return config.fitts_a_s + config.fitts_b_s * math.log2(distance / config.target_width + 1.0)
 
 
+def is_passing(config: DurationConfig) -> bool:
+    """Tell whether the hand passes its goal, at any velocity, instead of coming to rest there."""
+    return config.arrival == 'passing'
+
+
 def way_times(
     hand: HandState, candidates: Sequence[Candidate], goal_times: Sequence[float], config: DurationConfig
 ) -> list[float]:
@@ -52,6 +58,11 @@ def way_times(
     if config.model != 'cost_of_time':
         return [goal_times[candidate.goal] for candidate in candidates]
     return [_least_cost(hand, each.length, _heading(each.guess), config) for each in candidates]
+
+
+def time_price(config: DurationConfig) -> float:
+    """Return what a second costs beside effort [m^2/s^6]: nothing, but with model `cost_of_time`."""
+    return config.time_cost if config.model == 'cost_of_time' else 0.0
 
 
 def _heading(guess: Array) -> Array:
@@ -62,7 +73,8 @@ def _heading(guess: Array) -> Array:
 
 def _least_cost(hand: HandState, length: float, heading: Array, config: DurationConfig) -> float:
     speed, acceleration = float(hand.mean[2:4] @ heading), float(hand.mean[4:6] @ heading)
-    return least_cost_time(length, speed, acceleration, config.time_cost, config.min_time_to_go_s, config.max_time_to_go_s)
+    bounds = config.min_time_to_go_s, config.max_time_to_go_s
+    return least_cost_time(length, speed, acceleration, config.time_cost, *bounds, is_passing(config))
 
 
 def times_to_go(hand: HandState, goals: Array, config: DurationConfig) -> list[float]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import InputError
 from .records import Array, Record
@@ -126,6 +127,24 @@ def state_scale(dt: float) -> Array:
     return np.repeat([1.0, 1 / dt, 1 / dt**2], 2)
 
 
+@dataclass(frozen=True, eq=False)
+class _Scaled(Horizon):
+    """The triple integrator's horizon at a step dt [s]; unit: the one of unit step, of which the large arrays are multiples."""
+
+    unit: Horizon
+
+    @cached_property
+    def maps(self) -> Array:
+        scaled: Array = self.unit.maps * (self.dt ** np.array([3, 3, 6, 6, 6]))[:, None, None]
+        return scaled
+
+    @cached_property
+    def squared(self) -> tuple[Array, Array]:
+        scale = (self.dt**3 * state_scale(self.dt))[:, None] ** 2
+        end, way = self.unit.squared
+        return end * scale, way * scale
+
+
 @lru_cache(maxsize=CACHED_HORIZONS)
 def _unit_horizon(steps: int) -> Horizon:
     return horizon(triple_integrator(1.0), steps)
@@ -139,5 +158,11 @@ def triple_integrator_horizon(dt: float, steps: int) -> Horizon:
     """
     unit = _unit_horizon(steps)
     scale = state_scale(dt)
-    powers = unit.powers * (scale[:, None] / scale[None, :])
-    return Horizon(powers, unit.response * (dt**3 * scale)[None, :, None], dt)
+    powers, response = unit.powers * (scale[:, None] / scale[None, :]), unit.response * (dt**3 * scale)[None, :, None]
+    response.flags.writeable = False  # so that the record takes it as it is: it is large
+    return _Scaled(powers, response, dt, unit)
+
+
+def states_at_goal(n: int, passing: bool = False) -> NDArray[np.bool_]:
+    """Tell which of n states the goal fixes, (n,): all, as at rest; or, where the hand only passes it, all but the velocity."""
+    return np.array([not (passing and 2 <= state < 4) for state in range(n)])

@@ -25,6 +25,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .compiled import Matrix, Vector, compiled
+from .dense import cholesky, combined, lower_solved
 from .records import NANOSECONDS, Array, Record
 
 DEGREE = 5
@@ -39,6 +41,9 @@ MISFIT = 2.0
 
 ROUNDING = 1e-12
 """Share of the sum of squares that rounding leaves in the residuals; 2e-13 was seen with 20000 samples."""
+
+TOLD_APART = 1e-9
+"""Share of its own sum of squares that a degree has to add to those below it: bunched stamps do not tell them apart."""
 
 _K = np.arange(DEGREE + 1)
 _THIRD = _K * (_K - 1.0) * (_K - 2.0)
@@ -84,43 +89,53 @@ def _with_sample(effort: Effort, stamp_ns: int, position: Array) -> Effort:
         effort = replace(effort, start_ns=stamp_ns, origin=position)
     assert effort.start_ns is not None
     seconds = (stamp_ns - effort.start_ns) / NANOSECONDS
-    powers = seconds ** np.arange(2 * DEGREE + 1)
     z = position - effort.origin
-    return replace(
-        effort,
-        last_s=seconds,
-        powers=effort.powers + powers,
-        products=effort.products + np.outer(powers[: DEGREE + 1], z),
-        square=effort.square + float(z @ z),
-    )
+    powers, products = summed(effort.powers, effort.products, seconds, z)
+    return replace(effort, last_s=seconds, powers=powers, products=products, square=effort.square + float(z @ z))
+
+
+@compiled
+def summed(powers: Vector, products: Matrix, seconds: float, z: Vector) -> tuple[Vector, Matrix]:
+    """Return the sums of `Effort` with one more sample."""
+    powers, products, power = powers.copy(), products.copy(), 1.0
+    for k in range(len(powers)):
+        powers[k] += power
+        if k < len(products):
+            products[k] += power * z
+        power *= seconds
+    return powers, products
+
+
+@compiled
+def fitted(powers: Vector, products: Matrix, square: float, T: float, stddev: float) -> tuple[bool, float, bool]:
+    """Return whether a stretch of T [s] tells the degrees apart, its effort [m^2/s^5], and whether its quintic explains it."""
+    n, count = len(products), powers[0]
+    gram, right = np.empty((n, n)), np.empty((n, 2))
+    for j in range(n):
+        right[j] = products[j] / T**j
+        for k in range(n):
+            gram[j, k] = powers[j + k] / T ** (j + k)
+    root = cholesky(gram, 0.0)
+    for k in range(n):
+        if not root[k, k] ** 2 > TOLD_APART * gram[k, k]:
+            return False, 0.0, False
+    y = lower_solved(root, right)
+    energy = (y**2).sum(axis=1)
+    freedom = 2.0 * (count - n)
+    residual, rounding = max(square - energy.sum(), 0.0) / freedom, ROUNDING * square / freedom
+    noise = 2.0 * max(stddev**2, residual, rounding)
+    jerk = lower_solved(root, np.ascontiguousarray(lower_solved(root, _H).T))
+    length_squared = 12.0 * energy[1:].sum() / count
+    for k in range(n):
+        told = k >= 3 and noise * jerk[k, k] <= NOISE_SHARE * 720.0 * length_squared
+        y[k] *= max(1.0 - SHRINKAGE * noise / max(energy[k], noise), 0.0) if told else 0.0
+    spent = max((y * combined(jerk, y)).sum(), 0.0) / T**5
+    return True, spent, residual <= (MISFIT * stddev) ** 2 + rounding
 
 
 def _fitted(stretch: Effort, stddev: float) -> tuple[float, bool] | None:
     """Return a stretch's effort [m^2/s^5] and whether its quintic explains it; None where it is too short to tell."""
-    count, T = stretch.powers[0], stretch.last_s
-    if count < LEAST_SAMPLES or T < LEAST_TIME_S:
+    if stretch.powers[0] < LEAST_SAMPLES or stretch.last_s < LEAST_TIME_S:
         return None
-    root = _root(stretch.powers[_K[:, None] + _K] / T ** (_K[:, None] + _K))
-    if root is None:
-        return None
-    y = np.linalg.solve(root, stretch.products / T ** _K[:, None])
-    energy = np.sum(y**2, axis=1)
-    freedom = 2.0 * (count - DEGREE - 1)
-    residual = max(stretch.square - float(energy.sum()), 0.0) / freedom
-    rounding = ROUNDING * stretch.square / freedom
-    noise = 2.0 * max(stddev**2, residual, rounding)
-    jerk = np.linalg.solve(root, np.linalg.solve(root, _H).T)
-    length_squared = 12.0 * energy[1:].sum() / count
-    told = (_K >= 3) & (noise * np.diag(jerk) <= NOISE_SHARE * 720.0 * length_squared)
-    y = (np.maximum(1.0 - SHRINKAGE * noise / np.maximum(energy, noise), 0.0) * told)[:, None] * y
-    return max(float(np.sum(y * (jerk @ y))), 0.0) / T**5, residual <= (MISFIT * stddev) ** 2 + rounding
-
-
-def _root(gram: Array) -> Array | None:
-    """Return the Cholesky factor of the sums of powers; None where bunched stamps do not tell the degrees apart."""
-    try:
-        root = np.linalg.cholesky(gram).astype(np.float64, copy=False)
-    except np.linalg.LinAlgError:
-        return None
-    told_apart = bool(np.all(np.diag(root) ** 2 > 1e-9 * np.diag(gram)))
-    return root if told_apart else None
+    told, spent, explained = fitted(stretch.powers, stretch.products, stretch.square, stretch.last_s, stddev)
+    return (spent, explained) if told else None

@@ -28,7 +28,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .compiled import Matrix, Vector, compiled
 from .config import EstimatorConfig
+from .dense import combined, row_products
 from .effort import Effort, advanced
 from .records import NANOSECONDS, Array, HandSample, HandState
 from .verdict import Verdict
@@ -75,6 +77,7 @@ def update(state: Track | None, sample: HandSample, config: EstimatorConfig) -> 
     return Update(_moved(_filtered(state, sample, dt, config), sample, config), Verdict.ACCEPTED)
 
 
+@compiled
 def transition(dt: float) -> Array:
     """Return A(dt), (3, 3), of one axis."""
     return np.array([[1.0, dt, dt**2 / 2.0], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
@@ -95,40 +98,72 @@ _UNIT_ROOT = np.linalg.cholesky(gramian(1.0))
 """C for dt = 1 s; the rows scale with dt^2.5, dt^1.5 and dt^0.5."""
 
 
+@compiled
+def triangular(columns: Matrix) -> Matrix:
+    """Return the lower triangular L (n, n) with L L' = M M' for columns M (n, q), q >= n: M turned by plane rotations."""
+    turned = columns.copy()
+    n, q = turned.shape
+    for i in range(n):
+        for j in range(i + 1, q):
+            length = np.hypot(turned[i, i], turned[i, j])
+            if length > 0.0:
+                c, s = turned[i, i] / length, turned[i, j] / length
+                for k in range(i, n):
+                    turned[k, i], turned[k, j] = c * turned[k, i] + s * turned[k, j], c * turned[k, j] - s * turned[k, i]
+    return turned[:, :n].copy()
+
+
+@compiled
+def both_axes(covariance: Matrix) -> Matrix:
+    """Return the (6, 6) covariance of x, y, vx, vy, ax, ay from the (3, 3) one that both axes have."""
+    both = np.zeros((6, 6))
+    for i in range(3):
+        for j in range(3):
+            both[2 * i, 2 * j] = both[2 * i + 1, 2 * j + 1] = covariance[i, j]
+    return both
+
+
+@compiled
+def filtered(
+    mean: Vector, root: Matrix, dt: float, jerk_density: float, stddev: float, position: Vector
+) -> tuple[Vector, Matrix, Matrix]:
+    """Return mean (6,), covariance (6, 6) and root (3, 3) a time dt [s] on, corrected by a position (2,) of a deviation [m]."""
+    step, columns = transition(dt), np.empty((3, 6))
+    columns[:, :3] = combined(step, root)
+    for i in range(3):
+        columns[i, 3:] = jerk_density * dt ** (2.5 - i) * _UNIT_ROOT[i]
+    corrected = triangular(columns)
+    first = corrected[0, 0]
+    deviation = np.hypot(first, stddev)
+    states = combined(step, mean.reshape(3, 2))
+    missed = position - states[0]
+    for i in range(3):
+        states[i] += corrected[i, 0] * (first / deviation / deviation) * missed
+        corrected[i, 0] *= stddev / deviation
+    return states.ravel(), both_axes(row_products(corrected, corrected)), corrected
+
+
 def _first(sample: HandSample, config: EstimatorConfig) -> Track:
     """Start from one position."""
     root = np.zeros((3, 3))
     root[0, 0] = config.position_stddev
     root[1:, 1:] = config.jerk_density * np.linalg.cholesky(gramian(config.gap_s)[1:, 1:])
     mean = np.concatenate([sample.position, np.zeros(4)])
-    return Track(sample.stamp_ns, mean, _both_axes(root @ root.T), sample.height, sample.frame_id, root=root)
+    return Track(sample.stamp_ns, mean, both_axes(root @ root.T), sample.height, sample.frame_id, root=root)
 
 
 def _filtered(state: Track, sample: HandSample, dt: float, config: EstimatorConfig) -> Track:
     """Predict to the sample's stamp and correct by its position."""
-    columns = np.hstack([transition(dt) @ state.root, config.jerk_density * dt ** np.array([[2.5], [1.5], [0.5]]) * _UNIT_ROOT])
-    root = np.linalg.qr(columns.T)[1].T
-    deviation = math.hypot(root[0, 0], config.position_stddev)
-    gain = root[:, 0] * (root[0, 0] / deviation / deviation)
-    root[:, 0] *= config.position_stddev / deviation
-    mean = transition(dt) @ state.mean.reshape(3, 2)
-    mean = mean + np.outer(gain, sample.position - mean[0])
+    mean, covariance, root = filtered(state.mean, state.root, dt, config.jerk_density, config.position_stddev, sample.position)
     return replace(
         state,
         stamp_ns=sample.stamp_ns,
-        mean=mean.ravel(),
-        covariance=_both_axes(root @ root.T),
+        mean=mean,
+        covariance=covariance,
         height=sample.height,
         frame_id=sample.frame_id,
         root=root,
     )
-
-
-def _both_axes(covariance: Array) -> Array:
-    """Return the (6, 6) covariance of x, y, vx, vy, ax, ay from the (3, 3) one that both axes have."""
-    both = np.zeros((6, 6))
-    both[::2, ::2] = both[1::2, 1::2] = covariance
-    return both
 
 
 def _moved(state: Track, sample: HandSample, config: EstimatorConfig) -> Track:

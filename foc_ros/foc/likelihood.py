@@ -4,7 +4,8 @@
 
 which, unlike the usual exponential of cost differences, does not change with the unit of effort or the scale of the scene.
 
-J_i is the effort to go through class i, and what all share: a part of the effort spent since onset (`likelihood.spent_share`).
+J_i is the effort to go through class i, where time has a price what its duration costs (`duration.time_price`), and what all
+share: a part of the effort spent since onset (`likelihood.spent_share`).
 
 People weigh what is near, and leave far choices open. Where `likelihood.lookahead_s` is set, they look ahead by a time h that is
 exponentially distributed with that mean. A way round W, with all goals to which it leads, is worth V_W = sum_{i in W} J_i^-beta.

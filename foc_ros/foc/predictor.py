@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .config import REFERENCE_STEP_S, Config
+from .config import REFERENCE_STEP_S, Config, DurationConfig
 from .culling import relevant
 from .deadline import Deadline
-from .duration import times_to_go, way_times
+from .duration import is_passing, time_price, times_to_go, way_times
 from .dynamics import triple_integrator_horizon
 from .homotopy import search
 from .library import Way, recall
@@ -61,9 +61,10 @@ def predict(
     tried = solve_candidates(
         candidates, list(problems.values()), config.foc, config.likelihood, hand.effort_spent, memory.earlier, deadline
     )
-    tried = [_aged(outcome, hand.stamp_ns, memory) for outcome in tried]
+    tried = [_priced(_aged(outcome, hand.stamp_ns, memory), config.duration) for outcome in tried]
     outcomes = ranked(tried, config.likelihood, obstacles)
-    outcomes = [_seen(outcome, problems[outcome.candidate.label], hand, config.foc.process_noise) for outcome in outcomes]
+    unsure = {problem: _doubt(problem, hand, config) for problem in problems.values()}
+    outcomes = [_seen(outcome, unsure[problems[outcome.candidate.label]]) for outcome in outcomes]
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
     best = most_likely(labels, values, memory.most_likely, config.likelihood.margin)
@@ -106,6 +107,11 @@ def _aged(outcome: Outcome, stamp_ns: int, memory: Memory) -> Outcome:
     return replace(outcome, solution=replace(outcome.solution, message=f'{outcome.solution.message}; {age}'))
 
 
+def _priced(outcome: Outcome, config: DurationConfig) -> Outcome:
+    """Add what the time to go costs."""
+    return replace(outcome, cost=outcome.cost + time_price(config) * float(outcome.solution.times[-1]))
+
+
 def way_problems(
     config: Config,
     hand: HandState,
@@ -123,7 +129,7 @@ def way_problems(
 
 def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: Array, duration_s: float) -> Problem:
     """Build the problem of one goal (2,) [m], to be reached in duration_s [s]."""
-    foc = config.foc
+    foc, passing = config.foc, is_passing(config.duration)
     dt = duration_s / foc.steps
     horizon = triple_integrator_horizon(dt, foc.steps)
     return rest_to_goal(
@@ -133,9 +139,10 @@ def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal
         obstacles,
         noise_per_step(np.array([foc.noise_x, foc.noise_y]), REFERENCE_STEP_S, dt),
         foc.eta,
-        error_map=triple_integrator_error_map(dt, foc.steps),
+        error_map=triple_integrator_error_map(dt, foc.steps, passing),
         goal_weight=foc.goal_weight,
         recovery_s=foc.recovery_s,
+        passing=passing,
     )
 
 
@@ -157,14 +164,20 @@ def _start(hand: HandState, acceleration_time_s: float) -> HandState:
     return replace(hand, mean=np.concatenate([hand.mean[:2], settled, np.zeros(2)]))
 
 
-def _seen(outcome: Outcome, problem: Problem, hand: HandState, process_noise: float) -> Outcome:
-    """Add what we do not know of the hand, and jerk beside its plan, to what its own noise will do.
+def _doubt(problem: Problem, hand: HandState, config: Config) -> Array:
+    """Return the covariance at steps 0..N, (N + 1, 6, 6), of what we do not know of the hand, and of jerk beside its plan.
 
     The operator knows the hand better than our filter and plans its margins by motor noise alone, so the filter's
     covariance is no part of the chance constraint; but our prediction is as uncertain as the state it starts from.
     """
-    carried = problem.error_map @ hand.covariance @ problem.error_map.swapaxes(1, 2)
-    if process_noise > 0.0:
-        horizon = problem.horizon
-        carried = carried + process_noise**2 * triple_integrator_process_covariance(horizon.dt, horizon.steps)
-    return replace(outcome, solution=replace(outcome.solution, covariance=outcome.solution.covariance + carried))
+    carried: Array = problem.error_map @ hand.covariance @ problem.error_map.swapaxes(1, 2)
+    if config.foc.process_noise > 0.0:
+        horizon, passing = problem.horizon, is_passing(config.duration)
+        added = triple_integrator_process_covariance(horizon.dt, horizon.steps, passing)
+        carried = carried + config.foc.process_noise**2 * added
+    return carried
+
+
+def _seen(outcome: Outcome, doubt: Array) -> Outcome:
+    """Add a doubt (N + 1, 6, 6) to what the hand's own noise will do."""
+    return replace(outcome, solution=replace(outcome.solution, covariance=outcome.solution.covariance + doubt))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .chance import centres, courses, k_at, k_of_eta, size_moments
 from .compiled import Matrix, Tensor, Vector, compiled
 from .dense import values
-from .dynamics import Horizon
+from .dynamics import Horizon, states_at_goal
 from .errors import SceneError
 from .noise import stacked_noise
 from .records import Array, Obstacles, Record
@@ -235,10 +235,12 @@ def rest_to_goal(
     error_map: Array | None = None,
     goal_weight: float = 0.0,
     recovery_s: float = 0.0,
+    passing: bool = False,
 ) -> Problem:
     """Build the default problem: the mean reaches the goal position (2,) [m] exactly, at rest.
 
-    goal_weight: w of the position variance at the end. Raises SceneError for anything not finite.
+    goal_weight: w of the position variance at the end; passing: at any velocity instead, which no longer changes. Raises
+    SceneError for anything not finite.
     """
     n = len(initial_mean)
     goal = np.zeros(n)
@@ -255,7 +257,7 @@ def rest_to_goal(
         noise=np.asarray(noise, dtype=float),
         obstacles=obstacles,
         eta=eta,
-        at_goal=np.ones(n, dtype=bool),
+        at_goal=states_at_goal(n, passing),
         end_weights=np.where(np.arange(n) < 2, goal_weight, 0.0),
         way_weights=np.zeros(n),
         recovery_s=recovery_s,

@@ -5,7 +5,7 @@ message -> HandSample -> HandState -> Candidates -> Solutions -> Prediction -> m
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
@@ -22,12 +22,11 @@ class Record:
     """Base of the records: freezes every array field after construction."""
 
     def __post_init__(self) -> None:
-        for item in fields(self):  # type: ignore[arg-type]
-            value = getattr(self, item.name)
+        for name, value in vars(self).items():
             if isinstance(value, np.ndarray) and (value.flags.writeable or not value.flags.c_contiguous):
                 value = value.copy()
                 value.flags.writeable = False
-                object.__setattr__(self, item.name, value)
+                object.__setattr__(self, name, value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +206,8 @@ class Solution(Record):
 class Outcome:
     """One candidate with its solution; sides: side of every obstacle its path really passes, by id.
 
-    cost: effort to go and what all classes share, as effort spent since onset [m^2/s^5]; likelihood in [0, 1]: 0 unless solved.
+    cost: effort to go, what its time costs, and what all classes share, as effort spent since onset [m^2/s^5]; likelihood in
+    [0, 1]: 0 unless solved.
     """
 
     candidate: Candidate

@@ -10,6 +10,12 @@ with G the Gramian of the triple integrator; from rest J = 720 L^2 / T^5. So the
 time that is left agrees with itself from one moment to the next, without a clock: what is optimal from here is the rest of what
 was optimal before.
 
+Where the goal is passed at any velocity, the one in e is free: for e = (x, ., y), G without its row and column gives
+
+    J(T) = 45 x^2 / T^5 - 15 x y / T^3 + 9 y^2 / (4 T),
+
+which is nothing for a hand that keeps its speed.
+
 The path is taken for straight. Bending costs effort, too: C times as much makes the best duration C^(1/6) times as long.
 """
 
@@ -25,13 +31,15 @@ GRID = 64
 """Durations among which the best is sought, evenly in the logarithm; between them by a parabola."""
 
 
-def least_cost_time(length: float, speed: float, acceleration: float, time_cost: float, low: float, high: float) -> float:
+def least_cost_time(
+    length: float, speed: float, acceleration: float, time_cost: float, low: float, high: float, passing: bool = False
+) -> float:
     """Return the duration [s] in [low, high] of least effort plus time_cost [m^2/s^6] times duration.
 
-    length [m] of the path left; speed [m/s] and acceleration [m/s^2] along it now.
+    length [m] of the path left; speed [m/s] and acceleration [m/s^2] along it now; passing: it need not end at rest.
     """
     times = np.geomspace(low, high, GRID)
-    costs = effort_along(length, speed, acceleration, times) + time_cost * times
+    costs = effort_along(length, speed, acceleration, times, passing) + time_cost * times
     best = int(costs.argmin())
     if not 0 < best < GRID - 1:
         return float(times[best])
@@ -41,11 +49,13 @@ def least_cost_time(length: float, speed: float, acceleration: float, time_cost:
     return float(times[best] * math.exp(shift * math.log(high / low) / (GRID - 1)))
 
 
-def effort_along(length: float, speed: float, acceleration: float, times: Array) -> Array:
+def effort_along(length: float, speed: float, acceleration: float, times: Array, passing: bool = False) -> Array:
     """Return the least integral of squared jerk [m^2/s^5] that ends a path in given times (m,) [s]."""
     x = length - speed * times - acceleration * times**2 / 2.0
     v = -speed - acceleration * times
     a = -acceleration
+    if passing:
+        return np.asarray(45.0 * x**2 / times**5 - 15.0 * x * a / times**3 + 2.25 * a**2 / times)
     effort: Array = (
         720.0 * x**2 / times**5
         - 720.0 * x * v / times**4

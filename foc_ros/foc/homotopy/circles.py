@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
+from foc_ros.foc.compiled import Flags, FlagTable
 from foc_ros.foc.records import Array
 
-from .crossing import Complex, Flags
+from .crossing import Complex
 
 GRAZE = 1e-9
 """A run may pass this much nearer to a circle than its radius [m]: neighbours in a row share tangents, up to rounding."""
@@ -21,18 +22,17 @@ class Circles:
 
     centre (n + g,), complex [m]; radius (n + g,) [m]; bar (n,): square of the distance from each centre that bars a run [m^2];
     held (n + g, n): which centres each circle holds; outer (n + g,): which ones lie in no other circle, of equal ones the
-    first; blocker (n, n): direction of the outer circles that overlap with each [rad], NaN for others; overlapping: whether
-    there are any; cluster: number of the cluster of overlapping circles that each belongs to.
+    first; blocker (n, n): direction of the outer circles that overlap with each [rad], NaN for others; cluster: number of the
+    cluster of overlapping circles that each belongs to.
     """
 
     n: int
     centre: Complex
     radius: Array
     bar: Array
-    held: Flags
+    held: FlagTable
     outer: Flags
     blocker: Array
-    overlapping: bool
     cluster: tuple[int, ...]
 
     @property
@@ -54,7 +54,7 @@ def circles(centre: Complex, radius: Array, goals: Complex) -> Circles:
     overlap = touching & outer[:n] & ~np.eye(n, dtype=bool)
     blocker = np.where(overlap, np.angle(apart[:n]), np.nan)
     bar = (radius - GRAZE).clip(0.0) ** 2
-    return Circles(n, c, r, bar, distance < r[:, None], outer, blocker, bool(overlap.any()), _clusters(touching))
+    return Circles(n, c, r, bar, distance < r[:, None], outer, blocker, _clusters(touching))
 
 
 def _clusters(touching: Flags) -> tuple[int, ...]:

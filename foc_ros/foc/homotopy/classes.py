@@ -14,9 +14,9 @@ from .circles import GRAZE
 from .crossing import Complex, angle_of
 from .levels import MOST, Level, Levels
 from .scene import Scene
-from .sides import swept_seen
+from .sides import swept_angles
 from .tangents import TURN
-from .taut import taut
+from .taut import spaced
 from .ways import Plan, Way, ways
 
 FINENESS = 257
@@ -35,12 +35,17 @@ class Found:
 
 
 class Classes:
-    """The classes to one goal, in the order of their rank; notes: what was decided on the way, as counts by name."""
+    """The classes to one goal, in the order of their rank; notes: what was decided on the way, as counts by name.
 
-    def __init__(self, scene: Scene, levels: Levels, goal: int, ids: tuple[str, ...], states: int) -> None:
+    states: that the search may look at; usual: how many ways are usually asked for.
+    """
+
+    def __init__(self, scene: Scene, levels: Levels, goal: int, ids: tuple[str, ...], states: int, usual: int) -> None:
         self.notes: Counter[str] = Counter()
-        self._scene, self._levels, self._goal, self._ids, self._states = scene, levels, goal, ids, states
+        self._scene, self._levels, self._goal, self._ids = scene, levels, goal, ids
+        self._states, self._usual = states, usual
         self._named: list[int] = sorted(np.flatnonzero(scene.named[goal]).tolist(), key=ids.__getitem__)
+        self._names = [ids[row] for row in self._named]
         seen = scene.centre[self._named]
         self._turned: list[float] = (angle_of(scene.goals[goal] - seen) - angle_of(scene.hand - seen)).tolist()
 
@@ -63,11 +68,13 @@ class Classes:
         while True:
             bounded = len(rows) < MOST and not rows.issuperset(self._named)
             level = self._levels(rows, bounded)
-            told = tuple(level.place[row] for row in self._named if row in rows)
-            clusters = {level.plan.roadmap.circles.cluster[place] for place in told}
+            told = [k for k, row in enumerate(self._named) if row in rows]
+            places = [level.place[self._named[k]] for k in told]
+            clusters = {level.plan.roadmap.circles.cluster[place] for place in places}
             everyone = 1 << len(clusters) + len(self._named) - len(told)
-            for way in ways(level.plan, self._goal, told, level.limit * straight if bounded else np.inf, self._states):
-                found = self._found(way, level) if way else None
+            bound, named = level.limit * straight if bounded else np.inf, np.array(places, dtype=np.intp)
+            for way in ways(level.plan, self._goal, named, bound, self._states, self._usual):
+                found = self._found(way, level, told) if way else None
                 if found is None or found.sides in given:
                     self.notes['search_cut'] += way is None
                     continue
@@ -87,22 +94,21 @@ class Classes:
                     return
                 rows = self._levels.more(rows)
 
-    def _found(self, way: Way, level: Level) -> Found | None:
-        """Name a way; None for one that winds about an obstacle."""
-        crossings = iter(way.crossings)
-        swept = [
-            turned + TURN * next(crossings) if row in level.place else np.nan
-            for row, turned in zip(self._named, self._turned, strict=True)
-        ]
-        if any(abs(angle) >= TURN for angle in swept):
-            return None
-        if len(way.crossings) < len(swept):
-            others = [k for k, row in enumerate(self._named) if row not in level.place]
-            seen = _line(way, level.plan)[:, None] - self._scene.centre[[self._named[k] for k in others]]
-            for k, angle in zip(others, swept_seen(seen).tolist(), strict=True):
+    def _found(self, way: Way, level: Level, told: list[int]) -> Found | None:
+        """Name a way; None for one that winds about an obstacle. told: which of the names its crossings are of."""
+        swept = self._turned.copy()
+        for k, crossings in zip(told, way.crossings.tolist(), strict=True):
+            swept[k] += TURN * crossings
+            if abs(swept[k]) >= TURN:
+                return None
+        if len(told) < len(swept):
+            others = [k for k in range(len(swept)) if k not in told]
+            centres = self._scene.centre[[self._named[k] for k in others]]
+            line = _line(way, level.plan).view(float).reshape(-1, 2)
+            for k, angle in zip(others, swept_angles(line, centres.view(float).reshape(-1, 2)).tolist(), strict=True):
                 swept[k] = angle
-        sides = tuple((self._ids[row], LEFT if angle < 0.0 else RIGHT) for row, angle in zip(self._named, swept, strict=True))
-        label = f'goal{self._goal}:' + ''.join([('+' if side == LEFT else '-') + identity for identity, side in sides])
+        sides = tuple([(name, LEFT if angle < 0.0 else RIGHT) for name, angle in zip(self._names, swept, strict=True)])
+        label = f'goal{self._goal}:' + ''.join([('+' if side == LEFT else '-') + name for name, side in sides])
         return Found((round(way.key, 9), label), self._goal, sides, way, level.plan)
 
     def _met(self, found: Found, level: Level) -> list[int]:
@@ -114,6 +120,5 @@ class Classes:
 
 
 def _line(way: Way, plan: Plan) -> Complex:
-    path = taut(plan, [way])
-    points: Complex = path.points(path.length[:, None] * np.linspace(0.0, 1.0, FINENESS))[0]
-    return points
+    table = plan.table
+    return spaced(table.head, table.spans, table.places, plan.roadmap.circles.radius, way.runs, FINENESS)

@@ -11,31 +11,29 @@ from foc_ros.foc.records import Array
 from .classes import Found
 from .crossing import Complex
 from .scene import Scene
-from .taut import progress, taut
+from .taut import followed
 
 SLOPE = 0.5
 """A hand in a margin leaves it by this much for each metre on its way, and enters the margin of its goal likewise."""
 
 
 def guesses(
-    scene: Scene, velocity: complex, chosen: Sequence[Found], duration_s: Array, steps: int
-) -> tuple[list[Array], list[float]]:
-    """Return positions at steps 0..N of each class, (N + 1, 2) [m], and the lengths of their taut paths [m].
+    scene: Scene, velocity: complex, chosen: Sequence[Found], duration_s: Sequence[float], steps: int
+) -> list[tuple[Array, float]]:
+    """Return positions at steps 0..N of each class, (N + 1, 2) [m], and the length of its taut path [m].
 
     duration_s: to each goal [s]. Along the taut path, clear of all circles; a path that begins or ends in a margin gets out of
     it and into it gradually, straight away from the obstacle, as far as other obstacles are not in the way.
     """
-    paths: dict[int, Array] = {}
-    lengths: dict[int, float] = {}
-    for plan in {id(found.plan): found.plan for found in chosen}.values():
-        rows = [k for k, found in enumerate(chosen) if found.plan is plan]
-        path = taut(plan, [chosen[k].way for k in rows])
-        speed = (path.heading[path.first] * velocity.conjugate()).real
-        along = progress(path.length, speed, duration_s[[chosen[k].goal for k in rows]], steps)
-        for k, points, done, length in zip(rows, path.points(along), along, path.length.tolist(), strict=True):
-            paths[k] = _out_of_margins(scene, chosen[k].goal, points, done).view(float).reshape(-1, 2)
-            lengths[k] = length
-    return [paths[k] for k in range(len(chosen))], [lengths[k] for k in range(len(chosen))]
+    paths = []
+    for one in chosen:
+        table, radius = one.plan.table, one.plan.roadmap.circles.radius
+        points, along, length = followed(
+            table.head, table.spans, table.places, radius, one.way.runs, velocity, duration_s[one.goal], steps
+        )
+        points = _out_of_margins(scene, one.goal, points, along)
+        paths.append((points.view(float).reshape(-1, 2), length))
+    return paths
 
 
 def _out_of_margins(scene: Scene, goal: int, points: Complex, along: Array) -> Complex:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from foc_ros.foc.compiled import Indices, Points, Table, Vector, compiled_exactly
 from foc_ros.foc.records import Array, Candidate
 
 from .crossing import Complex
@@ -32,15 +33,25 @@ def strangers(ids: tuple[str, ...], goals: int, previous: Sequence[Candidate]) -
 
 def kept_open(ids: tuple[str, ...], centre: Complex, radius: Array, clearance: float, previous: Sequence[Candidate]) -> Array:
     """Return the radii (n,) [m], less by half of what is missing from gaps that candidates went through."""
-    names = sorted({identity for candidate in previous for identity, _ in candidate.sides}.intersection(ids))
-    if len(names) < 2:
-        return radius
-    sides = np.array([[dict(candidate.sides).get(identity, 0) for identity in names] for candidate in previous])
-    parted = (sides[:, :, None] * sides[:, None, :] < 0).any(axis=0)
-    place = {identity: row for row, identity in enumerate(ids)}
-    rows = [place[identity] for identity in names]
-    missing = radius[rows, None] + radius[rows] - np.abs(centre[rows, None] - centre[rows])
-    narrow = parted & (missing > -OPEN) & (missing < min(NARROWER, clearance))
+    names = {identity for candidate in previous for identity, _ in candidate.sides}
+    rows = [row for row, identity in enumerate(ids) if identity in names]
+    sides = [[held.get(ids[row], 0) for row in rows] for held in (dict(candidate.sides) for candidate in previous)]
+    table = np.array(sides, dtype=np.intp).reshape(len(previous), len(rows))
+    return lessened(centre, radius, np.array(rows, dtype=np.intp), table, min(NARROWER, clearance))
+
+
+@compiled_exactly
+def lessened(centre: Points, radius: Vector, rows: Indices, sides: Table, most: float) -> Vector:
+    """Return radii (n,) less by half of what is missing, but no more than `most`, from gaps between circles of the given rows.
+
+    sides (candidates, rows): a gap is one where some candidate passes its two circles on different sides.
+    """
     less = radius.copy()
-    less[rows] -= np.where(narrow, missing / 2.0 + OPEN, 0.0).max(axis=1)
+    for j in range(len(rows)):
+        for i in range(j):
+            a, b = rows[i], rows[j]
+            missing = radius[a] + radius[b] - abs(centre[a] - centre[b])
+            if -OPEN < missing < most and (sides[:, i] * sides[:, j] < 0).any():
+                less[a] = min(less[a], radius[a] - (missing / 2.0 + OPEN))
+                less[b] = min(less[b], radius[b] - (missing / 2.0 + OPEN))
     return less

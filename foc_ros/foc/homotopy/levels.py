@@ -56,7 +56,7 @@ class Levels:
 
     def _level(self, rows: list[int], bounded: bool) -> Level:
         scene = self._scene
-        limit = float(np.delete(scene.excess, rows).min(initial=np.inf))
+        limit = float(np.delete(scene.excess, rows).min(initial=np.inf)) if len(rows) < len(self._order) else np.inf
         if bounded:
             ellipse = Ellipse(scene.hand, scene.goals, limit * np.abs(scene.goals - scene.hand))
             made = roadmap_within(scene.centre[rows], self._radius[rows], scene.goals, ellipse)

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from foc_ros.foc.compiled import Flags, FlagTable, Matrix, Points, Vector, compiled_exactly
 from foc_ros.foc.records import Array, Candidate, Obstacles
 
 from .circles import GRAZE
-from .crossing import Complex, Flags
+from .crossing import Complex
 from .hysteresis import kept_open, strangers
+from .tangents import TURN
 
 REACH = 2.0
 """An obstacle is out of the way when passing it on its far side alone takes more than this times the straight way."""
@@ -39,39 +41,64 @@ class Scene:
     radius: Array
     wanted: Array
     held: Flags
-    near: Flags
+    near: FlagTable
     inside: Flags
-    named: Flags
+    named: FlagTable
     excess: Array
 
 
 def scene(hand: complex, goals: Complex, obstacles: Obstacles, clearance: float, previous: Sequence[Candidate]) -> Scene:
     """Look at the obstacles from the hand; previous: the candidates of the tick before."""
-    centre = obstacles.centre[:, 0] + 1j * obstacles.centre[:, 1]
+    centre: Complex = obstacles.centre.view(complex)[:, 0]
     wanted = kept_open(obstacles.ids, centre, np.maximum(obstacles.radius + clearance, SMALLEST), clearance, previous)
-    from_hand, from_goal = hand - centre, goals[:, None] - centre
-    a, b = np.abs(from_hand), np.abs(from_goal)
-    held, near = a <= wanted, b <= wanted
-    radius = np.where(held, np.maximum(a * (1.0 - TOUCH), POINT), wanted)
-    radius = np.where(near, np.minimum(np.maximum(b * (1.0 - TOUCH), POINT), radius), radius)
-    goals = np.where(np.abs(goals - hand) < GRAZE, hand + GRAZE, goals)
-    straight = np.maximum(np.abs(goals - hand), SMALLEST)[:, None]
-    named = _named(from_hand, from_goal, a, b, radius, straight, strangers(obstacles.ids, len(goals), previous))
-    excess = (np.maximum(a + b - 2.0 * radius, straight) / straight).min(axis=0, initial=np.inf)
-    return Scene(hand, goals, centre, radius, wanted, held, near, np.asarray((b < obstacles.radius).any(axis=1)), named, excess)
+    slack = strangers(obstacles.ids, len(goals), previous)
+    apart = np.where(np.abs(goals - hand) < GRAZE, hand + GRAZE, goals)
+    radius, held, near, inside, named, excess = looked_at(hand, goals, apart, centre, wanted, obstacles.radius, slack)
+    return Scene(hand, apart, centre, radius, wanted, held, near, inside, named, excess)
 
 
-def _named(from_hand: Complex, from_goal: Complex, a: Array, b: Array, radius: Array, straight: Array, slack: Array) -> Flags:
-    """Tell who takes part in the names (g, n): whose foot lies between hand and goal, and who blocks the way or is in reach.
+@compiled_exactly
+def matters(hand: complex, goal: complex, radius: float, straight: float, slack: float) -> bool:
+    """Tell whether an obstacle has a part in a name: its foot is between hand and goal, and it blocks the way or is in reach.
 
-    With the angle between hand and goal as seen from the centre, a path round the circle alone is two tangents and an arc of
+    hand, goal: as seen from its centre. With the angle between them, a path round the circle alone is two tangents and an arc of
     angle - acos(r / a) - acos(r / b); it blocks the way where that is positive, and 2 pi - angle in its place is the far side.
     No other obstacle has a say, so a name stays when obstacles appear, vanish or move elsewhere.
     """
-    foot = (from_hand * (from_hand - from_goal).conj()).real / straight
-    between = (foot > slack) & (foot < straight - slack)
-    a, b = np.maximum(a, radius), np.maximum(b, radius)
+    foot = (hand * (hand - goal).conjugate()).real / straight
+    if not slack < foot < straight - slack:
+        return False
+    a, b = max(abs(hand), radius), max(abs(goal), radius)
     saved = np.arccos(radius / a) + np.arccos(radius / b)
-    angle = np.abs(np.angle(from_goal * from_hand.conj()))
-    far = np.sqrt(a**2 - radius**2) + np.sqrt(b**2 - radius**2) + radius * (2.0 * np.pi - angle - saved)
-    return np.asarray(between & ((angle > saved) | (far <= REACH * straight - slack)))
+    turn = goal * hand.conjugate()
+    angle = abs(np.arctan2(turn.imag, turn.real))
+    far = np.sqrt(a * a - radius * radius) + np.sqrt(b * b - radius * radius) + radius * (TURN - angle - saved)
+    return bool(angle > saved or far <= REACH * straight - slack)
+
+
+@compiled_exactly
+def looked_at(
+    hand: complex, goals: Points, apart: Points, centre: Points, wanted: Vector, hard: Vector, slack: Matrix
+) -> tuple[Matrix, Flags, FlagTable, Flags, FlagTable, Vector]:
+    """Return radius, held, near, inside, named and excess of `Scene`.
+
+    apart (g,): the goals, if need be moved off the hand; hard (n,): radii without clearance; slack (g, n): what an obstacle has
+    to be within its bounds to have a name [m].
+    """
+    n, g = len(centre), len(goals)
+    radius, excess, held = np.empty((g, n)), np.full(n, np.inf), np.zeros(n, np.bool_)
+    near, inside, named = np.zeros((g, n), np.bool_), np.zeros(g, np.bool_), np.zeros((g, n), np.bool_)
+    for k in range(n):
+        away = abs(hand - centre[k])
+        held[k] = away <= wanted[k]
+        beside = max(away * (1.0 - TOUCH), POINT) if held[k] else wanted[k]
+        for goal in range(g):
+            left = abs(goals[goal] - centre[k])
+            near[goal, k] = left <= wanted[k]
+            inside[goal] |= left < hard[k]
+            r = min(max(left * (1.0 - TOUCH), POINT), beside) if near[goal, k] else beside
+            straight = max(abs(apart[goal] - hand), SMALLEST)
+            radius[goal, k] = r
+            named[goal, k] = matters(hand - centre[k], goals[goal] - centre[k], r, straight, slack[goal, k])
+            excess[k] = min(excess[k], max(away + left - 2.0 * r, straight) / straight)
+    return radius, held, near, inside, named, excess

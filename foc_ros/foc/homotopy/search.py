@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from foc_ros.foc.config import HomotopyConfig
+from foc_ros.foc.config import MOST_CANDIDATES, HomotopyConfig
 from foc_ros.foc.errors import SceneError
 from foc_ros.foc.records import Array, Candidate, Obstacles
 
@@ -19,7 +19,9 @@ from .scene import scene
 from .selection import select
 
 STATES, STATES_PER_CANDIDATE = 1000, 300
-"""States that the search for one goal may look at: a few dozen are enough for four candidates, 3 us each."""
+"""States that the search for one goal may look at: a few dozen are enough for four candidates."""
+WAYS_PER_CANDIDATE = 2
+"""Ways that are looked for at first: some beyond the candidates tell that no more are short enough."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,8 @@ def search(
 ) -> Search:
     """Find the best config.max_candidates classes between the hand and the goals.
 
+    Of more goals it is one to each, up to `MOST_CANDIDATES`.
+
     hand_mean (6,): state mean, SI units; goals (g, 2) [m]; duration_s: time to go to each goal [s]; steps: N of the guesses;
     previous: the candidates of the tick before, which stay where others are not clearly better. Obstacles are circles of radius
     + config.clearance: what their size is uncertain by is left to the chance constraint, which weighs it by eta. Raises
@@ -60,15 +64,17 @@ def search(
     levels = {radius.tobytes(): Levels(view, radius, velocity) for radius in view.radius}
     states = STATES + STATES_PER_CANDIDATE * config.max_candidates
     reachable = np.flatnonzero(~view.inside).tolist()
-    classes = [Classes(view, levels[view.radius[goal].tobytes()], goal, obstacles.ids, states) for goal in reachable]
-    chosen = select(classes, config.max_candidates, {candidate.label for candidate in previous})
+    usual = WAYS_PER_CANDIDATE * config.max_candidates
+    classes = [Classes(view, levels[view.radius[goal].tobytes()], goal, obstacles.ids, states, usual) for goal in reachable]
+    # a goal without a candidate could never be foretold
+    count = max(config.max_candidates, min(len(classes), MOST_CANDIDATES))
+    chosen = select(classes, count, {candidate.label for candidate in previous})
     notes = Counter({'hand_inside': int(view.held.sum()), 'goal_inside': int(view.inside.sum())})
     notes['goal_near'] = int((view.near.any(axis=1) & ~view.inside).sum())
     for to_goal in classes:
         notes.update(to_goal.notes)
-    paths, lengths = guesses(view, velocity, chosen, np.array(duration_s), steps)
     candidates = tuple(
         Candidate(one.rank[1], one.goal, one.sides, path, length)
-        for one, path, length in zip(chosen, paths, lengths, strict=True)
+        for one, (path, length) in zip(chosen, guesses(view, velocity, chosen, duration_s, steps), strict=True)
     )
     return Search(candidates, {name: count for name, count in notes.items() if count})

@@ -28,5 +28,5 @@ def timed(path: Array, velocity: Array, duration_s: float, steps: int) -> Array:
     step = np.diff(path, axis=0)
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*step.T))])
     heading = step[0] / max(float(np.hypot(*step[0])), np.finfo(float).tiny)
-    at = progress(along[-1:], np.array([heading @ velocity]), np.array([duration_s]), steps)[0]
+    at = progress(float(along[-1]), float(heading @ velocity), duration_s, steps)
     return np.column_stack([np.interp(at, along, axis) for axis in path.T])

@@ -8,131 +8,170 @@ circle j with D = c_j - c_i and w = s_j r_j - s_i r_i has the length l = sqrt(|D
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.foc.records import Array
+from foc_ros.foc.compiled import (
+    Flags,
+    FlagTable,
+    Indices,
+    Matrix,
+    Points,
+    PointTable,
+    Table,
+    Vector,
+    compiled_exactly,
+)
 
 from .circles import Circles
-from .crossing import Complex, Counts, along_circle, straight
-from .tries import Ellipse, Index, Tries
+from .crossing import along_circle, straight
+from .tries import EVERYWHERE, Ellipse
 
 TURN = 2.0 * np.pi
-AT_ONCE = 16
-"""Circles that runs are compared with at once; in a crowd most runs meet one of the first."""
-
-
-class Lists(NamedTuple):
-    """A table of runs as lists, for walking through it one by one; as in Runs."""
-
-    head: list[int]
-    length: list[float]
-    leave: list[float]
-    reach: list[float]
-    clear: list[float]
-    start: list[complex]
-    end: list[complex]
-    heading: list[complex]
-
-    def followed_by(self, more: Lists) -> Lists:
-        """Return the rows of both."""
-        return Lists(
-            self.head + more.head,
-            self.length + more.length,
-            self.leave + more.leave,
-            self.reach + more.reach,
-            self.clear + more.clear,
-            self.start + more.start,
-            self.end + more.end,
-            self.heading + more.heading,
-        )
+LENGTH, LEAVE, REACH, CLEAR = range(4)
+"""Columns of `Runs.spans`."""
+START, END, HEADING = range(3)
+"""Columns of `Runs.places`."""
 
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """A table of free runs.
+    """A table of m free runs.
 
-    tail, head: nodes; node 2 k + (s > 0) is circle k passed in sense s; length [m]; heading, complex of length 1; start, end,
-    complex [m]; leave, reach: angles of these on their circles, in [0, 2 pi]; clear: angle by which a path may follow the
-    circle from the end before it meets an overlapping one. Of the rays from the centres, (runs, n): crossing by the run and by
-    the way to its start, along its circle anticlockwise from angle 0; way_in: crossings by the way to its end likewise.
+    tail, head (m,): nodes. spans (m, 4): length [m]; angles of the points where it leaves and reaches its circles, in [0, 2 pi];
+    angle by which a path may follow the circle from the end before it meets an overlapping one. places (m, 3), complex: start,
+    end [m], heading of length 1. Of the rays from the centres, (m, n): crossing by the run and by the way to its start, along its
+    circle anticlockwise from angle 0; way_in: crossings by the way to its end likewise.
     """
 
-    tail: Index
-    head: Index
-    length: Array
-    heading: Complex
-    start: Complex
-    end: Complex
-    leave: Array
-    reach: Array
-    clear: Array
-    crossing: Counts
-    way_in: Counts
+    tail: Indices
+    head: Indices
+    spans: Matrix
+    places: PointTable
+    crossing: Table
+    way_in: Table
 
-    @cached_property
-    def lists(self) -> Lists:
-        """The table as lists."""
-        return Lists(*(getattr(self, name).tolist() for name in Lists._fields))
+    def followed_by(self, more: Runs) -> Runs:
+        """Return the rows of both."""
+        return Runs(
+            np.concatenate((self.tail, more.tail)),
+            np.concatenate((self.head, more.head)),
+            np.concatenate((self.spans, more.spans)),
+            np.concatenate((self.places, more.places)),
+            np.concatenate((self.crossing, more.crossing)),
+            np.concatenate((self.way_in, more.way_in)),
+        )
 
 
+def free(field: Circles, c: Points, r: Vector, tail: Indices, head: Indices, ellipse: Ellipse = EVERYWHERE) -> Indices:
+    """Return which of the runs exist, are free, and lie in an ellipse one way or the other; c, r: of circles, goals, hand."""
+    return free_tangents(c, r, field.bar, field.outer, tail, head, *ellipse)
+
+
+def tabulated(field: Circles, c: Points, r: Vector, tail: Indices, head: Indices) -> Runs:
+    """Tabulate free runs."""
+    return Runs(tail, head, *table(c, r, field.held, field.blocker, tail, head))
+
+
+@compiled_exactly
+def tangent(a: complex, r_a: float, b: complex, r_b: float) -> tuple[float, complex]:
+    """Return length, 0 where there is none, and direction of the run between circles; radii negative where passed clockwise."""
+    D, w = b - a, r_b - r_a
+    square = D.real * D.real + D.imag * D.imag
+    length = np.sqrt(max(square - w * w, 0.0))
+    return length, complex(length, -w) * D / max(square, 1e-300)
+
+
+@compiled_exactly
+def signed(radius: Vector, node: int) -> float:
+    """Return the radius of a node's circle, negative where it is passed clockwise."""
+    r: float = radius[node >> 1]
+    return r if node & 1 else -r
+
+
+@compiled_exactly
+def within(hand: complex, goals: Points, reach: Vector, start: complex, end: complex, length: float) -> bool:
+    """Tell whether the way from the hand over a run to some goal is shorter than the goal's reach (g,)."""
+    spare = (reach - np.abs(end - goals)).max()
+    return bool(abs(start - hand) + length < spare)
+
+
+@compiled_exactly
+def blocked(c: Points, bar: Vector, i: int, j: int, start: complex, u: complex, length: float) -> bool:
+    """Tell whether a run from circle i to circle j comes too near to another; bar (n,): square of the distance that is."""
+    for k in range(len(bar)):
+        if k not in (i, j):
+            seen = (c[k] - start) * u.conjugate()
+            beyond = seen.real - min(max(seen.real, 0.0), length)
+            if beyond * beyond + seen.imag * seen.imag < bar[k]:
+                return True
+    return False
+
+
+@compiled_exactly
 def free_tangents(
-    field: Circles, c: Complex, r: Array, tries: Tries, ellipse: Ellipse | None = None
-) -> tuple[Index, Array, Complex]:
-    """Return which of the runs exist and are free, their lengths [m] and directions; c, r: of circles, goals and perhaps hand.
-
-    ellipse: what runs have to stay in, one way or the other.
-    """
-    i, s_i, j, s_j, others = tries
-    D, w = c[j] - c[i], s_j * r[j] - s_i * r[i]
-    square = D.real**2 + D.imag**2
-    length = np.sqrt((square - w**2).clip(0.0))
-    u = (length - 1j * w) * D / square.clip(1e-300)
-    start = c[i] - 1j * (s_i * r[i]) * u
-    wanted = length > 0.0
-    if not field.outer.all():
-        outer = np.append(field.outer, True)
-        wanted &= outer[i] & outer[j]
-    if ellipse is not None:
+    c: Points,
+    r: Vector,
+    bar: Vector,
+    outer: Flags,
+    tail: Indices,
+    head: Indices,
+    hand: complex,
+    goals: Points,
+    reach: Vector,
+) -> Indices:
+    """Return the rows of the tries (m,) that are tangents between outer circles, within the ellipse, and not blocked."""
+    kept, count = np.empty(len(tail), np.intp), 0
+    for run in range(len(tail)):
+        i, j, r_i = tail[run] >> 1, head[run] >> 1, signed(r, tail[run])
+        if (i < len(bar) and not outer[i]) or (j < len(bar) and not outer[j]):
+            continue
+        length, u = tangent(c[i], r_i, c[j], signed(r, head[run]))
+        start = c[i] - 1j * r_i * u
         end = start + length * u
-        wanted &= ellipse.holds(start, end, length) | ellipse.holds(end, start, length)
-    free = np.flatnonzero(wanted)
-    for first in range(0, field.n, AT_ONCE):
-        part = slice(first, min(first + AT_ONCE, field.n))
-        seen = (c[part] - start[free, None]) * u[free, None].conj()
-        beyond = seen.real - seen.real.clip(0.0, length[free, None])
-        blocked = (beyond**2 + seen.imag**2 < field.bar[part]) & others[free, part]
-        free = free[~blocked.any(axis=1)]
-    return free, length[free], u[free]
+        if (
+            length > 0.0
+            and (within(hand, goals, reach, start, end, length) or within(hand, goals, reach, end, start, length))
+            and not blocked(c, bar, i, j, start, u, length)
+        ):
+            kept[count] = run
+            count += 1
+    return kept[:count].copy()
 
 
-def runs(field: Circles, c: Complex, r: Array, ends: tuple[Index, Index, Index, Index], length: Array, u: Complex) -> Runs:
-    """Tabulate free runs; ends: from, sense, to, sense."""
-    i, s_i, j, s_j = ends
-    from_i, from_j = -1j * (s_i * r[i]) * u, -1j * (s_j * r[j]) * u
-    start, end = c[i] + from_i, c[j] + from_j
-    leave, reach = np.angle(from_i) % TURN, np.angle(from_j) % TURN
-    start_seen, way_out = _seen(field, i, start, from_i)
-    end_seen, way_in = _seen(field, j, end, from_j)
-    crossing = way_out + straight(start_seen, end_seen)
-    clear = np.full(len(i), TURN)
-    if field.overlapping:
-        on = np.flatnonzero(j < field.n)
-        ahead = s_j[on, None] * (field.blocker[j[on]] - reach[on, None]) % TURN
-        clear[on] = np.fmin(TURN, np.fmin.reduce(ahead, axis=1, initial=TURN))
-    return Runs(2 * i + (s_i > 0), 2 * j + (s_j > 0), length, u, start, end, leave, reach, clear, crossing, way_in)
+@compiled_exactly
+def ahead(blocker: Vector, at: float, sense: int) -> float:
+    """Return the angle from a point of a circle to the next overlapping circle, a whole turn where there is none."""
+    clear = TURN
+    for k in range(len(blocker)):
+        if not np.isnan(blocker[k]):
+            clear = min(clear, sense * (blocker[k] - at) % TURN)
+    return clear
 
 
-def _seen(field: Circles, circle: Index, point: Complex, offset: Complex) -> tuple[Complex, Counts]:
-    """Return points on circles as seen from the centres, and crossings on the way there; offset: from the circle's own centre."""
-    seen = point[:, None] - field.centre[: field.n]
-    way = np.zeros(seen.shape, dtype=np.int64)
-    on = np.flatnonzero(circle < field.n)
-    if len(on):
-        own = circle[on]
-        seen[on, own] = offset[on]
-        east = (field.centre[own] + field.radius[own])[:, None] - field.centre[: field.n]
-        way[on] = along_circle(east, seen[on], field.held[own])
-    return seen, way
+@compiled_exactly
+def table(
+    c: Points, r: Vector, held: FlagTable, blocker: Matrix, tail: Indices, head: Indices
+) -> tuple[Matrix, PointTable, Table, Table]:
+    """Return spans, places, crossing and way_in of `Runs` for given runs; held, blocker: of `Circles`."""
+    m, n = len(tail), len(blocker)
+    spans, places = np.empty((m, 4)), np.empty((m, 3), np.complex128)
+    crossing, way_in = np.zeros((m, n), np.intp), np.zeros((m, n), np.intp)
+    for run in range(m):
+        i, j, r_i, r_j = tail[run] >> 1, head[run] >> 1, signed(r, tail[run]), signed(r, head[run])
+        length, u = tangent(c[i], r_i, c[j], r_j)
+        from_i, from_j = -1j * r_i * u, -1j * r_j * u
+        start, end = c[i] + from_i, c[j] + from_j
+        places[run, START], places[run, END], places[run, HEADING] = start, end, u
+        spans[run, LENGTH] = length
+        spans[run, LEAVE] = np.arctan2(from_i.imag, from_i.real) % TURN
+        spans[run, REACH] = np.arctan2(from_j.imag, from_j.real) % TURN
+        spans[run, CLEAR] = ahead(blocker[j], spans[run, REACH], 2 * (head[run] & 1) - 1) if j < n else TURN
+        for k in range(n):
+            from_k, to_k = from_i if k == i else start - c[k], from_j if k == j else end - c[k]
+            crossing[run, k] = straight(from_k, to_k)
+            if i < n:
+                crossing[run, k] += along_circle(c[i] + r[i] - c[k], from_k, held[i, k])
+            if j < n:
+                way_in[run, k] = along_circle(c[j] + r[j] - c[k], to_k, held[j, k])
+    return spans, places, crossing, way_in

@@ -1,103 +1,92 @@
-"""From ways to points: the straight runs and arcs of several ways laid end to end on one scale of length."""
+"""From a way to points: its straight runs and arcs laid end to end, and how far along them a hand is."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache
-
 import numpy as np
 
-from foc_ros.foc.records import Array
+from foc_ros.foc.compiled import Indices, Matrix, Points, PointTable, Vector, compiled, compiled_exactly
 
-from .crossing import Complex
-from .tangents import TURN
-from .tries import Index
-from .ways import BACK, Plan, Way
+from .best_first import arc
+from .tangents import END, HEADING, LENGTH, START
+
+AT, BEND = range(2)
+"""Columns of the pieces' measures."""
 
 
-@dataclass(frozen=True, eq=False)
-class Taut:
-    """k paths laid end to end, each a run, an arc, a run, ...
+@compiled_exactly
+def pieces(head: Indices, spans: Matrix, places: PointTable, radius: Vector, way: Indices) -> tuple[Matrix, PointTable, float]:
+    """Lay out a way: a run, an arc, a run, ...
 
-    Per piece: at, where it begins on the scale [m]; begin, complex [m]; heading there, complex of length 1; bend [1/m],
-    anticlockwise positive, 0 for runs. Per path: first and last piece; begins, where it begins on the scale [m]; length [m].
+    Returns for each piece where it begins along the path [m] and its bend [1/m], anticlockwise positive, 0 for runs; the point
+    at which it begins [m] and the heading there, of length 1; and the length of the path [m].
     """
-
-    at: Array
-    begin: Complex
-    heading: Complex
-    bend: Array
-    first: Index
-    last: Index
-    begins: Array
-    length: Array
-
-    def points(self, along: Array) -> Complex:
-        """Points at the lengths `along` (k, m) from the beginning of each path [m]; complex (k, m)."""
-        along = along + self.begins[:, None]
-        piece = np.searchsorted(self.at, along, side='right') - 1
-        piece = np.minimum(np.maximum(piece, self.first[:, None]), self.last[:, None])
-        step, bend = along - self.at[piece], self.bend[piece]
-        curved = bend != 0.0
-        turn = 1j * np.where(curved, bend, 1.0)
-        points: Complex = self.begin[piece] + self.heading[piece] * np.where(curved, (np.exp(turn * step) - 1.0) / turn, step)
-        return points
+    count = 2 * len(way) - 1
+    measures, begins, length = np.zeros((count, 2)), np.empty((count, 2), np.complex128), 0.0
+    for i in range(len(way)):
+        run = way[i]
+        measures[2 * i, AT] = length
+        begins[2 * i, 0], begins[2 * i, 1] = places[run, START], places[run, HEADING]
+        length += spans[run, LENGTH]
+        if i + 1 < len(way):
+            sense, circle = 2 * (head[run] & 1) - 1, head[run] >> 1
+            measures[2 * i + 1, AT], measures[2 * i + 1, BEND] = length, sense / radius[circle]
+            begins[2 * i + 1, 0], begins[2 * i + 1, 1] = places[run, END], places[run, HEADING]
+            length += radius[circle] * max(arc(spans, run, way[i + 1], sense), 0.0)
+    return measures, begins, length
 
 
-def taut(plan: Plan, found: Sequence[Way]) -> Taut:
-    """Lay out ways through a plan."""
-    at: list[float] = []
-    begin: list[complex] = []
-    heading: list[complex] = []
-    bend: list[float] = []
-    first: list[int] = []
-    begins: list[float] = []
-    scale = 0.0
-    for way in found:
-        first.append(len(at))
-        begins.append(scale)
-        for run, following in zip(way.runs, (*way.runs[1:], None), strict=True):
-            at.append(scale)
-            begin.append(plan.table.start[run])
-            heading.append(plan.table.heading[run])
-            bend.append(0.0)
-            scale += plan.table.length[run]
-            if following is not None:
-                sense, radius = 2 * (plan.table.head[run] & 1) - 1, plan.roadmap.radius[plan.table.head[run] >> 1]
-                angle = sense * (plan.table.leave[following] - plan.table.reach[run])
-                at.append(scale)
-                begin.append(plan.table.end[run])
-                heading.append(plan.table.heading[run])
-                bend.append(sense / radius)
-                scale += radius * (angle + TURN if angle < -BACK else max(angle, 0.0))
-    last = np.array([*first[1:], len(at)]) - 1
-    length = np.diff([*begins, scale])
-    return Taut(
-        np.array(at),
-        np.array(begin),
-        np.array(heading),
-        np.array(bend),
-        np.array(first),
-        last,
-        np.array(begins),
-        length,
-    )
+@compiled_exactly
+def points_at(measures: Matrix, begins: PointTable, along: Vector) -> Points:
+    """Return the points of laid out pieces at lengths `along` (m,) from the beginning [m]; complex (m,)."""
+    points = np.empty(len(along), np.complex128)
+    for i in range(len(along)):
+        piece = max(np.searchsorted(measures[:, AT], along[i], side='right') - 1, 0)
+        step, turn = along[i] - measures[piece, AT], 1j * measures[piece, BEND]
+        chord = step + 0j if turn == 0j else (np.exp(turn * step) - 1.0) / turn
+        points[i] = begins[piece, 0] + begins[piece, 1] * chord
+    return points
 
 
-def progress(length: Array, speed: Array, duration_s: Array, steps: int) -> Array:
-    """Path length at steps 0..N (k, N + 1) [m]: minimum jerk from the present speed along the path to rest at its end.
+@compiled
+def progress(length: float, speed: float, duration_s: float, steps: int) -> Vector:
+    """Path length at steps 0..N (N + 1,) [m]: minimum jerk from the present speed along the path to rest at its end.
 
     s = L (10 t^3 - 15 t^4 + 6 t^5) + v T (t - 6 t^3 + 8 t^4 - 3 t^5) with t in [0, 1]. It would overshoot beyond v T = 2.5 L
-    and begin backwards with v < 0, so v is held between. length, speed, duration_s: (k,) [m, m/s, s].
+    and begin backwards with v < 0, so v is held between. length [m], speed [m/s], duration_s [s].
     """
-    rest, carried = _shapes(steps)
-    reach = (speed * duration_s).clip(0.0, 2.5 * length)
-    along: Array = (length[:, None] * rest + reach[:, None] * carried).clip(0.0, length[:, None])
+    carried, along = min(max(speed * duration_s, 0.0), 2.5 * length), np.empty(steps + 1)
+    for step in range(steps + 1):
+        t = step / steps
+        rest = t**3 * (10.0 + t * (6.0 * t - 15.0))
+        along[step] = min(max(length * rest + carried * t * (1.0 + t**2 * (t * (8.0 - 3.0 * t) - 6.0)), 0.0), length)
     return along
 
 
-@lru_cache(maxsize=16)
-def _shapes(steps: int) -> tuple[Array, Array]:
-    t = np.linspace(0.0, 1.0, steps + 1)
-    return t**3 * (10.0 + t * (6.0 * t - 15.0)), t * (1.0 + t**2 * (t * (8.0 - 3.0 * t) - 6.0))
+@compiled_exactly
+def followed(
+    head: Indices,
+    spans: Matrix,
+    places: PointTable,
+    radius: Vector,
+    way: Indices,
+    velocity: complex,
+    duration_s: float,
+    steps: int,
+) -> tuple[Points, Vector, float]:
+    """Return where a hand that follows a way is at steps 0..N: points (N + 1,), lengths along the way (N + 1,), its length [m].
+
+    head, spans, places: of `tangents.Runs`; radius: of the circles [m]; velocity of the hand now [m/s]; duration_s [s].
+    """
+    measures, begins, length = pieces(head, spans, places, radius, way)
+    speed = (begins[0, 1] * velocity.conjugate()).real
+    along = progress(length, speed, duration_s, steps)
+    points = points_at(measures, begins, along)
+    points[-1] = places[way[-1], END]  # without what rounding has gathered on the way
+    return points, along, length
+
+
+@compiled_exactly
+def spaced(head: Indices, spans: Matrix, places: PointTable, radius: Vector, way: Indices, count: int) -> Points:
+    """Return points at equal distances along a way, from its beginning to its end; complex (count,)."""
+    measures, begins, length = pieces(head, spans, places, radius, way)
+    return points_at(measures, begins, length * np.linspace(0.0, 1.0, count))

@@ -1,0 +1,78 @@
+"""A goal that the hand passes: any velocity there, and none of the effort that stopping takes."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from foc_ros.foc.config import Config, updated
+from foc_ros.foc.dynamics import horizon, triple_integrator
+from foc_ros.foc.estimator import gramian, transition
+from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.records import HandState, make_obstacles
+from foc_ros.foc.replanning import replanned_error_map, triple_integrator_error_map, triple_integrator_process_covariance
+from foc_ros.foc.time_cost import effort_along, least_cost_time
+
+PASSING = updated(
+    Config(), {'duration.arrival': 'passing', 'duration.model': 'fixed', 'duration.fixed_s': 1.0, 'foc.process_noise': 0.5}
+)
+FREE = make_obstacles()
+
+
+def hand(*mean: float) -> HandState:
+    return HandState(0, np.array(mean), 1e-8 * np.eye(6), onset_ns=0, onset_position=np.array(mean[:2]))
+
+
+def test_a_hand_that_keeps_its_speed_passes_without_effort() -> None:
+    (found,) = predict(PASSING, hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0), FREE, np.array([[0.3, 0.1]]), Memory())[0].solved
+    assert found.solution.effort == pytest.approx(0.0, abs=1e-12)
+    assert_allclose(found.solution.mean[-1], [0.3, 0.1, 0.3, 0.1, 0.0, 0.0], atol=1e-9)
+
+
+def test_the_effort_is_the_least_that_leads_to_the_goal_without_acceleration() -> None:
+    start = np.array([0.0, 0.0, 0.2, -0.1, 0.5, 1.0])
+    config = updated(PASSING, {'foc.steps': 400})
+    (found,) = predict(config, hand(*start), FREE, np.array([[0.3, 0.1]]), Memory())[0].solved
+    along = [effort_along(way, *start[2 + axis :: 2], np.array([1.0]), True)[0] for axis, way in enumerate((0.3, 0.1))]
+    assert found.solution.effort * found.solution.dt == pytest.approx(sum(along), rel=1e-3)
+    assert_allclose(found.solution.mean[-1, [0, 1, 4, 5]], [0.3, 0.1, 0.0, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize(('length', 'speed', 'acceleration'), [(0.3, 0.0, 0.0), (0.2, 0.5, -1.0), (0.05, -0.2, 3.0)])
+def test_effort_along_a_line_is_that_of_least_energy(length: float, speed: float, acceleration: float) -> None:
+    held, times = [0, 2], np.array([0.4, 1.0, 2.5])
+    expected = []
+    for T in times:
+        missing = (np.array([length, 0.0, 0.0]) - transition(T) @ [0.0, speed, acceleration])[held]
+        expected.append(missing @ np.linalg.solve(gramian(T)[np.ix_(held, held)], missing))
+    assert_allclose(effort_along(length, speed, acceleration, times, True), expected, rtol=1e-9)
+    assert least_cost_time(0.4, 0.5, 0.0, 0.1, 0.05, 20.0, True) == pytest.approx(0.8, rel=0.05)
+
+
+def test_errors_are_corrected_but_for_the_velocity() -> None:
+    dt, steps = 0.05, 20
+    error_map = triple_integrator_error_map(dt, steps, True)
+    assert_allclose(error_map, replanned_error_map(horizon(triple_integrator(dt), steps), True), atol=1e-9)
+    assert_allclose(error_map[-1][[0, 1, 4, 5]], 0.0, atol=1e-9)
+    kept = error_map[-1][2, 2]
+    assert kept == pytest.approx(error_map[-1][3, 3]) and abs(kept) > 0.1
+    rest, passed = (triple_integrator_process_covariance(dt, steps, passing) for passing in (False, True))
+    assert passed[-1, 2, 2] > 2.0 * rest[-1, 2, 2]
+
+
+def test_where_the_hand_ends_it_is_as_unsure_as_it_passes() -> None:
+    scene = FREE, np.array([[0.3, 0.1]]), Memory()
+    now = hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0)
+    passing = predict(PASSING, now, *scene)[0].solved[0].solution
+    resting = predict(updated(PASSING, {'duration.arrival': 'rest'}), now, *scene)[0].solved[0].solution
+    assert_allclose(resting.mean[-1, 2:], 0.0, atol=1e-9)
+    assert resting.effort > 1.0
+    assert passing.covariance[-1, 2, 2] > 2.0 * resting.covariance[-1, 2, 2]
+
+
+def test_past_an_obstacle_the_goal_is_passed_on_the_way_on() -> None:
+    scene = make_obstacles([[0.15, 0.04]], 0.05), np.array([[0.3, 0.1]])
+    solved = predict(PASSING, hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0), *scene, Memory())[0].solved
+    assert len(solved) == 2
+    for each in solved:
+        assert_allclose(each.solution.mean[-1, [0, 1, 4, 5]], [0.3, 0.1, 0.0, 0.0], atol=1e-6)
+        assert np.hypot(*each.solution.mean[-1, 2:4]) > 0.1
