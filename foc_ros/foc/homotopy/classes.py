@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from foc_ros.foc.records import LEFT, RIGHT
 
 from .circles import GRAZE
-from .crossing import Complex, angle_of
+from .crossing import Complex
 from .levels import MOST, Level, Levels
 from .scene import Scene
 from .sides import swept_angles
@@ -23,13 +22,16 @@ FINENESS = 257
 """Points at which a path is compared with circles that its roadmap does not hold."""
 
 
-@dataclass(frozen=True, eq=False)
-class Found:
+Side = tuple[str, int]
+"""An obstacle's id, and LEFT or RIGHT."""
+
+
+class Found(NamedTuple):
     """One class: rank (the nanometre of its key [m], then its label); goal; sides by id; the way with its plan."""
 
     rank: tuple[float, str]
     goal: int
-    sides: tuple[tuple[str, int], ...]
+    sides: tuple[Side, ...]
     way: Way
     plan: Plan
 
@@ -41,13 +43,12 @@ class Classes:
     """
 
     def __init__(self, scene: Scene, levels: Levels, goal: int, ids: tuple[str, ...], states: int, usual: int) -> None:
-        self.notes: Counter[str] = Counter()
+        self.notes = dict.fromkeys(('no_way', 'search_cut', 'left_out'), 0)
         self._scene, self._levels, self._goal, self._ids = scene, levels, goal, ids
         self._states, self._usual = states, usual
         self._named: list[int] = sorted(np.flatnonzero(scene.named[goal]).tolist(), key=ids.__getitem__)
-        self._names = [ids[row] for row in self._named]
-        seen = scene.centre[self._named]
-        self._turned: list[float] = (angle_of(scene.goals[goal] - seen) - angle_of(scene.hand - seen)).tolist()
+        turned: list[float] = scene.turned[goal, self._named].tolist()
+        self._choices = [_sides(ids[row], angle) for row, angle in zip(self._named, turned, strict=True)]
 
     def __iter__(self) -> Iterator[Found]:
         """Yield each class once, by its shortest path."""
@@ -63,7 +64,7 @@ class Classes:
 
     def _by_key(self) -> Iterator[Found]:
         straight = abs(self._scene.goals[self._goal] - self._scene.hand)
-        given: set[tuple[tuple[str, int], ...]] = set()
+        given: set[tuple[Side, ...]] = set()
         rows = self._levels.first(self._named)
         while True:
             bounded = len(rows) < MOST and not rows.issuperset(self._named)
@@ -96,20 +97,23 @@ class Classes:
 
     def _found(self, way: Way, level: Level, told: list[int]) -> Found | None:
         """Name a way; None for one that winds about an obstacle. told: which of the names its crossings are of."""
-        swept = self._turned.copy()
-        for k, crossings in zip(told, way.crossings.tolist(), strict=True):
-            swept[k] += TURN * crossings
-            if abs(swept[k]) >= TURN:
-                return None
-        if len(told) < len(swept):
-            others = [k for k in range(len(swept)) if k not in told]
-            centres = self._scene.centre[[self._named[k] for k in others]]
-            line = _line(way, level.plan).view(float).reshape(-1, 2)
-            for k, angle in zip(others, swept_angles(line, centres.view(float).reshape(-1, 2)).tolist(), strict=True):
-                swept[k] = angle
-        sides = tuple([(name, LEFT if angle < 0.0 else RIGHT) for name, angle in zip(self._names, swept, strict=True)])
+        chosen = [self._choices[k][crossings] for k, crossings in zip(told, way.crossings.tolist(), strict=True)]
+        if None in chosen:
+            return None
+        if len(told) < len(self._named):
+            chosen = self._completed(dict(zip(told, chosen, strict=True)), way, level)
+        sides = tuple(side for side in chosen if side)
         label = f'goal{self._goal}:' + ''.join([('+' if side == LEFT else '-') + name for name, side in sides])
         return Found((round(way.key, 9), label), self._goal, sides, way, level.plan)
+
+    def _completed(self, sides: dict[int, Side | None], way: Way, level: Level) -> list[Side | None]:
+        """Add sides, by place in the name, of obstacles that a level does not hold: by the angle that the path sweeps."""
+        others = [k for k in range(len(self._named)) if k not in sides]
+        line, centres = _line(way, level.plan), self._scene.centre[[self._named[k] for k in others]]
+        swept = swept_angles(line.view(float).reshape(-1, 2), centres.view(float).reshape(-1, 2))
+        for k, angle in zip(others, swept.tolist(), strict=True):
+            sides[k] = self._ids[self._named[k]], LEFT if angle < 0.0 else RIGHT
+        return [sides[k] for k in range(len(sides))]
 
     def _met(self, found: Found, level: Level) -> list[int]:
         """Return the circles that a path meets and its roadmap does not hold."""
@@ -117,6 +121,15 @@ class Classes:
         apart = np.abs(_line(found.way, found.plan)[:, None] - self._scene.centre[others])
         met: list[int] = others[(apart < self._scene.radius[self._goal, others] - GRAZE).any(axis=0)].tolist()
         return met
+
+
+def _sides(name: str, turned: float) -> tuple[Side | None, ...]:
+    """Return the side of a way that crosses an obstacle's ray 0, 1 or -1 times, as index; None where that winds about it.
+
+    turned: from the direction of the hand to that of the goal, as seen from the obstacle [rad].
+    """
+    swept = (turned, turned + TURN, turned - TURN)
+    return tuple([(name, LEFT if angle < 0.0 else RIGHT) if abs(angle) < TURN else None for angle in swept])
 
 
 def _line(way: Way, plan: Plan) -> Complex:

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.foc.compiled import compiled_exactly
-from foc_ros.foc.records import Array
 
 Complex = NDArray[np.complex128]
 
@@ -33,7 +32,8 @@ def along_circle(east: complex, point: complex, held: bool) -> int:
     return 1 if east.imag >= 0.0 else 0
 
 
-def angle_of(seen: Complex) -> Array:
-    """Angle in (-pi, pi]; a negative zero counts as zero, as it does in the crossings."""
-    angle: Array = np.angle(seen + 0.0j)
+@compiled_exactly
+def direction(seen: complex) -> float:
+    """Return the angle of a point in (-pi, pi]; a negative zero counts as zero, as it does in the crossings."""
+    angle: float = np.arctan2(seen.imag + 0.0, seen.real + 0.0)
     return angle

@@ -11,7 +11,7 @@ from foc_ros.foc.compiled import Flags, FlagTable, Matrix, Points, Vector, compi
 from foc_ros.foc.records import Array, Candidate, Obstacles
 
 from .circles import GRAZE
-from .crossing import Complex
+from .crossing import Complex, direction
 from .hysteresis import kept_open, strangers
 from .tangents import TURN
 
@@ -29,21 +29,23 @@ TOUCH = 1e-6
 class Scene:
     """n obstacles as circles of radius + clearance, g goals, as seen from the hand.
 
-    hand, goals (g,), centre (n,): complex [m]; radius (g, n) on the way to each goal [m], smaller where a circle would hold the
-    hand (held (n,)) or that goal (near (g, n)); wanted (n,): radius + clearance [m]; inside (g,): goals inside an obstacle;
-    named (g, n): who takes part in the names of the ways to each goal; excess (n,): least length of a path to any goal that
-    touches the circle, as a multiple of the straight way to it.
+    hand, goals (g,), centre (n,): complex [m]; wanted (n,): radius + clearance [m]; radius (g, n) on the way to each goal [m],
+    smaller where a circle would hold the hand (held (n,)) or that goal (near (g, n)); inside (g,): goals inside an obstacle;
+    named (g, n): who takes part in the names of the ways to each goal; turned (g, n): from the direction of the hand to that of
+    the goal, as seen from each centre [rad]; excess (n,): least length of a path to any goal that touches the circle, as a
+    multiple of the straight way to it.
     """
 
     hand: complex
     goals: Complex
     centre: Complex
-    radius: Array
     wanted: Array
+    radius: Array
     held: Flags
     near: FlagTable
     inside: Flags
     named: FlagTable
+    turned: Array
     excess: Array
 
 
@@ -53,8 +55,8 @@ def scene(hand: complex, goals: Complex, obstacles: Obstacles, clearance: float,
     wanted = kept_open(obstacles.ids, centre, np.maximum(obstacles.radius + clearance, SMALLEST), clearance, previous)
     slack = strangers(obstacles.ids, len(goals), previous)
     apart = np.where(np.abs(goals - hand) < GRAZE, hand + GRAZE, goals)
-    radius, held, near, inside, named, excess = looked_at(hand, goals, apart, centre, wanted, obstacles.radius, slack)
-    return Scene(hand, apart, centre, radius, wanted, held, near, inside, named, excess)
+    seen = looked_at(hand, goals, apart, centre, wanted, obstacles.radius, slack)
+    return Scene(hand, apart, centre, wanted, *seen)
 
 
 @compiled_exactly
@@ -79,14 +81,14 @@ def matters(hand: complex, goal: complex, radius: float, straight: float, slack:
 @compiled_exactly
 def looked_at(
     hand: complex, goals: Points, apart: Points, centre: Points, wanted: Vector, hard: Vector, slack: Matrix
-) -> tuple[Matrix, Flags, FlagTable, Flags, FlagTable, Vector]:
-    """Return radius, held, near, inside, named and excess of `Scene`.
+) -> tuple[Matrix, Flags, FlagTable, Flags, FlagTable, Matrix, Vector]:
+    """Return radius, held, near, inside, named, turned and excess of `Scene`.
 
     apart (g,): the goals, if need be moved off the hand; hard (n,): radii without clearance; slack (g, n): what an obstacle has
     to be within its bounds to have a name [m].
     """
     n, g = len(centre), len(goals)
-    radius, excess, held = np.empty((g, n)), np.full(n, np.inf), np.zeros(n, np.bool_)
+    radius, turned, excess, held = np.empty((g, n)), np.empty((g, n)), np.full(n, np.inf), np.zeros(n, np.bool_)
     near, inside, named = np.zeros((g, n), np.bool_), np.zeros(g, np.bool_), np.zeros((g, n), np.bool_)
     for k in range(n):
         away = abs(hand - centre[k])
@@ -100,5 +102,6 @@ def looked_at(
             straight = max(abs(apart[goal] - hand), SMALLEST)
             radius[goal, k] = r
             named[goal, k] = matters(hand - centre[k], goals[goal] - centre[k], r, straight, slack[goal, k])
+            turned[goal, k] = direction(apart[goal] - centre[k]) - direction(hand - centre[k])
             excess[k] = min(excess[k], max(away + left - 2.0 * r, straight) / straight)
-    return radius, held, near, inside, named, excess
+    return radius, held, near, inside, named, turned, excess

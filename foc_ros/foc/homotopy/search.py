@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 
@@ -69,12 +69,14 @@ def search(
     # a goal without a candidate could never be foretold
     count = max(config.max_candidates, min(len(classes), MOST_CANDIDATES))
     chosen = select(classes, count, {candidate.label for candidate in previous})
-    notes = Counter({'hand_inside': int(view.held.sum()), 'goal_inside': int(view.inside.sum())})
-    notes['goal_near'] = int((view.near.any(axis=1) & ~view.inside).sum())
-    for to_goal in classes:
-        notes.update(to_goal.notes)
+    near = view.near.any(axis=1) & ~view.inside
+    counts = [('hand_inside', int(view.held.sum())), ('goal_inside', int(view.inside.sum())), ('goal_near', int(near.sum()))]
+    notes = dict[str, int]()
+    for name, count in chain(counts, *(to_goal.notes.items() for to_goal in classes)):
+        if count:
+            notes[name] = notes.get(name, 0) + count
     candidates = tuple(
         Candidate(one.rank[1], one.goal, one.sides, path, length)
         for one, (path, length) in zip(chosen, guesses(view, velocity, chosen, duration_s, steps), strict=True)
     )
-    return Search(candidates, {name: count for name, count in notes.items() if count})
+    return Search(candidates, notes)

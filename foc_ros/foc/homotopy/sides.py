@@ -8,7 +8,7 @@ from foc_ros.foc.compiled import Flags, Matrix, Tensor, Vector, compiled_exactly
 from foc_ros.foc.errors import SceneError
 from foc_ros.foc.records import LEFT, RIGHT, Array, Obstacles
 
-from .crossing import straight
+from .crossing import direction, straight
 from .tangents import TURN
 
 
@@ -46,13 +46,13 @@ def swept(path: Matrix, centres: Tensor) -> Vector:
     angles = np.empty(n)
     for k in range(n):
         x, y = path[0, 0] - centres[0, k, 0], path[0, 1] - centres[0, k, 1]
-        begins, before, turns = np.arctan2(y + 0.0, x + 0.0), complex(x, y), 0
+        begins, before, turns = direction(complex(x, y)), complex(x, y), 0
         for t in range(1, m):
             at = min(t, len(centres) - 1)
             x, y = path[t, 0] - centres[at, k, 0], path[t, 1] - centres[at, k, 1]
             turns += straight(before, complex(x, y))
             before = complex(x, y)
-        angles[k] = np.arctan2(y + 0.0, x + 0.0) - begins + TURN * turns
+        angles[k] = direction(before) - begins + TURN * turns
     return angles
 
 
