@@ -41,7 +41,7 @@ def candidate_answer(outcome: Outcome) -> dict[str, Any]:
 def solution_account(solution: Solution) -> dict[str, Any]:
     """Return all the rest of a solution: words, every term of the cost, where eta is attained, what holds it, the whole state.
 
-    Units: those of :class:`Solution`. rows: the active ones; covariance (N + 1, n, n) at steps 0..N; control (N, 2).
+    Units: those of :class:`Solution`. rows: the contacts that hold it; covariance (N + 1, n, n) at steps 0..N; control (N, 2).
     """
     held = zip(solution.multipliers, solution.held, strict=True)
     return {

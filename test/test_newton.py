@@ -82,6 +82,16 @@ def test_the_same_circle_twice_is_touched_once():
     np.testing.assert_allclose(control, expected, atol=1e-6 * np.abs(expected).max())
 
 
+def test_forces_that_are_not_known_count_as_equal():
+    problem = one_obstacle(0.9)
+    here, contacts = rough(problem)
+    unknown = Contacts(contacts.obstacle, contacts.time, np.full(len(contacts), np.nan))
+    control, found = slid(problem, here.control, joined(problem, unknown), TAU, LAM)
+    _, expected = slid(problem, here.control, joined(problem, contacts), TAU, LAM)
+    np.testing.assert_allclose(found.time, expected.time, atol=1e-6)
+    assert np.isfinite(control).all()
+
+
 def test_where_two_circles_leave_no_gap_there_is_no_way_between_two_steps_either():
     """Rows at the steps let the mean leap through the gap of 1 mm less than nothing."""
     shut = make_obstacles([[0.122, 0.03], [0.122, -0.03]], [0.0305, 0.0305], [0.0, 0.0])

@@ -1,4 +1,4 @@
-"""The account of a control: every term of its cost, what its active rows ask for, and what it falls short of."""
+"""The account of a control: every term of its cost, what its contacts ask for, and what it falls short of."""
 
 from __future__ import annotations
 

@@ -176,8 +176,12 @@ def entered(
     found, count = np.empty((m * (last + 1), 2)), 0
     for j in range(m):
         spare_before, rate_before = 0.0, 0.0
-        for t in range(1, last + 1):
-            spare, rate = spared(course, centre[j], drift[j], reach[j], missing[j], pace, float(t))
+        for t in range(1, last + 1):  # as `spared`, where no blend is needed
+            x, y = course[0, t] - centre[j, 0] - t * drift[j, 0], course[1, t] - centre[j, 1] - t * drift[j, 1]
+            distance = max(np.hypot(x, y), 1e-12)
+            wanted, faster, _ = kept(reach[j], missing[j], pace, float(t))
+            spare = distance - wanted
+            rate = (x * (course[2, t] - drift[j, 0]) + y * (course[3, t] - drift[j, 1])) / distance - faster
             time = -1.0
             if t == 1 and rate >= 0.0:
                 time = 1.0

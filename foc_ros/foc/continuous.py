@@ -33,7 +33,7 @@ WARM_STRIDE = 0.25
 SHORTEST = 2.0**-10
 """The shortest one, and the stride at which an end that is infeasible counts as reached."""
 USUAL_SLOPE = 0.3
-"""What k usually gains per unit of s: a first look goes as far as this says, for want of anything better."""
+"""What k usually gains per unit of s: a first look goes as far as this says where an earlier solution does not know better."""
 OVERSHOOT = 1.2
 """How much farther a look goes than to where k is expected to be the wanted one."""
 SPAN = 60.0
@@ -41,14 +41,14 @@ SPAN = 60.0
 LARGEST_SHARE = 1e6
 """Where the walk ends: a variance weight so many times the effort is all that counts, and k has stopped growing."""
 PATIENCE = 2
-"""Strides in a row, no shorter than `WARM_STRIDE`, without a larger k after which a warm start gives up: k has dips where the
-touching step changes. A cold one goes to the end, over every dip."""
+"""Strides in a row, no shorter than `WARM_STRIDE`, without a larger k after which a warm start gives up: k may fall for a
+while. A cold one goes to the end, over every dip."""
 CLOSE = 1e-5
 """Relative excess of k over the wanted one at which the root is found."""
-CELL = 0.25
-"""Bracket in s down to which it is halved: k(s) falls back where the touching step changes, and may cross a value twice."""
+CELL = 1.0
+"""Bracket in s down to which it is halved: k(s) may fall for a while where it is least at the goal, and cross a value twice."""
 NARROW = 1e-4
-"""Bracket in s at which the root is as good as found: k jumps there, because the touching step changes."""
+"""Bracket in s at which the root is as good as found: k jumps there, because the mean slips into another minimum."""
 MAX_TRIALS = 60
 LEAPS = 8
 """How often more times are added for a mean that leaps over circles between the steps."""
@@ -90,12 +90,13 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """How a walk ended: status, words, the point it ended at (None: no feasible point at all), QPs solved."""
+    """How a walk ended: status, words, the point it ended at (None: no feasible point at all), QPs solved, dk/ds there or 0."""
 
     status: Status
     message: str
     point: Point | None
     qp_solves: int
+    slope: float = 0.0
 
 
 class _Walker:
@@ -169,7 +170,7 @@ def _walk(walker: _Walker, start: Start) -> Walk:
         stride, first = STRIDE, walker.point(0.0, start.positions, WorkingSet())
     else:
         first = walker.near(curve.s_of(start.lam), start.control, joined(problem, start.contacts))
-        ahead = 0.0 if first is None else OVERSHOOT * abs(wanted - first.k) / USUAL_SLOPE
+        ahead = 0.0 if first is None else OVERSHOOT * abs(wanted - first.k) / (start.slope or USUAL_SLOPE)
         stride = min(max(ahead, SHORTEST), WARM_STRIDE)
     if first is None:
         return Walk(Status.INFEASIBLE, 'no way between the obstacles keeps clear of them', None, walker.qp_solves)
@@ -178,10 +179,10 @@ def _walk(walker: _Walker, start: Start) -> Walk:
     if high is None:
         message = f'eta {problem.eta:g} is out of reach: the largest on the curve is {eta_of_k(low.k):.4g}, at s = {low.s:.3g}'
         return Walk(Status.ETA_UNREACHABLE, message, low, walker.qp_solves)
-    point = high if low is high else _root(walker, low, high, wanted, guided=start.lam is not None)
+    point, slope = (high, start.slope) if low is high else _root(walker, low, high, wanted, guided=start.lam is not None)
     if not walker.verified(point):
         return Walk(Status.ITERATION_LIMIT, 'the QP linearised at the solution has another one', point, walker.qp_solves)
-    return Walk(Status.SOLVED, 'solved', point, walker.qp_solves)
+    return Walk(Status.SOLVED, 'solved', point, walker.qp_solves, slope)
 
 
 def _bracket(walker: _Walker, first: Point, wanted: float, stride: float, patience: float) -> tuple[Point, Point | None]:
@@ -239,12 +240,12 @@ def _next_stride(before: Point, point: Point, wanted: float, stride: float) -> f
     return math.copysign(min(max(length, SHORTEST), largest), stride)
 
 
-def _root(walker: _Walker, low: Point, high: Point, wanted: float, *, guided: bool) -> Point:
-    """Find k(s) = wanted between a point below and one at or above, by Illinois steps; returns one at or above.
+def _root(walker: _Walker, low: Point, high: Point, wanted: float, *, guided: bool) -> tuple[Point, float]:
+    """Find k(s) = wanted between a point below and one at or above, by Illinois steps; returns one at or above, and dk/ds.
 
     Comes from below only: of several solutions at the same s, those that are met first as s grows. A wide bracket is halved
     first, at points that do not depend on the wanted k. A guided search spares both: it comes from the nearer end. Aims at the
-    middle of what counts as close, and halves the bracket where two steps in a row came out on the same side: where k jumps,
+    middle of what counts as close, and halves the bracket where three steps in a row came out on the same side: where k jumps,
     that is the way to the jump.
     """
     while high.s - low.s > CELL and not guided:
@@ -257,7 +258,7 @@ def _root(walker: _Walker, low: Point, high: Point, wanted: float, *, guided: bo
     for _ in range(MAX_TRIALS):
         if high.k <= wanted * (1 + CLOSE) or high.s - low.s < NARROW:
             break
-        s = (low.s + high.s) / 2 if abs(side) > 1 else (low.s * above - high.s * below) / (above - below)
+        s = (low.s + high.s) / 2 if abs(side) > 2 else (low.s * above - high.s * below) / (above - below)
         point = walker.beside(s, high if guided and high.s - s < s - low.s else low)
         if point is None:
             break
@@ -267,4 +268,4 @@ def _root(walker: _Walker, low: Point, high: Point, wanted: float, *, guided: bo
         else:
             low, below, side = point, point.k - aim, side - 1 if side < 0 else -1
             above = above / 2 if side < -1 else above
-    return high
+    return high, max((high.k - low.k) / (high.s - low.s), 0.0)

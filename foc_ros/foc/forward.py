@@ -41,6 +41,7 @@ class _Ended:
     qp_solves: int
     contacts: Contacts
     iterations: int | None = None
+    slope: float = 0.0
 
 
 def forward(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline = NEVER) -> Solution:
@@ -72,7 +73,8 @@ def _continuous(problem: Problem, start: Start, settings: FocConfig, deadline: D
     if walked.point is None:
         return _best_effort(problem, start, *curve.at(0.0), walked.qp_solves)
     point = walked.point
-    return _Ended(walked.status, walked.message, point.control, *curve.at(point.s), walked.qp_solves, point.contacts)
+    reached = *curve.at(point.s), walked.qp_solves
+    return _Ended(walked.status, walked.message, point.control, *reached, point.contacts, slope=walked.slope)
 
 
 def _optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadline) -> _Ended:
@@ -149,6 +151,7 @@ def _solution(problem: Problem, ended: _Ended, assessment: Assessment, seconds: 
             for row, time, force in zip(ended.contacts.obstacle, ended.contacts.time, ended.contacts.force, strict=True)
         ),
         held=tuple(held),
+        slope=ended.slope,
         qp_solves=ended.qp_solves,
         iterations=ended.iterations,
         solve_s=seconds,

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from .compiled import Tensor, Vector, compiled
-from .dense import row_products
 from .dynamics import Horizon
 from .records import Array
 
@@ -38,5 +37,11 @@ def outer_sums(response: Tensor, weights: Vector) -> Tensor:
     steps, n, _ = response.shape
     summed = np.empty((steps, n, n))
     for t in range(steps):
-        summed[t] = row_products(response[t] * weights, response[t])
+        for i in range(n):
+            weighted = response[t, i] * weights
+            for j in range(i + 1):
+                total = 0.0
+                for u in range(len(weights)):
+                    total += weighted[u] * response[t, j, u]
+                summed[t, i, j], summed[t, j, i] = total, total
     return summed

@@ -167,7 +167,8 @@ class Solution(Record):
 
     multipliers: (obstacle id, step, value) of the contacts that hold the mean off, in `lv` and `hc` with fractions of a step: by
     how much J_aug would grow for each metre more of distance asked for [m/s^6]; held: what each of them asks for, tau [m^2] and
-    lambda [1/s^6]. qp_solves: QPs solved; iterations: of the loop of `algorithm1`, None in the others; solve_s: wall time [s].
+    lambda [1/s^6]. slope: dk/ds on the curve of `lv` and `hc`, 0 where not known. qp_solves: QPs solved; iterations: of the loop
+    of `algorithm1`, None in the others; solve_s: wall time [s].
     """
 
     status: Status
@@ -187,6 +188,7 @@ class Solution(Record):
     violation_at: tuple[str, float] | None = None
     multipliers: tuple[tuple[str, float, float], ...] = ()
     held: tuple[tuple[float, float], ...] = ()
+    slope: float = 0.0
     qp_solves: int = 0
     iterations: int | None = None
     solve_s: float = 0.0

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .backend import DenseQP, solve_named, solve_piqp
 from .compiled import Indices, Matrix, Vector, compiled
-from .dense import cholesky, lower_solved, upper_solved
+from .dense import cholesky, lower_solved, upper_solved, values
 from .qp import Cost, ReachingQP, compliance
 from .records import Array
 
@@ -134,13 +134,11 @@ def with_rows(
     cost: Cost, rows: Array, limits: Array, *, elastic: bool = False
 ) -> tuple[Array, Array] | Literal[Verdict.CONTRADICTION, Verdict.UNSOLVED]:
     """Return control (2N,) and multipliers (k,) >= 0 of the least cost with rows (k, 2N) u >= limits (k,)."""
-    missing = limits - rows @ cost.goal_control
     inverse, _, factor = cost.factors
-    pressed, gram, scaled, scale, stuck = range_space(rows, inverse, factor, missing, ELASTICITY if elastic else 0.0)
+    softness = ELASTICITY if elastic else 0.0
+    pressed, gram, scaled, scale, stuck = range_space(rows, inverse, factor, limits, cost.goal_control, softness)
     if stuck > TOLERANCE and not elastic:
         return Verdict.CONTRADICTION
-    size = max(-float(scaled.min()), float(scaled.max()), 1e-300)
-    scaled /= size
     answer = solve_piqp(DenseQP(gram, -scaled, lower=np.zeros(len(rows))))
     if not answer.solved:
         # Farkas: a combination y >= 0 of the rows that moves nothing and yet is missing something
@@ -150,28 +148,28 @@ def with_rows(
     largest = max(float(multipliers.max()), 1.0)
     if short > RESIDUAL * (largest if elastic else 1.0) or slack > RESIDUAL * largest**2:
         return Verdict.UNSOLVED
-    multipliers *= scale * size
+    multipliers *= scale
     return cost.goal_control + multipliers @ pressed, multipliers
 
 
 @compiled
 def range_space(
-    rows: Matrix, inverse: Vector, factor: Matrix, missing: Vector, softness: float
+    rows: Matrix, inverse: Vector, factor: Matrix, limits: Vector, goal_control: Vector, softness: float
 ) -> tuple[Matrix, Matrix, Vector, Vector, float]:
-    """Return what the rows' multipliers do, in units in which each row moves itself by one.
+    """Return what the rows' multipliers do, in units in which each row moves itself by one, and the most that is missing is one.
 
-    M P (k, 2N); K (k, k), softness added to its diagonal; what is missing (k,); the unit of each multiplier (k,); and the most
-    that is missing in a row which the goal alone decides: such a row has no part in the rest.
+    M P (k, 2N); K (k, k), softness added to its diagonal; what the goal's control misses (k,); the unit of each multiplier (k,);
+    and the most that is missing in a row which the goal alone decides [m]: such a row has no part in the rest.
     """
     pressed, gram = compliance(rows, inverse, factor)
-    k, stuck = len(missing), -np.inf
-    scaled, scale = missing.copy(), np.ones(k)
+    k, stuck = len(limits), -np.inf
+    scaled, scale = limits - values(rows, goal_control), np.ones(k)
     for i in range(k):
         wanted = 0.0
         for u in range(rows.shape[1]):
             wanted += rows[i, u] * rows[i, u] * inverse[u]
         if gram[i, i] < IMMOVABLE * wanted:
-            stuck = max(stuck, missing[i])
+            stuck = max(stuck, scaled[i])
             gram[i], gram[:, i], scaled[i] = 0.0, 0.0, 0.0
             gram[i, i] = 1.0
     for i in range(k):
@@ -181,7 +179,8 @@ def range_space(
         for j in range(k):
             gram[i, j] *= scale[i] * scale[j]
         gram[i, i] += softness
-    return pressed, gram, scaled, scale, stuck
+    size = max(np.abs(scaled).max(), 1e-300)
+    return pressed, gram, scaled / size, scale * size, stuck
 
 
 @compiled

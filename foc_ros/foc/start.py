@@ -15,14 +15,15 @@ from .records import Array, Solution
 class Start:
     """Positions (N, 2) at steps 1..N [m] to linearise at.
 
-    From an earlier solution also its stacked control (2N,), its contacts, and its lambda; lam is None for a cold start, which has
-    none of these.
+    From an earlier solution also its stacked control (2N,), its contacts, its lambda and its slope (0 where not known); lam is
+    None for a cold start, which has none of these.
     """
 
     positions: Array
     control: Array | None = None
     contacts: Contacts = field(default_factory=Contacts)
     lam: float | None = None
+    slope: float = 0.0
 
 
 def cold(guess: Array) -> Start:
@@ -50,4 +51,4 @@ def warm(previous: Solution, problem: Problem) -> Start:
     ]
     table = np.array(kept, dtype=float).reshape(-1, 3)
     contacts = Contacts(table[:, 0].astype(np.intp), table[:, 1].copy(), table[:, 2].copy())
-    return Start(positions, control.ravel(), contacts, previous.lam)
+    return Start(positions, control.ravel(), contacts, previous.lam, previous.slope)

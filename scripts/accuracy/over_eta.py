@@ -17,11 +17,11 @@ from .scenes import Scene, one_obstacle, random_scene
 STRATEGIES = ('lv', 'hc', 'optimal')
 ETAS = np.linspace(0.5, 0.9, 21)
 SCENES = 60
-SETTINGS = ((50, 0.05), (50, 0.1), (100, 0.1 * np.sqrt(2.0)))
-"""Steps N and noise c per step; the last two are the same noise per second."""
+SETTINGS = ((50, 0.05), (50, 0.1), (50, 0.15))
+"""Steps N and noise c per step."""
 NOTICED = 0.01
 """Relative rise of the effort that is called a jump, where it is left of a rise that was halved HALVINGS times."""
-HALVINGS = 6
+HALVINGS = 10
 SLIGHT = 2e-3
 """Relative decrease that counts as one."""
 
