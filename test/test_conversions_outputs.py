@@ -12,7 +12,7 @@ from message_helpers import STORE, both_kinds, message_types
 from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction, three_ways
 
 from foc_ros.conversions.outputs import OUTPUTS, output_messages
-from foc_ros.conversions.plane import lift, lift_covariance
+from foc_ros.conversions.plane import lift
 from foc_ros.conversions.ranking import MAX_RATIO
 from foc_ros.conversions.types import MessageTypes
 from foc_ros.foc.errors import FocError
@@ -58,7 +58,8 @@ def test_the_cloud_holds_every_solved_candidate(types: MessageTypes, plane: str)
         np.testing.assert_allclose(xyz, lift(solution.path, 0.2, plane), rtol=1e-6, atol=1e-9)
         velocity = np.stack([table[f'v{name}'][rows] for name in 'xyz'], axis=-1)
         np.testing.assert_allclose(velocity, lift(solution.mean[:, 2:4], 0.0, plane), rtol=1e-6, atol=1e-9)
-        space = lift_covariance(solution.covariance[:, :2, :2], plane)
+        lifted = lift(np.eye(2), 0.0, plane)
+        space = lifted.T @ solution.covariance[:, :2, :2] @ lifted
         for i, j in zip(*np.triu_indices(3), strict=True):
             np.testing.assert_allclose(table['xyz'[i] + 'xyz'[j]][rows], space[:, i, j], rtol=1e-6)
 
@@ -156,7 +157,8 @@ def test_an_ellipse_has_the_axes_of_the_covariance(plane: str) -> None:
                 (each.scale.y, rotated(each.pose.orientation, np.array([0, 1.0, 0]))),
             )
         )
-        np.testing.assert_allclose(drawn, lift_covariance([[4e-6, 1e-6], [1e-6, 9e-6]], plane), atol=1e-12)
+        lifted = lift(np.eye(2), 0.0, plane)
+        np.testing.assert_allclose(drawn, lifted.T @ [[4e-6, 1e-6], [1e-6, 9e-6]] @ lifted, atol=1e-12)
 
 
 def test_a_candidate_without_a_path_shows_its_guess() -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from foc_ros.conversions.plane import lift, lift_covariance, project
+from foc_ros.conversions.plane import lift, project
 
 PLANES = ('xy', 'xz', 'yz')
 points = arrays(np.float64, st.tuples(st.integers(0, 5), st.just(3)), elements=st.floats(-1e4, 1e4))
@@ -29,18 +29,6 @@ def test_lifting_undoes_projecting(table: np.ndarray, plane: str) -> None:
     positions, heights = project(table, plane)
     assert positions.shape == (len(table), 2)
     np.testing.assert_array_equal(lift(positions, heights, plane), table)
-
-
-@pytest.mark.parametrize('plane', PLANES)
-def test_variance_of_a_lifted_point_is_that_in_the_plane(plane: str) -> None:
-    covariance = np.array([[[4.0, 1.0], [1.0, 9.0]], [[1.0, 0.0], [0.0, 2.0]]])
-    space = lift_covariance(covariance, plane)
-    assert space.shape == (2, 3, 3)
-    for direction in np.eye(2):
-        lifted = lift(direction, 0.0, plane)
-        np.testing.assert_allclose(lifted @ space @ lifted, direction @ covariance @ direction)
-    normal = lift((0.0, 0.0), 1.0, plane)
-    np.testing.assert_array_equal(space @ normal, np.zeros((2, 3)))
 
 
 def test_arguments_are_left_alone() -> None:

@@ -54,7 +54,9 @@ def test_everything_is_fitted_and_written_for_the_node(past_an_obstacle: Path, c
     for name, each in answer['parameters'].items():
         assert values[name] == each['value']
         assert each['interval'][0] <= each['value'] * 1.01 and each['value'] <= each['interval'][1] * 1.01, name
-    unfitted = {name: value for name, value in values.items() if name not in answer['parameters']}
+    for name, choice in answer['chosen'].items():
+        assert values[name] == choice['value'] != choice['given']
+    unfitted = {name: value for name, value in values.items() if name not in answer['parameters'] | answer['chosen']}
     assert unfitted == {name: value for name, value in flatten(updated(Config(), QUICK)).items() if name in unfitted}
     assert answer['parameters']['estimator.position_stddev']['value'] == pytest.approx(5e-4, rel=0.2)
     ways = answer['scores']['ways']

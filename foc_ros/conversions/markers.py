@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -50,11 +51,18 @@ def marker_array(prediction: Prediction, obstacles: Obstacles, plane: str, types
 
 @dataclass(frozen=True)
 class _Pen:
-    """Draws in the plane of one prediction."""
+    """Draws in the plane of one prediction. What all markers have in common is made once."""
 
     prediction: Prediction
     plane: str
     types: MessageTypes
+
+    @cached_property
+    def _common(self) -> dict[str, Any]:
+        return {
+            'header': header(self.types, self.prediction.stamp_ns, self.prediction.frame_id),
+            'lifetime': self.types.make('builtin_interfaces/msg/Duration', sec=int(LIFETIME_S)),
+        }
 
     def clear(self) -> Any:
         return self._marker('', 0, 0, action=DELETE_ALL)
@@ -68,7 +76,7 @@ class _Pen:
             yield from self._ellipses(index, outcome, colour)
         else:
             colour, words = GREY, solution.status.value
-        points = [self._point(*xyz) for xyz in lift(line, self.prediction.height, self.plane)]
+        points = [self._point(*xyz) for xyz in lift(line, self.prediction.height, self.plane).tolist()]
         yield self._marker('path', index, LINE_STRIP, colour, (0.002 + 0.004 * likelihood, 0, 0), points=points)
         text = f'{outcome.candidate.label} {words}'
         yield self._marker('label', index, TEXT, colour, (0, 0, TEXT_HEIGHT), line[len(line) // 2], text=text)
@@ -112,11 +120,10 @@ class _Pen:
         **rest: Any,
     ) -> Any:
         make = self.types.make
-        at = lift(centre, self.prediction.height, self.plane) if kind != LINE_STRIP else (0.0, 0.0, 0.0)
+        at = lift(centre, self.prediction.height, self.plane).tolist() if kind != LINE_STRIP else (0.0, 0.0, 0.0)
         qx, qy, qz, qw = _turned(angle, self.plane) if kind == CYLINDER else (0.0, 0.0, 0.0, 1.0)
         return make(
             'visualization_msgs/msg/Marker',
-            header=header(self.types, self.prediction.stamp_ns, self.prediction.frame_id),
             ns=name,
             id=identity,
             type=kind,
@@ -127,7 +134,7 @@ class _Pen:
             ),
             scale=make('geometry_msgs/msg/Vector3', **dict(zip('xyz', scale, strict=True))),
             color=make('std_msgs/msg/ColorRGBA', **dict(zip('rgba', colour, strict=True))),
-            lifetime=make('builtin_interfaces/msg/Duration', sec=int(LIFETIME_S)),
+            **self._common,
             **rest,
         )
 

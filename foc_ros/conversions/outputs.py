@@ -6,7 +6,8 @@ is the most likely one. All messages carry the stamp and the frame of the hand s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from foc_ros.foc.records import NANOSECONDS, Obstacles, Outcome, Prediction
 
 from .markers import marker_array
-from .plane import lift, lift_covariance
+from .plane import lift
 from .ranking import cost_ratios, ranked
 from .types import MessageTypes, header
 
@@ -29,17 +30,13 @@ LIKELIHOOD_COLUMNS = ('likelihood', 'effort', 'cost_ratio', 'eta')
 
 def prediction_cloud(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
     """Return the PointCloud2 of all solved candidates, N + 1 rows each; no rows where nothing was solved."""
-    rows = [_rows(i, outcome, prediction.height, plane) for i, outcome in enumerate(ranked(prediction))]
-    table = np.concatenate([np.zeros(0, CLOUD_ROW), *rows])
+    table = _rows(ranked(prediction), prediction.height, plane)
     return types.make(
         'sensor_msgs/msg/PointCloud2',
         header=header(types, prediction.stamp_ns, prediction.frame_id),
         height=1,
         width=len(table),
-        fields=[
-            types.make('sensor_msgs/msg/PointField', name=name, offset=offset, datatype=_DATATYPES[kind.str], count=1)
-            for name, (kind, offset, *_) in (CLOUD_ROW.fields or {}).items()
-        ],
+        fields=_fields(types),
         point_step=CLOUD_ROW.itemsize,
         row_step=table.nbytes,
         data=table.tobytes(),
@@ -47,17 +44,30 @@ def prediction_cloud(prediction: Prediction, plane: str, types: MessageTypes) ->
     )
 
 
-def _rows(index: int, outcome: Outcome, height: float, plane: str) -> NDArray[np.void]:
-    solution = outcome.solution
-    rows = np.zeros(len(solution.mean), dtype=CLOUD_ROW)
-    for names, values in (
-        ('x y z', lift(solution.mean[:, :2], height, plane)),
-        ('vx vy vz', lift(solution.mean[:, 2:4], 0.0, plane)),
-        ('xx xy xz yy yz zz', lift_covariance(solution.covariance[:, :2, :2], plane)[:, *np.triu_indices(3)]),
-    ):
-        for name, column in zip(names.split(), values.T, strict=True):
-            rows[name] = column
-    rows['t'], rows['candidate'], rows['likelihood'] = solution.times, index, outcome.likelihood
+@lru_cache(maxsize=4)
+def _fields(types: MessageTypes) -> list[Any]:
+    """Return the description of a row, the same in every cloud."""
+    return [
+        types.make('sensor_msgs/msg/PointField', name=name, offset=offset, datatype=_DATATYPES[kind.str], count=1)
+        for name, (kind, offset, *_) in (CLOUD_ROW.fields or {}).items()
+    ]
+
+
+def _rows(outcomes: Sequence[Outcome], height: float, plane: str) -> NDArray[np.void]:
+    """Return the rows of all outcomes, one after the other, filled column by column."""
+    solutions = [outcome.solution for outcome in outcomes]
+    lengths = [len(solution.mean) for solution in solutions]
+    rows = np.zeros(sum(lengths), dtype=CLOUD_ROW)
+    if not len(rows):
+        return rows
+    mean = np.concatenate([solution.mean for solution in solutions])
+    covariance = np.concatenate([solution.covariance[:, :2, :2] for solution in solutions])
+    for place, axis in enumerate(plane):
+        rows[axis], rows['v' + axis], rows[axis + axis] = mean[:, place], mean[:, 2 + place], covariance[:, place, place]
+    rows[plane], rows[next(axis for axis in 'xyz' if axis not in plane)] = covariance[:, 0, 1], height
+    rows['t'] = np.concatenate([solution.times for solution in solutions])
+    rows['candidate'] = np.repeat(np.arange(len(outcomes)), lengths)
+    rows['likelihood'] = np.repeat([outcome.likelihood for outcome in outcomes], lengths)
     return rows
 
 
@@ -90,9 +100,9 @@ def path(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
     """Return the nav_msgs/Path of the most likely candidate, stamps of the poses in the future; empty where there is none."""
     poses: list[Any] = []
     for outcome in ranked(prediction)[:1]:
-        points = lift(outcome.solution.path, prediction.height, plane)
+        points = lift(outcome.solution.path, prediction.height, plane).tolist()
         orientation = types.make('geometry_msgs/msg/Quaternion', w=1.0)
-        for seconds, (x, y, z) in zip(outcome.solution.times, points, strict=True):
+        for seconds, (x, y, z) in zip(outcome.solution.times.tolist(), points, strict=True):
             stamp_ns = prediction.stamp_ns + round(seconds * NANOSECONDS)
             position = types.make('geometry_msgs/msg/Point', x=x, y=y, z=z)
             pose = types.make('geometry_msgs/msg/Pose', position=position, orientation=orientation)

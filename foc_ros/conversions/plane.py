@@ -30,12 +30,3 @@ def lift(positions: ArrayLike, height: ArrayLike, plane: str) -> Array:
     points[..., [first, second]] = array
     points[..., normal] = height
     return points
-
-
-def lift_covariance(covariance: ArrayLike, plane: str) -> Array:
-    """Return covariances (..., 3, 3) in space of covariances (..., 2, 2) in the plane: none along the normal."""
-    axes = _AXES[plane][:2]
-    array = np.asarray(covariance, dtype=float)
-    space = np.zeros((*array.shape[:-2], 3, 3))
-    space[..., np.ix_(axes, axes)[0], np.ix_(axes, axes)[1]] = array
-    return space

@@ -20,8 +20,10 @@ def ranked(prediction: Prediction) -> tuple[Outcome, ...]:
     """
     for outcome in prediction.solved:
         solution = outcome.solution
-        numbers = (solution.mean, solution.covariance, solution.effort, solution.eta, outcome.cost, outcome.likelihood)
-        if not all((np.abs(number) <= MAX_NUMBER).all() for number in numbers):
+        arrays = solution.mean, solution.covariance
+        numbers = solution.effort, solution.eta, outcome.cost, outcome.likelihood
+        # NaN goes through the maximum, and is not below anything
+        if not all(largest <= MAX_NUMBER for largest in (*(np.abs(each).max() for each in arrays), *map(abs, numbers))):
             raise FocError(f'candidate {outcome.candidate.label}: the solution holds a number that is not finite')
     return tuple(sorted(prediction.solved, key=lambda outcome: outcome.candidate.label != prediction.most_likely))
 

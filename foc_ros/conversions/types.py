@@ -7,7 +7,7 @@ Neither kind checks what it is given unless asked to, and both then pass memory 
 from __future__ import annotations
 
 import array
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
@@ -36,7 +36,7 @@ TYPECODES = {
 _IDL_NAMES = {'double': 'float64', 'float': 'float32', 'boolean': 'bool', 'octet': 'byte'}
 
 
-class MessageTypes(Protocol):
+class MessageTypes(Hashable, Protocol):
     """Makes messages by type name."""
 
     def make(self, name: str, /, **values: Any) -> Any:
@@ -52,7 +52,8 @@ class RclpyTypes:
     def make(self, name: str, /, **values: Any) -> Any:
         """Return a message of type `name`; see :class:`MessageTypes`."""
         message, converters = _rclpy_type(name)
-        _refuse_unknown(name, values, converters)
+        if not values.keys() <= converters.keys():
+            _refuse_unknown(name, values, converters)
         return message(**{field: converters[field](value) for field, value in values.items()})
 
 

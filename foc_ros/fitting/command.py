@@ -16,7 +16,8 @@ from foc_ros.parameters import dump_parameter_file, given_config
 from foc_ros.terminal import show_table
 
 from .estimates import as_json
-from .fit import Fit, fit
+from .fit import fit
+from .found import Fit
 
 SCORES = {
     'ways': 'log-likelihood of the way taken [nat]',
@@ -82,6 +83,7 @@ def _answer(found: Fit, given: Config, file: Path) -> dict[str, Any]:
         'recordings': found.recordings,
         'failed': found.failed,
         'parameters': {name: {**as_json(each), 'given': before[name]} for name, each in found.estimates.items()},
+        'chosen': {name: {'value': value, 'given': before[name]} for name, value in found.chosen.items()},
         'scores': found.scores,
         'warnings': found.warnings,
         'output': str(file),
@@ -95,6 +97,7 @@ def _show(found: Fit, given: Config, file: Path) -> None:
         (each.name, f'{before[each.name]:.4g}', f'{each.value:.4g}', f'{each.low:.4g} to {each.high:.4g}', each.how)
         for each in found.estimates.values()
     ]
+    rows += [(name, str(before[name]), value, '', 'positions and ways foretold') for name, value in found.chosen.items()]
     show_table(('parameter', 'given', 'fitted', '95 %', 'by'), rows)
     show_table(
         ('score', 'under', 'value'),

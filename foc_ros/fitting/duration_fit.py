@@ -14,12 +14,12 @@ import numpy as np
 from scipy.optimize import minimize
 
 from foc_ros.evaluation.path import Path
-from foc_ros.foc.config import Config, DurationConfig
+from foc_ros.foc.config import Config, DurationConfig, updated
 from foc_ros.foc.duration import times_to_go
 from foc_ros.foc.records import NANOSECONDS, Array, HandState
 
 from .demonstrations import Demonstration
-from .estimates import Estimate, bounded
+from .estimates import Estimate, applied, bounded
 from .resampling import CENTRAL, RESAMPLES, SEED
 
 CONSTANTS = {
@@ -28,6 +28,8 @@ CONSTANTS = {
     'cost_of_time': {'duration.time_cost': -6.0},
 }
 """By model, the constants that make durations longer, each with its power in a factor on all durations (`time_cost`)."""
+DISTANCED = ('fitts', 'cost_of_time')
+"""Models of which durations follow from distances."""
 NARROW_BITS = 0.5
 """Standard deviation of the index of difficulty below which intercept and slope are not told apart [bit]."""
 FACTORS = tuple(2.0 ** (np.arange(-10, 11) / 4.0))
@@ -101,6 +103,12 @@ def fit_duration(demonstrations: Sequence[Demonstration], config: Config) -> tup
         ends = sorted((each * min(low, 1.0) ** power, each * max(high, 1.0) ** power))
         found[name] = Estimate(name, bounded(name, each), float(ends[0]), float(ends[1]), how)
     return found, warnings
+
+
+def other_models(demonstrations: Sequence[Demonstration], config: Config) -> list[Config]:
+    """Return the configuration with each model of duration that can serve any distance, its constants fitted, but for its own."""
+    others = [updated(config, {'duration.model': model}) for model in DISTANCED if model != config.duration.model]
+    return [applied(each, fit_duration(demonstrations, each)[0]) for each in others]
 
 
 def _finer(errors: Array) -> float:

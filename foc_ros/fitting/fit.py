@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -14,19 +13,20 @@ from foc_ros.evaluation.heldout import chosen
 from foc_ros.evaluation.observations import Observations
 from foc_ros.evaluation.recordings import Recording
 from foc_ros.evaluation.workers import collected
-from foc_ros.foc.config import Config, flatten, updated
+from foc_ros.foc.config import Config, updated
 from foc_ros.foc.errors import RecordingError
 
 from . import choices
 from .demonstrations import Demonstration, demonstration
-from .duration_fit import fit_duration
-from .estimates import Estimate, applied, bounded
+from .duration_fit import fit_duration, other_models
+from .estimates import bounded
 from .estimator_fit import fit_estimator
 from .followed import fit_followed
+from .found import Fit
 from .plans import Reach, reach
 from .recovery import fit_plans
-from .replays import ACCELERATION, DURATION, ETA, NOISE, Foretold, compared, levels, observed, scored
-from .resampling import CENTRAL, RESAMPLES, SEED
+from .replays import ACCELERATION, ARRIVAL, DURATION, ETA, MODEL, NOISE, Foretold, levels, observed
+from .search import search
 
 PREDICTIONS = 10
 """About as many predictions are made in each recording: neighbours tell the same."""
@@ -34,30 +34,6 @@ SEARCHED = 16
 """Recordings that are replayed for each setting of the predictor; the rest only for the last."""
 FEWEST = 3
 """Recordings below which there is no cross-validation."""
-VALUES = {
-    DURATION: ('duration.fixed_s', 'duration.fitts_a_s', 'duration.fitts_b_s', 'duration.time_cost'),
-    ACCELERATION: ('estimator.acceleration_time_s',),
-    NOISE: ('foc.noise_x', 'foc.noise_y'),
-    ETA: ('foc.eta',),
-}
-
-
-@dataclass
-class Fit:
-    """What was found: config; estimates by name; warnings in words; failed recordings with reasons; scores as plain values."""
-
-    config: Config
-    recordings: int = 0
-    estimates: dict[str, Estimate] = field(default_factory=dict)
-    warnings: list[str] = field(default_factory=list)
-    failed: dict[str, str] = field(default_factory=dict)
-    scores: dict[str, Any] = field(default_factory=dict)
-
-    def take(self, found: tuple[Mapping[str, Estimate], Sequence[str]]) -> None:
-        """Take estimates into the configuration, and warnings."""
-        self.estimates.update(found[0])
-        self.warnings.extend(found[1])
-        self.config = applied(self.config, found[0])
 
 
 def fit(recordings: Mapping[str, Recording], config: Config, executor: Executor) -> Fit:
@@ -74,16 +50,17 @@ def fit(recordings: Mapping[str, Recording], config: Config, executor: Executor)
     some = dict(list(usable.items())[:: -(-len(usable) // SEARCHED)])
     if any(len(each.obstacles) for each in demonstrations):
         # with strategy `fixed` eta has no effect, and lambda was found for the noise as it is
-        kinds = [DURATION, ACCELERATION, *([] if config.foc.strategy == 'fixed' else [NOISE, ETA])]
+        kinds = [*([] if config.foc.strategy == 'fixed' else [NOISE, ETA]), ARRIVAL, MODEL, DURATION, ACCELERATION]
     else:
-        kinds = [DURATION, ACCELERATION]
+        kinds = [ARRIVAL, MODEL, DURATION, ACCELERATION]
         found.warnings.append(
             'foc.eta, foc.noise_x, foc.noise_y: no recording has an obstacle, and without one neither margins nor '
             'what widens them can be told: they are kept'
         )
     foretold: dict[Config, Foretold] = {}
     for kind in kinds:
-        _search(kind, some, found, thin, executor, foretold)
+        others = other_models(demonstrations, found.config) if kind == MODEL else levels(kind, found.config)
+        search(kind, others, some, found, thin, executor, foretold)
     _choose(usable, found, thin, executor)
     return found
 
@@ -113,41 +90,6 @@ def _thin(demonstrations: Sequence[Demonstration], config: Config) -> dict[str, 
     """Return the rate at which the recordings are replayed, as changed parameters."""
     duration_s = float(np.median([each.times[-1] for each in demonstrations]))
     return {'rate_hz': bounded('rate_hz', min(config.rate_hz, PREDICTIONS / max(duration_s, 1e-3)))}
-
-
-def _search(
-    kind: str,
-    recordings: Mapping[str, Recording],
-    found: Fit,
-    thin: Mapping[str, float],
-    executor: Executor,
-    foretold: dict[Config, Foretold],
-) -> None:
-    """Try other values of one kind and take the best; foretold: what is known of settings, and is added to."""
-    settings = [found.config, *levels(kind, found.config)]
-    for number, setting in enumerate(settings, 1):
-        if setting not in foretold:
-            words = f'{kind} {number}/{len(settings)}'
-            foretold[setting] = scored(observed(recordings, updated(setting, thin), executor, words)[0], setting)
-    scores = compared([foretold[setting] for setting in settings], list(recordings))
-    best = settings[int(scores.mean(axis=1).argmax())]
-    draws, n = np.random.default_rng(SEED), scores.shape[1]
-    drawn = [settings[int(scores[:, draws.integers(n, size=n)].mean(axis=1).argmax())] for _ in range(RESAMPLES)]
-    for name in VALUES[kind]:
-        value, tried = _value(best, name), {_value(setting, name) for setting in settings}
-        if len(tried) == 1:
-            continue
-        low, high = np.percentile([_value(setting, name) for setting in drawn], CENTRAL)
-        before = found.estimates.get(name)
-        how = 'positions and ways foretold' if before is None else f'{before.how}, then positions and ways foretold'
-        found.estimates[name] = Estimate(name, value, float(low), float(high), how)
-        if (low, high) == (min(tried), max(tried)):
-            found.warnings.append(f'{name}: from {low:.3g} to {high:.3g}, all that was tried, resampled recordings agree as well')
-    found.config = best
-
-
-def _value(config: Config, name: str) -> float:
-    return float(flatten(config)[name])
 
 
 def _choose(recordings: Mapping[str, Recording], found: Fit, thin: Mapping[str, float], executor: Executor) -> None:

@@ -2,7 +2,8 @@
 
 The score of a setting is the mean over the recordings of two log-likelihoods: of the way really taken, among the ways, and of the
 true positions 0.25, 0.5 and 1 s ahead, under the mixture of the candidates. Both are proper: no setting gains by claiming more or
-less than it knows. In both, what needs no replay is at its own best for each setting: the exponent beta, the process noise.
+less than it knows. In both, what needs no replay is at its own best for each setting: the likelihood's parameters, the process
+noise.
 """
 
 from __future__ import annotations
@@ -11,17 +12,17 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 
-from foc_ros.evaluation.families import POWERS
 from foc_ros.evaluation.forecasts import of_shares, power_rule
 from foc_ros.evaluation.heldout import asked
 from foc_ros.evaluation.observations import Observations
 from foc_ros.evaluation.observe import observe
 from foc_ros.evaluation.recordings import Recording
 from foc_ros.evaluation.workers import collected
-from foc_ros.foc.config import Config, LikelihoodConfig, flatten, updated
+from foc_ros.foc.config import ARRIVALS, Config, LikelihoodConfig, flatten, updated
 from foc_ros.foc.records import Array
 
 from .densities import log_densities
@@ -30,9 +31,19 @@ from .estimates import bounded
 
 Key = tuple[str, int]
 """A prediction: recording and stamp [ns]."""
-DURATION, ACCELERATION, NOISE, ETA = 'duration', 'acceleration', 'noise', 'eta'
-LEVELS = {DURATION: (0.8, 1.25, 1.6, 2.0), ACCELERATION: (0.0, 0.1, 0.3), NOISE: (0.06, 0.25, 2.0), ETA: (0.7, 0.5, 0.95)}
-"""What is tried in turn: factors on durations and noise, values of the others."""
+NOISE, ETA, ARRIVAL, MODEL, DURATION, ACCELERATION = 'noise', 'eta', 'arrival', 'model', 'duration', 'acceleration'
+LEVELS = {
+    NOISE: (0.06, 0.25, 2.0),
+    ETA: (0.7, 0.5, 0.95),
+    DURATION: (0.8, 1.25, 1.6, 2.0),
+    ACCELERATION: (0.0, 0.05, 0.1, 0.2),
+}
+"""What is tried in turn: factors on noise and durations, values of the others."""
+RULES = tuple(
+    replace(LikelihoodConfig(), beta=beta, spent_share=share, lookahead_s=seconds)
+    for seconds, beta, share in product((0.0, 0.35, 0.7), (0.5, 1.0, 2.0, 3.0, 6.0, 12.0), (1.0, 0.0))
+)
+"""The likelihoods of which each setting is judged by its best: by one alone, settings that suit the others would lose."""
 
 
 @dataclass(frozen=True)
@@ -53,12 +64,11 @@ def observed(
 
 def scored(observations: Sequence[Observations], config: Config) -> Foretold:
     """Score what one setting foretold."""
-    rules = [replace(LikelihoodConfig(), beta=beta) for beta in POWERS]
     ways, positions = {}, {}
     for recording in observations:
         for seen, question in asked(recording):
             ways[recording.name, seen.stamp_ns] = np.log(
-                [of_shares(power_rule(seen, rule), question).true(question) for rule in rules]
+                [of_shares(power_rule(seen, rule), question).true(question) for rule in RULES]
             )
         for seen in recording.each:
             row = log_densities(seen, seen.ways.likelihood, config)
@@ -96,6 +106,8 @@ def _best(rows: Mapping[Key, Array]) -> dict[Key, float]:
 
 def levels(kind: str, config: Config) -> list[Config]:
     """Return the configurations that are tried beside one."""
+    if kind == ARRIVAL:
+        return [updated(config, {'duration.arrival': each}) for each in ARRIVALS if each != config.duration.arrival]
     if kind == DURATION:
         return [_scaled(config, CONSTANTS[config.duration.model], factor) for factor in LEVELS[kind]]
     if kind == NOISE:

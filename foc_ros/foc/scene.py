@@ -11,7 +11,7 @@ from .records import NANOSECONDS, Array, Obstacles, Record, make_obstacles
 
 @dataclass(frozen=True)
 class Part:
-    """What one source said last: its obstacles, the stamp they hold for (None: always), the frame they are in."""
+    """What one source said last: its obstacles, each id once, the stamp they hold for (None: always), the frame they are in."""
 
     obstacles: Obstacles
     stamp_ns: int | None
@@ -42,8 +42,8 @@ class Scene(Record):
     def obstacles(self, stamp_ns: int) -> Obstacles:
         """Return all obstacles at a stamp [ns]: the union over the sources, where the latest source's row of an id holds."""
         tables = [part.at(stamp_ns) for part in self.parts.values()]
-        if not tables:
-            return make_obstacles()
+        if len(tables) < 2:
+            return tables[0] if tables else make_obstacles()
         ids = [name for table in tables for name in table.ids]
         latest = {name: row for row, name in enumerate(ids)}
         return _stacked(tables, ids).take(sorted(latest.values()))
