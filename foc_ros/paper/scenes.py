@@ -18,7 +18,7 @@ STRATEGY_SCENE = PaperScene(
 
 WAYS_SCENE = PaperScene(
     0.3,
-    ((0.0926, -0.0037, 0.019, 0.0034), (0.169, -0.1534, 0.0351, 0.0029)),
+    ((0.0976, -0.0041, 0.0191, 0.0036), (0.1692, -0.1516, 0.035, 0.0028)),
     (Way('H1', 0.06, (('0', LEFT),)), Way('H2', -0.05, (('0', RIGHT), ('1', LEFT)))),
 )
 """Of studies 5 and 6: J_H1 / J_H2 is similar to 1 up to eta 0.9, and at 0.9615 near the paper's for LV and HC (search `ways`)."""
