@@ -51,9 +51,9 @@ def held(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: 
 def joined(problem: Problem, contacts: Contacts) -> Contacts:
     """Return contacts that came from rows at steps, or from another problem, as they slide: one for each place.
 
-    Where the full QP left forces unknown, they count as equal.
+    Forces that are not known, as the full QP leaves them, count as equal.
     """
-    force = np.where(np.isfinite(contacts.force), contacts.force, 1.0)
+    force = np.where(np.isfinite(contacts.force) & (contacts.force > 0), contacts.force, 1.0)
     return Contacts(problem.first_alike[contacts.obstacle], contacts.time, force).merged()
 
 
