@@ -13,7 +13,7 @@ from foc_ros.evaluation.lanes import Lanes
 from foc_ros.evaluation.recordings import find_recordings
 from foc_ros.fitting.duration_fit import other_models
 from foc_ros.fitting.found import Fit
-from foc_ros.fitting.replays import ARRIVAL, levels
+from foc_ros.fitting.replays import ARRIVAL, levels, preferred
 from foc_ros.foc.config import Config, updated
 from foc_ros.foc.records import make_obstacles
 
@@ -22,10 +22,10 @@ GOAL = np.array([[0.3, 0.0]])
 
 
 def _scores(monkeypatch: pytest.MonkeyPatch, scores: list[list[float]]) -> Fit:
-    """Search how the hand arrives, with these scores of the given and the other setting by recording."""
+    """Search how the hand arrives, with these scores of positions, by recording, of the given and the other setting."""
     monkeypatch.setattr(searching, 'observed', lambda *_: ([], {}))
     monkeypatch.setattr(searching, 'scored', lambda *_: None)
-    monkeypatch.setattr(searching, 'compared', lambda *_: np.array(scores))
+    monkeypatch.setattr(searching, 'compared', lambda *_: np.array([np.zeros_like(scores), scores]))
     found = Fit(CONFIG)
     with Lanes(1) as executor:
         searching.search(ARRIVAL, levels(ARRIVAL, CONFIG), {}, found, {}, executor, {})
@@ -41,6 +41,13 @@ def test_what_is_given_is_kept_where_another_is_not_better_for_sure(monkeypatch:
     found = _scores(monkeypatch, [[0.0] * 8, [1.5, -0.2, -0.2, -0.2, -0.2, -0.2, -0.2, -0.2]])
     assert found.chosen == {} and found.config == CONFIG
     assert any(words.startswith('duration.arrival: passing is better than rest, but only in ') for words in found.warnings)
+
+
+def test_ways_come_first_and_positions_where_ways_do_not_tell() -> None:
+    positions = np.array([[0.0, 0.0, 0.0, 0.0], [5.0, 5.0, 5.0, 5.0], [1.0, 1.0, 1.0, 1.0]])
+    surely_worse = np.array([[1.0, 1.2, 1.1, 1.0], [0.5, 0.8, 0.5, 0.6], [0.9, 1.4, 1.0, 0.9]])
+    assert preferred(np.array([surely_worse, positions])) == 2
+    assert preferred(np.array([np.zeros((3, 4)), positions])) == 1
 
 
 def test_the_other_models_of_duration_come_with_their_constants_fitted() -> None:

@@ -161,7 +161,7 @@ def process_noise_estimate(table: Table) -> Estimate:
 
 
 def coverage(observations: Sequence[Observations], config: Config, noise: Array) -> float | None:
-    """Return the share of true positions that the 90 % ellipse of the likeliest way holds after 0.5 s.
+    """Return the share of true positions in movement that the 90 % ellipse of the likeliest way holds after 0.5 s.
 
     noise (n,): process noise for each recording, so that each can be judged by one that it had no part in.
     """
@@ -170,6 +170,7 @@ def coverage(observations: Sequence[Observations], config: Config, noise: Array)
         inside(seen, int(power_rule(seen, config.likelihood).argmax()), float(each), config, LEVEL)[place]
         for recording, each in zip(observations, noise, strict=True)
         for seen in recording.each
+        if seen.since_s > 0.0
     ]
     known = [value for value in held if not np.isnan(value)]
     return float(np.mean(known)) if known else None

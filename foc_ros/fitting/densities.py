@@ -23,12 +23,12 @@ def log_densities(seen: Observation, shares: Array, config: Config) -> Array | N
     """Return the log-density of the true positions, mean over the horizons, for each of `PROCESS_NOISES`, (q,) [nat, metres].
 
     shares (k,): of the candidates; config: that they were predicted with, but for the process noise. None where the
-    movement ends before the first horizon.
+    movement ends before the first horizon, or has not begun: how long a hand will wait is no part of the model.
     """
     true = seen.truth.positions[_PLACES]
     known = np.isfinite(true[:, 0])
     weighed = np.flatnonzero(shares > 0.0)
-    if not known.any() or not len(weighed):
+    if seen.since_s == 0.0 or not known.any() or not len(weighed):
         return None
     places = np.array(_PLACES)[known]
     away = true[known] - seen.ways.mean[np.ix_(weighed, places)]

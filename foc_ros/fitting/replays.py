@@ -1,9 +1,10 @@
 """Parameters of the predictor itself, by replays: each setting replays the recordings, and what it foretold is scored.
 
-The score of a setting is the mean over the recordings of two log-likelihoods: of the way really taken, among the ways, and of the
+A setting has two scores, means over the recordings: the log-likelihood of the way really taken, among the ways, and that of the
 true positions 0.25, 0.5 and 1 s ahead, under the mixture of the candidates. Both are proper: no setting gains by claiming more or
 less than it knows. In both, what needs no replay is at its own best for each setting: the likelihood's parameters, the process
-noise.
+noise. Ways come first: of the settings that are within one standard error of the best in these (Breiman et al. 1984), the one
+with the best positions is taken.
 """
 
 from __future__ import annotations
@@ -78,12 +79,12 @@ def scored(observations: Sequence[Observations], config: Config) -> Foretold:
 
 
 def compared(settings: Sequence[Foretold], names: Sequence[str]) -> Array:
-    """Return the score of each setting in each recording, (s, n) [nat].
+    """Return the scores of each setting in each recording, of ways and of positions, (2, s, n) [nat].
 
     A prediction that a setting could not make counts as the worst of those that others made in its place.
     """
-    total = np.zeros((len(settings), len(names)))
-    for table in ([each.ways for each in settings], [each.positions for each in settings]):
+    scores = np.zeros((2, len(settings), len(names)))
+    for score, table in zip(scores, ([each.ways for each in settings], [each.positions for each in settings]), strict=True):
         best = [_best(each) for each in table]
         worst: dict[Key, float] = {}
         for each in best:
@@ -92,8 +93,16 @@ def compared(settings: Sequence[Foretold], names: Sequence[str]) -> Array:
         for place, name in enumerate(names):
             keys = [key for key in worst if key[0] == name]
             if keys:
-                total[:, place] += [np.mean([each.get(key, worst[key]) for key in keys]) for each in best]
-    return total
+                score[:, place] = [np.mean([each.get(key, worst[key]) for key in keys]) for each in best]
+    return scores
+
+
+def preferred(scores: Array) -> int:
+    """Return the setting to take, by scores as of `compared`."""
+    ways, positions = scores
+    behind = ways[ways.mean(axis=1).argmax()] - ways
+    as_good = behind.mean(axis=1) <= behind.std(axis=1) / np.sqrt(ways.shape[1])
+    return int(np.where(as_good, positions.mean(axis=1), -np.inf).argmax())
 
 
 def _best(rows: Mapping[Key, Array]) -> dict[Key, float]:

@@ -13,7 +13,7 @@ from foc_ros.foc.config import Config, flatten, updated
 from .duration_fit import CONSTANTS
 from .estimates import Estimate
 from .found import Fit
-from .replays import ACCELERATION, ARRIVAL, DURATION, ETA, MODEL, NOISE, Foretold, compared, observed, scored
+from .replays import ACCELERATION, ARRIVAL, DURATION, ETA, MODEL, NOISE, Foretold, compared, observed, preferred, scored
 from .resampling import CENTRAL, RESAMPLES, SEED
 
 SURE = 0.95
@@ -45,9 +45,9 @@ def search(
             words = f'{kind} {number}/{len(settings)}'
             foretold[setting] = scored(observed(recordings, updated(setting, thin), executor, words)[0], setting)
     scores = compared([foretold[setting] for setting in settings], list(recordings))
-    draws, n = np.random.default_rng(SEED), scores.shape[1]
-    drawn = [settings[int(scores[:, draws.integers(n, size=n)].mean(axis=1).argmax())] for _ in range(RESAMPLES)]
-    best = settings[int(scores.mean(axis=1).argmax())]
+    draws, n = np.random.default_rng(SEED), scores.shape[2]
+    drawn = [settings[preferred(scores[:, :, draws.integers(n, size=n)])] for _ in range(RESAMPLES)]
+    best = settings[preferred(scores)]
     if kind in CHOICES:
         _take_choice(CHOICES[kind], best, drawn, found)
     else:
