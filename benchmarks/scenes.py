@@ -66,7 +66,8 @@ def with_far(near: Obstacles, count: int, seed: int, nearest: float = 1.0) -> Ob
     angle, distance = generator.uniform(0, 2 * np.pi, count), generator.uniform(nearest, 3.0, count)
     far = GOAL / 2 + distance[:, None] * np.stack((np.cos(angle), np.sin(angle)), axis=1)
     radius = np.concatenate((near.radius, generator.uniform(0.01, 0.03, count)))
-    return make_obstacles(np.concatenate((near.centre, far)), radius, 0.001)
+    radius_stddev = np.concatenate((near.radius_stddev, np.full(count, 0.001)))
+    return make_obstacles(np.concatenate((near.centre, far)), radius, radius_stddev)
 
 
 @dataclass(frozen=True, eq=False)

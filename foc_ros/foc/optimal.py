@@ -18,9 +18,9 @@ import numpy as np
 
 from .assess import assess
 from .chance import eta_of_k, k_of_eta, variance
-from .compiled import Matrix, Tensor, Vector, compiled
+from .compiled import Indices, Matrix, Tensor, Vector, compiled
 from .deadline import NEVER, Deadline, OutOfTimeError
-from .problem import Problem
+from .problem import Problem, moved, spread
 from .qp import Cost, ReachingQP, effort_cost, row_values, wanted_distance
 from .records import Array, Status
 from .sequential import converge
@@ -148,20 +148,20 @@ def surrogate_qp(
 
     complete: with the derivative of Var by the position.
     """
-    spread, maps = problem.position_variance(control), problem.horizon.maps
-    offset = problem.positions(control)[None] - problem.centres
-    slopes, surplus = linearised(
-        offset,
-        spread,
+    maps = problem.horizon.maps
+    slopes, limits, weights = surrogate_rows(
+        maps,
+        problem.noise_variance,
+        problem.free_position,
+        problem.free_variance,
+        np.ascontiguousarray(control, dtype=float),
+        problem.centres,
         problem.size[1],
         problem.obstacles.centre_covariance,
         wanted_distance(problem, 0.0),
         k,
         1.0 if complete else 0.0,
     )
-    weights = np.ones((5, len(control)))
-    weights[2:] = problem.noise_variance * control
-    limits = row_values(maps, weights, slopes, control) - surplus
     return ReachingQP(_bent(problem, control, active, multipliers, slopes), maps, weights, slopes, limits)
 
 
@@ -199,11 +199,44 @@ def linearised(
     return slopes, surplus
 
 
+@compiled
+def surrogate_rows(
+    maps: Tensor,
+    noise_variance: Vector,
+    free_position: Matrix,
+    free_variance: Matrix,
+    control: Vector,
+    centres: Tensor,
+    size_variance: Vector,
+    centre_covariance: Tensor,
+    wanted: Matrix,
+    k: float,
+    turning: float,
+) -> tuple[Tensor, Matrix, Matrix]:
+    """Return `linearised` at a control (2N,) as rows on u: slopes (m, N, 5), limits (m, N) and the maps' weights (5, 2N)."""
+    offset = np.expand_dims(moved(maps[:2], control, free_position), 0) - centres
+    covariance = spread(maps, noise_variance, control, free_variance)
+    slopes, surplus = linearised(offset, covariance, size_variance, centre_covariance, wanted, k, turning)
+    weights = np.ones((5, len(control)))
+    weights[2:] = noise_variance * control
+    return slopes, row_values(maps, weights, slopes, control) - surplus, weights
+
+
 def _bent(problem: Problem, control: Array, active: WorkingSet, multipliers: Array, slopes: Array) -> Cost:
     """Return the cost with the curvature of the active rows' standard deviations, about the control."""
     if not len(active):
         return effort_cost(problem, 0.0)
-    weight = -multipliers[:, None] * slopes[active.rows][:, 2:]
-    maps = problem.horizon.maps[2:].reshape(-1, len(control))
-    bend = weight.T.ravel() @ maps[(np.arange(3)[:, None] * problem.horizon.steps + active.step).ravel()] * problem.noise_variance
+    bend = bent(problem.horizon.maps, slopes, active.obstacle, active.step, multipliers) * problem.noise_variance
     return Cost(2.0 * (1.0 + problem.weighted_variance) + bend, bend * control, *problem.goal_rows)
+
+
+@compiled
+def bent(maps: Tensor, slopes: Tensor, obstacle: Indices, step: Indices, multipliers: Vector) -> Vector:
+    """Return by how much k rows of slopes (m, N, 5), with multipliers (k,), bend the cost by c u, (2N,): maps (5, N, 2N)."""
+    bend = np.zeros(maps.shape[2])
+    for i in range(len(step)):
+        for q in range(2, 5):
+            weight = -multipliers[i] * slopes[obstacle[i], step[i], q]
+            for u in range(len(bend)):
+                bend[u] += weight * maps[q, step[i], u]
+    return bend

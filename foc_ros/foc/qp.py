@@ -104,6 +104,12 @@ class ReachingQP:
         """Left-hand side of every obstacle row, (m, N)."""
         return row_values(self.maps, self.weights, self.coefficients, control)
 
+    def violated(
+        self, control: Array, obstacle: NDArray[np.intp], step: NDArray[np.intp], tolerance: float
+    ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Return the worst row of every stretch of steps at which a control (2N,) violates a circle's; known ones are met."""
+        return violated(self.maps, self.weights, self.coefficients, self.limits, control, obstacle, step, tolerance)
+
     def rows(self, obstacle: NDArray[np.intp], step: NDArray[np.intp]) -> Array:
         """Return obstacle rows (k, 2N) for k pairs of obstacle and step index."""
         return gathered(self.maps, self.weights, self.coefficients, obstacle, step)
@@ -127,6 +133,38 @@ def row_values(maps: Tensor, weights: Matrix, coefficients: Tensor, control: Vec
             for a in range(q):
                 found[j, t] += coefficients[j, t, a] * moved[a, t]
     return found
+
+
+@compiled
+def peaks(violation: Matrix, known_obstacle: Indices, known_step: Indices, tolerance: float) -> tuple[Indices, Indices]:
+    """Return the worst row of every stretch of violated steps (m, N), as obstacle and step index; rows known count as met."""
+    m, steps = violation.shape
+    left = violation.copy()
+    for i in range(len(known_step)):
+        left[known_obstacle[i], known_step[i]] = 0.0
+    obstacle, step, count = np.empty(m * steps, np.intp), np.empty(m * steps, np.intp), 0
+    for j in range(m):
+        for t in range(steps):
+            here = left[j, t]
+            if here > tolerance and (t == 0 or here >= left[j, t - 1]) and (t == steps - 1 or here > left[j, t + 1]):
+                obstacle[count], step[count] = j, t
+                count += 1
+    return obstacle[:count].copy(), step[:count].copy()
+
+
+@compiled
+def violated(
+    maps: Tensor,
+    weights: Matrix,
+    coefficients: Tensor,
+    limits: Matrix,
+    control: Vector,
+    known_obstacle: Indices,
+    known_step: Indices,
+    tolerance: float,
+) -> tuple[Indices, Indices]:
+    """Return the peaks of what the rows miss at a control (2N,)."""
+    return peaks(limits - row_values(maps, weights, coefficients, control), known_obstacle, known_step, tolerance)
 
 
 @compiled

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .backend import DenseQP, solve_named, solve_piqp
-from .compiled import Indices, Matrix, Vector, compiled
+from .compiled import Matrix, Vector, compiled
 from .dense import cholesky, lower_solved, upper_solved, values
 from .qp import Cost, ReachingQP, compliance
 from .records import Array
@@ -96,7 +96,7 @@ def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False) -> QPSo
                 break
             control, multipliers = answer
         # rows just solved for are met but for rounding; an elastic row may stay violated
-        obstacle, step = peaks(qp.limits - qp.row_values(control), *working.rows, TOLERANCE)
+        obstacle, step = qp.violated(control, *working.rows, TOLERANCE)
         if not len(obstacle):
             active = multipliers > 0
             return QPSolution(control, working.only(active), multipliers[active], solves)
@@ -104,23 +104,6 @@ def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False) -> QPSo
             working = working.only(multipliers > 0)
         working = working.joined(obstacle, step, qp.limits.shape[1])
     return None if elastic else solve_full(qp)
-
-
-@compiled
-def peaks(violation: Matrix, known_obstacle: Indices, known_step: Indices, tolerance: float) -> tuple[Indices, Indices]:
-    """Return the worst row of every stretch of violated steps (m, N), as obstacle and step index; rows known count as met."""
-    m, steps = violation.shape
-    left = violation.copy()
-    for i in range(len(known_step)):
-        left[known_obstacle[i], known_step[i]] = 0.0
-    obstacle, step, count = np.empty(m * steps, np.intp), np.empty(m * steps, np.intp), 0
-    for j in range(m):
-        for t in range(steps):
-            here = left[j, t]
-            if here > tolerance and (t == 0 or here >= left[j, t - 1]) and (t == steps - 1 or here > left[j, t + 1]):
-                obstacle[count], step[count] = j, t
-                count += 1
-    return obstacle[:count].copy(), step[:count].copy()
 
 
 class Verdict(Enum):
