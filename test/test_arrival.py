@@ -7,7 +7,8 @@ from numpy.testing import assert_allclose
 from foc_ros.foc.config import Config, updated
 from foc_ros.foc.dynamics import horizon, triple_integrator
 from foc_ros.foc.estimator import gramian, transition
-from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.memory import Memory
+from foc_ros.foc.predictor import predict
 from foc_ros.foc.records import HandState, make_obstacles
 from foc_ros.foc.replanning import replanned_error_map, triple_integrator_error_map, triple_integrator_process_covariance
 from foc_ros.foc.time_cost import effort_along, least_cost_time

@@ -6,8 +6,9 @@ import pytest
 from foc_ros.foc.config import Config, updated
 from foc_ros.foc.deadline import OutOfTimeError
 from foc_ros.foc.estimator import update
+from foc_ros.foc.memory import Memory
 from foc_ros.foc.outcomes import Earlier
-from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.predictor import predict
 from foc_ros.foc.records import HandSample, Status, make_obstacles
 
 OBSTACLES = make_obstacles([[0.12, 0.01], [0.2, -0.03]], [0.02, 0.02], 0.001)

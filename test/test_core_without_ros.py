@@ -34,7 +34,8 @@ assert 'foc_ros.foc.predictor' in names, names
 PREDICT = """
 import numpy as np
 from foc_ros.foc.config import Config
-from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.memory import Memory
+from foc_ros.foc.predictor import predict
 from foc_ros.foc.records import HandState, make_obstacles
 hand = HandState(0, np.zeros(6), np.zeros((6, 6)))
 scene = make_obstacles([[0.15, 0.0]], [0.03], 0.002)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from foc_ros.foc.config import Config, updated
-from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.memory import Memory
+from foc_ros.foc.predictor import predict
 from foc_ros.foc.records import HandState, Obstacles, Prediction, Status, make_obstacles
 
 GOAL = np.array([[0.3, 0.0]])

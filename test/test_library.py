@@ -11,7 +11,8 @@ from foc_ros.foc.config import Config, HomotopyConfig, updated
 from foc_ros.foc.errors import FocError
 from foc_ros.foc.homotopy import path_sides
 from foc_ros.foc.library import MOST, POINTS, demonstrated, recall, same
-from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.memory import Memory
+from foc_ros.foc.predictor import predict
 from foc_ros.foc.records import HandState, make_obstacles
 from foc_ros.library_file import load_library, save_library
 

@@ -11,8 +11,8 @@ from foc_ros.foc import pipeline as module
 from foc_ros.foc.config import Config, updated
 from foc_ros.foc.errors import SceneError
 from foc_ros.foc.library import Way
+from foc_ros.foc.memory import Memory
 from foc_ros.foc.pipeline import Pipeline, Verdict
-from foc_ros.foc.predictor import Memory
 from foc_ros.foc.records import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction, make_obstacles
 
 START = 1000 * NANOSECONDS

@@ -6,7 +6,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from foc_ros.foc.config import Config, updated
 from foc_ros.foc.dynamics import horizon, triple_integrator
 from foc_ros.foc.estimator import gramian
-from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.memory import Memory
+from foc_ros.foc.predictor import predict
 from foc_ros.foc.records import HandState, make_obstacles
 from foc_ros.foc.replanning import replanned_error_map, triple_integrator_process_covariance
 

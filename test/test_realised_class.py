@@ -12,7 +12,8 @@ import pytest
 from homotopy_scenes import GOAL, random_scene
 
 from foc_ros.foc.config import Config, updated
-from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.memory import Memory
+from foc_ros.foc.predictor import predict
 from foc_ros.foc.records import HandState, Obstacles, Prediction, make_obstacles
 
 SCENES = int(os.environ.get('FOC_ROS_SCENES', '40'))

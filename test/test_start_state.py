@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from foc_ros.foc.config import Config, updated
-from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.memory import Memory
+from foc_ros.foc.predictor import predict
 from foc_ros.foc.records import HandState, make_obstacles
 
 MEAN = np.array([0.0, 0.0, 0.2, 0.1, -0.4, 1.0])

@@ -8,7 +8,8 @@ from foc_ros.foc.config import Config, FocConfig, updated
 from foc_ros.foc.duration import way_times
 from foc_ros.foc.estimator import gramian, transition
 from foc_ros.foc.forward import forward
-from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.memory import Memory
+from foc_ros.foc.predictor import predict
 from foc_ros.foc.records import Candidate, HandState, make_obstacles
 from foc_ros.foc.start import cold
 from foc_ros.foc.time_cost import effort_along, least_cost_time

@@ -9,7 +9,8 @@ import numpy as np
 from measure import Times
 from scenes import Reach
 
-from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.memory import Memory
+from foc_ros.foc.predictor import predict
 from foc_ros.foc.records import Prediction
 
 

@@ -16,8 +16,9 @@ from scenes import tick_8x16 as eight_classes
 from foc_ros.foc import predictor
 from foc_ros.foc.config import FocConfig
 from foc_ros.foc.forward import forward
+from foc_ros.foc.memory import Memory
 from foc_ros.foc.outcomes import solve_candidates
-from foc_ros.foc.predictor import Memory, predict
+from foc_ros.foc.predictor import predict
 from foc_ros.foc.problem import Problem
 from foc_ros.foc.records import Candidate, Outcome
 from foc_ros.foc.start import cold

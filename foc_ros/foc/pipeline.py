@@ -11,7 +11,8 @@ from .config import Config
 from .errors import FocError
 from .estimator import Track, update
 from .library import Way
-from .predictor import Memory, predict
+from .memory import Memory
+from .predictor import predict
 from .records import NANOSECONDS, Array, HandSample, Obstacles, Prediction
 from .refusals import Refusals
 from .scene import Part, Scene

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,29 +16,12 @@ from .dynamics import triple_integrator_horizon
 from .homotopy import search
 from .library import Way, recall
 from .likelihood import most_likely
+from .memory import Memory
 from .noise import noise_per_step
-from .outcomes import NOTHING, Earlier, ranked, solve_candidates
+from .outcomes import ranked, solve_candidates
 from .problem import Problem, rest_to_goal
-from .records import NANOSECONDS, Array, Candidate, HandState, Obstacles, Outcome, Prediction, Solution, Status
+from .records import Array, Candidate, HandState, Obstacles, Outcome, Prediction
 from .replanning import triple_integrator_error_map, triple_integrator_process_covariance
-
-RETRY = 5
-"""Predictions for which a way that slid into another class is only followed there."""
-
-
-@dataclass(frozen=True)
-class Memory:
-    """What one prediction hands to the next.
-
-    most_likely: label; candidates: the ways followed; earlier: their solutions and likelihoods; solved_ns: when each was last
-    solved, by label; slid: for how many predictions in a row each has been in another class.
-    """
-
-    most_likely: str | None = None
-    candidates: tuple[Candidate, ...] = ()
-    earlier: Earlier = NOTHING
-    solved_ns: Mapping[str, int] = field(default_factory=dict)
-    slid: Mapping[str, int] = field(default_factory=dict)
 
 
 def predict(
@@ -59,9 +42,9 @@ def predict(
     problems = way_problems(config, hand, obstacles, goals, candidates, durations)
     deadline = Deadline(config.budget_s or None, began)
     tried = solve_candidates(
-        candidates, list(problems.values()), config.foc, config.likelihood, hand.effort_spent, memory.earlier, deadline
+        candidates, list(problems.values()), config.foc, config.likelihood, hand.effort_spent, memory.known(candidates), deadline
     )
-    tried = [_priced(_aged(outcome, hand.stamp_ns, memory), config.duration) for outcome in tried]
+    tried = [_priced(memory.aged(outcome, hand.stamp_ns), config.duration) for outcome in tried]
     outcomes = ranked(tried, config.likelihood, obstacles)
     unsure = {problem: _doubt(problem, hand, config) for problem in problems.values()}
     outcomes = [_seen(outcome, unsure[problems[outcome.candidate.label]]) for outcome in outcomes]
@@ -73,38 +56,7 @@ def predict(
     notes = dict(found.notes) | {name: count for name, count in counted.items() if count}
     seconds = time.perf_counter() - began
     prediction = Prediction(hand.stamp_ns, hand.frame_id, hand.height, tuple(outcomes), best, notes, seconds)
-    return prediction, _remembered(prediction, candidates, tried, memory)
-
-
-def _remembered(prediction: Prediction, candidates: tuple[Candidate, ...], tried: Sequence[Outcome], memory: Memory) -> Memory:
-    """Keep what the next prediction can start from.
-
-    A way that had no time keeps what it had. One that slid into another class is followed there, which costs little, and begun
-    anew from its own guess every RETRY predictions.
-    """
-    last, solutions, slid = memory.earlier.solutions, dict[str, Solution](), dict[str, int]()
-    for outcome in tried:
-        label, status = outcome.candidate.label, outcome.solution.status
-        if status is Status.DEADLINE and label in last:
-            solutions[label] = last[label]
-        elif status in (Status.SOLVED, Status.ETA_UNREACHABLE):
-            solutions[label] = outcome.solution
-        elif status is Status.LEFT_CLASS and memory.slid.get(label, 0) < RETRY:
-            solutions[label], slid[label] = outcome.solution, memory.slid.get(label, 0) + 1
-    likelihoods = {outcome.candidate.label: outcome.likelihood for outcome in prediction.outcomes}
-    labels = {candidate.label for candidate in candidates}
-    solved = {label: stamp for label, stamp in memory.solved_ns.items() if label in labels}
-    solved |= {outcome.candidate.label: prediction.stamp_ns for outcome in prediction.solved}
-    return Memory(prediction.most_likely, candidates, Earlier(solutions, likelihoods), solved, slid)
-
-
-def _aged(outcome: Outcome, stamp_ns: int, memory: Memory) -> Outcome:
-    """Say of a way that had no time when it was last solved: how likely it is, nobody knows."""
-    if outcome.solution.status is not Status.DEADLINE:
-        return outcome
-    solved_ns = memory.solved_ns.get(outcome.candidate.label)
-    age = 'never solved yet' if solved_ns is None else f'last solved {(stamp_ns - solved_ns) / NANOSECONDS:.3g} s ago'
-    return replace(outcome, solution=replace(outcome.solution, message=f'{outcome.solution.message}; {age}'))
+    return prediction, memory.after(prediction, candidates, tried)
 
 
 def _priced(outcome: Outcome, config: DurationConfig) -> Outcome:

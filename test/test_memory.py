@@ -1,0 +1,87 @@
+"""What a prediction takes from the one before: solutions by label, by an earlier name, and from where time ran out."""
+
+import numpy as np
+import pytest
+
+from foc_ros.foc.config import Config, updated
+from foc_ros.foc.deadline import Deadline, OutOfTimeError
+from foc_ros.foc.estimator import update
+from foc_ros.foc.memory import Memory
+from foc_ros.foc.outcomes import Earlier
+from foc_ros.foc.predictor import predict
+from foc_ros.foc.records import LEFT, RIGHT, Candidate, HandSample, Status, make_obstacles
+
+CONFIG = updated(Config(), {'foc.steps': 20})
+
+
+def way(sides: dict[str, int], goal: int = 0) -> Candidate:
+    label = f'goal{goal}:' + ''.join(('+' if side == LEFT else '-') + name for name, side in sides.items())
+    return Candidate(label, goal, tuple(sides.items()), np.zeros((2, 2)), 0.1)
+
+
+OVER_BOTH, BETWEEN = way({'a': LEFT, 'b': LEFT}), way({'a': LEFT, 'b': RIGHT})
+
+
+@pytest.fixture
+def memory() -> Memory:
+    solutions = {one.label: object() for one in (OVER_BOTH, BETWEEN)}
+    return Memory(None, (OVER_BOTH, BETWEEN), Earlier(solutions, {OVER_BOTH.label: 0.2, BETWEEN.label: 0.8}))
+
+
+@pytest.mark.parametrize(
+    ('now', 'before'),
+    [
+        pytest.param(BETWEEN, BETWEEN, id='the same name'),
+        pytest.param(way({'b': LEFT}), OVER_BOTH, id='an obstacle passed'),
+        pytest.param(way({'b': RIGHT}), BETWEEN, id='an obstacle passed on the other way'),
+        pytest.param(way({'a': LEFT, 'b': RIGHT, 'c': LEFT}), BETWEEN, id='an obstacle come into reach'),
+        pytest.param(way({'a': LEFT}), BETWEEN, id='the likelier of two that were told apart by what is passed'),
+        pytest.param(way({'a': RIGHT}), None, id='another side'),
+        pytest.param(way({'a': LEFT, 'c': LEFT}), None, id='one obstacle for another'),
+        pytest.param(way({'b': LEFT}, goal=1), None, id='another goal'),
+    ],
+)
+def test_a_way_is_known_by_its_name_or_the_one_it_had(memory, now, before):
+    found = memory.known([now]).solutions.get(now.label)
+    assert found is (None if before is None else memory.earlier.solutions[before.label])
+
+
+def reaching(x: float, memory: Memory, budget_s: float = 0.0):
+    """Predict for a hand at (x, 0) that moves, among two obstacles of which it passes the first at x = 0.1."""
+    obstacles = make_obstacles([[0.1, 0.04], [0.2, -0.01]], 0.02, 0.001)
+    state = None
+    for tick in range(40):
+        place = np.array([x - 0.004 * (39 - tick), 0.0])
+        state = update(state, HandSample(1_000_000_000 + 10_000_000 * tick, place), CONFIG.estimator).state
+    return predict(updated(CONFIG, {'budget_s': budget_s}), state, obstacles, np.array([[0.3, 0.0]]), memory)
+
+
+def test_when_an_obstacle_is_passed_its_ways_go_on_from_where_they_were():
+    _, memory = reaching(0.099, Memory())
+    warm, _ = reaching(0.101, memory)
+    cold, _ = reaching(0.101, Memory())
+    labels = {outcome.candidate.label for outcome in warm.solved}
+    assert labels.isdisjoint(memory.earlier.solutions), 'all names are new ones'
+    assert labels == {outcome.candidate.label for outcome in cold.solved}
+    for one in warm.solved:
+        other = next(each for each in cold.solved if each.candidate.label == one.candidate.label)
+        assert one.solution.qp_solves < other.solution.qp_solves
+        np.testing.assert_allclose(one.solution.path, other.solution.path, atol=1e-4)
+
+
+def test_a_way_that_was_stopped_goes_on_from_there(monkeypatch):
+    looks = []
+
+    def stop_after_a_few(_):
+        looks.append(1)
+        if len(looks) > 4:
+            raise OutOfTimeError
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Deadline, 'check', stop_after_a_few)
+        late, memory = reaching(0.0, Memory(), 60.0)
+    assert {outcome.solution.status for outcome in late.outcomes} == {Status.DEADLINE}
+    assert memory.earlier.solutions, 'the first way got somewhere'
+    assert all(solution.lam > 0.0 for solution in memory.earlier.solutions.values())
+    after, _ = reaching(0.0, memory)
+    assert set(memory.earlier.solutions) <= {outcome.candidate.label for outcome in after.solved}
