@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .between import course_of, entered, place
+from .between import course_of, entered
 from .compiled import Indices, Matrix, Tensor, Vector, compiled
 from .qp import goal_factors, to_goal
 from .touching import touching
@@ -20,14 +20,17 @@ NEW = 1e-6
 
 
 @compiled
-def _same_sides(before: Matrix, after: Matrix, centre: Matrix, drift: Matrix, obstacle: Indices, time: Vector) -> bool:
-    """Whether two courses (4, N + 1) pass the circles of contacts (k,) on the same side, when they are touched."""
-    for j, s in zip(obstacle, time):  # noqa: B905 (numba knows no strict)
-        p, q, along = place(before, s, 0), place(after, s, 0), 0.0
-        for axis in range(2):
-            middle = centre[j, axis] + s * drift[j, axis]
-            along += (p[axis] - middle) * (q[axis] - middle)
-        if along < 0.0:
+def same_ways(before: Matrix, after: Matrix, centre: Matrix, drift: Matrix) -> bool:
+    """Whether two courses (4, N + 1) with the same ends pass every circle on the same side: turn by the same angle round it."""
+    for j in range(len(centre)):
+        turned = 0.0
+        for course, sign in ((before, 1.0), (after, -1.0)):
+            x, y = course[0, 0] - centre[j, 0], course[1, 0] - centre[j, 1]
+            for t in range(1, course.shape[1]):
+                u, v = course[0, t] - centre[j, 0] - t * drift[j, 0], course[1, t] - centre[j, 1] - t * drift[j, 1]
+                turned += sign * np.arctan2(x * v - y * u, x * u + y * v)
+                x, y = u, v
+        if abs(turned) > np.pi:
             return False
     return True
 
@@ -56,14 +59,14 @@ def slide(
     """Find the least cost `qp.effort_cost` near a control (2N,) that keeps clear of every circle at every time.
 
     From contacts (k,) to begin with, which slide: those that pull are let go, and where a circle is entered there is a new one.
-    motion ... pace: as in `touching`; extent: of the scene [m]. Returns whether there is one with every contact on the side where
-    the first control passes its circle; the control, and its contacts' obstacles, times and forces.
+    motion ... pace: as in `touching`; extent: of the scene [m]. Returns whether there is one that passes every circle on the side
+    on which the first control does; the control, and its contacts' obstacles, times and forces.
     """
     inverse, root, factor = goal_factors(2.0 * (1.0 + weighted_variance + lam * summed_variance), goal_rows, softness)
     goal_control = to_goal(root, factor, goal_targets)
     before, control = course_of(motion, free, near), near.copy()
     obstacle, time, force = obstacle.copy(), time.copy(), force.copy()
-    for _ in range(CHANGES + 1):
+    for count in range(CHANGES + 1):
         if len(force):
             found, control, time, force = touching(
                 motion,
@@ -94,7 +97,7 @@ def slide(
         after = course_of(motion, free, control)
         new = entered(after, centre, drift, reach, short, pace, CLEAR * extent)
         if len(new) == 0:
-            return _same_sides(before, after, centre, drift, obstacle, time), control, obstacle, time, force
+            return count == 0 or same_ways(before, after, centre, drift), control, obstacle, time, force
         slight = NEW * (force.max() if len(force) else 1.0)
         obstacle = np.concatenate((obstacle, new[:, 0].astype(np.intp)))
         time, force = np.concatenate((time, new[:, 1])), np.concatenate((force, np.full(len(new), slight)))
