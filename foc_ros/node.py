@@ -29,6 +29,7 @@ from .endpoints import INPUTS, advertise, subscribe, waiting
 from .foc.config import Config
 from .foc.errors import FocError
 from .foc.pipeline import Pipeline, Verdict
+from .foc.predictor import rehearse
 from .frames import Frames
 from .freshness import Freshness
 from .intake import Intake
@@ -75,6 +76,7 @@ class FocNode(LifecycleNode):
         """Begin to listen."""
         self._begin()
         try:
+            rehearse(self._live.config)
             self._outputs = advertise(self)
             self._inputs = subscribe(self, self._receive)
         except Exception as error:

@@ -7,7 +7,7 @@ import pytest
 
 from foc_ros.foc.config import Config, updated
 from foc_ros.foc.memory import Memory
-from foc_ros.foc.predictor import predict
+from foc_ros.foc.predictor import predict, rehearse
 from foc_ros.foc.records import HandState, make_obstacles
 
 MEAN = np.array([0.0, 0.0, 0.2, 0.1, -0.4, 1.0])
@@ -32,3 +32,9 @@ def test_a_movement_goes_on_at_the_speed_that_its_acceleration_leads_to(time_s: 
 @pytest.mark.parametrize('time_s', [0.0, 0.5])
 def test_a_hand_that_has_not_begun_to_move_is_at_rest(time_s: float) -> None:
     np.testing.assert_allclose(first(time_s, None), np.zeros(6), atol=1e-12)
+
+
+@pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal', 'algorithm1', 'fixed'])
+@pytest.mark.parametrize('model', ['fixed', 'fitts', 'cost_of_time'])
+def test_every_configuration_can_be_rehearsed(strategy, model):
+    rehearse(updated(Config(), {'foc.strategy': strategy, 'duration.model': model, 'foc.steps': 10}))

@@ -20,7 +20,7 @@ from .memory import Memory
 from .noise import noise_per_step
 from .outcomes import ranked, solve_candidates
 from .problem import Problem, rest_to_goal
-from .records import Array, Candidate, HandState, Obstacles, Outcome, Prediction
+from .records import Array, Candidate, HandState, Obstacles, Outcome, Prediction, make_obstacles
 from .replanning import triple_integrator_error_map, triple_integrator_process_covariance
 
 
@@ -62,6 +62,12 @@ def predict(
 def _priced(outcome: Outcome, config: DurationConfig) -> Outcome:
     """Add what the time to go costs."""
     return replace(outcome, cost=outcome.cost + time_price(config) * float(outcome.solution.times[-1]))
+
+
+def rehearse(config: Config) -> None:
+    """Predict once for a made-up scene, so that the first real prediction finds what is computed once and kept."""
+    obstacles, goals = make_obstacles([[0.15, 0.0]], 0.02, 0.001), np.array([[0.3, 0.0]])
+    predict(config, HandState(0, np.zeros(6), np.zeros((6, 6))), obstacles, goals, Memory())
 
 
 def way_problems(
