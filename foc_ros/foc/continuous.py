@@ -18,7 +18,7 @@ from .chance import eta_of_k, k_of_eta
 from .contacts import Contacts
 from .deadline import NEVER, Deadline, OutOfTimeError
 from .least_k import smallest_k
-from .newton import joined, leapt, slid, stays
+from .newton import joined, leapt, same_class, slid, stays
 from .problem import Problem
 from .qp import NO_TIMES, effort_cost
 from .records import Array, Status
@@ -132,12 +132,13 @@ class _Walker:
         return self.near(s, neighbour.control, neighbour.contacts)
 
     def near(self, s: float, control: Array, contacts: Contacts) -> Point | None:
-        """Converge at s from a control (2N,) and its contacts: by Newton steps, else by QPs."""
+        """Converge at s from a control (2N,) and its contacts, in its class: by Newton steps, else by QPs."""
         self.deadline.check()
         point = self.settled(s, control, contacts)
         if point is not None:
             return point
-        return self.point(s, self.problem.positions(control), contacts.rows(self.problem.horizon.steps)[0])
+        point = self.point(s, self.problem.positions(control), contacts.rows(self.problem.horizon.steps)[0])
+        return point if point is not None and same_class(self.problem, control, point.control) else None
 
     def settled(self, s: float, control: Array, contacts: Contacts) -> Point | None:
         found = slid(self.problem, control, contacts, *self.curve.at(s))

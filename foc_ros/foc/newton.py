@@ -13,7 +13,7 @@ from .contacts import Contacts
 from .problem import Problem
 from .qp import NO_TIMES, Cost, depths, margins, wanted_distance
 from .records import Array
-from .sliding import CLEAR, SETTLED, slide
+from .sliding import CLEAR, SETTLED, same_ways, slide
 from .solver import Verdict, with_rows
 from .touching import half_planes_between, touching
 
@@ -90,6 +90,12 @@ def slid(problem: Problem, control: Array, contacts: Contacts, tau: float, lam: 
         problem.extent,
     )
     return (control, Contacts(obstacle, time, force)) if found else None
+
+
+def same_class(problem: Problem, one: Array, other: Array) -> bool:
+    """Whether the means of two controls (2N,) pass every circle on the same side."""
+    before, after = (course_of(problem.horizon.motion, problem.free_course, np.ascontiguousarray(each)) for each in (one, other))
+    return bool(same_ways(before, after, problem.obstacles.centre, problem.drift))
 
 
 def stays(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: float) -> bool:
