@@ -7,7 +7,7 @@ disappears.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -76,30 +76,32 @@ class _Pen:
             yield from self._ellipses(index, outcome, colour)
         else:
             colour, words = GREY, solution.status.value
-        points = [self._point(*xyz) for xyz in lift(line, self.prediction.height, self.plane).tolist()]
-        yield self._marker('path', index, LINE_STRIP, colour, (0.002 + 0.004 * likelihood, 0, 0), points=points)
+        points = self._lifted(line)
+        drawn = [self._point(*point) for point in points]
+        yield self._marker('path', index, LINE_STRIP, colour, (0.002 + 0.004 * likelihood, 0, 0), points=drawn)
         text = f'{outcome.candidate.label} {words}'
-        yield self._marker('label', index, TEXT, colour, (0, 0, TEXT_HEIGHT), line[len(line) // 2], text=text)
+        yield self._marker('label', index, TEXT, colour, (0, 0, TEXT_HEIGHT), points[len(points) // 2], text=text)
 
     def _ellipses(self, index: int, outcome: Outcome, colour: Colour) -> Iterator[Any]:
         """Draw one standard deviation about the mean at steps spread over the path."""
         steps = np.unique(np.linspace(0, len(outcome.solution.mean) - 1, ELLIPSES + 1).round().astype(int)[1:])
         variances, axes = np.linalg.eigh(outcome.solution.covariance[steps, :2, :2])
-        diameters = 2.0 * np.sqrt(np.maximum(variances, 0.0))
-        for i, step in enumerate(steps):
-            angle = math.atan2(axes[i, 1, 0], axes[i, 0, 0])
-            scale = (*diameters[i], THICKNESS)
-            centre, faint = outcome.solution.path[step], (*colour[:3], 0.3 * colour[3])
-            yield self._marker('deviation', 1000 * index + i, CYLINDER, faint, scale, centre, angle)
+        diameters = (2.0 * np.sqrt(np.maximum(variances, 0.0))).tolist()
+        angles = np.arctan2(axes[:, 1, 0], axes[:, 0, 0]).tolist()
+        faint = (*colour[:3], 0.3 * colour[3])
+        for i, centre in enumerate(self._lifted(outcome.solution.path[steps])):
+            scale = (diameters[i][0], diameters[i][1], THICKNESS)
+            yield self._marker('deviation', 1000 * index + i, CYLINDER, faint, scale, centre, angles[i])
 
     def obstacles(self, obstacles: Obstacles) -> Iterator[Any]:
         near = self._nearest(obstacles)
-        for i in range(len(near)):
-            for name, radius, colour in (
-                ('obstacle', near.radius[i], OBSTACLE),
-                ('obstacle_deviation', near.radius[i] + near.radius_stddev[i], SHELL),
-            ):
-                yield self._marker(name, i, CYLINDER, colour, (2 * radius, 2 * radius, 10 * THICKNESS), near.centre[i])
+        centres = self._lifted(near.centre)
+        for name, radii, colour in (
+            ('obstacle', near.radius, OBSTACLE),
+            ('obstacle_deviation', near.radius + near.radius_stddev, SHELL),
+        ):
+            for i, (centre, diameter) in enumerate(zip(centres, (2 * radii).tolist(), strict=True)):
+                yield self._marker(name, i, CYLINDER, colour, (diameter, diameter, 10 * THICKNESS), centre)
 
     def _nearest(self, obstacles: Obstacles) -> Obstacles:
         if len(obstacles) <= MAX_DRAWN or not self.prediction.outcomes:
@@ -115,12 +117,11 @@ class _Pen:
         kind: int,
         colour: Colour = GREY,
         scale: tuple[float, float, float] = (1, 1, 1),
-        centre: Array | tuple[float, float] = (0.0, 0.0),
+        centre: Sequence[float] = (0.0, 0.0, 0.0),
         angle: float = 0.0,
         **rest: Any,
     ) -> Any:
         make = self.types.make
-        at = lift(centre, self.prediction.height, self.plane).tolist() if kind != LINE_STRIP else (0.0, 0.0, 0.0)
         qx, qy, qz, qw = _turned(angle, self.plane) if kind == CYLINDER else (0.0, 0.0, 0.0, 1.0)
         return make(
             'visualization_msgs/msg/Marker',
@@ -129,7 +130,7 @@ class _Pen:
             type=kind,
             pose=make(
                 'geometry_msgs/msg/Pose',
-                position=self._point(*at),
+                position=self._point(*centre),
                 orientation=make('geometry_msgs/msg/Quaternion', x=qx, y=qy, z=qz, w=qw),
             ),
             scale=make('geometry_msgs/msg/Vector3', **dict(zip('xyz', scale, strict=True))),
@@ -137,6 +138,11 @@ class _Pen:
             **self._common,
             **rest,
         )
+
+    def _lifted(self, positions: Array) -> list[list[float]]:
+        """Return positions in the plane (m, 2) as points in space."""
+        points: list[list[float]] = lift(positions, self.prediction.height, self.plane).tolist()
+        return points
 
     def _point(self, x: float, y: float, z: float) -> Any:
         return self.types.make('geometry_msgs/msg/Point', x=x, y=y, z=z)

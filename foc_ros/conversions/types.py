@@ -40,9 +40,10 @@ class MessageTypes(Hashable, Protocol):
     """Makes messages by type name."""
 
     def make(self, name: str, /, **values: Any) -> Any:
-        """Return a message of type `name` ('std_msgs/msg/Header'); fields not given keep their defaults.
+        """Return a message of type `name` ('std_msgs/msg/Header'); fields not given have their defaults.
 
-        Raises TypeError for a field the type does not have.
+        Messages may share what is in them, defaults above all, so none is to be changed. Raises TypeError for a field the type
+        does not have.
         """
 
 
@@ -51,10 +52,15 @@ class RclpyTypes:
 
     def make(self, name: str, /, **values: Any) -> Any:
         """Return a message of type `name`; see :class:`MessageTypes`."""
-        message, converters = _rclpy_type(name)
+        kind, defaults, converters = _rclpy_type(name)
         if not values.keys() <= converters.keys():
             _refuse_unknown(name, values, converters)
-        return message(**{field: converters[field](value) for field, value in values.items()})
+        message = object.__new__(kind)  # its constructor would make the defaults of all fields, those given too
+        for slot, default in defaults:
+            setattr(message, slot, default)
+        for field, value in values.items():
+            setattr(message, field, converters[field](value))
+        return message
 
 
 class RosbagsTypes:
@@ -94,10 +100,13 @@ class RosbagsTypes:
 
 
 @cache
-def _rclpy_type(name: str) -> tuple[Any, dict[str, Converter]]:
+def _rclpy_type(name: str) -> tuple[type[Any], list[tuple[str, Any]], dict[str, Converter]]:
+    """Return a message class, what the slots of a message hold by default, and the converters of its fields."""
     package, _, leaf = name.split('/')
-    message = getattr(import_module(f'{package}.msg'), leaf)
-    return message, {field: _rclpy_converter(kind) for field, kind in message.get_fields_and_field_types().items()}
+    kind = getattr(import_module(f'{package}.msg'), leaf)
+    blank = kind()
+    converters = {field: _rclpy_converter(declared) for field, declared in kind.get_fields_and_field_types().items()}
+    return kind, [(slot, getattr(blank, slot)) for slot in blank.__slots__], converters
 
 
 def _rclpy_converter(kind: str) -> Converter:

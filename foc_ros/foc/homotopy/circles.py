@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
 
-from foc_ros.foc.compiled import Flags, FlagTable
+from foc_ros.foc.compiled import Flags, FlagTable, Indices, compiled_exactly
 from foc_ros.foc.records import Array
 
 from .crossing import Complex
@@ -41,6 +40,23 @@ class Circles:
         return len(self.centre) - self.n
 
 
+@compiled_exactly
+def clusters(touching: FlagTable) -> Indices:
+    """Return the number of the cluster that each circle belongs to, (n,): all that can be reached from one another."""
+    number = np.full(len(touching), -1)
+    for first in range(len(touching)):
+        if number[first] >= 0:
+            continue
+        number[first], reached = first, [first]
+        while reached:
+            circle = reached.pop()
+            for other in range(len(touching)):
+                if touching[circle, other] and number[other] < 0:
+                    number[other] = first
+                    reached.append(other)
+    return number
+
+
 def circles(centre: Complex, radius: Array, goals: Complex) -> Circles:
     """Take centre (n,), complex [m], radius (n,) > 0 [m] and goals (g,), complex [m], together."""
     n = len(centre)
@@ -54,10 +70,4 @@ def circles(centre: Complex, radius: Array, goals: Complex) -> Circles:
     overlap = touching & outer[:n] & ~np.eye(n, dtype=bool)
     blocker = np.where(overlap, np.angle(apart[:n]), np.nan)
     bar = (radius - GRAZE).clip(0.0) ** 2
-    return Circles(n, c, r, bar, distance < r[:, None], outer, blocker, _clusters(touching))
-
-
-def _clusters(touching: Flags) -> tuple[int, ...]:
-    if touching.sum() == len(touching):
-        return tuple(range(len(touching)))
-    return tuple(connected_components(touching, directed=False)[1].tolist())
+    return Circles(n, c, r, bar, distance < r[:, None], outer, blocker, tuple(clusters(touching).tolist()))
