@@ -22,6 +22,8 @@ FINENESS = 257
 """Points at which a path is compared with circles that its roadmap does not hold."""
 
 
+NOTES = ('no_way', 'search_cut', 'left_out')
+"""What is decided on the way, as explained at `search.Search`."""
 Side = tuple[str, int]
 """An obstacle's id, and LEFT or RIGHT."""
 
@@ -43,7 +45,7 @@ class Classes:
     """
 
     def __init__(self, scene: Scene, levels: Levels, goal: int, ids: tuple[str, ...], states: int, usual: int) -> None:
-        self.notes = dict.fromkeys(('no_way', 'search_cut', 'left_out'), 0)
+        self.notes = dict.fromkeys(NOTES, 0)
         self._scene, self._levels, self._goal, self._ids = scene, levels, goal, ids
         self._states, self._usual = states, usual
         self._named: list[int] = sorted(np.flatnonzero(scene.named[goal]).tolist(), key=ids.__getitem__)

@@ -32,6 +32,7 @@ def guesses(
             table.head, table.spans, table.places, radius, one.way.runs, velocity, duration_s[one.goal], steps
         )
         points = _out_of_margins(scene, one.goal, points, along)
+        points.flags.writeable = False
         paths.append((points.view(float).reshape(-1, 2), length))
     return paths
 

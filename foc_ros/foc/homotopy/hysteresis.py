@@ -34,24 +34,25 @@ def strangers(ids: tuple[str, ...], goals: int, previous: Sequence[Candidate]) -
 def kept_open(ids: tuple[str, ...], centre: Complex, radius: Array, clearance: float, previous: Sequence[Candidate]) -> Array:
     """Return the radii (n,) [m], less by half of what is missing from gaps that candidates went through."""
     names = {identity for candidate in previous for identity, _ in candidate.sides}
-    rows = [row for row, identity in enumerate(ids) if identity in names]
-    sides = [[held.get(ids[row], 0) for row in rows] for held in (dict(candidate.sides) for candidate in previous)]
-    table = np.array(sides, dtype=np.intp).reshape(len(previous), len(rows))
-    return lessened(centre, radius, np.array(rows, dtype=np.intp), table, min(NARROWER, clearance))
+    rows = np.array([row for row, identity in enumerate(ids) if identity in names], dtype=np.intp)
+    gaps, missing = narrow_gaps(centre, radius, rows, min(NARROWER, clearance))
+    less, sides = radius.copy(), [dict(candidate.sides) for candidate in previous] if len(gaps) else []
+    for (a, b), short in zip(gaps.tolist(), missing.tolist(), strict=True):
+        if any(held.get(ids[a], 0) * held.get(ids[b], 0) < 0 for held in sides):
+            for row in (a, b):
+                less[row] = min(less[row], radius[row] - (short / 2.0 + OPEN))
+    return less
 
 
 @compiled_exactly
-def lessened(centre: Points, radius: Vector, rows: Indices, sides: Table, most: float) -> Vector:
-    """Return radii (n,) less by half of what is missing, but no more than `most`, from gaps between circles of the given rows.
-
-    sides (candidates, rows): a gap is one where some candidate passes its two circles on different sides.
-    """
-    less = radius.copy()
+def narrow_gaps(centre: Points, radius: Vector, rows: Indices, most: float) -> tuple[Table, Vector]:
+    """Return the gaps (m, 2) between circles of some rows that are too narrow, by less than `most`, and by how much (m,) [m]."""
+    gaps, missing, count = np.empty((len(rows) ** 2, 2), np.intp), np.empty(len(rows) ** 2), 0
     for j in range(len(rows)):
         for i in range(j):
             a, b = rows[i], rows[j]
-            missing = radius[a] + radius[b] - abs(centre[a] - centre[b])
-            if -OPEN < missing < most and (sides[:, i] * sides[:, j] < 0).any():
-                less[a] = min(less[a], radius[a] - (missing / 2.0 + OPEN))
-                less[b] = min(less[b], radius[b] - (missing / 2.0 + OPEN))
-    return less
+            short = radius[a] + radius[b] - abs(centre[a] - centre[b])
+            if -OPEN < short < most:
+                gaps[count, 0], gaps[count, 1], missing[count] = a, b, short
+                count += 1
+    return gaps[:count].copy(), missing[:count].copy()

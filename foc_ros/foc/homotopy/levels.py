@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -33,13 +34,17 @@ class Levels:
 
     def __init__(self, scene: Scene, radius: Array, velocity: complex) -> None:
         self._scene, self._radius, self._velocity = scene, radius, velocity
-        self._order: list[int] = np.argsort(scene.excess, kind='stable').tolist()
         self._made: dict[tuple[frozenset[int], bool], Level] = {}
+
+    @cached_property
+    def _order(self) -> list[int]:
+        order: list[int] = np.argsort(self._scene.excess, kind='stable').tolist()
+        return order
 
     def first(self, named: list[int]) -> frozenset[int]:
         """Return the circles to begin with: all of a few, the named ones of many if they are few, or the close ones."""
-        if len(self._order) <= FEW:
-            return frozenset(self._order)
+        if len(self._radius) <= FEW:
+            return frozenset(range(len(self._radius)))
         few = frozenset(named).union(self._order[: FEW // 2])
         close = int((self._scene.excess < CLOSE).sum())
         return few if len(few) <= FEW else frozenset(self._order[: min(max(close, FEW), MOST)])
@@ -56,7 +61,7 @@ class Levels:
 
     def _level(self, rows: list[int], bounded: bool) -> Level:
         scene = self._scene
-        limit = float(np.delete(scene.excess, rows).min(initial=np.inf)) if len(rows) < len(self._order) else np.inf
+        limit = float(np.delete(scene.excess, rows).min(initial=np.inf)) if len(rows) < len(self._radius) else np.inf
         if bounded:
             ellipse = Ellipse(scene.hand, scene.goals, limit * np.abs(scene.goals - scene.hand))
             made = roadmap_within(scene.centre[rows], self._radius[rows], scene.goals, ellipse)

@@ -12,7 +12,7 @@ from foc_ros.foc.records import Array
 
 from .circles import Circles, circles
 from .crossing import Complex
-from .tangents import Runs, free, tabulated
+from .tangents import Runs, free_tangents, spread, table
 from .tries import EVERYWHERE, Ellipse, pairs, spokes
 
 
@@ -42,7 +42,7 @@ def roadmap_within(centre: Complex, radius: Array, goals: Complex, ellipse: Elli
     """Lay out circles and goals with only the runs that an ellipse holds."""
     field = circles(centre, radius, goals)
     tail, head = pairs(field.n, field.goals)
-    kept = free(field, field.centre, field.radius, tail, head, ellipse)
+    kept = free_tangents(field.centre, field.radius, field.bar, field.outer, tail, head, *ellipse)
     tail, head = tail[kept], head[kept]
     back = head < 2 * field.n
     # the same run backwards touches both circles in the other sense
@@ -50,12 +50,13 @@ def roadmap_within(centre: Complex, radius: Array, goals: Complex, ellipse: Elli
     order = np.argsort(tail, kind='stable')
     tail, head = tail[order], head[order]
     departures = np.searchsorted(tail, np.arange(2 * field.n + 1))
-    return Roadmap(field, tabulated(field, field.centre, field.radius, tail, head), departures)
+    columns = table(field.centre, field.radius, field.held, field.blocker, tail, head)
+    return Roadmap(field, Runs(tail, head, *columns), departures)
 
 
 def hand_runs(field: Circles, hand: complex) -> Runs:
     """Return the free runs from the hand, which lies in no circle, to the circles and goals."""
-    c, r = np.concatenate((field.centre, [hand])), np.concatenate((field.radius, [0.0]))
     tail, head = spokes(field.n, field.goals)
-    kept = free(field, c, r, tail, head)
-    return tabulated(field, c, r, tail[kept], head[kept])
+    seen = field.centre, field.radius, field.bar, field.outer, field.held, field.blocker
+    kept, spans, places, crossing, way_in = spread(*seen, tail, head, hand)
+    return Runs(tail[kept], head[kept], spans, places, crossing, way_in)

@@ -37,9 +37,9 @@ class Scene:
     """
 
     hand: complex
-    goals: Complex
     centre: Complex
     wanted: Array
+    goals: Complex
     radius: Array
     held: Flags
     near: FlagTable
@@ -54,9 +54,7 @@ def scene(hand: complex, goals: Complex, obstacles: Obstacles, clearance: float,
     centre: Complex = obstacles.centre.view(complex)[:, 0]
     wanted = kept_open(obstacles.ids, centre, np.maximum(obstacles.radius + clearance, SMALLEST), clearance, previous)
     slack = strangers(obstacles.ids, len(goals), previous)
-    apart = np.where(np.abs(goals - hand) < GRAZE, hand + GRAZE, goals)
-    seen = looked_at(hand, goals, apart, centre, wanted, obstacles.radius, slack)
-    return Scene(hand, apart, centre, wanted, *seen)
+    return Scene(hand, centre, wanted, *looked_at(hand, goals, centre, wanted, obstacles.radius, slack))
 
 
 @compiled_exactly
@@ -80,14 +78,14 @@ def matters(hand: complex, goal: complex, radius: float, straight: float, slack:
 
 @compiled_exactly
 def looked_at(
-    hand: complex, goals: Points, apart: Points, centre: Points, wanted: Vector, hard: Vector, slack: Matrix
-) -> tuple[Matrix, Flags, FlagTable, Flags, FlagTable, Matrix, Vector]:
-    """Return radius, held, near, inside, named, turned and excess of `Scene`.
+    hand: complex, goals: Points, centre: Points, wanted: Vector, hard: Vector, slack: Matrix
+) -> tuple[Points, Matrix, Flags, FlagTable, Flags, FlagTable, Matrix, Vector]:
+    """Return goals, radius, held, near, inside, named, turned and excess of `Scene`; goals on the hand are moved off it.
 
-    apart (g,): the goals, if need be moved off the hand; hard (n,): radii without clearance; slack (g, n): what an obstacle has
-    to be within its bounds to have a name [m].
+    hard (n,): radii without clearance; slack (g, n): what an obstacle has to be within its bounds to have a name [m].
     """
     n, g = len(centre), len(goals)
+    apart = np.where(np.abs(goals - hand) < GRAZE, hand + GRAZE, goals)
     radius, turned, excess, held = np.empty((g, n)), np.empty((g, n)), np.full(n, np.inf), np.zeros(n, np.bool_)
     near, inside, named = np.zeros((g, n), np.bool_), np.zeros(g, np.bool_), np.zeros((g, n), np.bool_)
     for k in range(n):
@@ -104,4 +102,4 @@ def looked_at(
             named[goal, k] = matters(hand - centre[k], goals[goal] - centre[k], r, straight, slack[goal, k])
             turned[goal, k] = direction(apart[goal] - centre[k]) - direction(hand - centre[k])
             excess[k] = min(excess[k], max(away + left - 2.0 * r, straight) / straight)
-    return radius, held, near, inside, named, turned, excess
+    return apart, radius, held, near, inside, named, turned, excess

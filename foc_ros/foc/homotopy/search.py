@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import chain
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from foc_ros.foc.config import MOST_CANDIDATES, HomotopyConfig
 from foc_ros.foc.errors import SceneError
 from foc_ros.foc.records import Array, Candidate, Obstacles
 
-from .classes import Classes
+from .classes import NOTES, Classes
 from .guesses import guesses
 from .levels import Levels
 from .scene import scene
@@ -60,7 +59,7 @@ def search(
     if len(duration_s) != len(goals):
         raise SceneError('duration_s', f'one for each of the {len(goals)} goals', len(duration_s))
     hand, velocity = complex(*hand_mean[:2]), complex(*hand_mean[2:4])
-    view = scene(hand, goals[:, 0] + 1j * goals[:, 1], obstacles, config.clearance, previous)
+    view = scene(hand, np.ascontiguousarray(goals, dtype=float).view(complex)[:, 0], obstacles, config.clearance, previous)
     levels = {radius.tobytes(): Levels(view, radius, velocity) for radius in view.radius}
     states = STATES + STATES_PER_CANDIDATE * config.max_candidates
     reachable = np.flatnonzero(~view.inside).tolist()
@@ -69,14 +68,11 @@ def search(
     # a goal without a candidate could never be foretold
     count = max(config.max_candidates, min(len(classes), MOST_CANDIDATES))
     chosen = select(classes, count, {candidate.label for candidate in previous})
-    near = view.near.any(axis=1) & ~view.inside
-    counts = [('hand_inside', int(view.held.sum())), ('goal_inside', int(view.inside.sum())), ('goal_near', int(near.sum()))]
-    notes = dict[str, int]()
-    for name, count in chain(counts, *(to_goal.notes.items() for to_goal in classes)):
-        if count:
-            notes[name] = notes.get(name, 0) + count
+    notes = {name: sum(to_goal.notes[name] for to_goal in classes) for name in NOTES}
+    notes |= {'hand_inside': int(np.count_nonzero(view.held)), 'goal_inside': int(np.count_nonzero(view.inside))}
+    notes['goal_near'] = int(np.count_nonzero(view.near.any(axis=1) & ~view.inside))
     candidates = tuple(
         Candidate(one.rank[1], one.goal, one.sides, path, length)
         for one, (path, length) in zip(chosen, guesses(view, velocity, chosen, duration_s, steps), strict=True)
     )
-    return Search(candidates, notes)
+    return Search(candidates, {name: count for name, count in notes.items() if count})

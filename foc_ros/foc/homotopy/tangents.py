@@ -23,9 +23,7 @@ from foc_ros.foc.compiled import (
     compiled_exactly,
 )
 
-from .circles import Circles
 from .crossing import along_circle, straight
-from .tries import EVERYWHERE, Ellipse
 
 TURN = 2.0 * np.pi
 LENGTH, LEAVE, REACH, CLEAR = range(4)
@@ -61,16 +59,6 @@ class Runs:
             np.concatenate((self.crossing, more.crossing)),
             np.concatenate((self.way_in, more.way_in)),
         )
-
-
-def free(field: Circles, c: Points, r: Vector, tail: Indices, head: Indices, ellipse: Ellipse = EVERYWHERE) -> Indices:
-    """Return which of the runs exist, are free, and lie in an ellipse one way or the other; c, r: of circles, goals, hand."""
-    return free_tangents(c, r, field.bar, field.outer, tail, head, *ellipse)
-
-
-def tabulated(field: Circles, c: Points, r: Vector, tail: Indices, head: Indices) -> Runs:
-    """Tabulate free runs."""
-    return Runs(tail, head, *table(c, r, field.held, field.blocker, tail, head))
 
 
 @compiled_exactly
@@ -175,3 +163,22 @@ def table(
             if j < n:
                 way_in[run, k] = along_circle(c[j] + r[j] - c[k], to_k, held[j, k])
     return spans, places, crossing, way_in
+
+
+@compiled_exactly
+def spread(
+    c: Points,
+    r: Vector,
+    bar: Vector,
+    outer: Flags,
+    held: FlagTable,
+    blocker: Matrix,
+    tail: Indices,
+    head: Indices,
+    hand: complex,
+) -> tuple[Indices, Matrix, PointTable, Table, Table]:
+    """Return which runs from a hand, the circle after the last goal, are free, and their `table`."""
+    centre, radius = np.append(c, hand), np.append(r, 0.0)
+    kept = free_tangents(centre, radius, bar, outer, tail, head, hand, np.zeros(1, np.complex128), np.full(1, np.inf))
+    spans, places, crossing, way_in = table(centre, radius, held, blocker, tail[kept], head[kept])
+    return kept, spans, places, crossing, way_in
