@@ -80,12 +80,16 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """One converged solution on the curve: control (2N,), the contacts that hold it, the k that it achieves."""
+    """One converged solution on the curve: control (2N,), the contacts that hold it, the k that it achieves.
+
+    rough: held by the rows of QPs, and so perhaps slightly inside a circle between two of them.
+    """
 
     s: float
     control: Array
     contacts: Contacts
     k: float
+    rough: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,10 +112,13 @@ class _Walker:
         self.best: Point | None = None
 
     def point(self, s: float, guess: Array, working: WorkingSet) -> Point | None:
-        """Converge at s from a guess (N, 2): by QPs with rows at the steps, then between them."""
+        """Converge at s from a guess (N, 2): by QPs, then by sliding contacts; where these find nothing, what the QPs found."""
         tau, lam = self.curve.at(s)
         rough = self.rough(guess, working, tau, lam)
-        return None if rough is None else self.settled(s, rough.control, joined(self.problem, rough.contacts))
+        if rough is None:
+            return None
+        settled = self.settled(s, rough.control, joined(self.problem, rough.contacts))
+        return self.judged(s, rough.control, rough.contacts, rough=True) if settled is None else settled
 
     def rough(self, guess: Array, working: WorkingSet, tau: float, lam: float) -> Converged | None:
         """Converge by QPs with rows at the steps, and at more times where the mean would leap over a circle between them."""
@@ -123,13 +130,14 @@ class _Walker:
             self.qp_solves += rough.qp_solves
             leaps = leapt(self.problem, rough.control, tau)
             if not len(leaps):
-                break
+                return rough
             between, working = np.union1d(between, leaps), rough.active.within(self.problem.horizon.steps)
-        return rough
+        return None
 
     def beside(self, s: float, neighbour: Point) -> Point | None:
         """Converge at s from a neighbour."""
-        return self.near(s, neighbour.control, neighbour.contacts)
+        contacts = joined(self.problem, neighbour.contacts) if neighbour.rough else neighbour.contacts
+        return self.near(s, neighbour.control, contacts)
 
     def near(self, s: float, control: Array, contacts: Contacts) -> Point | None:
         """Converge at s from a control (2N,) and its contacts, in its class: by Newton steps, else by QPs."""
@@ -142,9 +150,11 @@ class _Walker:
 
     def settled(self, s: float, control: Array, contacts: Contacts) -> Point | None:
         found = slid(self.problem, control, contacts, *self.curve.at(s))
-        if found is None:
-            return None
-        point = Point(s, *found, smallest_k(self.problem, found[0]))
+        return None if found is None else self.judged(s, *found)
+
+    def judged(self, s: float, control: Array, contacts: Contacts, *, rough: bool = False) -> Point:
+        """Return the point with the k that its control achieves, and remember it if that is the largest so far."""
+        point = Point(s, control, contacts, smallest_k(self.problem, control), rough)
         self.best = point if self.best is None or point.k > self.best.k else self.best
         return point
 

@@ -19,7 +19,7 @@ from .touching import half_planes_between, touching
 
 STAYS = 3e-7
 """Largest move of the mean that counts as staying, relative to the scene's extent."""
-LEAP = 0.2
+LEAP = 0.1
 """Depth in a circle between two steps, relative to the smallest, from which on the mean may be on the wrong side of it."""
 
 
