@@ -9,7 +9,7 @@ import pytest
 from reach_helpers import solved
 from varied_reaches import varied_reach
 
-from foc_ros.foc.between import course_of, place, place_row
+from foc_ros.foc.between import place, place_row
 from foc_ros.foc.chance import k_of_eta
 from foc_ros.foc.optimal import surrogate_qp
 from foc_ros.foc.problem import Problem
@@ -25,8 +25,7 @@ def at_any_time(problem: Problem, solution: Solution) -> ReachingQP:
     """Return the QP of `clearance_qp` with rows at the steps and at the times of the contacts, linearised at the solution."""
     steps = problem.horizon.steps
     times = np.concatenate((np.arange(1, steps + 1), [time for _, time, _ in solution.multipliers]))
-    motion, control = problem.horizon.motion, np.ascontiguousarray(solution.control.T.ravel())
-    course = course_of(motion, problem.free_course, control)
+    motion, course = problem.horizon.motion, problem.course(solution.control.T.ravel())
     maps = np.array([[place_row(motion, time, 0, x, y) for time in times] for x, y in ((1.0, 0.0), (0.0, 1.0))])
     centres = problem.obstacles.centre[:, None] + times[None, :, None] * problem.drift[:, None]
     away = np.array([place(course, time, 0) for time in times]) - centres
@@ -81,7 +80,7 @@ def test_the_mean_keeps_clear_between_the_steps(strategy):
         solution = solved(problem, guess, strategy)
         if solution.status is not Status.SOLVED:
             continue
-        course = course_of(problem.horizon.motion, problem.free_course, np.ascontiguousarray(solution.control.T.ravel()))
+        course = problem.course(solution.control.T.ravel())
         times = np.linspace(1.0, problem.horizon.steps, 50 * (problem.horizon.steps - 1) + 1)
         positions = np.array([place(course, time, 0) for time in times])
         away = positions - problem.obstacles.centre[:, None] - times[:, None] * problem.drift[:, None]

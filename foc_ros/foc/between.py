@@ -11,7 +11,7 @@ import numpy as np
 from .compiled import Matrix, Tensor, Vector, compiled
 
 ROOT_STEPS = 40
-"""Newton steps, or halvings, to the moment of closest approach within a step; five are usual."""
+"""Steps of regula falsi, or halvings, to the moment of closest approach within a step; five are usual."""
 ROOT_CLOSE = 1e-12
 """In steps."""
 
@@ -124,15 +124,33 @@ def kept(reach: float, missing: float, pace: float, time: float) -> tuple[float,
 
 
 @compiled
+def kept_at(reach: Vector, missing: Vector, pace: float, times: Vector) -> Matrix:
+    """Return the distances (m, q) to be kept from m centres at times (q,)."""
+    wanted = np.empty((len(reach), len(times)))
+    for j in range(len(reach)):
+        for t in range(len(times)):
+            wanted[j, t] = kept(reach[j], missing[j], pace, times[t])[0]
+    return wanted
+
+
+@compiled
 def spared(
-    course: Matrix, centre: Vector, drift: Vector, reach: float, missing: float, pace: float, time: float
+    p: Vector, v: Vector, centre: Vector, drift: Vector, reach: float, missing: float, pace: float, time: float
 ) -> tuple[float, float]:
-    """Return how much farther than wanted the mean is from a circle's centre at a time [m], and the rate of that per step."""
-    p, v = place(course, time, 0), place(course, time, 1)
+    """Return how much farther than wanted p (2,) is from a centre at a time [m], and the rate of that with v (2,) per step."""
     x, y = p[0] - centre[0] - time * drift[0], p[1] - centre[1] - time * drift[1]
     distance = max(np.hypot(x, y), 1e-12)
     wanted, faster, _ = kept(reach, missing, pace, time)
     return distance - wanted, (x * (v[0] - drift[0]) + y * (v[1] - drift[1])) / distance - faster
+
+
+@compiled
+def spared_at(
+    course: Matrix, centre: Vector, drift: Vector, reach: float, missing: float, pace: float, time: float
+) -> tuple[float, float]:
+    """Return the same on a course (4, N + 1)."""
+    spare, rate = spared(place(course, time, 0), place(course, time, 1), centre, drift, reach, missing, pace, time)
+    return spare, rate
 
 
 @compiled
@@ -152,7 +170,7 @@ def _closest(
     time = begin
     for i in range(ROOT_STEPS):
         time = (low + high) / 2 if i % 3 == 2 else (low * above - high * below) / (above - below)
-        _, rate = spared(course, centre, drift, reach, missing, pace, time)
+        _, rate = spared_at(course, centre, drift, reach, missing, pace, time)
         if rate < 0.0:
             low, below = time, rate
         else:
@@ -174,14 +192,11 @@ def entered(
     """
     m, last = len(reach), course.shape[1] - 1
     found, count = np.empty((m * (last + 1), 2)), 0
+    places, speeds = np.ascontiguousarray(course[:2].T), np.ascontiguousarray(course[2:].T)
     for j in range(m):
         spare_before, rate_before = 0.0, 0.0
-        for t in range(1, last + 1):  # as `spared`, where no blend is needed
-            x, y = course[0, t] - centre[j, 0] - t * drift[j, 0], course[1, t] - centre[j, 1] - t * drift[j, 1]
-            distance = max(np.hypot(x, y), 1e-12)
-            wanted, faster, _ = kept(reach[j], missing[j], pace, float(t))
-            spare = distance - wanted
-            rate = (x * (course[2, t] - drift[j, 0]) + y * (course[3, t] - drift[j, 1])) / distance - faster
+        for t in range(1, last + 1):
+            spare, rate = spared(places[t], speeds[t], centre[j], drift[j], reach[j], missing[j], pace, float(t))
             time = -1.0
             if t == 1 and rate >= 0.0:
                 time = 1.0
@@ -192,7 +207,7 @@ def entered(
             if t == last and rate < 0.0:
                 time = float(last)
             if time > 0.0:
-                nearest, _ = spared(course, centre[j], drift[j], reach[j], missing[j], pace, time)
+                nearest, _ = spared_at(course, centre[j], drift[j], reach[j], missing[j], pace, time)
                 if nearest < -tolerance:
                     found[count, 0], found[count, 1] = j, time
                     count += 1

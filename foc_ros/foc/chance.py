@@ -75,16 +75,21 @@ def variance(offset: Tensor, covariance: Matrix, size_variance: Vector, centre_c
 
 
 @compiled
+def k_of(mean: float, variance: float) -> float:
+    """k = -E / sqrt(Var) of one circle at one time; +-CERTAIN_K where the variance is zero."""
+    if variance > 0:
+        return float(min(max(-mean / np.sqrt(variance), -CERTAIN_K), CERTAIN_K))
+    return CERTAIN_K if mean <= 0 else -CERTAIN_K
+
+
+@compiled
 def achieved_k(mean: Matrix, variance: Matrix) -> Matrix:
-    """k = -E / sqrt(Var), elementwise; +-CERTAIN_K where the variance is zero."""
+    """`k_of`, elementwise."""
     n, steps = mean.shape
     k = np.empty((n, steps))
     for j in range(n):
         for t in range(steps):
-            if variance[j, t] > 0:
-                k[j, t] = min(max(-mean[j, t] / np.sqrt(variance[j, t]), -CERTAIN_K), CERTAIN_K)
-            else:
-                k[j, t] = CERTAIN_K if mean[j, t] <= 0 else -CERTAIN_K
+            k[j, t] = k_of(mean[j, t], variance[j, t])
     return k
 
 

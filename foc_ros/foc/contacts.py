@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .records import Array
 from .solver import Index, WorkingSet
@@ -46,15 +45,3 @@ class Contacts:
         total: Array = np.add.reduceat(force, first) if len(first) else force
         turned: Array = np.add.reduceat(force * time, first) if len(first) else time
         return Contacts(obstacle[first], turned / total, total)
-
-    def only(self, keep: NDArray[np.bool_]) -> Contacts:
-        """Return the contacts to keep, (k,) bool."""
-        return Contacts(self.obstacle[keep], self.time[keep], self.force[keep])
-
-    def joined(self, obstacle: Index, time: Array, force: float) -> Contacts:
-        """Return the contacts with more, all of the same force."""
-        return Contacts(
-            np.concatenate((self.obstacle, obstacle)),
-            np.concatenate((self.time, time)),
-            np.concatenate((self.force, np.full(len(time), force))),
-        )

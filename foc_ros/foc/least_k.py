@@ -8,7 +8,7 @@ import numpy as np
 
 from .assess import Assessment, assess
 from .between import course_of, place, place_row
-from .chance import CERTAIN_K, k_at
+from .chance import CERTAIN_K, k_at, k_of
 from .compiled import Matrix, Tensor, Vector, compiled
 from .problem import Problem, spread
 from .records import Array
@@ -77,11 +77,7 @@ def _k_at_time(
     for i in range(len(carried)):
         for j in range(len(carried)):
             var += carried[i] * initial_covariance[i, j] * carried[j]
-    total = size_variance + 4 * var
-    expected = size_mean - x * x - y * y
-    if total > 0:
-        return float(min(max(-expected / np.sqrt(total), -CERTAIN_K), CERTAIN_K))
-    return CERTAIN_K if expected <= 0 else -CERTAIN_K
+    return float(k_of(size_mean - x * x - y * y, size_variance + 4 * var))
 
 
 @compiled

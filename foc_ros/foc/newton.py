@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from .between import course_of, entered
+from .between import entered
 from .contacts import Contacts
+from .homotopy import swept_angles
 from .problem import Problem
 from .qp import NO_TIMES, Cost, depths, margins, wanted_distance
 from .records import Array
-from .sliding import CLEAR, SETTLED, same_ways, slide
+from .sliding import CLEAR, SETTLED, slide
 from .solver import Verdict, with_rows
 from .touching import half_planes_between, touching
 
@@ -62,18 +63,18 @@ def leapt(problem: Problem, control: Array, tau: float) -> Array:
     reach, missing, pace = margins(problem, tau)
     if not len(reach):
         return NO_TIMES
-    course = course_of(problem.horizon.motion, problem.free_course, np.ascontiguousarray(control))
     much = LEAP * float(reach.min())
-    times: Array = entered(course, problem.obstacles.centre, problem.drift, reach, missing, pace, much)[:, 1]
+    times: Array = entered(problem.course(control), problem.obstacles.centre, problem.drift, reach, missing, pace, much)[:, 1]
     return times
 
 
 def slid(problem: Problem, control: Array, contacts: Contacts, tau: float, lam: float) -> tuple[Array, Contacts] | None:
     """Find the solution at (tau, lambda) near a control (2N,) that keeps out of circles between the steps too.
 
-    contacts: to begin with. Returns the control and its contacts; None where there is none on the same sides of its circles.
+    contacts: to begin with. Returns the control and its contacts; None where there is none that passes every circle on the side
+    on which the first control does.
     """
-    found, control, obstacle, time, force = slide(
+    found, changed, solution, obstacle, time, force = slide(
         problem.horizon.motion,
         problem.free_course,
         problem.obstacles.centre,
@@ -89,13 +90,15 @@ def slid(problem: Problem, control: Array, contacts: Contacts, tau: float, lam: 
         np.ascontiguousarray(control, dtype=float),
         problem.extent,
     )
-    return (control, Contacts(obstacle, time, force)) if found else None
+    if not found or (changed and not same_class(problem, control, solution)):
+        return None
+    return solution, Contacts(obstacle, time, force)
 
 
 def same_class(problem: Problem, one: Array, other: Array) -> bool:
-    """Whether the means of two controls (2N,) pass every circle on the same side."""
-    before, after = (course_of(problem.horizon.motion, problem.free_course, np.ascontiguousarray(each)) for each in (one, other))
-    return bool(same_ways(before, after, problem.obstacles.centre, problem.drift))
+    """Whether the means of two controls (2N,) pass every circle on the same side: sweep the same angle about its centre."""
+    before, after = (swept_angles(problem.course(each)[:2].T, problem.courses) for each in (one, other))
+    return bool((np.abs(before - after) < np.pi).all())
 
 
 def stays(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: float) -> bool:

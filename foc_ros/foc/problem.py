@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from .between import course_of
 from .chance import centres, courses, k_at, k_of_eta, size_moments
 from .compiled import Matrix, Tensor, Vector, compiled
 from .dense import values
@@ -122,13 +123,6 @@ class Problem(Record):
         return np.hypot(away[:, 0], away[:, 1])
 
     @cached_property
-    def recovery_left(self) -> Array:
-        """Share of a missing distance that may still be missing at steps 1..N, (N,): a minimum-jerk way out, from 1 to 0."""
-        s = np.minimum(self.horizon.dt * np.arange(1, self.horizon.steps + 1) / self.recovery_s, 1.0)
-        left: Array = 1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-        return left
-
-    @cached_property
     def inside_margin(self) -> NDArray[np.bool_]:
         """Whether the hand is now inside the margin of each obstacle, (m,): never, without a recovery time."""
         if self.recovery_s <= 0 or not len(self.obstacles):
@@ -200,6 +194,10 @@ class Problem(Record):
     def positions(self, control: Array) -> Array:
         """Mean positions at steps 1..N from the stacked control, (N, 2) [m]."""
         return moved(self.horizon.position, np.ascontiguousarray(control, dtype=float), self.free_position)
+
+    def course(self, control: Array) -> Array:
+        """Mean position and velocity per step from the stacked control, x, y, vx, vy at steps 0..N, (4, N + 1) [m]."""
+        return course_of(self.horizon.motion, self.free_course, np.ascontiguousarray(control, dtype=float))
 
     def position_variance(self, control: Array) -> Array:
         """Rows xx, yy, xy of the position covariance at steps 1..N, (3, N) [m^2]."""

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .between import kept, place, place_row
+from .between import kept_at, place, place_row
 from .compiled import Indices, Matrix, Tensor, Vector, compiled
 from .dense import cholesky, combined, lower_solved, row_products, values
 from .problem import Problem
@@ -224,14 +224,10 @@ def wanted_distance(problem: Problem, tau: float) -> Array:
     Less where the hand is nearer now: what is missing now may be missing still, falling to zero over the recovery time as a
     minimum-jerk movement does, so that the problem asks for a way out, not for a jump.
     """
-    reach = np.sqrt(problem.size[0] + tau)[:, None]
-    if problem.recovery_s <= 0:
-        return reach
-    missing = reach - problem.distance_now[:, None]
-    if missing.max(initial=0.0) <= 0:
-        return reach
-    distance: Array = reach - np.maximum(missing, 0.0) * problem.recovery_left
-    return distance
+    reach, missing, pace = margins(problem, tau)
+    if problem.recovery_s <= 0 or missing.max(initial=0.0) <= 0:
+        return reach[:, None]
+    return kept_at(reach, missing, pace, np.arange(1.0, problem.horizon.steps + 1.0))
 
 
 def margins(problem: Problem, tau: float) -> tuple[Array, Array, float]:
@@ -285,6 +281,4 @@ def _half_planes_at(problem: Problem, guess: Array, tau: float, times: Array) ->
     path = np.concatenate((problem.initial_mean[None, :2], guess))
     there = np.stack([np.interp(times, np.arange(len(path)), axis) for axis in path.T], axis=1)
     normals, _, limits = normals_at(there, centres, centres - free)
-    reach, missing, pace = margins(problem, tau)
-    wanted = [[kept(*circle, pace, time)[0] for time in times] for circle in zip(reach, missing, strict=True)]
-    return maps, normals, limits + np.array(wanted).reshape(limits.shape)
+    return maps, normals, limits + kept_at(*margins(problem, tau), times)

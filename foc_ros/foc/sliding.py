@@ -20,22 +20,6 @@ NEW = 1e-6
 
 
 @compiled
-def same_ways(before: Matrix, after: Matrix, centre: Matrix, drift: Matrix) -> bool:
-    """Whether two courses (4, N + 1) with the same ends pass every circle on the same side: turn by the same angle round it."""
-    for j in range(len(centre)):
-        turned = 0.0
-        for course, sign in ((before, 1.0), (after, -1.0)):
-            x, y = course[0, 0] - centre[j, 0], course[1, 0] - centre[j, 1]
-            for t in range(1, course.shape[1]):
-                u, v = course[0, t] - centre[j, 0] - t * drift[j, 0], course[1, t] - centre[j, 1] - t * drift[j, 1]
-                turned += sign * np.arctan2(x * v - y * u, x * u + y * v)
-                x, y = u, v
-        if abs(turned) > np.pi:
-            return False
-    return True
-
-
-@compiled
 def slide(
     motion: Tensor,
     free: Matrix,
@@ -55,17 +39,16 @@ def slide(
     force: Vector,
     near: Vector,
     extent: float,
-) -> tuple[bool, Vector, Indices, Vector, Vector]:
+) -> tuple[bool, bool, Vector, Indices, Vector, Vector]:
     """Find the least cost `qp.effort_cost` near a control (2N,) that keeps clear of every circle at every time.
 
     From contacts (k,) to begin with, which slide: those that pull are let go, and where a circle is entered there is a new one.
-    motion ... pace: as in `touching`; extent: of the scene [m]. Returns whether there is one that passes every circle on the side
-    on which the first control does; the control, and its contacts' obstacles, times and forces.
+    motion ... pace: as in `touching`; extent: of the scene [m]. Returns whether there is one, and whether it has other contacts,
+    so that it may pass circles on another side; the control, and its contacts' obstacles, times and forces.
     """
     inverse, root, factor = goal_factors(2.0 * (1.0 + weighted_variance + lam * summed_variance), goal_rows, softness)
     goal_control = to_goal(root, factor, goal_targets)
-    before, control = course_of(motion, free, near), near.copy()
-    obstacle, time, force = obstacle.copy(), time.copy(), force.copy()
+    control, obstacle, time, force = near.copy(), obstacle.copy(), time.copy(), force.copy()
     for count in range(CHANGES + 1):
         if len(force):
             found, control, time, force = touching(
@@ -94,11 +77,10 @@ def slide(
         if len(pushing) < len(force):
             obstacle, time, force = obstacle[pushing], time[pushing], force[pushing]
             continue
-        after = course_of(motion, free, control)
-        new = entered(after, centre, drift, reach, short, pace, CLEAR * extent)
+        new = entered(course_of(motion, free, control), centre, drift, reach, short, pace, CLEAR * extent)
         if len(new) == 0:
-            return count == 0 or same_ways(before, after, centre, drift), control, obstacle, time, force
+            return True, count > 0, control, obstacle, time, force
         slight = NEW * (force.max() if len(force) else 1.0)
         obstacle = np.concatenate((obstacle, new[:, 0].astype(np.intp)))
         time, force = np.concatenate((time, new[:, 1])), np.concatenate((force, np.full(len(new), slight)))
-    return False, control, obstacle, time, force
+    return False, False, control, obstacle, time, force
