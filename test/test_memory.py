@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 
+from foc_ros.foc import outcomes
 from foc_ros.foc.config import Config, updated
 from foc_ros.foc.deadline import Deadline, OutOfTimeError
 from foc_ros.foc.estimator import update
-from foc_ros.foc.memory import Memory
+from foc_ros.foc.forward import forward
+from foc_ros.foc.memory import RETRY, Memory
 from foc_ros.foc.outcomes import Earlier
 from foc_ros.foc.predictor import predict
-from foc_ros.foc.records import LEFT, RIGHT, Candidate, HandSample, Status, make_obstacles
+from foc_ros.foc.records import LEFT, RIGHT, Candidate, HandSample, HandState, Status, make_obstacles
 
 CONFIG = updated(Config(), {'foc.steps': 20})
 
@@ -85,3 +87,17 @@ def test_a_way_that_was_stopped_goes_on_from_there(monkeypatch):
     assert all(solution.lam > 0.0 for solution in memory.earlier.solutions.values())
     after, _ = reaching(0.0, memory)
     assert set(memory.earlier.solutions) <= {outcome.candidate.label for outcome in after.solved}
+
+
+def test_a_way_out_of_reach_is_followed_and_begun_anew_now_and_then(monkeypatch):
+    starts = []
+    monkeypatch.setattr(outcomes, 'forward', lambda *given: starts.append(given[1].lam is None) or forward(*given))
+    config = updated(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0})
+    memory, begun = Memory(), []
+    for tick in range(2 * RETRY + 3):
+        state = HandState(10_000_000 * tick, np.zeros(6), np.zeros((6, 6)))
+        starts.clear()
+        prediction, memory = predict(config, state, make_obstacles([[0.15, 0.0]], 0.03, 0.003), np.array([[0.3, 0.0]]), memory)
+        assert {outcome.solution.status for outcome in prediction.outcomes} == {Status.ETA_UNREACHABLE}
+        begun.append(any(starts))
+    assert [tick for tick, anew in enumerate(begun) if anew] == [0, RETRY + 1, 2 * RETRY + 2]

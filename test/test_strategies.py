@@ -1,6 +1,7 @@
 """What each strategy promises, on scenes of the tests' own."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -204,6 +205,20 @@ def test_a_warm_start_finds_what_a_cold_one_finds(strategy):
     assert again.status is Status.SOLVED
     assert again.qp_solves < first.qp_solves
     np.testing.assert_allclose(again.path, first.path, atol=2e-6)
+
+
+@EVERY
+def test_a_warm_start_is_led_to_the_goal_from_where_the_hand_really_is(strategy):
+    before = solved(one_obstacle(0.86), BOWED, strategy)
+    state = np.array([0.002, 0.001, 0.03, 0.01, 0.8, 0.2])  # not where the plan would be, and far from its acceleration
+    problem = replace(one_obstacle(0.86), initial_mean=state)
+    start = warm(before, problem)
+    mean = problem.free[-1] + problem.horizon.response[-1] @ start.control
+    np.testing.assert_allclose(mean, problem.goal, atol=1e-9)
+    found = forward(problem, start, FocConfig(strategy=strategy))
+    fresh = forward(problem, cold(BOWED), FocConfig(strategy=strategy))
+    assert found.status is fresh.status is Status.SOLVED
+    np.testing.assert_allclose(found.path, fresh.path, atol=1e-5)
 
 
 @pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal', 'fixed', 'algorithm1'])

@@ -17,12 +17,13 @@ import numpy as np
 from .chance import eta_of_k, k_of_eta
 from .contacts import Contacts
 from .deadline import NEVER, Deadline, OutOfTimeError
+from .homotopy import swept_angles
 from .least_k import smallest_k
-from .newton import joined, leapt, same_class, slid, stays
+from .newton import goes, joined, leapt, slid, stays, way_of
 from .problem import Problem
 from .qp import NO_TIMES, effort_cost
 from .records import Array, Status
-from .sequential import Converged, converge
+from .sequential import MAX_QPS, Converged, converge
 from .solver import WorkingSet
 from .start import Start
 
@@ -41,8 +42,8 @@ SPAN = 60.0
 LARGEST_SHARE = 1e6
 """Where the walk ends: a variance weight so many times the effort is all that counts, and k has stopped growing."""
 PATIENCE = 2
-"""Strides in a row, no shorter than `WARM_STRIDE`, without a larger k after which a warm start gives up: k may fall for a
-while. A cold one goes to the end, over every dip."""
+"""Strides in a row, no shorter than `WARM_STRIDE`, without a larger k after which a look around gives up: k may fall for a
+while. A walk from the beginning of the curve goes to its end, over every dip."""
 CLOSE = 1e-5
 """Relative excess of k over the wanted one at which the root is found."""
 CELL = 1.0
@@ -52,6 +53,8 @@ NARROW = 1e-4
 MAX_TRIALS = 60
 LEAPS = 8
 """How often more times are added for a mean that leaps over circles between the steps."""
+FURTHER_QPS = 30
+"""Linearisations after which no point is found by QPs, along the curve; twice as many at its beginning."""
 
 
 @dataclass(frozen=True)
@@ -106,50 +109,60 @@ class Walk:
 class _Walker:
     """Evaluates points, each from a neighbour's solution, and counts."""
 
-    def __init__(self, problem: Problem, curve: Curve, deadline: Deadline) -> None:
+    def __init__(self, problem: Problem, curve: Curve, deadline: Deadline, *, follows: bool) -> None:
         self.problem, self.curve, self.end, self.deadline = problem, curve, curve.end(problem), deadline
+        self.follows = follows
         self.qp_solves = 0
         self.best: Point | None = None
 
-    def point(self, s: float, guess: Array, working: WorkingSet) -> Point | None:
-        """Converge at s from a guess (N, 2): by QPs, then by sliding contacts; where these find nothing, what the QPs found."""
+    def beginning(self, guess: Array, way: Array | None = None) -> Point | None:
+        """Converge at the beginning of the curve, from a guess (N, 2)."""
+        return self.point(0.0, guess, WorkingSet(), way, MAX_QPS)
+
+    def point(self, s: float, guess: Array, working: WorkingSet, way: Array | None, most: int) -> Point | None:
+        """Converge at s from a guess (N, 2): by QPs, then by sliding contacts; where these find nothing, what the QPs found.
+
+        way: the class that it has to be in, any if it is None; most: linearisations.
+        """
         tau, lam = self.curve.at(s)
-        rough = self.rough(guess, working, tau, lam)
-        if rough is None:
+        rough = self.rough(guess, working, tau, lam, most)
+        if rough is None or (way is not None and not goes(self.problem, rough.control, way)):
             return None
         settled = self.settled(s, rough.control, joined(self.problem, rough.contacts))
-        return self.judged(s, rough.control, rough.contacts, rough=True) if settled is None else settled
+        if settled is None and rough.stays:
+            return self.judged(s, rough.control, rough.contacts, rough=True)
+        return settled
 
-    def rough(self, guess: Array, working: WorkingSet, tau: float, lam: float) -> Converged | None:
+    def rough(self, guess: Array, working: WorkingSet, tau: float, lam: float, most: int) -> Converged | None:
         """Converge by QPs with rows at the steps, and at more times where the mean would leap over a circle between them."""
         between = NO_TIMES
         for _ in range(LEAPS):
-            rough = converge(self.problem, guess, working, tau, lam, self.deadline, verified=False, between=between)
+            rough = converge(self.problem, guess, working, tau, lam, self.deadline, verified=False, between=between, most=most)
             if rough is None:
                 return None
             self.qp_solves += rough.qp_solves
             leaps = leapt(self.problem, rough.control, tau)
             if not len(leaps):
                 return rough
+            most -= rough.linearisations
+            if most < 1:
+                return None
             between, working = np.union1d(between, leaps), rough.active.within(self.problem.horizon.steps)
         return None
 
     def beside(self, s: float, neighbour: Point) -> Point | None:
-        """Converge at s from a neighbour."""
-        contacts = joined(self.problem, neighbour.contacts) if neighbour.rough else neighbour.contacts
-        return self.near(s, neighbour.control, contacts)
-
-    def near(self, s: float, control: Array, contacts: Contacts) -> Point | None:
-        """Converge at s from a control (2N,) and its contacts, in its class: by Newton steps, else by QPs."""
+        """Converge at s from a neighbour, in its class: by Newton steps; by QPs where these fail, unless it only follows."""
         self.deadline.check()
-        point = self.settled(s, control, contacts)
-        if point is not None:
+        contacts = joined(self.problem, neighbour.contacts) if neighbour.rough else neighbour.contacts
+        point = self.settled(s, neighbour.control, contacts)
+        if point is not None or self.follows:
             return point
-        point = self.point(s, self.problem.positions(control), contacts.rows(self.problem.horizon.steps)[0])
-        return point if point is not None and same_class(self.problem, control, point.control) else None
+        guess, (working, _) = self.problem.positions(neighbour.control), contacts.rows(self.problem.horizon.steps)
+        return self.point(s, guess, working, way_of(self.problem, neighbour.control), FURTHER_QPS)
 
-    def settled(self, s: float, control: Array, contacts: Contacts) -> Point | None:
-        found = slid(self.problem, control, contacts, *self.curve.at(s))
+    def settled(self, s: float, control: Array, contacts: Contacts, way: Array | None = None) -> Point | None:
+        """Converge at s from a control (2N,) by Newton steps, in its class or that of a way."""
+        found = slid(self.problem, control, contacts, *self.curve.at(s), way)
         return None if found is None else self.judged(s, *found)
 
     def judged(self, s: float, control: Array, contacts: Contacts, *, rough: bool = False) -> Point:
@@ -166,8 +179,12 @@ class _Walker:
 
 
 def walk(problem: Problem, start: Start, curve: Curve, deadline: Deadline = NEVER) -> Walk:
-    """Find the smallest s whose converged solution meets the surrogate; a warm start looks around the s it had."""
-    walker = _Walker(problem, curve, deadline)
+    """Find the smallest s whose converged solution meets the surrogate.
+
+    A warm start follows what was found before: it looks around the s it had, and where there is nothing, from the beginning of
+    the curve on. It goes by Newton steps alone, and ends where they do.
+    """
+    walker = _Walker(problem, curve, deadline, follows=start.lam is not None)
     try:
         return _walk(walker, start)
     except OutOfTimeError:
@@ -177,15 +194,19 @@ def walk(problem: Problem, start: Start, curve: Curve, deadline: Deadline = NEVE
 
 def _walk(walker: _Walker, start: Start) -> Walk:
     problem, curve, wanted = walker.problem, walker.curve, k_of_eta(walker.problem.eta)
+    stride, patience = STRIDE, math.inf
     if start.control is None or start.lam is None:
-        stride, first = STRIDE, walker.point(0.0, start.positions, WorkingSet())
+        first = walker.beginning(start.positions)
     else:
-        first = walker.near(curve.s_of(start.lam), start.control, joined(problem, start.contacts))
-        ahead = 0.0 if first is None else OVERSHOOT * abs(wanted - first.k) / (start.slope or USUAL_SLOPE)
-        stride = min(max(ahead, SHORTEST), WARM_STRIDE)
+        way = swept_angles(np.concatenate((problem.initial_mean[None, :2], start.positions)), problem.courses)
+        first = walker.settled(curve.s_of(start.lam), start.control, joined(problem, start.contacts), way)
+        if first is None:
+            first = walker.beginning(start.positions, way)
+        else:
+            ahead = OVERSHOOT * abs(wanted - first.k) / (start.slope or USUAL_SLOPE)
+            stride, patience = min(max(ahead, SHORTEST), WARM_STRIDE), PATIENCE
     if first is None:
         return Walk(Status.INFEASIBLE, 'no way between the obstacles keeps clear of them', None, walker.qp_solves)
-    patience = math.inf if start.lam is None else PATIENCE
     low, high = _bracket(walker, first, wanted, stride, patience)
     if high is None:
         message = f'eta {problem.eta:g} is out of reach: the largest on the curve is {eta_of_k(low.k):.4g}, at s = {low.s:.3g}'

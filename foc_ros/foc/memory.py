@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from .outcomes import NOTHING, Earlier
 from .records import NANOSECONDS, Candidate, Outcome, Prediction, Solution, Status
 
-RETRY = 5
-"""Predictions for which a way that slid into another class is only followed there."""
+RETRY = 10
+"""Predictions for which a way that is out of reach, or slid into another class, is only followed."""
 
 
 @dataclass(frozen=True)
@@ -17,14 +17,14 @@ class Memory:
     """What is remembered, by label.
 
     most_likely: label; candidates: the ways followed; earlier: their solutions and likelihoods; solved_ns: when each was last
-    solved; slid: for how many predictions in a row each has been in another class.
+    solved; followed: for how many predictions in a row each has been followed without being solved.
     """
 
     most_likely: str | None = None
     candidates: tuple[Candidate, ...] = ()
     earlier: Earlier = NOTHING
     solved_ns: Mapping[str, int] = field(default_factory=dict)
-    slid: Mapping[str, int] = field(default_factory=dict)
+    followed: Mapping[str, int] = field(default_factory=dict)
 
     def known(self, candidates: Sequence[Candidate]) -> Earlier:
         """Return what is known of ways by their labels, or by the names that they had before.
@@ -46,23 +46,23 @@ class Memory:
     def after(self, prediction: Prediction, candidates: tuple[Candidate, ...], tried: Sequence[Outcome]) -> Memory:
         """Keep what the next prediction can start from.
 
-        A way that had no time keeps what it had, or begins where it was stopped. One that slid into another class is followed
-        there, which costs little, and begun anew from its own guess every RETRY predictions.
+        A way that had no time keeps what it had, or begins where it was stopped. One that is out of reach, or slid into another
+        class, is followed there, which costs little, and begun anew from its own guess after RETRY predictions.
         """
-        last, solutions, slid = self.earlier.solutions, dict[str, Solution](), dict[str, int]()
+        last, solutions, followed = self.earlier.solutions, dict[str, Solution](), dict[str, int]()
         for outcome in tried:
             label, status = outcome.candidate.label, outcome.solution.status
             if status is Status.DEADLINE and label in last:
                 solutions[label] = last[label]
-            elif status in (Status.SOLVED, Status.ETA_UNREACHABLE) or _stopped(outcome.solution):
+            elif status is Status.SOLVED or _stopped(outcome.solution):
                 solutions[label] = outcome.solution
-            elif status is Status.LEFT_CLASS and self.slid.get(label, 0) < RETRY:
-                solutions[label], slid[label] = outcome.solution, self.slid.get(label, 0) + 1
+            elif status in (Status.ETA_UNREACHABLE, Status.LEFT_CLASS) and self.followed.get(label, 0) < RETRY:
+                solutions[label], followed[label] = outcome.solution, self.followed.get(label, 0) + 1
         likelihoods = {outcome.candidate.label: outcome.likelihood for outcome in prediction.outcomes}
         labels = {candidate.label for candidate in candidates}
         solved = {label: stamp for label, stamp in self.solved_ns.items() if label in labels}
         solved |= {outcome.candidate.label: prediction.stamp_ns for outcome in prediction.solved}
-        return Memory(prediction.most_likely, candidates, Earlier(solutions, likelihoods), solved, slid)
+        return Memory(prediction.most_likely, candidates, Earlier(solutions, likelihoods), solved, followed)
 
     def aged(self, outcome: Outcome, stamp_ns: int) -> Outcome:
         """Say of a way that had no time when it was last solved: how likely it is, nobody knows."""

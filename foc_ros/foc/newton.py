@@ -68,11 +68,13 @@ def leapt(problem: Problem, control: Array, tau: float) -> Array:
     return times
 
 
-def slid(problem: Problem, control: Array, contacts: Contacts, tau: float, lam: float) -> tuple[Array, Contacts] | None:
+def slid(
+    problem: Problem, control: Array, contacts: Contacts, tau: float, lam: float, way: Array | None = None
+) -> tuple[Array, Contacts] | None:
     """Find the solution at (tau, lambda) near a control (2N,) that keeps out of circles between the steps too.
 
-    contacts: to begin with. Returns the control and its contacts; None where there is none that passes every circle on the side
-    on which the first control does.
+    contacts: to begin with; way (m,): the class that it has to be in, as of `way_of`; that of the control if not given.
+    Returns the control and its contacts; None where there is none in that class.
     """
     found, changed, solution, obstacle, time, force = slide(
         problem.horizon.motion,
@@ -90,15 +92,23 @@ def slid(problem: Problem, control: Array, contacts: Contacts, tau: float, lam: 
         np.ascontiguousarray(control, dtype=float),
         problem.extent,
     )
-    if not found or (changed and not same_class(problem, control, solution)):
+    if not found:
+        return None
+    if way is None and changed:  # with the same contacts it is in the class of the control
+        way = way_of(problem, control)
+    if way is not None and not goes(problem, solution, way):
         return None
     return solution, Contacts(obstacle, time, force)
 
 
-def same_class(problem: Problem, one: Array, other: Array) -> bool:
-    """Whether the means of two controls (2N,) pass every circle on the same side: sweep the same angle about its centre."""
-    before, after = (swept_angles(problem.course(each)[:2].T, problem.courses) for each in (one, other))
-    return bool((np.abs(before - after) < np.pi).all())
+def way_of(problem: Problem, control: Array) -> Array:
+    """Return the angles (m,) that the mean of a control (2N,) sweeps about the centres, which tell its class."""
+    return swept_angles(problem.course(control)[:2].T, problem.courses)
+
+
+def goes(problem: Problem, control: Array, way: Array) -> bool:
+    """Whether the mean of a control (2N,) passes every circle on the same side as a way (m,), as of `way_of`."""
+    return bool((np.abs(way_of(problem, control) - way) < np.pi).all())
 
 
 def stays(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: float) -> bool:

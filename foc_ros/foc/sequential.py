@@ -22,6 +22,7 @@ from .solver import WorkingSet, solve
 NEAR = 0.01
 """Largest move of the mean from which Newton steps are tried even if the active rows changed; relative."""
 MAX_QPS = 60
+"""Linearisations after which it counts as unsettled."""
 ALIGNED = 0.99
 """Cosine between two moves in a row that counts as the same direction."""
 PATIENCE = 6
@@ -32,13 +33,17 @@ LARGEST_STRETCH = 15.0
 
 @dataclass(frozen=True, eq=False)
 class Converged:
-    """A control that its own linearisation returns: stacked control (2N,), positions (N, 2) at steps 1..N, active rows."""
+    """A control that its own linearisation returns: stacked control (2N,), positions (N, 2) at steps 1..N, active rows.
+
+    qp_solves: QPs solved, rounds of the working set counted each; linearisations: how many there were; stays: whether it settled.
+    """
 
     control: Array
     positions: Array
     active: WorkingSet
     contacts: Contacts
     qp_solves: int
+    linearisations: int
     stays: bool
 
 
@@ -52,16 +57,18 @@ def converge(
     *,
     verified: bool = True,
     between: Array = NO_TIMES,
+    most: int = MAX_QPS,
 ) -> Converged | None:
     """Solve the reformulated problem at (tau, lambda) from a guess (N, 2); None where its rows contradict each other.
 
-    verified: end by a QP that stays, not by Newton steps. between (e,): `clearance_qp`. Raises OutOfTimeError past the deadline.
+    verified: end by a QP that stays, not by Newton steps. between (e,): `clearance_qp`. most: linearisations, at least 1. Raises
+    OutOfTimeError past the deadline.
     """
     times = np.concatenate((np.arange(1.0, problem.horizon.steps + 1.0), between))
     cost = effort_cost(problem, lam)
     solves, creep = 0, _Creep()
     previous: tuple[bytes, bytes] | None = None
-    for count in range(1, MAX_QPS + 1):
+    for count in range(1, most + 1):
         deadline.check()
         solution = solve(clearance_qp(problem, cost, guess, tau, between=between), working)
         if solution is None:
@@ -69,9 +76,9 @@ def converge(
         solves += solution.solves
         working, positions = solution.active, problem.positions(solution.control)
         move = float(np.abs(positions - guess).max()) / problem.extent
-        if move < STAYS or count == MAX_QPS:
+        if move < STAYS or count == most:
             contacts = Contacts(working.obstacle, times[working.step], solution.multipliers)
-            return Converged(solution.control, positions, working, contacts, solves, stays=move < STAYS)
+            return Converged(solution.control, positions, working, contacts, solves, count, stays=move < STAYS)
         rows = (working.obstacle.tobytes(), working.step.tobytes())
         better = None
         if len(working) and (rows == previous or move < NEAR):
@@ -81,12 +88,12 @@ def converge(
             control, contacts = better
             positions = problem.positions(control)
             if not verified:
-                return Converged(control, positions, working, contacts, solves, stays=True)
+                return Converged(control, positions, working, contacts, solves, count, stays=True)
             guess = creep.jumped(positions)
         else:
             guess = creep.ahead(positions)
         previous = rows
-    raise AssertionError('MAX_QPS is at least 1')
+    raise AssertionError('most is at least 1')
 
 
 def _cost(cost: Cost, control: Array) -> float:

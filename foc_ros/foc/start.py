@@ -8,6 +8,7 @@ import numpy as np
 
 from .contacts import Contacts
 from .problem import Problem
+from .qp import effort_cost, to_goal
 from .records import Array, Solution
 
 
@@ -42,7 +43,7 @@ def warm(previous: Solution, problem: Problem) -> Start:
     positions = np.stack([np.interp(times, previous.times, axis) for axis in previous.path.T], axis=1)
     held = np.floor((times - dt / 2) / previous.dt).astype(np.intp)
     inside = (held >= 0) & (held < len(previous.control))
-    control = np.where(inside, previous.control[np.where(inside, held, 0)].T, 0.0)
+    control = to_the_goal(problem, np.where(inside, previous.control[np.where(inside, held, 0)].T, 0.0).ravel(), previous.lam)
     row = {identity: index for index, identity in enumerate(problem.obstacles.ids)}
     kept = [
         (row[identity], moved, force)
@@ -51,4 +52,12 @@ def warm(previous: Solution, problem: Problem) -> Start:
     ]
     table = np.array(kept, dtype=float).reshape(-1, 3)
     contacts = Contacts(table[:, 0].astype(np.intp), table[:, 1].copy(), table[:, 2].copy())
-    return Start(positions, control.ravel(), contacts, previous.lam, previous.slope)
+    return Start(positions, control, contacts, previous.lam, previous.slope)
+
+
+def to_the_goal(problem: Problem, control: Array, lam: float) -> Array:
+    """Return a control (2N,) led to the goal again with least cost: the hand is never quite where it was to be."""
+    _, root, factor = effort_cost(problem, lam).factors
+    rows, targets, _ = problem.goal_rows
+    led: Array = control + to_goal(root, factor, targets - rows @ control)
+    return led
