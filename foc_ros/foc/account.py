@@ -21,22 +21,22 @@ def costs(problem: Problem, control: Array, mean: Array, covariance: Array, lam:
     """
     variances = np.diagonal(covariance, axis1=1, axis2=2)[1:]
     squared_error = (mean[1:] - problem.goal) ** 2
-    weights = np.concatenate((np.tile(problem.way_weights, (len(variances) - 1, 1)), problem.end_weights[None]))
+    way, end = problem.way_weights, problem.end_weights
     return {
         'effort': float(control @ control),
-        'mean_error': float((weights * squared_error).sum()),
-        'variance': float((weights * variances).sum()),
+        'mean_error': float((squared_error[:-1] @ way).sum() + squared_error[-1] @ end),
+        'variance': float((variances[:-1] @ way).sum() + variances[-1] @ end),
         'lambda_variance': float(lam * variances[:, :2].sum()),
     }
 
 
-def shortfall(problem: Problem, control: Array, tau: float) -> tuple[float, tuple[int, int] | None]:
-    """Return by how much the mean comes too near [m], and where: row of the obstacle and step (1..N) of the largest.
+def shortfall(problem: Problem, positions: Array, tau: float) -> tuple[float, tuple[int, int] | None]:
+    """Return by how much a mean (N, 2) comes too near [m], and where: row of the obstacle and step (1..N) of the largest.
 
     Too near is less than sqrt(E[R^2] + tau) from a centre, or less than a hand that is leaving a margin has to keep; 0 and None
     where it never is.
     """
-    missing = depths(problem.positions(control), problem.centres, wanted_distance(problem, tau))
+    missing = depths(positions, problem.centres, wanted_distance(problem, tau))
     if missing.max(initial=0.0) <= NO_VIOLATION:
         return 0.0, None
     row, column = np.unravel_index(int(missing.argmax()), missing.shape)

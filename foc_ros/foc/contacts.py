@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .compiled import Indices, Vector, compiled
 from .records import Array
 from .solver import Index, WorkingSet
 
@@ -37,11 +38,28 @@ class Contacts:
         np.add.at(force, which, self.force)
         return WorkingSet(*np.divmod(flat, steps)), force
 
-    def merged(self) -> Contacts:
-        """Return the contacts in order, neighbours with the same circle as one: at the centre of their forces, with their sum."""
-        order = np.lexsort((self.time, self.obstacle))
-        obstacle, time, force = self.obstacle[order], self.time[order], self.force[order]
-        first = np.flatnonzero(np.concatenate(([True], (np.diff(obstacle) != 0) | (np.diff(time) > MERGED)))[: len(self)])
-        total: Array = np.add.reduceat(force, first) if len(first) else force
-        turned: Array = np.add.reduceat(force * time, first) if len(first) else time
-        return Contacts(obstacle[first], turned / total, total)
+
+@compiled
+def merged(obstacle: Indices, time: Vector, force: Vector, first_alike: Indices) -> tuple[Indices, Vector, Vector]:
+    """Return contacts (k,) in order, neighbours with the same circle as one: at the centre of their forces, with their sum.
+
+    first_alike (m,): for each circle the first that is the same. Forces that are not known, as the full QP leaves them, count
+    as 1.
+    """
+    k, count = len(obstacle), 0
+    circle, at, push = np.empty(k, np.intp), np.empty(k), np.empty(k)
+    for i in range(k):
+        j, place = first_alike[obstacle[i]], i
+        while place > 0 and (circle[place - 1] > j or (circle[place - 1] == j and at[place - 1] > time[i])):
+            circle[place], at[place], push[place] = circle[place - 1], at[place - 1], push[place - 1]
+            place -= 1
+        circle[place], at[place], push[place] = j, time[i], force[i] if np.isfinite(force[i]) and force[i] > 0.0 else 1.0
+    total, turned, last = np.zeros(k), np.zeros(k), -np.inf
+    for i in range(k):
+        if i == 0 or circle[i] != circle[count - 1] or at[i] - last > MERGED:
+            circle[count] = circle[i]
+            count += 1
+        last = at[i]
+        total[count - 1] += push[i]
+        turned[count - 1] += push[i] * at[i]
+    return circle[:count].copy(), turned[:count] / total[:count], total[:count].copy()

@@ -18,7 +18,7 @@ from .chance import eta_of_k, k_of_eta
 from .contacts import Contacts
 from .deadline import NEVER, Deadline, OutOfTimeError
 from .homotopy import swept_angles
-from .least_k import smallest_k
+from .least_k import Least, smallest
 from .newton import goes, joined, leapt, slid, stays, way_of
 from .problem import Problem
 from .qp import NO_TIMES, effort_cost
@@ -83,16 +83,21 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """One converged solution on the curve: control (2N,), the contacts that hold it, the k that it achieves.
+    """One converged solution on the curve: control (2N,), the contacts that hold it, the smallest k with its place.
 
-    rough: held by the rows of QPs, and so perhaps slightly inside a circle between two of them.
+    least: as of `least_k.smallest`; rough: held by the rows of QPs, and so perhaps slightly inside a circle between two of them.
     """
 
     s: float
     control: Array
     contacts: Contacts
-    k: float
+    least: Least
     rough: bool = False
+
+    @property
+    def k(self) -> float:
+        """The k that it achieves."""
+        return self.least[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +172,7 @@ class _Walker:
 
     def judged(self, s: float, control: Array, contacts: Contacts, *, rough: bool = False) -> Point:
         """Return the point with the k that its control achieves, and remember it if that is the largest so far."""
-        point = Point(s, control, contacts, smallest_k(self.problem, control), rough)
+        point = Point(s, control, contacts, smallest(self.problem, control), rough)
         self.best = point if self.best is None or point.k > self.best.k else self.best
         return point
 

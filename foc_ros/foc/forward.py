@@ -15,7 +15,7 @@ from .config import FocConfig
 from .contacts import Contacts
 from .continuous import Curve, walk
 from .deadline import NEVER, Deadline, OutOfTimeError
-from .least_k import assess_between
+from .least_k import Least, assess_between
 from .noise import state_covariance
 from .optimal import optimise
 from .problem import Problem
@@ -31,7 +31,7 @@ SHORT_OF_ETA = 1e-5
 
 @dataclass(frozen=True)
 class _Ended:
-    """How a strategy ended: a control with the (tau, lambda) it belongs to, what it achieves, the rows that hold it."""
+    """How a strategy ended: a control with the (tau, lambda) it belongs to, its contacts, its smallest k if known."""
 
     status: Status
     message: str
@@ -42,6 +42,7 @@ class _Ended:
     contacts: Contacts
     iterations: int | None = None
     slope: float = 0.0
+    least: Least | None = None
 
 
 def forward(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline = NEVER) -> Solution:
@@ -57,7 +58,7 @@ def forward(problem: Problem, start: Start, settings: FocConfig, deadline: Deadl
         control, message = effort_cost(problem, 0.0).goal_control, 'out of time: the movement shown looks at no obstacle'
         ended = _Ended(Status.DEADLINE, message, control, 0.0, 0.0, 0, Contacts())
     continuous = _STRATEGIES[settings.strategy] is _continuous
-    assessment = assess_between(problem, ended.control) if continuous else assess(problem, ended.control)
+    assessment = assess_between(problem, ended.control, ended.least) if continuous else assess(problem, ended.control)
     if ended.status is Status.SOLVED and settings.strategy != 'fixed' and assessment.eta < problem.eta - SHORT_OF_ETA:
         message = f'the solution achieves eta {assessment.eta:.6g} only'
         ended = replace(ended, status=Status.ITERATION_LIMIT, message=message)
@@ -74,7 +75,7 @@ def _continuous(problem: Problem, start: Start, settings: FocConfig, deadline: D
         return _best_effort(problem, start, *curve.at(0.0), walked.qp_solves)
     point = walked.point
     reached = *curve.at(point.s), walked.qp_solves
-    return _Ended(walked.status, walked.message, point.control, *reached, point.contacts, slope=walked.slope)
+    return _Ended(walked.status, walked.message, point.control, *reached, point.contacts, slope=walked.slope, least=point.least)
 
 
 def _optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadline) -> _Ended:
@@ -126,7 +127,7 @@ def _solution(problem: Problem, ended: _Ended, assessment: Assessment, seconds: 
     mean = problem.free.copy()
     mean[1:] += horizon.response @ ended.control
     covariance = state_covariance(horizon, problem.free_covariance, problem.noise, ended.control)
-    violation, violated = shortfall(problem, ended.control, ended.tau)
+    violation, violated = shortfall(problem, mean[1:, :2].copy(), ended.tau)
     held = [(ended.tau, ended.lam)] * len(ended.contacts)
     if optimal:
         held = asked_for(problem, ended.control, ended.contacts, max(assessment.smallest_k, 0.0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -20,20 +21,22 @@ MUCH_MORE = 0.5
 """By how much of 1 + k a step's k may be above the smallest that the smallest between the steps is looked for beside it."""
 
 
-def assess_between(problem: Problem, control: Array) -> Assessment:
-    """Assess a control (2N,) at the steps and between them."""
+Least: TypeAlias = tuple[float, int, float]
+"""The smallest k, with its obstacle row and time in steps."""
+
+
+def assess_between(problem: Problem, control: Array, least: Least | None = None) -> Assessment:
+    """Assess a control (2N,) at the steps and between them; least: the `smallest`, where it is known."""
     assessment = assess(problem, control)
     if not assessment.k.size:
         return assessment
-    return replace(assessment, between=_smallest(problem, control))
+    return replace(assessment, between=smallest(problem, control) if least is None else least)
 
 
-def smallest_k(problem: Problem, control: Array) -> float:
-    """Return the k that holds everywhere, at the steps and between them: `assess_between`'s, without the rest."""
-    return _smallest(problem, control)[0] if len(problem.obstacles) else CERTAIN_K
-
-
-def _smallest(problem: Problem, control: Array) -> tuple[float, int, float]:
+def smallest(problem: Problem, control: Array) -> Least:
+    """Return the smallest k of a control (2N,), at the steps and between them; CERTAIN_K without obstacles."""
+    if not len(problem.obstacles):
+        return CERTAIN_K, 0, 1.0
     return least_k(
         problem.horizon.motion,
         problem.horizon.maps,

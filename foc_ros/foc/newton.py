@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from .between import entered
-from .contacts import Contacts
+from .contacts import Contacts, merged
 from .homotopy import swept_angles
 from .problem import Problem
 from .qp import NO_TIMES, Cost, depths, margins, wanted_distance
@@ -50,12 +50,8 @@ def held(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: 
 
 
 def joined(problem: Problem, contacts: Contacts) -> Contacts:
-    """Return contacts that came from rows at steps, or from another problem, as they slide: one for each place.
-
-    Forces that are not known, as the full QP leaves them, count as equal.
-    """
-    force = np.where(np.isfinite(contacts.force) & (contacts.force > 0), contacts.force, 1.0)
-    return Contacts(problem.first_alike[contacts.obstacle], contacts.time, force).merged()
+    """Return contacts that came from rows at steps, or from another problem, as they slide: one for each place."""
+    return Contacts(*merged(contacts.obstacle, contacts.time, contacts.force, problem.first_alike))
 
 
 def leapt(problem: Problem, control: Array, tau: float) -> Array:

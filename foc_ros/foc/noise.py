@@ -1,14 +1,15 @@
 """Signal-dependent noise: every variance is a diagonal quadratic in the control.
 
 U + eps, eps_i = c_i phi U_i with phi standard normal at every step and channel (paper, equations 2-3), so that
-P(t) = A^t P(0) A'^t + sum_k R_k diag(c^2 u_k^2) R_k', with R_k the response of the state at step t to the control at step k.
+P(t + 1) = A P(t) A' + B diag(c^2 u_t^2) B'. Stacked over the horizon, P(t) = A^t P(0) A'^t + sum_k R_k diag(c^2 u_k^2) R_k',
+with R_k the response of the state at step t to the control at step k.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from .compiled import Tensor, Vector, compiled
+from .compiled import Matrix, Tensor, Vector, compiled
 from .dynamics import Horizon
 from .records import Array
 
@@ -26,22 +27,28 @@ def noise_per_step(noise_at_reference: Array, reference_step: float, dt: float) 
 
 def state_covariance(horizon: Horizon, free: Array, noise: Array, control: Array) -> Array:
     """Return P at steps 0..N, (N + 1, n, n): free part (N + 1, n, n), noise (2,), control stacked (2N,)."""
-    covariance = free.copy()
-    covariance[1:] += outer_sums(horizon.response, (stacked_noise(noise, horizon.steps) * control) ** 2)
+    steps = horizon.steps
+    A, B = horizon.powers[1], np.ascontiguousarray(horizon.response[0, :, ::steps])
+    covariance: Array = free + accumulated(A, B, (stacked_noise(noise, steps) * control) ** 2)
     return covariance
 
 
 @compiled
-def outer_sums(response: Tensor, weights: Vector) -> Tensor:
-    """Return sum_u weights_u r_u r_u' for the columns r_u of every step's response (N, n, 2N): (N, n, n)."""
-    steps, n, _ = response.shape
-    summed = np.empty((steps, n, n))
+def accumulated(A: Matrix, B: Matrix, variance: Vector) -> Tensor:
+    """Return P(t + 1) = A P(t) A' + B diag(v_t) B' from P(0) = 0, (N + 1, n, n): A (n, n), B (n, 2), v stacked (2N,)."""
+    n, steps = len(A), len(variance) // 2
+    covariance, moved = np.zeros((steps + 1, n, n)), np.empty((n, n))
     for t in range(steps):
         for i in range(n):
-            weighted = response[t, i] * weights
-            for j in range(i + 1):
+            for j in range(n):
                 total = 0.0
-                for u in range(len(weights)):
-                    total += weighted[u] * response[t, j, u]
-                summed[t, i, j], summed[t, j, i] = total, total
-    return summed
+                for k in range(n):
+                    total += A[i, k] * covariance[t, k, j]
+                moved[i, j] = total
+        for i in range(n):
+            for j in range(i + 1):
+                total = B[i, 0] * variance[t] * B[j, 0] + B[i, 1] * variance[steps + t] * B[j, 1]
+                for k in range(n):
+                    total += moved[i, k] * A[j, k]
+                covariance[t + 1, i, j], covariance[t + 1, j, i] = total, total
+    return covariance

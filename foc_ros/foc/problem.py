@@ -84,6 +84,8 @@ class Problem(Record):
     @cached_property
     def free_covariance(self) -> Array:
         """The part of the state covariance at steps 0..N that the control does not cause, (N + 1, n, n)."""
+        if not self.initial_covariance.any():
+            return np.zeros_like(self.error_map)
         carried: Array = self.error_map @ self.initial_covariance @ self.error_map.swapaxes(1, 2)
         return carried
 

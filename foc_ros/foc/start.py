@@ -6,9 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .compiled import Matrix, Vector, compiled
 from .contacts import Contacts
+from .dense import values
 from .problem import Problem
-from .qp import effort_cost, to_goal
+from .qp import goal_factors, to_goal
 from .records import Array, Solution
 
 
@@ -39,11 +41,8 @@ def warm(previous: Solution, problem: Problem) -> Start:
     """
     steps, dt = problem.horizon.steps, problem.horizon.dt
     elapsed_s = previous.dt * len(previous.control) - dt * steps
-    times = elapsed_s + dt * np.arange(1, steps + 1)
-    positions = np.stack([np.interp(times, previous.times, axis) for axis in previous.path.T], axis=1)
-    held = np.floor((times - dt / 2) / previous.dt).astype(np.intp)
-    inside = (held >= 0) & (held < len(previous.control))
-    control = to_the_goal(problem, np.where(inside, previous.control[np.where(inside, held, 0)].T, 0.0).ravel(), previous.lam)
+    positions, control = read_off(previous.mean, previous.control, previous.dt, elapsed_s, dt, steps)
+    variance = problem.weighted_variance + previous.lam * problem.summed_variance
     row = {identity: index for index, identity in enumerate(problem.obstacles.ids)}
     kept = [
         (row[identity], moved, force)
@@ -52,12 +51,36 @@ def warm(previous: Solution, problem: Problem) -> Start:
     ]
     table = np.array(kept, dtype=float).reshape(-1, 3)
     contacts = Contacts(table[:, 0].astype(np.intp), table[:, 1].copy(), table[:, 2].copy())
-    return Start(positions, control, contacts, previous.lam, previous.slope)
+    return Start(positions, led(control, variance, *problem.goal_rows), contacts, previous.lam, previous.slope)
 
 
-def to_the_goal(problem: Problem, control: Array, lam: float) -> Array:
-    """Return a control (2N,) led to the goal again with least cost: the hand is never quite where it was to be."""
-    _, root, factor = effort_cost(problem, lam).factors
-    rows, targets, _ = problem.goal_rows
-    led: Array = control + to_goal(root, factor, targets - rows @ control)
-    return led
+@compiled
+def read_off(mean: Matrix, control: Matrix, before: float, elapsed_s: float, dt: float, steps: int) -> tuple[Matrix, Vector]:
+    """Return positions (steps, 2) and the stacked control (2 steps,) at new steps of dt [s], the first elapsed_s later.
+
+    mean (n + 1, states), its position first, and control (n, 2) at steps of `before` [s]; without control before they begin, and
+    after they end.
+    """
+    n = len(control)
+    positions, stacked = np.empty((steps, 2)), np.zeros(2 * steps)
+    for t in range(steps):
+        place = (elapsed_s + dt * (t + 1)) / before
+        held = min(max(int(np.floor(place)), 0), n - 1)
+        share = min(max(place - held, 0.0), 1.0)
+        during = int(np.floor(place - 0.5 * dt / before))
+        for axis in range(2):
+            positions[t, axis] = (1.0 - share) * mean[held, axis] + share * mean[held + 1, axis]
+            if 0 <= during < n:
+                stacked[axis * steps + t] = control[during, axis]
+    return positions, stacked
+
+
+@compiled
+def led(control: Vector, variance: Vector, goal_rows: Matrix, goal_targets: Vector, softness: Vector) -> Vector:
+    """Return a control (2N,) led to the goal again at the least cost: the hand is never quite where it was to be.
+
+    variance (2N,): what the squared control costs besides effort; goal_rows (r, 2N), goal_targets (r,), softness (r,): those of
+    the problem.
+    """
+    _, root, factor = goal_factors(2.0 * (1.0 + variance), goal_rows, softness)
+    return control + to_goal(root, factor, goal_targets - values(goal_rows, control))
