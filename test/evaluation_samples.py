@@ -32,6 +32,7 @@ def ways(sides, goal=None, likelihood=None, to_go=None, solved=None, price=0.0) 
         sides=np.array(sides, dtype=np.int8).reshape(k, n),
         mean=np.zeros((k, H, 2)),
         covariance=np.tile(np.eye(2), (k, H, 1, 1)),
+        late=np.zeros((k, H, 2)),
         partings=Partings(np.where(np.eye(k, dtype=bool), np.inf, 0.0), np.arange(k)),
     )
 

@@ -30,7 +30,8 @@ class Ways(Record):
     [m^2/s^5]: effort through each and what its time costs; likelihood (k,): as published, 0 unless solved; length (k,) [m]: of
     the shortest path in its class; price [m^2/s^6]: of time; time_s (k,): to its goal; named (k, n): whether the obstacle is in
     the candidate's name; sides (k, n): LEFT or RIGHT, on which it passes each of the n obstacles; mean (k, h, 2) [m] and
-    covariance (k, h, 2, 2) [m^2]: of the position at `TIMES_S`; partings: when they part.
+    covariance (k, h, 2, 2) [m^2]: of the position at `TIMES_S`; late (k, h, 2) [m]: by how much it lags behind for each share of
+    the time to the goal that the plan takes longer; partings: when they part.
     """
 
     labels: tuple[str, ...]
@@ -46,6 +47,7 @@ class Ways(Record):
     sides: Sides
     mean: Array
     covariance: Array
+    late: Array
     partings: Partings
 
     def __len__(self) -> int:

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.foc.chance import courses
-from foc_ros.foc.config import Config
-from foc_ros.foc.duration import time_price
+from foc_ros.foc.config import Config, DurationConfig
+from foc_ros.foc.doubt import lateness
+from foc_ros.foc.duration import is_passing, time_price
 from foc_ros.foc.errors import RecordingError
 from foc_ros.foc.homotopy import swept_angles
 from foc_ros.foc.partings import partings
@@ -39,13 +40,13 @@ def observe(recording: Recording, config: Config) -> Observations:
     goals = made[-1][0].scene.goals
     assert goals is not None
     past = Path(np.array(stamps), np.array(path), goals)
-    each = [_observation(step, hand, past, time_price(config.duration)) for step, hand in made if hand.stamp_ns <= past.end_ns]
+    each = [_observation(step, hand, past, config.duration) for step, hand in made if hand.stamp_ns <= past.end_ns]
     if not each:
         raise RecordingError(f'{recording.name}: nothing was predicted before its goal was reached')
     return Observations(recording.name, tuple(each), replayed.intake.counts)
 
 
-def _observation(step: Step, hand: HandState, past: Path, price: float) -> Observation:
+def _observation(step: Step, hand: HandState, past: Path, duration: DurationConfig) -> Observation:
     prediction, goals = step.prediction, step.scene.goals
     assert prediction is not None and goals is not None
     obstacles = step.scene.obstacles(prediction.stamp_ns)
@@ -61,14 +62,14 @@ def _observation(step: Step, hand: HandState, past: Path, price: float) -> Obser
         row=row,
         along=along,
         goals=goals,
-        ways=_ways(prediction, obstacles, hand.effort_spent, price),
+        ways=_ways(prediction, obstacles, hand.effort_spent, duration),
         most_likely=prediction.most_likely,
         truth=_truth(prediction.stamp_ns, past, obstacles, row, along, goals),
     )
 
 
-def _ways(prediction: Prediction, obstacles: Obstacles, spent: float, price: float) -> Ways:
-    outcomes = prediction.outcomes
+def _ways(prediction: Prediction, obstacles: Obstacles, spent: float, duration: DurationConfig) -> Ways:
+    outcomes, price, passing = prediction.outcomes, time_price(duration), is_passing(duration)
     solutions = [outcome.solution for outcome in outcomes]
     steps = [np.minimum(np.rint(np.array(TIMES_S) / each.dt).astype(int), len(each.mean) - 1) for each in solutions]
     named = [[identity in dict(outcome.candidate.sides) for identity in obstacles.ids] for outcome in outcomes]
@@ -86,6 +87,7 @@ def _ways(prediction: Prediction, obstacles: Obstacles, spent: float, price: flo
         sides=np.array([_predicted_sides(outcome, obstacles) for outcome in outcomes]),
         mean=np.array([each.mean[at, :2] for each, at in zip(solutions, steps, strict=True)]),
         covariance=np.array([each.covariance[at, :2, :2] for each, at in zip(solutions, steps, strict=True)]),
+        late=np.array([lateness(each, passing)[at, :2] for each, at in zip(solutions, steps, strict=True)]),
         partings=partings(outcomes, obstacles),
     )
 

@@ -11,6 +11,7 @@ from foc_ros.foc.records import Array
 
 from .minimum_jerk import straight_cost, straight_positions
 from .observations import HORIZONS_S, TIMES_S, Observation, Observations
+from .regions import denser
 
 LEVELS = (0.5, 0.9)
 """Probabilities of the ellipses."""
@@ -20,12 +21,14 @@ EXACT = 1e-18
 
 
 def position_scores(recordings: Sequence[Observations]) -> dict[str, Any]:
-    """Return average and final displacement errors [m] by predictor and horizon, and the share inside the ellipses.
+    """Return average and final displacement errors [m] by predictor and horizon, and the shares inside of what was predicted.
 
+    inside: the ellipse of the most likely way; inside_all: the smallest region of all ways together.
     The average is over the times up to the horizon; a horizon counts where the recording goes on until then.
     """
     seen = [each for recording in recordings for each in recording.each]
     true = np.array([each.truth.positions for each in seen])
+    beyond = np.array([mixture_levels(each, each.ways.likelihood, each.ways.covariance) for each in seen])
     predicted = {
         'most likely': np.array([each.ways.mean[_leading(each)] for each in seen]),
         'likelihood-weighted': np.array([np.tensordot(each.ways.likelihood, each.ways.mean, 1) for each in seen]),
@@ -35,6 +38,7 @@ def position_scores(recordings: Sequence[Observations]) -> dict[str, Any]:
     return {
         'displacement_m': {name: _errors(positions, true) for name, positions in predicted.items()},
         'inside': {f'{level:g}': _by_horizon(_inside(seen, true, level)) for level in LEVELS},
+        'inside_all': {f'{level:g}': _by_horizon(_within(beyond, level)) for level in LEVELS},
     }
 
 
@@ -56,6 +60,18 @@ def _inside(seen: Sequence[Observation], true: Array, level: float) -> Array:
     mean = np.array([each.ways.mean[row] for each, row in zip(seen, chosen, strict=True)])
     covariance = np.array([each.ways.covariance[row] for each, row in zip(seen, chosen, strict=True)])
     return held(true - mean, covariance, level)
+
+
+def mixture_levels(seen: Observation, likelihood: Array, covariance: Array) -> Array:
+    """Return what is denser than the true positions (h,), at the horizons, nan elsewhere: see `regions`."""
+    levels = np.full(len(TIMES), np.nan)
+    at = [TIMES_S.index(horizon) for horizon in HORIZONS_S]
+    levels[at] = denser(likelihood, seen.ways.mean[:, at], covariance[:, at] + EXACT * np.eye(2), seen.truth.positions[at])
+    return levels
+
+
+def _within(levels: Array, level: float) -> Array:
+    return np.where(np.isfinite(levels), (levels < level).astype(float), np.nan)
 
 
 def held(away: Array, covariance: Array, level: float) -> Array:

@@ -16,6 +16,7 @@ GAINS = {
     GOAL: 'Goal: log-likelihood above uniform [nat], by tenths of the movement',
 }
 RIGHT = 'Gap in the next row: right [%], by tenths of the way from row to row'
+INSIDE = {'inside': 'ellipse of the most likely way', 'inside_all': 'smallest region of all ways together'}
 
 
 def tables(answer: Mapping[str, Any]) -> Iterator[Table]:
@@ -57,9 +58,11 @@ def _positions(positions: Mapping[str, Any]) -> Iterator[Table]:
     columns = ('', *(f'{kind} {each} s' for kind in ('average', 'final') for each in horizons))
     yield 'Displacement error [mm]', columns, errors
     inside = [
-        (f'{100 * float(level):g} %', *(percent(by[each]) for each in horizons)) for level, by in positions['inside'].items()
+        (f'{words}, {100 * float(level):g} %', *(percent(by[each]) for each in horizons))
+        for name, words in INSIDE.items()
+        for level, by in positions[name].items()
     ]
-    yield 'True positions inside the ellipse of the most likely way [%]', ('', *(f'{each} s' for each in horizons)), inside
+    yield 'True positions inside [%]', ('', *(f'{each} s' for each in horizons)), inside
 
 
 def _facts(answer: Mapping[str, Any]) -> Table:

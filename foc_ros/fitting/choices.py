@@ -1,4 +1,4 @@
-"""The parameters of the likelihood and the process noise, from one replay: every setting tried on every recording once.
+"""The parameters of the likelihood, from one replay: every setting tried on every recording once.
 
 So the cross-validation is exact: held out, a recording, or all that took the same way, is judged by the setting that is best for
 the others. Of the likelihood's two forms the plain one stays unless the one that looks ahead is better held out by a margin.
@@ -17,7 +17,7 @@ import numpy as np
 from foc_ros.evaluation.families import power_rules
 from foc_ros.evaluation.forecasts import Forecast, of_shares, power_rule
 from foc_ros.evaluation.heldout import Family, asked, chosen, log_likelihoods
-from foc_ros.evaluation.observations import TIMES_S, Observation, Observations
+from foc_ros.evaluation.observations import Observation, Observations
 from foc_ros.evaluation.questions import Question
 from foc_ros.evaluation.workers import Failure, run
 from foc_ros.foc.config import Config, LikelihoodConfig
@@ -25,7 +25,7 @@ from foc_ros.foc.errors import RecordingError
 from foc_ros.foc.records import Array
 from foc_ros.terminal import track
 
-from .densities import PROCESS_NOISES, inside, log_densities
+from .densities import Doubt
 from .estimates import Estimate
 from .resampling import CENTRAL, resamples
 
@@ -36,15 +36,14 @@ UNTOLD_NAT = 2.0
 NAMES = ('likelihood.beta', 'likelihood.spent_share', 'likelihood.lookahead_s')
 MISSED = 0.1
 """Share of predictions without the way taken among their candidates that is told."""
-HORIZON_S, LEVEL = 0.5, 0.9
 
 
 @dataclass(frozen=True)
 class Table:
-    """Mean log-likelihood per prediction of each recording (rows, nan: nothing was asked) under each setting (columns)."""
+    """Mean log-likelihood, or log-density, per prediction of each recording under each setting (n, s); nan: nothing was asked."""
 
     values: Array
-    settings: tuple[LikelihoodConfig | float, ...]
+    settings: tuple[LikelihoodConfig | Doubt, ...]
 
     def best(self, columns: Sequence[int]) -> int:
         """Return the best of some settings for all recordings."""
@@ -82,16 +81,6 @@ def forecast(seen: Observation, question: Question, setting: LikelihoodConfig) -
 def _row(recording: Observations, family: Family) -> Array:
     pairs = asked(recording)
     return log_likelihoods(pairs, family) / len(pairs) if pairs else np.full(len(family.settings), np.nan)
-
-
-def density_table(observations: Sequence[Observations], config: Config) -> Table:
-    """Try every process noise on every recording."""
-    rows = []
-    for recording in observations:
-        each = [log_densities(seen, power_rule(seen, config.likelihood), config) for seen in recording.each]
-        known = [row for row in each if row is not None]
-        rows.append(np.mean(known, axis=0) if known else np.full(len(PROCESS_NOISES), np.nan))
-    return Table(np.array(rows), PROCESS_NOISES)
 
 
 def uniform(observations: Sequence[Observations]) -> Array:
@@ -149,28 +138,3 @@ def likelihood_estimates(table: Table, columns: Sequence[int]) -> tuple[dict[str
                 f'explains the ways within {UNTOLD_NAT:g} nat, other parameters following it'
             )
     return estimates, warnings
-
-
-def process_noise_estimate(table: Table) -> Estimate:
-    """Return the estimate of the process noise."""
-    columns = list(range(len(table.settings)))
-    drawn = [float(table.settings[place]) for place in table.resampled(columns)]  # type: ignore[arg-type]
-    low, high = np.percentile(drawn, CENTRAL)
-    value = float(f'{table.settings[table.best(columns)]:.4g}')
-    return Estimate('foc.process_noise', value, float(low), float(high), 'density of true positions')
-
-
-def coverage(observations: Sequence[Observations], config: Config, noise: Array) -> float | None:
-    """Return the share of true positions in movement that the 90 % ellipse of the likeliest way holds after 0.5 s.
-
-    noise (n,): process noise for each recording, so that each can be judged by one that it had no part in.
-    """
-    place = TIMES_S.index(HORIZON_S)
-    held = [
-        inside(seen, int(power_rule(seen, config.likelihood).argmax()), float(each), config, LEVEL)[place]
-        for recording, each in zip(observations, noise, strict=True)
-        for seen in recording.each
-        if seen.since_s > 0.0
-    ]
-    known = [value for value in held if not np.isnan(value)]
-    return float(np.mean(known)) if known else None

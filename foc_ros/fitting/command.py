@@ -22,7 +22,8 @@ from .found import Fit
 SCORES = {
     'ways': 'log-likelihood of the way taken [nat]',
     'positions': 'log-density of true positions [nat]',
-    'inside_90': 'true positions in the 90 % ellipse at 0.5 s',
+    'inside_90': 'true positions in the 90 % ellipse of the likeliest way at 0.5 s',
+    'inside_all_90': 'true positions in the 90 % region of all ways at 0.5 s',
 }
 
 

@@ -1,28 +1,56 @@
-"""How likely true positions were under what was predicted, for any process noise: no replay is needed to try one."""
+"""How likely true positions were under what was predicted, however unsure we are of the plans: no replay is needed to try."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass
+from itertools import product
 
 import numpy as np
 
 from foc_ros.evaluation.observations import HORIZONS_S, TIMES_S, Observation
 from foc_ros.evaluation.positions import EXACT, held
+from foc_ros.evaluation.regions import log_normal
 from foc_ros.foc.config import Config
 from foc_ros.foc.duration import is_passing
 from foc_ros.foc.records import Array
-from foc_ros.foc.replanning import triple_integrator_process_covariance
+from foc_ros.foc.replanning import triple_integrator_goal_map, triple_integrator_process_covariance
 
+NAMES = ('foc.process_noise', 'foc.endpoint_stddev', 'duration.spread')
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """How unsure predictions are of their plans: parameters that change nothing but their covariance."""
+
+    process_noise: float = 0.0
+    endpoint_stddev: float = 0.0
+    spread: float = 0.0
+
+    def parameters(self) -> Mapping[str, float]:
+        """Return the values by dotted name."""
+        return dict(zip(NAMES, astuple(self), strict=True))
+
+
+NO_DOUBT = Doubt()
 PROCESS_NOISES = (0.0, *(float(value) for value in np.geomspace(0.01, 100.0, 33)))
 """Process noises tried [m/s^2.5]: 0.01 is nothing beside a filter's jerk density, 100 is a hand that is thrown about."""
+ENDPOINT_STDDEVS = (0.0, 1e-3, 2e-3, 3e-3, 4e-3, 6e-3, 8e-3, 12e-3, 16e-3, 24e-3)
+"""Scatter of the ends tried [m]: 24 mm is what Fitts' law expects of a target of 0.1 m."""
+SPREADS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.6)
+"""Spreads of the time to go tried."""
+DOUBTS = tuple(Doubt(*values) for values in product(PROCESS_NOISES, ENDPOINT_STDDEVS, SPREADS))
 FURTHEST = -30.0
 """Least log-density that counts [nat]: one position that nobody expected is not to rule the rest."""
 
 _PLACES = [TIMES_S.index(horizon) for horizon in HORIZONS_S]
+_SQUARED = np.square([astuple(each) for each in DOUBTS]).T
 
 
 def log_densities(seen: Observation, shares: Array, config: Config) -> Array | None:
-    """Return the log-density of the true positions, mean over the horizons, for each of `PROCESS_NOISES`, (q,) [nat, metres].
+    """Return the log-density of the true positions, mean over the horizons, for each of `DOUBTS`, (q,) [nat, metres].
 
-    shares (k,): of the candidates; config: that they were predicted with, but for the process noise. None where the
+    shares (k,): of the candidates; config: that they were predicted with, but for the doubt. None where the
     movement ends before the first horizon, or has not begun: how long a hand will wait is no part of the model.
     """
     true = seen.truth.positions[_PLACES]
@@ -33,29 +61,38 @@ def log_densities(seen: Observation, shares: Array, config: Config) -> Array | N
     places = np.array(_PLACES)[known]
     away = true[known] - seen.ways.mean[np.ix_(weighed, places)]
     base = seen.ways.covariance[np.ix_(weighed, places)] + EXACT * np.eye(2)
-    added = np.array([_process_variance(float(seen.ways.time_s[row]), config)[places] for row in weighed])
-    squared = np.square(PROCESS_NOISES)[:, None, None]
-    xx, yy, xy = base[..., 0, 0] + squared * added, base[..., 1, 1] + squared * added, base[..., 0, 1]
-    determinant = xx * yy - xy**2
-    x, y = away[..., 0], away[..., 1]
-    distance = (yy * x**2 - 2.0 * xy * x * y + xx * y**2) / determinant
-    logs = np.log(shares[weighed])[:, None] - 0.5 * (distance + np.log(determinant)) - np.log(2.0 * np.pi)
-    mixed = np.logaddexp.reduce(logs, axis=1)
+    jerk, end = np.array([_variances(float(seen.ways.time_s[row]), config)[:, places] for row in weighed]).swapaxes(0, 1)
+    late = seen.ways.late[np.ix_(weighed, places)]
+    both = np.multiply.outer(_SQUARED[0], jerk) + np.multiply.outer(_SQUARED[1], end)
+    xx, yy, xy = (
+        base[..., i, j] + (both if i == j else 0.0) + np.multiply.outer(_SQUARED[2], late[..., i] * late[..., j])
+        for i, j in ((0, 0), (1, 1), (0, 1))
+    )
+    logs = np.log(shares[weighed])[:, None] + log_normal(away, xx, yy, xy)
+    greatest = logs.max(axis=1)
+    mixed = greatest + np.log(np.exp(logs - greatest[:, None]).sum(axis=1))
     density: Array = np.maximum(mixed, FURTHEST).mean(axis=1)
     return density
 
 
-def inside(seen: Observation, row: int, process_noise: float, config: Config, level: float) -> Array:
+def inside(seen: Observation, row: int, doubt: Doubt, config: Config, level: float) -> Array:
     """Return 1 where the ellipse of a candidate holds the true position at `TIMES_S`, 0 where not, nan beyond the end, (h,)."""
-    variance = process_noise**2 * _process_variance(float(seen.ways.time_s[row]), config)
-    covariance = seen.ways.covariance[row] + variance[:, None, None] * np.eye(2)
-    return held(seen.truth.positions - seen.ways.mean[row], covariance, level)
+    return held(seen.truth.positions - seen.ways.mean[row], widened(seen, doubt, config)[row], level)
 
 
-def _process_variance(time_s: float, config: Config) -> Array:
-    """Return the variance of a position at `TIMES_S` that process noise of unit density causes, (h,); none beyond the goal."""
+def widened(seen: Observation, doubt: Doubt, config: Config) -> Array:
+    """Return the covariance (k, h, 2, 2) [m^2] of the candidates' positions at `TIMES_S` with a doubt."""
+    added = np.array([_variances(float(time_s), config) for time_s in seen.ways.time_s])
+    both = doubt.process_noise**2 * added[:, 0] + doubt.endpoint_stddev**2 * added[:, 1]
+    late = doubt.spread * seen.ways.late
+    covariance: Array = seen.ways.covariance + both[..., None, None] * np.eye(2) + late[..., :, None] * late[..., None, :]
+    return covariance
+
+
+def _variances(time_s: float, config: Config) -> Array:
+    """Return the variance of a position at `TIMES_S` by process noise and by scatter of the end, of 1 each, (2, h)."""
     steps = config.foc.steps
-    dt = time_s / steps
-    places = np.minimum(np.rint(np.array(TIMES_S) / dt).astype(int), steps)
-    variance: Array = triple_integrator_process_covariance(dt, steps, is_passing(config.duration))[places, 0, 0]
-    return variance
+    kind = time_s / steps, steps, is_passing(config.duration)
+    places = np.minimum(np.rint(np.array(TIMES_S) / kind[0]).astype(int), steps)
+    jerk, end = triple_integrator_process_covariance(*kind), triple_integrator_goal_map(*kind) ** 2
+    return np.array([jerk[places, 0, 0], end[places, 0, 0]])

@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.evaluation.heldout import chosen
 from foc_ros.evaluation.observations import Observations
 from foc_ros.evaluation.recordings import Recording
 from foc_ros.evaluation.workers import collected
 from foc_ros.foc.config import Config, updated
 from foc_ros.foc.errors import RecordingError
 
-from . import choices
+from . import choices, doubts
 from .demonstrations import Demonstration, demonstration
 from .duration_fit import fit_duration, other_models
 from .estimates import bounded
@@ -93,7 +92,7 @@ def _thin(demonstrations: Sequence[Demonstration], config: Config) -> dict[str, 
 
 
 def _choose(recordings: Mapping[str, Recording], found: Fit, thin: Mapping[str, float], executor: Executor) -> None:
-    """Fit the likelihood and the process noise to one replay, and score them held out."""
+    """Fit the likelihood and the doubt about plans to one replay, and score them held out."""
     observations, failed = observed(recordings, updated(found.config, thin), executor, 'replay')
     found.failed.update(failed)
     if not observations:
@@ -108,10 +107,9 @@ def _choose(recordings: Mapping[str, Recording], found: Fit, thin: Mapping[str, 
         columns = choices.plain_or_ahead(table, names)
         found.take(choices.likelihood_estimates(table, columns))
         found.scores.update(_choice_scores(table, columns, observations))
-    densities = choices.density_table(observations, found.config)
-    noise = choices.process_noise_estimate(densities)
-    found.take(({noise.name: noise}, []))
-    found.scores.update(_position_scores(densities, noise.value, found.config, observations))
+    densities = doubts.density_table(observations, found.config)
+    found.take((doubts.doubt_estimates(densities), []))
+    found.scores.update(_position_scores(densities, found.config, observations))
     if len(observations) < FEWEST:
         found.warnings.append(f'cross-validation: {len(observations)} recordings are too few, {FEWEST} are needed')
 
@@ -130,15 +128,15 @@ def _choice_scores(table: choices.Table, columns: Sequence[int], observations: S
     return {'ways': {name: float(np.nanmean(values)) for name, values in scores.items()}}
 
 
-def _position_scores(table: choices.Table, noise: float, config: Config, observations: Sequence[Observations]) -> dict[str, Any]:
-    names, columns, n = [each.name for each in observations], list(range(len(table.settings))), len(observations)
-    scores = {'without process noise': table.values[:, 0], 'fitted': table.values[:, table.best(columns)]}
-    noises = {'without process noise': np.zeros(n), 'fitted': np.full(n, noise)}
-    if n >= FEWEST:
+def _position_scores(table: choices.Table, config: Config, observations: Sequence[Observations]) -> dict[str, Any]:
+    names, columns = [each.name for each in observations], list(range(len(table.settings)))
+    cross = len(names) >= FEWEST
+    scores = {'motor noise alone': table.values[:, 0], 'fitted': table.values[:, table.best(columns)]}
+    if cross:
         scores['without the recording'] = table.held_out(columns, names)
-        picked = chosen(np.nan_to_num(table.values), names)
-        noises['without the recording'] = np.array(table.settings, dtype=float)[picked]
+    tried = doubts.doubts(table, names if cross else None)
+    held = {name: doubts.coverage(observations, config, each) for name, each in tried.items()}
     return {
         'positions': {name: float(np.nanmean(values)) for name, values in scores.items()},
-        'inside_90': {name: choices.coverage(observations, config, each) for name, each in noises.items()},
+        **{kind: {name: each[kind] for name, each in held.items()} for kind in ('inside_90', 'inside_all_90')},
     }

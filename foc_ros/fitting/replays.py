@@ -2,9 +2,9 @@
 
 A setting has two scores, means over the recordings: the log-likelihood of the way really taken, among the ways, and that of the
 true positions 0.25, 0.5 and 1 s ahead, under the mixture of the candidates. Both are proper: no setting gains by claiming more or
-less than it knows. In both, what needs no replay is at its own best for each setting: the likelihood's parameters, the process
-noise. Ways come first: of the settings that are within one standard error of the best in these (Breiman et al. 1984), the one
-with the best positions is taken.
+less than it knows. In both, what needs no replay is at its own best for each setting: the likelihood's parameters, the doubt
+about plans. Ways come first: of the settings that are within one standard error of the best in these (Breiman et al. 1984), the
+one with the best positions is taken.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from foc_ros.evaluation.workers import collected
 from foc_ros.foc.config import ARRIVALS, Config, LikelihoodConfig, flatten, updated
 from foc_ros.foc.records import Array
 
-from .densities import log_densities
+from .densities import NO_DOUBT, log_densities
 from .duration_fit import CONSTANTS
 from .estimates import bounded
 
@@ -58,8 +58,8 @@ class Foretold:
 def observed(
     recordings: Mapping[str, Recording], config: Config, executor: Executor, words: str
 ) -> tuple[list[Observations], dict[str, str]]:
-    """Replay recordings without process noise; return the observations, and why others gave none, by name."""
-    plain = updated(config, {'foc.process_noise': 0.0})
+    """Replay recordings by motor noise alone; return the observations, and why others gave none, by name."""
+    plain = updated(config, NO_DOUBT.parameters())
     return collected(partial(observe, config=plain), list(recordings.items()), executor, words)
 
 

@@ -55,6 +55,13 @@ class FocConfig:
         0.0,
         1e3,
     )
+    endpoint_stddev: float = _p(
+        0.0,
+        'standard deviation, along each axis, of where movements end about their goal: widens what is predicted alone',
+        'm',
+        0.0,
+        1.0,
+    )
     lv_delta: float = _p(5e-5, 'tau per unit of s for strategy lv', 'm^2', 0.0, 1.0)
     hc_delta: float = _p(1e-4, 'tau per unit of s for strategy hc', 'm^2', 0.0, 1.0)
     growth: float = _p(2.0, 'factor on lambda per unit of s (Delta)', '', 1.0001, 1e6)
@@ -80,6 +87,13 @@ class DurationConfig:
     target_width: float = _p(0.02, 'target width of Fitts law', 'm', 1e-4, 10.0)
     time_cost: float = _p(100.0, 'cost of time of model cost_of_time: a longer way takes longer', 'm^2/s^6', 1e-9, 1e9)
     min_time_to_go_s: float = _p(0.3, 'floor of the time to go', 's', 0.01, 60.0)
+    spread: float = _p(
+        0.0,
+        'standard deviation of the time to go, as a share of it: widens what is predicted alone',
+        '',
+        0.0,
+        2.0,
+    )
     arrival: str = _p('rest', 'how the hand comes to its goal: to rest, or passing it at any speed', choices=ARRIVALS)
     max_time_to_go_s: float = _p(10.0, 'ceiling of the time to go', 's', 0.05, 120.0)
 

@@ -11,6 +11,7 @@ import numpy as np
 from .config import REFERENCE_STEP_S, Config, DurationConfig
 from .culling import relevant
 from .deadline import Deadline
+from .doubt import doubt, timing_doubt
 from .duration import is_passing, time_price, times_to_go, way_times
 from .dynamics import triple_integrator_horizon
 from .homotopy import search
@@ -21,7 +22,7 @@ from .noise import noise_per_step
 from .outcomes import ranked, solve_candidates
 from .problem import Problem, rest_to_goal
 from .records import Array, Candidate, HandState, Obstacles, Outcome, Prediction, make_obstacles
-from .replanning import triple_integrator_error_map, triple_integrator_process_covariance
+from .replanning import triple_integrator_error_map
 
 
 def predict(
@@ -46,8 +47,8 @@ def predict(
     )
     tried = [_priced(memory.aged(outcome, hand.stamp_ns), config.duration) for outcome in tried]
     outcomes = ranked(tried, config.likelihood, obstacles)
-    unsure = {problem: _doubt(problem, hand, config) for problem in problems.values()}
-    outcomes = [_seen(outcome, unsure[problems[outcome.candidate.label]]) for outcome in outcomes]
+    unsure = {problem: doubt(problem.horizon.dt, problem.horizon.steps, hand, config) for problem in problems.values()}
+    outcomes = [_seen(outcome, unsure[problems[outcome.candidate.label]], config) for outcome in outcomes]
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
     best = most_likely(labels, values, memory.most_likely, config.likelihood.margin)
@@ -122,20 +123,7 @@ def _start(hand: HandState, acceleration_time_s: float) -> HandState:
     return replace(hand, mean=np.concatenate([hand.mean[:2], settled, np.zeros(2)]))
 
 
-def _doubt(problem: Problem, hand: HandState, config: Config) -> Array:
-    """Return the covariance at steps 0..N, (N + 1, 6, 6), of what we do not know of the hand, and of jerk beside its plan.
-
-    The operator knows the hand better than our filter and plans its margins by motor noise alone, so the filter's
-    covariance is no part of the chance constraint; but our prediction is as uncertain as the state it starts from.
-    """
-    carried: Array = problem.error_map @ hand.covariance @ problem.error_map.swapaxes(1, 2)
-    if config.foc.process_noise > 0.0:
-        horizon, passing = problem.horizon, is_passing(config.duration)
-        added = triple_integrator_process_covariance(horizon.dt, horizon.steps, passing)
-        carried = carried + config.foc.process_noise**2 * added
-    return carried
-
-
-def _seen(outcome: Outcome, doubt: Array) -> Outcome:
-    """Add a doubt (N + 1, 6, 6) to what the hand's own noise will do."""
-    return replace(outcome, solution=replace(outcome.solution, covariance=outcome.solution.covariance + doubt))
+def _seen(outcome: Outcome, unsure: Array, config: Config) -> Outcome:
+    """Add a doubt (N + 1, 6, 6), and that of the time, to what the hand's own noise will do."""
+    covariance = outcome.solution.covariance + unsure + timing_doubt(outcome.solution, config)
+    return replace(outcome, solution=replace(outcome.solution, covariance=covariance))

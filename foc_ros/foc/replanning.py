@@ -1,8 +1,9 @@
-"""What an error of the initial state becomes when the operator corrects it on the way.
+"""What an error of the initial state becomes when the operator corrects it on the way, and what another end of the plan changes.
 
-The operator sees the hand and moves from where it is: whatever the true state, its plan ends at the goal. With least effort,
-u = -R_N^+ A^N e takes an error e of the state to zero at step N, so that at step t it is (A^t - R_t R_N^+ A^N) e. Without
-this, the estimator's doubt about acceleration would grow with t^2 over the whole horizon, although no hand would act on it.
+The operator sees the hand and moves from where it is: whatever the true state, its plan ends at the goal. What moves the end by d
+with least effort, u = R_N^+ d, moves the state at step t by K_t d, K_t = R_t R_N^+. So an error e of the state is taken to zero
+at step N by moving the end that it would have by -A^N e, and at step t it is (A^t - K_t A^N) e. Without this, the estimator's
+doubt about acceleration would grow with t^2 over the whole horizon, although no hand would act on it.
 
 Nobody keeps to a plan either. Jerk that nobody planned, white of unit spectral density, adds the covariance G (`estimator`) to
 the state in every step, and is corrected from then on like any other error:
@@ -25,16 +26,29 @@ from .estimator import gramian
 from .records import Array
 
 
-def replanned_error_map(stacked: Horizon, passing: bool = False) -> Array:
-    """Return what an initial error becomes at steps 0..N, (N + 1, n, n); passing: the goal does not fix the velocity."""
+def goal_map(stacked: Horizon, passing: bool = False) -> Array:
+    """Return K_t of steps 0..N, (N + 1, n, n): what another state at the goal changes in the plan of least effort to it.
+
+    passing: the goal does not fix the velocity; the columns of states that it does not fix are zero.
+    """
     fixed = states_at_goal(len(stacked.powers[-1]), passing)
     last = stacked.response[-1][fixed]
     # rows scaled to unit length first: they mix metres, metres per second and their like
     scale = 1.0 / np.sqrt((last**2).sum(axis=1))
-    correction = -np.linalg.pinv(scale[:, None] * last) @ (scale[:, None] * stacked.powers[-1][fixed])
-    error_map = stacked.powers.copy()
-    error_map[1:] += stacked.response @ correction
+    moved = np.zeros_like(stacked.powers)
+    moved[1:, :, fixed] = stacked.response @ (np.linalg.pinv(scale[:, None] * last) * scale)
+    return moved
+
+
+def replanned_error_map(stacked: Horizon, passing: bool = False) -> Array:
+    """Return what an initial error becomes at steps 0..N, (N + 1, n, n); passing: the goal does not fix the velocity."""
+    error_map: Array = stacked.powers - goal_map(stacked, passing) @ stacked.powers[-1]
     return error_map
+
+
+@lru_cache(maxsize=CACHED_HORIZONS)
+def _unit_goal_map(steps: int, passing: bool) -> Array:
+    return goal_map(horizon(triple_integrator(1.0), steps), passing)
 
 
 @lru_cache(maxsize=CACHED_HORIZONS)
@@ -42,8 +56,15 @@ def _unit_error_map(steps: int, passing: bool) -> Array:
     return replanned_error_map(horizon(triple_integrator(1.0), steps), passing)
 
 
+def triple_integrator_goal_map(dt: float, steps: int, passing: bool = False) -> Array:
+    """Return `goal_map` of the triple integrator at any dt [s], by scaling the map of unit step."""
+    scale = state_scale(dt)
+    moved: Array = _unit_goal_map(steps, passing) * (scale[:, None] / scale[None, :])
+    return moved
+
+
 def triple_integrator_error_map(dt: float, steps: int, passing: bool = False) -> Array:
-    """Return the same for the triple integrator at any dt [s], by scaling the map of unit step."""
+    """Return `replanned_error_map` of the same."""
     scale = state_scale(dt)
     error_map: Array = _unit_error_map(steps, passing) * (scale[:, None] / scale[None, :])
     return error_map

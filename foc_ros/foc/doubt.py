@@ -1,0 +1,58 @@
+"""How unsure a prediction is beside the motor noise that its plan counts on.
+
+None of it is part of the chance constraint: the operator knows the hand and what it is about better than we do, and plans
+margins by motor noise alone. But what we predict is as uncertain as
+
+- the state that it starts from, which the operator goes on to correct;
+- the plan's hold on the hand: jerk beside any plan (`foc.process_noise`), corrected likewise (`replanning`);
+- the end of the plan. Movements end beside the marked goal, by `foc.endpoint_stddev` along each axis, and sooner or later than at
+  the expected T, by `duration.spread` T. A plan that ends at T + delta has at T still to move by delta X'(T), X' the rate of the
+  state, so that to first order both displace the state at the goal:
+
+      cov(X(T)) = endpoint_stddev^2 diag(1, 1, 0, ...) + (spread T)^2 X'(T) X'(T)',
+
+  and by least effort the state at step t by K_t (`replanning`) times as much. From rest to rest over a distance L, with
+  s = t / T, the standard deviations are (10 s^3 - 15 s^4 + 6 s^5) endpoint_stddev and 30 L spread s^3 (1 - s)^2. Where the goal
+  is passed at any velocity, that the duration changes this velocity is left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .config import Config
+from .duration import is_passing
+from .records import Array, HandState, Solution
+from .replanning import triple_integrator_error_map, triple_integrator_goal_map, triple_integrator_process_covariance
+
+
+def doubt(dt: float, steps: int, hand: HandState, config: Config) -> Array:
+    """Return the covariance (N + 1, 6, 6) at steps 0..N that plans of one duration have in common: all but that of the time."""
+    kind = dt, steps, is_passing(config.duration)
+    error_map = triple_integrator_error_map(*kind)
+    unsure: Array = error_map @ hand.covariance @ error_map.swapaxes(1, 2)
+    if config.foc.process_noise > 0.0:
+        unsure = unsure + config.foc.process_noise**2 * triple_integrator_process_covariance(*kind)
+    if config.foc.endpoint_stddev > 0.0:
+        moved = config.foc.endpoint_stddev * triple_integrator_goal_map(*kind)[:, :, :2]
+        unsure = unsure + moved @ moved.swapaxes(1, 2)
+    return unsure
+
+
+def timing_doubt(solution: Solution, config: Config) -> Array | float:
+    """Return the covariance (N + 1, 6, 6) at steps 0..N that the spread of a plan's duration makes."""
+    if config.duration.spread == 0.0:
+        return 0.0
+    moved = config.duration.spread * lateness(solution, is_passing(config.duration))
+    covariance: Array = moved[:, :, None] * moved[:, None, :]
+    return covariance
+
+
+def lateness(solution: Solution, passing: bool) -> Array:
+    """Return by how much a plan's states at steps 0..N, (N + 1, 6), lag behind for each share of T that it takes longer."""
+    # the control is that of the middle of its step: in 50 steps of a reach from rest, the last is 7 % below the jerk at the end
+    jerk = 1.5 * solution.control[-1] - 0.5 * solution.control[-2]
+    rate = np.concatenate([solution.mean[-1, 2:6], jerk])
+    moved = triple_integrator_goal_map(solution.dt, len(solution.control), passing)
+    late: Array = moved @ (float(solution.times[-1]) * rate)
+    return late

@@ -1,0 +1,79 @@
+"""That movements end beside their goal, sooner or later than expected, widens what is predicted, and nothing else."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from foc_ros.foc.config import Config, updated
+from foc_ros.foc.doubt import lateness
+from foc_ros.foc.dynamics import horizon, triple_integrator, triple_integrator_horizon
+from foc_ros.foc.forward import forward
+from foc_ros.foc.memory import Memory
+from foc_ros.foc.predictor import predict
+from foc_ros.foc.problem import rest_to_goal
+from foc_ros.foc.records import HandState, Solution, make_obstacles
+from foc_ros.foc.replanning import goal_map, triple_integrator_goal_map
+from foc_ros.foc.start import cold
+
+STEPS = 50
+S = np.arange(STEPS + 1) / STEPS
+GOAL = np.array([0.3, 0.1])
+HAND = HandState(0, np.array([0.05, 0.0, 0.3, -0.1, 1.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2))
+
+
+def _plan(duration_s: float, passing: bool, mean: np.ndarray) -> Solution:
+    """Plan a movement without obstacles."""
+    stacked = triple_integrator_horizon(duration_s / STEPS, STEPS)
+    problem = rest_to_goal(stacked, mean, GOAL, make_obstacles([], []), np.array([0.05, 0.05]), 0.9, passing=passing)
+    return forward(problem, cold(np.linspace(mean[:2], GOAL, STEPS + 1)), Config().foc)
+
+
+def test_a_goal_elsewhere_is_reached_by_a_minimum_jerk_movement_to_it() -> None:
+    moved = triple_integrator_goal_map(0.02, STEPS)
+    assert_allclose(moved[:, 0, 0], 10 * S**3 - 15 * S**4 + 6 * S**5, atol=2e-3)
+    assert_allclose(moved[:, 0, 4], S**3 * (1 - S) ** 2 / 2, atol=2e-4)
+    assert_allclose(moved[-1], np.eye(6), atol=1e-9)
+    assert_allclose(moved, goal_map(horizon(triple_integrator(0.02), STEPS)), atol=1e-9)
+    assert_array_equal(moved[0], 0.0)
+
+
+def test_a_goal_that_is_passed_fixes_no_velocity() -> None:
+    moved = triple_integrator_goal_map(0.02, STEPS, True)
+    assert_array_equal(moved[:, :, 2:4], 0.0)
+    assert_allclose(moved[-1][np.ix_([0, 1, 4, 5], [0, 1, 4, 5])], np.eye(4), atol=1e-9)
+    assert moved[-1, 2, 0] > 1.0  # it gets there faster
+
+
+@pytest.mark.parametrize('passing', [False, True])
+@pytest.mark.parametrize('mean', [np.zeros(6), HAND.mean])
+def test_lateness_is_the_difference_that_a_longer_duration_makes(passing: bool, mean: np.ndarray) -> None:
+    duration_s, share = 0.8, 0.01
+    sooner, later = (_plan(duration_s * (1 + each), passing, mean) for each in (-share, share))
+    now = _plan(duration_s, passing, mean)
+    expected = np.zeros((STEPS + 1, 2))
+    for axis in range(2):
+        early, late = (np.interp(now.times, each.times, each.mean[:, axis]) for each in (sooner, later))
+        expected[:, axis] = (early - late) / (2.0 * share)
+    middle = slice(0, int(0.95 * STEPS))  # the sooner one ends before the end
+    found = lateness(now, passing)[:, :2]
+    assert np.abs(found).max() > 0.05
+    # the velocity that is left open changes, too, which is no part of the map
+    assert_allclose(found[middle], expected[middle], atol=(0.04 if passing else 0.015) * np.abs(found).max())
+
+
+def test_predictions_widen_about_the_goal_and_along_the_way_and_means_and_likelihoods_stay() -> None:
+    scene = make_obstacles([[0.2, 0.0]], 0.02), np.array([GOAL, [0.4, -0.1]])
+    sure = predict(Config(), HAND, *scene, Memory())[0]
+    unsure = predict(updated(Config(), {'foc.endpoint_stddev': 0.006, 'duration.spread': 0.3}), HAND, *scene, Memory())[0]
+    assert len(sure.solved) == len(unsure.solved) >= 3
+    for before, after in zip(sure.outcomes, unsure.outcomes, strict=True):
+        assert_array_equal(before.solution.mean, after.solution.mean)
+        assert before.likelihood == after.likelihood
+        added = after.solution.covariance - before.solution.covariance
+        assert_allclose(added[-1, :2, :2], 0.006**2 * np.eye(2), atol=1e-9)
+        assert_allclose(added, added.swapaxes(1, 2), atol=1e-12)
+        late = lateness(before.solution, False)[STEPS // 2, :2]
+        across = np.array([-late[1], late[0]]) / np.hypot(*late)
+        half_way = triple_integrator_goal_map(before.solution.dt, STEPS)[STEPS // 2, 0, 0]
+        assert across @ added[STEPS // 2, :2, :2] @ across == pytest.approx((0.006 * half_way) ** 2)
+        assert np.trace(added[STEPS // 2, :2, :2]) == pytest.approx(2 * (0.006 * half_way) ** 2 + 0.3**2 * late @ late)
