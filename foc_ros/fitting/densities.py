@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass
 from itertools import product
 
@@ -40,15 +40,19 @@ ENDPOINT_STDDEVS = (0.0, 1e-3, 2e-3, 3e-3, 4e-3, 6e-3, 8e-3, 12e-3, 16e-3, 24e-3
 SPREADS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.6)
 """Spreads of the time to go tried."""
 DOUBTS = tuple(Doubt(*values) for values in product(PROCESS_NOISES, ENDPOINT_STDDEVS, SPREADS))
+FEWER_DOUBTS = tuple(
+    Doubt(*values)
+    for values in product(PROCESS_NOISES[:1] + PROCESS_NOISES[1::4], (0.0, 3e-3, 6e-3, 12e-3, 24e-3), (0.0, 0.2, 0.4))
+)
+"""Those among which the best is good enough to compare predictions that differ in more."""
 FURTHEST = -30.0
 """Least log-density that counts [nat]: one position that nobody expected is not to rule the rest."""
 
 _PLACES = [TIMES_S.index(horizon) for horizon in HORIZONS_S]
-_SQUARED = np.square([astuple(each) for each in DOUBTS]).T
 
 
-def log_densities(seen: Observation, shares: Array, config: Config) -> Array | None:
-    """Return the log-density of the true positions, mean over the horizons, for each of `DOUBTS`, (q,) [nat, metres].
+def log_densities(seen: Observation, shares: Array, config: Config, doubts: Sequence[Doubt]) -> Array | None:
+    """Return the log-density of the true positions, mean over the horizons, for each of some doubts, (q,) [nat, metres].
 
     shares (k,): of the candidates; config: that they were predicted with, but for the doubt. None where the
     movement ends before the first horizon, or has not begun: how long a hand will wait is no part of the model.
@@ -63,9 +67,10 @@ def log_densities(seen: Observation, shares: Array, config: Config) -> Array | N
     base = seen.ways.covariance[np.ix_(weighed, places)] + EXACT * np.eye(2)
     jerk, end = np.array([_variances(float(seen.ways.time_s[row]), config)[:, places] for row in weighed]).swapaxes(0, 1)
     late = seen.ways.late[np.ix_(weighed, places)]
-    both = np.multiply.outer(_SQUARED[0], jerk) + np.multiply.outer(_SQUARED[1], end)
+    squared = np.square([astuple(each) for each in doubts]).T
+    both = np.multiply.outer(squared[0], jerk) + np.multiply.outer(squared[1], end)
     xx, yy, xy = (
-        base[..., i, j] + (both if i == j else 0.0) + np.multiply.outer(_SQUARED[2], late[..., i] * late[..., j])
+        base[..., i, j] + (both if i == j else 0.0) + np.multiply.outer(squared[2], late[..., i] * late[..., j])
         for i, j in ((0, 0), (1, 1), (0, 1))
     )
     logs = np.log(shares[weighed])[:, None] + log_normal(away, xx, yy, xy)

@@ -24,7 +24,7 @@ def density_table(observations: Sequence[Observations], config: Config) -> Table
     """Try every doubt about the plans on every recording; none is the first."""
     rows = []
     for recording in observations:
-        each = [log_densities(seen, power_rule(seen, config.likelihood), config) for seen in recording.each]
+        each = [log_densities(seen, power_rule(seen, config.likelihood), config, DOUBTS) for seen in recording.each]
         known = [row for row in each if row is not None]
         rows.append(np.mean(known, axis=0) if known else np.full(len(DOUBTS), np.nan))
     return Table(np.array(rows), DOUBTS)

@@ -26,7 +26,7 @@ from foc_ros.evaluation.workers import collected
 from foc_ros.foc.config import ARRIVALS, Config, LikelihoodConfig, flatten, updated
 from foc_ros.foc.records import Array
 
-from .densities import NO_DOUBT, log_densities
+from .densities import FEWER_DOUBTS, NO_DOUBT, log_densities
 from .duration_fit import CONSTANTS
 from .estimates import bounded
 
@@ -72,7 +72,7 @@ def scored(observations: Sequence[Observations], config: Config) -> Foretold:
                 [of_shares(power_rule(seen, rule), question).true(question) for rule in RULES]
             )
         for seen in recording.each:
-            row = log_densities(seen, seen.ways.likelihood, config)
+            row = log_densities(seen, seen.ways.likelihood, config, FEWER_DOUBTS)
             if row is not None:
                 positions[recording.name, seen.stamp_ns] = row
     return Foretold(ways, positions)
