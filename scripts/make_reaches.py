@@ -1,8 +1,12 @@
 """Write recordings of simulated hand reaches among several goals without obstacles, as tables for `evaluate` and `fit`.
 
-make_reaches.py FOLDER [SEED]: 48 reaches from near the origin to 25 goals on a grid of 0.4 x 0.3 m, sampled at 120 Hz with 0.5 mm
-of noise. Each waits 0.2 to 0.6 s, takes a duration that varies by 20 % about a law, bends, falls short and corrects, and ends
-about 6 mm beside its goal; one in seven starts towards another goal first.
+make_reaches.py FOLDER [SEED [KIND]]: 48 reaches of one of two kinds.
+
+- grid: from near the origin to 25 goals on a grid of 0.4 x 0.3 m, sampled at 120 Hz with 0.5 mm of noise. Each waits 0.2 to
+  0.6 s, takes a duration that varies by 20 % about a law, bends, falls short and corrects, and ends about 6 mm beside its goal;
+  one in seven starts towards another goal first.
+- star: from near the origin to 8 goals all round, 0.1 to 0.3 m away, sampled at 100 Hz with 0.3 mm of noise. Each waits 0.1 to
+  0.4 s, takes 0.4 to 1 s however far it goes, bends a little, and ends about 3 mm beside its goal.
 """
 
 from __future__ import annotations
@@ -14,18 +18,23 @@ import numpy as np
 
 from foc_ros.foc.records import Array
 
-COUNT, RATE_HZ, NOISE_M = 48, 120.0, 5e-4
+COUNT = 48
 SIDE = 5
-STAY_S = 0.6
+STAR_M = np.array([0.1, 0.2, 0.3, 0.15, 0.25, 0.1, 0.2, 0.3])
 
 
-def reach(goals: Array, aim: int, draws: np.random.Generator) -> tuple[Array, Array]:
+def grid_goals() -> Array:
+    """Return the goals (25, 2) [m]."""
+    return np.stack(np.meshgrid(np.linspace(-0.2, 0.2, SIDE), np.linspace(0.2, 0.5, SIDE)), -1).reshape(-1, 2)
+
+
+def grid_reach(goals: Array, aim: int, draws: np.random.Generator) -> tuple[Array, Array]:
     """Return times (m,) [s] and positions (m, 2) [m] of one reach."""
     start, end = draws.normal(0.0, 0.005, 2), goals[aim] + draws.normal(0.0, 0.006, 2)
     distance = float(np.hypot(*(end - start)))
     lasts = (0.25 + 0.13 * np.log2(distance / 0.02 + 1.0)) * np.exp(draws.normal(0.0, 0.2))
     waits = draws.uniform(0.2, 0.6)
-    t = np.arange(0.0, waits + lasts + STAY_S, 1.0 / RATE_HZ)
+    t = np.arange(0.0, waits + lasts + 0.6, 1.0 / 120.0)
     primary, along = draws.uniform(0.85, 1.02), (end - start) / distance
     bow = draws.normal(0.0, 0.04) * distance
     first = _minimum_jerk(np.clip((t - waits) / lasts, 0.0, 1.0) ** draws.uniform(0.85, 1.05))
@@ -35,7 +44,27 @@ def reach(goals: Array, aim: int, draws: np.random.Generator) -> tuple[Array, Ar
     if draws.random() < 0.15:
         other = goals[draws.integers(len(goals))] - start
         path += np.outer(0.06 * _minimum_jerk((t - waits + 0.15) / 0.25) * (1.0 - _minimum_jerk((t - waits - 0.05) / 0.4)), other)
-    return t, path + draws.normal(0.0, NOISE_M, path.shape)
+    return t, path + draws.normal(0.0, 5e-4, path.shape)
+
+
+def star_goals() -> Array:
+    """Return the goals (8, 2) [m]."""
+    angles = np.arange(len(STAR_M)) * 2.0 * np.pi / len(STAR_M)
+    return np.column_stack([STAR_M * np.cos(angles), STAR_M * np.sin(angles)])
+
+
+def star_reach(goals: Array, aim: int, draws: np.random.Generator) -> tuple[Array, Array]:
+    """Return times (m,) [s] and positions (m, 2) [m] of one reach."""
+    end, start = goals[aim] + draws.normal(0.0, 0.003, 2), draws.normal(0.0, 0.002, 2)
+    lasts, waits = draws.uniform(0.4, 1.0), draws.uniform(0.1, 0.4)
+    t = np.arange(0.0, waits + lasts + 0.4, 0.01)
+    done = _minimum_jerk(np.clip((t - waits) / lasts, 0.0, 1.0) ** draws.uniform(0.9, 1.0))
+    across = np.array([start[1] - end[1], end[0] - start[0]])
+    path = start + np.outer(done, end - start) + np.outer(draws.normal(0.0, 0.02) * np.sin(np.pi * done), across)
+    return t, path + draws.normal(0.0, 3e-4, path.shape)
+
+
+KINDS = {'grid': (grid_goals, grid_reach), 'star': (star_goals, star_reach)}
 
 
 def _minimum_jerk(share: Array) -> Array:
@@ -44,10 +73,10 @@ def _minimum_jerk(share: Array) -> Array:
     return done
 
 
-def main(folder: Path, seed: int) -> None:
+def main(folder: Path, seed: int, kind: str) -> None:
     """Write the tables."""
-    draws = np.random.default_rng(seed)
-    goals = np.stack(np.meshgrid(np.linspace(-0.2, 0.2, SIDE), np.linspace(0.2, 0.5, SIDE)), -1).reshape(-1, 2)
+    draws, (made, reach) = np.random.default_rng(seed), KINDS[kind]
+    goals = made()
     lines = ['recording,t_s,x_m,y_m']
     for number in range(COUNT):
         t, path = reach(goals, number % len(goals), draws)
@@ -58,4 +87,4 @@ def main(folder: Path, seed: int) -> None:
 
 
 if __name__ == '__main__':
-    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 2)
+    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 2, sys.argv[3] if len(sys.argv) > 3 else 'grid')

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from foc_ros.foc.config import Config, updated
-from foc_ros.foc.doubt import lateness
+from foc_ros.foc.doubt import lateness, waiting
 from foc_ros.foc.dynamics import horizon, triple_integrator, triple_integrator_horizon
 from foc_ros.foc.forward import forward
 from foc_ros.foc.memory import Memory
@@ -77,3 +77,29 @@ def test_predictions_widen_about_the_goal_and_along_the_way_and_means_and_likeli
         half_way = triple_integrator_goal_map(before.solution.dt, STEPS)[STEPS // 2, 0, 0]
         assert across @ added[STEPS // 2, :2, :2] @ across == pytest.approx((0.006 * half_way) ** 2)
         assert np.trace(added[STEPS // 2, :2, :2]) == pytest.approx(2 * (0.006 * half_way) ** 2 + 0.3**2 * late @ late)
+
+
+def test_a_wait_before_the_movement_is_as_drawn() -> None:
+    plan, wait_s = _plan(0.8, False, np.zeros(6)), 0.15
+    delays = np.random.default_rng(4).exponential(wait_s, 20_000)
+    found = waiting(plan, wait_s)
+    for step in (5, 20, 40, STEPS):
+        began = np.maximum(plan.times[step] - delays, 0.0)
+        away = np.stack(
+            [np.interp(began, plan.times, plan.mean[:, state]) - plan.mean[step, state] for state in range(6)], axis=1
+        )
+        drawn = away.T @ away / len(delays)
+        scale = np.sqrt(np.outer(np.diag(drawn), np.diag(drawn)))
+        assert np.abs(found[step] - drawn).max() > 0.0
+        assert_allclose(found[step], drawn, atol=0.05 * scale.max())
+        assert_allclose(found[step, :2, :2], drawn[:2, :2], atol=0.05 * drawn[:2, :2].max())
+
+
+def test_only_of_a_hand_at_rest_it_is_unknown_when_it_begins() -> None:
+    scene = make_obstacles([], []), GOAL[None]
+    waiting_hand = updated(Config(), {'duration.wait_s': 0.2})
+    for hand, widens in ((HandState(0, np.zeros(6), 1e-6 * np.eye(6)), True), (HAND, False)):
+        plain, unsure = (predict(config, hand, *scene, Memory())[0].outcomes[0] for config in (Config(), waiting_hand))
+        assert_array_equal(plain.solution.mean, unsure.solution.mean)
+        added = (unsure.solution.covariance - plain.solution.covariance)[STEPS // 2, :2, :2]
+        assert (np.trace(added) > 0.05**2) == widens and (widens or not added.any())

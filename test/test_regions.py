@@ -40,7 +40,8 @@ def test_a_truth_about_which_the_likeliest_way_is_wrong_is_in_the_region_and_not
     two = replace(two, mean=np.stack([np.zeros((H, 2)), np.full((H, 2), [10.0, 0.0])]))
     true = np.full((H, 2), [11.6, 0.0])
     true[-1] = np.nan
-    scores = position_scores([recorded(observation(two, positions=true))])
+    scores = position_scores([recorded(observation(two, positions=true, true_sides=(RIGHT,)))])
     assert scores['inside']['0.9'] == {'0.25': 0.0, '0.5': 0.0, '1': None}
+    assert scores['inside_taken']['0.9'] == {'0.25': 1.0, '0.5': 1.0, '1': None}
     assert scores['inside_all']['0.9'] == {'0.25': 1.0, '0.5': 1.0, '1': None}
     assert scores['inside_all']['0.5'] == {'0.25': 0.0, '0.5': 0.0, '1': None}

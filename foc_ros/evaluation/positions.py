@@ -9,6 +9,7 @@ import numpy as np
 
 from foc_ros.foc.records import Array
 
+from .heldout import asked
 from .minimum_jerk import straight_cost, straight_positions
 from .observations import HORIZONS_S, TIMES_S, Observation, Observations
 from .regions import denser
@@ -23,11 +24,12 @@ EXACT = 1e-18
 def position_scores(recordings: Sequence[Observations]) -> dict[str, Any]:
     """Return average and final displacement errors [m] by predictor and horizon, and the shares inside of what was predicted.
 
-    inside: the ellipse of the most likely way; inside_all: the smallest region of all ways together.
-    The average is over the times up to the horizon; a horizon counts where the recording goes on until then.
+    inside: the ellipse of the most likely way; inside_taken: of the way that was taken; inside_all: the smallest region of all
+    ways together. The average is over the times up to the horizon; a horizon counts where the recording goes on until then.
     """
     seen = [each for recording in recordings for each in recording.each]
     true = np.array([each.truth.positions for each in seen])
+    likely = [_leading(each) for each in seen]
     beyond = np.array([mixture_levels(each, each.ways.likelihood, each.ways.covariance) for each in seen])
     predicted = {
         'most likely': np.array([each.ways.mean[_leading(each)] for each in seen]),
@@ -37,7 +39,8 @@ def position_scores(recordings: Sequence[Observations]) -> dict[str, Any]:
     }
     return {
         'displacement_m': {name: _errors(positions, true) for name, positions in predicted.items()},
-        'inside': {f'{level:g}': _by_horizon(_inside(seen, true, level)) for level in LEVELS},
+        'inside': {f'{level:g}': _by_horizon(_inside(seen, likely, true, level)) for level in LEVELS},
+        'inside_taken': {f'{level:g}': _by_horizon(_inside(seen, _taken(recordings), true, level)) for level in LEVELS},
         'inside_all': {f'{level:g}': _by_horizon(_within(beyond, level)) for level in LEVELS},
     }
 
@@ -54,9 +57,8 @@ def _by_horizon(values: Array) -> dict[str, float | None]:
     return {name: float(np.nanmean(each)) if np.isfinite(each).any() else None for name, each in at.items()}
 
 
-def _inside(seen: Sequence[Observation], true: Array, level: float) -> Array:
-    """Return 1 where the ellipse of the most likely way holds the true position, 0 where not, nan where there is none."""
-    chosen = [_leading(each) for each in seen]
+def _inside(seen: Sequence[Observation], chosen: Sequence[int], true: Array, level: float) -> Array:
+    """Return 1 where the ellipse of a chosen candidate holds the true position, 0 where not, nan where there is none."""
     mean = np.array([each.ways.mean[row] for each, row in zip(seen, chosen, strict=True)])
     covariance = np.array([each.ways.covariance[row] for each, row in zip(seen, chosen, strict=True)])
     return held(true - mean, covariance, level)
@@ -86,6 +88,18 @@ def held(away: Array, covariance: Array, level: float) -> Array:
 def _leading(seen: Observation) -> int:
     """Return the row of the most likely way, as published."""
     return seen.ways.labels.index(seen.most_likely) if seen.most_likely else int(seen.ways.likelihood.argmax())
+
+
+def _taken(recordings: Sequence[Observations]) -> list[int]:
+    """Return the row of the likeliest candidate of those that go the way taken; of the most likely way where none does."""
+    rows = []
+    for recording in recordings:
+        about = {seen.stamp_ns: question for seen, question in asked(recording)}
+        for seen in recording.each:
+            question = about.get(seen.stamp_ns)
+            same = question.given == question.truth if question is not None else np.zeros(len(seen.ways), dtype=bool)
+            rows.append(int(np.where(same, seen.ways.likelihood, -1.0).argmax()) if same.any() else _leading(seen))
+    return rows
 
 
 def _going_on(seen: Observation) -> Array:

@@ -16,7 +16,11 @@ GAINS = {
     GOAL: 'Goal: log-likelihood above uniform [nat], by tenths of the movement',
 }
 RIGHT = 'Gap in the next row: right [%], by tenths of the way from row to row'
-INSIDE = {'inside': 'ellipse of the most likely way', 'inside_all': 'smallest region of all ways together'}
+INSIDE = {
+    'inside': 'ellipse of the most likely way',
+    'inside_taken': 'ellipse of the way taken',
+    'inside_all': 'smallest region of all ways together',
+}
 
 
 def tables(answer: Mapping[str, Any]) -> Iterator[Table]:

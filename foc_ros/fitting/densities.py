@@ -55,7 +55,7 @@ def log_densities(seen: Observation, shares: Array, config: Config, doubts: Sequ
     """Return the log-density of the true positions, mean over the horizons, for each of some doubts, (q,) [nat, metres].
 
     shares (k,): of the candidates; config: that they were predicted with, but for the doubt. None where the
-    movement ends before the first horizon, or has not begun: how long a hand will wait is no part of the model.
+    movement ends before the first horizon, or has not begun: a hand at rest tells how long it waits, not how it moves.
     """
     true = seen.truth.positions[_PLACES]
     known = np.isfinite(true[:, 0])

@@ -26,6 +26,7 @@ from .plans import Reach, reach
 from .recovery import fit_plans
 from .replays import ACCELERATION, ARRIVAL, DURATION, ETA, MODEL, NOISE, Foretold, levels, observed
 from .search import search
+from .wait_fit import fit_wait
 
 PREDICTIONS = 10
 """About as many predictions are made in each recording: neighbours tell the same."""
@@ -42,6 +43,7 @@ def fit(recordings: Mapping[str, Recording], config: Config, executor: Executor)
     usable = {each.name: recordings[each.name] for each in demonstrations}
     found.take(fit_estimator(demonstrations, found.config))
     found.take(fit_duration(demonstrations, found.config))
+    found.take(fit_wait(demonstrations, found.config))
     found.take(fit_followed(demonstrations, found.config))
     if config.foc.strategy == 'fixed':
         found.take(fit_plans(_reaches(demonstrations, found), found.config))

@@ -94,6 +94,7 @@ class DurationConfig:
         0.0,
         2.0,
     )
+    wait_s: float = _p(0.0, 'mean time that a hand at rest waits: widens what is predicted of it alone', 's', 0.0, 60.0)
     arrival: str = _p('rest', 'how the hand comes to its goal: to rest, or passing it at any speed', choices=ARRIVALS)
     max_time_to_go_s: float = _p(10.0, 'ceiling of the time to go', 's', 0.05, 120.0)
 

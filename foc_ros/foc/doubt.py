@@ -14,13 +14,21 @@ margins by motor noise alone. But what we predict is as uncertain as
   and by least effort the state at step t by K_t (`replanning`) times as much. From rest to rest over a distance L, with
   s = t / T, the standard deviations are (10 s^3 - 15 s^4 + 6 s^5) endpoint_stddev and 30 L spread s^3 (1 - s)^2. Where the goal
   is passed at any velocity, that the duration changes this velocity is left out.
+- the beginning. A plan for a hand at rest begins now, the hand after a time d that we do not know. Where no more is known of it
+  than its mean, `duration.wait_s`, it is exponentially distributed, and the hand is at X(t - d), until then where it is now:
+
+      cov(X(t)) = E[(X(t - d) - X(t)) (X(t - d) - X(t))'],
+
+  with moments of X(t - d) that are low-pass filters of X and X X' with this time constant.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from .config import Config
+from .config import Config, DurationConfig
 from .duration import is_passing
 from .records import Array, HandState, Solution
 from .replanning import triple_integrator_error_map, triple_integrator_goal_map, triple_integrator_process_covariance
@@ -39,12 +47,27 @@ def doubt(dt: float, steps: int, hand: HandState, config: Config) -> Array:
     return unsure
 
 
-def timing_doubt(solution: Solution, config: Config) -> Array | float:
-    """Return the covariance (N + 1, 6, 6) at steps 0..N that the spread of a plan's duration makes."""
-    if config.duration.spread == 0.0:
-        return 0.0
-    moved = config.duration.spread * lateness(solution, is_passing(config.duration))
-    covariance: Array = moved[:, :, None] * moved[:, None, :]
+def timing_doubt(solution: Solution, at_rest: bool, config: DurationConfig) -> Array | float:
+    """Return the covariance (N + 1, 6, 6) at steps 0..N that comes of not knowing when a plan begins and how long it takes."""
+    covariance: Array | float = 0.0
+    if config.spread > 0.0:
+        moved = config.spread * lateness(solution, is_passing(config))
+        covariance = moved[:, :, None] * moved[:, None, :]
+    if at_rest and config.wait_s > 0.0:
+        covariance = covariance + waiting(solution, config.wait_s)
+    return covariance
+
+
+def waiting(solution: Solution, wait_s: float) -> Array:
+    """Return the covariance (N + 1, 6, 6), about a plan from rest, of beginning it after an exponentially distributed time."""
+    states = solution.mean - solution.mean[0]
+    products = states[:, :, None] * states[:, None, :]
+    lag = np.subtract.outer(np.arange(len(states)), np.arange(1, len(states)))
+    kept = math.exp(-solution.dt / wait_s)
+    share = np.where(lag >= 0, (1.0 - kept) * kept ** np.maximum(lag, 0), 0.0)
+    mean, square = (np.tensordot(share, 0.5 * (each[1:] + each[:-1]), 1) for each in (states, products))
+    mixed = mean[:, :, None] * states[:, None, :]
+    covariance: Array = square - mixed - mixed.swapaxes(1, 2) + products
     return covariance
 
 

@@ -48,7 +48,7 @@ def predict(
     tried = [_priced(memory.aged(outcome, hand.stamp_ns), config.duration) for outcome in tried]
     outcomes = ranked(tried, config.likelihood, obstacles)
     unsure = {problem: doubt(problem.horizon.dt, problem.horizon.steps, hand, config) for problem in problems.values()}
-    outcomes = [_seen(outcome, unsure[problems[outcome.candidate.label]], config) for outcome in outcomes]
+    outcomes = [_seen(outcome, hand, unsure[problems[outcome.candidate.label]], config.duration) for outcome in outcomes]
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
     best = most_likely(labels, values, memory.most_likely, config.likelihood.margin)
@@ -123,7 +123,8 @@ def _start(hand: HandState, acceleration_time_s: float) -> HandState:
     return replace(hand, mean=np.concatenate([hand.mean[:2], settled, np.zeros(2)]))
 
 
-def _seen(outcome: Outcome, unsure: Array, config: Config) -> Outcome:
-    """Add a doubt (N + 1, 6, 6), and that of the time, to what the hand's own noise will do."""
-    covariance = outcome.solution.covariance + unsure + timing_doubt(outcome.solution, config)
-    return replace(outcome, solution=replace(outcome.solution, covariance=covariance))
+def _seen(outcome: Outcome, hand: HandState, unsure: Array, duration: DurationConfig) -> Outcome:
+    """Add a doubt (N + 1, 6, 6), and that of the times, to what the hand's own noise will do."""
+    solution = outcome.solution
+    covariance = solution.covariance + unsure + timing_doubt(solution, hand.onset_ns is None, duration)
+    return replace(outcome, solution=replace(solution, covariance=covariance))
