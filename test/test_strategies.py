@@ -238,7 +238,7 @@ def test_a_deadline_in_the_middle_leaves_the_best_so_far(strategy, monkeypatch):
     calls = iter(range(10_000))
 
     def check(_):
-        if next(calls) == 7:
+        if next(calls) == 3:
             raise OutOfTimeError
 
     monkeypatch.setattr('foc_ros.foc.deadline.Deadline.check', check)

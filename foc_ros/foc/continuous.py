@@ -23,7 +23,7 @@ from .newton import goes, joined, leapt, slid, stays, way_of
 from .problem import Problem
 from .qp import NO_TIMES, effort_cost
 from .records import Array, Status
-from .sequential import MAX_QPS, Converged, converge
+from .sequential import MAX_QPS, Converged, Jump, converge
 from .solver import WorkingSet
 from .start import Start
 
@@ -53,8 +53,8 @@ NARROW = 1e-4
 MAX_TRIALS = 60
 LEAPS = 8
 """How often more times are added for a mean that leaps over circles between the steps."""
-FURTHER_QPS = 30
-"""Linearisations after which no point is found by QPs, along the curve; twice as many at its beginning."""
+FURTHER_QPS = 16
+"""Linearisations after which no point is found by QPs along the curve; at its beginning there may be more."""
 
 
 @dataclass(frozen=True)
@@ -125,34 +125,37 @@ class _Walker:
         return self.point(0.0, guess, WorkingSet(), way, MAX_QPS)
 
     def point(self, s: float, guess: Array, working: WorkingSet, way: Array | None, most: int) -> Point | None:
-        """Converge at s from a guess (N, 2): by QPs, then by sliding contacts; where these find nothing, what the QPs found.
+        """Converge at s from a guess (N, 2): by QPs, until sliding contacts find it from there; else where the QPs settle.
 
         way: the class that it has to be in, any if it is None; most: linearisations.
         """
         tau, lam = self.curve.at(s)
-        rough = self.rough(guess, working, tau, lam, most)
-        if rough is None or (way is not None and not goes(self.problem, rough.control, way)):
-            return None
-        settled = self.settled(s, rough.control, joined(self.problem, rough.contacts))
-        if settled is None and rough.stays:
-            return self.judged(s, rough.control, rough.contacts, rough=True)
-        return settled
 
-    def rough(self, guess: Array, working: WorkingSet, tau: float, lam: float, most: int) -> Converged | None:
+        def jump(control: Array, contacts: Contacts) -> tuple[Array, Contacts] | None:
+            return slid(self.problem, control, joined(self.problem, contacts), tau, lam, way)
+
+        found = self.sequence(guess, working, tau, lam, most, jump)
+        if found is None or not found.stays or (way is not None and not goes(self.problem, found.control, way)):
+            return None
+        return self.judged(s, found.control, found.contacts, rough=not found.jumped)
+
+    def sequence(self, guess: Array, working: WorkingSet, tau: float, lam: float, most: int, jump: Jump) -> Converged | None:
         """Converge by QPs with rows at the steps, and at more times where the mean would leap over a circle between them."""
         between = NO_TIMES
         for _ in range(LEAPS):
-            rough = converge(self.problem, guess, working, tau, lam, self.deadline, verified=False, between=between, most=most)
-            if rough is None:
+            found = converge(
+                self.problem, guess, working, tau, lam, self.deadline, verified=False, between=between, most=most, jump=jump
+            )
+            if found is None:
                 return None
-            self.qp_solves += rough.qp_solves
-            leaps = leapt(self.problem, rough.control, tau)
+            self.qp_solves += found.qp_solves
+            leaps = NO_TIMES if found.jumped else leapt(self.problem, found.control, tau)
             if not len(leaps):
-                return rough
-            most -= rough.linearisations
+                return found
+            most -= found.linearisations
             if most < 1:
                 return None
-            between, working = np.union1d(between, leaps), rough.active.within(self.problem.horizon.steps)
+            between, working = np.union1d(between, leaps), found.active.within(self.problem.horizon.steps)
         return None
 
     def beside(self, s: float, neighbour: Point) -> Point | None:

@@ -7,7 +7,9 @@ further ahead.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -31,11 +33,15 @@ LARGEST_STRETCH = 15.0
 """Most moves that the next linearisation is taken ahead."""
 
 
+Jump: TypeAlias = Callable[[Array, Contacts], tuple[Array, Contacts] | None]
+
+
 @dataclass(frozen=True, eq=False)
 class Converged:
     """A control that its own linearisation returns: stacked control (2N,), positions (N, 2) at steps 1..N, active rows.
 
-    qp_solves: QPs solved, rounds of the working set counted each; linearisations: how many there were; stays: whether it settled.
+    qp_solves: QPs solved, rounds of the working set counted each; linearisations: how many there were; stays: whether it settled;
+    jumped: whether `converge`'s jump ended it.
     """
 
     control: Array
@@ -45,6 +51,7 @@ class Converged:
     qp_solves: int
     linearisations: int
     stays: bool
+    jumped: bool = False
 
 
 def converge(
@@ -58,11 +65,13 @@ def converge(
     verified: bool = True,
     between: Array = NO_TIMES,
     most: int = MAX_QPS,
+    jump: Jump | None = None,
 ) -> Converged | None:
     """Solve the reformulated problem at (tau, lambda) from a guess (N, 2); None where its rows contradict each other.
 
-    verified: end by a QP that stays, not by Newton steps. between (e,): `clearance_qp`. most: linearisations, at least 1. Raises
-    OutOfTimeError past the deadline.
+    verified: end by a QP that stays, not by Newton steps. between (e,): `clearance_qp`. most: linearisations, at least 1. jump:
+    tried at the solution of each QP, its control and contacts; what it finds ends the sequence. Raises OutOfTimeError past the
+    deadline.
     """
     times = np.concatenate((np.arange(1.0, problem.horizon.steps + 1.0), between))
     cost = effort_cost(problem, lam)
@@ -79,10 +88,14 @@ def converge(
         if move < STAYS or count == most:
             contacts = Contacts(working.obstacle, times[working.step], solution.multipliers)
             return Converged(solution.control, positions, working, contacts, solves, count, stays=move < STAYS)
+        contacts = Contacts(working.obstacle, times[working.step], solution.multipliers)
+        found = jump(solution.control, contacts) if jump is not None else None
+        if found is not None:
+            positions = problem.positions(found[0])
+            return Converged(found[0], positions, working, found[1], solves, count, stays=True, jumped=True)
         rows = (working.obstacle.tobytes(), working.step.tobytes())
         better = None
         if len(working) and (rows == previous or move < NEAR):
-            contacts = Contacts(working.obstacle, times[working.step], solution.multipliers)
             better = held(problem, cost, solution.control, contacts, tau)
         if better is not None and _cost(cost, better[0]) <= _cost(cost, solution.control) * (1 + 1e-12):
             control, contacts = better
