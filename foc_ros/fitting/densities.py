@@ -35,7 +35,7 @@ class Doubt:
 NO_DOUBT = Doubt()
 PROCESS_NOISES = (0.0, *(float(value) for value in np.geomspace(0.01, 100.0, 33)))
 """Process noises tried [m/s^2.5]: 0.01 is nothing beside a filter's jerk density, 100 is a hand that is thrown about."""
-ENDPOINT_STDDEVS = (0.0, 1e-3, 1.5e-3, 2e-3, 3e-3, 4e-3, 6e-3, 8e-3, 12e-3, 16e-3, 24e-3, 32e-3, 48e-3)
+ENDPOINT_STDDEVS = (0.0, 5e-4, 1e-3, 2e-3, 3e-3, 4e-3, 6e-3, 8e-3, 12e-3, 16e-3, 24e-3, 32e-3, 48e-3)
 """Scatter of the ends tried [m]: 48 mm is what Fitts' law expects of a target of 0.2 m."""
 SPREADS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.6)
 """Spreads of the time to go tried."""
