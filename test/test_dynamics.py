@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from foc_ros.foc.dynamics import Plant, damped_mass, horizon, triple_integrator, triple_integrator_horizon
+from foc_ros.foc.dynamics import Plant, damped_mass, horizon, states_at_goal, triple_integrator, triple_integrator_horizon
 from foc_ros.foc.errors import InputError
 from foc_ros.foc.replanning import replanned_error_map, triple_integrator_error_map
 
@@ -85,3 +85,17 @@ def test_mass_and_damping_are_checked():
         damped_mass(0.01, 0.0, 1.0)
     with pytest.raises(InputError, match='damping'):
         damped_mass(0.01, 1.0, float('nan'))
+
+
+@pytest.mark.parametrize('passing', [False, True])
+def test_a_control_that_leads_back_ends_at_the_goal_and_nearer_to_the_path(passing):
+    generator = np.random.default_rng(6)
+    stacked = triple_integrator_horizon(0.02, 40)
+    fixed = tuple(np.flatnonzero(states_at_goal(6, passing)).tolist())
+    path, state = 0.01 * np.cumsum(generator.standard_normal((40, 2)), axis=0), generator.standard_normal(6)[list(fixed)]
+    control = stacked.returning(path, state, fixed)
+    np.testing.assert_allclose(stacked.response[-1, list(fixed)] @ control, state, atol=1e-8)
+    straight = stacked.returning(np.zeros((40, 2)), state, fixed)
+    assert np.linalg.norm((stacked.position @ control).T - path) < np.linalg.norm((stacked.position @ straight).T - path)
+    own = horizon(triple_integrator(0.02), 40).returning(path, state, fixed)
+    np.testing.assert_allclose(stacked.position @ control, stacked.position @ own, atol=1e-9)

@@ -47,7 +47,7 @@ Kernel = TypeVar('Kernel', bound=Callable[..., object])
 
 
 def compiled(kernel: Kernel) -> Kernel:
-    """Compile a function for the types that its annotations name; it never changes its arguments."""
+    """Compile a function for the types that its annotations name; it never changes its arguments and never raises."""
     return _compiled(kernel, REORDERED)
 
 
@@ -59,8 +59,8 @@ def compiled_exactly(kernel: Kernel) -> Kernel:
 def _compiled(kernel: Kernel, freedom: set[str]) -> Kernel:
     signature = tuple(_TYPES[str(kind)] for name, kind in kernel.__annotations__.items() if name != 'return')
     try:
-        return cast('Kernel', njit(signature, cache=True, fastmath=freedom)(kernel))
+        return cast('Kernel', njit(signature, cache=True, fastmath=freedom, error_model='numpy')(kernel))
     except RuntimeError as error:  # no directory to keep it in: compile in every process
         if 'cannot cache' not in str(error):
             raise
-        return cast('Kernel', njit(signature, fastmath=freedom)(kernel))
+        return cast('Kernel', njit(signature, fastmath=freedom, error_model='numpy')(kernel))

@@ -122,29 +122,42 @@ class _Walker:
 
     def beginning(self, guess: Array, way: Array | None = None) -> Point | None:
         """Converge at the beginning of the curve, from a guess (N, 2)."""
-        return self.point(0.0, guess, WorkingSet(), way, MAX_QPS)
+        return self.point(0.0, guess, WorkingSet(), way, thorough=True)
 
-    def point(self, s: float, guess: Array, working: WorkingSet, way: Array | None, most: int) -> Point | None:
+    def point(self, s: float, guess: Array, working: WorkingSet, way: Array | None, *, thorough: bool) -> Point | None:
         """Converge at s from a guess (N, 2): by QPs, until sliding contacts find it from there; else where the QPs settle.
 
-        way: the class that it has to be in, any if it is None; most: linearisations.
+        way: the class that it has to be in, any if it is None; thorough: spare no effort.
         """
         tau, lam = self.curve.at(s)
 
         def jump(control: Array, contacts: Contacts) -> tuple[Array, Contacts] | None:
             return slid(self.problem, control, joined(self.problem, contacts), tau, lam, way)
 
-        found = self.sequence(guess, working, tau, lam, most, jump)
+        found = self.sequence(guess, working, tau, lam, jump, thorough=thorough)
         if found is None or not found.stays or (way is not None and not goes(self.problem, found.control, way)):
             return None
         return self.judged(s, found.control, found.contacts, rough=not found.jumped)
 
-    def sequence(self, guess: Array, working: WorkingSet, tau: float, lam: float, most: int, jump: Jump) -> Converged | None:
+    def sequence(
+        self, guess: Array, working: WorkingSet, tau: float, lam: float, jump: Jump, *, thorough: bool
+    ) -> Converged | None:
         """Converge by QPs with rows at the steps, and at more times where the mean would leap over a circle between them."""
+        most = MAX_QPS if thorough else FURTHER_QPS
         between = NO_TIMES
         for _ in range(LEAPS):
             found = converge(
-                self.problem, guess, working, tau, lam, self.deadline, verified=False, between=between, most=most, jump=jump
+                self.problem,
+                guess,
+                working,
+                tau,
+                lam,
+                self.deadline,
+                verified=False,
+                between=between,
+                most=most,
+                thorough=thorough,
+                jump=jump,
             )
             if found is None:
                 return None
@@ -166,7 +179,7 @@ class _Walker:
         if point is not None or self.follows:
             return point
         guess, (working, _) = self.problem.positions(neighbour.control), contacts.rows(self.problem.horizon.steps)
-        return self.point(s, guess, working, way_of(self.problem, neighbour.control), FURTHER_QPS)
+        return self.point(s, guess, working, way_of(self.problem, neighbour.control), thorough=False)
 
     def settled(self, s: float, control: Array, contacts: Contacts, way: Array | None = None) -> Point | None:
         """Converge at s from a control (2N,) by Newton steps, in its class or that of a way."""

@@ -17,6 +17,8 @@ from .records import Array, Record
 
 CACHED_HORIZONS = 16
 """Horizons kept: those of one tick (one per duration) and a few ticks before it, about 0.1 MB each at N = 50."""
+FREEDOM = 1e-2
+"""Weight w of the control that leads back to a path, relative to what it moves: less would turn sharply to be back at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +110,30 @@ class Horizon(Record):
         squared = self.response**2
         return squared[-1], squared[:-1].sum(axis=0)
 
+    def returning(self, path: Array, state: Array, fixed: tuple[int, ...]) -> Array:
+        """Return the control (2N,) that makes up for what a path, and the fixed states at its end, are missing.
+
+        path (N, 2): of the positions at steps 1..N; state (f,): of the f fixed states at step N. It is the u of least
+        |S u - path|^2 + w |u|^2 with E u = state, where S and E are the responses of the positions and of the fixed states.
+        """
+        back, to_goal = _returning(self, fixed)
+        control: Array = back @ path.T.ravel() + to_goal @ state
+        return control
+
+
+@lru_cache(maxsize=CACHED_HORIZONS)
+def _returning(stacked: Horizon, fixed: tuple[int, ...]) -> tuple[Array, Array]:
+    S, E = np.concatenate(stacked.position), stacked.response[-1, list(fixed)]
+    unit = 1.0 / np.sqrt((E**2).sum(axis=1))  # of rows that mix metres, metres per second and their like
+    n, f = len(S), len(E)
+    square = S.T @ S
+    system = np.zeros((n + f, n + f))
+    system[:n, :n] = square + FREEDOM * np.trace(square) / n * np.eye(n)
+    system[n:, :n] = unit[:, None] * E
+    system[:n, n:] = system[n:, :n].T
+    inverse = np.linalg.inv(system)[:n]
+    return inverse[:, :n] @ S.T, inverse[:, n:] * unit
+
 
 def horizon(plant: Plant, steps: int) -> Horizon:
     """Stack a plant over `steps` >= 1 steps."""
@@ -143,6 +169,9 @@ class _Scaled(Horizon):
         scale = (self.dt**3 * state_scale(self.dt))[:, None] ** 2
         end, way = self.unit.squared
         return end * scale, way * scale
+
+    def returning(self, path: Array, state: Array, fixed: tuple[int, ...]) -> Array:
+        return self.unit.returning(path, state / state_scale(self.dt)[list(fixed)], fixed) / self.dt**3
 
 
 @lru_cache(maxsize=CACHED_HORIZONS)

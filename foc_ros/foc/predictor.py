@@ -47,7 +47,7 @@ def predict(
     )
     tried = [_priced(memory.aged(outcome, hand.stamp_ns), config.duration) for outcome in tried]
     outcomes = ranked(tried, config.likelihood, obstacles)
-    unsure = {problem: doubt(problem.horizon.dt, problem.horizon.steps, hand, config) for problem in problems.values()}
+    unsure = {one: doubt(one.horizon.dt, one.horizon.steps, hand, config) for one in dict.fromkeys(problems.values())}
     outcomes = [_seen(outcome, hand, unsure[problems[outcome.candidate.label]], config.duration) for outcome in outcomes]
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
@@ -62,7 +62,8 @@ def predict(
 
 def _priced(outcome: Outcome, config: DurationConfig) -> Outcome:
     """Add what the time to go costs."""
-    return replace(outcome, cost=outcome.cost + time_price(config) * float(outcome.solution.times[-1]))
+    price = time_price(config)
+    return replace(outcome, cost=outcome.cost + price * float(outcome.solution.times[-1])) if price else outcome
 
 
 def rehearse(config: Config) -> None:

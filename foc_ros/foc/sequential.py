@@ -65,13 +65,14 @@ def converge(
     verified: bool = True,
     between: Array = NO_TIMES,
     most: int = MAX_QPS,
+    thorough: bool = True,
     jump: Jump | None = None,
 ) -> Converged | None:
     """Solve the reformulated problem at (tau, lambda) from a guess (N, 2); None where its rows contradict each other.
 
-    verified: end by a QP that stays, not by Newton steps. between (e,): `clearance_qp`. most: linearisations, at least 1. jump:
-    tried at the solution of each QP, its control and contacts; what it finds ends the sequence. Raises OutOfTimeError past the
-    deadline.
+    verified: end by a QP that stays, not by Newton steps. between (e,): `clearance_qp`. most: linearisations, at least 1;
+    thorough: `solve`. jump: tried at the solution of each QP, its control and contacts; what it finds ends the sequence. Raises
+    OutOfTimeError past the deadline.
     """
     times = np.concatenate((np.arange(1.0, problem.horizon.steps + 1.0), between))
     cost = effort_cost(problem, lam)
@@ -79,7 +80,7 @@ def converge(
     previous: tuple[bytes, bytes] | None = None
     for count in range(1, most + 1):
         deadline.check()
-        solution = solve(clearance_qp(problem, cost, guess, tau, between=between), working)
+        solution = solve(clearance_qp(problem, cost, guess, tau, between=between), working, thorough=thorough)
         if solution is None:
             return None
         solves += solution.solves

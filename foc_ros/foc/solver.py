@@ -79,11 +79,12 @@ class QPSolution:
     solves: int
 
 
-def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False) -> QPSolution | None:
+def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False, thorough: bool = True) -> QPSolution | None:
     """Return the solution, None where no control meets every row.
 
     working: rows to begin with, say those of the last solve. elastic: rows that contradict each other share the violation
-    instead (least squares, each weighted by what its control can move), so that there always is an answer.
+    instead (least squares, each weighted by what its control can move), so that there always is an answer. thorough: where the
+    working set comes to no end, solve with every row at once, which can take a hundred times as long.
     """
     control, multipliers = qp.cost.goal_control, np.zeros(0)
     for solves in range(1, MAX_ROUNDS + 1):
@@ -103,7 +104,7 @@ def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False) -> QPSo
         if not elastic:
             working = working.only(multipliers > 0)
         working = working.joined(obstacle, step, qp.limits.shape[1])
-    return None if elastic else solve_full(qp)
+    return solve_full(qp) if thorough and not elastic else None
 
 
 class Verdict(Enum):

@@ -8,9 +8,7 @@ import numpy as np
 
 from .compiled import Matrix, Vector, compiled
 from .contacts import Contacts
-from .dense import values
 from .problem import Problem
-from .qp import goal_factors, to_goal
 from .records import Array, Solution
 
 
@@ -42,7 +40,6 @@ def warm(previous: Solution, problem: Problem) -> Start:
     steps, dt = problem.horizon.steps, problem.horizon.dt
     elapsed_s = previous.dt * len(previous.control) - dt * steps
     positions, control = read_off(previous.mean, previous.control, previous.dt, elapsed_s, dt, steps)
-    variance = problem.weighted_variance + previous.lam * problem.summed_variance
     row = {identity: index for index, identity in enumerate(problem.obstacles.ids)}
     kept = [
         (row[identity], moved, force)
@@ -51,7 +48,7 @@ def warm(previous: Solution, problem: Problem) -> Start:
     ]
     table = np.array(kept, dtype=float).reshape(-1, 3)
     contacts = Contacts(table[:, 0].astype(np.intp), table[:, 1].copy(), table[:, 2].copy())
-    return Start(positions, led(control, variance, *problem.goal_rows), contacts, previous.lam, previous.slope)
+    return Start(positions, led(problem, control, positions), contacts, previous.lam, previous.slope)
 
 
 @compiled
@@ -75,12 +72,10 @@ def read_off(mean: Matrix, control: Matrix, before: float, elapsed_s: float, dt:
     return positions, stacked
 
 
-@compiled
-def led(control: Vector, variance: Vector, goal_rows: Matrix, goal_targets: Vector, softness: Vector) -> Vector:
-    """Return a control (2N,) led to the goal again at the least cost: the hand is never quite where it was to be.
-
-    variance (2N,): what the squared control costs besides effort; goal_rows (r, 2N), goal_targets (r,), softness (r,): those of
-    the problem.
-    """
-    _, root, factor = goal_factors(2.0 * (1.0 + variance), goal_rows, softness)
-    return control + to_goal(root, factor, goal_targets - values(goal_rows, control))
+def led(problem: Problem, control: Array, path: Array) -> Array:
+    """Lead a control (2N,) back to a path (N, 2) and to the goal: the hand is never quite where it was to be."""
+    fixed = np.flatnonzero(problem.at_goal)
+    last = problem.free[-1] + problem.horizon.response[-1] @ control
+    missing = (problem.goal - last)[fixed]
+    led: Array = control + problem.horizon.returning(path - problem.positions(control), missing, tuple(fixed.tolist()))
+    return led
