@@ -124,15 +124,12 @@ class Horizon(Record):
 @lru_cache(maxsize=CACHED_HORIZONS)
 def _returning(stacked: Horizon, fixed: tuple[int, ...]) -> tuple[Array, Array]:
     S, E = np.concatenate(stacked.position), stacked.response[-1, list(fixed)]
-    unit = 1.0 / np.sqrt((E**2).sum(axis=1))  # of rows that mix metres, metres per second and their like
-    n, f = len(S), len(E)
+    unit = 1.0 / np.sqrt((E**2).sum(axis=1))[:, None]  # of rows that mix metres, metres per second and their like
     square = S.T @ S
-    system = np.zeros((n + f, n + f))
-    system[:n, :n] = square + FREEDOM * np.trace(square) / n * np.eye(n)
-    system[n:, :n] = unit[:, None] * E
-    system[:n, n:] = system[n:, :n].T
-    inverse = np.linalg.inv(system)[:n]
-    return inverse[:, :n] @ S.T, inverse[:, n:] * unit
+    weight = square + FREEDOM * np.trace(square) / len(square) * np.eye(len(square))
+    back, turned = np.linalg.solve(weight, S.T), np.linalg.solve(weight, (unit * E).T)
+    to_goal = turned @ np.linalg.pinv(unit * E @ turned) * unit.T
+    return back - to_goal @ (E @ back), to_goal
 
 
 def horizon(plant: Plant, steps: int) -> Horizon:
