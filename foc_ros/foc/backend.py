@@ -40,15 +40,15 @@ class Answer:
     x: Array
 
 
-def solve_piqp(qp: DenseQP) -> Answer:
-    """Solve by PIQP, with other settings if it fails with the first.
+def solve_piqp(qp: DenseQP, attempts: int = len(ATTEMPTS)) -> Answer:
+    """Solve by PIQP, with other settings if it fails with the first, as often as there are attempts.
 
     PIQP can call a feasible problem infeasible, or miss an accuracy that rounding does not allow.
     """
     P = np.asfortranarray(qp.P)
     A = None if qp.A is None else np.asfortranarray(qp.A)
     G = None if qp.G is None else np.asfortranarray(qp.G)
-    for accuracy, reach, scale_cost in ATTEMPTS:
+    for accuracy, reach, scale_cost in ATTEMPTS[:attempts]:
         solver = _solver(accuracy, reach, scale_cost)
         solver.setup(P, qp.c, A, qp.b, G, qp.g, None, qp.lower, None)
         if solver.solve() == piqp.PIQP_SOLVED:

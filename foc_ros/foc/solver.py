@@ -28,6 +28,8 @@ MAX_ROUNDS = 25
 """Rounds of the working set before the full QP is solved instead; two or three are usual."""
 ELASTICITY = 1e-6
 """Softness of elastic rows, as a share of what a unit multiplier moves them: a lone row gives way by a millionth."""
+MOST_ELASTIC = 150
+"""Elastic rows beyond which no more are taken in: what they ask for is out of reach by far."""
 IMMOVABLE = 1e-12
 """Share of a row's freedom that the goal leaves it, below which the goal fixes it: the last step's, above all."""
 RESIDUAL = 1e-6
@@ -83,8 +85,9 @@ def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False, thoroug
     """Return the solution, None where no control meets every row.
 
     working: rows to begin with, say those of the last solve. elastic: rows that contradict each other share the violation
-    instead (least squares, each weighted by what its control can move), so that there always is an answer. thorough: where the
-    working set comes to no end, solve with every row at once, which can take a hundred times as long.
+    instead (least squares, each weighted by what its control can move; the first `MOST_ELASTIC` of many), so that there always is
+    an answer. thorough: where the working set comes to no end, solve with every row at once, which can take a hundred times as
+    long.
     """
     control, multipliers = qp.cost.goal_control, np.zeros(0)
     for solves in range(1, MAX_ROUNDS + 1):
@@ -98,7 +101,7 @@ def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False, thoroug
             control, multipliers = answer
         # rows just solved for are met but for rounding; an elastic row may stay violated
         obstacle, step = qp.violated(control, *working.rows, TOLERANCE)
-        if not len(obstacle):
+        if not len(obstacle) or (elastic and len(working) > MOST_ELASTIC):
             active = multipliers > 0
             return QPSolution(control, working.only(active), multipliers[active], solves)
         if not elastic:
@@ -221,7 +224,7 @@ def solve_full(qp: ReachingQP, backend: str = 'piqp') -> QPSolution | None:
         qp.rows(obstacle, step) * unit,
         qp.limits.ravel(),
     )
-    scaled = solve_piqp(dense) if backend == 'piqp' else solve_named(dense, backend)
+    scaled = solve_piqp(dense, attempts=1) if backend == 'piqp' else solve_named(dense, backend)
     if not scaled.solved:
         return None
     control = unit * scaled.x
