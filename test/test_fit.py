@@ -16,7 +16,7 @@ from fit_recordings import write_tables
 
 from foc_ros.command_line import main
 from foc_ros.fitting import fit as fitting
-from foc_ros.fitting import replays
+from foc_ros.fitting import movements
 from foc_ros.foc.config import Config, flatten, updated
 from foc_ros.parameters import dump_parameter_file, load_parameter_file
 
@@ -26,8 +26,8 @@ QUICK = {'foc.steps': 15, 'homotopy.max_candidates': 2, 'duration.fitts_a_s': 0.
 @pytest.fixture(autouse=True)
 def few_predictions(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fitting, 'PREDICTIONS', 3)
-    levels = {replays.DURATION: (1.25,), replays.ACCELERATION: (0.1,), replays.NOISE: (0.5,), replays.ETA: (0.7,)}
-    monkeypatch.setattr(replays, 'LEVELS', levels)
+    for name, few in {'DURATIONS': (1.4,), 'NOISES': (0.5,), 'ETAS': (0.7,)}.items():
+        monkeypatch.setattr(movements, name, few)
 
 
 def _fit(folder: Path, capsys: pytest.CaptureFixture[str], *arguments: str, **parameters: Any) -> tuple[dict[str, Any], Config]:

@@ -1,4 +1,4 @@
-"""How to arrive, and what durations follow from: taken where recordings tell it for sure."""
+"""How long a movement takes, how it ends and whether accelerations fade: tried together, in a race by replays."""
 
 from __future__ import annotations
 
@@ -8,63 +8,151 @@ import numpy as np
 import pytest
 from fit_recordings import demonstration, write_tables
 
-import foc_ros.fitting.search as searching
 from foc_ros.evaluation.lanes import Lanes
 from foc_ros.evaluation.recordings import find_recordings
-from foc_ros.fitting.duration_fit import other_models
+from foc_ros.fitting import search as searching
+from foc_ros.fitting.duration_fit import fit_duration, other_models
+from foc_ros.fitting.fading_fit import fit_fading
 from foc_ros.fitting.found import Fit
-from foc_ros.fitting.replays import ARRIVAL, levels, preferred
+from foc_ros.fitting.movements import DURATIONS, movements
+from foc_ros.fitting.replays import Replays
 from foc_ros.foc.config import Config, updated
-from foc_ros.foc.records import make_obstacles
+from foc_ros.foc.estimator import transition
+from foc_ros.foc.records import Array, make_obstacles
 
 CONFIG = updated(Config(), {'foc.steps': 15, 'homotopy.max_candidates': 2, 'rate_hz': 4.0})
 GOAL = np.array([[0.3, 0.0]])
+ARRIVALS = [CONFIG, updated(CONFIG, {'duration.arrival': 'passing'})]
 
 
-def _scores(monkeypatch: pytest.MonkeyPatch, scores: list[list[float]]) -> Fit:
-    """Search how the hand arrives, with these scores of positions, by recording, of the given and the other setting."""
-    monkeypatch.setattr(searching, 'observed', lambda *_: ([], {}))
-    monkeypatch.setattr(searching, 'scored', lambda *_: None)
-    monkeypatch.setattr(searching, 'compared', lambda *_: np.array([np.zeros_like(scores), scores]))
-    found = Fit(CONFIG)
-    with Lanes(1) as executor:
-        searching.search(ARRIVAL, levels(ARRIVAL, CONFIG), {}, found, {}, executor, {})
-    return found
+class Told:
+    """Replays of which the scores are known beforehand, by setting and recording; notes who was asked what."""
+
+    def __init__(self, ways: Array) -> None:
+        self.ways = np.asarray(ways, dtype=float)
+        self.recordings = {str(place): None for place in range(self.ways.shape[1])}
+        self.rounds: list[tuple[int, int]] = []
+
+    def searched(self, settings: list[Config]) -> Fit:
+        self.settings, found = settings, Fit(settings[0])
+        searching.search('kind', settings, self, found)  # type: ignore[arg-type]
+        return found
+
+    def scores(self, settings: list[Config], names: list[str], words: str) -> Array:
+        self.rounds.append((len(settings), len(names)))
+        rows = self.ways[[self.settings.index(each) for each in settings]]
+        ways = rows[:, [int(name) for name in names]]
+        return np.array([ways, np.zeros_like(ways)])
 
 
-def test_another_way_to_arrive_is_taken_where_it_is_better_for_sure(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = _scores(monkeypatch, [[0.0] * 8, [0.1, 0.2, 0.1, 0.2, 0.1, 0.2, 0.1, -0.1]])
+def test_the_better_choice_is_taken() -> None:
+    found = Told([[0.0] * 8, [0.1, 0.2, 0.1, 0.2, 0.1, 0.2, 0.1, -0.1]]).searched(ARRIVALS)
     assert found.chosen == {'duration.arrival': 'passing'} and found.config.duration.arrival == 'passing'
+    assert found.warnings == []
 
 
-def test_what_is_given_is_kept_where_another_is_not_better_for_sure(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = _scores(monkeypatch, [[0.0] * 8, [1.5, -0.2, -0.2, -0.2, -0.2, -0.2, -0.2, -0.2]])
-    assert found.chosen == {} and found.config == CONFIG
-    assert any(words.startswith('duration.arrival: passing is better than rest, but only in ') for words in found.warnings)
+def test_a_choice_that_resampled_recordings_do_not_agree_on_is_said_to_be_unsure() -> None:
+    found = Told([[0.0] * 8, [1.5, -0.2, -0.2, -0.2, -0.2, -0.2, -0.2, 0.0]]).searched(ARRIVALS)
+    assert found.config.duration.arrival == 'passing'
+    assert any(words.startswith('duration.arrival: passing is the best, but only in ') for words in found.warnings)
 
 
-def test_ways_come_first_and_positions_where_ways_do_not_tell() -> None:
-    positions = np.array([[0.0, 0.0, 0.0, 0.0], [5.0, 5.0, 5.0, 5.0], [1.0, 1.0, 1.0, 1.0]])
-    surely_worse = np.array([[1.0, 1.2, 1.1, 1.0], [0.5, 0.8, 0.5, 0.6], [0.9, 1.4, 1.0, 0.9]])
-    assert preferred(np.array([surely_worse, positions])) == 2
-    assert preferred(np.array([np.zeros((3, 4)), positions])) == 1
+def test_what_is_given_is_kept_where_nothing_is_told() -> None:
+    found = Told(np.zeros((2, 8))).searched(ARRIVALS)
+    assert found.config == CONFIG and found.chosen == {}
 
 
-def test_the_other_models_of_duration_come_with_their_constants_fitted() -> None:
+def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_recordings(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(searching, 'PLAIN', 1e6)
+    settings = [updated(CONFIG, {'foc.eta': 0.5 + 0.02 * place}) for place in range(20)]
+    quality = -np.abs(np.arange(20.0) - 13.0)[:, None] + 0.1 * np.random.default_rng(3).standard_normal((20, 40))
+    told = Told(quality)
+    found = told.searched(settings)
+    assert told.rounds == [(20, 6), (10, 12), (5, 24), (4, 40)]
+    assert found.config == settings[13]
+    each = found.estimates['foc.eta']
+    assert each.low <= each.value == settings[13].foc.eta <= each.high
+
+
+def test_what_is_plainly_worse_leaves_at_once() -> None:
+    spread = 0.2 * np.random.default_rng(4).standard_normal((6, 24))
+    told = Told(np.array([-1.0, 0.0, 0.05, -1.1, -1.2, 0.1])[:, None] + spread)
+    found = told.searched([updated(CONFIG, {'foc.eta': 0.5 + 0.02 * place}) for place in range(6)])
+    assert told.rounds == [(6, 6), (3, 12), (3, 24)]
+    assert found.config.foc.eta in (0.52, 0.54, 0.6)
+
+
+def test_more_recordings_than_make_a_difference_are_not_replayed() -> None:
+    told = Told(np.zeros((2, 500)))
+    told.searched(ARRIVALS)
+    assert told.rounds[-1] == (2, searching.MOST)
+
+
+def test_ways_decide_and_positions_where_ways_do_not_tell() -> None:
+    positions = np.array([[0.0, 0.0], [5.0, 5.0], [1.0, 1.0]])
+    assert searching.ranked(np.array([[[1.0, 1.2], [0.5, 0.8], [0.9, 1.4]], positions])) == [2, 0, 1]
+    assert searching.ranked(np.array([np.zeros((3, 2)), positions])) == [1, 2, 0]
+
+
+def test_durations_arrivals_and_fading_are_tried_in_all_combinations() -> None:
+    reaches = _reaches(CONFIG)
+    tried = movements(reaches, CONFIG, [0.0, 0.07])
+    assert tried[0] == CONFIG
+    assert len(set(tried)) == len(tried) == 2 * (1 + len(DURATIONS)) * 2 * 2
+    assert {each.duration.model for each in tried} == {'fitts', 'cost_of_time'}
+    factors = {round(each.duration.fitts_a_s / CONFIG.duration.fitts_a_s, 6) for each in tried}
+    assert factors == {1.0, *DURATIONS}
+
+
+def _reaches(config: Config) -> list:
     t = np.arange(0.0, 1.61, 0.02)
     s = np.clip((t - 0.1) / 1.5, 0.0, 1.0)
     path = (s**3 * (10.0 - 15.0 * s + 6.0 * s**2))[:, None] * GOAL
-    reaches = [demonstration(str(number), t, path, make_obstacles(), GOAL) for number in range(3)]
-    (priced,) = other_models(reaches, CONFIG)
+    return [demonstration(str(number), t, path, make_obstacles(), GOAL) for number in range(3)]
+
+
+def test_the_other_models_of_duration_come_with_their_constants_fitted() -> None:
+    (priced,) = other_models(_reaches(CONFIG), CONFIG)
     assert priced.duration.model == 'cost_of_time'
     assert (3600.0 * 0.3**2 / priced.duration.time_cost) ** (1 / 6) == pytest.approx(1.5, rel=0.1)
     given = updated(CONFIG, {'duration.model': 'fixed'})
-    assert [each.duration.model for each in other_models(reaches, given)] == ['fitts', 'cost_of_time']
+    assert [each.duration.model for each in other_models(_reaches(CONFIG), given)] == ['fitts', 'cost_of_time']
+    assert fit_duration(_reaches(CONFIG), given)[0]
 
 
-def test_reaches_that_end_at_rest_are_known_as_such(tmp_path: Path) -> None:
-    recordings = find_recordings(write_tables(tmp_path / 'data', count=4, obstacle=False, hz=30.0))
-    found = Fit(CONFIG)
+@pytest.mark.parametrize('fading_s', [0.06, 0.2])
+def test_the_time_in_which_accelerations_fade_is_found(fading_s: float) -> None:
+    rng, dt = np.random.default_rng(5), 0.005
+    hands = []
+    for number in range(6):
+        state, path = np.array([[0.0, 0.0], [0.2, 0.0], [0.0, 0.0]]), []
+        for _ in range(2000):
+            state = transition(dt) @ state
+            # white jerk drives an acceleration that fades
+            state[2] = state[2] * np.exp(-dt / fading_s) + 3.0 * np.sqrt(dt) * rng.standard_normal(2)
+            path.append(state[0])
+        hands.append(demonstration(str(number), dt * np.arange(2000.0), np.array(path), make_obstacles(), GOAL))
+    # a filter that follows accelerations at once: what it lags behind is no part of the estimate
+    config = updated(CONFIG, {'estimator.position_stddev': 1e-6, 'estimator.jerk_density': 30.0})
+    found = fit_fading(hands, config)
+    assert found is not None and found.low <= found.value <= found.high
+    assert found.value == pytest.approx(fading_s, rel=0.25)
+
+
+def test_recordings_too_short_to_compare_tell_no_fading() -> None:
+    still = demonstration('still', 0.02 * np.arange(50.0), np.zeros((50, 2)), make_obstacles(), GOAL)
+    assert fit_fading([still], CONFIG) is None
+
+
+def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recordings = find_recordings(write_tables(tmp_path / 'data', count=4, hz=30.0))
+    names = list(recordings)
+    hopeless = updated(CONFIG, {'foc.noise_x': 2.0, 'foc.noise_y': 2.0})
     with Lanes(1) as executor:
-        searching.search(ARRIVAL, levels(ARRIVAL, CONFIG), recordings, found, {}, executor, {})
-    assert found.chosen == {}
+        replays = Replays(recordings, {}, executor)
+        scores = replays.scores([hopeless, CONFIG], names, 'both')
+        assert scores.shape == (2, 2, 4) and scores[0, 1].mean() > scores[0, 0].mean() + 0.1
+        monkeypatch.setattr('foc_ros.fitting.replays._foretold', None)
+        assert np.array_equal(replays.scores([CONFIG, hopeless], names, 'again'), scores[:, ::-1])

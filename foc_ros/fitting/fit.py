@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -17,21 +18,21 @@ from foc_ros.foc.errors import RecordingError
 
 from . import choices, doubts
 from .demonstrations import Demonstration, demonstration
-from .duration_fit import fit_duration, other_models
+from .duration_fit import fit_duration
 from .estimates import bounded
 from .estimator_fit import fit_estimator
+from .fading_fit import fit_fading
 from .followed import fit_followed
 from .found import Fit
+from .movements import etas, movements, noises
 from .plans import Reach, reach
 from .recovery import fit_plans
-from .replays import ACCELERATION, ARRIVAL, DURATION, ETA, MODEL, NOISE, Foretold, levels, observed
+from .replays import Replays, observed
 from .search import search
 from .wait_fit import fit_wait
 
 PREDICTIONS = 10
 """About as many predictions are made in each recording: neighbours tell the same."""
-SEARCHED = 16
-"""Recordings that are replayed for each setting of the predictor; the rest only for the last."""
 FEWEST = 3
 """Recordings below which there is no cross-validation."""
 
@@ -48,22 +49,28 @@ def fit(recordings: Mapping[str, Recording], config: Config, executor: Executor)
     if config.foc.strategy == 'fixed':
         found.take(fit_plans(_reaches(demonstrations, found), found.config))
     thin = _thin(demonstrations, config)
-    some = dict(list(usable.items())[:: -(-len(usable) // SEARCHED)])
-    if any(len(each.obstacles) for each in demonstrations):
-        # with strategy `fixed` eta has no effect, and lambda was found for the noise as it is
-        kinds = [*([] if config.foc.strategy == 'fixed' else [NOISE, ETA]), ARRIVAL, MODEL, DURATION, ACCELERATION]
-    else:
-        kinds = [ARRIVAL, MODEL, DURATION, ACCELERATION]
+    _search(demonstrations, found, Replays(usable, thin, executor))
+    _choose(usable, found, thin, executor)
+    return found
+
+
+def _search(demonstrations: Sequence[Demonstration], found: Fit, replays: Replays) -> None:
+    """Fit what needs replays."""
+    if not any(len(each.obstacles) for each in demonstrations):
         found.warnings.append(
             'foc.eta, foc.noise_x, foc.noise_y: no recording has an obstacle, and without one neither margins nor '
             'what widens them can be told: they are kept'
         )
-    foretold: dict[Config, Foretold] = {}
-    for kind in kinds:
-        others = other_models(demonstrations, found.config) if kind == MODEL else levels(kind, found.config)
-        search(kind, others, some, found, thin, executor, foretold)
-    _choose(usable, found, thin, executor)
-    return found
+    elif found.config.foc.strategy != 'fixed':
+        # with strategy `fixed` eta has no effect, and lambda was found for the noise as it is
+        search('noise', noises(found.config), replays, found)
+        search('eta', etas(found.config), replays, found)
+    fading = fit_fading(demonstrations, found.config)
+    times_s = [0.0] if fading is None else [0.0, fading.value]
+    search('movement', movements(demonstrations, found.config, times_s), replays, found)
+    if fading is not None and found.config.estimator.acceleration_time_s == fading.value:
+        low, high = found.estimates[fading.name].low, found.estimates[fading.name].high
+        found.estimates[fading.name] = replace(fading, low=min(low, fading.low), high=max(high, fading.high))
 
 
 def _read(recordings: Mapping[str, Recording], found: Fit, executor: Executor) -> list[Demonstration]:

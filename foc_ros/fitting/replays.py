@@ -1,45 +1,36 @@
 """Parameters of the predictor itself, by replays: each setting replays the recordings, and what it foretold is scored.
 
-A setting has two scores, means over the recordings: the log-likelihood of the way really taken, among the ways, and that of the
-true positions 0.25, 0.5 and 1 s ahead, under the mixture of the candidates. Both are proper: no setting gains by claiming more or
-less than it knows. In both, what needs no replay is at its own best for each setting: the likelihood's parameters, the doubt
-about plans. Ways come first: of the settings that are within one standard error of the best in these (Breiman et al. 1984), the
-one with the best positions is taken.
+A setting has two scores, means over the recordings. That of ways is the log-likelihood of the way really taken plus that of the
+gap really taken in the next row, or where there are no ways that of the goal. (The next gap is what help acts on first, and
+less is left to chance in it than in choices that the operator has yet to make.) That of positions is the log-likelihood of the
+true ones 0.25, 0.5 and 1 s ahead, under the mixture of the candidates. All are proper: no setting gains by claiming more or less
+than it knows. What needs no replay is at its own best for each setting: the likelihood's parameters, the doubt about plans.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
 
 import numpy as np
 
 from foc_ros.evaluation.forecasts import of_shares, power_rule
-from foc_ros.evaluation.heldout import asked
+from foc_ros.evaluation.heldout import asked, asked_about
 from foc_ros.evaluation.observations import Observations
 from foc_ros.evaluation.observe import observe
+from foc_ros.evaluation.questions import GAP
 from foc_ros.evaluation.recordings import Recording
 from foc_ros.evaluation.workers import collected
-from foc_ros.foc.config import ARRIVALS, Config, LikelihoodConfig, flatten, updated
+from foc_ros.foc.config import Config, LikelihoodConfig, updated
 from foc_ros.foc.records import Array
 
 from .densities import FEWER_DOUBTS, NO_DOUBT, log_densities
-from .duration_fit import CONSTANTS
-from .estimates import bounded
 
 Key = tuple[str, int]
 """A prediction: recording and stamp [ns]."""
-NOISE, ETA, ARRIVAL, MODEL, DURATION, ACCELERATION = 'noise', 'eta', 'arrival', 'model', 'duration', 'acceleration'
-LEVELS = {
-    NOISE: (0.06, 0.25, 2.0),
-    ETA: (0.7, 0.5, 0.95),
-    DURATION: (0.8, 1.25, 1.6, 2.0),
-    ACCELERATION: (0.0, 0.05, 0.1, 0.2),
-}
-"""What is tried in turn: factors on noise and durations, values of the others."""
 RULES = tuple(
     replace(LikelihoodConfig(), beta=beta, spent_share=share, lookahead_s=seconds)
     for seconds, beta, share in product((0.0, 0.35, 0.7), (0.5, 1.0, 2.0, 3.0, 6.0, 12.0), (1.0, 0.0))
@@ -49,44 +40,96 @@ RULES = tuple(
 
 @dataclass(frozen=True)
 class Foretold:
-    """The scores of one setting by prediction: of ways and positions, rows of log-likelihoods over what needs no replay."""
+    """The scores of one setting by prediction.
 
-    ways: Mapping[Key, Array]
-    positions: Mapping[Key, Array]
+    ways, positions: rows of log-likelihoods over what needs no replay; even: that of an even guess among the ways.
+    """
+
+    ways: dict[Key, Array] = field(default_factory=dict)
+    positions: dict[Key, Array] = field(default_factory=dict)
+    even: dict[Key, float] = field(default_factory=dict)
+
+
+@dataclass
+class Replays:
+    """Replays of recordings under settings, each made once.
+
+    thin: parameters of these replays alone.
+    """
+
+    recordings: Mapping[str, Recording]
+    thin: Mapping[str, float]
+    executor: Executor
+    _known: dict[Config, dict[str, Foretold]] = field(default_factory=dict)
+
+    def scores(self, settings: Sequence[Config], names: Sequence[str], words: str) -> Array:
+        """Return the scores of settings in the recordings of these names, as of `compared`; words: for the progress bar."""
+        known = [self._known.setdefault(setting, {}) for setting in settings]
+        missing = [(place, name) for place, done in enumerate(known) for name in names if name not in done]
+        items = [
+            (f'{name} {place}', (place, self.recordings[name], updated(settings[place], self.thin))) for place, name in missing
+        ]
+        for place, name, found in collected(_foretold, items, self.executor, words)[0]:
+            known[place][name] = found
+        for place, name in missing:
+            known[place].setdefault(name, Foretold())
+        return compared([_together(done[name] for name in names) for done in known], names)
 
 
 def observed(
     recordings: Mapping[str, Recording], config: Config, executor: Executor, words: str
 ) -> tuple[list[Observations], dict[str, str]]:
     """Replay recordings by motor noise alone; return the observations, and why others gave none, by name."""
-    plain = updated(config, NO_DOUBT.parameters())
-    return collected(partial(observe, config=plain), list(recordings.items()), executor, words)
+    return collected(partial(observe, config=_plain(config)), list(recordings.items()), executor, words)
 
 
-def scored(observations: Sequence[Observations], config: Config) -> Foretold:
-    """Score what one setting foretold."""
-    ways, positions = {}, {}
-    for recording in observations:
-        for seen, question in asked(recording):
-            ways[recording.name, seen.stamp_ns] = np.log(
-                [of_shares(power_rule(seen, rule), question).true(question) for rule in RULES]
-            )
-        for seen in recording.each:
-            row = log_densities(seen, seen.ways.likelihood, config, FEWER_DOUBTS)
-            if row is not None:
-                positions[recording.name, seen.stamp_ns] = row
-    return Foretold(ways, positions)
+def _plain(config: Config) -> Config:
+    return updated(config, NO_DOUBT.parameters())
+
+
+def _foretold(item: tuple[int, Recording, Config]) -> tuple[int, str, Foretold]:
+    place, recording, config = item
+    return place, recording.name, scored(observe(recording, _plain(config)), config)
+
+
+def _together(each: Iterable[Foretold]) -> Foretold:
+    whole = Foretold()
+    for part in each:
+        whole.ways.update(part.ways)
+        whole.positions.update(part.positions)
+        whole.even.update(part.even)
+    return whole
+
+
+def scored(recording: Observations, config: Config) -> Foretold:
+    """Score what one setting foretold in a recording."""
+    found = Foretold()
+    gaps = {seen.stamp_ns: question for seen, question in asked_about(recording, GAP)}
+    for seen, question in asked(recording):
+        questions = [question, *([gaps[seen.stamp_ns]] if seen.stamp_ns in gaps else [])]
+        shares = [power_rule(seen, rule) for rule in RULES]
+        found.ways[recording.name, seen.stamp_ns] = np.sum(
+            [[np.log(of_shares(each, about).true(about)) for each in shares] for about in questions], axis=0
+        )
+        found.even[recording.name, seen.stamp_ns] = -sum(np.log(about.open) for about in questions)
+    for seen in recording.each:
+        row = log_densities(seen, seen.ways.likelihood, config, FEWER_DOUBTS)
+        if row is not None:
+            found.positions[recording.name, seen.stamp_ns] = row
+    return found
 
 
 def compared(settings: Sequence[Foretold], names: Sequence[str]) -> Array:
     """Return the scores of each setting in each recording, of ways and of positions, (2, s, n) [nat].
 
-    A prediction that a setting could not make counts as the worst of those that others made in its place.
+    A prediction that a setting could not make counts as the worst of those that others made in its place, of ways at most as an
+    even guess.
     """
     scores = np.zeros((2, len(settings), len(names)))
-    for score, table in zip(scores, ([each.ways for each in settings], [each.positions for each in settings]), strict=True):
-        best = [_best(each) for each in table]
-        worst: dict[Key, float] = {}
+    even = {key: value for each in settings for key, value in each.even.items()}
+    tables = (([each.ways for each in settings], even), ([each.positions for each in settings], {}))
+    for score, (table, most) in zip(scores, tables, strict=True):
+        best, worst = [_best(each) for each in table], dict(most)
         for each in best:
             for key, value in each.items():
                 worst[key] = min(value, worst.get(key, value))
@@ -97,35 +140,9 @@ def compared(settings: Sequence[Foretold], names: Sequence[str]) -> Array:
     return scores
 
 
-def preferred(scores: Array) -> int:
-    """Return the setting to take, by scores as of `compared`."""
-    ways, positions = scores
-    behind = ways[ways.mean(axis=1).argmax()] - ways
-    as_good = behind.mean(axis=1) <= behind.std(axis=1) / np.sqrt(ways.shape[1])
-    return int(np.where(as_good, positions.mean(axis=1), -np.inf).argmax())
-
-
 def _best(rows: Mapping[Key, Array]) -> dict[Key, float]:
     """Return the log-likelihoods at what is best for all of them together."""
     if not rows:
         return {}
     place = int(np.sum(list(rows.values()), axis=0).argmax())
     return {key: float(row[place]) for key, row in rows.items()}
-
-
-def levels(kind: str, config: Config) -> list[Config]:
-    """Return the configurations that are tried beside one."""
-    if kind == ARRIVAL:
-        return [updated(config, {'duration.arrival': each}) for each in ARRIVALS if each != config.duration.arrival]
-    if kind == DURATION:
-        return [_scaled(config, CONSTANTS[config.duration.model], factor) for factor in LEVELS[kind]]
-    if kind == NOISE:
-        return [_scaled(config, {'foc.noise_x': 1.0, 'foc.noise_y': 1.0}, factor) for factor in LEVELS[kind]]
-    name = {ACCELERATION: 'estimator.acceleration_time_s', ETA: 'foc.eta'}[kind]
-    return [changed for value in LEVELS[kind] if (changed := updated(config, {name: value})) != config]
-
-
-def _scaled(config: Config, powers: Mapping[str, float], factor: float) -> Config:
-    """Multiply each of the parameters by its power of a factor."""
-    before = flatten(config)
-    return updated(config, {name: bounded(name, factor**power * float(before[name])) for name, power in powers.items()})

@@ -1,87 +1,107 @@
-"""Settings of the predictor tried by replays, one kind after the other, and the best taken."""
+"""Settings of the predictor in a race by replays, and what the best of them says of each parameter.
+
+The race is successive halving (Jamieson and Talwalkar 2016, arXiv:1502.07943): all settings foretell a few recordings, the better
+half of them twice as many, and so on. What is hard to tell gets the data, and what is plainly worse none.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import Executor
+from collections.abc import Sequence
 
 import numpy as np
 
-from foc_ros.evaluation.recordings import Recording
-from foc_ros.foc.config import Config, flatten, updated
+from foc_ros.foc.config import Config, flatten
+from foc_ros.foc.records import Array
 
 from .duration_fit import CONSTANTS
 from .estimates import Estimate
 from .found import Fit
-from .replays import ACCELERATION, ARRIVAL, DURATION, ETA, MODEL, NOISE, Foretold, compared, observed, preferred, scored
+from .replays import Replays
 from .resampling import CENTRAL, RESAMPLES, SEED
 
+FIRST = 6
+"""Recordings that all settings foretell."""
+FINALISTS = 4
+"""Settings that come to the end and foretell all recordings, unless they are plainly worse."""
+MOST = 48
+"""Recordings in which settings are compared; more make no difference that counts."""
+PLAIN = 3.0
+"""Standard errors by which a setting behind the best is plainly worse."""
 SURE = 0.95
-"""Share of the resamples in which another way to arrive, or another model of duration, has to be the better one."""
-CHOICES = {ARRIVAL: 'duration.arrival', MODEL: 'duration.model'}
-VALUES = {
-    ACCELERATION: ('estimator.acceleration_time_s',),
-    NOISE: ('foc.noise_x', 'foc.noise_y'),
-    ETA: ('foc.eta',),
-}
+"""Share of the resamples below which a choice is said to be unsure."""
 
 
-def search(
-    kind: str,
-    others: Sequence[Config],
-    recordings: Mapping[str, Recording],
-    found: Fit,
-    thin: Mapping[str, float],
-    executor: Executor,
-    foretold: dict[Config, Foretold],
-) -> None:
-    """Try other settings of one kind and take the best.
-
-    thin: parameters of these replays alone; foretold: what is known of settings, and is added to.
-    """
-    settings = [found.config, *others]
-    for number, setting in enumerate(settings, 1):
-        if setting not in foretold:
-            words = f'{kind} {number}/{len(settings)}'
-            foretold[setting] = scored(observed(recordings, updated(setting, thin), executor, words)[0], setting)
-    scores = compared([foretold[setting] for setting in settings], list(recordings))
-    draws, n = np.random.default_rng(SEED), scores.shape[2]
-    drawn = [settings[preferred(scores[:, :, draws.integers(n, size=n)])] for _ in range(RESAMPLES)]
-    best = settings[preferred(scores)]
-    if kind in CHOICES:
-        _take_choice(CHOICES[kind], best, drawn, found)
-    else:
-        names = CONSTANTS[best.duration.model] if kind == DURATION else VALUES[kind]
-        _take_values(names, best, settings, drawn, found)
-
-
-def _take_choice(name: str, best: Config, drawn: Sequence[Config], found: Fit) -> None:
-    """Take what is no number, where it is better for sure; else keep what is given."""
-    value, given = str(flatten(best)[name]), str(flatten(found.config)[name])
-    if value == given:
-        return
-    sure = float(np.mean([each == best for each in drawn]))
-    if sure < SURE:
-        words = f'{value} is better than {given}, but only in {100 * sure:.0f} % of the resamples: {given} is kept'
-        found.warnings.append(f'{name}: {words}')
-        return
-    found.chosen[name], found.config = value, best
-
-
-def _take_values(names: Iterable[str], best: Config, settings: Sequence[Config], drawn: Sequence[Config], found: Fit) -> None:
-    """Take the numbers of the best setting."""
-    for name in names:
-        value, tried = _value(best, name), {_value(setting, name) for setting in settings}
-        if len(tried) == 1:
+def search(kind: str, settings: Sequence[Config], replays: Replays, found: Fit) -> None:
+    """Take the best of some settings; the first is what is held so far."""
+    finalists, scores = race(kind, settings, replays)
+    n = scores.shape[2]
+    draws = np.random.default_rng(SEED)
+    drawn = [finalists[preferred(scores[:, :, draws.integers(n, size=n)])] for _ in range(RESAMPLES)]
+    found.config = best = finalists[preferred(scores)]
+    given, constants = flatten(settings[0]), [name for each in CONSTANTS.values() for name in each]
+    for name, value in flatten(best).items():
+        if name in constants and name not in CONSTANTS[best.duration.model]:
             continue
-        low, high = np.percentile([_value(setting, name) for setting in drawn], CENTRAL)
-        before = found.estimates.get(name)
-        how = 'positions and ways foretold' if before is None else f'{before.how}, then positions and ways foretold'
-        found.estimates[name] = Estimate(name, value, float(low), float(high), how)
-        if (low, high) == (min(tried), max(tried)):
-            found.warnings.append(f'{name}: from {low:.3g} to {high:.3g}, all that was tried, resampled recordings agree as well')
-    found.config = best
+        if isinstance(value, str):
+            _take_choice(name, value, str(given[name]), drawn, found)
+            continue
+        alike = [each for each in settings if name not in constants or each.duration.model == best.duration.model]
+        _take_value(name, float(value), alike, [each for each in drawn if each in alike], found)
 
 
-def _value(config: Config, name: str) -> float:
-    return float(flatten(config)[name])
+def race(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[list[Config], Array]:
+    """Return the finalists, in the order given, with their scores as of `compared`."""
+    names = list(replays.recordings)
+    # every beginning of the list is a fair sample of the recordings, however they were ordered
+    names = [names[place] for place in np.random.default_rng(SEED).permutation(len(names))[:MOST]]
+    left, count = list(settings), FIRST
+    while True:
+        known = names[:count]
+        scores = replays.scores(left, known, f'{kind} {len(left)}')
+        if len(known) == len(names) or len(left) == 1:
+            return left, scores
+        kept = set(ranked(scores)[: max(-(-len(left) // 2), FINALISTS)]) - worse(scores)
+        left, count = [left[place] for place in sorted(kept)], 2 * count
+
+
+def ranked(scores: Array) -> list[int]:
+    """Return the settings from the best to the worst: by ways, and where these are equal by positions."""
+    ways, positions = scores.mean(axis=2)
+    order: list[int] = np.lexsort((-positions, -ways)).tolist()
+    return order
+
+
+def worse(scores: Array) -> set[int]:
+    """Return the settings that are plainly worse than the best in ways."""
+    ways = scores[0]
+    behind = ways[ways.mean(axis=1).argmax()] - ways
+    return set(np.flatnonzero(behind.mean(axis=1) > PLAIN * behind.std(axis=1) / np.sqrt(ways.shape[1])).tolist())
+
+
+def preferred(scores: Array) -> int:
+    """Return the setting to take, by scores as of `compared`."""
+    return ranked(scores)[0]
+
+
+def _take_choice(name: str, value: str, given: str, drawn: Sequence[Config], found: Fit) -> None:
+    """Take what is no number."""
+    if value != given:
+        found.chosen[name] = value
+    sure = float(np.mean([flatten(each)[name] == value for each in drawn]))
+    if sure < SURE:
+        found.warnings.append(f'{name}: {value} is the best, but only in {100 * sure:.0f} % of the resamples')
+
+
+def _take_value(name: str, value: float, settings: Sequence[Config], drawn: Sequence[Config], found: Fit) -> None:
+    """Take a number, if any was tried."""
+    tried = {float(flatten(each)[name]) for each in settings}
+    if len(tried) == 1:
+        return
+    low, high = np.percentile([float(flatten(each)[name]) for each in drawn], CENTRAL).tolist()
+    if (low, high) == (min(tried), max(tried)):
+        found.warnings.append(f'{name}: from {low:.3g} to {high:.3g}, all that was tried, resampled recordings agree as well')
+    before, how = found.estimates.get(name), 'positions and ways foretold'
+    if before is not None:
+        how = before.how if how in before.how else f'{before.how}, then {how}'
+        low, high = (min(low, before.low), max(high, before.high)) if before.value == value else (low, high)
+    found.estimates[name] = Estimate(name, value, low, high, how)
