@@ -26,7 +26,7 @@ QUICK = {'foc.steps': 15, 'homotopy.max_candidates': 2, 'duration.fitts_a_s': 0.
 @pytest.fixture(autouse=True)
 def few_predictions(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fitting, 'PREDICTIONS', 3)
-    for name, few in {'DURATIONS': (1.4,), 'NOISES': (0.5,), 'ETAS': (0.7,)}.items():
+    for name, few in {'DURATIONS': (), 'NOISES': (0.5,), 'ETAS': (0.7,)}.items():
         monkeypatch.setattr(movements, name, few)
 
 

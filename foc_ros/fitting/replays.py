@@ -127,8 +127,8 @@ def compared(settings: Sequence[Foretold], names: Sequence[str]) -> Array:
     """
     scores = np.zeros((2, len(settings), len(names)))
     even = {key: value for each in settings for key, value in each.even.items()}
-    tables = (([each.ways for each in settings], even), ([each.positions for each in settings], {}))
-    for score, (table, most) in zip(scores, tables, strict=True):
+    tables = [each.ways for each in settings], [each.positions for each in settings]
+    for score, table, most in zip(scores, tables, (even, {}), strict=True):
         best, worst = [_best(each) for each in table], dict(most)
         for each in best:
             for key, value in each.items():
