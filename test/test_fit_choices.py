@@ -1,4 +1,4 @@
-"""How long a movement takes, how it ends and whether accelerations fade: tried together, in a race by replays."""
+"""How long a movement takes and how it ends, tried together in a race by replays; and how soon accelerations fade."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from foc_ros.evaluation.lanes import Lanes
 from foc_ros.evaluation.recordings import find_recordings
 from foc_ros.fitting import search as searching
 from foc_ros.fitting.duration_fit import fit_duration, other_models
-from foc_ros.fitting.fading_fit import fit_fading
+from foc_ros.fitting.fading_fit import NAME, fit_fading
 from foc_ros.fitting.found import Fit
 from foc_ros.fitting.movements import DURATIONS, movements
 from foc_ros.fitting.replays import Replays
@@ -94,11 +94,11 @@ def test_ways_decide_and_positions_where_ways_do_not_tell() -> None:
     assert searching.ranked(np.array([np.zeros((3, 2)), positions])) == [1, 2, 0]
 
 
-def test_durations_arrivals_and_fading_are_tried_in_all_combinations() -> None:
+def test_models_durations_and_arrivals_are_tried_in_all_combinations() -> None:
     reaches = _reaches(CONFIG)
-    tried = movements(reaches, CONFIG, [0.0, 0.07])
+    tried = movements(reaches, CONFIG)
     assert tried[0] == CONFIG
-    assert len(set(tried)) == len(tried) == 2 * (1 + len(DURATIONS)) * 2 * 2
+    assert len(set(tried)) == len(tried) == 2 * (1 + len(DURATIONS)) * 2
     assert {each.duration.model for each in tried} == {'fitts', 'cost_of_time'}
     factors = {round(each.duration.fitts_a_s / CONFIG.duration.fitts_a_s, 6) for each in tried}
     assert factors == {1.0, *DURATIONS}
@@ -134,14 +134,21 @@ def test_the_time_in_which_accelerations_fade_is_found(fading_s: float) -> None:
         hands.append(demonstration(str(number), dt * np.arange(2000.0), np.array(path), make_obstacles(), GOAL))
     # a filter that follows accelerations at once: what it lags behind is no part of the estimate
     config = updated(CONFIG, {'estimator.position_stddev': 1e-6, 'estimator.jerk_density': 30.0})
-    found = fit_fading(hands, config)
-    assert found is not None and found.low <= found.value <= found.high
+    found = fit_fading(hands, config)[0][NAME]
+    assert found.low <= found.value <= found.high
     assert found.value == pytest.approx(fading_s, rel=0.25)
 
 
-def test_recordings_too_short_to_compare_tell_no_fading() -> None:
+def test_an_acceleration_that_lasts_is_known_as_such() -> None:
+    t = np.arange(0.0, 3.0, 0.02)
+    hands = [demonstration(str(a), t, np.outer(0.5 * a * t**2, [1.0, 0.0]), make_obstacles(), GOAL) for a in (0.3, 0.5)]
+    assert fit_fading(hands, updated(CONFIG, {'estimator.position_stddev': 1e-6}))[0][NAME].value == 0.0
+
+
+def test_hands_at_rest_tell_no_fading() -> None:
     still = demonstration('still', 0.02 * np.arange(50.0), np.zeros((50, 2)), make_obstacles(), GOAL)
-    assert fit_fading([still], CONFIG) is None
+    estimates, warnings = fit_fading([still], CONFIG)
+    assert estimates == {} and warnings[0].startswith(f'{NAME}: ')
 
 
 def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twice(

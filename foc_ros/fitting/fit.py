@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -43,6 +42,7 @@ def fit(recordings: Mapping[str, Recording], config: Config, executor: Executor)
     demonstrations = _read(recordings, found, executor)
     usable = {each.name: recordings[each.name] for each in demonstrations}
     found.take(fit_estimator(demonstrations, found.config))
+    found.take(fit_fading(demonstrations, found.config))
     found.take(fit_duration(demonstrations, found.config))
     found.take(fit_wait(demonstrations, found.config))
     found.take(fit_followed(demonstrations, found.config))
@@ -65,12 +65,7 @@ def _search(demonstrations: Sequence[Demonstration], found: Fit, replays: Replay
         # with strategy `fixed` eta has no effect, and lambda was found for the noise as it is
         search('noise', noises(found.config), replays, found)
         search('eta', etas(found.config), replays, found)
-    fading = fit_fading(demonstrations, found.config)
-    times_s = [0.0] if fading is None else [0.0, fading.value]
-    search('movement', movements(demonstrations, found.config, times_s), replays, found)
-    if fading is not None and found.config.estimator.acceleration_time_s == fading.value:
-        low, high = found.estimates[fading.name].low, found.estimates[fading.name].high
-        found.estimates[fading.name] = replace(fading, low=min(low, fading.low), high=max(high, fading.high))
+    search('movement', movements(demonstrations, found.config), replays, found)
 
 
 def _read(recordings: Mapping[str, Recording], found: Fit, executor: Executor) -> list[Demonstration]:

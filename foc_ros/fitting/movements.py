@@ -1,7 +1,6 @@
-"""What is tried of the predictor: margins by themselves, and all that says how a hand moves together.
+"""What is tried of the predictor: margins each by itself, how long a movement takes and how it ends together.
 
-How long a movement takes, how it ends and whether accelerations fade are answers to one question: where a goal that is passed is
-taken for one where the hand stops, no duration is right. So they are tried in all combinations.
+Where a goal that is passed is taken for one where the hand stops, no duration is right. So they are tried in all combinations.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ from foc_ros.foc.config import ARRIVALS, Config, flatten, updated
 from .demonstrations import Demonstration
 from .duration_fit import CONSTANTS, other_models
 from .estimates import bounded
-from .fading_fit import NAME as FADING
 
 NOISES, DURATIONS = (0.06, 0.25, 2.0), (0.7, 1.4, 2.0)
 """Factors tried beside 1."""
@@ -31,19 +29,12 @@ def etas(config: Config) -> list[Config]:
     return list(dict.fromkeys([config, *(updated(config, {'foc.eta': eta}) for eta in ETAS)]))
 
 
-def movements(demonstrations: Sequence[Demonstration], config: Config, fading_s: Sequence[float]) -> list[Config]:
-    """Return every combination of duration, arrival and fading, the configuration's own first.
-
-    fading_s: times in which accelerations may fade [s], beside the configuration's own.
-    """
+def movements(demonstrations: Sequence[Demonstration], config: Config) -> list[Config]:
+    """Return every combination of model, duration and arrival, the configuration's own first."""
     models = [config, *other_models(demonstrations, config)]
     lasting = [_scaled(each, CONSTANTS[each.duration.model], factor) for each, factor in product(models, (1.0, *DURATIONS))]
     arrivals = dict.fromkeys([config.duration.arrival, *ARRIVALS])
-    fading = dict.fromkeys([config.estimator.acceleration_time_s, *fading_s])
-    return [
-        updated(each, {'duration.arrival': arrival, FADING: seconds})
-        for each, arrival, seconds in product(lasting, arrivals, fading)
-    ]
+    return [updated(each, {'duration.arrival': arrival}) for each, arrival in product(lasting, arrivals)]
 
 
 def _scaled(config: Config, powers: Mapping[str, float], factor: float) -> Config:
