@@ -181,6 +181,26 @@ def _closest(
 
 
 @compiled
+def _longest(course: Matrix) -> float:
+    """Return how far a mean gets from the step before it at most, before the next."""
+    longest = 0.0
+    for t in range(course.shape[1] - 1):
+        chord = np.hypot(course[0, t + 1] - course[0, t], course[1, t + 1] - course[1, t])
+        longest = max(longest, chord + np.hypot(course[2, t], course[3, t]) + np.hypot(course[2, t + 1], course[3, t + 1]))
+    return longest
+
+
+@compiled
+def _is_far(places: Matrix, centre: Vector, drift: Vector, distance: float) -> bool:
+    """Tell whether a circle's centre is farther than a distance from the places (N + 1, 2) of all steps."""
+    nearest = np.inf
+    for t in range(len(places)):
+        x, y = places[t, 0] - centre[0] - t * drift[0], places[t, 1] - centre[1] - t * drift[1]
+        nearest = min(nearest, x * x + y * y)
+    return nearest > distance * distance
+
+
+@compiled
 def entered(
     course: Matrix, centre: Matrix, drift: Matrix, reach: Vector, missing: Vector, pace: float, tolerance: float
 ) -> Matrix:
@@ -193,17 +213,18 @@ def entered(
     m, last = len(reach), course.shape[1] - 1
     found, count = np.empty((m * (last + 1), 2)), 0
     places, speeds = np.ascontiguousarray(course[:2].T), np.ascontiguousarray(course[2:].T)
+    travelled = _longest(course)
     for j in range(m):
+        if _is_far(places, centre[j], drift[j], reach[j] + travelled + np.hypot(drift[j, 0], drift[j, 1])):
+            continue
         spare_before, rate_before = 0.0, 0.0
         for t in range(1, last + 1):
             spare, rate = spared(places[t], speeds[t], centre[j], drift[j], reach[j], missing[j], pace, float(t))
             time = -1.0
             if t == 1 and rate >= 0.0:
                 time = 1.0
-            elif t > 1 and rate_before < 0.0 <= rate:
-                travelled = abs(rate_before) + abs(rate)
-                if min(spare, spare_before) < travelled:
-                    time = _closest(course, centre[j], drift[j], reach[j], missing[j], pace, t - 1.0, rate_before, rate)
+            elif t > 1 and rate_before < 0.0 <= rate and min(spare, spare_before) < abs(rate_before) + abs(rate):
+                time = _closest(course, centre[j], drift[j], reach[j], missing[j], pace, t - 1.0, rate_before, rate)
             if t == last and rate < 0.0:
                 time = float(last)
             if time > 0.0:

@@ -9,7 +9,7 @@ import numpy as np
 
 from .assess import Assessment, assess
 from .between import course_of, place, place_row
-from .chance import CERTAIN_K, k_at, k_of
+from .chance import CERTAIN_K, expectation, k_of, variance
 from .compiled import Matrix, Tensor, Vector, compiled
 from .problem import Problem, spread
 from .records import Array
@@ -84,6 +84,12 @@ def _k_at_time(
 
 
 @compiled
+def _is_above(bound: float, mean: float, variance: float) -> bool:
+    """Tell whether `chance.k_of` is above a bound for certain, without its root: most circles are far away."""
+    return mean < 0.0 and (bound <= 0.0 or mean * mean > bound * bound * variance)
+
+
+@compiled
 def least_k(
     motion: Tensor,
     maps: Tensor,
@@ -109,19 +115,25 @@ def least_k(
     course, control_variance = course_of(motion, free, control), noise_variance * control * control
     positions = np.ascontiguousarray(course[:2, 1:].T)
     covariance = spread(maps, noise_variance, control, free_variance)
-    k_at_steps = k_at(positions, covariance, centres, size_mean, size_variance, centre_covariance)
-    m, steps = k_at_steps.shape
+    offset = np.expand_dims(positions, 0) - centres
+    mean = expectation(offset, np.zeros_like(positions), size_mean)
+    var = variance(offset, covariance, size_variance, centre_covariance)
+    m, steps = mean.shape
     least, row, moment = np.inf, 0, 1.0
     for j in range(m):
         for t in range(steps):
             if t + 1.0 < leaving[j]:
-                k_at_steps[j, t] = np.inf
-            elif k_at_steps[j, t] < least:
-                least, row, moment = k_at_steps[j, t], j, t + 1.0
+                mean[j, t] = -np.inf
+            elif not _is_above(least, mean[j, t], var[j, t]):
+                k = k_of(mean[j, t], var[j, t])
+                if k < least:
+                    least, row, moment = k, j, t + 1.0
     near = least + MUCH_MORE * (1.0 + abs(least))
     for j in range(m):
         for t in range(1, steps - 1):
-            ka, kb, kc = k_at_steps[j, t - 1], k_at_steps[j, t], k_at_steps[j, t + 1]
+            if _is_above(near, mean[j, t], var[j, t]):
+                continue
+            ka, kb, kc = k_of(mean[j, t - 1], var[j, t - 1]), k_of(mean[j, t], var[j, t]), k_of(mean[j, t + 1], var[j, t + 1])
             if not (kb <= ka and kb < kc and kb < near and ka < CERTAIN_K and kc < CERTAIN_K):
                 continue
             a, b, c = float(t), t + 1.0, t + 2.0

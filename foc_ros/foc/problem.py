@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .between import course_of
 from .chance import centres, courses, k_at, k_of_eta, size_moments
-from .compiled import Matrix, Tensor, Vector, compiled
+from .compiled import Indices, Matrix, Tensor, Vector, compiled
 from .dense import values
 from .dynamics import Horizon, states_at_goal
 from .errors import SceneError
@@ -109,9 +109,7 @@ class Problem(Record):
     def first_alike(self) -> NDArray[np.intp]:
         """For each obstacle the first one that is the same circle, (m,): a mean that touches both is held by one of them."""
         circle = np.column_stack((self.obstacles.centre, self.obstacles.velocity * self.horizon.dt, np.sqrt(self.size[0])))
-        alike = np.abs(circle[:, None] - circle).max(axis=2, initial=0.0) < ALIKE * self.extent
-        first: NDArray[np.intp] = alike.argmax(axis=1) if len(circle) else np.zeros(0, dtype=np.intp)
-        return first
+        return first_within(circle, ALIKE * self.extent)
 
     @cached_property
     def centres_from_free(self) -> Array:
@@ -204,6 +202,18 @@ class Problem(Record):
     def position_variance(self, control: Array) -> Array:
         """Rows xx, yy, xy of the position covariance at steps 1..N, (3, N) [m^2]."""
         return spread(self.horizon.maps, self.noise_variance, np.ascontiguousarray(control, dtype=float), self.free_variance)
+
+
+@compiled
+def first_within(rows: Matrix, tolerance: float) -> Indices:
+    """Return for each of the rows (m, q) the first that is nowhere farther from it than a tolerance, (m,)."""
+    first = np.arange(len(rows))
+    for i in range(len(rows)):
+        for j in range(i):
+            if np.abs(rows[i] - rows[j]).max() < tolerance:
+                first[i] = j
+                break
+    return first
 
 
 @compiled
