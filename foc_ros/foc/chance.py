@@ -60,6 +60,12 @@ def expectation(offset: Tensor, position_minus_guess: Matrix, size_mean: Vector)
 
 
 @compiled
+def variance_of(x: float, y: float, xx: float, yy: float, xy: float, size_variance: float) -> float:
+    """Var[C] of one circle at one time: d = (x, y), and xx, yy, xy the covariance of the position relative to the centre."""
+    return size_variance + 4 * (x * x * xx + y * y * yy + 2 * x * y * xy)
+
+
+@compiled
 def variance(offset: Tensor, covariance: Matrix, size_variance: Vector, centre_covariance: Tensor) -> Matrix:
     """Var[C] (n, N) [m^4]: offset d (n, N, 2); covariance (3, N) of the position, xx, yy, xy; centre_covariance (n, 2, 2)."""
     n, steps, _ = offset.shape
@@ -70,7 +76,7 @@ def variance(offset: Tensor, covariance: Matrix, size_variance: Vector, centre_c
             xx = covariance[0, t] + centre_covariance[j, 0, 0]
             yy = covariance[1, t] + centre_covariance[j, 1, 1]
             xy = covariance[2, t] + centre_covariance[j, 0, 1]
-            value[j, t] = size_variance[j] + 4 * (x * x * xx + y * y * yy + 2 * x * y * xy)
+            value[j, t] = variance_of(x, y, xx, yy, xy, size_variance[j])
     return value
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from .assess import Assessment, assess
 from .between import course_of, place, place_row
-from .chance import CERTAIN_K, expectation, k_of, variance
+from .chance import CERTAIN_K, k_of, variance_of
 from .compiled import Matrix, Tensor, Vector, compiled
 from .problem import Problem, spread
 from .records import Array
@@ -84,6 +84,26 @@ def _k_at_time(
 
 
 @compiled
+def _moments(
+    course: Matrix,
+    covariance: Matrix,
+    centres: Tensor,
+    size_mean: Vector,
+    size_variance: Vector,
+    centre_covariance: Tensor,
+    leaving: Vector,
+    j: int,
+    t: int,
+) -> tuple[float, float]:
+    """Return E[C] and Var[C] of circle j at step t + 1; E is without a bound where the circle does not count."""
+    x, y = course[0, t + 1] - centres[j, t, 0], course[1, t + 1] - centres[j, t, 1]
+    xx, yy = covariance[0, t] + centre_covariance[j, 0, 0], covariance[1, t] + centre_covariance[j, 1, 1]
+    xy = covariance[2, t] + centre_covariance[j, 0, 1]
+    mean = size_mean[j] - x * x - y * y if t + 1.0 >= leaving[j] else -np.inf
+    return mean, variance_of(x, y, xx, yy, xy, size_variance[j])
+
+
+@compiled
 def _is_above(bound: float, mean: float, variance: float) -> bool:
     """Tell whether `chance.k_of` is above a bound for certain, without its root: most circles are far away."""
     return mean < 0.0 and (bound <= 0.0 or mean * mean > bound * bound * variance)
@@ -113,27 +133,25 @@ def least_k(
     three times, closer and closer. leaving (m,): steps from now in which a circle does not count.
     """
     course, control_variance = course_of(motion, free, control), noise_variance * control * control
-    positions = np.ascontiguousarray(course[:2, 1:].T)
     covariance = spread(maps, noise_variance, control, free_variance)
-    offset = np.expand_dims(positions, 0) - centres
-    mean = expectation(offset, np.zeros_like(positions), size_mean)
-    var = variance(offset, covariance, size_variance, centre_covariance)
-    m, steps = mean.shape
+    m, steps, _ = centres.shape
+    circles = course, covariance, centres, size_mean, size_variance, centre_covariance, leaving
     least, row, moment = np.inf, 0, 1.0
     for j in range(m):
         for t in range(steps):
-            if t + 1.0 < leaving[j]:
-                mean[j, t] = -np.inf
-            elif not _is_above(least, mean[j, t], var[j, t]):
-                k = k_of(mean[j, t], var[j, t])
+            mean, var = _moments(*circles, j, t)
+            if not _is_above(least, mean, var):
+                k = k_of(mean, var)
                 if k < least:
                     least, row, moment = k, j, t + 1.0
     near = least + MUCH_MORE * (1.0 + abs(least))
     for j in range(m):
         for t in range(1, steps - 1):
-            if _is_above(near, mean[j, t], var[j, t]):
+            mean, var = _moments(*circles, j, t)
+            if _is_above(near, mean, var):
                 continue
-            ka, kb, kc = k_of(mean[j, t - 1], var[j, t - 1]), k_of(mean[j, t], var[j, t]), k_of(mean[j, t + 1], var[j, t + 1])
+            before, after = _moments(*circles, j, t - 1), _moments(*circles, j, t + 1)
+            ka, kb, kc = k_of(before[0], before[1]), k_of(mean, var), k_of(after[0], after[1])
             if not (kb <= ka and kb < kc and kb < near and ka < CERTAIN_K and kc < CERTAIN_K):
                 continue
             a, b, c = float(t), t + 1.0, t + 2.0
