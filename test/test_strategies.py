@@ -20,7 +20,7 @@ from foc_ros.foc.optimal import surrogate_qp
 from foc_ros.foc.problem import rest_to_goal
 from foc_ros.foc.records import Status, make_obstacles
 from foc_ros.foc.solver import WorkingSet
-from foc_ros.foc.start import cold, warm
+from foc_ros.foc.start import cold, led, warm
 
 BOWED = bowed((0, 0), (0.3, 0), 50, 0.05)
 EVERY = pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
@@ -213,8 +213,10 @@ def test_a_warm_start_is_led_to_the_goal_from_where_the_hand_really_is(strategy)
     state = np.array([0.002, 0.001, 0.03, 0.01, 0.8, 0.2])  # not where the plan would be, and far from its acceleration
     problem = replace(one_obstacle(0.86), initial_mean=state)
     start = warm(before, problem)
-    mean = problem.free[-1] + problem.horizon.response[-1] @ start.control
-    np.testing.assert_allclose(mean, problem.goal, atol=1e-9)
+    control = led(problem, start.control, start.positions)
+    np.testing.assert_allclose(problem.free[-1] + problem.horizon.response[-1] @ control, problem.goal, atol=1e-9)
+    left, kept = (np.abs(problem.positions(each) - start.positions).max() for each in (start.control, control))
+    assert kept < left / 2
     found = forward(problem, start, FocConfig(strategy=strategy))
     fresh = forward(problem, cold(BOWED), FocConfig(strategy=strategy))
     assert found.status is fresh.status is Status.SOLVED

@@ -25,7 +25,7 @@ from .qp import NO_TIMES, effort_cost
 from .records import Array, Status
 from .sequential import MAX_QPS, Converged, Jump, converge
 from .solver import WorkingSet
-from .start import Start
+from .start import Start, led
 
 STRIDE = 4.0
 """First look along the curve, in s: lambda grows by 16 from one to the next."""
@@ -220,7 +220,8 @@ def _walk(walker: _Walker, start: Start) -> Walk:
         first = walker.beginning(start.positions)
     else:
         way = swept_angles(np.concatenate((problem.initial_mean[None, :2], start.positions)), problem.courses)
-        first = walker.settled(curve.s_of(start.lam), start.control, joined(problem, start.contacts), way)
+        control = led(problem, start.control, start.positions)
+        first = walker.settled(curve.s_of(start.lam), control, joined(problem, start.contacts), way)
         if first is None:
             first = walker.beginning(start.positions, way)
         else:

@@ -48,7 +48,7 @@ def warm(previous: Solution, problem: Problem) -> Start:
     ]
     table = np.array(kept, dtype=float).reshape(-1, 3)
     contacts = Contacts(table[:, 0].astype(np.intp), table[:, 1].copy(), table[:, 2].copy())
-    return Start(positions, led(problem, control, positions), contacts, previous.lam, previous.slope)
+    return Start(positions, control, contacts, previous.lam, previous.slope)
 
 
 @compiled
