@@ -29,10 +29,10 @@ def position_scores(recordings: Sequence[Observations]) -> dict[str, Any]:
     """
     seen = [each for recording in recordings for each in recording.each]
     true = np.array([each.truth.positions for each in seen])
-    likely = [_leading(each) for each in seen]
+    likely, taken = [_leading(each) for each in seen], _taken(recordings)
     beyond = np.array([mixture_levels(each, each.ways.likelihood, each.ways.covariance) for each in seen])
     predicted = {
-        'most likely': np.array([each.ways.mean[_leading(each)] for each in seen]),
+        'most likely': np.array([each.ways.mean[row] for each, row in zip(seen, likely, strict=True)]),
         'likelihood-weighted': np.array([np.tensordot(each.ways.likelihood, each.ways.mean, 1) for each in seen]),
         'constant velocity': np.array([_going_on(each) for each in seen]),
         'straight minimum jerk': np.array([_straight(each) for each in seen]),
@@ -40,7 +40,7 @@ def position_scores(recordings: Sequence[Observations]) -> dict[str, Any]:
     return {
         'displacement_m': {name: _errors(positions, true) for name, positions in predicted.items()},
         'inside': {f'{level:g}': _by_horizon(_inside(seen, likely, true, level)) for level in LEVELS},
-        'inside_taken': {f'{level:g}': _by_horizon(_inside(seen, _taken(recordings), true, level)) for level in LEVELS},
+        'inside_taken': {f'{level:g}': _by_horizon(_inside(seen, taken, true, level)) for level in LEVELS},
         'inside_all': {f'{level:g}': _by_horizon(_within(beyond, level)) for level in LEVELS},
     }
 

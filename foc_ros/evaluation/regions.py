@@ -54,15 +54,17 @@ def denser(likelihood: Array, mean: Array, covariance: Array, position: Array) -
 def _log_density(weight: Array, mean: Array, covariance: Array, position: Array) -> Array:
     """Return the logarithm of the mixture's density (..., h) at positions (..., h, 2)."""
     away = position[..., None, :, :] - mean
-    logs = np.log(weight)[:, None] + log_normal(away, covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1])
+    return log_mixture(weight, away, covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1])
+
+
+def log_mixture(weight: Array, away: Array, xx: Array, yy: Array, xy: Array) -> Array:
+    """Return the logarithm of the density (..., h) of normal distributions with weights (k,), together.
+
+    At away (..., k, h, 2) [m] from the middle of each, for covariances [[xx, xy], [xy, yy]] (..., k, h) [m^2].
+    """
+    x, y, determinant = away[..., 0], away[..., 1], xx * yy - xy**2
+    distance = (yy * x**2 - 2.0 * xy * x * y + xx * y**2) / determinant
+    logs = np.log(weight)[:, None] + (-0.5 * (distance + np.log(determinant)) - np.log(2.0 * np.pi))
     greatest = logs.max(axis=-2)
     density: Array = greatest + np.log(np.exp(logs - greatest[..., None, :]).sum(axis=-2))
     return density
-
-
-def log_normal(away: Array, xx: Array, yy: Array, xy: Array) -> Array:
-    """Return the logarithm of the normal density at (..., 2) [m] from its middle, of covariance [[xx, xy], [xy, yy]] [m^2]."""
-    x, y, determinant = away[..., 0], away[..., 1], xx * yy - xy**2
-    distance = (yy * x**2 - 2.0 * xy * x * y + xx * y**2) / determinant
-    logs: Array = -0.5 * (distance + np.log(determinant)) - np.log(2.0 * np.pi)
-    return logs

@@ -9,8 +9,8 @@ from itertools import product
 import numpy as np
 
 from foc_ros.evaluation.observations import HORIZONS_S, TIMES_S, Observation
-from foc_ros.evaluation.positions import EXACT, held
-from foc_ros.evaluation.regions import log_normal
+from foc_ros.evaluation.positions import EXACT
+from foc_ros.evaluation.regions import log_mixture
 from foc_ros.foc.config import Config
 from foc_ros.foc.duration import is_passing
 from foc_ros.foc.records import Array
@@ -73,16 +73,8 @@ def log_densities(seen: Observation, shares: Array, config: Config, doubts: Sequ
         base[..., i, j] + (both if i == j else 0.0) + np.multiply.outer(squared[2], late[..., i] * late[..., j])
         for i, j in ((0, 0), (1, 1), (0, 1))
     )
-    logs = np.log(shares[weighed])[:, None] + log_normal(away, xx, yy, xy)
-    greatest = logs.max(axis=1)
-    mixed = greatest + np.log(np.exp(logs - greatest[:, None]).sum(axis=1))
-    density: Array = np.maximum(mixed, FURTHEST).mean(axis=1)
+    density: Array = np.maximum(log_mixture(shares[weighed], away, xx, yy, xy), FURTHEST).mean(axis=1)
     return density
-
-
-def inside(seen: Observation, row: int, doubt: Doubt, config: Config, level: float) -> Array:
-    """Return 1 where the ellipse of a candidate holds the true position at `TIMES_S`, 0 where not, nan beyond the end, (h,)."""
-    return held(seen.truth.positions - seen.ways.mean[row], widened(seen, doubt, config)[row], level)
 
 
 def widened(seen: Observation, doubt: Doubt, config: Config) -> Array:

@@ -9,11 +9,11 @@ import numpy as np
 from foc_ros.evaluation.forecasts import power_rule
 from foc_ros.evaluation.heldout import chosen
 from foc_ros.evaluation.observations import TIMES_S, Observations
-from foc_ros.evaluation.positions import mixture_levels
+from foc_ros.evaluation.positions import held, mixture_levels
 from foc_ros.foc.config import Config
 
 from .choices import Table
-from .densities import DOUBTS, NO_DOUBT, Doubt, inside, log_densities, widened
+from .densities import DOUBTS, NO_DOUBT, Doubt, log_densities, widened
 from .estimates import Estimate
 from .resampling import CENTRAL
 
@@ -62,12 +62,14 @@ def coverage(observations: Sequence[Observations], config: Config, doubts: Seque
     doubts (n,): for each recording, so that each can be judged by one that it had no part in. By all ways together: in their
     smallest region of 90 %.
     """
-    place, held = TIMES_S.index(HORIZON_S), []
+    place, counted = TIMES_S.index(HORIZON_S), []
     for recording, doubt in zip(observations, doubts, strict=True):
         for seen in recording.each:
             if seen.since_s > 0.0 and np.isfinite(seen.truth.positions[place, 0]):
                 shares = power_rule(seen, config.likelihood)
-                all_ways = mixture_levels(seen, shares, widened(seen, doubt, config))[place] < LEVEL
-                held.append((inside(seen, int(shares.argmax()), doubt, config, LEVEL)[place], float(all_ways)))
-    one, together = np.mean(held, axis=0).tolist() if held else (None, None)
+                covariance, row = widened(seen, doubt, config), int(shares.argmax())
+                likeliest = held(seen.truth.positions - seen.ways.mean[row], covariance[row], LEVEL)
+                all_ways = mixture_levels(seen, shares, covariance) < LEVEL
+                counted.append((likeliest[place], float(all_ways[place])))
+    one, together = np.mean(counted, axis=0).tolist() if counted else (None, None)
     return {'inside_90': one, 'inside_all_90': together}

@@ -135,7 +135,9 @@ class _Walker:
             return slid(self.problem, control, joined(self.problem, contacts), tau, lam, way)
 
         found = self.sequence(guess, working, tau, lam, jump, thorough=thorough)
-        if found is None or not found.stays or (way is not None and not goes(self.problem, found.control, way)):
+        if found is None or not found.stays:
+            return None
+        if way is not None and not found.jumped and not goes(self.problem, found.control, way):
             return None
         return self.judged(s, found.control, found.contacts, rough=not found.jumped)
 

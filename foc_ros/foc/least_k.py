@@ -9,7 +9,7 @@ import numpy as np
 
 from .assess import Assessment, assess
 from .between import course_of, place, place_row
-from .chance import CERTAIN_K, k_of, variance_of
+from .chance import CERTAIN_K, k_of, variance_at
 from .compiled import Matrix, Tensor, Vector, compiled
 from .problem import Problem, spread
 from .records import Array
@@ -97,10 +97,8 @@ def _moments(
 ) -> tuple[float, float]:
     """Return E[C] and Var[C] of circle j at step t + 1; E is without a bound where the circle does not count."""
     x, y = course[0, t + 1] - centres[j, t, 0], course[1, t + 1] - centres[j, t, 1]
-    xx, yy = covariance[0, t] + centre_covariance[j, 0, 0], covariance[1, t] + centre_covariance[j, 1, 1]
-    xy = covariance[2, t] + centre_covariance[j, 0, 1]
     mean = size_mean[j] - x * x - y * y if t + 1.0 >= leaving[j] else -np.inf
-    return mean, variance_of(x, y, xx, yy, xy, size_variance[j])
+    return mean, variance_at(x, y, covariance, t, size_variance[j], centre_covariance[j])
 
 
 @compiled

@@ -47,7 +47,7 @@ def predict(
     )
     tried = [_priced(memory.aged(outcome, hand.stamp_ns), config.duration) for outcome in tried]
     outcomes = ranked(tried, config.likelihood, obstacles)
-    unsure = {one: doubt(one.horizon.dt, one.horizon.steps, hand, config) for one in dict.fromkeys(problems.values())}
+    unsure = {one: doubt(one.error_map, one.horizon.dt, hand, config) for one in dict.fromkeys(problems.values())}
     outcomes = [_seen(outcome, hand, unsure[problems[outcome.candidate.label]], config.duration) for outcome in outcomes]
     answer = [outcome for outcome in outcomes if outcome.solved]
     labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])

@@ -86,10 +86,9 @@ def converge(
         solves += solution.solves
         working, positions = solution.active, problem.positions(solution.control)
         move = float(np.abs(positions - guess).max()) / problem.extent
-        if move < STAYS or count == most:
-            contacts = Contacts(working.obstacle, times[working.step], solution.multipliers)
-            return Converged(solution.control, positions, working, contacts, solves, count, stays=move < STAYS)
         contacts = Contacts(working.obstacle, times[working.step], solution.multipliers)
+        if move < STAYS or count == most:
+            return Converged(solution.control, positions, working, contacts, solves, count, stays=move < STAYS)
         found = jump(solution.control, contacts) if jump is not None else None
         if found is not None:
             positions = problem.positions(found[0])
