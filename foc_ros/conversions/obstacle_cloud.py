@@ -17,10 +17,12 @@ from .plane import project
 
 REQUIRED = ('x', 'y', 'z', 'radius')
 OPTIONAL = ('radius_stddev', 'vx', 'vy', 'vz')
+COLUMNS = (*REQUIRED, *OPTIONAL)
 IDENTITY = 'id'
 MAX_ROWS = 20_000
 """Obstacles in one message, or held from markers; more is no scene a hand moves in."""
 
+_LEAST = np.array([[0.0 if name.startswith('radius') else -MAX_COORDINATE] for name in COLUMNS])
 _KINDS = {1: 'i1', 2: 'u1', 3: 'i2', 4: 'u2', 5: 'i4', 6: 'u4', 7: 'f4', 8: 'f8'}
 """numpy's name of each sensor_msgs/PointField datatype."""
 
@@ -51,11 +53,11 @@ def cloud_obstacles(message: Any, plane: str) -> CloudScene:
     if not len(table):
         return CloudScene(make_obstacles(), stamp_ns, frame_id, {})
     columns = _columns(table)
-    finite = np.flatnonzero(np.all([np.isfinite(column) for column in columns.values()], axis=0))
-    for name, column in columns.items():
-        _check_column(name, column, finite)
-    kept = _last_of_each(table[IDENTITY] if IDENTITY in (table.dtype.names or ()) else np.arange(len(table)), finite)
-    dropped = {'not_finite': len(table) - len(finite), 'duplicate_id': len(finite) - len(kept)}
+    finite = np.logical_and.reduce(np.isfinite(columns))
+    _check(columns, finite)
+    rows = np.flatnonzero(finite)
+    kept = _last_of_each(table[IDENTITY] if IDENTITY in (table.dtype.names or ()) else np.arange(len(table)), rows)
+    dropped = {'not_finite': len(table) - len(rows), 'duplicate_id': len(rows) - len(kept)}
     obstacles = _obstacles(columns, kept, plane)
     return CloudScene(obstacles, stamp_ns, frame_id, {reason: count for reason, count in dropped.items() if count})
 
@@ -102,20 +104,23 @@ def _layout(message: Any, step: int) -> np.dtype[np.void]:
     return np.dtype({'names': list(members), 'formats': list(formats), 'offsets': list(offsets), 'itemsize': step})
 
 
-def _columns(table: NDArray[np.void]) -> dict[str, Array]:
-    """Return every column of numbers (n,) as float64; optional ones that are absent are 0."""
-    given = table.dtype.names or ()
-    zeros = np.zeros(len(table))
+def _columns(table: NDArray[np.void]) -> Array:
+    """Return the numbers of the rows as COLUMNS (8, n); optional ones that are absent are 0."""
+    columns = np.zeros((len(COLUMNS), len(table)))
     with np.errstate(invalid='ignore'):  # a signalling NaN is a NaN like others; its row is left out later
-        return {name: table[name].astype(float) if name in given else zeros for name in (*REQUIRED, *OPTIONAL)}
+        for name in table.dtype.names or ():
+            if name != IDENTITY:
+                columns[COLUMNS.index(name)] = table[name]
+    return columns
 
 
-def _check_column(name: str, column: Array, rows: NDArray[np.intp]) -> None:
-    low = 0.0 if name.startswith('radius') else -MAX_COORDINATE
-    wrong = rows[(column[rows] < low) | (column[rows] > MAX_COORDINATE)]
-    if len(wrong):
+def _check(columns: Array, finite: NDArray[np.bool_]) -> None:
+    wrong = ((columns < _LEAST) | (columns > MAX_COORDINATE)) & finite
+    if wrong.any():
+        column, row = np.argwhere(wrong)[0]
+        name, value = COLUMNS[column], columns[column, row]
         unit = 'm/s' if name.startswith('v') else 'm'
-        raise MessageError(f'{name}[{wrong[0]}]', f'a number in [{low:g}, {MAX_COORDINATE:g}] {unit}', f'{column[wrong[0]]:g}')
+        raise MessageError(f'{name}[{row}]', f'a number in [{_LEAST[column, 0]:g}, {MAX_COORDINATE:g}] {unit}', f'{value:g}')
 
 
 def _last_of_each(identities: NDArray[Any], rows: NDArray[np.intp]) -> dict[str, int]:
@@ -124,11 +129,9 @@ def _last_of_each(identities: NDArray[Any], rows: NDArray[np.intp]) -> dict[str,
     return {str(identity): row for identity, row in sorted(latest.items(), key=itemgetter(1))}
 
 
-def _obstacles(columns: dict[str, Array], kept: dict[str, int], plane: str) -> Obstacles:
-    rows = list(kept.values())
-    centre, _ = project(np.stack([columns[name][rows] for name in ('x', 'y', 'z')], axis=-1), plane)
-    velocity, _ = project(np.stack([columns[name][rows] for name in ('vx', 'vy', 'vz')], axis=-1), plane)
-    return make_obstacles(centre, columns['radius'][rows], columns['radius_stddev'][rows], tuple(kept), velocity)
+def _obstacles(columns: Array, kept: dict[str, int], plane: str) -> Obstacles:
+    x_y_z, (radius, radius_stddev), velocity = np.split(columns[:, list(kept.values())], (3, 5))
+    return make_obstacles(project(x_y_z.T, plane)[0], radius, radius_stddev, tuple(kept), project(velocity.T, plane)[0])
 
 
 def _bytes(data: Any) -> NDArray[np.uint8]:

@@ -11,22 +11,22 @@ from numpy.typing import ArrayLike
 
 from foc_ros.foc.records import Array
 
-_AXES = {'xy': (0, 1, 2), 'xz': (0, 2, 1), 'yz': (1, 2, 0)}
-"""First and second axis of each plane, then its normal."""
+_AXES = {'xy': (slice(0, 2), 2), 'xz': (slice(0, 3, 2), 1), 'yz': (slice(1, 3), 0)}
+"""First and second axis of each plane, as a slice, then its normal."""
 
 
 def project(points: ArrayLike, plane: str) -> tuple[Array, Array]:
-    """Split points (..., 3) [m] into positions in the plane (..., 2) and heights (...)."""
-    first, second, normal = _AXES[plane]
+    """Split points (..., 3) [m] into positions in the plane (..., 2) and heights (...), both views of an array's own numbers."""
+    inside, normal = _AXES[plane]
     array = np.asarray(points, dtype=float)
-    return array[..., [first, second]], array[..., normal]
+    return array[..., inside], array[..., normal]
 
 
 def lift(positions: ArrayLike, height: ArrayLike, plane: str) -> Array:
     """Return the points (..., 3) of positions in the plane (..., 2) at a height [m]; velocities lift at height 0."""
-    first, second, normal = _AXES[plane]
+    inside, normal = _AXES[plane]
     array = np.asarray(positions, dtype=float)
     points = np.empty((*array.shape[:-1], 3))
-    points[..., [first, second]] = array
+    points[..., inside] = array
     points[..., normal] = height
     return points

@@ -21,7 +21,7 @@ the jerk is highest. At no time more than 1.03 of the whole effort. With 1 mm of
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -74,24 +74,16 @@ def advanced(effort: Effort, stamp_ns: int, position: Array, stddev: float) -> E
 
     A sample that the stretch's quintic does not explain ends the stretch, and belongs to none: it may be an outlier.
     """
-    stretch = _with_sample(effort, stamp_ns, position)
-    fit = _fitted(stretch, stddev)
-    if fit is None:
-        return stretch
-    spent, explained = fit
-    if not explained:
-        return Effort(spent=effort.spent, before=effort.spent)
-    return replace(stretch, spent=stretch.before + spent)
-
-
-def _with_sample(effort: Effort, stamp_ns: int, position: Array) -> Effort:
-    if effort.start_ns is None:
-        effort = replace(effort, start_ns=stamp_ns, origin=position)
-    assert effort.start_ns is not None
-    seconds = (stamp_ns - effort.start_ns) / NANOSECONDS
-    z = position - effort.origin
+    start_ns, origin = (stamp_ns, position) if effort.start_ns is None else (effort.start_ns, effort.origin)
+    seconds, z = (stamp_ns - start_ns) / NANOSECONDS, position - origin
     powers, products = summed(effort.powers, effort.products, seconds, z)
-    return replace(effort, last_s=seconds, powers=powers, products=products, square=effort.square + float(z @ z))
+    square, spent = effort.square + float(z @ z), effort.spent
+    if powers[0] >= LEAST_SAMPLES and seconds >= LEAST_TIME_S:
+        told, added, explained = fitted(powers, products, square, seconds, stddev)
+        if told and not explained:
+            return Effort(spent=effort.spent, before=effort.spent)
+        spent = effort.before + added if told else spent
+    return Effort(spent, effort.before, start_ns, seconds, origin, powers, products, square)
 
 
 @compiled
@@ -131,11 +123,3 @@ def fitted(powers: Vector, products: Matrix, square: float, T: float, stddev: fl
         y[k] *= max(1.0 - SHRINKAGE * noise / max(energy[k], noise), 0.0) if told else 0.0
     spent = max((y * combined(jerk, y)).sum(), 0.0) / T**5
     return True, spent, residual <= (MISFIT * stddev) ** 2 + rounding
-
-
-def _fitted(stretch: Effort, stddev: float) -> tuple[float, bool] | None:
-    """Return a stretch's effort [m^2/s^5] and whether its quintic explains it; None where it is too short to tell."""
-    if stretch.powers[0] < LEAST_SAMPLES or stretch.last_s < LEAST_TIME_S:
-        return None
-    told, spent, explained = fitted(stretch.powers, stretch.products, stretch.square, stretch.last_s, stddev)
-    return (spent, explained) if told else None

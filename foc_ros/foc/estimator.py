@@ -24,7 +24,7 @@ several per second to one in 45 s or fewer, and delays a true one (0.3 m in 1 s)
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -74,7 +74,7 @@ def update(state: Track | None, sample: HandSample, config: EstimatorConfig) -> 
         return Update(state, Verdict.LATE)
     if dt > config.gap_s:
         return Update(_first(sample, config), Verdict.RESTARTED_GAP)
-    return Update(_moved(_filtered(state, sample, dt, config), sample, config), Verdict.ACCEPTED)
+    return Update(_followed(state, sample, dt, config), Verdict.ACCEPTED)
 
 
 @compiled
@@ -152,28 +152,23 @@ def _first(sample: HandSample, config: EstimatorConfig) -> Track:
     return Track(sample.stamp_ns, mean, both_axes(root @ root.T), sample.height, sample.frame_id, root=root)
 
 
-def _filtered(state: Track, sample: HandSample, dt: float, config: EstimatorConfig) -> Track:
-    """Predict to the sample's stamp and correct by its position."""
+def _followed(state: Track, sample: HandSample, dt: float, config: EstimatorConfig) -> Track:
+    """Predict to the sample's stamp, correct by its position, and see what becomes of the movement."""
     mean, covariance, root = filtered(state.mean, state.root, dt, config.jerk_density, config.position_stddev, sample.position)
-    return replace(
-        state,
-        stamp_ns=sample.stamp_ns,
-        mean=mean,
-        covariance=covariance,
-        height=sample.height,
-        frame_id=sample.frame_id,
-        root=root,
-    )
+    onset_ns, onset_position, effort = _movement(state, sample, mean, covariance, config)
+    hand = sample.stamp_ns, mean, covariance, sample.height, sample.frame_id
+    return Track(*hand, onset_ns, onset_position, effort.spent, root, effort)
 
 
-def _moved(state: Track, sample: HandSample, config: EstimatorConfig) -> Track:
-    """Begin, go on with, or end a movement."""
-    speed = math.hypot(state.mean[2], state.mean[3])
-    if state.onset_ns is None:
-        if speed <= max(config.onset_speed, ONSET_STDDEVS * math.sqrt(state.covariance[2, 2])):
-            return state
-        state = replace(state, onset_ns=state.stamp_ns, onset_position=state.mean[:2])
+def _movement(
+    state: Track, sample: HandSample, mean: Array, covariance: Array, config: EstimatorConfig
+) -> tuple[int | None, Array | None, Effort]:
+    """Begin, go on with, or end a movement: return its onset and where that was, None at rest, and its effort."""
+    onset_ns, onset_position, speed = state.onset_ns, state.onset_position, math.hypot(mean[2], mean[3])
+    if onset_ns is None:
+        if speed <= max(config.onset_speed, ONSET_STDDEVS * math.sqrt(covariance[2, 2])):
+            return None, None, state.effort
+        onset_ns, onset_position = sample.stamp_ns, mean[:2]
     elif speed < config.onset_speed / 2.0:
-        return replace(state, onset_ns=None, onset_position=None, effort_spent=0.0, effort=Effort())
-    effort = advanced(state.effort, sample.stamp_ns, sample.position, config.position_stddev)
-    return replace(state, effort=effort, effort_spent=effort.spent)
+        return None, None, Effort()
+    return onset_ns, onset_position, advanced(state.effort, sample.stamp_ns, sample.position, config.position_stddev)

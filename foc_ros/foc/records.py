@@ -118,10 +118,10 @@ def make_obstacles(
     return Obstacles(
         tuple(str(i) for i in range(n)) if ids is None else tuple(ids),
         centres,
-        np.broadcast_to(np.asarray(radius, dtype=float) if np.size(radius) else np.zeros(0), (n,)).copy(),
-        np.broadcast_to(np.asarray(radius_stddev, dtype=float), (n,)).copy(),
-        np.broadcast_to(np.asarray(velocity, dtype=float), (n, 2)).copy(),
-        np.broadcast_to(np.asarray(centre_covariance, dtype=float), (n, 2, 2)).copy(),
+        np.full(n, radius, dtype=float),
+        np.full(n, radius_stddev, dtype=float),
+        np.full((n, 2), velocity, dtype=float),
+        np.full((n, 2, 2), centre_covariance, dtype=float),
     )
 
 
