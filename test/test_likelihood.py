@@ -24,7 +24,7 @@ def test_ratio_of_likelihoods_is_the_power_of_the_ratio_of_costs() -> None:
 
 def test_nothing_in_nothing_out() -> None:
     assert likelihoods(np.zeros(0), plain(0.5)).shape == (0,)
-    assert most_likely([], np.zeros(0), 'a', 0.1) is None
+    assert most_likely({}, 'a', 0.1) is None
 
 
 def test_beta_zero_is_uniform_and_large_beta_picks_the_cheapest() -> None:
@@ -60,17 +60,17 @@ def test_a_cost_that_is_none_is_refused_by_name(wrong: float) -> None:
 
 
 def test_most_likely_stays_until_another_leads_by_more_than_the_margin() -> None:
-    p = np.array([0.44, 0.56])
-    assert most_likely(['a', 'b'], p, 'a', 0.13) == 'a'
-    assert most_likely(['a', 'b'], p, 'a', 0.11) == 'b'
-    assert most_likely(['a', 'b'], p, None, 0.13) == 'b'
-    assert most_likely(['a', 'b'], p, 'gone', 0.13) == 'b'
-    assert most_likely(['a', 'b'], np.array([0.0, 1.0]), 'a', 1.0) == 'a'
+    p = {'a': 0.44, 'b': 0.56}
+    assert most_likely(p, 'a', 0.13) == 'a'
+    assert most_likely(p, 'a', 0.11) == 'b'
+    assert most_likely(p, None, 0.13) == 'b'
+    assert most_likely(p, 'gone', 0.13) == 'b'
+    assert most_likely({'a': 0.0, 'b': 1.0}, 'a', 1.0) == 'a'
 
 
 @given(st.permutations(list('abcd')), st.sampled_from([None, *'abcdx']), st.floats(0.0, 1.0))
 def test_the_order_of_the_classes_does_not_matter(order: list[str], previous: str | None, margin: float) -> None:
     p = {'a': 0.2, 'b': 0.3, 'c': 0.3, 'd': 0.2}
-    answer = most_likely(order, np.array([p[label] for label in order]), previous, margin)
-    assert answer == most_likely(list('abcd'), np.array([0.2, 0.3, 0.3, 0.2]), previous, margin)
+    answer = most_likely({label: p[label] for label in order}, previous, margin)
+    assert answer == most_likely(p, previous, margin)
     assert answer == (previous if previous in ('b', 'c') or (previous in p and margin >= 0.3 - 0.2) else 'b')

@@ -25,6 +25,7 @@ margins by motor noise alone. But what we predict is as uncertain as
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -49,15 +50,13 @@ def doubt(error_map: Array, dt: float, hand: HandState, config: Config) -> Array
     return unsure
 
 
-def timing_doubt(solution: Solution, at_rest: bool, config: DurationConfig) -> Array | float:
-    """Return the covariance (N + 1, 6, 6) at steps 0..N that comes of not knowing when a plan begins and how long it takes."""
-    covariance: Array | float = 0.0
+def timing_doubts(solution: Solution, at_rest: bool, config: DurationConfig) -> Iterator[Array]:
+    """Yield the covariances (N + 1, 6, 6) at steps 0..N that come of not knowing when a plan begins and how long it takes."""
     if config.spread > 0.0:
         moved = config.spread * lateness(solution, is_passing(config))
-        covariance = moved[:, :, None] * moved[:, None, :]
+        yield moved[:, :, None] * moved[:, None, :]
     if at_rest and config.wait_s > 0.0:
-        covariance = covariance + waiting(solution, config.wait_s)
-    return covariance
+        yield waiting(solution, config.wait_s)
 
 
 def waiting(solution: Solution, wait_s: float) -> Array:

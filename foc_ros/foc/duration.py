@@ -84,7 +84,8 @@ def times_to_go(hand: HandState, goals: Array, config: DurationConfig) -> list[f
     longer by the least factor with which, for one goal, the way left at the present speed is in time. At rest: the duration from
     here.
     """
-    distances = [math.dist(hand.mean[:2], goal) for goal in goals]
+    here, places = hand.mean[:2].tolist(), goals.tolist()
+    distances = [math.dist(here, goal) for goal in places]
     if config.model == 'cost_of_time':
         lines = [np.linspace(hand.mean[:2], goal, 6) for goal in goals]
         return [_least_cost(hand, away, _heading(line), config) for away, line in zip(distances, lines, strict=True)]
@@ -92,7 +93,8 @@ def times_to_go(hand: HandState, goals: Array, config: DurationConfig) -> list[f
         expected = [movement_time(distance, config) for distance in distances]
     else:
         since_s = (hand.stamp_ns - hand.onset_ns) / NANOSECONDS
-        whole = [max(movement_time(math.dist(hand.onset_position, goal), config), SHORTEST_S) for goal in goals]
+        began = hand.onset_position.tolist()
+        whole = [max(movement_time(math.dist(began, goal), config), SHORTEST_S) for goal in places]
         speed = max(math.hypot(hand.mean[2], hand.mean[3]), SLOWEST)
         told = [
             (since_s + distance / speed) / lasts

@@ -19,10 +19,12 @@ evenly when it is far. Looking ahead without end, h is infinite, and p_i is as a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping
 
 import numpy as np
 
+from .compiled import Vector, compiled
 from .config import LikelihoodConfig
 from .errors import InputError
 from .partings import Partings
@@ -43,18 +45,30 @@ def likelihoods(costs: Array, config: LikelihoodConfig, partings: Partings | Non
     partings: of these classes, not asked for without a look-ahead. Costs below `COST_FLOOR` count as that. Computed from
     logarithms, so nothing overflows. Raises InputError for a cost that is negative or not finite.
     """
-    values = np.asarray(costs, dtype=float)
-    if not len(values):
-        return np.zeros(0)
-    wrong = np.flatnonzero(~(np.isfinite(values) & (values >= 0.0)))
-    if len(wrong):
-        raise InputError(f'costs[{wrong[0]}]', 'a finite number >= 0', values[wrong[0]])
-    logs = -config.beta * np.log(np.maximum(values, COST_FLOOR))
-    if config.lookahead_s > 0.0 and partings is not None:
+    values = np.ascontiguousarray(costs, dtype=float)
+    for row, value in enumerate(values.tolist()):
+        if not 0.0 <= value < math.inf:
+            raise InputError(f'costs[{row}]', 'a finite number >= 0', value)
+    logs = worths(values, config.beta)
+    if config.lookahead_s > 0.0 and partings is not None and len(logs):
         logs = _looking_ahead(logs - logs.max(), partings, config.lookahead_s)
-    weights = np.exp(logs - logs.max())
-    shares: Array = weights / weights.sum()
-    return shares
+    return shares(logs)
+
+
+@compiled
+def worths(costs: Vector, beta: float) -> Vector:
+    """Return log J_i^-beta, (k,)."""
+    return -beta * np.log(np.maximum(costs, COST_FLOOR))
+
+
+@compiled
+def shares(logs: Vector) -> Vector:
+    """Return what is proportional to exp(logs) and sums to one, (k,)."""
+    if not len(logs):
+        return np.zeros(0)
+    weights: Array = np.exp(logs - logs.max())
+    weights /= weights.sum()
+    return weights
 
 
 def _looking_ahead(logs: Array, partings: Partings, lookahead_s: float) -> Array:
@@ -74,14 +88,14 @@ def _looking_ahead(logs: Array, partings: Partings, lookahead_s: float) -> Array
     return weighed
 
 
-def most_likely(labels: Sequence[str], likelihoods: Array, previous: str | None, margin: float) -> str | None:
+def most_likely(likelihoods: Mapping[str, float], previous: str | None, margin: float) -> str | None:
     """Return the label of the most likely class, which stays `previous` until another leads by more than `margin`.
 
-    Of equally likely ones the label first in the alphabet holds, whatever the order of the input. None for none.
+    likelihoods: by label. Of equally likely ones the label first in the alphabet holds, whatever the order of the input. None
+    for none.
     """
-    if not labels:
+    if not likelihoods:
         return None
-    ranked = sorted(zip(labels, likelihoods, strict=True), key=lambda item: (-item[1], item[0]))
-    best, lead = ranked[0]
-    held = dict(ranked).get(previous) if previous is not None else None
-    return previous if held is not None and lead - held <= margin else best
+    lead, best = min((-share, label) for label, share in likelihoods.items())
+    held = likelihoods.get(previous) if previous is not None else None
+    return previous if held is not None and -lead - held <= margin else best

@@ -32,6 +32,8 @@ class Memory:
         A name changes, and those of all ways at once, where an obstacle is passed or comes into reach. A way that passes
         all obstacles that both names hold on the same sides starts from where the other was, the likeliest of several.
         """
+        if all(candidate.label in self.earlier.solutions for candidate in candidates):
+            return self.earlier
         solutions, likelihoods = dict(self.earlier.solutions), dict(self.earlier.likelihoods)
         before = [one for one in self.candidates if one.label in solutions]
         before.sort(key=lambda one: (-likelihoods.get(one.label, 0.0), one.label))

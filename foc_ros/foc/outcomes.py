@@ -71,6 +71,8 @@ def _judged(candidate: Candidate, problem: Problem, solution: Solution, shared: 
 
 def distinct(outcomes: Sequence[Outcome]) -> list[Outcome]:
     """Drop what slid into a class that another outcome solved: the same way round is never counted twice."""
+    if all(outcome.solution.status is not Status.LEFT_CLASS for outcome in outcomes):
+        return list(outcomes)
     held = {_class(outcome) for outcome in outcomes if outcome.solved}
     return [outcome for outcome in outcomes if outcome.solution.status is not Status.LEFT_CLASS or _class(outcome) not in held]
 
@@ -84,7 +86,8 @@ def ranked(outcomes: Sequence[Outcome], likelihood: LikelihoodConfig, obstacles:
     outcomes = distinct(outcomes)
     solved = [outcome for outcome in outcomes if outcome.solved]
     parted = partings(solved, obstacles) if likelihood.lookahead_s > 0.0 else None
-    shares = likelihoods(np.array([outcome.cost for outcome in solved]), likelihood, parted)
-    weighed = [replace(outcome, likelihood=float(share)) for outcome, share in zip(solved, shares, strict=True)]
+    shares = likelihoods(np.array([outcome.cost for outcome in solved]), likelihood, parted).tolist()
+    pairs = zip(solved, shares, strict=True)
+    weighed = [Outcome(one.candidate, one.solution, one.sides, one.cost, share) for one, share in pairs]
     weighed.sort(key=lambda outcome: (-outcome.likelihood, outcome.candidate.label))
     return weighed + [outcome for outcome in outcomes if not outcome.solved]

@@ -11,7 +11,7 @@ import numpy as np
 from .config import REFERENCE_STEP_S, Config, DurationConfig
 from .culling import relevant
 from .deadline import Deadline
-from .doubt import doubt, timing_doubt
+from .doubt import doubt, timing_doubts
 from .duration import is_passing, time_price, times_to_go, way_times
 from .dynamics import triple_integrator_horizon
 from .homotopy import search
@@ -45,13 +45,12 @@ def predict(
     tried = solve_candidates(
         candidates, list(problems.values()), config.foc, config.likelihood, hand.effort_spent, memory.known(candidates), deadline
     )
-    tried = [_priced(memory.aged(outcome, hand.stamp_ns), config.duration) for outcome in tried]
+    tried = [_priced(memory.aged(outcome, hand.stamp_ns), time_price(config.duration)) for outcome in tried]
     outcomes = ranked(tried, config.likelihood, obstacles)
     unsure = {one: doubt(one.error_map, one.horizon.dt, hand, config) for one in dict.fromkeys(problems.values())}
     outcomes = [_seen(outcome, hand, unsure[problems[outcome.candidate.label]], config.duration) for outcome in outcomes]
-    answer = [outcome for outcome in outcomes if outcome.solved]
-    labels, values = [outcome.candidate.label for outcome in answer], np.array([outcome.likelihood for outcome in answer])
-    best = most_likely(labels, values, memory.most_likely, config.likelihood.margin)
+    shares = {outcome.candidate.label: outcome.likelihood for outcome in outcomes if outcome.solved}
+    best = most_likely(shares, memory.most_likely, config.likelihood.margin)
     counted = {'merged': len(candidates) - len(outcomes), 'culled': len(given) - len(obstacles)}
     counted['recalled'] = len(candidates) - len(found.candidates)
     notes = dict(found.notes) | {name: count for name, count in counted.items() if count}
@@ -60,9 +59,8 @@ def predict(
     return prediction, memory.after(prediction, candidates, tried)
 
 
-def _priced(outcome: Outcome, config: DurationConfig) -> Outcome:
+def _priced(outcome: Outcome, price: float) -> Outcome:
     """Add what the time to go costs."""
-    price = time_price(config)
     return replace(outcome, cost=outcome.cost + price * float(outcome.solution.times[-1])) if price else outcome
 
 
@@ -117,7 +115,7 @@ def _start(hand: HandState, acceleration_time_s: float) -> HandState:
     a thumb stick, that is soon, and a plan that starts from v + tau a without acceleration is nearer to what comes.
     """
     if hand.onset_ns is None:
-        return replace(hand, mean=np.append(hand.mean[:2], np.zeros(4)))
+        return replace(hand, mean=np.concatenate([hand.mean[:2], np.zeros(4)]))
     if not acceleration_time_s:
         return hand
     settled = hand.mean[2:4] + acceleration_time_s * hand.mean[4:]
@@ -127,5 +125,8 @@ def _start(hand: HandState, acceleration_time_s: float) -> HandState:
 def _seen(outcome: Outcome, hand: HandState, unsure: Array, duration: DurationConfig) -> Outcome:
     """Add a doubt (N + 1, 6, 6), and that of the times, to what the hand's own noise will do."""
     solution = outcome.solution
-    covariance = solution.covariance + unsure + timing_doubt(solution, hand.onset_ns is None, duration)
-    return replace(outcome, solution=replace(solution, covariance=covariance))
+    covariance = solution.covariance + unsure
+    for added in timing_doubts(solution, hand.onset_ns is None, duration):
+        covariance += added
+    seen = solution.with_covariance(covariance)
+    return Outcome(outcome.candidate, seen, outcome.sides, outcome.cost, outcome.likelihood)

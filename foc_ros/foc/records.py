@@ -18,6 +18,12 @@ LEFT, RIGHT = 1, -1
 """Side on which a path passes an obstacle, seen in the direction of travel."""
 
 
+def fixed(array: Array) -> Array:
+    """Make an array that nobody else holds read-only, so that a record takes it as it is, without a copy."""
+    array.flags.writeable = False
+    return array
+
+
 class Record:
     """Base of the records: freezes every array field after construction."""
 
@@ -192,6 +198,12 @@ class Solution(Record):
     qp_solves: int = 0
     iterations: int | None = None
     solve_s: float = 0.0
+
+    def with_covariance(self, covariance: Array) -> Solution:
+        """Return the solution with another covariance (N + 1, n, n), fresh: `dataclasses.replace` at a tenth of the time."""
+        other = object.__new__(Solution)
+        vars(other).update(vars(self), covariance=fixed(covariance))
+        return other
 
     @property
     def path(self) -> Array:
