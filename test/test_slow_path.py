@@ -24,15 +24,18 @@ AGREE_M = 1e-6
 def at_any_time(problem: Problem, solution: Solution) -> ReachingQP:
     """Return the QP of `clearance_qp` with rows at the steps and at the times of the contacts, linearised at the solution."""
     steps = problem.horizon.steps
-    times = np.concatenate((np.arange(1, steps + 1), [time for _, time, _ in solution.multipliers]))
+    further = np.array([time for _, time, _ in solution.multipliers])
+    times = np.concatenate((np.arange(1, steps + 1), further))
     motion, course = problem.horizon.motion, problem.course(solution.control.T.ravel())
-    maps = np.array([[place_row(motion, time, 0, x, y) for time in times] for x, y in ((1.0, 0.0), (0.0, 1.0))])
+    maps = np.array([[place_row(motion, time, x, y) for time in further] for x, y in ((1.0, 0.0), (0.0, 1.0))])
+    maps = maps.reshape(2, len(further), 2 * steps)
     centres = problem.obstacles.centre[:, None] + times[None, :, None] * problem.drift[:, None]
     away = np.array([place(course, time, 0) for time in times]) - centres
     normals = away / np.linalg.norm(away, axis=2, keepdims=True)
     free = np.array([place(problem.free_course, time, 0) for time in times])
     limits = np.sqrt(problem.size[0] + solution.tau)[:, None] + np.einsum('mta,mta->mt', normals, centres - free)
-    return ReachingQP(effort_cost(problem, solution.lam), maps, np.ones((2, 2 * steps)), normals, limits)
+    positions = problem.horizon.maps[:2]
+    return ReachingQP(effort_cost(problem, solution.lam), positions, np.ones((2, 2 * steps)), normals, limits, maps)
 
 
 def slow_path(problem: Problem, solution: Solution, strategy: str) -> np.ndarray:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compiled import Matrix, Tensor, Vector, compiled
+from .driven import driven
 
 ROOT_STEPS = 40
 """Steps of regula falsi, or halvings, to the moment of closest approach within a step; five are usual."""
@@ -49,31 +50,32 @@ def place(course: Matrix, time: float, order: int) -> Vector:
 
 
 @compiled
-def place_row(motion: Tensor, time: float, order: int, x: float, y: float) -> Vector:
-    """Return what the control (2N,) adds to x p_x + y p_y, or its derivative; motion (4, N + 1, 2N) gives the course from it."""
-    t = min(int(time), motion.shape[1] - 2)
-    weight, direction = blend(time - t, order), (x, y)
-    row = np.zeros(motion.shape[2])
-    for axis in range(2):
-        for u in range(len(row)):
-            row[u] += direction[axis] * (
-                weight[0] * motion[axis, t, u]
-                + weight[1] * motion[2 + axis, t, u]
-                + weight[2] * motion[axis, t + 1, u]
-                + weight[3] * motion[2 + axis, t + 1, u]
-            )
+def place_row(motion: Tensor, time: float, x: float, y: float) -> Vector:
+    """Return what the control (2N,) adds to x p_x + y p_y at a time; motion (4, 2, N + 1): the course's responses to it."""
+    steps = motion.shape[2] - 1
+    t = min(int(time), steps - 1)
+    weight, direction = blend(time - t, 0), (x, y)
+    row = np.zeros(2 * steps)
+    for channel in range(2):
+        for axis in range(2):
+            p, v = motion[axis, channel], motion[2 + axis, channel]
+            for k in range(t + 1):
+                now, then = t - k, t + 1 - k
+                value = weight[0] * p[now] + weight[1] * v[now] + weight[2] * p[then] + weight[3] * v[then]
+                row[channel * steps + k] += direction[axis] * value
     return row
 
 
 @compiled
 def around(motion: Tensor, free: Matrix, control: Vector, t: int) -> Matrix:
     """Return the course of a control (2N,) at steps t and t + 1 only, (4, 2)."""
-    course = np.empty((4, 2))
+    course, steps = np.empty((4, 2)), motion.shape[2] - 1
     for q in range(4):
         for i in range(2):
             total = free[q, t + i]
-            for u in range(len(control)):
-                total += motion[q, t + i, u] * control[u]
+            for channel in range(2):
+                for k in range(t + i):
+                    total += motion[q, channel, t + i - k] * control[channel * steps + k]
             course[q, i] = total
     return course
 
@@ -81,31 +83,27 @@ def around(motion: Tensor, free: Matrix, control: Vector, t: int) -> Matrix:
 @compiled
 def contact_rows(motion: Tensor, time: float, x: float, y: float, turn: float) -> Matrix:
     """Return what the control adds at a time, (3, 2N): to n.p; to n.v + turn t.p; to t.p. n = (x, y), t = (-y, x)."""
-    step = min(int(time), motion.shape[1] - 2)
+    steps = motion.shape[2] - 1
+    step = min(int(time), steps - 1)
     p, v = blend(time - step, 0), blend(time - step, 1)
-    rows = np.empty((3, motion.shape[2]))
-    for u in range(motion.shape[2]):
-        xa, va = motion[0, step, u], motion[2, step, u]
-        xb, vb = motion[0, step + 1, u], motion[2, step + 1, u]
-        ya, wa = motion[1, step, u], motion[3, step, u]
-        yb, wb = motion[1, step + 1, u], motion[3, step + 1, u]
-        px, py = p[0] * xa + p[1] * va + p[2] * xb + p[3] * vb, p[0] * ya + p[1] * wa + p[2] * yb + p[3] * wb
-        vx, vy = v[0] * xa + v[1] * va + v[2] * xb + v[3] * vb, v[0] * ya + v[1] * wa + v[2] * yb + v[3] * wb
-        along, across = x * px + y * py, x * py - y * px
-        rows[0, u], rows[1, u], rows[2, u] = along, x * vx + y * vy + turn * across, across
+    rows = np.zeros((3, 2 * steps))
+    for channel in range(2):
+        response = motion[:, channel]
+        for k in range(step + 1):
+            now, then, u = step - k, step + 1 - k, channel * steps + k
+            xa, va, xb, vb = response[0, now], response[2, now], response[0, then], response[2, then]
+            ya, wa, yb, wb = response[1, now], response[3, now], response[1, then], response[3, then]
+            px, py = p[0] * xa + p[1] * va + p[2] * xb + p[3] * vb, p[0] * ya + p[1] * wa + p[2] * yb + p[3] * wb
+            vx, vy = v[0] * xa + v[1] * va + v[2] * xb + v[3] * vb, v[0] * ya + v[1] * wa + v[2] * yb + v[3] * wb
+            along, across = x * px + y * py, x * py - y * px
+            rows[0, u], rows[1, u], rows[2, u] = along, x * vx + y * vy + turn * across, across
     return rows
 
 
 @compiled
 def course_of(motion: Tensor, free: Matrix, control: Vector) -> Matrix:
     """Return the course (4, N + 1) of a control (2N,); free (4, N + 1): without it."""
-    course = free.copy()
-    for q in range(4):
-        for t in range(1, course.shape[1]):
-            total = 0.0
-            for u in range(len(control)):
-                total += motion[q, t, u] * control[u]
-            course[q, t] += total
+    course: Matrix = free + driven(motion, control)
     return course
 
 
@@ -135,29 +133,31 @@ def kept_at(reach: Vector, missing: Vector, pace: float, times: Vector) -> Matri
 
 @compiled
 def spared(
-    p: Vector, v: Vector, centre: Vector, drift: Vector, reach: float, missing: float, pace: float, time: float
+    x: float, y: float, vx: float, vy: float, reach: float, missing: float, pace: float, time: float
 ) -> tuple[float, float]:
-    """Return how much farther than wanted p (2,) is from a centre at a time [m], and the rate of that with v (2,) per step."""
-    x, y = p[0] - centre[0] - time * drift[0], p[1] - centre[1] - time * drift[1]
-    distance = max(np.hypot(x, y), 1e-12)
+    """Return how much farther than wanted (x, y) is from a centre at a time [m], and the rate of that; both relative to it."""
+    distance = max(np.sqrt(x * x + y * y), 1e-12)
     wanted, faster, _ = kept(reach, missing, pace, time)
-    return distance - wanted, (x * (v[0] - drift[0]) + y * (v[1] - drift[1])) / distance - faster
+    return distance - wanted, (x * vx + y * vy) / distance - faster
 
 
 @compiled
 def spared_at(
-    course: Matrix, centre: Vector, drift: Vector, reach: float, missing: float, pace: float, time: float
+    course: Matrix, cx: float, cy: float, dx: float, dy: float, reach: float, missing: float, pace: float, time: float
 ) -> tuple[float, float]:
-    """Return the same on a course (4, N + 1)."""
-    spare, rate = spared(place(course, time, 0), place(course, time, 1), centre, drift, reach, missing, pace, time)
+    """Return the same on a course (4, N + 1), of a circle that is at (cx, cy) now and moves by (dx, dy) per step."""
+    p, v = place(course, time, 0), place(course, time, 1)
+    spare, rate = spared(p[0] - cx - time * dx, p[1] - cy - time * dy, v[0] - dx, v[1] - dy, reach, missing, pace, time)
     return spare, rate
 
 
 @compiled
 def _closest(
     course: Matrix,
-    centre: Vector,
-    drift: Vector,
+    cx: float,
+    cy: float,
+    dx: float,
+    dy: float,
     reach: float,
     missing: float,
     pace: float,
@@ -170,7 +170,7 @@ def _closest(
     time = begin
     for i in range(ROOT_STEPS):
         time = (low + high) / 2 if i % 3 == 2 else (low * above - high * below) / (above - below)
-        _, rate = spared_at(course, centre, drift, reach, missing, pace, time)
+        _, rate = spared_at(course, cx, cy, dx, dy, reach, missing, pace, time)
         if rate < 0.0:
             low, below = time, rate
         else:
@@ -183,19 +183,22 @@ def _closest(
 @compiled
 def _longest(course: Matrix) -> float:
     """Return how far a mean gets from the step before it at most, before the next."""
-    longest = 0.0
-    for t in range(course.shape[1] - 1):
-        chord = np.hypot(course[0, t + 1] - course[0, t], course[1, t + 1] - course[1, t])
-        longest = max(longest, chord + np.hypot(course[2, t], course[3, t]) + np.hypot(course[2, t + 1], course[3, t + 1]))
+    longest, before = 0.0, 0.0
+    for t in range(course.shape[1]):
+        speed = np.sqrt(course[2, t] ** 2 + course[3, t] ** 2)
+        if t > 0:
+            x, y = course[0, t] - course[0, t - 1], course[1, t] - course[1, t - 1]
+            longest = max(longest, np.sqrt(x * x + y * y) + before + speed)
+        before = speed
     return longest
 
 
 @compiled
-def _is_far(places: Matrix, centre: Vector, drift: Vector, distance: float) -> bool:
-    """Tell whether a circle's centre is farther than a distance from the places (N + 1, 2) of all steps."""
+def _is_far(course: Matrix, cx: float, cy: float, dx: float, dy: float, distance: float) -> bool:
+    """Tell whether a circle's centre is farther than a distance from the places of all steps."""
     nearest = np.inf
-    for t in range(len(places)):
-        x, y = places[t, 0] - centre[0] - t * drift[0], places[t, 1] - centre[1] - t * drift[1]
+    for t in range(course.shape[1]):
+        x, y = course[0, t] - cx - t * dx, course[1, t] - cy - t * dy
         nearest = min(nearest, x * x + y * y)
     return nearest > distance * distance
 
@@ -212,23 +215,25 @@ def entered(
     """
     m, last = len(reach), course.shape[1] - 1
     found, count = np.empty((m * (last + 1), 2)), 0
-    places, speeds = np.ascontiguousarray(course[:2].T), np.ascontiguousarray(course[2:].T)
     travelled = _longest(course)
     for j in range(m):
-        if _is_far(places, centre[j], drift[j], reach[j] + travelled + np.hypot(drift[j, 0], drift[j, 1])):
+        cx, cy, dx, dy = centre[j, 0], centre[j, 1], drift[j, 0], drift[j, 1]
+        margin, short = reach[j], missing[j]
+        if _is_far(course, cx, cy, dx, dy, margin + travelled + np.hypot(dx, dy)):
             continue
         spare_before, rate_before = 0.0, 0.0
         for t in range(1, last + 1):
-            spare, rate = spared(places[t], speeds[t], centre[j], drift[j], reach[j], missing[j], pace, float(t))
+            x, y = course[0, t] - cx - t * dx, course[1, t] - cy - t * dy
+            spare, rate = spared(x, y, course[2, t] - dx, course[3, t] - dy, margin, short, pace, float(t))
             time = -1.0
             if t == 1 and rate >= 0.0:
                 time = 1.0
             elif t > 1 and rate_before < 0.0 <= rate and min(spare, spare_before) < abs(rate_before) + abs(rate):
-                time = _closest(course, centre[j], drift[j], reach[j], missing[j], pace, t - 1.0, rate_before, rate)
+                time = _closest(course, cx, cy, dx, dy, margin, short, pace, t - 1.0, rate_before, rate)
             if t == last and rate < 0.0:
                 time = float(last)
             if time > 0.0:
-                nearest, _ = spared_at(course, centre[j], drift[j], reach[j], missing[j], pace, time)
+                nearest, _ = spared_at(course, cx, cy, dx, dy, margin, short, pace, time)
                 if nearest < -tolerance:
                     found[count, 0], found[count, 1] = j, time
                     count += 1

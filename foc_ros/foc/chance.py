@@ -60,11 +60,8 @@ def expectation(offset: Tensor, position_minus_guess: Matrix, size_mean: Vector)
 
 
 @compiled
-def variance_at(x: float, y: float, covariance: Matrix, t: int, size_variance: float, centre_covariance: Matrix) -> float:
-    """Var[C] of one circle, offset d = (x, y), at column t of the covariance (3, N) of the position; centre_covariance (2, 2)."""
-    xx = covariance[0, t] + centre_covariance[0, 0]
-    yy = covariance[1, t] + centre_covariance[1, 1]
-    xy = covariance[2, t] + centre_covariance[0, 1]
+def variance_of(x: float, y: float, xx: float, yy: float, xy: float, size_variance: float) -> float:
+    """Var[C] of one circle at one time: d = (x, y), and xx, yy, xy the covariance of the position relative to the centre."""
     return float(size_variance + 4 * (x * x * xx + y * y * yy + 2 * x * y * xy))
 
 
@@ -74,8 +71,10 @@ def variance(offset: Tensor, covariance: Matrix, size_variance: Vector, centre_c
     n, steps, _ = offset.shape
     value = np.empty((n, steps))
     for j in range(n):
+        own_xx, own_yy, own_xy = centre_covariance[j, 0, 0], centre_covariance[j, 1, 1], centre_covariance[j, 0, 1]
         for t in range(steps):
-            value[j, t] = variance_at(offset[j, t, 0], offset[j, t, 1], covariance, t, size_variance[j], centre_covariance[j])
+            xx, yy, xy = covariance[0, t] + own_xx, covariance[1, t] + own_yy, covariance[2, t] + own_xy
+            value[j, t] = variance_of(offset[j, t, 0], offset[j, t, 1], xx, yy, xy, size_variance[j])
     return value
 
 

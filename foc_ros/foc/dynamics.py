@@ -16,7 +16,7 @@ from .errors import InputError
 from .records import Array, Record
 
 CACHED_HORIZONS = 16
-"""Horizons kept: those of one tick (one per duration) and a few ticks before it, about 0.1 MB each at N = 50."""
+"""Horizons kept: those of one tick (one per duration) and a few ticks before it, about 60 kB each at N = 50."""
 FREEDOM = 1e-2
 """Weight w of the control that leads back to a path, relative to what it moves: less would turn sharply to be back at once."""
 
@@ -67,48 +67,60 @@ def damped_mass(dt: float, mass: float, damping: float) -> Plant:
 
 @dataclass(frozen=True, eq=False)
 class Horizon(Record):
-    """What N steps of a plant do, stacked: X(t) = A^t X(0) + response[t-1] u for t = 1..N.
+    """What N steps of a plant do: X(t) = A^t X(0) + what the control drives it to, `driven(states, u)`.
 
-    u (2N,) is the control stacked axis after axis: first channel at steps 0..N-1, then the second. response (N, n, 2N);
-    powers (N + 1, n, n): A^0..A^N. dt [s].
+    u (2N,) is the control stacked axis after axis: first channel at steps 0..N-1, then the second. powers (N + 1, n, n):
+    A^0..A^N; states (n, 2, N + 1): the responses of the states, as in `driven`. dt [s].
     """
 
     powers: Array
-    response: Array
+    states: Array
     dt: float
 
     @property
     def steps(self) -> int:
         """N."""
-        return len(self.response)
+        return int(self.states.shape[-1]) - 1
 
     @cached_property
     def maps(self) -> Array:
-        """What the position at steps 1..N owes to u: x, y and their products xx, yy, xy, (5, N, 2N).
+        """Responses of the position: x, y and their products xx, yy, xy, (5, 2, N + 1).
 
-        The first two times u move it; the last three times c^2 u^2 spread it.
+        The first two, driven by u, move it; the last three, driven by c^2 u^2, spread it.
         """
-        x, y = self.response[:, 0], self.response[:, 1]
+        x, y = self.states[:2]
         return np.stack((x, y, x * x, y * y, x * y))
-
-    @property
-    def position(self) -> Array:
-        """S: positions at steps 1..N from u, (2, N, 2N)."""
-        return self.maps[:2]
 
     @cached_property
     def motion(self) -> Array:
-        """Position and velocity per step, x, y, vx, vy at steps 0..N, that the position owes to u, (4, N + 1, 2N)."""
-        motion = np.zeros((4, self.steps + 1, self.response.shape[-1]))
-        motion[:, 1:] = self.response[:, :4].swapaxes(0, 1)
+        """Responses of position and velocity per step: x, y, vx, vy, (4, 2, N + 1)."""
+        motion = self.states[:4].copy()
         motion[2:] *= self.dt
         return motion
 
     @cached_property
+    def last(self) -> Array:
+        """What the states at step N owe to u, (n, 2N)."""
+        last: Array = self.states[..., :0:-1].reshape(len(self.states), -1)
+        return last
+
+    @cached_property
+    def response(self) -> Array:
+        """What the states at steps 1..N owe to u, written out in full, (N, n, 2N)."""
+        since = np.arange(1, self.steps + 1)[:, None] - np.arange(self.steps)
+        response: Array = self.states[..., np.maximum(since, 0)].transpose(2, 0, 1, 3)  # nothing is owed to what comes later
+        return response.reshape(self.steps, len(self.states), -1)
+
+    @property
+    def position(self) -> Array:
+        """S: positions at steps 1..N from u, written out in full, (2, N, 2N)."""
+        return self.response[:, :2].swapaxes(0, 1)
+
+    @cached_property
     def squared(self) -> tuple[Array, Array]:
         """Squares of `response`, (n, 2N): of the last step, and summed over the steps before it."""
-        squared = self.response**2
-        return squared[-1], squared[:-1].sum(axis=0)
+        before = np.cumsum(self.states[..., :-1] ** 2, axis=-1)[..., ::-1]
+        return self.last**2, before.reshape(len(before), -1)
 
     def returning(self, path: Array, state: Array, fixed: tuple[int, ...]) -> Array:
         """Return the control (2N,) that makes up for what a path, and the fixed states at its end, are missing.
@@ -123,7 +135,7 @@ class Horizon(Record):
 
 @lru_cache(maxsize=CACHED_HORIZONS)
 def _returning(stacked: Horizon, fixed: tuple[int, ...]) -> tuple[Array, Array]:
-    S, E = np.concatenate(stacked.position), stacked.response[-1, list(fixed)]
+    S, E = np.concatenate(stacked.position), stacked.last[list(fixed)]
     unit = 1.0 / np.sqrt((E**2).sum(axis=1))[:, None]  # of rows that mix metres, metres per second and their like
     square = S.T @ S
     weight = square + FREEDOM * np.trace(square) / len(square) * np.eye(len(square))
@@ -139,10 +151,9 @@ def horizon(plant: Plant, steps: int) -> Horizon:
     powers[0] = np.eye(n)
     for t in range(steps):
         powers[t + 1] = plant.A @ powers[t]
-    impulse = np.concatenate((np.zeros((1, n, 2)), powers[:-1] @ plant.B))  # after j steps; nothing before it is felt
-    lag = np.arange(1, steps + 1)[:, None] - np.arange(steps)[None, :]
-    response = impulse[np.maximum(lag, 0)]  # (t, k, n, channel)
-    return Horizon(powers, response.transpose(0, 2, 3, 1).reshape(steps, n, 2 * steps), plant.dt)
+    states = np.zeros((n, 2, steps + 1))
+    states[..., 1:] = (powers[:-1] @ plant.B).transpose(1, 2, 0)
+    return Horizon(powers, states, plant.dt)
 
 
 def state_scale(dt: float) -> Array:
@@ -152,20 +163,9 @@ def state_scale(dt: float) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Scaled(Horizon):
-    """The triple integrator's horizon at a step dt [s]; unit: the one of unit step, of which the large arrays are multiples."""
+    """The triple integrator's horizon at a step dt [s]; unit: the one of unit step, which knows the way back to a path."""
 
     unit: Horizon
-
-    @cached_property
-    def maps(self) -> Array:
-        scaled: Array = self.unit.maps * (self.dt ** np.array([3, 3, 6, 6, 6]))[:, None, None]
-        return scaled
-
-    @cached_property
-    def squared(self) -> tuple[Array, Array]:
-        scale = (self.dt**3 * state_scale(self.dt))[:, None] ** 2
-        end, way = self.unit.squared
-        return end * scale, way * scale
 
     def returning(self, path: Array, state: Array, fixed: tuple[int, ...]) -> Array:
         return self.unit.returning(path, state / state_scale(self.dt)[list(fixed)], fixed) / self.dt**3
@@ -184,9 +184,7 @@ def triple_integrator_horizon(dt: float, steps: int) -> Horizon:
     """
     unit = _unit_horizon(steps)
     scale = state_scale(dt)
-    powers, response = unit.powers * (scale[:, None] / scale[None, :]), unit.response * (dt**3 * scale)[None, :, None]
-    response.flags.writeable = False  # so that the record takes it as it is: it is large
-    return _Scaled(powers, response, dt, unit)
+    return _Scaled(unit.powers * (scale[:, None] / scale), unit.states * (dt**3 * scale)[:, None, None], dt, unit)
 
 
 def states_at_goal(n: int, passing: bool = False) -> NDArray[np.bool_]:

@@ -15,6 +15,7 @@ from .config import FocConfig
 from .contacts import Contacts
 from .continuous import Curve, walk
 from .deadline import NEVER, Deadline, OutOfTimeError
+from .driven import driven
 from .least_k import Least, assess_between
 from .noise import state_covariance
 from .optimal import optimise
@@ -124,8 +125,7 @@ _STRATEGIES = {'lv': _continuous, 'hc': _continuous, 'optimal': _optimal, 'algor
 
 def _solution(problem: Problem, ended: _Ended, assessment: Assessment, seconds: float, *, optimal: bool) -> Solution:
     horizon, ids = problem.horizon, problem.obstacles.ids
-    mean = problem.free.copy()
-    mean[1:] += horizon.response @ ended.control
+    mean = problem.free + driven(horizon.states, ended.control).T
     covariance = state_covariance(horizon, problem.free_covariance, problem.noise, ended.control)
     violation, violated = shortfall(problem, mean[1:, :2].copy(), ended.tau)
     held = [(ended.tau, ended.lam)] * len(ended.contacts)

@@ -8,8 +8,8 @@ from typing import TypeAlias
 import numpy as np
 
 from .assess import Assessment, assess
-from .between import course_of, place, place_row
-from .chance import CERTAIN_K, k_of, variance_at
+from .between import blend, course_of, place, place_row
+from .chance import CERTAIN_K, k_of, variance_of
 from .compiled import Matrix, Tensor, Vector, compiled
 from .problem import Problem, spread
 from .records import Array
@@ -56,6 +56,23 @@ def smallest(problem: Problem, control: Array) -> Least:
 
 
 @compiled
+def _carried(error_course: Tensor, initial_covariance: Matrix, time: float, x: float, y: float) -> float:
+    """Return the variance of x p_x + y p_y at a time that comes from the initial state's."""
+    if not initial_covariance.any():
+        return 0.0
+    t = min(int(time), error_course.shape[1] - 2)
+    weight, total = blend(time - t, 0), 0.0
+    row = np.zeros(len(initial_covariance))
+    for axis in range(2):
+        p, v, direction = error_course[axis], error_course[2 + axis], (x, y)[axis]
+        row += direction * (weight[0] * p[t] + weight[1] * v[t] + weight[2] * p[t + 1] + weight[3] * v[t + 1])
+    for i in range(len(row)):
+        for j in range(len(row)):
+            total += row[i] * initial_covariance[i, j] * row[j]
+    return total
+
+
+@compiled
 def _k_at_time(
     motion: Tensor,
     course: Matrix,
@@ -72,14 +89,11 @@ def _k_at_time(
     at = place(course, time, 0)
     x, y = at[0] - centre[0], at[1] - centre[1]
     # the variance of the distance's square along d is that of d.p: one row for both axes
-    row = place_row(motion, time, 0, x, y)
+    row = place_row(motion, time, x, y)
     var = x * x * centre_covariance[0, 0] + 2 * x * y * centre_covariance[0, 1] + y * y * centre_covariance[1, 1]
     for u in range(len(row)):
         var += row[u] * row[u] * control_variance[u]
-    carried = place_row(error_course, time, 0, x, y)
-    for i in range(len(carried)):
-        for j in range(len(carried)):
-            var += carried[i] * initial_covariance[i, j] * carried[j]
+    var += _carried(error_course, initial_covariance, time, x, y)
     return float(k_of(size_mean - x * x - y * y, size_variance + 4 * var))
 
 
@@ -92,13 +106,18 @@ def _moments(
     size_variance: Vector,
     centre_covariance: Tensor,
     leaving: Vector,
-    j: int,
-    t: int,
-) -> tuple[float, float]:
-    """Return E[C] and Var[C] of circle j at step t + 1; E is without a bound where the circle does not count."""
-    x, y = course[0, t + 1] - centres[j, t, 0], course[1, t + 1] - centres[j, t, 1]
-    mean = size_mean[j] - x * x - y * y if t + 1.0 >= leaving[j] else -np.inf
-    return mean, variance_at(x, y, covariance, t, size_variance[j], centre_covariance[j])
+) -> tuple[Matrix, Matrix]:
+    """Return E[C] and Var[C] of every circle at steps 1..N, (m, N) each; E is without a bound where the circle does not count."""
+    m, steps, _ = centres.shape
+    mean, var = np.empty((m, steps)), np.empty((m, steps))
+    for j in range(m):
+        free_xx, free_yy, free_xy = centre_covariance[j, 0, 0], centre_covariance[j, 1, 1], centre_covariance[j, 0, 1]
+        for t in range(steps):
+            x, y = course[0, t + 1] - centres[j, t, 0], course[1, t + 1] - centres[j, t, 1]
+            xx, yy, xy = covariance[0, t] + free_xx, covariance[1, t] + free_yy, covariance[2, t] + free_xy
+            mean[j, t] = size_mean[j] - x * x - y * y if t + 1.0 >= leaving[j] else -np.inf
+            var[j, t] = variance_of(x, y, xx, yy, xy, size_variance[j])
+    return mean, var
 
 
 @compiled
@@ -133,23 +152,20 @@ def least_k(
     course, control_variance = course_of(motion, free, control), noise_variance * control * control
     covariance = spread(maps, noise_variance, control, free_variance)
     m, steps, _ = centres.shape
-    circles = course, covariance, centres, size_mean, size_variance, centre_covariance, leaving
+    mean, var = _moments(course, covariance, centres, size_mean, size_variance, centre_covariance, leaving)
     least, row, moment = np.inf, 0, 1.0
     for j in range(m):
         for t in range(steps):
-            mean, var = _moments(*circles, j, t)
-            if not _is_above(least, mean, var):
-                k = k_of(mean, var)
+            if not _is_above(least, mean[j, t], var[j, t]):
+                k = k_of(mean[j, t], var[j, t])
                 if k < least:
                     least, row, moment = k, j, t + 1.0
     near = least + MUCH_MORE * (1.0 + abs(least))
     for j in range(m):
         for t in range(1, steps - 1):
-            mean, var = _moments(*circles, j, t)
-            if _is_above(near, mean, var):
+            if _is_above(near, mean[j, t], var[j, t]):
                 continue
-            before, after = _moments(*circles, j, t - 1), _moments(*circles, j, t + 1)
-            ka, kb, kc = k_of(before[0], before[1]), k_of(mean, var), k_of(after[0], after[1])
+            ka, kb, kc = k_of(mean[j, t - 1], var[j, t - 1]), k_of(mean[j, t], var[j, t]), k_of(mean[j, t + 1], var[j, t + 1])
             if not (kb <= ka and kb < kc and kb < near and ka < CERTAIN_K and kc < CERTAIN_K):
                 continue
             a, b, c = float(t), t + 1.0, t + 2.0

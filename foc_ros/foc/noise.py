@@ -28,7 +28,7 @@ def noise_per_step(noise_at_reference: Array, reference_step: float, dt: float) 
 def state_covariance(horizon: Horizon, free: Array, noise: Array, control: Array) -> Array:
     """Return P at steps 0..N, (N + 1, n, n): free part (N + 1, n, n), noise (2,), control stacked (2N,)."""
     steps = horizon.steps
-    A, B = horizon.powers[1], np.ascontiguousarray(horizon.response[0, :, ::steps])
+    A, B = horizon.powers[1], np.ascontiguousarray(horizon.states[..., 1])
     covariance: Array = free + accumulated(A, B, (stacked_noise(noise, steps) * control) ** 2)
     return covariance
 

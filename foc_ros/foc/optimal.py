@@ -219,7 +219,7 @@ def surrogate_rows(
     slopes, surplus = linearised(offset, covariance, size_variance, centre_covariance, wanted, k, turning)
     weights = np.ones((5, len(control)))
     weights[2:] = noise_variance * control
-    return slopes, row_values(maps, weights, slopes, control) - surplus, weights
+    return slopes, row_values(maps, np.empty((0, 0, 0)), weights, slopes, control) - surplus, weights
 
 
 def _bent(problem: Problem, control: Array, active: WorkingSet, multipliers: Array, slopes: Array) -> Cost:
@@ -232,11 +232,13 @@ def _bent(problem: Problem, control: Array, active: WorkingSet, multipliers: Arr
 
 @compiled
 def bent(maps: Tensor, slopes: Tensor, obstacle: Indices, step: Indices, multipliers: Vector) -> Vector:
-    """Return by how much k rows of slopes (m, N, 5), with multipliers (k,), bend the cost by c u, (2N,): maps (5, N, 2N)."""
-    bend = np.zeros(maps.shape[2])
+    """Return by how much k rows of slopes (m, N, 5), with multipliers (k,), bend the cost by c u, (2N,): maps (5, 2, N + 1)."""
+    steps = maps.shape[2] - 1
+    bend = np.zeros(2 * steps)
     for i in range(len(step)):
         for q in range(2, 5):
             weight = -multipliers[i] * slopes[obstacle[i], step[i], q]
-            for u in range(len(bend)):
-                bend[u] += weight * maps[q, step[i], u]
+            for channel in range(2):
+                for k in range(step[i] + 1):
+                    bend[channel * steps + k] += weight * maps[q, channel, step[i] + 1 - k]
     return bend

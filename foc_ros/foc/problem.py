@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .between import course_of
 from .chance import centres, courses, k_at, k_of_eta, size_moments
 from .compiled import Indices, Matrix, Tensor, Vector, compiled
-from .dense import values
+from .driven import driven
 from .dynamics import Horizon, states_at_goal
 from .errors import SceneError
 from .noise import stacked_noise
@@ -178,22 +178,23 @@ class Problem(Record):
         hard = np.flatnonzero(self.at_goal)
         soft = np.flatnonzero(~self.at_goal & (self.end_weights > 0))
         way = np.flatnonzero(self.way_weights > 0)
-        last, before = self.horizon.response[-1], self.horizon.response[:-1, way]
+        last, steps = self.horizon.last, self.horizon.steps
+        before = self.horizon.response[:-1, way].reshape(-1, 2 * steps) if len(way) else last[way]
         missing = self.goal - self.free[1:]
-        rows = np.concatenate((last[hard], last[soft], before.reshape(-1, before.shape[-1])))
+        rows = np.concatenate((last[hard], last[soft], before))
         targets = np.concatenate((missing[-1, hard], missing[-1, soft], missing[:-1, way].ravel()))
         softness = np.concatenate(
             (
                 np.zeros(len(hard)),
                 0.5 / self.end_weights[soft],
-                np.tile(0.5 / self.way_weights[way], self.horizon.steps - 1),
+                np.tile(0.5 / self.way_weights[way], steps - 1),
             )
         )
         return rows, targets, softness
 
     def positions(self, control: Array) -> Array:
         """Mean positions at steps 1..N from the stacked control, (N, 2) [m]."""
-        return moved(self.horizon.position, np.ascontiguousarray(control, dtype=float), self.free_position)
+        return moved(self.horizon.maps[:2], np.ascontiguousarray(control, dtype=float), self.free_position)
 
     def course(self, control: Array) -> Array:
         """Mean position and velocity per step from the stacked control, x, y, vx, vy at steps 0..N, (4, N + 1) [m]."""
@@ -218,19 +219,15 @@ def first_within(rows: Matrix, tolerance: float) -> Indices:
 
 @compiled
 def moved(position: Tensor, control: Vector, free: Matrix) -> Matrix:
-    """Return free + S u, (N, 2), for S (2, N, 2N)."""
-    positions = free.copy()
-    for axis in range(2):
-        positions[:, axis] += values(position[axis], control)
+    """Return free + S u, (N, 2), for the responses (2, 2, N + 1) of the position."""
+    positions: Matrix = free + driven(position, control)[:, 1:].T
     return positions
 
 
 @compiled
 def spread(maps: Tensor, noise_variance: Vector, control: Vector, free: Matrix) -> Matrix:
-    """Return the rows xx, yy, xy of free + V u^2, (3, N), for `Horizon.maps` (5, N, 2N) and c^2 (2N,)."""
-    weights, variance = noise_variance * control * control, free.copy()
-    for row in range(3):
-        variance[row] += values(maps[2 + row], weights)
+    """Return the rows xx, yy, xy of free + V u^2, (3, N), for `Horizon.maps` (5, 2, N + 1) and c^2 (2N,)."""
+    variance: Matrix = free + driven(maps[2:], noise_variance * control * control)[:, 1:]
     return variance
 
 

@@ -1,12 +1,12 @@
 """The quadratic programme of one linearisation, built apart from its solution.
 
 minimise 1/2 u' diag(hessian) u - linear' u + sum_r (goal_rows u - target)_r^2 / (2 softness_r) (an equality where softness is 0)
-subject to sum_q coefficient[j, t, q] (maps[q, t] * weights[q]) u >= limit[j, t] for every obstacle j and step t.
+subject to sum_q coefficient[j, t, q] (map_q(t) * weights[q]) u >= limit[j, t] for every obstacle j and step t.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from .between import kept_at, place, place_row
 from .compiled import Indices, Matrix, Tensor, Vector, compiled
 from .dense import cholesky, combined, lower_solved, row_products, values
+from .driven import driven
 from .problem import Problem
 from .records import Array
 
@@ -92,44 +93,47 @@ def compliance(rows: Matrix, inverse: Vector, factor: Matrix) -> tuple[Matrix, M
 
 @dataclass(frozen=True, eq=False)
 class ReachingQP:
-    """A cost and obstacle rows: maps (q, N, 2N), weights (q, 2N), coefficients (m, N, q) and limits (m, N), m obstacles."""
+    """A cost and obstacle rows: q quantities at N steps, and at e further times, for m obstacles.
+
+    responses (q, 2, N + 1): of the quantities, as in `driven`, and further (q, e, 2N): their maps at the further times; weights
+    (q, 2N) of the control in them; coefficients (m, N + e, q) and limits (m, N + e).
+    """
 
     cost: Cost
-    maps: Array
+    responses: Array
     weights: Array
     coefficients: Array
     limits: Array
+    further: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
 
     def row_values(self, control: Array) -> Array:
-        """Left-hand side of every obstacle row, (m, N)."""
-        return row_values(self.maps, self.weights, self.coefficients, control)
+        """Left-hand side of every obstacle row, (m, N + e)."""
+        return row_values(self.responses, self.further, self.weights, self.coefficients, control)
 
     def violated(
         self, control: Array, obstacle: NDArray[np.intp], step: NDArray[np.intp], tolerance: float
     ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Return the worst row of every stretch of steps at which a control (2N,) violates a circle's; known ones are met."""
-        return violated(self.maps, self.weights, self.coefficients, self.limits, control, obstacle, step, tolerance)
+        kinds = self.responses, self.further, self.weights, self.coefficients
+        return violated(*kinds, self.limits, control, obstacle, step, tolerance)
 
     def rows(self, obstacle: NDArray[np.intp], step: NDArray[np.intp]) -> Array:
         """Return obstacle rows (k, 2N) for k pairs of obstacle and step index."""
-        return gathered(self.maps, self.weights, self.coefficients, obstacle, step)
+        return gathered(self.responses, self.further, self.weights, self.coefficients, obstacle, step)
 
 
 @compiled
-def row_values(maps: Tensor, weights: Matrix, coefficients: Tensor, control: Vector) -> Matrix:
-    """Return the left-hand side of every row, (m, N)."""
-    q, steps, n = maps.shape
-    moved = np.zeros((q, steps))
+def row_values(responses: Tensor, further: Tensor, weights: Matrix, coefficients: Tensor, control: Vector) -> Matrix:
+    """Return the left-hand side of every row, (m, N + e)."""
+    m, times, q = coefficients.shape
+    steps, moved, found = responses.shape[2] - 1, np.empty((q, times)), np.zeros((m, times))
     for a in range(q):
         weighted = weights[a] * control
-        for t in range(steps):
-            total = 0.0
-            for i in range(n):
-                total += maps[a, t, i] * weighted[i]
-            moved[a, t] = total
-    found = np.zeros((coefficients.shape[0], steps))
-    for j in range(coefficients.shape[0]):
-        for t in range(steps):
+        moved[a, :steps] = driven(responses[a : a + 1], weighted)[0, 1:]
+        if times > steps:
+            moved[a, steps:] = values(further[a], weighted)
+    for j in range(m):
+        for t in range(times):
             for a in range(q):
                 found[j, t] += coefficients[j, t, a] * moved[a, t]
     return found
@@ -154,7 +158,8 @@ def peaks(violation: Matrix, known_obstacle: Indices, known_step: Indices, toler
 
 @compiled
 def violated(
-    maps: Tensor,
+    responses: Tensor,
+    further: Tensor,
     weights: Matrix,
     coefficients: Tensor,
     limits: Matrix,
@@ -164,19 +169,29 @@ def violated(
     tolerance: float,
 ) -> tuple[Indices, Indices]:
     """Return the peaks of what the rows miss at a control (2N,)."""
-    return peaks(limits - row_values(maps, weights, coefficients, control), known_obstacle, known_step, tolerance)
+    return peaks(limits - row_values(responses, further, weights, coefficients, control), known_obstacle, known_step, tolerance)
 
 
 @compiled
-def gathered(maps: Tensor, weights: Matrix, coefficients: Tensor, obstacle: Indices, step: Indices) -> Matrix:
+def gathered(
+    responses: Tensor, further: Tensor, weights: Matrix, coefficients: Tensor, obstacle: Indices, step: Indices
+) -> Matrix:
     """Return the rows of k pairs of obstacle and step, (k, 2N)."""
-    q, _, n = maps.shape
-    rows = np.zeros((len(step), n))
+    q, _, times = responses.shape
+    steps = times - 1
+    rows = np.zeros((len(step), 2 * steps))
     for i in range(len(step)):
+        t = step[i]
         for a in range(q):
-            share = coefficients[obstacle[i], step[i], a]
-            for u in range(n):
-                rows[i, u] += share * maps[a, step[i], u] * weights[a, u]
+            share = coefficients[obstacle[i], t, a]
+            if t >= steps:
+                for u in range(2 * steps):
+                    rows[i, u] += share * further[a, t - steps, u] * weights[a, u]
+                continue
+            for channel in range(2):
+                for k in range(t + 1):
+                    u = channel * steps + k
+                    rows[i, u] += share * responses[a, channel, t + 1 - k] * weights[a, u]
     return rows
 
 
@@ -262,20 +277,21 @@ def clearance_qp(
     """
     normals, limits = half_planes(problem, guess, tau, literal=literal)
     if not len(between):
-        return ReachingQP(cost, problem.horizon.position, problem.unweighted, normals, limits)
+        return ReachingQP(cost, problem.horizon.maps[:2], problem.unweighted, normals, limits)
     more_maps, more_normals, more_limits = _half_planes_at(problem, guess, tau, between)
     return ReachingQP(
         cost,
-        np.concatenate((problem.horizon.position, more_maps), axis=1),
+        problem.horizon.maps[:2],
         problem.unweighted,
         np.concatenate((normals, more_normals), axis=1),
         np.concatenate((limits, more_limits), axis=1),
+        more_maps,
     )
 
 
 def _half_planes_at(problem: Problem, guess: Array, tau: float, times: Array) -> tuple[Array, Array, Array]:
     """Return the position's maps (2, e, 2N), and `half_planes` of a guess (N, 2), straight between the steps, at times (e,)."""
-    maps = np.array([[place_row(problem.horizon.motion, time, 0, x, y) for time in times] for x, y in ((1.0, 0.0), (0.0, 1.0))])
+    maps = np.array([[place_row(problem.horizon.motion, time, x, y) for time in times] for x, y in ((1.0, 0.0), (0.0, 1.0))])
     free = np.array([place(problem.free_course, time, 0) for time in times])
     centres = problem.obstacles.centre[:, None] + times[:, None] * problem.drift[:, None]
     path = np.concatenate((problem.initial_mean[None, :2], guess))

@@ -32,7 +32,7 @@ def goal_map(stacked: Horizon, passing: bool = False) -> Array:
     passing: the goal does not fix the velocity; the columns of states that it does not fix are zero.
     """
     fixed = states_at_goal(len(stacked.powers[-1]), passing)
-    last = stacked.response[-1][fixed]
+    last = stacked.last[fixed]
     # rows scaled to unit length first: they mix metres, metres per second and their like
     scale = 1.0 / np.sqrt((last**2).sum(axis=1))
     moved = np.zeros_like(stacked.powers)

@@ -49,7 +49,7 @@ def half_planes_between(
         cx, cy = centre[j, 0] + s * drift[j, 0], centre[j, 1] + s * drift[j, 1]
         distance = np.hypot(at[0] - cx, at[1] - cy)
         x, y = (at[0] - cx) / distance, (at[1] - cy) / distance
-        rows[i] = place_row(motion, s, 0, x, y)
+        rows[i] = place_row(motion, s, x, y)
         limits[i] = kept(reach[j], short[j], pace, s)[0] + x * (cx - without[0]) + y * (cy - without[1])
     return rows, limits
 
@@ -145,12 +145,12 @@ def touching(
     It is a minimum if the first two are positive definite, and d / y_last less what is left of C_gg is too: pressed any harder,
     the mean would slip round the circle. A contact that is held in time has no moment, and holds less: the mean may slip past it.
 
-    motion (4, N + 1, 2N), free (4, N + 1): the course, as in `between`; centre, drift, reach, short, pace: the circles, as
+    motion (4, 2, N + 1), free (4, N + 1): the course, as in `between`; centre, drift, reach, short, pace: the circles, as
     there; obstacle, begin, force (k,): the contacts; near (2N,): where to begin; sliding: 1, or 0 for contacts held in time;
     settled [m]: a move of the contacts that ends the steps. Returns whether there is such a minimum, the control, times (k,)
     and forces (k,); where some turn out to pull, at once, with control and times as they were to begin with.
     """
-    k, end = len(obstacle), float(motion.shape[1] - 1)
+    k, end = len(obstacle), motion.shape[2] - 1.0
     control, time, pressing, last = near.copy(), begin.copy(), force.copy(), np.inf
     rows, missing = np.empty((3 * k, len(inverse))), np.empty((3 * k, 1))
     normal, first = np.empty((k, 2)), np.empty((k, 2))
@@ -161,7 +161,7 @@ def touching(
         for i in range(k):
             j, s = obstacle[i], time[i]
             wanted, faster, harder = kept(reach[j], short[j], pace, s)
-            t = min(int(s), motion.shape[1] - 2)
+            t = min(int(s), motion.shape[2] - 2)
             course = around(motion, free, control, t)
             at, velocity, acceleration = place(course, s - t, 0), place(course, s - t, 1), place(course, s - t, 2)
             x, y = at[0] - centre[j, 0] - s * drift[j, 0], at[1] - centre[j, 1] - s * drift[j, 1]
