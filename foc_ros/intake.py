@@ -46,14 +46,14 @@ class Intake:
 
     def take(self, role: str, message: Any) -> Verdict | None:
         """Take one message; None where it cannot be converted."""
-        before = sum(self.pipeline.counts.values())
+        before = self.pipeline.refused
         try:
             verdict = self._takers[role](message)
         except MessageError as error:
             self._counts[f'{role}_invalid'] += 1
             self.last_refusal = f'{role}: {error}'
             return None
-        if sum(self.pipeline.counts.values()) > before:
+        if self.pipeline.refused > before:
             self.last_refusal = self.pipeline.last_refusal
         return verdict
 

@@ -27,7 +27,7 @@ import numpy as np
 
 from .compiled import Matrix, Vector, compiled
 from .dense import cholesky, combined, lower_solved
-from .records import NANOSECONDS, Array, Record
+from .records import NANOSECONDS, Array, Record, fixed
 
 DEGREE = 5
 LEAST_SAMPLES = 8
@@ -76,7 +76,7 @@ def advanced(effort: Effort, stamp_ns: int, position: Array, stddev: float) -> E
     """
     start_ns, origin = (stamp_ns, position) if effort.start_ns is None else (effort.start_ns, effort.origin)
     seconds, z = (stamp_ns - start_ns) / NANOSECONDS, position - origin
-    powers, products = summed(effort.powers, effort.products, seconds, z)
+    powers, products = map(fixed, summed(effort.powers, effort.products, seconds, z))
     square, spent = effort.square + float(z @ z), effort.spent
     if powers[0] >= LEAST_SAMPLES and seconds >= LEAST_TIME_S:
         told, added, explained = fitted(powers, products, square, seconds, stddev)

@@ -32,7 +32,7 @@ from .compiled import Matrix, Vector, compiled
 from .config import EstimatorConfig
 from .dense import combined, row_products
 from .effort import Effort, advanced
-from .records import NANOSECONDS, Array, HandSample, HandState
+from .records import NANOSECONDS, Array, HandSample, HandState, fixed
 from .verdict import Verdict
 
 ONSET_STDDEVS = 3.0
@@ -154,7 +154,8 @@ def _first(sample: HandSample, config: EstimatorConfig) -> Track:
 
 def _followed(state: Track, sample: HandSample, dt: float, config: EstimatorConfig) -> Track:
     """Predict to the sample's stamp, correct by its position, and see what becomes of the movement."""
-    mean, covariance, root = filtered(state.mean, state.root, dt, config.jerk_density, config.position_stddev, sample.position)
+    settings = config.jerk_density, config.position_stddev
+    mean, covariance, root = map(fixed, filtered(state.mean, state.root, dt, *settings, sample.position))
     onset_ns, onset_position, effort = _movement(state, sample, mean, covariance, config)
     hand = sample.stamp_ns, mean, covariance, sample.height, sample.frame_id
     return Track(*hand, onset_ns, onset_position, effort.spent, root, effort)

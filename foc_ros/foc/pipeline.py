@@ -49,6 +49,11 @@ class Pipeline:
         return dict(self._refusals.counts)
 
     @property
+    def refused(self) -> int:
+        """How many refusals there were, of all kinds."""
+        return self._refusals.refused
+
+    @property
     def last_refusal(self) -> str | None:
         """The text of the last refusal."""
         return self._refusals.last

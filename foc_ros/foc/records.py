@@ -20,7 +20,7 @@ LEFT, RIGHT = 1, -1
 
 def fixed(array: Array) -> Array:
     """Make an array that nobody else holds read-only, so that a record takes it as it is, without a copy."""
-    array.flags.writeable = False
+    array.setflags(write=False)
     return array
 
 
@@ -28,11 +28,10 @@ class Record:
     """Base of the records: freezes every array field after construction."""
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if isinstance(value, np.ndarray) and (value.flags.writeable or not value.flags.c_contiguous):
-                value = value.copy()
-                value.flags.writeable = False
-                object.__setattr__(self, name, value)
+        held = vars(self)
+        for name, value in held.items():
+            if isinstance(value, np.ndarray) and ((flags := value.flags).writeable or not flags.c_contiguous):
+                held[name] = fixed(value.copy())
 
 
 @dataclass(frozen=True, eq=False)

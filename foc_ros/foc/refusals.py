@@ -9,10 +9,11 @@ from .records import NANOSECONDS
 
 
 class Refusals:
-    """Attributes: counts, by kind; last, the text of the last refusal, None before the first."""
+    """Attributes: counts, by kind; refused, how many refusals; last, the text of the last one, None before the first."""
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
+        self.refused = 0
         self.last: str | None = None
 
     def count(self, kind: str) -> None:
@@ -22,6 +23,7 @@ class Refusals:
     def refuse(self, kind: str, words: str) -> None:
         """Count a refusal and keep its text."""
         self.counts[kind] += 1
+        self.refused += 1
         self.last = words
 
     def behind(self, kind: str, topic: str, stamp_ns: int, newest_ns: int) -> None:
