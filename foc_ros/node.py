@@ -15,6 +15,7 @@ is lost.
 from __future__ import annotations
 
 import traceback
+from time import monotonic
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -55,7 +56,6 @@ class FocNode(LifecycleNode):
         self._live = LiveParameters(self, declare_all(self, Config()), self._reconfigure)
         self._library = load_library(self._live.config.homotopy.library)
         at_once = autostart(self)
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._types = RclpyTypes()
         # A logger throttles each of its lines by itself: one per input, so that none silences another.
         self._loggers = {role: self.get_logger().get_child(role) for role in INPUTS}
@@ -67,7 +67,7 @@ class FocNode(LifecycleNode):
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_service(SetBool, '~/engage', self._engage)
         self.create_service(Trigger, '~/reset', self._reset)
-        self.create_timer(1.0, self._publish_health, clock=self._steady)
+        self.create_timer(1.0, self._publish_health, clock=Clock(clock_type=ClockType.STEADY_TIME))
         answer_refused_transitions(self)
         if at_once and (self.trigger_configure() != SUCCESS or self.trigger_activate() != SUCCESS):
             raise FocError(self._obstacle_to_start)
@@ -111,7 +111,7 @@ class FocNode(LifecycleNode):
 
     def _begin(self) -> None:
         self.pipeline = Pipeline(self._live.config, self._library)
-        self.intake, self._freshness, self._monitor = Intake(self.pipeline), Freshness(), Monitor(self._now_s())
+        self.intake, self._freshness, self._monitor = Intake(self.pipeline), Freshness(), Monitor(monotonic())
 
     def _release(self) -> None:
         for subscription in self._inputs.values():
@@ -147,7 +147,7 @@ class FocNode(LifecycleNode):
 
     def _take(self, role: str, message: Any) -> bool:
         moved = self._frames.moved(role, message, self.pipeline.frame_id)
-        verdict, now_s = self.intake.take(role, moved), self._now_s()
+        verdict, now_s = self.intake.take(role, moved), monotonic()
         taken = verdict is not None and verdict.taken
         refused, received = self._monitor.received(role, now_s, taken=taken)
         if taken:
@@ -167,10 +167,10 @@ class FocNode(LifecycleNode):
         self._freshness.pose(sample.stamp_ns, clock_ns, timeout_s, restarted=verdict.restarted)
 
     def _obstruction(self) -> tuple[str, str] | None:
-        return self._freshness.obstruction(self._now_s(), self.pipeline.config, self.pipeline.scene.parts)
+        return self._freshness.obstruction(monotonic(), self.pipeline.config, self.pipeline.scene.parts)
 
     def _predict(self) -> None:
-        began_s = self._now_s()
+        began_s = monotonic()
         obstruction = self._obstruction()
         if obstruction is not None:
             self._monitor.withheld(obstruction[0])
@@ -188,7 +188,7 @@ class FocNode(LifecycleNode):
             return
         for name, message in messages.items():
             self._publish(self._outputs[name], message)
-        self._monitor.predicted(prediction, began_s, self._now_s())
+        self._monitor.predicted(prediction, began_s, monotonic())
 
     def report(self, error: Exception) -> None:
         """Count and log an error that should not happen."""
@@ -199,7 +199,7 @@ class FocNode(LifecycleNode):
     def _publish_health(self) -> None:
         obstruction = self._obstruction()
         words = None if obstruction is None else obstruction[1]
-        health = self._monitor.health(self._now_s(), self.intake, self._state, words)
+        health = self._monitor.health(monotonic(), self.intake, self._state, words)
         name = self.get_fully_qualified_name()
         stamp_ns = self.get_clock().now().nanoseconds
         self._publish(self._diagnostics, diagnostic_array(health, f'{name[1:]}: prediction', name, stamp_ns, self._types))
@@ -220,6 +220,3 @@ class FocNode(LifecycleNode):
         self._freshness.forget()
         response.success, response.message = True, 'the movement is forgotten, the scene is kept'
         return response
-
-    def _now_s(self) -> float:
-        return float(self._steady.now().nanoseconds) * 1e-9

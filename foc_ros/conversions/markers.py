@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from foc_ros.foc.records import Array, Obstacles, Outcome, Prediction
 
@@ -84,7 +85,7 @@ class _Pen:
 
     def _ellipses(self, index: int, outcome: Outcome, colour: Colour) -> Iterator[Any]:
         """Draw one standard deviation about the mean at steps spread over the path."""
-        steps = np.unique(np.linspace(0, len(outcome.solution.mean) - 1, ELLIPSES + 1).round().astype(int)[1:])
+        steps = _spread(len(outcome.solution.mean))
         variances, axes = np.linalg.eigh(outcome.solution.covariance[steps, :2, :2])
         diameters = (2.0 * np.sqrt(np.maximum(variances, 0.0))).tolist()
         angles = np.arctan2(axes[:, 1, 0], axes[:, 0, 0]).tolist()
@@ -146,6 +147,12 @@ class _Pen:
 
     def _point(self, x: float, y: float, z: float) -> Any:
         return self.types.make('geometry_msgs/msg/Point', x=x, y=y, z=z)
+
+
+@lru_cache(maxsize=4)
+def _spread(samples: int) -> NDArray[np.intp]:
+    """Return the numbers of up to ELLIPSES of the samples, spread evenly, the last among them and the first not."""
+    return np.unique(np.linspace(0, samples - 1, ELLIPSES + 1).round().astype(np.intp)[1:])
 
 
 _STANDING = {

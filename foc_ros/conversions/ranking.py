@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from foc_ros.foc.errors import FocError
@@ -13,8 +15,11 @@ MAX_RATIO = 1e9
 """Cost ratios end here: next to a candidate that costs nothing, every other is infinitely dear."""
 
 
+@lru_cache(maxsize=1)
 def ranked(prediction: Prediction) -> tuple[Outcome, ...]:
     """Return the solved outcomes: the one called most likely (which changes only by a margin), then by likelihood.
+
+    Every output asks for them, so those of the last prediction are kept.
 
     Raises FocError, naming the candidate, for a number that is not finite or beyond MAX_NUMBER: none may leave.
     """

@@ -33,6 +33,9 @@ TYPECODES = {
 }
 """Typecode of `array.array` and of numpy alike, per type name of a .msg file. byte (octet), bool and string have none."""
 
+CHECKS = '_check_fields'
+"""Slot of rclpy's messages that says whether their properties check what they are given."""
+
 _IDL_NAMES = {'double': 'float64', 'float': 'float32', 'boolean': 'bool', 'octet': 'byte'}
 
 
@@ -52,14 +55,17 @@ class RclpyTypes:
 
     def make(self, name: str, /, **values: Any) -> Any:
         """Return a message of type `name`; see :class:`MessageTypes`."""
-        kind, defaults, converters = _rclpy_type(name)
-        if not values.keys() <= converters.keys():
-            _refuse_unknown(name, values, converters)
-        message = object.__new__(kind)  # its constructor would make the defaults of all fields, those given too
-        for slot, default in defaults:
-            setattr(message, slot, default)
-        for field, value in values.items():
-            setattr(message, field, converters[field](value))
+        kind, checks, fields = _rclpy_type(name)
+        message, given = object.__new__(kind), 0  # its constructor would make the defaults of all fields, those given too
+        setattr(message, CHECKS, checks)
+        for field, (attribute, convert, default) in fields.items():
+            if field in values:
+                setattr(message, attribute, convert(values[field]))
+                given += 1
+            else:
+                setattr(message, attribute, default)
+        if given < len(values):
+            _refuse_unknown(name, values, fields)
         return message
 
 
@@ -100,13 +106,19 @@ class RosbagsTypes:
 
 
 @cache
-def _rclpy_type(name: str) -> tuple[type[Any], list[tuple[str, Any]], dict[str, Converter]]:
-    """Return a message class, what the slots of a message hold by default, and the converters of its fields."""
+def _rclpy_type(name: str) -> tuple[type[Any], bool, dict[str, tuple[str, Converter, Any]]]:
+    """Return a message class, whether rclpy checks fields, and by field where its value goes, its converter, its default.
+
+    A value goes where the field's property would put it; through the property only where that has something to check.
+    """
     package, _, leaf = name.split('/')
     kind = getattr(import_module(f'{package}.msg'), leaf)
     blank = kind()
-    converters = {field: _rclpy_converter(declared) for field, declared in kind.get_fields_and_field_types().items()}
-    return kind, [(slot, getattr(blank, slot)) for slot in blank.__slots__], converters
+    checks, declared = getattr(blank, CHECKS), kind.get_fields_and_field_types()
+    fields = {
+        field: (field if checks else f'_{field}', _rclpy_converter(declared[field]), getattr(blank, field)) for field in declared
+    }
+    return kind, checks, fields
 
 
 def _rclpy_converter(kind: str) -> Converter:
