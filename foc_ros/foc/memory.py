@@ -51,7 +51,9 @@ class Memory:
         A way that had no time keeps what it had, or begins where it was stopped. One that is out of reach, or slid into another
         class, is followed there, which costs little, and begun anew from its own guess after RETRY predictions.
         """
-        last, solutions, followed = self.earlier.solutions, dict[str, Solution](), dict[str, int]()
+        last = self.earlier.solutions
+        solutions: dict[str, Solution] = {}
+        followed: dict[str, int] = {}
         for outcome in tried:
             label, status = outcome.candidate.label, outcome.solution.status
             if status is Status.DEADLINE and label in last:
@@ -61,9 +63,9 @@ class Memory:
             elif status in (Status.ETA_UNREACHABLE, Status.LEFT_CLASS) and self.followed.get(label, 0) < RETRY:
                 solutions[label], followed[label] = outcome.solution, self.followed.get(label, 0) + 1
         likelihoods = {outcome.candidate.label: outcome.likelihood for outcome in prediction.outcomes}
-        labels = {candidate.label for candidate in candidates}
-        solved = {label: stamp for label, stamp in self.solved_ns.items() if label in labels}
-        solved |= {outcome.candidate.label: prediction.stamp_ns for outcome in prediction.solved}
+        solved = {one.label: self.solved_ns[one.label] for one in candidates if one.label in self.solved_ns}
+        for outcome in prediction.solved:
+            solved[outcome.candidate.label] = prediction.stamp_ns
         return Memory(prediction.most_likely, candidates, Earlier(solutions, likelihoods), solved, followed)
 
     def aged(self, outcome: Outcome, stamp_ns: int) -> Outcome:

@@ -99,6 +99,8 @@ class Obstacles(Record):
 
     def after(self, seconds: float) -> Obstacles:
         """Return the obstacles moved on at their velocity for `seconds` [s]."""
+        if not self.velocity.any():
+            return self
         return Obstacles(
             self.ids,
             self.centre + seconds * self.velocity,
