@@ -51,5 +51,5 @@ def test_linearisation_is_an_upper_bound_of_the_constraint():
 
 
 def test_centres_move_on_at_their_velocity():
-    moved = centres(make_obstacles([[1.0, 2.0]], [0.1], velocity=[[0.5, -1.0]]), 0.1, 3)
+    moved = centres(np.array([[1.0, 2.0]]), 0.1 * np.array([[0.5, -1.0]]), 3)
     np.testing.assert_allclose(moved, [[[1.05, 1.9], [1.1, 1.8], [1.15, 1.7]]])

@@ -5,9 +5,10 @@ import pytest
 from reach_helpers import bowed, make_obstacles, one_obstacle, reach
 
 from foc_ros.foc.contacts import Contacts
-from foc_ros.foc.newton import held, joined, slid, stays
+from foc_ros.foc.newton import held, joined, stays
 from foc_ros.foc.qp import effort_cost
 from foc_ros.foc.sequential import converge
+from foc_ros.foc.settled import settled
 from foc_ros.foc.solver import WorkingSet
 
 TAU, LAM = 5e-4, 1e4
@@ -18,6 +19,12 @@ def rough(problem, lam=LAM):
     """Return what the QPs end with, and its rows as contacts."""
     here = converge(problem, BOWED[1:], WorkingSet(), TAU, lam)
     return here, here.contacts
+
+
+def slid(problem, control, contacts, tau, lam):
+    """Return the control and the contacts of what settles, None where nothing does."""
+    found = settled(problem, control, contacts, tau, lam)
+    return None if found is None else (found.control, found.contacts)
 
 
 @pytest.mark.parametrize('factor', [0.5, 1.0, 2.0])

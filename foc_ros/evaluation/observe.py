@@ -95,7 +95,7 @@ def _ways(prediction: Prediction, obstacles: Obstacles, spent: float, duration: 
 def _predicted_sides(outcome: Outcome, obstacles: Obstacles) -> NDArray[np.int8]:
     """Return the sides (n,) on which a candidate runs: those in its name where it could not be solved, else its path's own."""
     solution = outcome.solution
-    sides = _sides(solution.path, courses(obstacles, solution.dt, len(solution.mean) - 1))
+    sides = _sides(solution.path, courses(obstacles.centre, solution.dt * obstacles.velocity, len(solution.mean) - 1))
     named = {} if outcome.solved else dict(outcome.candidate.sides)
     return np.array([named.get(identity, side) for identity, side in zip(obstacles.ids, sides, strict=True)], dtype=np.int8)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -14,40 +13,43 @@ from .records import Array
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """k achieved per obstacle and step (m, N), infinite where the hand is still leaving a margin; relaxed: whose margins.
+    """The k that holds everywhere, CERTAIN_K where there is no obstacle; where it is attained; whose margins do not count yet.
 
-    between: the smallest k between the steps, with its obstacle row and time in steps, where it was looked for and is smaller.
+    place: obstacle row and time in steps, None without obstacles; relaxed: obstacles whose margins the hand is still leaving.
     """
 
-    k: Array
+    smallest_k: float
+    place: tuple[int, float] | None
     relaxed: tuple[str, ...]
-    between: tuple[float, int, float] | None = None
-
-    @cached_property
-    def smallest_k(self) -> float:
-        """The k that holds everywhere; CERTAIN_K where there is no obstacle."""
-        if self.between is not None:
-            return self.between[0]
-        return min(float(self.k.min(initial=CERTAIN_K)), CERTAIN_K)
 
     @property
     def eta(self) -> float:
         """The eta that holds everywhere."""
         return eta_of_k(self.smallest_k)
 
-    @property
-    def place(self) -> tuple[int, float] | None:
-        """Obstacle row and time in steps where eta is attained; None without obstacles."""
-        if self.between is not None:
-            return self.between[1:]
-        if self.k.size == 0:
-            return None
-        row, column = np.unravel_index(int(self.k.argmin()), self.k.shape)
-        return int(row), int(column) + 1.0
-
 
 def assess(problem: Problem, control: Array) -> Assessment:
-    """Evaluate k = -E[C] / sqrt(Var[C]) linearised at the control's own mean (paper, equation 8). control: stacked (2N,)."""
+    """Evaluate `achieved` at the control's own mean, at the steps. control: stacked (2N,)."""
+    k = achieved(problem, control)
+    if not k.size:
+        return assessed(problem, CERTAIN_K, (0, 1.0))
+    row, column = np.unravel_index(int(k.argmin()), k.shape)
+    return assessed(problem, min(float(k[row, column]), CERTAIN_K), (int(row), int(column) + 1.0))
+
+
+def assessed(problem: Problem, smallest_k: float, place: tuple[int, float]) -> Assessment:
+    """Return the assessment of a smallest k at an obstacle row and time in steps."""
+    if not len(problem.obstacles):
+        return Assessment(smallest_k, None, ())
+    inside = zip(problem.obstacles.ids, problem.inside_margin.tolist(), strict=True)
+    return Assessment(smallest_k, place, tuple(identity for identity, is_inside in inside if is_inside))
+
+
+def achieved(problem: Problem, control: Array) -> Array:
+    """Return k = -E[C] / sqrt(Var[C]) per obstacle and step (m, N), linearised at the mean of a control (2N,).
+
+    It is infinite where the hand is still leaving a margin (paper, equation 8).
+    """
     k = k_at(
         problem.positions(control),
         problem.position_variance(control),
@@ -56,4 +58,4 @@ def assess(problem: Problem, control: Array) -> Assessment:
         problem.obstacles.centre_covariance,
     )
     k[np.arange(1, problem.horizon.steps + 1) < problem.leaving[:, None]] = np.inf
-    return Assessment(k, tuple(np.array(problem.obstacles.ids, dtype=object)[problem.inside_margin]))
+    return k

@@ -28,17 +28,26 @@ def eta_of_k(k: float) -> float:
     return k * k / (1.0 + k * k) if k > 0 else 0.0
 
 
-def centres(obstacles: Obstacles, dt: float, steps: int) -> Array:
-    """Mean centres at steps 1..N, (n, N, 2) [m]: moved on at their velocity."""
-    times = dt * np.arange(1, steps + 1)
-    moved: Array = obstacles.centre[:, None, :] + times[None, :, None] * obstacles.velocity[:, None, :]
+@compiled
+def centres(centre: Matrix, drift: Matrix, steps: int) -> Tensor:
+    """Mean centres at steps 1..N, (n, N, 2) [m], from those now (n, 2) [m] and how far each moves in a step (n, 2) [m]."""
+    moved = np.empty((len(centre), steps, 2))
+    for j in range(len(centre)):
+        for t in range(steps):
+            for axis in range(2):
+                moved[j, t, axis] = centre[j, axis] + (t + 1) * drift[j, axis]
     return moved
 
 
-def courses(obstacles: Obstacles, dt: float, steps: int) -> Array:
-    """Mean centres now and at steps 1..N, step by step, (N + 1, n, 2) [m]."""
-    course: Array = np.concatenate((obstacles.centre[:, None], centres(obstacles, dt, steps)), axis=1).swapaxes(0, 1)
-    return course
+@compiled
+def courses(centre: Matrix, drift: Matrix, steps: int) -> Tensor:
+    """The same now and at steps 1..N, step by step, (N + 1, n, 2) [m]."""
+    moved = np.empty((steps + 1, len(centre), 2))
+    for t in range(steps + 1):
+        for j in range(len(centre)):
+            for axis in range(2):
+                moved[t, j, axis] = centre[j, axis] + t * drift[j, axis]
+    return moved
 
 
 def size_moments(obstacles: Obstacles) -> tuple[Array, Array]:

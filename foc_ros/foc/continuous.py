@@ -19,24 +19,25 @@ from .contacts import Contacts
 from .deadline import NEVER, Deadline, OutOfTimeError
 from .homotopy import swept_angles
 from .least_k import Least, smallest
-from .newton import goes, joined, leapt, slid, stays, way_of
+from .newton import goes, joined, leapt, stays, way_of
 from .problem import Problem
 from .qp import NO_TIMES, effort_cost
 from .records import Array, Status
 from .sequential import MAX_QPS, Converged, Jump, converge
+from .settled import Settled, settled
 from .solver import WorkingSet
 from .start import Start, led
 
 STRIDE = 4.0
 """First look along the curve, in s: lambda grows by 16 from one to the next."""
-WARM_STRIDE = 0.25
+WARM_STRIDE = 0.5
 """The longest first look around the s of a warm start."""
 SHORTEST = 2.0**-10
 """The shortest one, and the stride at which an end that is infeasible counts as reached."""
 USUAL_SLOPE = 0.3
 """What k usually gains per unit of s: a first look goes as far as this says where an earlier solution does not know better."""
-OVERSHOOT = 1.2
-"""How much farther a look goes than to where k is expected to be the wanted one."""
+TINY = 1e-6
+"""The shortest stride of a look around that follows the slope."""
 SPAN = 60.0
 """The largest s in any case: without noise, say, when lambda weighs nothing."""
 LARGEST_SHARE = 1e6
@@ -131,15 +132,17 @@ class _Walker:
         """
         tau, lam = self.curve.at(s)
 
-        def jump(control: Array, contacts: Contacts) -> tuple[Array, Contacts] | None:
-            return slid(self.problem, control, joined(self.problem, contacts), tau, lam, way)
+        def jump(control: Array, contacts: Contacts) -> Settled | None:
+            return settled(self.problem, control, joined(self.problem, contacts), tau, lam, way)
 
         found = self.sequence(guess, working, tau, lam, jump, thorough=thorough)
         if found is None or not found.stays:
             return None
-        if way is not None and not found.jumped and not goes(self.problem, found.control, way):
+        if found.jumped is not None:
+            return self.reached(s, found.jumped)
+        if way is not None and not goes(self.problem, found.control, way):
             return None
-        return self.judged(s, found.control, found.contacts, rough=not found.jumped)
+        return self.reached(s, Settled(found.control, found.contacts, smallest(self.problem, found.control)), rough=True)
 
     def sequence(
         self, guess: Array, working: WorkingSet, tau: float, lam: float, jump: Jump, *, thorough: bool
@@ -164,7 +167,7 @@ class _Walker:
             if found is None:
                 return None
             self.qp_solves += found.qp_solves
-            leaps = NO_TIMES if found.jumped else leapt(self.problem, found.control, tau)
+            leaps = NO_TIMES if found.jumped is not None else leapt(self.problem, found.control, tau)
             if not len(leaps):
                 return found
             most -= found.linearisations
@@ -177,20 +180,20 @@ class _Walker:
         """Converge at s from a neighbour, in its class: by Newton steps; by QPs where these fail, unless it only follows."""
         self.deadline.check()
         contacts = joined(self.problem, neighbour.contacts) if neighbour.rough else neighbour.contacts
-        point = self.settled(s, neighbour.control, contacts)
+        point = self.followed(s, neighbour.control, contacts)
         if point is not None or self.follows:
             return point
         guess, (working, _) = self.problem.positions(neighbour.control), contacts.rows(self.problem.horizon.steps)
         return self.point(s, guess, working, way_of(self.problem, neighbour.control), thorough=False)
 
-    def settled(self, s: float, control: Array, contacts: Contacts, way: Array | None = None) -> Point | None:
+    def followed(self, s: float, control: Array, contacts: Contacts, way: Array | None = None) -> Point | None:
         """Converge at s from a control (2N,) by Newton steps, in its class or that of a way."""
-        found = slid(self.problem, control, contacts, *self.curve.at(s), way)
-        return None if found is None else self.judged(s, *found)
+        found = settled(self.problem, control, contacts, *self.curve.at(s), way)
+        return None if found is None else self.reached(s, found)
 
-    def judged(self, s: float, control: Array, contacts: Contacts, *, rough: bool = False) -> Point:
-        """Return the point with the k that its control achieves, and remember it if that is the largest so far."""
-        point = Point(s, control, contacts, smallest(self.problem, control), rough)
+    def reached(self, s: float, found: Settled, *, rough: bool = False) -> Point:
+        """Return the point, and remember it if its k is the largest so far."""
+        point = Point(s, found.control, found.contacts, found.least, rough)
         self.best = point if self.best is None or point.k > self.best.k else self.best
         return point
 
@@ -223,12 +226,11 @@ def _walk(walker: _Walker, start: Start) -> Walk:
     else:
         way = swept_angles(np.concatenate((problem.initial_mean[None, :2], start.positions)), problem.courses)
         control = led(problem, start.control, start.positions)
-        first = walker.settled(curve.s_of(start.lam), control, joined(problem, start.contacts), way)
+        first = walker.followed(curve.s_of(start.lam), control, joined(problem, start.contacts), way)
         if first is None:
             first = walker.beginning(start.positions, way)
         else:
-            ahead = OVERSHOOT * abs(wanted - first.k) / (start.slope or USUAL_SLOPE)
-            stride, patience = min(max(ahead, SHORTEST), WARM_STRIDE), PATIENCE
+            stride, patience = _ahead(first, wanted, start.slope or USUAL_SLOPE, WARM_STRIDE), PATIENCE
     if first is None:
         return Walk(Status.INFEASIBLE, 'no way between the obstacles keeps clear of them', None, walker.qp_solves)
     low, high = _bracket(walker, first, wanted, stride, patience)
@@ -242,16 +244,18 @@ def _walk(walker: _Walker, start: Start) -> Walk:
 
 
 def _bracket(walker: _Walker, first: Point, wanted: float, stride: float, patience: float) -> tuple[Point, Point | None]:
-    """Return the last point below the wanted k and the first at or above it.
+    """Return the last point below the wanted k and the first at or above it; or, instead of both, one that is close and one before.
 
     Both the same where the first is close enough, or the curve's beginning is enough; no upper one where the wanted k is out of
     reach: then the best point.
     """
-    if wanted <= first.k <= wanted * (1 + CLOSE):
+    if _is_close(first, wanted):
         return first, first
     if first.k >= wanted:
         high = first
         for point in _strides(walker, first, wanted, -stride):
+            if _is_close(point, wanted):
+                return high, point
             if point.k < wanted:
                 return point, high
             high = point
@@ -276,12 +280,14 @@ def _strides(walker: _Walker, first: Point, wanted: float, stride: float) -> Ite
     guided = abs(stride) < STRIDE
     point, end = first, walker.end if stride > 0 else 0.0
     shortest = (SHORTEST if guided else WARM_STRIDE) / 2
-    while point.s != end and abs(stride) > shortest:
+    while point.s != end:
         s = min(point.s + stride, end) if stride > 0 else max(point.s + stride, end)
         further = walker.beside(s, point)
         if further is None:
             stride /= 4
             end = point.s + 3 * stride
+            if abs(stride) < shortest:
+                return
             continue
         stride = _next_stride(point, further, wanted, stride) if guided else math.copysign(min(4 * abs(stride), STRIDE), stride)
         point = further
@@ -289,11 +295,23 @@ def _strides(walker: _Walker, first: Point, wanted: float, stride: float) -> Ite
 
 
 def _next_stride(before: Point, point: Point, wanted: float, stride: float) -> float:
-    """Go a little farther than where k would be the wanted one if it went on as it does; at most four times the last stride."""
+    """Go to where k would be the wanted one if it went on as it does, on the same way; at most four times the last stride."""
     largest = min(4 * abs(stride), STRIDE)
     slope = (point.k - before.k) / (point.s - before.s)
-    length = OVERSHOOT * abs(wanted - point.k) / slope if slope > 0 else largest
-    return math.copysign(min(max(length, SHORTEST), largest), stride)
+    return math.copysign(_ahead(point, wanted, slope, largest) if slope > 0 else largest, stride)
+
+
+def _ahead(point: Point, wanted: float, slope: float, most: float) -> float:
+    """Return how far from a point k is the wanted one if it grows with a slope, in the middle of what counts as close."""
+    return min(max(abs(_aim(wanted) - point.k) / slope, TINY), most)
+
+
+def _aim(wanted: float) -> float:
+    return wanted * (1 + CLOSE / 2)
+
+
+def _is_close(point: Point, wanted: float) -> bool:
+    return wanted <= point.k <= wanted * (1 + CLOSE)
 
 
 def _root(walker: _Walker, low: Point, high: Point, wanted: float, *, guided: bool) -> tuple[Point, float]:
@@ -309,7 +327,7 @@ def _root(walker: _Walker, low: Point, high: Point, wanted: float, *, guided: bo
         if middle is None:
             break
         low, high = (low, middle) if middle.k >= wanted else (middle, high)
-    aim = wanted * (1 + CLOSE / 2)
+    aim = _aim(wanted)
     below, above, side = low.k - aim, high.k - aim, 0
     for _ in range(MAX_TRIALS):
         if high.k <= wanted * (1 + CLOSE) or high.s - low.s < NARROW:

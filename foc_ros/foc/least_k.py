@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 
-from .assess import Assessment, assess
+from .assess import Assessment, assessed
 from .between import blend, course_of, place, place_row
 from .chance import CERTAIN_K, k_of, variance_of
 from .compiled import Matrix, Tensor, Vector, compiled
@@ -27,32 +26,13 @@ Least: TypeAlias = tuple[float, int, float]
 
 def assess_between(problem: Problem, control: Array, least: Least | None = None) -> Assessment:
     """Assess a control (2N,) at the steps and between them; least: the `smallest`, where it is known."""
-    assessment = assess(problem, control)
-    if not assessment.k.size:
-        return assessment
-    return replace(assessment, between=smallest(problem, control) if least is None else least)
+    k, *place = smallest(problem, control) if least is None else least
+    return assessed(problem, k, (place[0], place[1]))
 
 
 def smallest(problem: Problem, control: Array) -> Least:
     """Return the smallest k of a control (2N,), at the steps and between them; CERTAIN_K without obstacles."""
-    if not len(problem.obstacles):
-        return CERTAIN_K, 0, 1.0
-    return least_k(
-        problem.horizon.motion,
-        problem.horizon.maps,
-        problem.free_course,
-        problem.free_variance,
-        problem.error_course,
-        problem.initial_covariance,
-        problem.noise_variance,
-        np.ascontiguousarray(control, dtype=float),
-        problem.obstacles.centre,
-        problem.drift,
-        problem.centres,
-        *problem.size,
-        problem.obstacles.centre_covariance,
-        problem.leaving,
-    )
+    return least_k(*problem.circles, *problem.chances, np.ascontiguousarray(control, dtype=float))
 
 
 @compiled
@@ -129,22 +109,22 @@ def _is_above(bound: float, mean: float, variance: float) -> bool:
 @compiled
 def least_k(
     motion: Tensor,
-    maps: Tensor,
     free: Matrix,
+    centre: Matrix,
+    drift: Matrix,
+    maps: Tensor,
     free_variance: Matrix,
     error_course: Tensor,
     initial_covariance: Matrix,
     noise_variance: Vector,
-    control: Vector,
-    centre: Matrix,
-    drift: Matrix,
     centres: Tensor,
     size_mean: Vector,
     size_variance: Vector,
     centre_covariance: Tensor,
     leaving: Vector,
+    control: Vector,
 ) -> tuple[float, int, float]:
-    """Return the smallest k of a control (2N,), its circle and its time in steps.
+    """Return the smallest k of a control (2N,), its circle and its time in steps; CERTAIN_K without circles.
 
     Where a step's k is smaller than its neighbours', the smallest is looked for beside it: at the vertex of the parabola through
     three times, closer and closer. leaving (m,): steps from now in which a circle does not count.

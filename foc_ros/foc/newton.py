@@ -10,11 +10,12 @@ import numpy as np
 
 from .between import entered
 from .contacts import Contacts, merged
+from .driven import driven
 from .homotopy import swept_angles
 from .problem import Problem
 from .qp import NO_TIMES, Cost, depths, margins, wanted_distance
 from .records import Array
-from .sliding import CLEAR, SETTLED, slide
+from .sliding import CLEAR, SETTLED
 from .solver import Verdict, with_rows
 from .touching import half_planes_between, touching
 
@@ -27,14 +28,15 @@ LEAP = 0.1
 def held(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: float) -> tuple[Array, Contacts] | None:
     """Find the solution near a control (2N,) that touches at the given steps; None where it is none, or enters a circle."""
     inverse, _, factor = cost.factors
+    motion, free, centre, drift = problem.circles
     found, control, time, force = touching(
-        problem.horizon.motion,
-        problem.free_course,
+        motion,
+        free,
         inverse,
         factor,
         cost.goal_control,
-        problem.obstacles.centre,
-        problem.drift,
+        centre,
+        drift,
         *margins(problem, tau),
         contacts.obstacle,
         contacts.time,
@@ -64,39 +66,6 @@ def leapt(problem: Problem, control: Array, tau: float) -> Array:
     return times
 
 
-def slid(
-    problem: Problem, control: Array, contacts: Contacts, tau: float, lam: float, way: Array | None = None
-) -> tuple[Array, Contacts] | None:
-    """Find the solution at (tau, lambda) near a control (2N,) that keeps out of circles between the steps too.
-
-    contacts: to begin with; way (m,): the class that it has to be in, as of `way_of`; that of the control if not given.
-    Returns the control and its contacts; None where there is none in that class.
-    """
-    found, changed, solution, obstacle, time, force = slide(
-        problem.horizon.motion,
-        problem.free_course,
-        problem.obstacles.centre,
-        problem.drift,
-        *margins(problem, tau),
-        problem.weighted_variance,
-        problem.summed_variance,
-        lam,
-        *problem.goal_rows,
-        contacts.obstacle,
-        contacts.time,
-        contacts.force,
-        np.ascontiguousarray(control, dtype=float),
-        problem.extent,
-    )
-    if not found:
-        return None
-    if way is None and changed:  # with the same contacts it is in the class of the control
-        way = way_of(problem, control)
-    if way is not None and not goes(problem, solution, way):
-        return None
-    return solution, Contacts(obstacle, time, force)
-
-
 def way_of(problem: Problem, control: Array) -> Array:
     """Return the angles (m,) that the mean of a control (2N,) sweeps about the centres, which tell its class."""
     return swept_angles(problem.course(control)[:2].T, problem.courses)
@@ -111,21 +80,9 @@ def stays(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau:
     """Whether the QP linearised at a control (2N,), with a row for each contact, has that control as its solution."""
     if not len(contacts):
         return True
-    reach, missing, pace = margins(problem, tau)
-    rows, limits = half_planes_between(
-        problem.horizon.motion,
-        problem.free_course,
-        control,
-        problem.obstacles.centre,
-        problem.drift,
-        reach,
-        missing,
-        pace,
-        contacts.obstacle,
-        contacts.time,
-    )
+    rows, limits = half_planes_between(*problem.circles, *margins(problem, tau), control, contacts.obstacle, contacts.time)
     answer = with_rows(cost, rows, limits)
     if isinstance(answer, Verdict):
         return False
-    move = problem.positions(answer[0]) - problem.positions(control)
+    move = driven(problem.horizon.maps[:2], answer[0] - control)
     return float(np.abs(move).max()) < STAYS * problem.extent

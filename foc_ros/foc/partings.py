@@ -47,6 +47,6 @@ def partings(outcomes: Sequence[Outcome], obstacles: Obstacles) -> Partings:
 def _seen(outcome: Outcome, obstacles: Obstacles) -> tuple[Array, Array]:
     """Return the angle (n,) [rad] that the mean path sweeps about each obstacle, and when (n,) [s] it is nearest to it."""
     solution = outcome.solution
-    where = courses(obstacles, solution.dt, len(solution.mean) - 1)
+    where = courses(obstacles.centre, solution.dt * obstacles.velocity, len(solution.mean) - 1)
     apart = solution.path[:, None] - where
     return swept_angles(solution.path, where), solution.times[(apart**2).sum(axis=2).argmin(axis=0)]

@@ -76,6 +76,22 @@ class Problem(Record):
         return np.ascontiguousarray(self.error_map[:, :4].swapaxes(0, 1) * scale[:, None, None])
 
     @cached_property
+    def circles(self) -> tuple[Array, Array, Array, Array]:
+        """What kernels ask about courses and circles: the course's responses, and it without control; centres and their drifts."""
+        return self.horizon.motion, self.free_course, self.obstacles.centre, self.drift
+
+    @cached_property
+    def costs(self) -> tuple[Array, Array, Array, Array, Array]:
+        """What kernels ask about the cost: what weighs the squared control, and the goal's rows, targets and softness."""
+        return self.weighted_variance, self.summed_variance, *self.goal_rows
+
+    @cached_property
+    def chances(self) -> tuple[Array, ...]:
+        """What kernels ask about the chance constraint: `least_k`, from maps to leaving."""
+        course = self.horizon.maps, self.free_variance, self.error_course, self.initial_covariance, self.noise_variance
+        return *course, self.centres, *self.size, self.obstacles.centre_covariance, self.leaving
+
+    @cached_property
     def drift(self) -> Array:
         """How far each centre moves in a step, (m, 2) [m]."""
         drift: Array = self.obstacles.velocity * self.horizon.dt
@@ -98,18 +114,17 @@ class Problem(Record):
     @cached_property
     def centres(self) -> Array:
         """Mean centres of the obstacles at steps 1..N, (m, N, 2) [m]."""
-        return centres(self.obstacles, self.horizon.dt, self.horizon.steps)
+        return centres(self.obstacles.centre, self.drift, self.horizon.steps)
 
     @cached_property
     def courses(self) -> Array:
         """Mean centres of the obstacles at steps 0..N, step by step, (N + 1, m, 2) [m]."""
-        return courses(self.obstacles, self.horizon.dt, self.horizon.steps)
+        return courses(self.obstacles.centre, self.drift, self.horizon.steps)
 
     @cached_property
     def first_alike(self) -> NDArray[np.intp]:
         """For each obstacle the first one that is the same circle, (m,): a mean that touches both is held by one of them."""
-        circle = np.column_stack((self.obstacles.centre, self.obstacles.velocity * self.horizon.dt, np.sqrt(self.size[0])))
-        return first_within(circle, ALIKE * self.extent)
+        return first_alike(self.obstacles.centre, self.drift, np.sqrt(self.size[0]), ALIKE * self.extent)
 
     @cached_property
     def centres_from_free(self) -> Array:
@@ -206,12 +221,15 @@ class Problem(Record):
 
 
 @compiled
-def first_within(rows: Matrix, tolerance: float) -> Indices:
-    """Return for each of the rows (m, q) the first that is nowhere farther from it than a tolerance, (m,)."""
-    first = np.arange(len(rows))
-    for i in range(len(rows)):
+def first_alike(centre: Matrix, drift: Matrix, reach: Vector, tolerance: float) -> Indices:
+    """Return for each circle the first that differs by less than a tolerance [m] in place, drift per step and reach, (m,)."""
+    first = np.arange(len(reach))
+    for i in range(len(reach)):
         for j in range(i):
-            if np.abs(rows[i] - rows[j]).max() < tolerance:
+            apart = abs(reach[i] - reach[j])
+            for axis in range(2):
+                apart = max(apart, abs(centre[i, axis] - centre[j, axis]), abs(drift[i, axis] - drift[j, axis]))
+            if apart < tolerance:
                 first[i] = j
                 break
     return first

@@ -19,6 +19,7 @@ from .newton import STAYS, held
 from .problem import Problem
 from .qp import NO_TIMES, Cost, clearance_qp, effort_cost
 from .records import Array
+from .settled import Settled
 from .solver import WorkingSet, solve
 
 NEAR = 0.01
@@ -33,7 +34,7 @@ LARGEST_STRETCH = 15.0
 """Most moves that the next linearisation is taken ahead."""
 
 
-Jump: TypeAlias = Callable[[Array, Contacts], tuple[Array, Contacts] | None]
+Jump: TypeAlias = Callable[[Array, Contacts], Settled | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +42,7 @@ class Converged:
     """A control that its own linearisation returns: stacked control (2N,), positions (N, 2) at steps 1..N, active rows.
 
     qp_solves: QPs solved, rounds of the working set counted each; linearisations: how many there were; stays: whether it settled;
-    jumped: whether `converge`'s jump ended it.
+    jumped: what `converge`'s jump found, if that ended it.
     """
 
     control: Array
@@ -51,7 +52,7 @@ class Converged:
     qp_solves: int
     linearisations: int
     stays: bool
-    jumped: bool = False
+    jumped: Settled | None = None
 
 
 def converge(
@@ -91,8 +92,8 @@ def converge(
             return Converged(solution.control, positions, working, contacts, solves, count, stays=move < STAYS)
         found = jump(solution.control, contacts) if jump is not None else None
         if found is not None:
-            positions = problem.positions(found[0])
-            return Converged(found[0], positions, working, found[1], solves, count, stays=True, jumped=True)
+            positions = problem.positions(found.control)
+            return Converged(found.control, positions, working, found.contacts, solves, count, stays=True, jumped=found)
         rows = (working.obstacle.tobytes(), working.step.tobytes())
         better = None
         if len(working) and (rows == previous or move < NEAR):

@@ -28,9 +28,7 @@ def slide(
     reach: Vector,
     short: Vector,
     pace: float,
-    weighted_variance: Vector,
-    summed_variance: Vector,
-    lam: float,
+    hessian: Vector,
     goal_rows: Matrix,
     goal_targets: Vector,
     softness: Vector,
@@ -43,10 +41,10 @@ def slide(
     """Find the least cost `qp.effort_cost` near a control (2N,) that keeps clear of every circle at every time.
 
     From contacts (k,) to begin with, which slide: those that pull are let go, and where a circle is entered there is a new one.
-    motion ... pace: as in `touching`; extent: of the scene [m]. Returns whether there is one, and whether it has other contacts,
+    motion ... pace: as in `touching`; hessian (2N,) and the goal: as in `qp.Cost`; extent: of the scene [m]. Returns whether there is one, and whether it has other contacts,
     so that it may pass circles on another side; the control, and its contacts' obstacles, times and forces.
     """
-    inverse, root, factor = goal_factors(2.0 * (1.0 + weighted_variance + lam * summed_variance), goal_rows, softness)
+    inverse, root, factor = goal_factors(hessian, goal_rows, softness)
     goal_control = to_goal(root, factor, goal_targets)
     control, obstacle, time, force = near.copy(), obstacle.copy(), time.copy(), force.copy()
     for count in range(CHANGES + 1):

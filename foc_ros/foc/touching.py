@@ -30,12 +30,12 @@ SHARED = 1e-13
 def half_planes_between(
     motion: Tensor,
     free: Matrix,
-    control: Vector,
     centre: Matrix,
     drift: Matrix,
     reach: Vector,
     short: Vector,
     pace: float,
+    control: Vector,
     obstacle: Indices,
     time: Vector,
 ) -> tuple[Matrix, Vector]:

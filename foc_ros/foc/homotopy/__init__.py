@@ -2,6 +2,6 @@
 
 from .search import Search, search
 from .shown import named_obstacles, timed
-from .sides import path_sides, swept_angles
+from .sides import path_sides, swept, swept_angles
 
-__all__ = ['Search', 'named_obstacles', 'path_sides', 'search', 'swept_angles', 'timed']
+__all__ = ['Search', 'named_obstacles', 'path_sides', 'search', 'swept', 'swept_angles', 'timed']
