@@ -5,7 +5,7 @@ import pytest
 
 from foc_ros.foc.dynamics import damped_mass, horizon, triple_integrator
 from foc_ros.foc.noise import noise_per_step, stacked_noise, state_covariance
-from foc_ros.foc.problem import spread
+from foc_ros.foc.stacked import spread, squares
 
 PLANTS = pytest.mark.parametrize('plant', [triple_integrator(0.03), damped_mass(0.04, 1.5, 4.0)], ids=['jerk', 'force'])
 
@@ -37,6 +37,15 @@ def test_position_variance_is_diagonal_in_the_squared_control(plant):
     full = state_covariance(stacked, np.zeros((16, len(plant.A), len(plant.A))), noise, control)[1:]
     xx, yy, xy = spread(stacked.maps, stacked_noise(noise, 15) ** 2, control, np.zeros((3, 15)))
     np.testing.assert_allclose([xx, yy, xy], [full[:, 0, 0], full[:, 1, 1], full[:, 0, 1]], atol=1e-15)
+
+
+@PLANTS
+def test_weighted_variances_are_sums_of_squared_responses(plant):
+    generator = np.random.default_rng(5)
+    stacked, n = horizon(plant, 15), len(plant.A)
+    end, way = generator.uniform(size=(2, n))
+    squared = stacked.response**2
+    np.testing.assert_allclose(squares(stacked.states, end, way), end @ squared[-1] + way @ squared[:-1].sum(axis=0), rtol=1e-12)
 
 
 def test_covariance_is_that_of_noisy_rollouts():

@@ -116,12 +116,6 @@ class Horizon(Record):
         """S: positions at steps 1..N from u, written out in full, (2, N, 2N)."""
         return self.response[:, :2].swapaxes(0, 1)
 
-    @cached_property
-    def squared(self) -> tuple[Array, Array]:
-        """Squares of `response`, (n, 2N): of the last step, and summed over the steps before it."""
-        before = np.cumsum(self.states[..., :-1] ** 2, axis=-1)[..., ::-1]
-        return self.last**2, before.reshape(len(before), -1)
-
     def returning(self, path: Array, state: Array, fixed: tuple[int, ...]) -> Array:
         """Return the control (2N,) that makes up for what a path, and the fixed states at its end, are missing.
 

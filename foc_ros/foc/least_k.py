@@ -10,8 +10,9 @@ from .assess import Assessment, assessed
 from .between import blend, course_of, place, place_row
 from .chance import CERTAIN_K, k_of, variance_of
 from .compiled import Matrix, Tensor, Vector, compiled
-from .problem import Problem, spread
+from .problem import Problem
 from .records import Array
+from .stacked import spread
 
 PARABOLAS = 8
 VERTEX = 1e-4

@@ -20,11 +20,12 @@ from .assess import assess
 from .chance import eta_of_k, k_of_eta, variance
 from .compiled import Indices, Matrix, Tensor, Vector, compiled
 from .deadline import NEVER, Deadline, OutOfTimeError
-from .problem import Problem, moved, spread
+from .problem import Problem
 from .qp import Cost, ReachingQP, effort_cost, row_values, wanted_distance
 from .records import Array, Status
 from .sequential import converge
 from .solver import WorkingSet, solve
+from .stacked import moved, spread
 from .start import Start
 
 SETTLED = 1e-6

@@ -4,21 +4,37 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .between import course_of
-from .chance import centres, courses, k_at, k_of_eta, size_moments
-from .compiled import Indices, Matrix, Tensor, Vector, compiled
-from .driven import driven
+from .chance import centres, courses, k_of_eta, size_moments
 from .dynamics import Horizon, states_at_goal
 from .errors import SceneError
 from .noise import stacked_noise
 from .records import Array, Obstacles, Record
+from .stacked import carried_variance, end_rows, extent, first_alike, inside, moved, spread, squares, without_control
 
+BOTH = np.ones(2)
 ALIKE = 1e-6
 """Difference between two circles, relative to the scene, at which they count as the same."""
+
+
+class Chances(NamedTuple):
+    """`Horizon.maps`, and of a `Problem` what has the same names."""
+
+    maps: Array
+    free_variance: Array
+    error_course: Array
+    initial_covariance: Array
+    noise_variance: Array
+    centres: Array
+    size_mean: Array
+    size_variance: Array
+    centre_covariance: Array
+    leaving: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,28 +66,37 @@ class Problem(Record):
     @cached_property
     def extent(self) -> float:
         """Size of the scene that tolerances are relative to: the way to the goal, or the largest circle if that is more [m]."""
-        way = self.goal[:2] - self.initial_mean[:2]
-        return max(float(np.hypot(way[0], way[1])), float(self.obstacles.radius.max(initial=0.0)), 1e-6)
+        way_x, way_y, *_ = (self.goal - self.initial_mean).tolist()
+        return extent(way_x, way_y, self.obstacles.radius)
 
     @cached_property
+    def without_control(self) -> tuple[Array, Array, Array]:
+        """The mean without control: states at steps 0..N (N + 1, n), positions at steps 1..N (N, 2) [m], and `free_course`."""
+        return without_control(self.horizon.powers, self.initial_mean, self.horizon.dt)
+
+    @property
     def free(self) -> Array:
         """Mean state at steps 0..N without control, (N + 1, n)."""
-        return self.horizon.powers @ self.initial_mean
+        return self.without_control[0]
 
-    @cached_property
+    @property
     def free_position(self) -> Array:
         """Mean position at steps 1..N without control, (N, 2) [m]."""
-        return self.free[1:, :2].copy()
+        return self.without_control[1]
 
-    @cached_property
+    @property
     def free_course(self) -> Array:
         """Mean position and velocity per step without control, x, y, vx, vy at steps 0..N, (4, N + 1) [m]."""
-        scale = np.array([1.0, 1.0, self.horizon.dt, self.horizon.dt])
-        return np.ascontiguousarray(self.free[:, :4].T * scale[:, None])
+        return self.without_control[2]
 
     @cached_property
     def error_course(self) -> Array:
-        """What an error of the initial state becomes in position and velocity per step, at steps 0..N, (4, N + 1, n)."""
+        """What an error of the initial state becomes in position and velocity per step, at steps 0..N, (4, N + 1, n).
+
+        Without steps where there is no such error.
+        """
+        if not self.initial_covariance.any():
+            return np.zeros((4, 0, len(self.initial_mean)))
         scale = np.array([1.0, 1.0, self.horizon.dt, self.horizon.dt])
         return np.ascontiguousarray(self.error_map[:, :4].swapaxes(0, 1) * scale[:, None, None])
 
@@ -86,10 +111,10 @@ class Problem(Record):
         return self.weighted_variance, self.summed_variance, *self.goal_rows
 
     @cached_property
-    def chances(self) -> tuple[Array, ...]:
-        """What kernels ask about the chance constraint: `least_k`, from maps to leaving."""
+    def chances(self) -> Chances:
+        """What kernels ask about the chance constraint."""
         course = self.horizon.maps, self.free_variance, self.error_course, self.initial_covariance, self.noise_variance
-        return *course, self.centres, *self.size, self.obstacles.centre_covariance, self.leaving
+        return Chances(*course, self.centres, *self.size, self.obstacles.centre_covariance, self.leaving)
 
     @cached_property
     def drift(self) -> Array:
@@ -108,8 +133,7 @@ class Problem(Record):
     @cached_property
     def free_variance(self) -> Array:
         """Rows xx, yy, xy of the free position covariance at steps 1..N, (3, N) [m^2]."""
-        covariance = self.free_covariance[1:]
-        return np.stack((covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]))
+        return carried_variance(self.error_map, self.initial_covariance)
 
     @cached_property
     def centres(self) -> Array:
@@ -142,18 +166,13 @@ class Problem(Record):
         """Whether the hand is now inside the margin of each obstacle, (m,): never, without a recovery time."""
         if self.recovery_s <= 0 or not len(self.obstacles):
             return np.zeros(len(self.obstacles), dtype=np.bool_)
-        now = self.free_covariance[0]
-        covariance = np.array([[now[0, 0]], [now[1, 1]], [now[0, 1]]])
-        here, centre = self.initial_mean[None, :2], self.obstacles.centre[:, None]
-        inside: NDArray[np.bool_] = k_at(here, covariance, centre, *self.size, self.obstacles.centre_covariance)[:, 0] < k_of_eta(
-            self.eta
-        )
-        return inside
+        circles = self.obstacles.centre, *self.size, self.obstacles.centre_covariance
+        return inside(self.initial_mean, self.initial_covariance, *circles, k_of_eta(self.eta))
 
     @cached_property
     def leaving(self) -> Array:
         """Steps from now in which each obstacle does not count, because the hand is still leaving its margin, (m,)."""
-        return np.where(self.inside_margin, self.recovery_s / self.horizon.dt, 0.0)
+        return self.inside_margin * (self.recovery_s / self.horizon.dt)
 
     @cached_property
     def size(self) -> tuple[Array, Array]:
@@ -163,7 +182,7 @@ class Problem(Record):
     @cached_property
     def noise_variance(self) -> Array:
         """c^2 for every entry of the stacked control, (2N,)."""
-        return stacked_noise(self.noise, self.horizon.steps) ** 2
+        return stacked_noise(self.noise**2, self.horizon.steps)
 
     @cached_property
     def unweighted(self) -> Array:
@@ -173,15 +192,13 @@ class Problem(Record):
     @cached_property
     def summed_variance(self) -> Array:
         """(2N,): sum over steps of the variances of x and y is this times u^2, plus the free part."""
-        end, way = self.horizon.squared
-        summed: Array = (end[:2] + way[:2]).sum(axis=0) * self.noise_variance
+        summed: Array = squares(self.horizon.states[:2], BOTH, BOTH) * self.noise_variance
         return summed
 
     @cached_property
     def weighted_variance(self) -> Array:
         """(2N,): the variance terms of J_X are this times u^2, plus the free part."""
-        end, way = self.horizon.squared
-        weighted: Array = (self.end_weights @ end + self.way_weights @ way) * self.noise_variance
+        weighted: Array = squares(self.horizon.states, self.end_weights, self.way_weights) * self.noise_variance
         return weighted
 
     @cached_property
@@ -190,22 +207,16 @@ class Problem(Record):
 
         Softness 0 is an equality; 1 / (2 w) is a term w (X_i - goal_i)^2 of the cost.
         """
-        hard = np.flatnonzero(self.at_goal)
-        soft = np.flatnonzero(~self.at_goal & (self.end_weights > 0))
-        way = np.flatnonzero(self.way_weights > 0)
-        last, steps = self.horizon.last, self.horizon.steps
-        before = self.horizon.response[:-1, way].reshape(-1, 2 * steps) if len(way) else last[way]
-        missing = self.goal - self.free[1:]
-        rows = np.concatenate((last[hard], last[soft], before))
-        targets = np.concatenate((missing[-1, hard], missing[-1, soft], missing[:-1, way].ravel()))
-        softness = np.concatenate(
-            (
-                np.zeros(len(hard)),
-                0.5 / self.end_weights[soft],
-                np.tile(0.5 / self.way_weights[way], steps - 1),
-            )
+        rows, targets, softness = end_rows(self.horizon.last, self.goal - self.free[-1], self.at_goal, self.end_weights)
+        if not self.way_weights.any():
+            return rows, targets, softness
+        way, steps = np.flatnonzero(self.way_weights > 0), self.horizon.steps
+        before, missing = self.horizon.response[:-1, way], (self.goal - self.free[1:-1])[:, way]
+        return (
+            np.concatenate((rows, before.reshape(-1, 2 * steps))),
+            np.concatenate((targets, missing.ravel())),
+            np.concatenate((softness, np.tile(0.5 / self.way_weights[way], steps - 1))),
         )
-        return rows, targets, softness
 
     def positions(self, control: Array) -> Array:
         """Mean positions at steps 1..N from the stacked control, (N, 2) [m]."""
@@ -218,35 +229,6 @@ class Problem(Record):
     def position_variance(self, control: Array) -> Array:
         """Rows xx, yy, xy of the position covariance at steps 1..N, (3, N) [m^2]."""
         return spread(self.horizon.maps, self.noise_variance, np.ascontiguousarray(control, dtype=float), self.free_variance)
-
-
-@compiled
-def first_alike(centre: Matrix, drift: Matrix, reach: Vector, tolerance: float) -> Indices:
-    """Return for each circle the first that differs by less than a tolerance [m] in place, drift per step and reach, (m,)."""
-    first = np.arange(len(reach))
-    for i in range(len(reach)):
-        for j in range(i):
-            apart = abs(reach[i] - reach[j])
-            for axis in range(2):
-                apart = max(apart, abs(centre[i, axis] - centre[j, axis]), abs(drift[i, axis] - drift[j, axis]))
-            if apart < tolerance:
-                first[i] = j
-                break
-    return first
-
-
-@compiled
-def moved(position: Tensor, control: Vector, free: Matrix) -> Matrix:
-    """Return free + S u, (N, 2), for the responses (2, 2, N + 1) of the position."""
-    positions: Matrix = free + driven(position, control)[:, 1:].T
-    return positions
-
-
-@compiled
-def spread(maps: Tensor, noise_variance: Vector, control: Vector, free: Matrix) -> Matrix:
-    """Return the rows xx, yy, xy of free + V u^2, (3, N), for `Horizon.maps` (5, 2, N + 1) and c^2 (2N,)."""
-    variance: Matrix = free + driven(maps[2:], noise_variance * control * control)[:, 1:]
-    return variance
 
 
 def rest_to_goal(
