@@ -89,10 +89,10 @@ def test_mass_and_damping_are_checked():
 def test_a_control_that_leads_back_ends_at_the_goal_and_nearer_to_the_path(passing):
     generator = np.random.default_rng(6)
     stacked = triple_integrator_horizon(0.02, 40)
-    fixed = tuple(np.flatnonzero(states_at_goal(6, passing)).tolist())
-    path, state = 0.01 * np.cumsum(generator.standard_normal((40, 2)), axis=0), generator.standard_normal(6)[list(fixed)]
+    fixed = states_at_goal(6, passing)
+    path, state = 0.01 * np.cumsum(generator.standard_normal((40, 2)), axis=0), generator.standard_normal(6)
     control = stacked.returning(path, state, fixed)
-    np.testing.assert_allclose(stacked.response[-1, list(fixed)] @ control, state, atol=1e-8)
+    np.testing.assert_allclose(stacked.response[-1, fixed] @ control, state[fixed], atol=1e-8)
     straight = stacked.returning(np.zeros((40, 2)), state, fixed)
     assert np.linalg.norm((stacked.position @ control).T - path) < np.linalg.norm((stacked.position @ straight).T - path)
     own = horizon(triple_integrator(0.02), 40).returning(path, state, fixed)

@@ -22,7 +22,7 @@ def test_covariance_is_the_recursion(plant):
     control, P = generator.standard_normal((steps, 2)), correlated(generator, n)
     stacked = horizon(plant, steps)
     free = stacked.powers @ P @ stacked.powers.swapaxes(1, 2)
-    closed = state_covariance(stacked, free, noise, control.T.ravel())
+    closed = state_covariance(stacked, free, stacked_noise(noise, steps) ** 2, control.T.ravel())
     for t in range(steps):
         np.testing.assert_allclose(closed[t], P, rtol=1e-9, atol=1e-15)
         P = plant.A @ P @ plant.A.T + plant.B @ np.diag((noise * control[t]) ** 2) @ plant.B.T
@@ -34,7 +34,7 @@ def test_position_variance_is_diagonal_in_the_squared_control(plant):
     generator = np.random.default_rng(3)
     stacked, noise = horizon(plant, 15), np.array([0.3, 0.1])
     control = generator.standard_normal(30)
-    full = state_covariance(stacked, np.zeros((16, len(plant.A), len(plant.A))), noise, control)[1:]
+    full = state_covariance(stacked, np.zeros((16, len(plant.A), len(plant.A))), stacked_noise(noise, 15) ** 2, control)[1:]
     xx, yy, xy = spread(stacked.maps, stacked_noise(noise, 15) ** 2, control, np.zeros((3, 15)))
     np.testing.assert_allclose([xx, yy, xy], [full[:, 0, 0], full[:, 1, 1], full[:, 0, 1]], atol=1e-15)
 
@@ -53,7 +53,9 @@ def test_covariance_is_that_of_noisy_rollouts():
     plant, steps, samples, noise = triple_integrator(0.05), 10, 40_000, np.array([0.2, 0.1])
     control, P0 = generator.standard_normal((steps, 2)) * 50, correlated(generator, 6)
     stacked = horizon(plant, steps)
-    closed = state_covariance(stacked, stacked.powers @ P0 @ stacked.powers.swapaxes(1, 2), noise, control.T.ravel())
+    closed = state_covariance(
+        stacked, stacked.powers @ P0 @ stacked.powers.swapaxes(1, 2), stacked_noise(noise, steps) ** 2, control.T.ravel()
+    )
     states = generator.multivariate_normal(np.zeros(6), P0, samples, method='eigh')
     for t in range(steps):
         noisy = control[t] * (1 + noise * generator.standard_normal((samples, 2)))

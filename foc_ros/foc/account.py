@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .chance import variance
+from .compiled import Matrix, Tensor, Vector, compiled
 from .contacts import Contacts
 from .problem import Problem
 from .qp import depths, wanted_distance
@@ -19,28 +20,45 @@ def costs(problem: Problem, control: Array, mean: Array, covariance: Array, lam:
 
     control (2N,); mean (N + 1, n) and covariance (N + 1, n, n) that follow from it.
     """
-    variances = np.diagonal(covariance, axis1=1, axis2=2)[1:]
-    squared_error = (mean[1:] - problem.goal) ** 2
-    way, end = problem.way_weights, problem.end_weights
-    return {
-        'effort': float(control @ control),
-        'mean_error': float((squared_error[:-1] @ way).sum() + squared_error[-1] @ end),
-        'variance': float((variances[:-1] @ way).sum() + variances[-1] @ end),
-        'lambda_variance': float(lam * variances[:, :2].sum()),
-    }
+    mean_error, variance, summed = weighed(mean, covariance, problem.goal, problem.end_weights, problem.way_weights)
+    effort = float(control @ control)
+    return {'effort': effort, 'mean_error': mean_error, 'variance': variance, 'lambda_variance': lam * summed}
 
 
-def shortfall(problem: Problem, positions: Array, tau: float) -> tuple[float, tuple[int, int] | None]:
-    """Return by how much a mean (N, 2) comes too near [m], and where: row of the obstacle and step (1..N) of the largest.
+@compiled
+def weighed(mean: Matrix, covariance: Tensor, goal: Vector, end: Vector, way: Vector) -> tuple[float, float, float]:
+    """Return the squared errors of a mean (N + 1, n) and the variances, with weights (n,), and the sum of those of x and y."""
+    times, n = mean.shape
+    squared, variance, summed = 0.0, 0.0, 0.0
+    for t in range(1, times):
+        for i in range(n):
+            weight = end[i] if t == times - 1 else way[i]
+            squared += weight * (mean[t, i] - goal[i]) ** 2
+            variance += weight * covariance[t, i, i]
+        summed += covariance[t, 0, 0] + covariance[t, 1, 1]
+    return squared, variance, summed
+
+
+def shortfall(problem: Problem, mean: Array, tau: float) -> tuple[float, tuple[int, int] | None]:
+    """Return by how much a mean (N + 1, n) comes too near [m], and where: row of the obstacle and step (1..N) of the largest.
 
     Too near is less than sqrt(E[R^2] + tau) from a centre, or less than a hand that is leaving a margin has to keep; 0 and None
     where it never is.
     """
-    missing = depths(positions, problem.centres, wanted_distance(problem, tau))
-    if missing.max(initial=0.0) <= NO_VIOLATION:
-        return 0.0, None
-    row, column = np.unravel_index(int(missing.argmax()), missing.shape)
-    return float(missing[row, column]), (int(row), int(column) + 1)
+    missing, row, step = nearest(mean, problem.centres, wanted_distance(problem, tau))
+    return (missing, (row, step)) if missing > NO_VIOLATION else (0.0, None)
+
+
+@compiled
+def nearest(mean: Matrix, centres: Tensor, wanted: Matrix) -> tuple[float, int, int]:
+    """Return the largest `depths` of a mean (N + 1, n) [m], its circle, and its step 1..N."""
+    depth = depths(mean[1:, :2].copy(), centres, wanted)
+    deepest, row, step = -np.inf, 0, 0
+    for j in range(depth.shape[0]):
+        for t in range(depth.shape[1]):
+            if depth[j, t] > deepest:
+                deepest, row, step = depth[j, t], j, t + 1
+    return deepest, row, step
 
 
 def asked_for(problem: Problem, control: Array, contacts: Contacts, k: float) -> list[tuple[float, float]]:

@@ -41,7 +41,7 @@ def centres(centre: Matrix, drift: Matrix, steps: int) -> Tensor:
 
 @compiled
 def courses(centre: Matrix, drift: Matrix, steps: int) -> Tensor:
-    """The same now and at steps 1..N, step by step, (N + 1, n, 2) [m]."""
+    """Mean centres now and at steps 1..N, step by step, (N + 1, n, 2) [m]."""
     moved = np.empty((steps + 1, len(centre), 2))
     for t in range(steps + 1):
         for j in range(len(centre)):

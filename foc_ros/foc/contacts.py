@@ -25,6 +25,11 @@ class Contacts:
     def __len__(self) -> int:
         return len(self.obstacle)
 
+    @property
+    def columns(self) -> tuple[Index, Array, Array]:
+        """Obstacles, times and forces."""
+        return self.obstacle, self.time, self.force
+
     @staticmethod
     def at_steps(rows: WorkingSet, multipliers: Array) -> Contacts:
         """Return obstacle rows, which hold at steps, with their multipliers (k,) as contacts."""

@@ -244,7 +244,7 @@ def _walk(walker: _Walker, start: Start) -> Walk:
 
 
 def _bracket(walker: _Walker, first: Point, wanted: float, stride: float, patience: float) -> tuple[Point, Point | None]:
-    """Return the last point below the wanted k and the first at or above it; or, instead of both, one that is close and one before.
+    """Return the last point below the wanted k and the first at or above it; or else any point, and one after it that is close.
 
     Both the same where the first is close enough, or the curve's beginning is enough; no upper one where the wanted k is out of
     reach: then the best point.

@@ -116,26 +116,29 @@ class Horizon(Record):
         """S: positions at steps 1..N from u, written out in full, (2, N, 2N)."""
         return self.response[:, :2].swapaxes(0, 1)
 
-    def returning(self, path: Array, state: Array, fixed: tuple[int, ...]) -> Array:
-        """Return the control (2N,) that makes up for what a path, and the fixed states at its end, are missing.
+    def returning(self, path: Array, state: Array, fixed: NDArray[np.bool_]) -> Array:
+        """Return the control (2N,) that makes up for what a path, and the fixed states (n,) at its end, are missing.
 
-        path (N, 2): of the positions at steps 1..N; state (f,): of the f fixed states at step N. It is the u of least
+        path (N, 2): of the positions at steps 1..N; state (n,): of the states at step N. It is the u of least
         |S u - path|^2 + w |u|^2 with E u = state, where S and E are the responses of the positions and of the fixed states.
         """
-        back, to_goal = _returning(self, fixed)
+        back, to_goal = _returning(self, fixed.tobytes())
         control: Array = back @ path.T.ravel() + to_goal @ state
         return control
 
 
 @lru_cache(maxsize=CACHED_HORIZONS)
-def _returning(stacked: Horizon, fixed: tuple[int, ...]) -> tuple[Array, Array]:
-    S, E = np.concatenate(stacked.position), stacked.last[list(fixed)]
+def _returning(stacked: Horizon, fixed: bytes) -> tuple[Array, Array]:
+    is_fixed = np.frombuffer(fixed, dtype=np.bool_)
+    S, E = np.concatenate(stacked.position), stacked.last[is_fixed]
     unit = 1.0 / np.sqrt((E**2).sum(axis=1))[:, None]  # of rows that mix metres, metres per second and their like
     square = S.T @ S
     weight = square + FREEDOM * np.trace(square) / len(square) * np.eye(len(square))
     back, turned = np.linalg.solve(weight, S.T), np.linalg.solve(weight, (unit * E).T)
     to_goal = turned @ np.linalg.pinv(unit * E @ turned) * unit.T
-    return back - to_goal @ (E @ back), to_goal
+    of_each_state = np.zeros((len(to_goal), len(is_fixed)))
+    of_each_state[:, is_fixed] = to_goal
+    return back - to_goal @ (E @ back), of_each_state
 
 
 def horizon(plant: Plant, steps: int) -> Horizon:
@@ -150,9 +153,14 @@ def horizon(plant: Plant, steps: int) -> Horizon:
     return Horizon(powers, states, plant.dt)
 
 
+STATE_ORDER = np.array([0.0, 0.0, 1.0, 1.0, 2.0, 2.0])
+"""Of the triple integrator's states as derivatives of the position."""
+
+
 def state_scale(dt: float) -> Array:
     """Diagonal of D, (6,): the triple integrator's state at step dt [s] is D times its state at unit step."""
-    return np.repeat([1.0, 1 / dt, 1 / dt**2], 2)
+    scale: Array = dt**-STATE_ORDER
+    return scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,8 +169,8 @@ class _Scaled(Horizon):
 
     unit: Horizon
 
-    def returning(self, path: Array, state: Array, fixed: tuple[int, ...]) -> Array:
-        return self.unit.returning(path, state / state_scale(self.dt)[list(fixed)], fixed) / self.dt**3
+    def returning(self, path: Array, state: Array, fixed: NDArray[np.bool_]) -> Array:
+        return self.unit.returning(path, state * self.dt**STATE_ORDER, fixed) / self.dt**3
 
 
 @lru_cache(maxsize=CACHED_HORIZONS)

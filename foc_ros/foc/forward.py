@@ -21,7 +21,7 @@ from .noise import state_covariance
 from .optimal import optimise
 from .problem import Problem
 from .qp import clearance_qp, effort_cost
-from .records import Array, Solution, Status
+from .records import Array, Solution, Status, fixed
 from .sequential import converge
 from .solver import WorkingSet, solve
 from .start import Start
@@ -126,8 +126,8 @@ _STRATEGIES = {'lv': _continuous, 'hc': _continuous, 'optimal': _optimal, 'algor
 def _solution(problem: Problem, ended: _Ended, assessment: Assessment, seconds: float, *, optimal: bool) -> Solution:
     horizon, ids = problem.horizon, problem.obstacles.ids
     mean = problem.free + driven(horizon.states, ended.control).T
-    covariance = state_covariance(horizon, problem.free_covariance, problem.noise, ended.control)
-    violation, violated = shortfall(problem, mean[1:, :2].copy(), ended.tau)
+    covariance = state_covariance(horizon, problem.free_covariance, problem.noise_variance, ended.control)
+    violation, violated = shortfall(problem, mean, ended.tau)
     held = [(ended.tau, ended.lam)] * len(ended.contacts)
     if optimal:
         held = asked_for(problem, ended.control, ended.contacts, max(assessment.smallest_k, 0.0))
@@ -135,8 +135,8 @@ def _solution(problem: Problem, ended: _Ended, assessment: Assessment, seconds: 
         status=ended.status,
         message=_words(problem, ended, assessment, violation),
         dt=horizon.dt,
-        mean=mean,
-        covariance=covariance,
+        mean=fixed(mean),
+        covariance=fixed(covariance),
         control=ended.control.reshape(2, -1).T,
         effort=float(ended.control @ ended.control),
         costs=costs(problem, ended.control, mean, covariance, ended.lam),
@@ -148,8 +148,7 @@ def _solution(problem: Problem, ended: _Ended, assessment: Assessment, seconds: 
         violation=violation,
         violation_at=_named(ids, violated),
         multipliers=tuple(
-            (ids[row], float(time), float(force))
-            for row, time, force in zip(ended.contacts.obstacle, ended.contacts.time, ended.contacts.force, strict=True)
+            (ids[row], time, force) for row, time, force in zip(*(each.tolist() for each in ended.contacts.columns), strict=True)
         ),
         held=tuple(held),
         slope=ended.slope,

@@ -7,7 +7,7 @@ from typing import TypeAlias
 import numpy as np
 
 from .assess import Assessment, assessed
-from .between import blend, course_of, place, place_row
+from .between import blend, place, place_row
 from .chance import CERTAIN_K, k_of, variance_of
 from .compiled import Matrix, Tensor, Vector, compiled
 from .problem import Problem
@@ -27,13 +27,15 @@ Least: TypeAlias = tuple[float, int, float]
 
 def assess_between(problem: Problem, control: Array, least: Least | None = None) -> Assessment:
     """Assess a control (2N,) at the steps and between them; least: the `smallest`, where it is known."""
-    k, *place = smallest(problem, control) if least is None else least
-    return assessed(problem, k, (place[0], place[1]))
+    k, row, time = smallest(problem, control) if least is None else least
+    return assessed(problem, k, (row, time))
 
 
 def smallest(problem: Problem, control: Array) -> Least:
     """Return the smallest k of a control (2N,), at the steps and between them; CERTAIN_K without obstacles."""
-    return least_k(*problem.circles, *problem.chances, np.ascontiguousarray(control, dtype=float))
+    control = np.ascontiguousarray(control, dtype=float)
+    motion, _, centre, drift = problem.circles
+    return least_k(motion, problem.course(control), centre, drift, *problem.chances, control)
 
 
 @compiled
@@ -110,7 +112,7 @@ def _is_above(bound: float, mean: float, variance: float) -> bool:
 @compiled
 def least_k(
     motion: Tensor,
-    free: Matrix,
+    course: Matrix,
     centre: Matrix,
     drift: Matrix,
     maps: Tensor,
@@ -125,12 +127,12 @@ def least_k(
     leaving: Vector,
     control: Vector,
 ) -> tuple[float, int, float]:
-    """Return the smallest k of a control (2N,), its circle and its time in steps; CERTAIN_K without circles.
+    """Return the smallest k of a control (2N,) and its course, its circle and its time in steps; CERTAIN_K without circles.
 
     Where a step's k is smaller than its neighbours', the smallest is looked for beside it: at the vertex of the parabola through
     three times, closer and closer. leaving (m,): steps from now in which a circle does not count.
     """
-    course, control_variance = course_of(motion, free, control), noise_variance * control * control
+    control_variance = noise_variance * control * control
     covariance = spread(maps, noise_variance, control, free_variance)
     m, steps, _ = centres.shape
     mean, var = _moments(course, covariance, centres, size_mean, size_variance, centre_covariance, leaving)

@@ -53,7 +53,7 @@ def held(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: 
 
 def joined(problem: Problem, contacts: Contacts) -> Contacts:
     """Return contacts that came from rows at steps, or from another problem, as they slide: one for each place."""
-    return Contacts(*merged(contacts.obstacle, contacts.time, contacts.force, problem.first_alike))
+    return Contacts(*merged(*contacts.columns, problem.first_alike))
 
 
 def leapt(problem: Problem, control: Array, tau: float) -> Array:

@@ -25,18 +25,15 @@ def noise_per_step(noise_at_reference: Array, reference_step: float, dt: float) 
     return scaled
 
 
-def state_covariance(horizon: Horizon, free: Array, noise: Array, control: Array) -> Array:
-    """Return P at steps 0..N, (N + 1, n, n): free part (N + 1, n, n), noise (2,), control stacked (2N,)."""
-    steps = horizon.steps
-    A, B = horizon.powers[1], np.ascontiguousarray(horizon.states[..., 1])
-    covariance: Array = free + accumulated(A, B, (stacked_noise(noise, steps) * control) ** 2)
-    return covariance
+def state_covariance(horizon: Horizon, free: Array, noise_variance: Array, control: Array) -> Array:
+    """Return P at steps 0..N, (N + 1, n, n): free part (N + 1, n, n), c^2 (2N,), control stacked (2N,)."""
+    return accumulated(horizon.powers[1], np.ascontiguousarray(horizon.states[..., 1]), noise_variance, control, free)
 
 
 @compiled
-def accumulated(A: Matrix, B: Matrix, variance: Vector) -> Tensor:
-    """Return P(t + 1) = A P(t) A' + B diag(v_t) B' from P(0) = 0, (N + 1, n, n): A (n, n), B (n, 2), v stacked (2N,)."""
-    n, steps = len(A), len(variance) // 2
+def accumulated(A: Matrix, B: Matrix, noise_variance: Vector, control: Vector, free: Tensor) -> Tensor:
+    """Return P(t + 1) = A P(t) A' + B diag(c^2 u_t^2) B' from P(0) = 0, plus a free part, (N + 1, n, n): A (n, n), B (n, 2)."""
+    n, steps, variance = len(A), len(control) // 2, noise_variance * control * control
     covariance, moved = np.zeros((steps + 1, n, n)), np.empty((n, n))
     for t in range(steps):
         for i in range(n):
@@ -51,4 +48,5 @@ def accumulated(A: Matrix, B: Matrix, variance: Vector) -> Tensor:
                 for k in range(n):
                     total += moved[i, k] * A[j, k]
                 covariance[t + 1, i, j], covariance[t + 1, j, i] = total, total
+    covariance += free
     return covariance

@@ -102,7 +102,7 @@ class Problem(Record):
 
     @cached_property
     def circles(self) -> tuple[Array, Array, Array, Array]:
-        """What kernels ask about courses and circles: the course's responses, and it without control; centres and their drifts."""
+        """What kernels ask about courses and circles: responses of the course, and it without control; centres and drifts."""
         return self.horizon.motion, self.free_course, self.obstacles.centre, self.drift
 
     @cached_property
@@ -172,7 +172,8 @@ class Problem(Record):
     @cached_property
     def leaving(self) -> Array:
         """Steps from now in which each obstacle does not count, because the hand is still leaving its margin, (m,)."""
-        return self.inside_margin * (self.recovery_s / self.horizon.dt)
+        leaving: Array = self.inside_margin.astype(np.float64) * (self.recovery_s / self.horizon.dt)
+        return leaving
 
     @cached_property
     def size(self) -> tuple[Array, Array]:

@@ -41,9 +41,7 @@ def settled(
         *margins(problem, tau),
         *problem.costs,
         lam,
-        contacts.obstacle,
-        contacts.time,
-        contacts.force,
+        *contacts.columns,
         np.ascontiguousarray(control, dtype=float),
         problem.extent,
         *problem.chances,
@@ -54,9 +52,9 @@ def settled(
 
 
 @compiled
-def path_of(motion: Tensor, free: Matrix, control: Vector) -> Matrix:
-    """Return the positions of a control (2N,) at steps 0..N, (N + 1, 2) [m]."""
-    return course_of(motion, free, control)[:2].T.copy()
+def path(course: Matrix) -> Matrix:
+    """Return the positions (N + 1, 2) [m] of a course (4, N + 1)."""
+    return course[:2].T.copy()
 
 
 @compiled
@@ -94,7 +92,7 @@ def settle(
 ) -> tuple[bool, Vector, Indices, Vector, Vector, tuple[float, int, float]]:
     """Return whether there is a point, its control, its contacts' obstacles, times and forces, and `least_k`: see `settled`."""
     hessian = 2.0 * (1.0 + weighted_variance + lam * summed_variance)
-    found, changed, control, obstacle, time, force = slide(
+    found, changed, control, course, obstacle, time, force = slide(
         motion,
         free,
         centre,
@@ -113,13 +111,13 @@ def settle(
         extent,
     )
     if found and (changed or len(way) > 0):  # with the same contacts it is in the class of the control
-        wanted = way if len(way) > 0 else swept(path_of(motion, free, near), courses)
-        found = bool((np.abs(swept(path_of(motion, free, control), courses) - wanted) < np.pi).all())
+        wanted = way if len(way) > 0 else swept(path(course_of(motion, free, near)), courses)
+        found = bool((np.abs(swept(path(course), courses) - wanted) < np.pi).all())
     if not found:
         return False, control, obstacle, time, force, (0.0, 0, 0.0)
     least = least_k(
         motion,
-        free,
+        course,
         centre,
         drift,
         maps,

@@ -37,12 +37,13 @@ def slide(
     force: Vector,
     near: Vector,
     extent: float,
-) -> tuple[bool, bool, Vector, Indices, Vector, Vector]:
+) -> tuple[bool, bool, Vector, Matrix, Indices, Vector, Vector]:
     """Find the least cost `qp.effort_cost` near a control (2N,) that keeps clear of every circle at every time.
 
     From contacts (k,) to begin with, which slide: those that pull are let go, and where a circle is entered there is a new one.
-    motion ... pace: as in `touching`; hessian (2N,) and the goal: as in `qp.Cost`; extent: of the scene [m]. Returns whether there is one, and whether it has other contacts,
-    so that it may pass circles on another side; the control, and its contacts' obstacles, times and forces.
+    motion ... pace: as in `touching`; hessian (2N,) and the goal: as in `qp.Cost`; extent: of the
+    scene [m]. Returns whether there is one, and whether it has other contacts,
+    so that it may pass circles on another side; the control, its course, and its contacts' obstacles, times and forces.
     """
     inverse, root, factor = goal_factors(hessian, goal_rows, softness)
     goal_control = to_goal(root, factor, goal_targets)
@@ -75,10 +76,11 @@ def slide(
         if len(pushing) < len(force):
             obstacle, time, force = obstacle[pushing], time[pushing], force[pushing]
             continue
-        new = entered(course_of(motion, free, control), centre, drift, reach, short, pace, CLEAR * extent)
+        course = course_of(motion, free, control)
+        new = entered(course, centre, drift, reach, short, pace, CLEAR * extent)
         if len(new) == 0:
-            return True, count > 0, control, obstacle, time, force
+            return True, count > 0, control, course, obstacle, time, force
         slight = NEW * (force.max() if len(force) else 1.0)
         obstacle = np.concatenate((obstacle, new[:, 0].astype(np.intp)))
         time, force = np.concatenate((time, new[:, 1])), np.concatenate((force, np.full(len(new), slight)))
-    return False, False, control, obstacle, time, force
+    return False, False, control, free.copy(), obstacle, time, force

@@ -12,10 +12,10 @@ from .driven import driven
 @compiled
 def extent(way_x: float, way_y: float, radius: Vector) -> float:
     """Return the length of the way to the goal, or the largest radius (m,) if that is more [m]; never zero."""
-    largest = max(np.hypot(way_x, way_y), 1e-6)
+    largest = max(float(np.hypot(way_x, way_y)), 1e-6)
     for j in range(len(radius)):
         largest = max(largest, radius[j])
-    return largest
+    return float(largest)
 
 
 @compiled

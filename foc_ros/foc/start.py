@@ -74,8 +74,6 @@ def read_off(mean: Matrix, control: Matrix, before: float, elapsed_s: float, dt:
 
 def led(problem: Problem, control: Array, path: Array) -> Array:
     """Lead a control (2N,) back to a path (N, 2) and to the goal: the hand is never quite where it was to be."""
-    fixed = np.flatnonzero(problem.at_goal)
-    last = problem.free[-1] + problem.horizon.last @ control
-    missing = (problem.goal - last)[fixed]
-    led: Array = control + problem.horizon.returning(path - problem.positions(control), missing, tuple(fixed.tolist()))
+    missing = problem.goal - problem.free[-1] - problem.horizon.last @ control
+    led: Array = control + problem.horizon.returning(path - problem.positions(control), missing, problem.at_goal)
     return led
