@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .answers import candidate_answer, solution_account, table
+from .foc.duration import is_passing
 from .foc.errors import InputError
 from .foc.homotopy import path_sides, search
 from .foc.monte_carlo import monte_carlo
@@ -18,6 +19,7 @@ from .foc.outcomes import ranked, solve_candidates
 from .foc.predictor import reaching_problem
 from .foc.problem import Problem
 from .foc.records import LEFT, Array, Candidate, Outcome
+from .foc.replanning import triple_integrator_error_map
 from .scene_file import SceneFile, load_scene
 from .terminal import show_table
 
@@ -73,7 +75,10 @@ def run(arguments: argparse.Namespace) -> int:
 def scene_problems(scene: SceneFile) -> list[Problem]:
     """Return the problem of every goal: noise per step as the file says; the start is as uncertain to the operator as to us."""
     made = [reaching_problem(scene.config, scene.hand, scene.obstacles, goal, scene.duration_s) for goal in scene.goals]
-    return [replace(problem, noise=scene.noise, initial_covariance=scene.hand.covariance) for problem in made]
+    steps = scene.config.foc.steps
+    error_map = triple_integrator_error_map(scene.duration_s / steps, steps, is_passing(scene.config.duration))
+    covariance = scene.hand.covariance
+    return [replace(problem, noise=scene.noise, initial_covariance=covariance, error_map=error_map) for problem in made]
 
 
 def solve_scene(scene: SceneFile, problems: Sequence[Problem]) -> list[Outcome]:

@@ -32,16 +32,17 @@ import numpy as np
 from .config import Config, DurationConfig
 from .duration import is_passing
 from .records import Array, HandState, Solution
-from .replanning import triple_integrator_goal_map, triple_integrator_process_covariance
+from .replanning import (
+    triple_integrator_error_covariance,
+    triple_integrator_goal_map,
+    triple_integrator_process_covariance,
+)
 
 
-def doubt(error_map: Array, dt: float, hand: HandState, config: Config) -> Array:
-    """Return the covariance (N + 1, 6, 6) at steps 0..N that plans of one duration have in common: all but that of the time.
-
-    error_map (N + 1, 6, 6): what an error of the state now becomes (`replanning`).
-    """
-    kind = dt, len(error_map) - 1, is_passing(config.duration)
-    unsure: Array = error_map @ hand.covariance @ error_map.swapaxes(1, 2)
+def doubt(hand: HandState, dt: float, steps: int, config: Config) -> Array:
+    """Return the covariance (N + 1, 6, 6) at steps 0..N that plans of one duration have in common: all but that of the time."""
+    kind = dt, steps, is_passing(config.duration)
+    unsure = triple_integrator_error_covariance(hand.covariance, *kind)
     if config.foc.process_noise > 0.0:
         unsure = unsure + config.foc.process_noise**2 * triple_integrator_process_covariance(*kind)
     if config.foc.endpoint_stddev > 0.0:

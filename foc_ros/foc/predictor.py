@@ -22,7 +22,6 @@ from .noise import noise_per_step
 from .outcomes import ranked, solve_candidates
 from .problem import Problem, rest_to_goal
 from .records import Array, Candidate, HandState, Obstacles, Outcome, Prediction, make_obstacles
-from .replanning import triple_integrator_error_map
 
 
 def predict(
@@ -47,7 +46,7 @@ def predict(
     )
     tried = [_priced(memory.aged(outcome, hand.stamp_ns), time_price(config.duration)) for outcome in tried]
     outcomes = ranked(tried, config.likelihood, obstacles)
-    unsure = {one: doubt(one.error_map, one.horizon.dt, hand, config) for one in dict.fromkeys(problems.values())}
+    unsure = {one: doubt(hand, one.horizon.dt, config.foc.steps, config) for one in dict.fromkeys(problems.values())}
     outcomes = [_seen(outcome, hand, unsure[problems[outcome.candidate.label]], config.duration) for outcome in outcomes]
     shares = {outcome.candidate.label: outcome.likelihood for outcome in outcomes if outcome.solved}
     best = most_likely(shares, memory.most_likely, config.likelihood.margin)
@@ -86,8 +85,8 @@ def way_problems(
 
 
 def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: Array, duration_s: float) -> Problem:
-    """Build the problem of one goal (2,) [m], to be reached in duration_s [s]."""
-    foc, passing = config.foc, is_passing(config.duration)
+    """Build the problem of one goal (2,) [m], to be reached in duration_s [s], by a hand whose state is known."""
+    foc = config.foc
     dt = duration_s / foc.steps
     horizon = triple_integrator_horizon(dt, foc.steps)
     return rest_to_goal(
@@ -97,10 +96,9 @@ def reaching_problem(config: Config, hand: HandState, obstacles: Obstacles, goal
         obstacles,
         noise_per_step(np.array([foc.noise_x, foc.noise_y]), REFERENCE_STEP_S, dt),
         foc.eta,
-        error_map=triple_integrator_error_map(dt, foc.steps, passing),
         goal_weight=foc.goal_weight,
         recovery_s=foc.recovery_s,
-        passing=passing,
+        passing=is_passing(config.duration),
     )
 
 
