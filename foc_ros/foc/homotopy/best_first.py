@@ -12,48 +12,25 @@ from heapq import heappop, heappush
 
 import numpy as np
 
-from foc_ros.foc.compiled import (
-    FlagTable,
-    Indices,
-    Matrix,
-    Points,
-    PointTable,
-    Table,
-    Vector,
-    compiled_exactly,
-)
+from foc_ros.foc.compiled import Indices, Matrix, PointTable, Table, Vector, compiled_exactly
 
-from .tangents import CLEAR, END, LEAVE, LENGTH, REACH, TURN
+from .crossing import TURN, side
+from .signatures import count, equal, masked, winds
+from .tangents import CLEAR, END, LEAVE, LENGTH, REACH
 
 BACK = 1e-9
 """An arc may turn back this much [rad]: runs of neighbours that share a tangent follow each other without one."""
+TIE = 2e-9
+"""Keys that differ by less may have the same nanometre [m]."""
 ROOM = 256
 """Entries for which there is room at first."""
 
 
 @compiled_exactly
-def arc(spans: Matrix, run: int, following: int, sense: int) -> float:
-    """Return the angle along a circle, in the sense in which it is passed, from the end of a run to the start of another."""
-    angle: float = sense * (spans[following, LEAVE] - spans[run, REACH])
+def arc(left: float, reached: float, sense: int) -> float:
+    """Return the angle along a circle, in the sense in which it is passed, from where a run reached it to where one left it."""
+    angle = sense * (left - reached)
     return angle + TURN if angle < -BACK else angle
-
-
-@compiled_exactly
-def winds(signature: Indices) -> bool:
-    """Tell whether a path has crossed some ray twice the same way."""
-    for crossings in signature:  # noqa: SIM110  machine code has no generators
-        if abs(crossings) > 1:
-            return True
-    return False
-
-
-@compiled_exactly
-def equal(one: Indices, other: Indices) -> bool:
-    """Tell whether two signatures agree."""
-    for i in range(len(one)):  # noqa: SIM110
-        if one[i] != other[i]:
-            return False
-    return True
 
 
 @compiled_exactly
@@ -64,6 +41,15 @@ def seen(signature: Indices, signatures: Table, latest: int, earlier: Indices) -
             return True
         latest = earlier[latest]
     return False
+
+
+@compiled_exactly
+def sides(signature: Indices, named: Indices, turned: Vector) -> Indices:
+    """Return on which side a path that ends with a signature passes each named circle, 0 where it winds about it."""
+    passed = np.empty(len(named), np.intp)
+    for i in range(len(named)):
+        passed[i] = side(turned[named[i]] + TURN * count(signature, named[i]))
+    return passed
 
 
 @compiled_exactly
@@ -87,74 +73,89 @@ def traced(found: Indices, run: Indices, parent: Indices) -> tuple[Indices, Indi
 
 
 @compiled_exactly
-def shortest_ways(
+def shortest(
+    departures: Indices,
     head: Indices,
     spans: Matrix,
     places: PointTable,
-    crossing: Table,
-    way_in: Table,
-    departures: Indices,
-    centre: Points,
+    crossings: Table,
+    holds: Table,
+    first_head: Indices,
+    first_spans: Matrix,
+    first_places: PointTable,
+    first_crossings: Table,
+    first_key: Vector,
     radius: Vector,
-    held: FlagTable,
-    first: Vector,
-    goal: int,
+    goal: complex,
+    node: int,
     named: Indices,
+    turned: Vector,
+    told: bool,
     bound: float,
     states: int,
     most: int,
-) -> tuple[Vector, Indices, Indices, Table, bool]:
-    """Find the shortest ways to a goal, at most so many, one for each signature.
+) -> tuple[Vector, Table, Indices, Indices, bool]:
+    """Find the shortest ways to a goal, one for each signature: so many, and those that are no longer than these but for a TIE.
 
-    head, spans, places, crossing, way_in: of `tangents.Runs`, the last of which leave the hand and have the keys `first` [m];
-    departures: of the roadmap; centre, radius, held: of its circles, of which the goal is one. named (k,): circles that tell
-    classes apart; bound: on the key [m]; states: to look at at most. A path that winds about a named circle is not followed.
+    departures, ..., holds: of `roadmap.Runs`; first_...: the same of the runs that leave the hand, and their keys [m]; radius: of
+    the circles; goal: where its node is; named (k,): circles that tell classes apart; turned (n,): from the direction of the hand
+    to that of the goal, as seen from each circle [rad]; told: whether these tell all classes apart, or ways that arrive by
+    different runs may be of different classes; bound: on the key [m]; states: to look at at most. A path that winds about a named
+    circle is not followed.
 
-    Returns the keys (w,) [m], the runs of the ways one after the other, where those of each end (w,), the crossings (w, k), and
-    whether the search was cut: states were left.
+    Returns the keys (w,) [m], the sides (w, k), the runs of the ways one after the other, those from the hand counted from -1
+    downwards, where the runs of each end (w,), and whether the search was cut: states were left.
     """
-    node, inner = 2 * goal + 1, len(head) - len(first)
-    starts = [inner + i for i in range(len(first)) if head[inner + i] < departures.size - 1 or head[inner + i] == node]
-    room, met, looked_at, count = len(starts) + ROOM, 0, 0, 0
+    words, mask = holds.shape[1], masked(named, holds.shape[1])
+    room, met, looked_at, ways = len(first_key) + ROOM, len(first_key), 0, 0
     key, run, parent, earlier = np.empty(room), np.empty(room, np.intp), np.full(room, -1), np.empty(room, np.intp)
-    signatures, latest, found = np.empty((room, len(named)), np.intp), np.full(len(head), -1), np.empty(most, np.intp)
+    signatures, latest = np.empty((room, words), np.intp), np.full(len(head) + met + 1, -1)
+    found, passed = np.empty(most, np.intp), np.empty((most, len(named)), np.intp)
     heap = [(0.0, 0) for _ in range(0)]
-    for start in starts:
-        key[met], run[met], signatures[met] = first[start - inner], start, crossing[start][named]
-        heappush(heap, (key[met] + abs(places[start, END] - centre[goal]), met))
-        met += 1
-    while heap and looked_at < states and count < most:
+    for i in range(met):
+        key[i], run[i] = first_key[i], -1 - i
+        for word in range(words):
+            signatures[i, word] = first_crossings[i, word] & mask[word]
+        heappush(heap, (key[i] + abs(first_places[i, END] - goal), i))
+    while heap and looked_at < states and (ways < most or heap[0][0] < key[found[ways - 1]] + TIE):
         here = heappop(heap)[1]
-        arrival = run[here]
-        if seen(signatures[here], signatures, latest[arrival], earlier):
+        arrival, start = run[here], -1 - run[here]
+        at = head[arrival] if arrival >= 0 else first_head[start]
+        state = len(head) if told and at == node else arrival
+        if seen(signatures[here], signatures, latest[state], earlier):
             continue
-        earlier[here], latest[arrival] = latest[arrival], here
+        earlier[here], latest[state] = latest[state], here
         looked_at += 1
-        if head[arrival] == node:
-            found[count] = here
-            count += 1
+        if at == node:
+            if ways == len(found):
+                found, passed = np.append(found, found), np.concatenate((passed, passed))
+            passed[ways] = sides(signatures[here], named, turned)
+            if passed[ways].all():
+                found[ways] = here
+                ways += 1
             continue
-        circle, sense = head[arrival] >> 1, 2 * (head[arrival] & 1) - 1
-        for following in range(departures[head[arrival]], departures[head[arrival] + 1]):
-            angle = arc(spans, arrival, following, sense)
+        circle, sense = at >> 1, 2 * (at & 1) - 1
+        span, crossed = (spans[arrival], crossings[arrival]) if arrival >= 0 else (first_spans[start], first_crossings[start])
+        for following in range(departures[at], departures[at + 1]):
+            if head[following] >= len(departures) - 1 and head[following] != node:
+                continue
+            angle = arc(spans[following, LEAVE], span[REACH], sense)
             onward = key[here] + radius[circle] * angle + spans[following, LENGTH]
-            least = onward + abs(places[following, END] - centre[goal])
-            leads = head[following] < departures.size - 1 or head[following] == node
-            if not leads or angle > spans[arrival, CLEAR] or least >= bound:
+            least = onward + abs(places[following, END] - goal)
+            if angle > span[CLEAR] or least >= bound:
                 continue
             if met == room:
                 room *= 2
                 key, run, parent = np.append(key, key), np.append(run, run), np.append(parent, parent)
                 earlier, signatures = np.append(earlier, earlier), np.concatenate((signatures, signatures))
-            turned = sense if sense * (spans[following, LEAVE] - spans[arrival, REACH]) < -BACK else 0
-            for i in range(len(named)):
-                k = named[i]
-                crossings = crossing[following, k] - way_in[arrival, k] + turned * held[circle, k]
-                signatures[met, i] = signatures[here, i] + crossings
-            if not winds(signatures[met]) and not seen(signatures[met], signatures, latest[following], earlier):
+            turns = sense if sense * (spans[following, LEAVE] - span[REACH]) < -BACK else 0
+            for i in range(words):
+                onto = (crossings[following, i] & mask[i]) - (crossed[words + i] & mask[i])
+                signatures[met, i] = signatures[here, i] + onto + turns * (holds[circle, i] & mask[i])
+            state = len(head) if told and head[following] == node else following
+            if not winds(signatures[met], mask) and not seen(signatures[met], signatures, latest[state], earlier):
                 key[met], run[met], parent[met] = onward, following, here
                 heappush(heap, (least, met))
                 met += 1
-    entries = found[:count]
-    trails, ends = traced(entries, run, parent)
-    return key[entries], trails, ends, signatures[entries], count < most and len(heap) > 0
+    trails, ends = traced(found[:ways], run, parent)
+    return key[found[:ways]], passed[:ways], trails, ends, ways < most and len(heap) > 0

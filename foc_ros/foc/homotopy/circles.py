@@ -2,42 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.foc.compiled import Flags, FlagTable, Indices, compiled_exactly
-from foc_ros.foc.records import Array
-
-from .crossing import Complex
+from foc_ros.foc.compiled import Flags, FlagTable, Indices, Matrix, Points, Vector, compiled_exactly
 
 GRAZE = 1e-9
 """A run may pass this much nearer to a circle than its radius [m]: neighbours in a row share tangents, up to rounding."""
 
 
-@dataclass(frozen=True, eq=False)
-class Circles:
+class Circles(NamedTuple):
     """n circles and, after them, g goals: circles of radius 0.
 
     centre (n + g,), complex [m]; radius (n + g,) [m]; bar (n,): square of the distance from each centre that bars a run [m^2];
     held (n + g, n): which centres each circle holds; outer (n + g,): which ones lie in no other circle, of equal ones the
-    first; blocker (n, n): direction of the outer circles that overlap with each [rad], NaN for others; cluster: number of the
-    cluster of overlapping circles that each belongs to.
+    first; blocker (n, n): direction of the outer circles that overlap with each [rad], NaN for others.
     """
 
-    n: int
-    centre: Complex
-    radius: Array
-    bar: Array
+    centre: Points
+    radius: Vector
+    bar: Vector
     held: FlagTable
     outer: Flags
-    blocker: Array
-    cluster: tuple[int, ...]
-
-    @property
-    def goals(self) -> int:
-        """How many goals there are."""
-        return len(self.centre) - self.n
+    blocker: Matrix
 
 
 @compiled_exactly
@@ -57,17 +45,23 @@ def clusters(touching: FlagTable) -> Indices:
     return number
 
 
-def circles(centre: Complex, radius: Array, goals: Complex) -> Circles:
-    """Take centre (n,), complex [m], radius (n,) > 0 [m] and goals (g,), complex [m], together."""
-    n = len(centre)
-    c, r = np.concatenate([centre, goals]), np.concatenate([radius, np.zeros(len(goals))])
-    apart = centre - c[:, None]
-    distance = np.abs(apart)
-    within = (distance[:n] + radius[:, None] <= radius) & ~np.eye(n, dtype=bool)
-    within &= ~(within.T & np.triu(np.ones((n, n), dtype=bool)))
-    outer = np.append(~within.any(axis=1), np.ones(len(goals), dtype=bool))
-    touching = distance[:n] < radius[:, None] + radius
-    overlap = touching & outer[:n] & ~np.eye(n, dtype=bool)
-    blocker = np.where(overlap, np.angle(apart[:n]), np.nan)
-    bar = (radius - GRAZE).clip(0.0) ** 2
-    return Circles(n, c, r, bar, distance < r[:, None], outer, blocker, tuple(clusters(touching).tolist()))
+@compiled_exactly
+def together(centre: Points, radius: Vector, goals: Points) -> tuple[Points, Vector, Vector, FlagTable, Flags, Matrix, Indices]:
+    """Take centre (n,) [m], radius (n,) > 0 [m] and goals (g,) [m] together: the fields of `Circles`, and clusters (n,)."""
+    n, c, r = len(centre), np.concatenate((centre, goals)), np.concatenate((radius, np.zeros(len(goals))))
+    held, touching = np.zeros((len(c), n), np.bool_), np.zeros((n, n), np.bool_)
+    outer, blocker = np.ones(len(c), np.bool_), np.full((n, n), np.nan)
+    for j in range(n):
+        for i in range(len(c)):
+            distance = abs(c[j] - c[i])
+            held[i, j] = distance < r[i]
+            if i < n:
+                touching[i, j] = distance < r[i] + r[j]
+                hidden, hides = distance + r[i] <= r[j], distance + r[j] <= r[i]
+                outer[i] &= i == j or not hidden or (hides and i < j)
+    for i in range(n):
+        for j in range(n):
+            if touching[i, j] and outer[j] and i != j:
+                apart = c[j] - c[i]
+                blocker[i, j] = np.arctan2(apart.imag, apart.real)
+    return c, r, np.maximum(radius - GRAZE, 0.0) ** 2, held, outer, blocker, clusters(touching)

@@ -7,16 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from foc_ros.foc.compiled import Matrix
 from foc_ros.foc.records import LEFT, RIGHT
 
 from .circles import GRAZE
-from .crossing import Complex
 from .levels import MOST, Level, Levels
+from .names import Names
 from .scene import Scene
 from .sides import swept_angles
-from .tangents import TURN
 from .taut import spaced
-from .ways import Plan, Way, ways
+from .ways import shortest_ways
 
 FINENESS = 257
 """Points at which a path is compared with circles that its roadmap does not hold."""
@@ -24,70 +24,77 @@ FINENESS = 257
 
 NOTES = ('no_way', 'search_cut', 'left_out')
 """What is decided on the way, as explained at `search.Search`."""
-Side = tuple[str, int]
-"""An obstacle's id, and LEFT or RIGHT."""
 
 
 class Found(NamedTuple):
-    """One class: rank (the nanometre of its key [m], then its label); goal; sides by id; the way with its plan."""
+    """One class.
 
-    rank: tuple[float, str]
+    key: the nanometre of its way's key [m], and label: by which it ranks; goal; course: the label without the goal; ids, sides
+    (k,): of the named obstacles; pieces: of its way, as `taut.laid_out` has them.
+    """
+
+    key: float
+    label: str
     goal: int
-    sides: tuple[Side, ...]
-    way: Way
-    plan: Plan
+    course: str
+    ids: tuple[str, ...]
+    sides: list[int]
+    pieces: Matrix
+
+
+class Quest(NamedTuple):
+    """What is looked for.
+
+    scene, as it is for a hand with this velocity [m/s]; names; states: that the search for one goal may look at; usual: how many
+    ways to one goal are usually asked for.
+    """
+
+    scene: Scene
+    velocity: complex
+    names: Names
+    states: int
+    usual: int
 
 
 class Classes:
-    """The classes to one goal, in the order of their rank; notes: what was decided on the way, as counts by name.
+    """The classes to one goal, in the order of their rank; notes: counts by name, to which is added what was decided."""
 
-    states: that the search may look at; usual: how many ways are usually asked for.
-    """
-
-    def __init__(self, scene: Scene, levels: Levels, goal: int, ids: tuple[str, ...], states: int, usual: int) -> None:
-        self.notes = dict.fromkeys(NOTES, 0)
-        self._scene, self._levels, self._goal, self._ids = scene, levels, goal, ids
-        self._states, self._usual = states, usual
-        self._named: list[int] = sorted(np.flatnonzero(scene.named[goal]).tolist(), key=ids.__getitem__)
-        turned: list[float] = scene.turned[goal, self._named].tolist()
-        self._choices = [_sides(ids[row], angle) for row, angle in zip(self._named, turned, strict=True)]
+    def __init__(self, quest: Quest, levels: Levels, goal: int, notes: dict[str, int]) -> None:
+        self._quest, self._levels, self._goal, self._notes = quest, levels, goal, notes
+        named, names = quest.scene.named[goal].tolist(), quest.names
+        self._named = [row for row in names.order if named[row]]
+        self._ids, self._prefix = tuple([names.ids[row] for row in self._named]), f'goal{goal}:'
+        self._parts = [names.signed[row] for row in self._named]
 
     def __iter__(self) -> Iterator[Found]:
         """Yield each class once, by its shortest path."""
-        equal: list[Found] = []
-        for found in self._by_key():
-            if equal and found.rank[0] != equal[0].rank[0]:
-                yield from sorted(equal, key=lambda one: one.rank)
-                equal = []
-            equal.append(found)
-        if not equal:
-            self.notes['no_way'] += 1
-        yield from sorted(equal, key=lambda one: one.rank)
+        found = None
+        for found in self._distinct():
+            yield found
+        self._notes['no_way'] += found is None
 
-    def _by_key(self) -> Iterator[Found]:
-        straight = abs(self._scene.goals[self._goal] - self._scene.hand)
-        given: set[tuple[Side, ...]] = set()
+    def _distinct(self) -> Iterator[Found]:
+        scene = self._quest.scene
+        straight = abs(scene.goals[self._goal] - scene.hand)
+        given: set[str] = set()
         rows = self._levels.first(self._named)
         while True:
             bounded = len(rows) < MOST and not rows.issuperset(self._named)
             level = self._levels(rows, bounded)
-            told = [k for k, row in enumerate(self._named) if row in rows]
+            told = [k for k, row in enumerate(self._named) if row in level.place]
             places = [level.place[self._named[k]] for k in told]
-            clusters = {level.plan.roadmap.circles.cluster[place] for place in places}
-            everyone = 1 << len(clusters) + len(self._named) - len(told)
-            bound, named = level.limit * straight if bounded else np.inf, np.array(places, dtype=np.intp)
-            for way in ways(level.plan, self._goal, named, bound, self._states, self._usual):
-                found = self._found(way, level, told) if way else None
-                if found is None or found.sides in given:
-                    self.notes['search_cut'] += way is None
+            everyone = 1 << len({level.roadmap.cluster[place] for place in places}) + len(self._named) - len(told)
+            limit = level.limit * straight
+            for found in self._ranked(level, places, told, limit if bounded else np.inf, everyone):
+                if found.course in given:
                     continue
-                met = self._met(found, level) if found.way.key >= level.limit * straight else []
+                met = self._met(found, level) if found.key >= limit else []
                 if met and len(rows) < MOST:
                     rows = rows.union(met)
                     break
-                given.add(found.sides)
+                given.add(found.course)
                 if met:
-                    self.notes['left_out'] += 1
+                    self._notes['left_out'] += 1
                 else:
                     yield found
                 if len(given) == everyone:
@@ -97,43 +104,45 @@ class Classes:
                     return
                 rows = self._levels.more(rows)
 
-    def _found(self, way: Way, level: Level, told: list[int]) -> Found | None:
-        """Name a way; None for one that winds about an obstacle. told: which of the names its crossings are of."""
-        chosen = [self._choices[k][crossings] for k, crossings in zip(told, way.crossings.tolist(), strict=True)]
-        if None in chosen:
-            return None
-        if len(told) < len(self._named):
-            chosen = self._completed(dict(zip(told, chosen, strict=True)), way, level)
-        sides = tuple(side for side in chosen if side)
-        label = f'goal{self._goal}:' + ''.join([('+' if side == LEFT else '-') + name for name, side in sides])
-        return Found((round(way.key, 9), label), self._goal, sides, way, level.plan)
+    def _ranked(self, level: Level, places: list[int], told: list[int], bound: float, everyone: int) -> Iterator[Found]:
+        """Yield the ways over a level by their rank."""
+        scene, velocity, _, states, usual = self._quest
+        circles, runs, _ = level.roadmap
+        turned, named = scene.turned[self._goal], np.array(places, dtype=np.intp)
+        if len(level.place) < len(turned):
+            turned = turned[list(level.place)]
+        all_told = len(told) == len(self._named)
+        ends, given, most = (scene.hand, velocity, self._goal), 0, min(usual, everyone)
+        while True:
+            keys, sides, pieces, stops, cut = shortest_ways(*circles, *runs, *ends, named, turned, all_told, bound, states, most)
+            begins = [0, *stops.tolist()]
+            found = [
+                self._found(key, passed, told, pieces[begin:end])
+                for key, passed, begin, end in zip(keys.tolist(), sides.tolist(), begins, begins[1:], strict=False)
+            ]
+            yield from sorted(found[given:])
+            if len(keys) < most:
+                self._notes['search_cut'] += cut
+                return
+            given, most = len(keys), 2 * most
 
-    def _completed(self, sides: dict[int, Side | None], way: Way, level: Level) -> list[Side | None]:
-        """Add sides, by place in the name, of obstacles that a level does not hold: by the angle that the path sweeps."""
-        others = [k for k in range(len(self._named)) if k not in sides]
-        line, centres = _line(way, level.plan), self._scene.centre[[self._named[k] for k in others]]
+    def _found(self, key: float, sides: list[int], told: list[int], pieces: Matrix) -> Found:
+        """Name a way; told: which named circles the sides are of."""
+        if len(told) < len(self._named):
+            sides = self._completed(dict(zip(told, sides, strict=True)), pieces)
+        course = ''.join([part[side] for part, side in zip(self._parts, sides, strict=True)])
+        return Found(key, self._prefix + course, self._goal, course, self._ids, sides, pieces)
+
+    def _completed(self, sides: dict[int, int], pieces: Matrix) -> list[int]:
+        """Return sides of all named circles: of those that a level does not hold, by the angle that the path sweeps."""
+        line, centres = spaced(pieces, FINENESS), self._quest.scene.centre[self._named]
         swept = swept_angles(line.view(float).reshape(-1, 2), centres.view(float).reshape(-1, 2))
-        for k, angle in zip(others, swept.tolist(), strict=True):
-            sides[k] = self._ids[self._named[k]], LEFT if angle < 0.0 else RIGHT
-        return [sides[k] for k in range(len(sides))]
+        return [sides.get(k) or (LEFT if angle < 0.0 else RIGHT) for k, angle in enumerate(swept.tolist())]
 
     def _met(self, found: Found, level: Level) -> list[int]:
         """Return the circles that a path meets and its roadmap does not hold."""
-        others = np.delete(np.arange(len(self._ids)), list(level.place))
-        apart = np.abs(_line(found.way, found.plan)[:, None] - self._scene.centre[others])
-        met: list[int] = others[(apart < self._scene.radius[self._goal, others] - GRAZE).any(axis=0)].tolist()
+        scene = self._quest.scene
+        others = np.delete(np.arange(len(scene.centre)), list(level.place))
+        apart = np.abs(spaced(found.pieces, FINENESS)[:, None] - scene.centre[others])
+        met: list[int] = others[(apart < scene.radius[self._goal, others] - GRAZE).any(axis=0)].tolist()
         return met
-
-
-def _sides(name: str, turned: float) -> tuple[Side | None, ...]:
-    """Return the side of a way that crosses an obstacle's ray 0, 1 or -1 times, as index; None where that winds about it.
-
-    turned: from the direction of the hand to that of the goal, as seen from the obstacle [rad].
-    """
-    swept = (turned, turned + TURN, turned - TURN)
-    return tuple([(name, LEFT if angle < 0.0 else RIGHT) if abs(angle) < TURN else None for angle in swept])
-
-
-def _line(way: Way, plan: Plan) -> Complex:
-    table = plan.table
-    return spaced(table.head, table.spans, table.places, plan.roadmap.circles.radius, way.runs, FINENESS)

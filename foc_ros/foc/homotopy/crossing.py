@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.foc.compiled import compiled_exactly
+from foc_ros.foc.records import LEFT, RIGHT
 
+TURN = 2.0 * np.pi
 Complex = NDArray[np.complex128]
 
 
@@ -37,3 +39,11 @@ def direction(seen: complex) -> float:
     """Return the angle of a point in (-pi, pi]; a negative zero counts as zero, as it does in the crossings."""
     angle: float = np.arctan2(seen.imag + 0.0, seen.real + 0.0)
     return angle
+
+
+@compiled_exactly
+def side(angle: float) -> int:
+    """Return on which side a path passes a centre about which it sweeps an angle: LEFT, RIGHT, 0 where it winds about it."""
+    if abs(angle) >= TURN:
+        return 0
+    return LEFT if angle < 0.0 else RIGHT

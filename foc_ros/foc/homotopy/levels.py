@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from foc_ros.foc.records import Array
 
-from .roadmap import roadmap, roadmap_within
+from .roadmap import Roadmap, roadmap, roadmap_within
 from .scene import Scene
 from .tries import Ellipse
-from .ways import Plan, plan
 
 FEW, MOST = 16, 64
 """Circles that are always looked at together, and the most that ever are."""
@@ -20,20 +19,22 @@ CLOSE = 1.02
 """Excess of the circles that many are narrowed down to at first: the best ways through a crowd are nearly straight."""
 
 
-@dataclass(frozen=True, eq=False)
-class Level:
-    """A plan among some circles: place of each in it by its row in the scene; limit: excess from which a path may meet others."""
+class Level(NamedTuple):
+    """A roadmap of some circles.
 
-    plan: Plan
-    place: dict[int, int]
+    place: of each in it by its row in the scene; limit: excess from which a path may meet others.
+    """
+
+    roadmap: Roadmap
+    place: dict[int, int] | range
     limit: float
 
 
 class Levels:
     """Levels for the goals to which the circles are equally large, each made when first asked for."""
 
-    def __init__(self, scene: Scene, radius: Array, velocity: complex) -> None:
-        self._scene, self._radius, self._velocity = scene, radius, velocity
+    def __init__(self, scene: Scene, radius: Array) -> None:
+        self._scene, self._radius = scene, radius
         self._made: dict[tuple[frozenset[int], bool], Level] = {}
 
     @cached_property
@@ -61,10 +62,13 @@ class Levels:
 
     def _level(self, rows: list[int], bounded: bool) -> Level:
         scene = self._scene
-        limit = float(np.delete(scene.excess, rows).min(initial=np.inf)) if len(rows) < len(self._radius) else np.inf
+        if len(rows) == len(self._radius):
+            return Level(roadmap(scene.centre, self._radius, scene.goals), range(len(rows)), np.inf)
+        centre, radius = scene.centre[rows], self._radius[rows]
+        limit = float(np.delete(scene.excess, rows).min())
         if bounded:
             ellipse = Ellipse(scene.hand, scene.goals, limit * np.abs(scene.goals - scene.hand))
-            made = roadmap_within(scene.centre[rows], self._radius[rows], scene.goals, ellipse)
+            made = roadmap_within(centre, radius, scene.goals, ellipse)
         else:
-            made = roadmap(scene.centre[rows], self._radius[rows], scene.goals)
-        return Level(plan(made, scene.hand, self._velocity), {row: k for k, row in enumerate(rows)}, limit)
+            made = roadmap(centre, radius, scene.goals)
+        return Level(made, {row: k for k, row in enumerate(rows)}, limit)

@@ -2,30 +2,46 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.foc.compiled import Indices
+from foc_ros.foc.compiled import Flags, FlagTable, Indices, Matrix, Points, PointTable, Table, Vector, compiled_exactly
 from foc_ros.foc.records import Array
 
-from .circles import Circles, circles
+from .circles import Circles, together
 from .crossing import Complex
-from .tangents import Runs, free_tangents, spread, table
-from .tries import EVERYWHERE, Ellipse, pairs, spokes
+from .signatures import packed
+from .tangents import free_tangents, table
+from .tries import EVERYWHERE, Ellipse, pairs
 
 
-@dataclass(frozen=True, eq=False)
-class Roadmap:
-    """What does not depend on the hand: the circles and the runs among them and to the goals.
+class Runs(NamedTuple):
+    """The m free runs among circles and to goals, in the order of the nodes that they leave.
 
-    runs: in the order of their tails; departures (2 n + 1,): row of the first run that leaves each node of the n circles.
+    departures (2 n + 1,): row of the first run that leaves each node of the n circles; head (m,): nodes at the ends; spans (m, 4)
+    and places (m, 3): see `tangents`; crossings (m, 2 w): signatures by and to a run, in w words each; holds (n, w): digits 1
+    for the centres that a circle holds.
+    """
+
+    departures: Indices
+    head: Indices
+    spans: Matrix
+    places: PointTable
+    crossings: Table
+    holds: Table
+
+
+class Roadmap(NamedTuple):
+    """What does not depend on the hand: the circles, the runs among them and to the goals, and the circles' clusters.
+
+    cluster (n,): number of the cluster of overlapping circles that each belongs to.
     """
 
     circles: Circles
     runs: Runs
-    departures: Indices
+    cluster: tuple[int, ...]
 
 
 def roadmap(centre: Complex, radius: Array, goals: Complex) -> Roadmap:
@@ -40,23 +56,29 @@ def _kept(centre: bytes, radius: bytes, goals: bytes) -> Roadmap:
 
 def roadmap_within(centre: Complex, radius: Array, goals: Complex, ellipse: Ellipse = EVERYWHERE) -> Roadmap:
     """Lay out circles and goals with only the runs that an ellipse holds."""
-    field = circles(centre, radius, goals)
-    tail, head = pairs(field.n, field.goals)
-    kept = free_tangents(field.centre, field.radius, field.bar, field.outer, tail, head, *ellipse)
-    tail, head = tail[kept], head[kept]
-    back = head < 2 * field.n
+    field = together(centre, radius, goals)
+    return Roadmap(Circles(*field[:-1]), Runs(*runs(*field[:-1], *ellipse)), tuple(field[-1].tolist()))
+
+
+@compiled_exactly
+def runs(
+    c: Points,
+    r: Vector,
+    bar: Vector,
+    held: FlagTable,
+    outer: Flags,
+    blocker: Matrix,
+    hand: complex,
+    goals: Points,
+    reach: Vector,
+) -> tuple[Indices, Indices, Matrix, PointTable, Table, Table]:
+    """Return the fields of `Runs` among circles; hand, goals, reach: of an `Ellipse`."""
+    n = len(bar)
+    forth = free_tangents(c, r, bar, outer, pairs(n, len(c) - n), hand, goals, reach)
     # the same run backwards touches both circles in the other sense
-    tail, head = np.concatenate((tail, head[back] ^ 1)), np.concatenate((head, tail[back] ^ 1))
-    order = np.argsort(tail, kind='stable')
-    tail, head = tail[order], head[order]
-    departures = np.searchsorted(tail, np.arange(2 * field.n + 1))
-    columns = table(field.centre, field.radius, field.held, field.blocker, tail, head)
-    return Roadmap(field, Runs(tail, head, *columns), departures)
-
-
-def hand_runs(field: Circles, hand: complex) -> Runs:
-    """Return the free runs from the hand, which lies in no circle, to the circles and goals."""
-    tail, head = spokes(field.n, field.goals)
-    seen = field.centre, field.radius, field.bar, field.outer, field.held, field.blocker
-    kept, spans, places, crossing, way_in = spread(*seen, tail, head, hand)
-    return Runs(tail[kept], head[kept], spans, places, crossing, way_in)
+    back = forth[forth[:, 1] < 2 * n][:, ::-1] ^ 1
+    both = np.concatenate((forth, back))
+    both = both[np.argsort(both[:, 0], kind='mergesort')]
+    departures = np.searchsorted(both[:, 0], np.arange(2 * n + 1))
+    spans, places, crossings = table(c, r, held, blocker, both)
+    return departures, both[:, 1].copy(), spans, places, crossings, packed(held[:n])

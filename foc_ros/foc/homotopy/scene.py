@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.foc.compiled import Flags, FlagTable, Matrix, Points, Vector, compiled_exactly
-from foc_ros.foc.records import Array, Candidate, Obstacles
+from foc_ros.foc.compiled import Flags, FlagTable, Indices, Matrix, Points, Table, Vector, compiled_exactly
+from foc_ros.foc.records import Candidate, Obstacles
 
 from .circles import GRAZE
-from .crossing import Complex, direction
+from .crossing import TURN, Complex, direction
 from .hysteresis import kept_open, strangers
-from .tangents import TURN
+from .names import names_of, passed_before
 
 REACH = 2.0
 """An obstacle is out of the way when passing it on its far side alone takes more than this times the straight way."""
@@ -25,36 +25,35 @@ TOUCH = 1e-6
 """A circle that holds the hand or a goal shrinks to this part less than its distance."""
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
+class Scene(NamedTuple):
     """n obstacles as circles of radius + clearance, g goals, as seen from the hand.
 
     hand, goals (g,), centre (n,): complex [m]; wanted (n,): radius + clearance [m]; radius (g, n) on the way to each goal [m],
     smaller where a circle would hold the hand (held (n,)) or that goal (near (g, n)); inside (g,): goals inside an obstacle;
     named (g, n): who takes part in the names of the ways to each goal; turned (g, n): from the direction of the hand to that of
     the goal, as seen from each centre [rad]; excess (n,): least length of a path to any goal that touches the circle, as a
-    multiple of the straight way to it.
+    multiple of the straight way to it; close: how many goals are near, but not inside.
     """
 
     hand: complex
     centre: Complex
-    wanted: Array
-    goals: Complex
-    radius: Array
+    goals: Points
+    wanted: Vector
+    radius: Matrix
     held: Flags
     near: FlagTable
     inside: Flags
     named: FlagTable
-    turned: Array
-    excess: Array
+    turned: Matrix
+    excess: Vector
+    close: int
 
 
 def scene(hand: complex, goals: Complex, obstacles: Obstacles, clearance: float, previous: Sequence[Candidate]) -> Scene:
     """Look at the obstacles from the hand; previous: the candidates of the tick before."""
     centre: Complex = obstacles.centre.view(complex)[:, 0]
-    wanted = kept_open(obstacles.ids, centre, np.maximum(obstacles.radius + clearance, SMALLEST), clearance, previous)
-    slack = strangers(obstacles.ids, len(goals), previous)
-    return Scene(hand, centre, wanted, *looked_at(hand, goals, centre, wanted, obstacles.radius, slack))
+    before = passed_before(names_of(obstacles.ids), previous)
+    return Scene(hand, centre, *looked_at(hand, goals, centre, obstacles.radius, clearance, *before))
 
 
 @compiled_exactly
@@ -78,12 +77,14 @@ def matters(hand: complex, goal: complex, radius: float, straight: float, slack:
 
 @compiled_exactly
 def looked_at(
-    hand: complex, goals: Points, centre: Points, wanted: Vector, hard: Vector, slack: Matrix
-) -> tuple[Points, Matrix, Flags, FlagTable, Flags, FlagTable, Matrix, Vector]:
-    """Return goals, radius, held, near, inside, named, turned and excess of `Scene`; goals on the hand are moved off it.
+    hand: complex, goals: Points, centre: Points, hard: Vector, clearance: float, before: Indices, sides: Table
+) -> tuple[Points, Vector, Matrix, Flags, FlagTable, Flags, FlagTable, Matrix, Vector, int]:
+    """Return goals, wanted, ..., close of `Scene`; goals on the hand are moved off it.
 
-    hard (n,): radii without clearance; slack (g, n): what an obstacle has to be within its bounds to have a name [m].
+    hard (n,): radii without clearance [m]; before, sides: see `hysteresis`.
     """
+    wanted = kept_open(centre, np.maximum(hard + clearance, SMALLEST), clearance, sides)
+    slack = strangers(len(goals), before, sides)
     n, g = len(centre), len(goals)
     apart = np.where(np.abs(goals - hand) < GRAZE, hand + GRAZE, goals)
     radius, turned, excess, held = np.empty((g, n)), np.empty((g, n)), np.full(n, np.inf), np.zeros(n, np.bool_)
@@ -102,4 +103,7 @@ def looked_at(
             named[goal, k] = matters(hand - centre[k], goals[goal] - centre[k], r, straight, slack[goal, k])
             turned[goal, k] = direction(apart[goal] - centre[k]) - direction(hand - centre[k])
             excess[k] = min(excess[k], max(away + left - 2.0 * r, straight) / straight)
-    return apart, radius, held, near, inside, named, turned, excess
+    close = 0
+    for goal in range(g):
+        close += near[goal].any() and not inside[goal]
+    return apart, wanted, radius, held, near, inside, named, turned, excess, close

@@ -11,16 +11,19 @@ from foc_ros.foc.config import MOST_CANDIDATES, HomotopyConfig
 from foc_ros.foc.errors import SceneError
 from foc_ros.foc.records import Array, Candidate, Obstacles
 
-from .classes import NOTES, Classes
+from .classes import NOTES, Classes, Quest
 from .guesses import guesses
 from .levels import Levels
+from .names import names_of
 from .scene import scene
 from .selection import select
+from .taut import AT
 
 STATES, STATES_PER_CANDIDATE = 1000, 300
 """States that the search for one goal may look at: a few dozen are enough for four candidates."""
-WAYS_PER_CANDIDATE = 2
-"""Ways that are looked for at first: some beyond the candidates tell that no more are short enough."""
+SPARE_WAYS = 2
+"""Ways to one goal that are looked for at first, beside those that there is room for after the first to each: that first one, and
+one that tells that no more are short enough."""
 
 
 @dataclass(frozen=True)
@@ -58,21 +61,22 @@ def search(
         raise SceneError('hand_mean, goals', 'arrays (6,) and (g, 2)', f'{hand_mean.shape} and {goals.shape}')
     if len(duration_s) != len(goals):
         raise SceneError('duration_s', f'one for each of the {len(goals)} goals', len(duration_s))
-    hand, velocity = complex(*hand_mean[:2]), complex(*hand_mean[2:4])
+    x, y, v_x, v_y = hand_mean[:4].tolist()
+    hand, velocity, names = complex(x, y), complex(v_x, v_y), names_of(obstacles.ids)
     view = scene(hand, np.ascontiguousarray(goals, dtype=float).view(complex)[:, 0], obstacles, config.clearance, previous)
-    levels = {radius.tobytes(): Levels(view, radius, velocity) for radius in view.radius}
-    states = STATES + STATES_PER_CANDIDATE * config.max_candidates
-    reachable = np.flatnonzero(~view.inside).tolist()
-    usual = WAYS_PER_CANDIDATE * config.max_candidates
-    classes = [Classes(view, levels[view.radius[goal].tobytes()], goal, obstacles.ids, states, usual) for goal in reachable]
+    sizes = [radius.tobytes() for radius in view.radius]
+    levels = {size: Levels(view, radius) for size, radius in zip(sizes, view.radius, strict=True)}
+    reachable = [goal for goal, inside in enumerate(view.inside.tolist()) if not inside]
     # a goal without a candidate could never be foretold
-    count = max(config.max_candidates, min(len(classes), MOST_CANDIDATES))
+    count = max(config.max_candidates, min(len(reachable), MOST_CANDIDATES))
+    states, usual = STATES + STATES_PER_CANDIDATE * config.max_candidates, max(count - len(reachable), 0) + SPARE_WAYS
+    quest, notes = Quest(view, velocity, names, states, usual), dict.fromkeys(NOTES, 0)
+    classes = [Classes(quest, levels[sizes[goal]], goal, notes) for goal in reachable]
     chosen = select(classes, count, {candidate.label for candidate in previous})
-    notes = {name: sum(to_goal.notes[name] for to_goal in classes) for name in NOTES}
-    notes |= {'hand_inside': int(np.count_nonzero(view.held)), 'goal_inside': int(np.count_nonzero(view.inside))}
-    notes['goal_near'] = int(np.count_nonzero(view.near.any(axis=1) & ~view.inside))
+    notes |= {'hand_inside': int(np.count_nonzero(view.held)), 'goal_inside': len(goals) - len(reachable)}
+    notes['goal_near'] = view.close
     candidates = tuple(
-        Candidate(one.rank[1], one.goal, one.sides, path, length)
-        for one, (path, length) in zip(chosen, guesses(view, velocity, chosen, duration_s, steps), strict=True)
+        Candidate(one.label, one.goal, tuple(zip(one.ids, one.sides, strict=True)), path, float(one.pieces[-1, AT]))
+        for one, path in zip(chosen, guesses(view, velocity, chosen, duration_s, steps), strict=True)
     )
     return Search(candidates, {name: count for name, count in notes.items() if count})

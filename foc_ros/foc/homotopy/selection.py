@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import insort
 from collections.abc import Collection, Iterable
 from heapq import merge
+from itertools import islice
 
 from .classes import Found
 
@@ -21,20 +22,15 @@ def select(classes: Iterable[Iterable[Found]], count: int, previous: Collection[
     length, with the two factors.
     """
     streams = [iter(to_goal) for to_goal in classes]
-    firsts = sorted((found for stream in streams if (found := next(stream, None)) is not None), key=_rank)[:count]
+    firsts = sorted([found for stream in streams for found in islice(stream, 1)])[:count]
     room = count - len(firsts)
-    owner = {found.sides: found.goal for found in firsts}
-    awaited = {*previous} - {found.rank[1] for found in firsts}
+    owner = {found.course: found.goal for found in firsts}
+    awaited = {*previous} - {found.label for found in firsts}
     others: list[tuple[float, str, Found]] = []
-    for found in merge(*streams, key=_rank) if room else ():
-        key, label = found.rank
-        if len(others) >= room and (STAY if awaited else 1.0) * key > others[room - 1][0]:
+    for found in merge(*streams) if room else ():
+        if len(others) >= room and (STAY if awaited else 1.0) * found.key > others[room - 1][0]:
             break
-        factor = REPEAT if owner.setdefault(found.sides, found.goal) != found.goal else 1.0
-        insort(others, (key * factor * (STAY if label in awaited else 1.0), label, found))
-        awaited.discard(label)
-    return sorted([*firsts, *(found for _, _, found in others[:room])], key=_rank)
-
-
-def _rank(found: Found) -> tuple[float, str]:
-    return found.rank
+        factor = REPEAT if owner.setdefault(found.course, found.goal) != found.goal else 1.0
+        insort(others, (found.key * factor * (STAY if found.label in awaited else 1.0), found.label, found))
+        awaited.discard(found.label)
+    return sorted([*firsts, *[found for _, _, found in others[:room]]])

@@ -8,8 +8,7 @@ from foc_ros.foc.compiled import Flags, Matrix, Tensor, Vector, compiled_exactly
 from foc_ros.foc.errors import SceneError
 from foc_ros.foc.records import LEFT, RIGHT, Array, Obstacles
 
-from .crossing import direction, straight
-from .tangents import TURN
+from .crossing import TURN, direction, straight
 
 
 def swept_angles(path: Array, centres: Array) -> Array:

@@ -7,14 +7,11 @@ circle j with D = c_j - c_i and w = s_j r_j - s_i r_i has the length l = sqrt(|D
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from foc_ros.foc.compiled import (
     Flags,
     FlagTable,
-    Indices,
     Matrix,
     Points,
     PointTable,
@@ -23,42 +20,14 @@ from foc_ros.foc.compiled import (
     compiled_exactly,
 )
 
-from .crossing import along_circle, straight
+from .crossing import TURN, along_circle, straight
+from .signatures import DIGITS, ZERO, words
 
-TURN = 2.0 * np.pi
 LENGTH, LEAVE, REACH, CLEAR = range(4)
-"""Columns of `Runs.spans`."""
+"""Columns of spans: length [m]; angles of the points where a run leaves and reaches its circles, in [0, 2 pi]; angle by which a
+path may follow the circle from the end before it meets an overlapping one."""
 START, END, HEADING = range(3)
-"""Columns of `Runs.places`."""
-
-
-@dataclass(frozen=True, eq=False)
-class Runs:
-    """A table of m free runs.
-
-    tail, head (m,): nodes. spans (m, 4): length [m]; angles of the points where it leaves and reaches its circles, in [0, 2 pi];
-    angle by which a path may follow the circle from the end before it meets an overlapping one. places (m, 3), complex: start,
-    end [m], heading of length 1. Of the rays from the centres, (m, n): crossing by the run and by the way to its start, along its
-    circle anticlockwise from angle 0; way_in: crossings by the way to its end likewise.
-    """
-
-    tail: Indices
-    head: Indices
-    spans: Matrix
-    places: PointTable
-    crossing: Table
-    way_in: Table
-
-    def followed_by(self, more: Runs) -> Runs:
-        """Return the rows of both."""
-        return Runs(
-            np.concatenate((self.tail, more.tail)),
-            np.concatenate((self.head, more.head)),
-            np.concatenate((self.spans, more.spans)),
-            np.concatenate((self.places, more.places)),
-            np.concatenate((self.crossing, more.crossing)),
-            np.concatenate((self.way_in, more.way_in)),
-        )
+"""Columns of places, complex: start, end [m], heading of length 1."""
 
 
 @compiled_exactly
@@ -98,23 +67,16 @@ def blocked(c: Points, bar: Vector, i: int, j: int, start: complex, u: complex, 
 
 @compiled_exactly
 def free_tangents(
-    c: Points,
-    r: Vector,
-    bar: Vector,
-    outer: Flags,
-    tail: Indices,
-    head: Indices,
-    hand: complex,
-    goals: Points,
-    reach: Vector,
-) -> Indices:
-    """Return the rows of the tries (m,) that are tangents between outer circles, within the ellipse, and not blocked."""
-    kept, count = np.empty(len(tail), np.intp), 0
-    for run in range(len(tail)):
-        i, j, r_i = tail[run] >> 1, head[run] >> 1, signed(r, tail[run])
-        if (i < len(bar) and not outer[i]) or (j < len(bar) and not outer[j]):
+    c: Points, r: Vector, bar: Vector, outer: Flags, tries: Table, hand: complex, goals: Points, reach: Vector
+) -> Table:
+    """Return those of the tries (m, 2) that are tangents between outer circles, within the ellipse, and not blocked."""
+    kept, count = np.empty_like(tries), 0
+    for run in range(len(tries)):
+        tail, head = tries[run]
+        i, j, r_i = tail >> 1, head >> 1, signed(r, tail)
+        if not (outer[i] and outer[j]):
             continue
-        length, u = tangent(c[i], r_i, c[j], signed(r, head[run]))
+        length, u = tangent(c[i], r_i, c[j], signed(r, head))
         start = c[i] - 1j * r_i * u
         end = start + length * u
         if (
@@ -122,7 +84,7 @@ def free_tangents(
             and (within(hand, goals, reach, start, end, length) or within(hand, goals, reach, end, start, length))
             and not blocked(c, bar, i, j, start, u, length)
         ):
-            kept[count] = run
+            kept[count] = tries[run]
             count += 1
     return kept[:count].copy()
 
@@ -138,47 +100,42 @@ def ahead(blocker: Vector, at: float, sense: int) -> float:
 
 
 @compiled_exactly
-def table(
-    c: Points, r: Vector, held: FlagTable, blocker: Matrix, tail: Indices, head: Indices
-) -> tuple[Matrix, PointTable, Table, Table]:
-    """Return spans, places, crossing and way_in of `Runs` for given runs; held, blocker: of `Circles`."""
-    m, n = len(tail), len(blocker)
-    spans, places = np.empty((m, 4)), np.empty((m, 3), np.complex128)
-    crossing, way_in = np.zeros((m, n), np.intp), np.zeros((m, n), np.intp)
-    for run in range(m):
-        i, j, r_i, r_j = tail[run] >> 1, head[run] >> 1, signed(r, tail[run]), signed(r, head[run])
-        length, u = tangent(c[i], r_i, c[j], r_j)
-        from_i, from_j = -1j * r_i * u, -1j * r_j * u
-        start, end = c[i] + from_i, c[j] + from_j
-        places[run, START], places[run, END], places[run, HEADING] = start, end, u
-        spans[run, LENGTH] = length
-        spans[run, LEAVE] = np.arctan2(from_i.imag, from_i.real) % TURN
-        spans[run, REACH] = np.arctan2(from_j.imag, from_j.real) % TURN
-        spans[run, CLEAR] = ahead(blocker[j], spans[run, REACH], 2 * (head[run] & 1) - 1) if j < n else TURN
-        for k in range(n):
-            from_k, to_k = from_i if k == i else start - c[k], from_j if k == j else end - c[k]
-            crossing[run, k] = straight(from_k, to_k)
-            if i < n:
-                crossing[run, k] += along_circle(c[i] + r[i] - c[k], from_k, held[i, k])
-            if j < n:
-                way_in[run, k] = along_circle(c[j] + r[j] - c[k], to_k, held[j, k])
-    return spans, places, crossing, way_in
+def crossed(
+    c: Points, r: Vector, held: FlagTable, i: int, j: int, from_i: complex, from_j: complex, word: int
+) -> tuple[int, int]:
+    """Return a word of the crossings by and to a run from circle i to circle j; from_i, from_j: its ends from their centres.
+
+    By the run: its own and those of the way to its start, along circle i anticlockwise from angle 0. To it: of the way to its end
+    likewise.
+    """
+    n, start, end, by, to = held.shape[1], c[i] + from_i, c[j] + from_j, 0, 0
+    for k in range(DIGITS * word, min(DIGITS * (word + 1), n)):
+        from_k, to_k = from_i if k == i else start - c[k], from_j if k == j else end - c[k]
+        run, way = straight(from_k, to_k), 0
+        if i < n:
+            run += along_circle(c[i] + r[i] - c[k], from_k, held[i, k])
+        if j < n:
+            way = along_circle(c[j] + r[j] - c[k], to_k, held[j, k])
+        by += run + ZERO << 3 * (k % DIGITS)
+        to += way + ZERO << 3 * (k % DIGITS)
+    return by, to
 
 
 @compiled_exactly
-def spread(
-    c: Points,
-    r: Vector,
-    bar: Vector,
-    outer: Flags,
-    held: FlagTable,
-    blocker: Matrix,
-    tail: Indices,
-    head: Indices,
-    hand: complex,
-) -> tuple[Indices, Matrix, PointTable, Table, Table]:
-    """Return which runs from a hand, the circle after the last goal, are free, and their `table`."""
-    centre, radius = np.append(c, hand), np.append(r, 0.0)
-    kept = free_tangents(centre, radius, bar, outer, tail, head, hand, np.zeros(1, np.complex128), np.full(1, np.inf))
-    spans, places, crossing, way_in = table(centre, radius, held, blocker, tail[kept], head[kept])
-    return kept, spans, places, crossing, way_in
+def table(c: Points, r: Vector, held: FlagTable, blocker: Matrix, runs: Table) -> tuple[Matrix, PointTable, Table]:
+    """Return spans (m, 4), places (m, 3) and crossings (m, 2 w) by and to runs (m, 2); held, blocker: of `Circles`."""
+    m, n, w = len(runs), len(blocker), words(len(blocker))
+    spans, places, crossings = np.empty((m, 4)), np.empty((m, 3), np.complex128), np.empty((m, 2 * w), np.intp)
+    for run in range(m):
+        tail, head = runs[run]
+        i, j, r_i, r_j = tail >> 1, head >> 1, signed(r, tail), signed(r, head)
+        length, u = tangent(c[i], r_i, c[j], r_j)
+        from_i, from_j = -1j * r_i * u, -1j * r_j * u
+        places[run, START], places[run, END], places[run, HEADING] = c[i] + from_i, c[j] + from_j, u
+        spans[run, LENGTH] = length
+        spans[run, LEAVE] = np.arctan2(from_i.imag, from_i.real) % TURN
+        spans[run, REACH] = np.arctan2(from_j.imag, from_j.real) % TURN
+        spans[run, CLEAR] = ahead(blocker[j], spans[run, REACH], 2 * (head & 1) - 1) if j < n else TURN
+        for word in range(w):
+            crossings[run, word], crossings[run, w + word] = crossed(c, r, held, i, j, from_i, from_j, word)
+    return spans, places, crossings

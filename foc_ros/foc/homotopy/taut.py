@@ -7,44 +7,65 @@ import numpy as np
 from foc_ros.foc.compiled import Indices, Matrix, Points, PointTable, Vector, compiled, compiled_exactly
 
 from .best_first import arc
-from .tangents import END, HEADING, LENGTH, START
+from .tangents import END, HEADING, LEAVE, LENGTH, REACH, START
 
-AT, BEND = range(2)
-"""Columns of the pieces' measures."""
+AT, BEND, X, Y, HEADING_X, HEADING_Y = range(6)
+"""Columns of pieces: where a run or an arc begins along the path [m]; its bend [1/m], anticlockwise positive, 0 for runs; the
+point at which it begins [m] and the heading there, of length 1. The last piece of a way is its end."""
 
 
 @compiled_exactly
-def pieces(head: Indices, spans: Matrix, places: PointTable, radius: Vector, way: Indices) -> tuple[Matrix, PointTable, float]:
-    """Lay out a way: a run, an arc, a run, ...
+def laid_out(
+    head: Indices,
+    spans: Matrix,
+    places: PointTable,
+    first_head: Indices,
+    first_spans: Matrix,
+    first_places: PointTable,
+    radius: Vector,
+    trails: Indices,
+    ends: Indices,
+) -> tuple[Matrix, Indices]:
+    """Lay out ways (w,), each a run, an arc, a run, ...
 
-    Returns for each piece where it begins along the path [m] and its bend [1/m], anticlockwise positive, 0 for runs; the point
-    at which it begins [m] and the heading there, of length 1; and the length of the path [m].
+    head, ..., radius, trails, ends: as in `best_first.shortest`. Returns pieces of the ways one after the other, and where those
+    of each end (w,).
     """
-    count = 2 * len(way) - 1
-    measures, begins, length = np.zeros((count, 2)), np.empty((count, 2), np.complex128), 0.0
-    for i in range(len(way)):
-        run = way[i]
-        measures[2 * i, AT] = length
-        begins[2 * i, 0], begins[2 * i, 1] = places[run, START], places[run, HEADING]
-        length += spans[run, LENGTH]
-        if i + 1 < len(way):
-            sense, circle = 2 * (head[run] & 1) - 1, head[run] >> 1
-            measures[2 * i + 1, AT], measures[2 * i + 1, BEND] = length, sense / radius[circle]
-            begins[2 * i + 1, 0], begins[2 * i + 1, 1] = places[run, END], places[run, HEADING]
-            length += radius[circle] * max(arc(spans, run, way[i + 1], sense), 0.0)
-    return measures, begins, length
+    pieces, begin = np.zeros((2 * len(trails), 6)), 0
+    for way in range(len(ends)):
+        along = 0.0
+        for i in range(begin, ends[way]):
+            run, start, piece = trails[i], -1 - trails[i], pieces[2 * i : 2 * i + 2]
+            at = head[run] if run >= 0 else first_head[start]
+            span, place = (spans[run], places[run]) if run >= 0 else (first_spans[start], first_places[start])
+            piece[0, AT], piece[0, X], piece[0, Y] = along, place[START].real, place[START].imag
+            along += span[LENGTH]
+            piece[1, AT], piece[1, X], piece[1, Y] = along, place[END].real, place[END].imag
+            piece[:, HEADING_X], piece[:, HEADING_Y] = place[HEADING].real, place[HEADING].imag
+            if i + 1 < ends[way]:
+                sense, r = 2 * (at & 1) - 1, radius[at >> 1]
+                piece[1, BEND] = sense / r
+                along += r * max(arc(spans[trails[i + 1], LEAVE], span[REACH], sense), 0.0)
+        begin = ends[way]
+    return pieces, 2 * ends
 
 
 @compiled_exactly
-def points_at(measures: Matrix, begins: PointTable, along: Vector) -> Points:
-    """Return the points of laid out pieces at lengths `along` (m,) from the beginning [m]; complex (m,)."""
+def points_at(pieces: Matrix, along: Vector) -> Points:
+    """Return the points of the pieces of a way at lengths `along` (m,) from its beginning [m]; complex (m,)."""
     points = np.empty(len(along), np.complex128)
     for i in range(len(along)):
-        piece = max(np.searchsorted(measures[:, AT], along[i], side='right') - 1, 0)
-        step, turn = along[i] - measures[piece, AT], 1j * measures[piece, BEND]
+        piece = pieces[max(np.searchsorted(pieces[:, AT], along[i], side='right') - 1, 0)]
+        step, turn = along[i] - piece[AT], 1j * piece[BEND]
         chord = step + 0j if turn == 0j else (np.exp(turn * step) - 1.0) / turn
-        points[i] = begins[piece, 0] + begins[piece, 1] * chord
+        points[i] = complex(piece[X], piece[Y]) + complex(piece[HEADING_X], piece[HEADING_Y]) * chord
     return points
+
+
+@compiled_exactly
+def spaced(pieces: Matrix, count: int) -> Points:
+    """Return points at equal distances along a way, from its beginning to its end; complex (count,)."""
+    return points_at(pieces, pieces[-1, AT] * np.linspace(0.0, 1.0, count))
 
 
 @compiled
@@ -60,33 +81,3 @@ def progress(length: float, speed: float, duration_s: float, steps: int) -> Vect
         rest = t**3 * (10.0 + t * (6.0 * t - 15.0))
         along[step] = min(max(length * rest + carried * t * (1.0 + t**2 * (t * (8.0 - 3.0 * t) - 6.0)), 0.0), length)
     return along
-
-
-@compiled_exactly
-def followed(
-    head: Indices,
-    spans: Matrix,
-    places: PointTable,
-    radius: Vector,
-    way: Indices,
-    velocity: complex,
-    duration_s: float,
-    steps: int,
-) -> tuple[Points, Vector, float]:
-    """Return where a hand that follows a way is at steps 0..N: points (N + 1,), lengths along the way (N + 1,), its length [m].
-
-    head, spans, places: of `tangents.Runs`; radius: of the circles [m]; velocity of the hand now [m/s]; duration_s [s].
-    """
-    measures, begins, length = pieces(head, spans, places, radius, way)
-    speed = (begins[0, 1] * velocity.conjugate()).real
-    along = progress(length, speed, duration_s, steps)
-    points = points_at(measures, begins, along)
-    points[-1] = places[way[-1], END]  # without what rounding has gathered on the way
-    return points, along, length
-
-
-@compiled_exactly
-def spaced(head: Indices, spans: Matrix, places: PointTable, radius: Vector, way: Indices, count: int) -> Points:
-    """Return points at equal distances along a way, from its beginning to its end; complex (count,)."""
-    measures, begins, length = pieces(head, spans, places, radius, way)
-    return points_at(measures, begins, length * np.linspace(0.0, 1.0, count))

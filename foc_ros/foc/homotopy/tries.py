@@ -2,32 +2,40 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.foc.compiled import Indices
+from foc_ros.foc.compiled import Table, compiled_exactly
 from foc_ros.foc.records import Array
 
 from .crossing import Complex
 
 
-@lru_cache(maxsize=32)
-def pairs(n: int, goals: int) -> tuple[Indices, Indices]:
-    """Return tails and heads between n circles, in one direction each, and from circles to goals, the circles after them."""
-    i, j = np.triu_indices(n, 1)
-    k, goal = np.divmod(np.arange(n * goals), max(goals, 1))
-    tail = np.concatenate([np.repeat(2 * i, 4) + np.tile([0, 0, 1, 1], len(i)), np.repeat(2 * k, 2) + np.tile([0, 1], len(k))])
-    head = np.concatenate([np.repeat(2 * j, 4) + np.tile([0, 1, 0, 1], len(i)), np.repeat(2 * (n + goal) + 1, 2)])
-    return tail, head
+@compiled_exactly
+def pairs(n: int, goals: int) -> Table:
+    """Return tails and heads (m, 2) between n circles, in one direction each, and from circles to goals, circles after them."""
+    tries, count = np.empty((2 * n * (n - 1) + 2 * n * goals, 2), np.intp), 0
+    for i in range(n):
+        for j in range(i + 1, n):
+            for senses in range(4):
+                tries[count, 0], tries[count, 1] = 2 * i + (senses >> 1), 2 * j + (senses & 1)
+                count += 1
+    for k in range(n):
+        for goal in range(goals):
+            for sense in range(2):
+                tries[count, 0], tries[count, 1] = 2 * k + sense, 2 * (n + goal) + 1
+                count += 1
+    return tries
 
 
-@lru_cache(maxsize=32)
-def spokes(n: int, goals: int) -> tuple[Indices, Indices]:
-    """Return tails and heads from the hand, the circle after the last goal, to circles and goals."""
-    head = np.concatenate([np.arange(2 * n), 2 * np.arange(n, n + goals) + 1])
-    return np.full(len(head), 2 * (n + goals) + 1), head
+@compiled_exactly
+def spokes(n: int, goal: int, hand: int) -> Table:
+    """Return tails and heads (m, 2) from a hand to n circles and a goal, both of which are circles too."""
+    tries = np.full((2 * n + 1, 2), 2 * hand + 1)
+    tries[: 2 * n, 1] = np.arange(2 * n)
+    tries[2 * n, 1] = 2 * goal + 1
+    return tries
 
 
 class Ellipse(NamedTuple):

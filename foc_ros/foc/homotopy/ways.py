@@ -1,66 +1,65 @@
-"""The ways from a hand to a goal, class by class, over a roadmap with the hand in it."""
+"""The ways from the hand to a goal, class by class, over a roadmap that the hand enters."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import NamedTuple
+import numpy as np
 
-from foc_ros.foc.compiled import Indices
-from foc_ros.foc.records import Array
+from foc_ros.foc.compiled import Flags, FlagTable, Indices, Matrix, Points, PointTable, Table, Vector, compiled_exactly
 
-from .best_first import shortest_ways
-from .roadmap import Roadmap, hand_runs
-from .tangents import HEADING, LENGTH, Runs
+from .best_first import shortest
+from .tangents import HEADING, LENGTH, free_tangents, table
+from .taut import laid_out
+from .tries import spokes
 
 COAST_S = 0.2
 """A path that leaves at an angle p to the velocity v ranks as if |v| (1 - cos p) times this longer: a hand coasts first."""
+NANO = 1e9
 
 
-class Way(NamedTuple):
-    """One path: key by which it ranks [m]; runs, rows of the plan's table; crossings of the rays from the named circles."""
+@compiled_exactly
+def shortest_ways(
+    centre: Points,
+    radius: Vector,
+    bar: Vector,
+    held: FlagTable,
+    outer: Flags,
+    blocker: Matrix,
+    departures: Indices,
+    head: Indices,
+    spans: Matrix,
+    places: PointTable,
+    crossings: Table,
+    holds: Table,
+    hand: complex,
+    velocity: complex,
+    goal: int,
+    named: Indices,
+    turned: Vector,
+    told: bool,
+    bound: float,
+    states: int,
+    most: int,
+) -> tuple[Vector, Table, Matrix, Indices, bool]:
+    """Return the shortest ways from a hand to a goal, one of each class: at least so many, as far as there are.
 
-    key: float
-    runs: Indices
-    crossings: Indices
+    centre, ..., blocker: of `Circles`; departures, ..., holds: of `Runs`; velocity: of the hand [m/s]; goal: its number; named
+    (k,): circles that tell classes apart; turned (n,): from the direction of the hand to that of the goal, as seen from each
+    circle [rad]; told: whether these tell all classes apart, else ways that arrive by different runs are all given; bound: on the
+    key [m]; states: to look at at most. Those that rank alike with the last are all there; a path that winds about a named circle
+    is no way. The hand is put after the last goal, as a circle of radius 0.
 
-
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """A roadmap with the hand in it.
-
-    table: all runs, the hand's last; first: keys of the hand's runs [m], their lengths and what the turn into them costs.
+    Returns keys (w,), to the nanometre, by which they rank [m]; sides (w, k) of the named circles; pieces of the ways one after
+    the other, as `taut.laid_out` has them, and where those of each end (w,); whether there were too many states to find all.
     """
-
-    roadmap: Roadmap
-    table: Runs
-    first: Array
-
-
-def plan(roadmap: Roadmap, hand: complex, velocity: complex) -> Plan:
-    """Put a hand with a velocity [m/s] into a roadmap."""
-    start = hand_runs(roadmap.circles, hand)
-    penalty = COAST_S * (abs(velocity) - (start.places[:, HEADING] * velocity.conjugate()).real)
-    return Plan(roadmap, roadmap.runs.followed_by(start), start.spans[:, LENGTH] + penalty)
-
-
-def ways(plan: Plan, goal: int, named: Indices, bound: float, states: int, most: int) -> Iterator[Way | None]:
-    """Yield the shortest way of each class, shortest first; at the end None if there were too many states.
-
-    goal: its number; named: the circles that tell classes apart; bound: on the key [m]; states: to look at at most; most: ways
-    to look for at first, twice as many each time these were not enough. A path that winds about a named circle on the way is not
-    followed.
-    """
-    field, table, given = plan.roadmap.circles, plan.table, 0
-    runs = table.head, table.spans, table.places, table.crossing, table.way_in
-    maze = plan.roadmap.departures, field.centre, field.radius, field.held
-    while True:
-        keys, trails, ends, crossings, cut = shortest_ways(*runs, *maze, plan.first, field.n + goal, named, bound, states, most)
-        begins = [0, *ends.tolist()]
-        for way, key in enumerate(keys[given:].tolist(), given):
-            yield Way(key, trails[begins[way] : begins[way + 1]], crossings[way])
-        if len(keys) < most:
-            if cut:
-                yield None
-            return
-        given, most = most, 2 * most
+    n, last = len(bar), len(centre)
+    c, r, sees = np.append(centre, hand), np.append(radius, 0.0), np.append(outer, True)
+    start = free_tangents(c, r, bar, sees, spokes(n, n + goal, last), hand, np.zeros(1, np.complex128), np.full(1, np.inf))
+    first_spans, first_places, first_crossings = table(c, r, held, blocker, start)
+    coasting = COAST_S * (abs(velocity) - (first_places[:, HEADING] * velocity.conjugate()).real)
+    known, first = (departures, head, spans, places, crossings, holds), (start[:, 1], first_spans, first_places)
+    key, node, end = first_spans[:, LENGTH] + coasting, 2 * (n + goal) + 1, centre[n + goal]
+    keys, sides, trails, ends, cut = shortest(
+        *known, *first, first_crossings, key, radius, end, node, named, turned, told, bound, states, most
+    )
+    pieces, ends = laid_out(head, spans, places, *first, radius, trails, ends)
+    return np.rint(keys * NANO) / NANO, sides, pieces, ends, cut
