@@ -34,21 +34,21 @@ def arc(left: float, reached: float, sense: int) -> float:
 
 
 @compiled_exactly
-def seen(signature: Indices, signatures: Table, latest: int, earlier: Indices) -> bool:
-    """Tell whether a signature is among those from the latest entry back."""
+def seen(signatures: Table, one: int, latest: int, earlier: Indices) -> bool:
+    """Tell whether the signature of an entry is among those from the latest entry back."""
     while latest >= 0:
-        if equal(signatures[latest], signature):
+        if equal(signatures, latest, one):
             return True
         latest = earlier[latest]
     return False
 
 
 @compiled_exactly
-def sides(signature: Indices, named: Indices, turned: Vector) -> Indices:
+def sides(signatures: Table, one: int, named: Indices, turned: Vector) -> Indices:
     """Return on which side a path that ends with a signature passes each named circle, 0 where it winds about it."""
     passed = np.empty(len(named), np.intp)
     for i in range(len(named)):
-        passed[i] = side(turned[named[i]] + TURN * count(signature, named[i]))
+        passed[i] = side(turned[named[i]] + TURN * count(signatures, one, named[i]))
     return passed
 
 
@@ -122,14 +122,14 @@ def shortest(
         arrival, start = run[here], -1 - run[here]
         at = head[arrival] if arrival >= 0 else first_head[start]
         state = len(head) if told and at == node else arrival
-        if seen(signatures[here], signatures, latest[state], earlier):
+        if seen(signatures, here, latest[state], earlier):
             continue
         earlier[here], latest[state] = latest[state], here
         looked_at += 1
         if at == node:
             if ways == len(found):
                 found, passed = np.append(found, found), np.concatenate((passed, passed))
-            passed[ways] = sides(signatures[here], named, turned)
+            passed[ways] = sides(signatures, here, named, turned)
             if passed[ways].all():
                 found[ways] = here
                 ways += 1
@@ -153,7 +153,7 @@ def shortest(
                 onto = (crossings[following, i] & mask[i]) - (crossed[words + i] & mask[i])
                 signatures[met, i] = signatures[here, i] + onto + turns * (holds[circle, i] & mask[i])
             state = len(head) if told and head[following] == node else following
-            if not winds(signatures[met], mask) and not seen(signatures[met], signatures, latest[state], earlier):
+            if not winds(signatures, met, mask) and not seen(signatures, met, latest[state], earlier):
                 key[met], run[met], parent[met] = onward, following, here
                 heappush(heap, (least, met))
                 met += 1

@@ -13,11 +13,11 @@ GRAZE = 1e-9
 
 
 class Circles(NamedTuple):
-    """n circles and, after them, g goals: circles of radius 0.
+    """n circles and, after them, g goals and a place for the hand: circles of radius 0.
 
-    centre (n + g,), complex [m]; radius (n + g,) [m]; bar (n,): square of the distance from each centre that bars a run [m^2];
-    held (n + g, n): which centres each circle holds; outer (n + g,): which ones lie in no other circle, of equal ones the
-    first; blocker (n, n): direction of the outer circles that overlap with each [rad], NaN for others.
+    centre (n + g + 1,), complex [m]; radius (n + g + 1,) [m]; bar (n,): square of the distance from each centre that bars a run
+    [m^2]; held (n + g + 1, n): which centres each circle holds; outer (n + g + 1,): which ones lie in no other circle, of equal
+    ones the first; blocker (n, n): direction of the outer circles that overlap with each [rad], NaN for others.
     """
 
     centre: Points
@@ -48,7 +48,11 @@ def clusters(touching: FlagTable) -> Indices:
 @compiled_exactly
 def together(centre: Points, radius: Vector, goals: Points) -> tuple[Points, Vector, Vector, FlagTable, Flags, Matrix, Indices]:
     """Take centre (n,) [m], radius (n,) > 0 [m] and goals (g,) [m] together: the fields of `Circles`, and clusters (n,)."""
-    n, c, r = len(centre), np.concatenate((centre, goals)), np.concatenate((radius, np.zeros(len(goals))))
+    n, c, r = (
+        len(centre),
+        np.concatenate((centre, goals, np.zeros(1, np.complex128))),
+        np.append(radius, np.zeros(len(goals) + 1)),
+    )
     held, touching = np.zeros((len(c), n), np.bool_), np.zeros((n, n), np.bool_)
     outer, blocker = np.ones(len(c), np.bool_), np.full((n, n), np.nan)
     for j in range(n):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
+from operator import getitem
 from typing import NamedTuple
 
 import numpy as np
@@ -74,23 +76,20 @@ class Classes:
         self._notes['no_way'] += found is None
 
     def _distinct(self) -> Iterator[Found]:
-        scene = self._quest.scene
+        scene, levels, named = self._quest.scene, self._levels, self._named
         straight = abs(scene.goals[self._goal] - scene.hand)
         given: set[str] = set()
-        rows = self._levels.first(self._named)
+        level = levels.first(named)
         while True:
-            bounded = len(rows) < MOST and not rows.issuperset(self._named)
-            level = self._levels(rows, bounded)
-            told = [k for k, row in enumerate(self._named) if row in level.place]
-            places = [level.place[self._named[k]] for k in told]
-            everyone = 1 << len({level.roadmap.cluster[place] for place in places}) + len(self._named) - len(told)
+            places = [level.place[row] for row in named if row in level.place]
+            everyone = 1 << len({level.roadmap.cluster[place] for place in places}) + len(named) - len(places)
             limit = level.limit * straight
-            for found in self._ranked(level, places, told, limit if bounded else np.inf, everyone):
+            for found in self._ranked(level, places, limit if level.bounded else np.inf, everyone):
                 if found.course in given:
                     continue
                 met = self._met(found, level) if found.key >= limit else []
-                if met and len(rows) < MOST:
-                    rows = rows.union(met)
+                if met and len(level.place) < MOST:
+                    level = levels.joined(level, met, named)
                     break
                 given.add(found.course)
                 if met:
@@ -100,44 +99,47 @@ class Classes:
                 if len(given) == everyone:
                     return
             else:
-                if not bounded:
+                if not level.bounded:
                     return
-                rows = self._levels.more(rows)
+                level = levels.more(level, named)
 
-    def _ranked(self, level: Level, places: list[int], told: list[int], bound: float, everyone: int) -> Iterator[Found]:
-        """Yield the ways over a level by their rank."""
+    def _ranked(self, level: Level, places: list[int], bound: float, everyone: int) -> Iterator[Found]:
+        """Yield the ways over a level, in which the named circles have these places, by their rank."""
         scene, velocity, _, states, usual = self._quest
-        circles, runs, _ = level.roadmap
-        turned, named = scene.turned[self._goal], np.array(places, dtype=np.intp)
+        circles, runs, *_ = level.roadmap
+        turned, told = scene.turned[self._goal], len(places) == len(self._named)
         if len(level.place) < len(turned):
             turned = turned[list(level.place)]
-        all_told = len(told) == len(self._named)
-        ends, given, most = (scene.hand, velocity, self._goal), 0, min(usual, everyone)
+        ends, named = (scene.hand, velocity, self._goal), np.array(places, dtype=np.intp)
+        given, most = 0, min(usual, everyone)
         while True:
-            keys, sides, pieces, stops, cut = shortest_ways(*circles, *runs, *ends, named, turned, all_told, bound, states, most)
+            keys, sides, pieces, stops, cut = shortest_ways(*circles, *runs, *ends, named, turned, told, bound, states, most)
             begins = [0, *stops.tolist()]
-            found = [
-                self._found(key, passed, told, pieces[begin:end])
-                for key, passed, begin, end in zip(keys.tolist(), sides.tolist(), begins, begins[1:], strict=False)
-            ]
-            yield from sorted(found[given:])
+            laid = [pieces[begin:end] for begin, end in pairwise(begins)]
+            passed = (
+                sides.tolist()
+                if told
+                else [self._completed(one, level, way) for one, way in zip(sides.tolist(), laid, strict=True)]
+            )
+            yield from sorted(map(self._found, keys.tolist(), passed, laid))[given:]
             if len(keys) < most:
                 self._notes['search_cut'] += cut
                 return
             given, most = len(keys), 2 * most
 
-    def _found(self, key: float, sides: list[int], told: list[int], pieces: Matrix) -> Found:
-        """Name a way; told: which named circles the sides are of."""
-        if len(told) < len(self._named):
-            sides = self._completed(dict(zip(told, sides, strict=True)), pieces)
-        course = ''.join([part[side] for part, side in zip(self._parts, sides, strict=True)])
+    def _found(self, key: float, sides: list[int], pieces: Matrix) -> Found:
+        course = ''.join(map(getitem, self._parts, sides))
         return Found(key, self._prefix + course, self._goal, course, self._ids, sides, pieces)
 
-    def _completed(self, sides: dict[int, int], pieces: Matrix) -> list[int]:
+    def _completed(self, told: list[int], level: Level, pieces: Matrix) -> list[int]:
         """Return sides of all named circles: of those that a level does not hold, by the angle that the path sweeps."""
         line, centres = spaced(pieces, FINENESS), self._quest.scene.centre[self._named]
-        swept = swept_angles(line.view(float).reshape(-1, 2), centres.view(float).reshape(-1, 2))
-        return [sides.get(k) or (LEFT if angle < 0.0 else RIGHT) for k, angle in enumerate(swept.tolist())]
+        swept = swept_angles(line.view(float).reshape(-1, 2), centres.view(float).reshape(-1, 2)).tolist()
+        known = iter(told)
+        return [
+            next(known) if row in level.place else LEFT if angle < 0.0 else RIGHT
+            for row, angle in zip(self._named, swept, strict=True)
+        ]
 
     def _met(self, found: Found, level: Level) -> list[int]:
         """Return the circles that a path meets and its roadmap does not hold."""

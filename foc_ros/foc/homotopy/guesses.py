@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from foc_ros.foc.compiled import Flags, FlagTable, Indices, Matrix, Points, PointTable, Vector, compiled_exactly
-from foc_ros.foc.records import Array
+from foc_ros.foc.records import Array, fixed
 
 from .classes import Found
 from .scene import Scene
@@ -38,8 +38,7 @@ def guesses(scene: Scene, velocity: complex, chosen: Sequence[Found], duration_s
         scene.held,
         scene.near,
     )
-    points.flags.writeable = False
-    return points.view(float).reshape(len(chosen), steps + 1, 2)
+    return fixed(points.view(float).reshape(len(chosen), steps + 1, 2))
 
 
 @compiled_exactly

@@ -22,12 +22,14 @@ CLOSE = 1.02
 class Level(NamedTuple):
     """A roadmap of some circles.
 
-    place: of each in it by its row in the scene; limit: excess from which a path may meet others.
+    place: of each in it by its row in the scene; limit: excess from which a path may meet others; bounded: whether there are only
+    those runs that paths within the limit can take.
     """
 
     roadmap: Roadmap
     place: dict[int, int] | range
     limit: float
+    bounded: bool
 
 
 class Levels:
@@ -42,33 +44,42 @@ class Levels:
         order: list[int] = np.argsort(self._scene.excess, kind='stable').tolist()
         return order
 
-    def first(self, named: list[int]) -> frozenset[int]:
-        """Return the circles to begin with: all of a few, the named ones of many if they are few, or the close ones."""
+    @cached_property
+    def _whole(self) -> Level:
+        scene, n = self._scene, len(self._radius)
+        return Level(roadmap(scene.centre, self._radius, scene.goals), range(n), np.inf, bounded=False)
+
+    def first(self, named: list[int]) -> Level:
+        """Return the level to begin with: all of a few circles, the named ones of many if they are few, or the close ones."""
         if len(self._radius) <= FEW:
-            return frozenset(range(len(self._radius)))
+            return self._whole
         few = frozenset(named).union(self._order[: FEW // 2])
         close = int((self._scene.excess < CLOSE).sum())
-        return few if len(few) <= FEW else frozenset(self._order[: min(max(close, FEW), MOST)])
+        return self._of(few if len(few) <= FEW else frozenset(self._order[: min(max(close, FEW), MOST)]), named)
 
-    def more(self, rows: frozenset[int]) -> frozenset[int]:
-        """Return twice as many circles, the nearest ones."""
-        return frozenset(self._order[: min(2 * len(rows), MOST)])
+    def more(self, level: Level, named: list[int]) -> Level:
+        """Return the level of twice as many circles, the nearest ones."""
+        return self._of(frozenset(self._order[: min(2 * len(level.place), MOST)]), named)
 
-    def __call__(self, rows: frozenset[int], bounded: bool) -> Level:
-        """Return the level of some circles; bounded: with only those runs that paths within its limit can take."""
+    def joined(self, level: Level, met: list[int], named: list[int]) -> Level:
+        """Return the level that holds the circles of another and those that a path met."""
+        return self._of(frozenset(level.place).union(met), named)
+
+    def _of(self, rows: frozenset[int], named: list[int]) -> Level:
+        """Return the level of some circles: within its limit where there may be more, and not all the named ones are there."""
+        if len(rows) == len(self._radius):
+            return self._whole
+        bounded = len(rows) < MOST and not rows.issuperset(named)
         if (rows, bounded) not in self._made:
             self._made[rows, bounded] = self._level(sorted(rows), bounded)
         return self._made[rows, bounded]
 
     def _level(self, rows: list[int], bounded: bool) -> Level:
-        scene = self._scene
-        if len(rows) == len(self._radius):
-            return Level(roadmap(scene.centre, self._radius, scene.goals), range(len(rows)), np.inf)
-        centre, radius = scene.centre[rows], self._radius[rows]
+        scene, centre, radius = self._scene, self._scene.centre[rows], self._radius[rows]
         limit = float(np.delete(scene.excess, rows).min())
         if bounded:
             ellipse = Ellipse(scene.hand, scene.goals, limit * np.abs(scene.goals - scene.hand))
             made = roadmap_within(centre, radius, scene.goals, ellipse)
         else:
             made = roadmap(centre, radius, scene.goals)
-        return Level(made, {row: k for k, row in enumerate(rows)}, limit)
+        return Level(made, {row: k for k, row in enumerate(rows)}, limit, bounded)

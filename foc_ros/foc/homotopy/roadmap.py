@@ -74,7 +74,7 @@ def runs(
 ) -> tuple[Indices, Indices, Matrix, PointTable, Table, Table]:
     """Return the fields of `Runs` among circles; hand, goals, reach: of an `Ellipse`."""
     n = len(bar)
-    forth = free_tangents(c, r, bar, outer, pairs(n, len(c) - n), hand, goals, reach)
+    forth = free_tangents(c, r, bar, outer, pairs(n, len(c) - 1 - n), hand, goals, reach)
     # the same run backwards touches both circles in the other sense
     back = forth[forth[:, 1] < 2 * n][:, ::-1] ^ 1
     both = np.concatenate((forth, back))

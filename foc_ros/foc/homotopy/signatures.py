@@ -44,26 +44,26 @@ def masked(named: Indices, size: int) -> Indices:
 
 
 @compiled_exactly
-def count(signature: Indices, k: int) -> int:
+def count(signatures: Table, one: int, k: int) -> int:
     """Return how often the ray of a circle has been crossed."""
-    digit: int = signature[k // DIGITS] >> 3 * (k % DIGITS) & 7
+    digit: int = signatures[one, k // DIGITS] >> 3 * (k % DIGITS) & 7
     return digit - ZERO
 
 
 @compiled_exactly
-def winds(signature: Indices, named: Indices) -> bool:
+def winds(signatures: Table, one: int, mask: Indices) -> bool:
     """Tell whether a path has crossed the ray of a named circle, of those with digit 7, more than once the same way."""
-    for i in range(len(signature)):
-        above = signature[i] - (ONES & named[i])  # 0, 1, 2 for counts -1, 0, 1
+    for i in range(signatures.shape[1]):
+        above = signatures[one, i] - (ONES & mask[i])  # 0, 1, 2 for counts -1, 0, 1
         if above & FOURS or above & above >> 1 & ONES:
             return True
     return False
 
 
 @compiled_exactly
-def equal(one: Indices, other: Indices) -> bool:
+def equal(signatures: Table, one: int, other: int) -> bool:
     """Tell whether two signatures agree."""
-    for i in range(len(one)):  # noqa: SIM110  machine code has no generators
-        if one[i] != other[i]:
+    for i in range(signatures.shape[1]):  # noqa: SIM110  machine code has no generators
+        if signatures[one, i] != signatures[other, i]:
             return False
     return True

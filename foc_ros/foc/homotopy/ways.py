@@ -46,15 +46,15 @@ def shortest_ways(
     (k,): circles that tell classes apart; turned (n,): from the direction of the hand to that of the goal, as seen from each
     circle [rad]; told: whether these tell all classes apart, else ways that arrive by different runs are all given; bound: on the
     key [m]; states: to look at at most. Those that rank alike with the last are all there; a path that winds about a named circle
-    is no way. The hand is put after the last goal, as a circle of radius 0.
+    is no way.
 
     Returns keys (w,), to the nanometre, by which they rank [m]; sides (w, k) of the named circles; pieces of the ways one after
     the other, as `taut.laid_out` has them, and where those of each end (w,); whether there were too many states to find all.
     """
-    n, last = len(bar), len(centre)
-    c, r, sees = np.append(centre, hand), np.append(radius, 0.0), np.append(outer, True)
-    start = free_tangents(c, r, bar, sees, spokes(n, n + goal, last), hand, np.zeros(1, np.complex128), np.full(1, np.inf))
-    first_spans, first_places, first_crossings = table(c, r, held, blocker, start)
+    n, last, c = len(bar), len(centre) - 1, centre.copy()
+    c[last] = hand
+    start = free_tangents(c, radius, bar, outer, spokes(n, n + goal, last), hand, np.zeros(1, np.complex128), np.full(1, np.inf))
+    first_spans, first_places, first_crossings = table(c, radius, held, blocker, start)
     coasting = COAST_S * (abs(velocity) - (first_places[:, HEADING] * velocity.conjugate()).real)
     known, first = (departures, head, spans, places, crossings, holds), (start[:, 1], first_spans, first_places)
     key, node, end = first_spans[:, LENGTH] + coasting, 2 * (n + goal) + 1, centre[n + goal]
