@@ -24,6 +24,9 @@ PointTable: TypeAlias = NDArray[np.complex128]
 Flags: TypeAlias = NDArray[np.bool_]
 FlagTable: TypeAlias = NDArray[np.bool_]
 """Arguments of kernels: C-contiguous arrays, tables of two axes, a tensor of three, indices of any stride; read-only ones too."""
+Scratch: TypeAlias = NDArray[np.float64]
+Register: TypeAlias = NDArray[np.intp]
+"""Arrays of a kernel's own that it lends to another one to write to."""
 
 _TYPES = {
     'float': types.float64,
@@ -39,6 +42,8 @@ _TYPES = {
     'PointTable': types.Array(types.complex128, 2, 'C', readonly=True),
     'Flags': types.Array(types.boolean, 1, 'C', readonly=True),
     'FlagTable': types.Array(types.boolean, 2, 'C', readonly=True),
+    'Scratch': types.Array(types.float64, 1, 'C'),
+    'Register': types.Array(types.intp, 1, 'C'),
 }
 REORDERED = {'contract', 'reassoc'}
 """Freedom of the compiler: sums in another order, fused products. Not that numbers are finite."""
@@ -47,7 +52,7 @@ Kernel = TypeVar('Kernel', bound=Callable[..., object])
 
 
 def compiled(kernel: Kernel) -> Kernel:
-    """Compile a function for the types that its annotations name; it never changes its arguments and never raises."""
+    """Compile a function for the types that its annotations name; it changes only what it is lent and never raises."""
     return _compiled(kernel, REORDERED)
 
 

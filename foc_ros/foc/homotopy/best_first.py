@@ -8,13 +8,12 @@ signature is the shortest of its class, and classes come out in the order of the
 
 from __future__ import annotations
 
-from heapq import heappop, heappush
-
 import numpy as np
 
 from foc_ros.foc.compiled import Indices, Matrix, PointTable, Table, Vector, compiled_exactly
 
 from .crossing import TURN, side
+from .heap import pop, push
 from .signatures import count, equal, masked, winds
 from .tangents import CLEAR, END, LEAVE, LENGTH, REACH
 
@@ -111,14 +110,15 @@ def shortest(
     key, run, parent, earlier = np.empty(room), np.empty(room, np.intp), np.full(room, -1), np.empty(room, np.intp)
     signatures, latest = np.empty((room, words), np.intp), np.full(len(head) + met + 1, -1)
     found, passed = np.empty(most, np.intp), np.empty((most, len(named)), np.intp)
-    heap = [(0.0, 0) for _ in range(0)]
+    least, heap, size = np.empty(room), np.empty(room, np.intp), met
     for i in range(met):
         key[i], run[i] = first_key[i], -1 - i
         for word in range(words):
             signatures[i, word] = first_crossings[i, word] & mask[word]
-        heappush(heap, (key[i] + abs(first_places[i, END] - goal), i))
-    while heap and looked_at < states and (ways < most or heap[0][0] < key[found[ways - 1]] + TIE):
-        here = heappop(heap)[1]
+        push(least, heap, i, key[i] + abs(first_places[i, END] - goal), i)
+    while size and looked_at < states and (ways < most or least[0] < key[found[ways - 1]] + TIE):
+        here = pop(least, heap, size)
+        size -= 1
         arrival, start = run[here], -1 - run[here]
         at = head[arrival] if arrival >= 0 else first_head[start]
         state = len(head) if told and at == node else arrival
@@ -141,13 +141,14 @@ def shortest(
                 continue
             angle = arc(spans[following, LEAVE], span[REACH], sense)
             onward = key[here] + radius[circle] * angle + spans[following, LENGTH]
-            least = onward + abs(places[following, END] - goal)
-            if angle > span[CLEAR] or least >= bound:
+            whole = onward + abs(places[following, END] - goal)
+            if angle > span[CLEAR] or whole >= bound:
                 continue
             if met == room:
                 room *= 2
                 key, run, parent = np.append(key, key), np.append(run, run), np.append(parent, parent)
                 earlier, signatures = np.append(earlier, earlier), np.concatenate((signatures, signatures))
+                least, heap = np.append(least, least), np.append(heap, heap)
             turns = sense if sense * (spans[following, LEAVE] - span[REACH]) < -BACK else 0
             for i in range(words):
                 onto = (crossings[following, i] & mask[i]) - (crossed[words + i] & mask[i])
@@ -155,7 +156,7 @@ def shortest(
             state = len(head) if told and head[following] == node else following
             if not winds(signatures, met, mask) and not seen(signatures, met, latest[state], earlier):
                 key[met], run[met], parent[met] = onward, following, here
-                heappush(heap, (least, met))
-                met += 1
+                push(least, heap, size, whole, met)
+                met, size = met + 1, size + 1
     trails, ends = traced(found[:ways], run, parent)
-    return key[found[:ways]], passed[:ways], trails, ends, ways < most and len(heap) > 0
+    return key[found[:ways]], passed[:ways], trails, ends, ways < most and size > 0

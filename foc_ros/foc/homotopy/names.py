@@ -31,10 +31,11 @@ def names_of(ids: tuple[str, ...]) -> Names:
 
 def passed_before(names: Names, previous: Sequence[Candidate]) -> tuple[Indices, Table]:
     """Return goals (p,) and sides (p, n) of earlier candidates, 0 where their names do not hold a circle."""
-    table, row = np.zeros((len(previous), len(names.ids)), dtype=np.intp), names.row
-    cells = table.data  # numpy itself takes twice as long to set single numbers
+    n, row = len(names.ids), names.row
+    table = np.zeros((len(previous), n), dtype=np.intp)
+    cells = table.reshape(-1).data  # numpy itself takes twice as long to set single numbers
     for one, candidate in enumerate(previous):
         for identity, side in candidate.sides:
             if identity in row:
-                cells[one, row[identity]] = side
+                cells[one * n + row[identity]] = side
     return np.array([candidate.goal for candidate in previous], dtype=np.intp), table
