@@ -139,3 +139,12 @@ def test_what_the_pipeline_refuses_is_told_too(intake: Intake) -> None:
     assert move(intake, 1.1, 'camera') is Verdict.WRONG_FRAME
     assert intake.counts == {'hand_duplicate': 1, 'hand_wrong_frame': 1}
     assert intake.last_refusal == intake.pipeline.last_refusal and 'camera' in intake.last_refusal
+
+
+def test_a_restart_is_no_refusal_and_leaves_the_last_one_told(intake: Intake) -> None:
+    move(intake, 1.0)
+    move(intake, 1.1, 'camera')
+    assert intake.take('goals', pose_array(TYPES, [(float('nan'), 0.0, 0.0)])) is None
+    told = intake.last_refusal
+    assert move(intake, 60.0) is Verdict.RESTARTED_GAP
+    assert intake.last_refusal == told and 'poses[0]' in told

@@ -1,0 +1,62 @@
+"""Records hold their arrays read-only, as their own copies unless these were made for them."""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import pytest
+
+from foc_ros.foc.config import Config
+from foc_ros.foc.memory import Memory
+from foc_ros.foc.predictor import predict
+from foc_ros.foc.records import Array, HandState, Prediction, Record, Solution, fixed, make_obstacles
+
+
+@dataclass(frozen=True, eq=False)
+class Kept(Record):
+    """A record of one array."""
+
+    array: Array
+
+
+@pytest.fixture(scope='module')
+def prediction() -> Prediction:
+    """Predict a reach past one obstacle."""
+    hand = HandState(0, np.zeros(6), 1e-6 * np.eye(6))
+    return predict(Config(), hand, make_obstacles([[0.15, 0.0]], 0.02, 0.001), np.array([[0.3, 0.0]]), Memory())[0]
+
+
+def test_what_is_written_to_an_array_later_does_not_reach_the_record() -> None:
+    array = np.zeros(3)
+    kept = Kept(array)
+    array[0] = 1.0
+    assert kept.array[0] == 0.0
+    with pytest.raises(ValueError, match='read-only'):
+        kept.array[0] = 1.0
+
+
+def test_an_array_that_was_made_for_a_record_is_taken_as_it_is() -> None:
+    array = fixed(np.zeros(3))
+    assert Kept(array).array is array
+    with pytest.raises(ValueError, match='read-only'):
+        array[0] = 1.0
+
+
+def test_a_view_across_rows_becomes_contiguous() -> None:
+    kept = Kept(fixed(np.arange(6.0).reshape(3, 2))[:, 0])
+    assert kept.array.flags.c_contiguous and kept.array.tolist() == [0.0, 2.0, 4.0]
+
+
+def test_a_solution_with_another_covariance_is_otherwise_the_same(prediction: Prediction) -> None:
+    solution = prediction.outcomes[0].solution
+    covariance = 2.0 * solution.covariance
+    found, expected = solution.with_covariance(covariance.copy()), replace(solution, covariance=covariance)
+    assert vars(found).keys() == vars(expected).keys() == {field.name for field in fields(Solution)}
+    for name, value in vars(expected).items():
+        np.testing.assert_array_equal(vars(found)[name], value)
+
+
+def test_no_array_of_a_prediction_can_be_written_to(prediction: Prediction) -> None:
+    for outcome in prediction.outcomes:
+        for record in (outcome.solution, outcome.candidate):
+            arrays = [value for value in vars(record).values() if isinstance(value, np.ndarray)]
+            assert arrays and not any(array.flags.writeable for array in arrays)
