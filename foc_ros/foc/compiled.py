@@ -1,13 +1,15 @@
 """Kernels in machine code: plain functions on arrays, compiled by numba where they are defined.
 
 The first import on a machine compiles them, which takes some seconds; numba keeps the result beside the source, or in the user's
-cache directory where that cannot be written. Numba looks only at the file of a kernel, not at those it calls: after a change in
-`dense.py`, `make clean` clears what is kept.
+cache directory where that cannot be written. Numba looks only at the file of a kernel, not at those that it calls, so what is
+older than any of them is removed from beside the sources here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
 from typing import TypeAlias, TypeVar, cast
 
 import numpy as np
@@ -45,8 +47,24 @@ _TYPES = {
     'Scratch': types.Array(types.float64, 1, 'C'),
     'Register': types.Array(types.intp, 1, 'C'),
 }
+KEPT = '*.nb[ic]'
+"""Numba's files of machine code, named source.kernel-line.python.nbi and .nbc."""
 REORDERED = {'contract', 'reassoc'}
 """Freedom of the compiler: sums in another order, fused products. Not that numbers are finite."""
+
+
+def forget_outdated(folder: Path) -> None:
+    """Remove kept machine code that is older than the source of any kernel in a folder and those below."""
+    kept = list(folder.glob(f'**/__pycache__/{KEPT}'))
+    sources = {each.parent.parent / f'{each.name.partition(".")[0]}.py' for each in kept}
+    changed = max((each.stat().st_mtime for each in sources if each.exists()), default=0.0)
+    for each in kept:
+        with suppress(OSError):  # another process was faster, or it is not ours to remove
+            if each.stat().st_mtime < changed:
+                each.unlink()
+
+
+forget_outdated(Path(__file__).parent)
 
 Kernel = TypeVar('Kernel', bound=Callable[..., object])
 

@@ -30,7 +30,7 @@ from .start import Start
 
 SETTLED = 1e-6
 """Largest move of the mean, relative to the way, at which the sequence has settled."""
-ROUGHLY = 1e-2
+ROUGHLY = 5e-2
 """The same for the rows that leave the growth of Var out."""
 MAX_QPS = 30
 """Of one search for a minimum with the rows that leave the growth of Var out."""

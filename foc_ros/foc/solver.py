@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .backend import DenseQP, solve_named, solve_piqp
-from .compiled import Matrix, Vector, compiled
+from .compiled import Indices, Matrix, Vector, compiled
 from .dense import cholesky, lower_solved, upper_solved, values
 from .qp import Cost, ReachingQP, compliance
 from .records import Array
@@ -59,8 +59,7 @@ class WorkingSet:
 
     def joined(self, obstacle: Index, step: Index, steps: int) -> WorkingSet:
         """Return the set with more rows, each once, in order."""
-        flat = np.unique(np.concatenate((self.obstacle * steps + self.step, obstacle * steps + step)))
-        return WorkingSet(*np.divmod(flat, steps))
+        return WorkingSet(*united(self.obstacle, self.step, obstacle, step, steps))
 
     def within(self, steps: int) -> WorkingSet:
         """Return the rows at the first so many steps."""
@@ -69,6 +68,13 @@ class WorkingSet:
     def only(self, keep: NDArray[np.bool_]) -> WorkingSet:
         """Return the set of the rows to keep (k,)."""
         return WorkingSet(self.obstacle[keep], self.step[keep])
+
+
+@compiled
+def united(obstacle: Indices, step: Indices, other_obstacle: Indices, other_step: Indices, steps: int) -> tuple[Indices, Indices]:
+    """Return the rows of two sets, each once, in order of obstacle and step (0..steps - 1)."""
+    flat = np.unique(np.concatenate((obstacle * steps + step, other_obstacle * steps + other_step)))
+    return flat // steps, flat % steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +132,7 @@ def with_rows(
     pressed, gram, scaled, scale, stuck = range_space(rows, inverse, factor, limits, cost.goal_control, softness)
     if stuck > TOLERANCE and not elastic:
         return Verdict.CONTRADICTION
-    answer = solve_piqp(DenseQP(gram, -scaled, lower=np.zeros(len(rows))))
+    answer = solve_piqp(DenseQP(gram.T, -scaled, lower=np.zeros(len(rows))))
     if not answer.solved:
         # Farkas: a combination y >= 0 of the rows that moves nothing and yet is missing something
         ray = answer.x / max(float(answer.x.max()), 1e-300)
@@ -135,8 +141,7 @@ def with_rows(
     largest = max(float(multipliers.max()), 1.0)
     if short > RESIDUAL * (largest if elastic else 1.0) or slack > RESIDUAL * largest**2:
         return Verdict.UNSOLVED
-    multipliers *= scale
-    return cost.goal_control + multipliers @ pressed, multipliers
+    return pushed(multipliers, scale, pressed, cost.goal_control)
 
 
 @compiled
@@ -202,6 +207,16 @@ def sharpened(gram: Matrix, missing: Vector, answer: Vector) -> tuple[Vector, fl
             left += gram[i, j] * multipliers[j]
         short, slack = max(short, -left), max(slack, abs(left * multipliers[i]))
     return multipliers, short, slack
+
+
+@compiled
+def pushed(multipliers: Vector, scale: Vector, pressed: Matrix, goal_control: Vector) -> tuple[Vector, Vector]:
+    """Return the control (2N,) that multipliers (k,) in their units (k,) make of the goal's, and them without units."""
+    control, plain = goal_control.copy(), multipliers * scale
+    for i in range(len(plain)):
+        for u in range(len(control)):
+            control[u] += plain[i] * pressed[i, u]
+    return control, plain
 
 
 def solve_full(qp: ReachingQP, backend: str = 'piqp') -> QPSolution | None:
