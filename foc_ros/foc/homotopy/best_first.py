@@ -14,14 +14,14 @@ from foc_ros.foc.compiled import Indices, Matrix, PointTable, Table, Vector, com
 
 from .crossing import TURN, side
 from .heap import pop, push
-from .signatures import count, equal, masked, winds
+from .signatures import DIGITS, among, count, equal, masked, winds
 from .tangents import CLEAR, END, LEAVE, LENGTH, REACH
 
 BACK = 1e-9
 """An arc may turn back this much [rad]: runs of neighbours that share a tangent follow each other without one."""
 TIE = 2e-9
 """Keys that differ by less may have the same nanometre [m]."""
-ROOM = 256
+ROOM = 1024
 """Entries for which there is room at first."""
 
 
@@ -43,11 +43,22 @@ def seen(signatures: Table, one: int, latest: int, earlier: Indices) -> bool:
 
 
 @compiled_exactly
-def sides(signatures: Table, one: int, named: Indices, turned: Vector) -> Indices:
-    """Return on which side a path that ends with a signature passes each named circle, 0 where it winds about it."""
-    passed = np.empty(len(named), np.intp)
-    for i in range(len(named)):
-        passed[i] = side(turned[named[i]] + TURN * count(signatures, one, named[i]))
+def winding(named: Indices, turned: Vector, crossings: int, size: int) -> Indices:
+    """Return so many words with a digit 1 for the named circles about which a path winds that crosses their rays so often."""
+    digits = np.zeros(size, np.intp)
+    for k in named:
+        if not side(turned[k] + TURN * crossings):
+            digits[k // DIGITS] |= 1 << 3 * (k % DIGITS)
+    return digits
+
+
+@compiled_exactly
+def sides(entries: Indices, signatures: Table, named: Indices, turned: Vector) -> Table:
+    """Return on which side paths (w,) that end with some signatures pass each named circle, (w, k)."""
+    passed = np.empty((len(entries), len(named)), np.intp)
+    for way in range(len(entries)):
+        for i in range(len(named)):
+            passed[way, i] = side(turned[named[i]] + TURN * count(signatures, entries[way], named[i]))
     return passed
 
 
@@ -107,12 +118,12 @@ def shortest(
     """
     words, mask = holds.shape[1], masked(named, holds.shape[1])
     room, met, looked_at, ways = len(first_key) + ROOM, len(first_key), 0, 0
-    key, run, parent, earlier = np.empty(room), np.empty(room, np.intp), np.full(room, -1), np.empty(room, np.intp)
+    key, run, parent, earlier = np.empty(room), np.empty(room, np.intp), np.empty(room, np.intp), np.empty(room, np.intp)
     signatures, latest = np.empty((room, words), np.intp), np.full(len(head) + met + 1, -1)
-    found, passed = np.empty(most, np.intp), np.empty((most, len(named)), np.intp)
+    found, more, less = np.empty(most, np.intp), winding(named, turned, 1, words), winding(named, turned, -1, words)
     least, heap, size = np.empty(room), np.empty(room, np.intp), met
     for i in range(met):
-        key[i], run[i] = first_key[i], -1 - i
+        key[i], run[i], parent[i] = first_key[i], -1 - i, -1
         for word in range(words):
             signatures[i, word] = first_crossings[i, word] & mask[word]
         push(least, heap, i, key[i] + abs(first_places[i, END] - goal), i)
@@ -127,10 +138,8 @@ def shortest(
         earlier[here], latest[state] = latest[state], here
         looked_at += 1
         if at == node:
-            if ways == len(found):
-                found, passed = np.append(found, found), np.concatenate((passed, passed))
-            passed[ways] = sides(signatures, here, named, turned)
-            if passed[ways].all():
+            if not among(signatures, here, more, less):
+                found = np.append(found, found) if ways == len(found) else found
                 found[ways] = here
                 ways += 1
             continue
@@ -158,5 +167,6 @@ def shortest(
                 key[met], run[met], parent[met] = onward, following, here
                 push(least, heap, size, whole, met)
                 met, size = met + 1, size + 1
-    trails, ends = traced(found[:ways], run, parent)
-    return key[found[:ways]], passed[:ways], trails, ends, ways < most and size > 0
+    found = found[:ways]
+    trails, ends = traced(found, run, parent)
+    return key[found], sides(found, signatures, named, turned), trails, ends, ways < most and size > 0

@@ -8,7 +8,9 @@ from foc_ros.foc.compiled import Indices, Register, Scratch, Vector, compiled_ex
 @compiled_exactly
 def before(key: Vector, entry: Indices, one: int, other: int) -> bool:
     """Tell which of two places of a heap comes first."""
-    return bool(key[one] < key[other] or (key[one] == key[other] and entry[one] < entry[other]))
+    # without branches, which a processor would guess wrongly half of the time
+    first: bool = (key[one] < key[other]) | ((key[one] == key[other]) & (entry[one] < entry[other]))
+    return first
 
 
 @compiled_exactly
@@ -26,8 +28,8 @@ def pop(key: Scratch, entry: Register, size: int) -> int:
     """Take the first entry from a heap of some size > 0."""
     first, last, at, below = entry[0], size - 1, 0, 1
     while below < last:
-        if below + 1 < last and before(key, entry, below + 1, below):
-            below += 1
+        if below + 1 < last:
+            below += before(key, entry, below + 1, below)
         if before(key, entry, last, below):
             break
         key[at], entry[at] = key[below], entry[below]

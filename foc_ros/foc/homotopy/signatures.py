@@ -61,6 +61,16 @@ def winds(signatures: Table, one: int, mask: Indices) -> bool:
 
 
 @compiled_exactly
+def among(signatures: Table, one: int, more: Indices, less: Indices) -> bool:
+    """Tell whether a count is 1 where `more` has a digit 1, or -1 where `less` has one; all counts are within -1..1."""
+    for i in range(signatures.shape[1]):
+        odd, above = signatures[one, i], signatures[one, i] >> 1
+        if odd & (above & more[i] | ~above & less[i]):
+            return True
+    return False
+
+
+@compiled_exactly
 def equal(signatures: Table, one: int, other: int) -> bool:
     """Tell whether two signatures agree."""
     for i in range(signatures.shape[1]):  # noqa: SIM110  machine code has no generators
