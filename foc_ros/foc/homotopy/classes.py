@@ -59,10 +59,13 @@ class Quest(NamedTuple):
 
 
 class Classes:
-    """The classes to one goal, in the order of their rank; notes: counts by name, to which is added what was decided."""
+    """The classes to one goal, in the order of their rank; notes: counts by name, to which is added what was decided.
+
+    none: whether none has been found so far.
+    """
 
     def __init__(self, quest: Quest, levels: Levels, goal: int, notes: dict[str, int]) -> None:
-        self._quest, self._levels, self._goal, self._notes = quest, levels, goal, notes
+        self._quest, self._levels, self._goal, self._notes, self.none = quest, levels, goal, notes, True
         named, names = quest.scene.named[goal].tolist(), quest.names
         self._named = [row for row in names.order if named[row]]
         self._ids, self._prefix = tuple([names.ids[row] for row in self._named]), f'goal{goal}:'
@@ -70,15 +73,9 @@ class Classes:
 
     def __iter__(self) -> Iterator[Found]:
         """Yield each class once, by its shortest path."""
-        found = None
-        for found in self._distinct():
-            yield found
-        self._notes['no_way'] += found is None
-
-    def _distinct(self) -> Iterator[Found]:
         scene, levels, named = self._quest.scene, self._levels, self._named
-        straight = abs(scene.goals[self._goal] - scene.hand)
         given: set[str] = set()
+        straight = abs(scene.goals[self._goal] - scene.hand)
         level = levels.first(named)
         while True:
             places = [level.place[row] for row in named if row in level.place]
@@ -95,6 +92,7 @@ class Classes:
                 if met:
                     self._notes['left_out'] += 1
                 else:
+                    self.none = False
                     yield found
                 if len(given) == everyone:
                     return
@@ -114,22 +112,18 @@ class Classes:
         given, most = 0, min(usual, everyone)
         while True:
             keys, sides, pieces, stops, cut = shortest_ways(*circles, *runs, *ends, named, turned, told, bound, states, most)
-            begins = [0, *stops.tolist()]
-            laid = [pieces[begin:end] for begin, end in pairwise(begins)]
-            passed = (
-                sides.tolist()
-                if told
-                else [self._completed(one, level, way) for one, way in zip(sides.tolist(), laid, strict=True)]
-            )
-            yield from sorted(map(self._found, keys.tolist(), passed, laid))[given:]
+            laid = [pieces[begin:end] for begin, end in pairwise([0, *stops.tolist()])][given:]
+            passed, found = sides[given:].tolist(), []
+            if not told:
+                passed = [self._completed(one, level, way) for one, way in zip(passed, laid, strict=True)]
+            for key, one, way in zip(keys[given:].tolist(), passed, laid, strict=True):
+                course = ''.join(map(getitem, self._parts, one))
+                found.append(Found(key, self._prefix + course, self._goal, course, self._ids, one, way))
+            yield from sorted(found)
             if len(keys) < most:
                 self._notes['search_cut'] += cut
                 return
             given, most = len(keys), 2 * most
-
-    def _found(self, key: float, sides: list[int], pieces: Matrix) -> Found:
-        course = ''.join(map(getitem, self._parts, sides))
-        return Found(key, self._prefix + course, self._goal, course, self._ids, sides, pieces)
 
     def _completed(self, told: list[int], level: Level, pieces: Matrix) -> list[int]:
         """Return sides of all named circles: of those that a level does not hold, by the angle that the path sweeps."""

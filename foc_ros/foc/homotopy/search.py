@@ -74,7 +74,7 @@ def search(
     classes = [Classes(quest, levels[sizes[goal]], goal, notes) for goal in reachable]
     chosen = select(classes, count, {candidate.label for candidate in previous})
     notes |= {'hand_inside': int(np.count_nonzero(view.held)), 'goal_inside': len(goals) - len(reachable)}
-    notes['goal_near'] = view.close
+    notes['goal_near'], notes['no_way'] = view.close, sum(to_goal.none for to_goal in classes)
     candidates = tuple(
         Candidate(one.label, one.goal, tuple(zip(one.ids, one.sides, strict=True)), path, float(one.pieces[-1, AT]))
         for one, path in zip(chosen, guesses(view, velocity, chosen, duration_s, steps), strict=True)

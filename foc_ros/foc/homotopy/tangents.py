@@ -49,8 +49,11 @@ def signed(radius: Vector, node: int) -> float:
 @compiled_exactly
 def within(hand: complex, goals: Points, reach: Vector, start: complex, end: complex, length: float) -> bool:
     """Tell whether the way from the hand over a run to some goal is shorter than the goal's reach (g,)."""
-    spare = (reach - np.abs(end - goals)).max()
-    return bool(abs(start - hand) + length < spare)
+    before = abs(start - hand) + length
+    for goal in range(len(goals)):  # noqa: SIM110  machine code has no generators
+        if before < reach[goal] - abs(end - goals[goal]):
+            return True
+    return False
 
 
 @compiled_exactly
