@@ -1,9 +1,7 @@
 """Strategies `lv` and `hc`: the smallest s on a curve of clearance and precision that meets the surrogate.
 
-tau = delta s, lambda = lambda0 growth^s. The paper steps along this curve in whole s (algorithm 1); here s is continuous, so that
-the effort follows eta as cost ratios need. For that the clearance is kept between the steps too: a contact with a circle then
-slides on along it as the hand slows down, where rows at the steps would make it jump from one pair of steps to the next. A small
-delta slows down (`lv`), a large one goes wide (`hc`).
+tau = delta s, lambda = lambda0 growth^s: a small delta slows down (`lv`), a large one goes wide (`hc`). The paper steps along it in
+whole s (algorithm 1); here s is continuous, so that the effort follows eta as cost ratios need.
 """
 
 from __future__ import annotations
@@ -15,33 +13,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from .chance import eta_of_k, k_of_eta
-from .contacts import Contacts
+from .curve import STRIDE, Curve, Point, Walker
 from .deadline import NEVER, Deadline, OutOfTimeError
 from .homotopy import swept_angles
-from .least_k import Least, smallest
-from .newton import goes, joined, leapt, stays, way_of
+from .newton import joined
 from .problem import Problem
-from .qp import NO_TIMES, effort_cost
-from .records import Array, Status
-from .sequential import MAX_QPS, Converged, Jump, converge
-from .settled import Settled, settled
-from .solver import WorkingSet
+from .records import Status
 from .start import Start, led
 
-STRIDE = 4.0
-"""First look along the curve, in s: lambda grows by 16 from one to the next."""
 WARM_STRIDE = 0.5
 """The longest first look around the s of a warm start."""
 SHORTEST = 2.0**-10
-"""The shortest one, and the stride at which an end that is infeasible counts as reached."""
+"""The stride of a look around at which an end that is infeasible counts as reached."""
 USUAL_SLOPE = 0.3
 """What k usually gains per unit of s: a first look goes as far as this says where an earlier solution does not know better."""
 TINY = 1e-6
-"""The shortest stride of a look around that follows the slope."""
-SPAN = 60.0
-"""The largest s in any case: without noise, say, when lambda weighs nothing."""
-LARGEST_SHARE = 1e6
-"""Where the walk ends: a variance weight so many times the effort is all that counts, and k has stopped growing."""
+"""The shortest stride of a look around, which goes to where the slope of k leads."""
 PATIENCE = 2
 """Strides in a row, no shorter than `WARM_STRIDE`, without a larger k after which a look around gives up: k may fall for a
 while. A walk from the beginning of the curve goes to its end, over every dip."""
@@ -52,53 +39,6 @@ CELL = 1.0
 NARROW = 1e-4
 """Bracket in s at which the root is as good as found: k jumps there, because the mean slips into another minimum."""
 MAX_TRIALS = 60
-LEAPS = 8
-"""How often more times are added for a mean that leaps over circles between the steps."""
-FURTHER_QPS = 16
-"""Linearisations after which no point is found by QPs along the curve; at its beginning there may be more."""
-
-
-@dataclass(frozen=True)
-class Curve:
-    """tau = delta s [m^2], lambda = first_lambda growth^s."""
-
-    delta: float
-    growth: float
-    first_lambda: float
-
-    def at(self, s: float) -> tuple[float, float]:
-        """Return (tau, lambda) at s >= 0."""
-        return self.delta * s, self.first_lambda * self.growth**s
-
-    def s_of(self, lam: float) -> float:
-        """Return the s of a lambda on the curve."""
-        return max(0.0, math.log(lam / self.first_lambda) / math.log(self.growth)) if lam > self.first_lambda > 0 else 0.0
-
-    def end(self, problem: Problem) -> float:
-        """Return the largest s worth trying."""
-        variance = float(problem.summed_variance.max())
-        if not self.first_lambda * variance > 0:
-            return SPAN
-        return min(max(STRIDE, math.log(LARGEST_SHARE / (self.first_lambda * variance)) / math.log(self.growth)), SPAN)
-
-
-@dataclass(frozen=True, eq=False)
-class Point:
-    """One converged solution on the curve: control (2N,), the contacts that hold it, the smallest k with its place.
-
-    least: as of `least_k.smallest`; rough: held by the rows of QPs, and so perhaps slightly inside a circle between two of them.
-    """
-
-    s: float
-    control: Array
-    contacts: Contacts
-    least: Least
-    rough: bool = False
-
-    @property
-    def k(self) -> float:
-        """The k that it achieves."""
-        return self.least[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,105 +52,13 @@ class Walk:
     slope: float = 0.0
 
 
-class _Walker:
-    """Evaluates points, each from a neighbour's solution, and counts."""
-
-    def __init__(self, problem: Problem, curve: Curve, deadline: Deadline, *, follows: bool) -> None:
-        self.problem, self.curve, self.end, self.deadline = problem, curve, curve.end(problem), deadline
-        self.follows = follows
-        self.qp_solves = 0
-        self.best: Point | None = None
-
-    def beginning(self, guess: Array, way: Array | None = None) -> Point | None:
-        """Converge at the beginning of the curve, from a guess (N, 2)."""
-        return self.point(0.0, guess, WorkingSet(), way, thorough=True)
-
-    def point(self, s: float, guess: Array, working: WorkingSet, way: Array | None, *, thorough: bool) -> Point | None:
-        """Converge at s from a guess (N, 2): by QPs, until sliding contacts find it from there; else where the QPs settle.
-
-        way: the class that it has to be in, any if it is None; thorough: spare no effort.
-        """
-        tau, lam = self.curve.at(s)
-
-        def jump(control: Array, contacts: Contacts) -> Settled | None:
-            return settled(self.problem, control, joined(self.problem, contacts), tau, lam, way)
-
-        found = self.sequence(guess, working, tau, lam, jump, thorough=thorough)
-        if found is None or not found.stays:
-            return None
-        if found.jumped is not None:
-            return self.reached(s, found.jumped)
-        if way is not None and not goes(self.problem, found.control, way):
-            return None
-        return self.reached(s, Settled(found.control, found.contacts, smallest(self.problem, found.control)), rough=True)
-
-    def sequence(
-        self, guess: Array, working: WorkingSet, tau: float, lam: float, jump: Jump, *, thorough: bool
-    ) -> Converged | None:
-        """Converge by QPs with rows at the steps, and at more times where the mean would leap over a circle between them."""
-        most = MAX_QPS if thorough else FURTHER_QPS
-        between = NO_TIMES
-        for _ in range(LEAPS):
-            found = converge(
-                self.problem,
-                guess,
-                working,
-                tau,
-                lam,
-                self.deadline,
-                verified=False,
-                between=between,
-                most=most,
-                thorough=thorough,
-                jump=jump,
-            )
-            if found is None:
-                return None
-            self.qp_solves += found.qp_solves
-            leaps = NO_TIMES if found.jumped is not None else leapt(self.problem, found.control, tau)
-            if not len(leaps):
-                return found
-            most -= found.linearisations
-            if most < 1:
-                return None
-            between, working = np.union1d(between, leaps), found.active.within(self.problem.horizon.steps)
-        return None
-
-    def beside(self, s: float, neighbour: Point) -> Point | None:
-        """Converge at s from a neighbour, in its class: by Newton steps; by QPs where these fail, unless it only follows."""
-        self.deadline.check()
-        contacts = joined(self.problem, neighbour.contacts) if neighbour.rough else neighbour.contacts
-        point = self.followed(s, neighbour.control, contacts)
-        if point is not None or self.follows:
-            return point
-        guess, (working, _) = self.problem.positions(neighbour.control), contacts.rows(self.problem.horizon.steps)
-        return self.point(s, guess, working, way_of(self.problem, neighbour.control), thorough=False)
-
-    def followed(self, s: float, control: Array, contacts: Contacts, way: Array | None = None) -> Point | None:
-        """Converge at s from a control (2N,) by Newton steps, in its class or that of a way."""
-        found = settled(self.problem, control, contacts, *self.curve.at(s), way)
-        return None if found is None else self.reached(s, found)
-
-    def reached(self, s: float, found: Settled, *, rough: bool = False) -> Point:
-        """Return the point, and remember it if its k is the largest so far."""
-        point = Point(s, found.control, found.contacts, found.least, rough)
-        self.best = point if self.best is None or point.k > self.best.k else self.best
-        return point
-
-    def verified(self, point: Point) -> bool:
-        """Whether the QP linearised at a point has the same solution."""
-        self.qp_solves += 1
-        tau, lam = self.curve.at(point.s)
-        return stays(self.problem, effort_cost(self.problem, lam), point.control, point.contacts, tau)
-
-
 def walk(problem: Problem, start: Start, curve: Curve, deadline: Deadline = NEVER) -> Walk:
     """Find the smallest s whose converged solution meets the surrogate.
 
     A warm start follows what was found before: it looks around the s it had, and where there is nothing, from the beginning of
     the curve on. It goes by Newton steps alone, and ends where they do.
     """
-    walker = _Walker(problem, curve, deadline, follows=start.lam is not None)
+    walker = Walker(problem, curve, deadline, follows=start.lam is not None)
     try:
         return _walk(walker, start)
     except OutOfTimeError:
@@ -218,7 +66,7 @@ def walk(problem: Problem, start: Start, curve: Curve, deadline: Deadline = NEVE
         return Walk(Status.DEADLINE, f'out of time, with {reached} found', walker.best, walker.qp_solves)
 
 
-def _walk(walker: _Walker, start: Start) -> Walk:
+def _walk(walker: Walker, start: Start) -> Walk:
     problem, curve, wanted = walker.problem, walker.curve, k_of_eta(walker.problem.eta)
     stride, patience = STRIDE, math.inf
     if start.control is None or start.lam is None:
@@ -243,7 +91,7 @@ def _walk(walker: _Walker, start: Start) -> Walk:
     return Walk(Status.SOLVED, 'solved', point, walker.qp_solves, slope)
 
 
-def _bracket(walker: _Walker, first: Point, wanted: float, stride: float, patience: float) -> tuple[Point, Point | None]:
+def _bracket(walker: Walker, first: Point, wanted: float, stride: float, patience: float) -> tuple[Point, Point | None]:
     """Return the last point below the wanted k and the first at or above it; or else any point, and one after it that is close.
 
     Both the same where the first is close enough, or the curve's beginning is enough; no upper one where the wanted k is out of
@@ -272,7 +120,7 @@ def _bracket(walker: _Walker, first: Point, wanted: float, stride: float, patien
     return best, None
 
 
-def _strides(walker: _Walker, first: Point, wanted: float, stride: float) -> Iterator[Point]:
+def _strides(walker: Walker, first: Point, wanted: float, stride: float) -> Iterator[Point]:
     """Yield points further and further along the curve, or back for a negative stride; towards an infeasible end in quarters.
 
     Warm ones go by the slope of k. Cold ones go the same way whatever k is wanted, so that more eta never comes out cheaper.
@@ -314,7 +162,7 @@ def _is_close(point: Point, wanted: float) -> bool:
     return wanted <= point.k <= wanted * (1 + CLOSE)
 
 
-def _root(walker: _Walker, low: Point, high: Point, wanted: float, *, guided: bool) -> tuple[Point, float]:
+def _root(walker: Walker, low: Point, high: Point, wanted: float, *, guided: bool) -> tuple[Point, float]:
     """Find k(s) = wanted between a point below and one at or above, by Illinois steps; returns one at or above, and dk/ds.
 
     Comes from below only: of several solutions at the same s, those that are met first as s grows. A wide bracket is halved

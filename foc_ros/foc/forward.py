@@ -13,7 +13,8 @@ from .algorithm1 import algorithm1
 from .assess import Assessment, assess
 from .config import FocConfig
 from .contacts import Contacts
-from .continuous import Curve, walk
+from .continuous import walk
+from .curve import Curve
 from .deadline import NEVER, Deadline, OutOfTimeError
 from .driven import driven
 from .least_k import Least, assess_between
