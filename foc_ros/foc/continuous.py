@@ -1,7 +1,7 @@
 """Strategies `lv` and `hc`: the smallest s on a curve of clearance and precision that meets the surrogate.
 
-tau = delta s, lambda = lambda0 growth^s: a small delta slows down (`lv`), a large one goes wide (`hc`). The paper steps along it in
-whole s (algorithm 1); here s is continuous, so that the effort follows eta as cost ratios need.
+tau = delta s, lambda = lambda0 growth^s: a small delta slows down (`lv`), a large one goes wide (`hc`). The paper steps along it
+in whole s (algorithm 1); here s is continuous, so that the effort follows eta as cost ratios need.
 """
 
 from __future__ import annotations

@@ -84,5 +84,5 @@ def stays(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau:
     answer = with_rows(cost, rows, limits)
     if isinstance(answer, Verdict):
         return False
-    move = driven(problem.horizon.maps[:2], answer[0] - control)
+    move = driven(problem.horizon.maps[:2], answer - control)
     return float(np.abs(move).max()) < STAYS * problem.extent

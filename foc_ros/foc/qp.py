@@ -110,12 +110,10 @@ class ReachingQP:
         """Left-hand side of every obstacle row, (m, N + e)."""
         return row_values(self.responses, self.further, self.weights, self.coefficients, control)
 
-    def violated(
-        self, control: Array, obstacle: NDArray[np.intp], step: NDArray[np.intp], tolerance: float
-    ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Return the worst row of every stretch of steps at which a control (2N,) violates a circle's; known ones are met."""
-        kinds = self.responses, self.further, self.weights, self.coefficients
-        return violated(*kinds, self.limits, control, obstacle, step, tolerance)
+    @property
+    def terms(self) -> tuple[Array, Array, Array, Array, Array]:
+        """What kernels ask about the obstacle rows."""
+        return self.responses, self.further, self.weights, self.coefficients, self.limits
 
     def rows(self, obstacle: NDArray[np.intp], step: NDArray[np.intp]) -> Array:
         """Return obstacle rows (k, 2N) for k pairs of obstacle and step index."""
@@ -168,7 +166,7 @@ def violated(
     known_step: Indices,
     tolerance: float,
 ) -> tuple[Indices, Indices]:
-    """Return the peaks of what the rows miss at a control (2N,)."""
+    """Return the worst row of every stretch of steps at which a control (2N,) violates a circle's; known ones (k,) are met."""
     return peaks(limits - row_values(responses, further, weights, coefficients, control), known_obstacle, known_step, tolerance)
 
 

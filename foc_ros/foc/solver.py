@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .backend import DenseQP, solve_named, solve_piqp
-from .compiled import Indices, Matrix, Vector, compiled
-from .dense import cholesky, lower_solved, upper_solved, values
-from .qp import Cost, ReachingQP, compliance
+from .compiled import Indices, Matrix, Tensor, Vector, compiled
+from .dense import cholesky, combined, lower_solved, upper_solved, values
+from .qp import Cost, ReachingQP, compliance, gathered, violated
 from .records import Array
 
 Index = NDArray[np.intp]
@@ -57,10 +57,6 @@ class WorkingSet:
         """Obstacle and step index, as an index into arrays (m, N)."""
         return self.obstacle, self.step
 
-    def joined(self, obstacle: Index, step: Index, steps: int) -> WorkingSet:
-        """Return the set with more rows, each once, in order."""
-        return WorkingSet(*united(self.obstacle, self.step, obstacle, step, steps))
-
     def within(self, steps: int) -> WorkingSet:
         """Return the rows at the first so many steps."""
         return self.only(self.step < steps)
@@ -68,13 +64,6 @@ class WorkingSet:
     def only(self, keep: NDArray[np.bool_]) -> WorkingSet:
         """Return the set of the rows to keep (k,)."""
         return WorkingSet(self.obstacle[keep], self.step[keep])
-
-
-@compiled
-def united(obstacle: Indices, step: Indices, other_obstacle: Indices, other_step: Indices, steps: int) -> tuple[Indices, Indices]:
-    """Return the rows of two sets, each once, in order of obstacle and step (0..steps - 1)."""
-    flat = np.unique(np.concatenate((obstacle * steps + step, other_obstacle * steps + other_step)))
-    return flat // steps, flat % steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,25 +84,33 @@ def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False, thoroug
     an answer. thorough: where the working set comes to no end, solve with every row at once, which can take a hundred times as
     long.
     """
-    control, multipliers = qp.cost.goal_control, np.zeros(0)
+    goal_control, (inverse, _, factor) = qp.cost.goal_control, qp.cost.factors
+    control, multipliers = goal_control, np.zeros(0)
     for solves in range(1, MAX_ROUNDS + 1):
         if len(working):
-            rows = qp.rows(working.obstacle, working.step)
-            answer = with_rows(qp.cost, rows, qp.limits[working.rows], elastic=elastic)
-            if answer is Verdict.CONTRADICTION:
+            softness = ELASTICITY if elastic else 0.0
+            space = reduced(*qp.terms, *working.rows, inverse, factor, goal_control, softness)
+            pressing = multipliers_of(*space[1:], elastic=elastic)
+            if pressing is Verdict.CONTRADICTION:
                 return None
-            if answer is Verdict.UNSOLVED:
+            if pressing is Verdict.UNSOLVED:
                 break
-            control, multipliers = answer
+            multipliers, control = pressing, pushed(pressing, space[0], goal_control)
         # rows just solved for are met but for rounding; an elastic row may stay violated
-        obstacle, step = qp.violated(control, *working.rows, TOLERANCE)
+        obstacle, step = violated(*qp.terms, control, *working.rows, TOLERANCE)
         if not len(obstacle) or (elastic and len(working) > MOST_ELASTIC):
             active = multipliers > 0
             return QPSolution(control, working.only(active), multipliers[active], solves)
-        if not elastic:
-            working = working.only(multipliers > 0)
-        working = working.joined(obstacle, step, qp.limits.shape[1])
+        kept = working if elastic else working.only(multipliers > 0)
+        working = WorkingSet(*united(*kept.rows, obstacle, step, qp.limits.shape[1]))
     return solve_full(qp) if thorough and not elastic else None
+
+
+@compiled
+def united(obstacle: Indices, step: Indices, other_obstacle: Indices, other_step: Indices, steps: int) -> tuple[Indices, Indices]:
+    """Return the rows of two sets, each once, in order of obstacle and step (0..steps - 1)."""
+    flat = np.unique(np.concatenate((obstacle * steps + step, other_obstacle * steps + other_step)))
+    return flat // steps, flat % steps
 
 
 class Verdict(Enum):
@@ -123,25 +120,30 @@ class Verdict(Enum):
     UNSOLVED = 'unsolved'
 
 
-def with_rows(
-    cost: Cost, rows: Array, limits: Array, *, elastic: bool = False
-) -> tuple[Array, Array] | Literal[Verdict.CONTRADICTION, Verdict.UNSOLVED]:
-    """Return control (2N,) and multipliers (k,) >= 0 of the least cost with rows (k, 2N) u >= limits (k,)."""
+Failed: TypeAlias = Literal[Verdict.CONTRADICTION, Verdict.UNSOLVED]
+
+
+def with_rows(cost: Cost, rows: Array, limits: Array) -> Array | Failed:
+    """Return the control (2N,) of the least cost with rows (k, 2N) u >= limits (k,)."""
     inverse, _, factor = cost.factors
-    softness = ELASTICITY if elastic else 0.0
-    pressed, gram, scaled, scale, stuck = range_space(rows, inverse, factor, limits, cost.goal_control, softness)
+    space = range_space(rows, inverse, factor, limits, cost.goal_control, 0.0)
+    pressing = multipliers_of(*space[1:], elastic=False)
+    return pressing if isinstance(pressing, Verdict) else pushed(pressing, space[0], cost.goal_control)
+
+
+def multipliers_of(gram: Array, missing: Array, unit: Array, stuck: float, *, elastic: bool) -> Array | Failed:
+    """Return the multipliers y (k,) >= 0 of least 1/2 y'Ky - m'y, given as of `range_space`."""
     if stuck > TOLERANCE and not elastic:
         return Verdict.CONTRADICTION
-    answer = solve_piqp(DenseQP(gram.T, -scaled, lower=np.zeros(len(rows))))
+    answer = solve_piqp(DenseQP(gram.T, -missing, lower=np.zeros(len(missing))))
     if not answer.solved:
         # Farkas: a combination y >= 0 of the rows that moves nothing and yet is missing something
         ray = answer.x / max(float(answer.x.max()), 1e-300)
-        return Verdict.CONTRADICTION if np.abs(gram @ ray).max() < FARKAS * float(scaled @ ray) else Verdict.UNSOLVED
-    multipliers, short, slack = sharpened(gram, scaled, answer.x)
-    largest = max(float(multipliers.max()), 1.0)
+        return Verdict.CONTRADICTION if np.abs(gram @ ray).max() < FARKAS * float(missing @ ray) else Verdict.UNSOLVED
+    multipliers, largest, short, slack = sharpened(gram, missing, unit, answer.x)
     if short > RESIDUAL * (largest if elastic else 1.0) or slack > RESIDUAL * largest**2:
         return Verdict.UNSOLVED
-    return pushed(multipliers, scale, pressed, cost.goal_control)
+    return multipliers
 
 
 @compiled
@@ -176,10 +178,33 @@ def range_space(
 
 
 @compiled
-def sharpened(gram: Matrix, missing: Vector, answer: Vector) -> tuple[Vector, float, float]:
+def reduced(
+    responses: Tensor,
+    further: Tensor,
+    weights: Matrix,
+    coefficients: Tensor,
+    limits: Matrix,
+    obstacle: Indices,
+    step: Indices,
+    inverse: Vector,
+    factor: Matrix,
+    goal_control: Vector,
+    softness: float,
+) -> tuple[Matrix, Matrix, Vector, Vector, float]:
+    """Return the `range_space` of the rows of k pairs of obstacle and step."""
+    wanted = np.empty(len(step))
+    for i in range(len(step)):
+        wanted[i] = limits[obstacle[i], step[i]]
+    rows = gathered(responses, further, weights, coefficients, obstacle, step)
+    return range_space(rows, inverse, factor, wanted, goal_control, softness)
+
+
+@compiled
+def sharpened(gram: Matrix, missing: Vector, unit: Vector, answer: Vector) -> tuple[Vector, float, float, float]:
     """Sharpen an interior-point answer: solve for the multipliers that are not zero, if that keeps their signs.
 
-    Returns them (k,), the most that a row misses, and the largest product of a multiplier and what its row has to spare.
+    Returns them (k,) without their units, the largest in its unit, but at least 1, the most that a row misses, and the largest
+    product of a multiplier and what its row has to spare.
     """
     active = np.flatnonzero(answer > NEGLIGIBLE * max(0.0, answer.max()))
     n = len(active)
@@ -206,17 +231,14 @@ def sharpened(gram: Matrix, missing: Vector, answer: Vector) -> tuple[Vector, fl
         for j in range(len(answer)):
             left += gram[i, j] * multipliers[j]
         short, slack = max(short, -left), max(slack, abs(left * multipliers[i]))
-    return multipliers, short, slack
+    return multipliers * unit, max(multipliers.max(), 1.0), short, slack
 
 
 @compiled
-def pushed(multipliers: Vector, scale: Vector, pressed: Matrix, goal_control: Vector) -> tuple[Vector, Vector]:
-    """Return the control (2N,) that multipliers (k,) in their units (k,) make of the goal's, and them without units."""
-    control, plain = goal_control.copy(), multipliers * scale
-    for i in range(len(plain)):
-        for u in range(len(control)):
-            control[u] += plain[i] * pressed[i, u]
-    return control, plain
+def pushed(multipliers: Vector, pressed: Matrix, goal_control: Vector) -> Vector:
+    """Return the control (2N,) that multipliers (k,) of rows make of the goal's: u_goal + P M'y, for M P (k, 2N)."""
+    control: Vector = goal_control + combined(np.expand_dims(multipliers, 0), pressed)[0]
+    return control
 
 
 def solve_full(qp: ReachingQP, backend: str = 'piqp') -> QPSolution | None:
