@@ -10,13 +10,13 @@ import numpy as np
 
 from .between import entered
 from .contacts import Contacts, merged
-from .driven import driven
 from .homotopy import swept_angles
 from .problem import Problem
 from .qp import NO_TIMES, Cost, depths, margins, wanted_distance
 from .records import Array
 from .sliding import CLEAR, SETTLED
 from .solver import Verdict, with_rows
+from .stacked import apart
 from .touching import half_planes_between, touching
 
 STAYS = 3e-7
@@ -84,5 +84,4 @@ def stays(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau:
     answer = with_rows(cost, rows, limits)
     if isinstance(answer, Verdict):
         return False
-    move = driven(problem.horizon.maps[:2], answer - control)
-    return float(np.abs(move).max()) < STAYS * problem.extent
+    return apart(problem.horizon.maps[:2], control, answer) < STAYS * problem.extent

@@ -25,12 +25,12 @@ from .qp import Cost, ReachingQP, effort_cost, row_values, wanted_distance
 from .records import Array, Status
 from .sequential import converge
 from .solver import WorkingSet, solve
-from .stacked import moved, spread
+from .stacked import apart, moved, spread
 from .start import Start
 
 SETTLED = 1e-6
 """Largest move of the mean, relative to the way, at which the sequence has settled."""
-ROUGHLY = 5e-2
+ROUGHLY = 1e-2
 """The same for the rows that leave the growth of Var out."""
 MAX_QPS = 30
 """Of one search for a minimum with the rows that leave the growth of Var out."""
@@ -127,7 +127,7 @@ class _Search:
 
     def repeat(self, iterate: _Iterate, k: float, tolerance: float, *, complete: bool) -> _Iterate | None:
         """Repeat the QP until it moves the mean by less than the tolerance, relative to the scene; None if it does not."""
-        problem, positions = self.problem, self.problem.positions(iterate.control)
+        problem, position = self.problem, self.problem.horizon.maps[:2]
         for _ in range(MAX_COMPLETE_QPS if complete else MAX_QPS):
             self.deadline.check()
             qp = surrogate_qp(problem, iterate.control, iterate.active, iterate.multipliers, k, complete=complete)
@@ -135,9 +135,9 @@ class _Search:
             if solution is None or not solution.multipliers.max(initial=0.0) < DIVERGED:
                 return None
             self.qp_solves += solution.solves
-            before, positions = positions, problem.positions(solution.control)
+            move = apart(position, iterate.control, solution.control)
             iterate = _Iterate(solution.control, solution.active, solution.multipliers)
-            if np.abs(positions - before).max() < tolerance * problem.extent:
+            if move < tolerance * problem.extent:
                 return iterate
         return None
 
@@ -227,13 +227,25 @@ def _bent(problem: Problem, control: Array, active: WorkingSet, multipliers: Arr
     """Return the cost with the curvature of the active rows' standard deviations, about the control."""
     if not len(active):
         return effort_cost(problem, 0.0)
-    bend = bent(problem.horizon.maps, slopes, active.obstacle, active.step, multipliers) * problem.noise_variance
-    return Cost(2.0 * (1.0 + problem.weighted_variance) + bend, bend * control, *problem.goal_rows)
+    variances = problem.noise_variance, problem.weighted_variance
+    return Cost(*bent(problem.horizon.maps, slopes, *active.rows, multipliers, *variances, control), *problem.goal_rows)
 
 
 @compiled
-def bent(maps: Tensor, slopes: Tensor, obstacle: Indices, step: Indices, multipliers: Vector) -> Vector:
-    """Return by how much k rows of slopes (m, N, 5), with multipliers (k,), bend the cost by c u, (2N,): maps (5, 2, N + 1)."""
+def bent(
+    maps: Tensor,
+    slopes: Tensor,
+    obstacle: Indices,
+    step: Indices,
+    multipliers: Vector,
+    noise_variance: Vector,
+    weighted_variance: Vector,
+    control: Vector,
+) -> tuple[Vector, Vector]:
+    """Return the Hessian (2N,) that k rows of slopes (m, N, 5), with multipliers (k,), bend, and the linear term (2N,) of that.
+
+    maps (5, 2, N + 1): `Horizon.maps`; noise_variance, weighted_variance (2N,): of the problem; control (2N,): bent about.
+    """
     steps = maps.shape[2] - 1
     bend = np.zeros(2 * steps)
     for i in range(len(step)):
@@ -242,4 +254,5 @@ def bent(maps: Tensor, slopes: Tensor, obstacle: Indices, step: Indices, multipl
             for channel in range(2):
                 for k in range(step[i] + 1):
                     bend[channel * steps + k] += weight * maps[q, channel, step[i] + 1 - k]
-    return bend
+    bend *= noise_variance
+    return 2.0 * (1.0 + weighted_variance) + bend, bend * control

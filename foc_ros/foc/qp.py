@@ -50,8 +50,7 @@ class Cost:
         inverse, root, factor = self.factors
         if self.linear is None:
             return to_goal(root, factor, self.goal_targets)
-        free = inverse * self.linear
-        return free + to_goal(root, factor, self.goal_targets - self.goal_rows @ free)
+        return pulled_to_goal(inverse, root, factor, self.goal_rows, self.goal_targets, self.linear)
 
 
 @compiled
@@ -77,6 +76,16 @@ def goal_factors(hessian: Vector, goal_rows: Matrix, softness: Vector) -> tuple[
 def to_goal(root: Matrix, factor: Matrix, missing: Vector) -> Vector:
     """Return the least control (2N,) that makes up for what the goal rows are missing (r,)."""
     control: Vector = combined(np.expand_dims(values(root, missing), 0), factor)[0]
+    return control
+
+
+@compiled
+def pulled_to_goal(
+    inverse: Vector, root: Matrix, factor: Matrix, goal_rows: Matrix, goal_targets: Vector, linear: Vector
+) -> Vector:
+    """Return the control (2N,) of least cost with a linear term (2N,) that meets the goal alone."""
+    free = inverse * linear
+    control: Vector = free + to_goal(root, factor, goal_targets - values(goal_rows, free))
     return control
 
 

@@ -129,6 +129,12 @@ def moved(position: Tensor, control: Vector, free: Matrix) -> Matrix:
 
 
 @compiled
+def apart(position: Tensor, control: Vector, other: Vector) -> float:
+    """Return the largest difference in x or y between the means of two controls (2N,) [m]; position (2, 2, N + 1)."""
+    return float(np.abs(driven(position, control - other)).max())
+
+
+@compiled
 def spread(maps: Tensor, noise_variance: Vector, control: Vector, free: Matrix) -> Matrix:
     """Return the rows xx, yy, xy of free + V u^2, (3, N), for `Horizon.maps` (5, 2, N + 1) and c^2 (2N,)."""
     variance: Matrix = free + driven(maps[2:], noise_variance * control * control)[:, 1:]
