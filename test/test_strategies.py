@@ -250,6 +250,16 @@ def test_a_deadline_in_the_middle_leaves_the_best_so_far(strategy, monkeypatch):
     assert f'eta {solution.eta:.4g}' in solution.message
 
 
+@EVERY
+@pytest.mark.parametrize('steps', [1, 2, 3, 5])
+def test_however_few_the_steps_there_is_an_answer(strategy, steps):
+    problem = reach(make_obstacles([[0.15, 0.01]], [0.03], [0.001]), steps=steps)
+    solution = solved(problem, bowed((0, 0), (0.3, 0), steps, 0.05), strategy)
+    assert solution.mean.shape == (steps + 1, 6)
+    assert np.isfinite(solution.mean).all()
+    assert np.isfinite(solution.covariance).all()
+
+
 @pytest.mark.parametrize('steps', [20, 50])
 def test_optimal_settles_wherever_the_obstacle_lies_between_two_steps(steps):
     """The touching step slides along the circle with the obstacle's position, and the sequence creeps where it changes."""

@@ -101,8 +101,7 @@ class Horizon(Record):
     @cached_property
     def last(self) -> Array:
         """What the states at step N owe to u, (n, 2N)."""
-        last: Array = self.states[..., :0:-1].reshape(len(self.states), -1)
-        return last
+        return np.ascontiguousarray(self.states[..., :0:-1].reshape(len(self.states), -1))
 
     @cached_property
     def response(self) -> Array:
