@@ -38,6 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         context.try_shutdown()
         print(f'foc_node: {" ".join(str(error).split())}', file=sys.stderr)
         return 2
+    gc.collect()
     gc.freeze()  # what is there by now stays: a full collection of it would hold a prediction up by 80 ms
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)

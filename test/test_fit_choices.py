@@ -94,14 +94,16 @@ def test_ways_decide_and_positions_where_ways_do_not_tell() -> None:
     assert searching.ranked(np.array([np.zeros((3, 2)), positions])) == [1, 2, 0]
 
 
-def test_models_durations_and_arrivals_are_tried_in_all_combinations() -> None:
-    reaches = _reaches(CONFIG)
-    tried = movements(reaches, CONFIG)
-    assert tried[0] == CONFIG
-    assert len(set(tried)) == len(tried) == 2 * (1 + len(DURATIONS)) * 2
-    assert {each.duration.model for each in tried} == {'fitts', 'cost_of_time'}
-    factors = {round(each.duration.fitts_a_s / CONFIG.duration.fitts_a_s, 6) for each in tried}
-    assert factors == {1.0, *DURATIONS}
+def test_models_durations_arrivals_and_fading_are_tried_in_all_combinations() -> None:
+    reaches, fading = _reaches(CONFIG), updated(CONFIG, {'estimator.acceleration_time_s': 0.06})
+    for config, accelerations in ((CONFIG, {0.0}), (fading, {0.06, 0.0})):
+        tried = movements(reaches, config)
+        assert tried[0] == config
+        assert len(set(tried)) == len(tried) == 2 * (1 + len(DURATIONS)) * 2 * len(accelerations)
+        assert {each.duration.model for each in tried} == {'fitts', 'cost_of_time'}
+        assert {each.estimator.acceleration_time_s for each in tried} == accelerations
+        factors = {round(each.duration.fitts_a_s / CONFIG.duration.fitts_a_s, 6) for each in tried}
+        assert factors == {1.0, *DURATIONS}
 
 
 def _reaches(config: Config) -> list:

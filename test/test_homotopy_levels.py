@@ -65,3 +65,11 @@ def test_of_more_ways_the_first_are_those_that_fewer_would_have_been(most):
     assert (few == keys[:most]).all() and (stops == ends[:most]).all() and (laid == pieces[: stops[-1]]).all()
     keys, *_, cut = shortest_ways(*asked, 20, 12)
     assert cut and len(keys) < 12
+
+
+@pytest.mark.parametrize(('rows', 'columns'), [(3, 6), (4, 5), (5, 5), (2, 9)])
+def test_a_peg_board_has_ways_of_equal_length_and_no_trouble_with_them(rows, columns):
+    pegs = [[0.05 * (1 + row), 0.05 * (column - (columns - 1) / 2)] for row in range(rows) for column in range(columns)]
+    found = find(make_obstacles(pegs, 0.02), goals=[[0.3, 0.0]], k=4, clearance=0.005)
+    labels = [one.label for one in found.candidates]
+    assert len(labels) == len(set(labels)) > 0

@@ -1,6 +1,7 @@
-"""What is tried of the predictor: margins each by itself, how long a movement takes and how it ends together.
+"""What is tried of the predictor: margins each by itself, how long a movement takes and how it begins and ends together.
 
-Where a goal that is passed is taken for one where the hand stops, no duration is right. So they are tried in all combinations.
+Where a goal that is passed is taken for one where the hand stops, no duration is right, nor where an acceleration that lasts is
+taken for one that fades. So they are tried in all combinations.
 """
 
 from __future__ import annotations
@@ -30,11 +31,15 @@ def etas(config: Config) -> list[Config]:
 
 
 def movements(demonstrations: Sequence[Demonstration], config: Config) -> list[Config]:
-    """Return every combination of model, duration and arrival, the configuration's own first."""
+    """Return every combination of model, duration, arrival and whether accelerations fade, the configuration's own first."""
     models = [config, *other_models(demonstrations, config)]
     lasting = [_scaled(each, CONSTANTS[each.duration.model], factor) for each, factor in product(models, (1.0, *DURATIONS))]
     arrivals = dict.fromkeys([config.duration.arrival, *ARRIVALS])
-    return [updated(each, {'duration.arrival': arrival}) for each, arrival in product(lasting, arrivals)]
+    fadings = dict.fromkeys([config.estimator.acceleration_time_s, 0.0])
+    return [
+        updated(each, {'duration.arrival': arrival, 'estimator.acceleration_time_s': fading})
+        for each, arrival, fading in product(lasting, arrivals, fadings)
+    ]
 
 
 def _scaled(config: Config, powers: Mapping[str, float], factor: float) -> Config:

@@ -16,7 +16,7 @@ from .errors import InputError
 from .records import Array, Record
 
 CACHED_HORIZONS = 16
-"""Horizons kept: those of one tick (one per duration) and a few ticks before it, about 60 kB each at N = 50."""
+"""Horizons kept: those of one tick (one per duration) and a few ticks before it, about 30 kB each at N = 50."""
 FREEDOM = 1e-2
 """Weight w of the control that leads back to a path, relative to what it moves: less would turn sharply to be back at once."""
 

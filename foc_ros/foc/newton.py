@@ -1,4 +1,4 @@
-"""Newton steps on the Karush-Kuhn-Tucker equations of a mean that is held off circles at a few contacts.
+"""A mean that is held off circles at a few contacts: Newton steps on its Karush-Kuhn-Tucker equations, its class, its check.
 
 Where sequential QPs would creep along a circle, these jump: they know its curvature. A contact is held at its step, as a row of a
 QP is, or it slides: it is then where the mean, between its steps too, comes closest to the circle.

@@ -52,13 +52,23 @@ def solve_candidates(
 def _solved(
     candidate: Candidate, problem: Problem, settings: FocConfig, shared: float, previous: Solution | None, deadline: Deadline
 ) -> Outcome:
-    """Solve from the earlier solution; if that gets into what the earlier one was not, from the candidate's own guess."""
+    """Solve from the earlier solution; if that gets into what the earlier one was not, from the candidate's own guess.
+
+    A way that was out of reach and is solved may have come from far beyond the least effort: then the cheaper of both counts.
+    """
+    outcome = None
     if previous is not None:
         again = forward(problem, warm(previous, problem), settings, deadline)
         outcome = _judged(candidate, problem, again, shared)
-        if outcome.solved or outcome.solution.status in (previous.status, Status.DEADLINE):
+        if outcome.solution.status in (previous.status, Status.DEADLINE) or (outcome.solved and _stopped(previous)):
             return outcome
-    return _judged(candidate, problem, forward(problem, cold(candidate.guess), settings, deadline), shared)
+    fresh = _judged(candidate, problem, forward(problem, cold(candidate.guess), settings, deadline), shared)
+    return outcome if outcome is not None and outcome.solved and not (fresh.solved and fresh.cost < outcome.cost) else fresh
+
+
+def _stopped(previous: Solution) -> bool:
+    """Tell whether an earlier solution ran out of time on its way: what goes on from there has left nothing out."""
+    return previous.status is Status.DEADLINE
 
 
 def _judged(candidate: Candidate, problem: Problem, solution: Solution, shared: float) -> Outcome:

@@ -23,7 +23,7 @@ ALIKE = 1e-6
 
 
 class Chances(NamedTuple):
-    """`Horizon.maps`, and of a `Problem` what has the same names."""
+    """`Horizon.maps`, and of a `Problem` what has the same names; its `size` in two; its obstacles' covariances (m, 2, 2)."""
 
     maps: Array
     free_variance: Array
@@ -43,11 +43,9 @@ class Problem(Record):
 
     horizon: the plant over N steps; initial_mean (n,) and initial_covariance (n, n): the state now; error_map (N + 1, n, n): what
     an error of the initial state becomes at steps 0..N (`horizon.powers` where nobody corrects it); goal (n,), of which the
-    states
-    in at_goal (n,) bool are reached exactly by the mean; end_weights and way_weights (n,): w of the mean error and variance
-    at the
-    last step and at each step before it; noise (2,): c per step; obstacles: circles now; eta: wanted probability of avoidance per
-    obstacle and step; recovery_s: time in which a hand that is inside a margin has to be out of it [s].
+    states in at_goal (n,) bool are reached exactly by the mean; end_weights and way_weights (n,): w of the mean error and
+    variance at the last step and at each step before it; noise (2,): c per step; obstacles: circles now; eta: wanted probability
+    of avoidance per obstacle and step; recovery_s: time in which a hand that is inside a margin has to be out of it [s].
     """
 
     horizon: Horizon
@@ -152,7 +150,7 @@ class Problem(Record):
 
     @cached_property
     def centres_from_free(self) -> Array:
-        """The same, less the mean position without control, (m, N, 2) [m]."""
+        """`centres`, less the mean position without control, (m, N, 2) [m]."""
         return self.centres - self.free[1:, :2]
 
     @cached_property
@@ -253,13 +251,14 @@ def rest_to_goal(
     n = len(initial_mean)
     goal = np.zeros(n)
     goal[:2] = goal_position
-    for field, value in (('start', initial_mean), ('goal', goal_position), ('noise', noise)):
+    covariance = np.zeros((n, n)) if initial_covariance is None else np.asarray(initial_covariance, dtype=float)
+    for field, value in (('start', initial_mean), ('goal', goal_position), ('noise', noise), ('start covariance', covariance)):
         if not np.isfinite(value).all():
             raise SceneError(field, 'finite numbers', np.asarray(value).tolist())
     return Problem(
         horizon=horizon,
         initial_mean=np.asarray(initial_mean, dtype=float),
-        initial_covariance=np.zeros((n, n)) if initial_covariance is None else initial_covariance,
+        initial_covariance=covariance,
         error_map=horizon.powers if error_map is None else error_map,
         goal=goal,
         noise=np.asarray(noise, dtype=float),

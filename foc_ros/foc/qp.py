@@ -211,9 +211,8 @@ def half_planes(problem: Problem, guess: Array, tau: float, *, literal: bool = F
     """Linearise |p - o|^2 >= E[R^2] + tau at a guess (N, 2): unit normals (m, N, 2) and limits (m, N) on normal . (S u) [m].
 
     literal: the paper's E[C] + tau <= 0 divided by 2 |d|; its plane lies (reach^2 + d^2) / (2 d) from the centre, d = |guess -
-    centre|. Otherwise the plane with the same normal that touches the circle: the two agree at a solution, where the
-    constraint is
-    active, and the touching one cuts less off before it, so a far obstacle is never in the way. Both stay outside the circle.
+    centre|. Otherwise the plane with the same normal that touches the circle: the two agree at a solution, where the constraint
+    is active, and the touching one cuts less off before it, so a far obstacle is never in the way. Both stay outside the circle.
     """
     normals, distance, limits = normals_at(np.ascontiguousarray(guess, dtype=float), problem.centres, problem.centres_from_free)
     reach = wanted_distance(problem, tau)

@@ -41,9 +41,9 @@ def slide(
     """Find the least cost `qp.effort_cost` near a control (2N,) that keeps clear of every circle at every time.
 
     From contacts (k,) to begin with, which slide: those that pull are let go, and where a circle is entered there is a new one.
-    motion ... pace: as in `touching`; hessian (2N,) and the goal: as in `qp.Cost`; extent: of the
-    scene [m]. Returns whether there is one, and whether it has other contacts,
-    so that it may pass circles on another side; the control, its course, and its contacts' obstacles, times and forces.
+    motion ... pace: as in `touching`; hessian (2N,) and the goal: as in `qp.Cost`; extent: of the scene [m].
+    Returns whether there is one, and whether it has other contacts, so that it may pass circles on another side; the control, its
+    course, and its contacts' obstacles, times and forces.
     """
     inverse, root, factor = goal_factors(hessian, goal_rows, softness)
     goal_control = to_goal(root, factor, goal_targets)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from operator import getitem
+from operator import getitem, itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -119,7 +119,7 @@ class Classes:
             for key, one, way in zip(keys[given:].tolist(), passed, laid, strict=True):
                 course = ''.join(map(getitem, self._parts, one))
                 found.append(Found(key, self._prefix + course, self._goal, course, self._ids, one, way))
-            yield from sorted(found)
+            yield from sorted(found, key=itemgetter(0, 1))
             if len(keys) < most:
                 self._notes['search_cut'] += cut
                 return
