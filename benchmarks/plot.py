@@ -38,7 +38,7 @@ def main() -> None:
         for panel, (label, reaches) in zip(axes, panels.items(), strict=True):
             _draw(panel, label, reaches)
         axes[0].set_ylabel('warm tick [ms]')
-        axes[1].legend(frameon=False, loc='upper left')
+        axes[1].legend(frameon=False, loc='lower right')
     save(figure, sys.argv[1] if len(sys.argv) > 1 else SPEED)
 
 
@@ -54,6 +54,8 @@ def _draw(panel: Axes, label: str, reaches: dict[int, Reach]) -> None:
     panel.axhline(4.0, color='0.4', linestyle=':', label='4 ms')
     panel.set_xlabel(label)
     panel.set_yscale('log')
+    panel.yaxis.set_major_formatter('{x:g}')
+    panel.yaxis.set_minor_formatter('{x:g}')
 
 
 if __name__ == '__main__':
