@@ -12,7 +12,8 @@ from foc_ros.foc.assess import achieved, assess
 from foc_ros.foc.chance import eta_of_k
 from foc_ros.foc.config import FocConfig
 from foc_ros.foc.deadline import Deadline, OutOfTimeError
-from foc_ros.foc.dynamics import damped_mass, horizon
+from foc_ros.foc.dynamics import damped_mass, horizon, triple_integrator_horizon
+from foc_ros.foc.errors import SceneError
 from foc_ros.foc.forward import forward
 from foc_ros.foc.least_k import assess_between
 from foc_ros.foc.monte_carlo import monte_carlo
@@ -269,3 +270,18 @@ def test_optimal_settles_wherever_the_obstacle_lies_between_two_steps(steps):
         problem = reach(make_obstacles([centre], [0.03], [0.001]), steps=steps, duration=1.2, noise=(0.05, 0.05))
         solution = solved(problem, bowed((0, 0), (0.3, 0), steps, 0.05), 'optimal')
         assert solution.status is Status.SOLVED
+
+
+@pytest.mark.parametrize(
+    ('field', 'values'),
+    [
+        ('start', {'initial_mean': np.full(6, np.nan)}),
+        ('goal', {'goal_position': np.array([np.inf, 0.0])}),
+        ('noise', {'noise': np.array([0.1, np.nan])}),
+        ('start covariance', {'initial_covariance': np.full((6, 6), np.inf)}),
+    ],
+)
+def test_a_problem_that_is_not_finite_is_refused_by_name(field, values):
+    given = {'initial_mean': np.zeros(6), 'goal_position': np.array([0.3, 0.0]), 'noise': np.array([0.1, 0.1])}
+    with pytest.raises(SceneError, match=f'{field}: expected finite numbers'):
+        rest_to_goal(triple_integrator_horizon(0.02, 50), obstacles=make_obstacles(), eta=0.9, **(given | values))
