@@ -29,25 +29,20 @@ def eta_of_k(k: float) -> float:
 
 
 @compiled
-def centres(centre: Matrix, drift: Matrix, steps: int) -> Tensor:
-    """Mean centres at steps 1..N, (n, N, 2) [m], from those now (n, 2) [m] and how far each moves in a step (n, 2) [m]."""
-    moved = np.empty((len(centre), steps, 2))
-    for j in range(len(centre)):
-        for t in range(steps):
-            for axis in range(2):
-                moved[j, t, axis] = centre[j, axis] + (t + 1) * drift[j, axis]
-    return moved
-
-
-@compiled
 def courses(centre: Matrix, drift: Matrix, steps: int) -> Tensor:
-    """Mean centres now and at steps 1..N, step by step, (N + 1, n, 2) [m]."""
+    """Mean centres at steps 0..N, step by step, (N + 1, n, 2) [m]; centre (n, 2): now; drift (n, 2): in a step."""
     moved = np.empty((steps + 1, len(centre), 2))
     for t in range(steps + 1):
         for j in range(len(centre)):
             for axis in range(2):
                 moved[t, j, axis] = centre[j, axis] + t * drift[j, axis]
     return moved
+
+
+@compiled
+def centres(centre: Matrix, drift: Matrix, steps: int) -> Tensor:
+    """Mean centres at steps 1..N, circle by circle, (n, N, 2) [m]: `courses`."""
+    return np.ascontiguousarray(courses(centre, drift, steps)[1:].transpose((1, 0, 2)))
 
 
 def size_moments(obstacles: Obstacles) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from .assess import Assessment, assessed
 from .between import blend, place, place_row
-from .chance import CERTAIN_K, k_of, variance_of
+from .chance import CERTAIN_K, k_of, variance
 from .compiled import Matrix, Tensor, Vector, compiled
 from .problem import Problem
 from .records import Array
@@ -92,15 +92,13 @@ def _moments(
 ) -> tuple[Matrix, Matrix]:
     """Return E[C] and Var[C] of every circle at steps 1..N, (m, N) each; E is without a bound where the circle does not count."""
     m, steps, _ = centres.shape
-    mean, var = np.empty((m, steps)), np.empty((m, steps))
+    mean, offset = np.empty((m, steps)), np.empty((m, steps, 2))
     for j in range(m):
-        free_xx, free_yy, free_xy = centre_covariance[j, 0, 0], centre_covariance[j, 1, 1], centre_covariance[j, 0, 1]
         for t in range(steps):
             x, y = course[0, t + 1] - centres[j, t, 0], course[1, t + 1] - centres[j, t, 1]
-            xx, yy, xy = covariance[0, t] + free_xx, covariance[1, t] + free_yy, covariance[2, t] + free_xy
+            offset[j, t, 0], offset[j, t, 1] = x, y
             mean[j, t] = size_mean[j] - x * x - y * y if t + 1.0 >= leaving[j] else -np.inf
-            var[j, t] = variance_of(x, y, xx, yy, xy, size_variance[j])
-    return mean, var
+    return mean, variance(offset, covariance, size_variance, centre_covariance)
 
 
 @compiled

@@ -10,7 +10,7 @@ import numpy as np
 
 from .between import entered
 from .contacts import Contacts, merged
-from .homotopy import swept_angles
+from .homotopy import same_way, swept_angles
 from .problem import Problem
 from .qp import NO_TIMES, Cost, depths, margins, wanted_distance
 from .records import Array
@@ -38,9 +38,7 @@ def held(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: 
         centre,
         drift,
         *margins(problem, tau),
-        contacts.obstacle,
-        contacts.time,
-        contacts.force,
+        *contacts.columns,
         np.ascontiguousarray(control, dtype=float),
         0,
         SETTLED * problem.extent,
@@ -73,7 +71,7 @@ def way_of(problem: Problem, control: Array) -> Array:
 
 def goes(problem: Problem, control: Array, way: Array) -> bool:
     """Whether the mean of a control (2N,) passes every circle on the same side as a way (m,), as of `way_of`."""
-    return bool((np.abs(way_of(problem, control) - way) < np.pi).all())
+    return same_way(way_of(problem, control), way)
 
 
 def stays(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: float) -> bool:

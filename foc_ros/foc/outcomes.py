@@ -60,15 +60,12 @@ def _solved(
     if previous is not None:
         again = forward(problem, warm(previous, problem), settings, deadline)
         outcome = _judged(candidate, problem, again, shared)
-        if outcome.solution.status in (previous.status, Status.DEADLINE) or (outcome.solved and _stopped(previous)):
+        # what ran out of time on its way goes on from there, and has left nothing out
+        stopped = previous.status is Status.DEADLINE and outcome.solved
+        if outcome.solution.status in (previous.status, Status.DEADLINE) or stopped:
             return outcome
     fresh = _judged(candidate, problem, forward(problem, cold(candidate.guess), settings, deadline), shared)
     return outcome if outcome is not None and outcome.solved and not (fresh.solved and fresh.cost < outcome.cost) else fresh
-
-
-def _stopped(previous: Solution) -> bool:
-    """Tell whether an earlier solution ran out of time on its way: what goes on from there has left nothing out."""
-    return previous.status is Status.DEADLINE
 
 
 def _judged(candidate: Candidate, problem: Problem, solution: Solution, shared: float) -> Outcome:

@@ -15,7 +15,7 @@ from .dynamics import Horizon, states_at_goal
 from .errors import SceneError
 from .noise import stacked_noise
 from .records import Array, Obstacles, Record
-from .stacked import carried_variance, end_rows, extent, first_alike, inside, moved, spread, squares, without_control
+from .stacked import end_rows, extent, first_alike, inside, moved, spread, squares, without_control
 
 BOTH = np.ones(2)
 ALIKE = 1e-6
@@ -131,7 +131,8 @@ class Problem(Record):
     @cached_property
     def free_variance(self) -> Array:
         """Rows xx, yy, xy of the free position covariance at steps 1..N, (3, N) [m^2]."""
-        return carried_variance(self.error_map, self.initial_covariance)
+        covariance = self.free_covariance[1:]
+        return np.stack((covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]))
 
     @cached_property
     def centres(self) -> Array:

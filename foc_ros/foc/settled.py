@@ -9,7 +9,7 @@ import numpy as np
 from .between import course_of
 from .compiled import Indices, Matrix, Tensor, Vector, compiled
 from .contacts import Contacts
-from .homotopy import swept
+from .homotopy import same_way, swept
 from .least_k import Least, least_k
 from .problem import Problem
 from .qp import margins
@@ -112,7 +112,7 @@ def settle(
     )
     if found and (changed or len(way) > 0):  # with the same contacts it is in the class of the control
         wanted = way if len(way) > 0 else swept(path(course_of(motion, free, near)), courses)
-        found = bool((np.abs(swept(path(course), courses) - wanted) < np.pi).all())
+        found = same_way(swept(path(course), courses), wanted)
     if not found:
         return False, control, obstacle, time, force, (0.0, 0, 0.0)
     least = least_k(

@@ -35,23 +35,6 @@ def without_control(powers: Tensor, mean: Vector, dt: float) -> tuple[Matrix, Ma
 
 
 @compiled
-def carried_variance(error_map: Tensor, covariance: Matrix) -> Matrix:
-    """Return xx, yy, xy of E P E' at steps 1..N, (3, N) [m^2], for an error map E (N + 1, n, n) and P (n, n)."""
-    times, n, _ = error_map.shape
-    carried = np.zeros((3, times - 1))
-    if not covariance.any():
-        return carried
-    for t in range(1, times):
-        for i in range(n):
-            for j in range(n):
-                both = covariance[i, j]
-                carried[0, t - 1] += error_map[t, 0, i] * both * error_map[t, 0, j]
-                carried[1, t - 1] += error_map[t, 1, i] * both * error_map[t, 1, j]
-                carried[2, t - 1] += error_map[t, 0, i] * both * error_map[t, 1, j]
-    return carried
-
-
-@compiled
 def squares(states: Tensor, end: Vector, way: Vector) -> Vector:
     """Return d (2N,), where d.u^2 is what a control's noise u adds to sum_i end_i X_i(N)^2 + way_i sum_{t < N} X_i(t)^2.
 

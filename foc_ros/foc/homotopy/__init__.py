@@ -2,6 +2,6 @@
 
 from .search import Search, search
 from .shown import named_obstacles, timed
-from .sides import path_sides, swept, swept_angles
+from .sides import path_sides, same_way, swept, swept_angles
 
-__all__ = ['Search', 'named_obstacles', 'path_sides', 'search', 'swept', 'swept_angles', 'timed']
+__all__ = ['Search', 'named_obstacles', 'path_sides', 'same_way', 'search', 'swept', 'swept_angles', 'timed']

@@ -56,6 +56,12 @@ def swept(path: Matrix, centres: Tensor) -> Vector:
 
 
 @compiled_exactly
+def same_way(angles: Vector, others: Vector) -> bool:
+    """Tell whether two paths with the same ends, which sweep angles (n,) each, pass all centres on the same sides."""
+    return bool((np.abs(angles - others) < np.pi).all())
+
+
+@compiled_exactly
 def passed(path: Matrix, centres: Tensor, angles: Vector) -> Flags:
     """Tell which centres (m, n, 2) or (1, n, 2) a path (m, 2) that sweeps angles (n,) about them passes."""
     flags = np.zeros(len(angles), np.bool_)
