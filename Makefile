@@ -40,7 +40,7 @@ endif
 $(STAMP): setup.py setup.cfg pyproject.toml
 	@test -e $@ || $(PYTHON) -m venv --clear $(VENV_OPTIONS) $(VENV) || { echo 'make: no venv in $(PYTHON); on Debian and Ubuntu: apt install python3-venv' >&2; exit 1; }
 	$(PIP) install --quiet --editable '.[$(EXTRAS)]'
-	$(BIN)/python -c 'import foc_ros.foc.pipeline'  # compiles the solver's kernels, which takes some seconds once
+	$(BIN)/python -c 'import foc_ros.core.pipeline'  # compiles the solver's kernels, which takes some seconds once
 	touch $@
 
 demo: $(STAMP)
@@ -85,7 +85,7 @@ $(VENV)/.bench: $(STAMP)
 
 # What is derived from foc_ros/foc/config.py
 pages: $(STAMP)
-	$(BIN)/python -m foc_ros.parameters > config/foc.yaml
+	$(BIN)/python -m foc_ros.ros.parameters > config/foc.yaml
 	$(BIN)/python scripts/make_parameter_page.py
 
 clean:

@@ -21,7 +21,9 @@ setup(
     license='Apache-2.0',
     keywords=['ROS', 'teleoperation', 'motion prediction', 'stochastic optimal control', 'homotopy'],
     packages=find_packages(exclude=['test', 'test.*']),
-    package_data={PACKAGE: ['py.typed', 'page/*.css', 'page/*.html', 'page/*.js', 'recordings/*.mcap']},
+    package_data={
+        PACKAGE: ['py.typed', 'reporting/page/*.css', 'reporting/page/*.html', 'reporting/page/*.js', 'recordings/*.mcap']
+    },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (f'share/{PACKAGE}', ['package.xml']),
@@ -73,8 +75,8 @@ setup(
     },
     entry_points={
         'console_scripts': [
-            'foc_node = foc_ros.node_main:main',
-            'foc_ros = foc_ros.command_line:main',
+            'foc_node = foc_ros.ros.main:main',
+            'foc_ros = foc_ros.cli.main:main',
         ],
     },
 )

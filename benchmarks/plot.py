@@ -16,8 +16,8 @@ from matplotlib.axes import Axes
 from rows.ticking import Ticking, alternating
 from scenes import Reach, clusters, tick_4x8, with_far
 
-from foc_ros.drawing import new_figure
-from foc_ros.plots import save
+from foc_ros.reporting.drawing import new_figure
+from foc_ros.reporting.plots import save
 
 SPEED = Path(__file__).resolve().parents[1] / 'doc' / 'images' / 'speed.png'
 TICKS = 16

@@ -20,7 +20,7 @@ from catalogue import ROWS
 from rich.console import Console
 from rich.table import Table
 
-from foc_ros import page
+from foc_ros.reporting import page
 
 HERE = Path(__file__).resolve().parent
 ONE_THREAD = dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'), '1')

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.dynamics import triple_integrator_horizon
-from foc_ros.foc.estimator import Track, update
-from foc_ros.foc.problem import Problem, rest_to_goal
-from foc_ros.foc.records import HandSample, Obstacles, make_obstacles
+from foc_ros.core.config import Config, updated
+from foc_ros.core.dynamics.plants import triple_integrator_horizon
+from foc_ros.core.estimation.kalman_filter import Track, update
+from foc_ros.core.ocp.problem import Problem, rest_to_goal
+from foc_ros.core.types import HandSample, Obstacles, make_obstacles
 
 Array = NDArray[np.float64]
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Find the scenes of `foc_ros.paper.scenes`: the paper gives no coordinates, so they are searched for, with seeds.
+"""Find the scenes of `foc_ros.analysis.paper.scenes`: the paper gives no coordinates, so they are searched for, with seeds.
 
 python scripts/find_paper_scenes.py strategies|ways [--seeds FIRST LAST] [--refine]
 
@@ -21,10 +21,10 @@ from itertools import product
 
 import numpy as np
 
-from foc_ros.foc.records import LEFT, RIGHT, Array, Status
-from foc_ros.paper.reaching import Method, PaperScene, Way, solve_way, speed_to_obstacles
-from foc_ros.paper.scenes import NOISE, SMALL_NOISE, STRATEGY_SCENE, WAYS_SCENE
-from foc_ros.paper.studies import PAPER_ETA, PAPER_RATIOS
+from foc_ros.analysis.paper.reaching import Method, PaperScene, Way, solve_way, speed_to_obstacles
+from foc_ros.analysis.paper.scenes import NOISE, SMALL_NOISE, STRATEGY_SCENE, WAYS_SCENE
+from foc_ros.analysis.paper.studies import PAPER_ETA, PAPER_RATIOS
+from foc_ros.core.types import LEFT, RIGHT, Array, Status
 
 GOAL_X = 0.3
 ETAS = (0.6, 0.7, 0.8, 0.86, 0.9, 0.93, 0.95, PAPER_ETA, 0.965)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from accuracy import guarantee, literal, over_eta, page, reference
 
-from foc_ros.plots import save
+from foc_ros.reporting.plots import save
 
 
 def main() -> None:

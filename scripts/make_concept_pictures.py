@@ -14,24 +14,24 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from foc_ros.drawing import class_style, draw_legend, draw_scene, draw_ways, new_figure, stddev_ellipse, tag
-from foc_ros.foc.config import FocConfig, LikelihoodConfig
-from foc_ros.foc.dynamics import triple_integrator_horizon
-from foc_ros.foc.forward import forward
-from foc_ros.foc.likelihood import likelihoods
-from foc_ros.foc.monte_carlo import monte_carlo
-from foc_ros.foc.noise import noise_per_step, stacked_noise
-from foc_ros.foc.problem import Problem, rest_to_goal
-from foc_ros.foc.records import Array, Obstacles, Solution, make_obstacles
-from foc_ros.foc.start import cold
-from foc_ros.guess import guess_path
-from foc_ros.moments import ways_of
-from foc_ros.paper.reaching import Method, solve_way
-from foc_ros.paper.scenes import NOISE as PAPER_NOISE
-from foc_ros.paper.scenes import STRATEGY_SCENE
-from foc_ros.plots import bounds_of, save
-from foc_ros.scene_file import load_scene
-from foc_ros.solve import scene_problems, solve_scene
+from foc_ros.analysis.paper.reaching import Method, solve_way
+from foc_ros.analysis.paper.scenes import NOISE as PAPER_NOISE
+from foc_ros.analysis.paper.scenes import STRATEGY_SCENE
+from foc_ros.cli.solve import scene_problems, solve_scene
+from foc_ros.core.config import FocConfig, LikelihoodConfig
+from foc_ros.core.dynamics.noise import noise_per_step, stacked_noise
+from foc_ros.core.dynamics.plants import triple_integrator_horizon
+from foc_ros.core.likelihood import likelihoods
+from foc_ros.core.ocp.monte_carlo import monte_carlo
+from foc_ros.core.ocp.problem import Problem, rest_to_goal
+from foc_ros.core.ocp.solve import forward
+from foc_ros.core.ocp.warm_start import cold
+from foc_ros.core.types import Array, Obstacles, Solution, make_obstacles
+from foc_ros.io.guess import guess_path
+from foc_ros.io.scene_file import load_scene
+from foc_ros.reporting.drawing import class_style, draw_legend, draw_scene, draw_ways, new_figure, stddev_ellipse, tag
+from foc_ros.reporting.plots import bounds_of, save
+from foc_ros.reporting.snapshots import ways_of
 
 PICTURES = Path(__file__).resolve().parents[1] / 'doc' / 'images'
 SCENE = Path(__file__).resolve().parents[1] / 'doc' / 'examples' / 'scene.yaml'

@@ -16,12 +16,12 @@ from make_readme_picture import replayed
 from matplotlib.figure import Figure
 from PIL import Image
 
-from foc_ros.drawing import CLASS_COLOURS, CLASSES, draw_hand, draw_likelihoods, draw_scene, draw_ways, new_figure
-from foc_ros.foc.config import Config
-from foc_ros.foc.records import NANOSECONDS
-from foc_ros.lineage import lineages, slots
-from foc_ros.moments import Moment, Track, movements
-from foc_ros.plots import bounds_of
+from foc_ros.core.config import Config
+from foc_ros.core.types import NANOSECONDS
+from foc_ros.reporting.drawing import CLASS_COLOURS, CLASSES, draw_hand, draw_likelihoods, draw_scene, draw_ways, new_figure
+from foc_ros.reporting.plots import bounds_of
+from foc_ros.reporting.snapshots import Moment, Track, movements
+from foc_ros.reporting.track_association import lineages, slots
 
 ANIMATION = Path(__file__).resolve().parents[1] / 'doc' / 'images' / 'demo.gif'
 MOVEMENTS = (0, 4, 6)

@@ -11,12 +11,12 @@ import csv
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from foc_ros.bags import BagReader
-from foc_ros.foc.config import Config
-from foc_ros.foc.pipeline import Pipeline
-from foc_ros.foc.records import NANOSECONDS, Array, HandSample, Obstacles
-from foc_ros.intake import Intake
-from foc_ros.moments import Track, movements, track_of
+from foc_ros.core.config import Config
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, Obstacles
+from foc_ros.io.bags import BagReader
+from foc_ros.reporting.snapshots import Track, movements, track_of
+from foc_ros.ros.intake import Intake
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORDING, EXAMPLES = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap', ROOT / 'doc' / 'examples'

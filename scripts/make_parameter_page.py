@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from foc_ros.foc.config import Config, Parameter, parameters
+from foc_ros.core.config import Config, Parameter, parameters
 
 PAGE = Path(__file__).parents[1] / 'doc' / 'parameters.md'
 

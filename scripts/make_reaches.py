@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from foc_ros.foc.records import Array
+from foc_ros.core.types import Array
 
 COUNT = 48
 SIDE = 5

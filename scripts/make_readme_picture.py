@@ -11,13 +11,13 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from foc_ros.bags import BagReader
-from foc_ros.drawing import draw_colour_bar, draw_hand, draw_legend, draw_scene, draw_ways, new_figure
-from foc_ros.foc.config import Config
-from foc_ros.foc.records import NANOSECONDS, HandSample
-from foc_ros.moments import Moment, Track, moment_of, movements, track_of
-from foc_ros.plots import bounds_of, save
-from foc_ros.replay import Replay
+from foc_ros.analysis.replay import Replay
+from foc_ros.core.config import Config
+from foc_ros.core.types import NANOSECONDS, HandSample
+from foc_ros.io.bags import BagReader
+from foc_ros.reporting.drawing import draw_colour_bar, draw_hand, draw_legend, draw_scene, draw_ways, new_figure
+from foc_ros.reporting.plots import bounds_of, save
+from foc_ros.reporting.snapshots import Moment, Track, moment_of, movements, track_of
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORDING = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from foc_ros.fitting.trials import trial
+from foc_ros.analysis.fitting.trials import trial
 
 TRIALS = 20
 

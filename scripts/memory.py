@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from rich.progress import track
 
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.pipeline import Pipeline
-from foc_ros.foc.records import HandSample, make_obstacles
+from foc_ros.core.config import Config, updated
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.types import HandSample, make_obstacles
 
 WARM_UP, GROWTH = 0.1, 1.05
 CONFIG = updated(Config(), {'foc.steps': 30, 'rate_hz': 100.0, 'scene.timeout_s': 0.0})

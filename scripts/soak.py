@@ -28,9 +28,9 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.conversions.types import RclpyTypes
-from foc_ros.demo.environment import free_domain, private_environment
-from foc_ros.input_messages import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.cli.demo.environment import free_domain, private_environment
+from foc_ros.ros.messages.input_messages import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.ros.messages.types import RclpyTypes
 
 PERIOD_S = 0.01
 REPORT_S = 5.0
@@ -264,7 +264,7 @@ def main() -> int:
     seconds = 60.0 * parser.parse_args().minutes
     with tempfile.TemporaryDirectory(prefix='foc_ros_soak_') as logs:
         os.environ.update(graph_environment(Path(logs)))
-        command = [sys.executable, '-m', 'foc_ros.node_main', '--ros-args', '-p', 'homotopy.max_candidates:=2']
+        command = [sys.executable, '-m', 'foc_ros.ros.main', '--ros-args', '-p', 'homotopy.max_candidates:=2']
         with Player() as player, subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
             begun(player)
             table = soaked(process, player, seconds)

@@ -31,7 +31,7 @@ def catches(process: subprocess.Popen[str], number: int) -> bool:
 
 def stopped_once(player: Player, number: signal.Signals, after_s: float) -> str | None:
     """Start a node, stop it; return what was wrong, None where nothing was."""
-    command = [sys.executable, '-m', 'foc_ros.node_main', '--ros-args', '-p', 'foc.steps:=20', '-p', 'homotopy.max_candidates:=2']
+    command = [sys.executable, '-m', 'foc_ros.ros.main', '--ros-args', '-p', 'foc.steps:=20', '-p', 'homotopy.max_candidates:=2']
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
         began = time.monotonic()
         while not catches(process, signal.SIGTERM):

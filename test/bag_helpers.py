@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.bags import TYPESTORE, BagWriter
-from foc_ros.conversions.types import RosbagsTypes
-from foc_ros.foc.config import Config, updated
-from foc_ros.input_messages import goal_poses, hand_pose, obstacle_cloud
-from foc_ros.parameters import dump_parameter_file
+from foc_ros.core.config import Config, updated
+from foc_ros.io.bags import TYPESTORE, BagWriter
+from foc_ros.ros.messages.input_messages import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.ros.messages.types import RosbagsTypes
+from foc_ros.ros.parameters import dump_parameter_file
 
 TYPES = RosbagsTypes(TYPESTORE)
 CONFIG = updated(Config(), {'foc.strategy': 'fixed', 'foc.tau': 5e-4, 'foc.steps': 30})

@@ -8,7 +8,7 @@ from hypothesis import settings
 from message_helpers import message_types
 from ros_helpers import Graph, graph, prepare_environment
 
-from foc_ros.conversions.types import MessageTypes
+from foc_ros.ros.messages.types import MessageTypes
 
 prepare_environment()
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from foc_ros.evaluation.observations import TIMES_S, Observation, Observations, Truth, Ways
-from foc_ros.foc.partings import Partings
-from foc_ros.foc.records import LEFT, RIGHT
+from foc_ros.analysis.evaluation.observations import TIMES_S, Observation, Observations, Truth, Ways
+from foc_ros.core.homotopy.branch_times import Partings
+from foc_ros.core.types import LEFT, RIGHT
 
 H = len(TIMES_S)
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from foc_ros.fitting.demonstrations import Demonstration
-from foc_ros.foc.records import Obstacles
+from foc_ros.analysis.fitting.demonstrations import Demonstration
+from foc_ros.core.types import Obstacles
 
 OBSTACLE = (0.15, 0.0, 0.03)
 GOALS = np.array([[0.3, -0.1], [0.3, 0.0], [0.3, 0.1]])

@@ -8,8 +8,8 @@ import numpy as np
 from hypothesis import strategies as st
 from message_helpers import cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped
 
-from foc_ros import topics
-from foc_ros.conversions.types import MessageTypes
+from foc_ros.io import topics
+from foc_ros.ros.messages.types import MessageTypes
 
 EXTREMES = (float('nan'), float('inf'), float('-inf'), 1e4, -1e4, 1e30, -1e30, 1e-300, 0.0, -0.0)
 PLACES = st.floats(-0.5, 0.5)

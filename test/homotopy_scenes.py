@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from foc_ros.foc.config import HomotopyConfig
-from foc_ros.foc.homotopy import Search, search
-from foc_ros.foc.records import Obstacles, make_obstacles
+from foc_ros.core.config import HomotopyConfig
+from foc_ros.core.homotopy import Search, search
+from foc_ros.core.types import Obstacles, make_obstacles
 
 CLEARANCE = 0.005
 GOAL = np.array([0.35, 0.0])

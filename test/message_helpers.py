@@ -10,7 +10,7 @@ import pytest
 import ros_helpers
 from rosbags.typesys import Stores, get_typestore
 
-from foc_ros.conversions.types import MessageTypes, RclpyTypes, RosbagsTypes, header
+from foc_ros.ros.messages.types import MessageTypes, RclpyTypes, RosbagsTypes, header
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 DATATYPES = {'i1': 1, 'u1': 2, 'i2': 3, 'u2': 4, 'i4': 5, 'u4': 6, 'f4': 7, 'f8': 8}

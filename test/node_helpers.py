@@ -9,7 +9,7 @@ import numpy as np
 from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped
 from ros_helpers import Graph
 
-from foc_ros.conversions.types import RclpyTypes
+from foc_ros.ros.messages.types import RclpyTypes
 
 TYPES = RclpyTypes()
 ROWS = [(0.15, 0.02, 0.0, 0.03)]
@@ -39,8 +39,8 @@ class Bench:
         from sensor_msgs.msg import PointCloud2
         from visualization_msgs.msg import MarkerArray
 
-        from foc_ros.endpoints import OUTPUTS
-        from foc_ros.node import FocNode
+        from foc_ros.ros.endpoints import OUTPUTS
+        from foc_ros.ros.node import FocNode
 
         parameters = QUICK | RELIABLE_HAND | options.pop('parameters', {})
         ticking, connected = options.pop('ticking', False), options.pop('connected', True)

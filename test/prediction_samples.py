@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.foc.records import Candidate, Outcome, Prediction, Solution, Status, make_obstacles
+from foc_ros.core.types import Candidate, Outcome, Prediction, Solution, Status, make_obstacles
 
 STEPS, DT = 4, 0.05
 

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foc_ros.foc.config import FocConfig
-from foc_ros.foc.dynamics import triple_integrator_horizon
-from foc_ros.foc.forward import forward
-from foc_ros.foc.problem import Problem, rest_to_goal
-from foc_ros.foc.records import Obstacles, Solution, make_obstacles
-from foc_ros.foc.start import cold
+from foc_ros.core.config import FocConfig
+from foc_ros.core.dynamics.plants import triple_integrator_horizon
+from foc_ros.core.ocp.problem import Problem, rest_to_goal
+from foc_ros.core.ocp.solve import forward
+from foc_ros.core.ocp.warm_start import cold
+from foc_ros.core.types import Obstacles, Solution, make_obstacles
 
 REFERENCE = Path(__file__).resolve().parents[2] / 'shared' / 'reference' / 'cases.json'
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foc_ros.foc.records import (
+from foc_ros.core.types import (
     NANOSECONDS,
     Array,
     Candidate,

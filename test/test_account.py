@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from reach_helpers import bowed, one_obstacle, reach, solved
 
-from foc_ros.foc.records import Status, make_obstacles
+from foc_ros.core.types import Status, make_obstacles
 
 BOWED = bowed((0, 0), (0.3, 0), 50, 0.08)
 EVERY = ['lv', 'hc', 'optimal', 'fixed', 'algorithm1']

@@ -4,14 +4,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.dynamics import horizon, triple_integrator
-from foc_ros.foc.estimator import gramian, transition
-from foc_ros.foc.memory import Memory
-from foc_ros.foc.predictor import predict
-from foc_ros.foc.records import HandState, make_obstacles
-from foc_ros.foc.replanning import replanned_error_map, triple_integrator_error_map, triple_integrator_process_covariance
-from foc_ros.foc.time_cost import effort_along, least_cost_time
+from foc_ros.core.config import Config, updated
+from foc_ros.core.dynamics.plants import horizon, triple_integrator
+from foc_ros.core.dynamics.replanning import (
+    replanned_error_map,
+    triple_integrator_error_map,
+    triple_integrator_process_covariance,
+)
+from foc_ros.core.estimation.kalman_filter import gramian, transition
+from foc_ros.core.estimation.time_cost import effort_along, least_cost_time
+from foc_ros.core.memory import Memory
+from foc_ros.core.predictor import predict
+from foc_ros.core.types import HandState, make_obstacles
 
 PASSING = updated(
     Config(), {'duration.arrival': 'passing', 'duration.model': 'fixed', 'duration.fixed_s': 1.0, 'foc.process_noise': 0.5}

@@ -13,9 +13,9 @@ import pytest
 from bag_helpers import START_NS, TYPES, messages, write_bag
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from foc_ros.bags import TYPESTORE, BagReader, BagWriter
-from foc_ros.foc.errors import RecordingError
-from foc_ros.input_messages import hand_pose
+from foc_ros.core.errors import RecordingError
+from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
+from foc_ros.ros.messages.input_messages import hand_pose
 
 
 def read(path: Path, chosen: dict[str, str] | None = None) -> list[Any]:

@@ -20,7 +20,7 @@ from std_srvs.srv import SetBool  # noqa: E402
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = ROOT / 'doc' / 'examples' / 'teleoperation_loop.py'
-NODE = ['-m', 'foc_ros.node_main', '--ros-args', '-r', 'hand_pose:=MTMR/measured_cp', '-p', 'scene.timeout_s:=0.5']
+NODE = ['-m', 'foc_ros.ros.main', '--ros-args', '-r', 'hand_pose:=MTMR/measured_cp', '-p', 'scene.timeout_s:=0.5']
 QUICK = ['-p', 'foc.steps:=20', '-p', 'homotopy.max_candidates:=2', '-p', 'rate_hz:=20.0']
 
 

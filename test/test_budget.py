@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.deadline import OutOfTimeError
-from foc_ros.foc.estimator import update
-from foc_ros.foc.memory import Memory
-from foc_ros.foc.outcomes import Earlier
-from foc_ros.foc.predictor import predict
-from foc_ros.foc.records import HandSample, Status, make_obstacles
+from foc_ros.core.candidates import Earlier
+from foc_ros.core.config import Config, updated
+from foc_ros.core.deadline import OutOfTimeError
+from foc_ros.core.estimation.kalman_filter import update
+from foc_ros.core.memory import Memory
+from foc_ros.core.predictor import predict
+from foc_ros.core.types import HandSample, Status, make_obstacles
 
 OBSTACLES = make_obstacles([[0.12, 0.01], [0.2, -0.03]], [0.02, 0.02], 0.001)
 GOALS = np.array([[0.3, 0.0]])
@@ -67,13 +67,13 @@ def test_the_likeliest_of_last_time_comes_first(monkeypatch, turned):
     def forward_with_time_for_one(problem, start, settings, deadline):
         asked.append(problem)
         if len(asked) > 1:
-            monkeypatch.setattr('foc_ros.foc.deadline.Deadline.check', out_of_time)
+            monkeypatch.setattr('foc_ros.core.deadline.Deadline.check', out_of_time)
         return real(problem, start, settings, deadline)
 
     def out_of_time(_):
         raise OutOfTimeError
 
-    from foc_ros.foc import outcomes
+    from foc_ros.core import candidates as outcomes
 
     real = outcomes.forward
     monkeypatch.setattr(outcomes, 'forward', forward_with_time_for_one)

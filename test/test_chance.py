@@ -5,8 +5,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foc_ros.foc.chance import CERTAIN_K, achieved_k, centres, eta_of_k, expectation, k_of_eta, size_moments, variance
-from foc_ros.foc.records import make_obstacles
+from foc_ros.core.obstacles.chance_constraint import (
+    CERTAIN_K,
+    achieved_k,
+    centres,
+    eta_of_k,
+    expectation,
+    k_of_eta,
+    size_moments,
+    variance,
+)
+from foc_ros.core.types import make_obstacles
 
 
 @given(st.floats(0.0, 0.999))

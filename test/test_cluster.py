@@ -7,8 +7,8 @@ import pytest
 import worker_tasks
 from test_workers import ITEMS, SQUARES
 
-from foc_ros.evaluation.workers import Failure, run, workers
-from foc_ros.foc.errors import InputError, RecordingError
+from foc_ros.analysis.evaluation.workers import Failure, run, workers
+from foc_ros.core.errors import InputError, RecordingError
 
 distributed = pytest.importorskip('distributed', reason='the extra cluster is not installed')
 
@@ -52,7 +52,7 @@ def test_a_scheduler_that_dies_ends_the_run_in_words() -> None:
 
 
 def test_a_scheduler_without_workers_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('foc_ros.evaluation.cluster.CONNECT_S', 0.3)
+    monkeypatch.setattr('foc_ros.analysis.evaluation.cluster.CONNECT_S', 0.3)
     refused = pytest.raises(InputError, match='--scheduler: expected a Dask scheduler with workers, got none at')
     with distributed.LocalCluster(n_workers=0, dashboard_address=':0') as cluster, refused:
         workers(argparse.Namespace(scheduler=cluster.scheduler_address))

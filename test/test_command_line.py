@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from foc_ros import command_line
-from foc_ros.foc.errors import InputError
+from foc_ros.cli import main as command_line
+from foc_ros.core.errors import InputError
 
 ROOT = Path(__file__).parents[1]
 
@@ -39,7 +39,7 @@ def test_wrong_arguments_exit_2_with_one_line(arguments: list[str], line: str) -
 
 def test_help_names_every_command_and_imports_nothing_heavy() -> None:
     program = (
-        'import sys\nfrom foc_ros.command_line import main\ntry:\n main(["--help"])\nfinally:\n'
+        'import sys\nfrom foc_ros.cli.main import main\ntry:\n main(["--help"])\nfinally:\n'
         ' print("heavy:", sorted({"numpy", "rclpy", "rosbags", "rich", "piqp"} & set(sys.modules)))'
     )
     result = subprocess.run([sys.executable, '-c', program], cwd=ROOT, capture_output=True, text=True, timeout=100, check=False)

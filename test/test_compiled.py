@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from foc_ros.foc.compiled import forget_outdated
+from foc_ros.core.kernels import forget_outdated
 
 
 @pytest.mark.parametrize(('changed', 'stays'), [('callee.py', False), ('caller.py', False), ('other.py', True), (None, True)])

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from message_helpers import SECOND, both_kinds, cloud, message_types, obstacle_table
 
-from foc_ros.conversions.obstacle_cloud import MAX_ROWS, cloud_obstacles
-from foc_ros.conversions.types import MessageTypes
-from foc_ros.foc.errors import MessageError
+from foc_ros.core.errors import MessageError
+from foc_ros.ros.messages.obstacle_cloud import MAX_ROWS, cloud_obstacles
+from foc_ros.ros.messages.types import MessageTypes
 
 BAGS = message_types('rosbags')
 FULL = [(name, '<f4') for name in ('x', 'y', 'z', 'radius', 'radius_stddev', 'vx', 'vy', 'vz')] + [('id', '<u4')]

@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from message_helpers import SECOND, both_kinds, marker, marker_array, message_types
 
-from foc_ros.conversions import marker_scene
-from foc_ros.conversions.marker_scene import MarkerScene
-from foc_ros.conversions.types import MessageTypes
-from foc_ros.foc.errors import MessageError
+from foc_ros.core.errors import MessageError
+from foc_ros.ros.messages import marker_scene
+from foc_ros.ros.messages.marker_scene import MarkerScene
+from foc_ros.ros.messages.types import MessageTypes
 
 BAGS = message_types('rosbags')
 

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from message_helpers import STORE, both_kinds, message_types
 from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction, three_ways
 
-from foc_ros.conversions.outputs import OUTPUTS, output_messages
-from foc_ros.conversions.plane import lift
-from foc_ros.conversions.ranking import MAX_RATIO
-from foc_ros.conversions.types import MessageTypes
-from foc_ros.foc.errors import FocError
-from foc_ros.foc.records import Outcome, Prediction, Status, make_obstacles
+from foc_ros.core.errors import FocError
+from foc_ros.core.types import Outcome, Prediction, Status, make_obstacles
+from foc_ros.ros.messages.outputs import OUTPUTS, output_messages
+from foc_ros.ros.messages.plane import lift
+from foc_ros.ros.messages.ranking import MAX_RATIO
+from foc_ros.ros.messages.types import MessageTypes
 
 BAGS = message_types('rosbags')
 NAMES = ['x', 'y', 'z', 't', 'vx', 'vy', 'vz', 'xx', 'xy', 'xz', 'yy', 'yz', 'zz', 'candidate', 'likelihood']

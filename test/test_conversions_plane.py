@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from foc_ros.conversions.plane import lift, project
+from foc_ros.ros.messages.plane import lift, project
 
 PLANES = ('xy', 'xz', 'yz')
 points = arrays(np.float64, st.tuples(st.integers(0, 5), st.just(3)), elements=st.floats(-1e4, 1e4))

@@ -10,8 +10,8 @@ import pytest
 from ros_helpers import require_ros
 from rosbags.typesys import Stores, get_typestore
 
-from foc_ros.conversions import types as conversion_types
-from foc_ros.conversions.types import MessageTypes, RclpyTypes, RosbagsTypes
+from foc_ros.ros.messages import types as conversion_types
+from foc_ros.ros.messages.types import MessageTypes, RclpyTypes, RosbagsTypes
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foc_ros.bags import BagReader
-from foc_ros.command_line import main
-from foc_ros.foc.errors import RecordingError
+from foc_ros.cli.main import main
+from foc_ros.core.errors import RecordingError
+from foc_ros.io.bags import BagReader
 
 RECORDINGS = 'recording,t_s,x_m,y_m\na,0.0,0.1,0.2\na,0.5,0.3,0.4\na,1.2,0.5,0.6\nb,3.25,-1,2e-3\n'
 OBSTACLES = 'name,x_m,y_m,radius_m\nleft,0.5,-0.1,0.03\nright,0.425,0.08,0.025\n'

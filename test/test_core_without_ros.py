@@ -24,11 +24,11 @@ sys.meta_path.insert(0, Blocker())
 
 IMPORT_ALL = """
 import importlib, pkgutil
-import foc_ros.foc
-names = [module.name for module in pkgutil.walk_packages(foc_ros.foc.__path__, 'foc_ros.foc.')]
+import foc_ros.core
+names = [module.name for module in pkgutil.walk_packages(foc_ros.core.__path__, 'foc_ros.core.')]
 for name in names:
     importlib.import_module(name)
-assert 'foc_ros.foc.predictor' in names, names
+assert 'foc_ros.core.predictor' in names, names
 """
 
 PREDICT = """

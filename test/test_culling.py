@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from foc_ros.foc.culling import relevant
-from foc_ros.foc.records import make_obstacles
+from foc_ros.core.obstacles.culling import relevant
+from foc_ros.core.types import make_obstacles
 
 HAND, GOALS = np.zeros(2), np.array([[0.3, 0.0], [0.0, 0.3]])
 RNG = np.random.default_rng(3)

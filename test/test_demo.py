@@ -44,7 +44,7 @@ def counted(bag: Path) -> Counter[str]:
 
 
 def test_end_to_end(domain: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from foc_ros.demo.command import perform
+    from foc_ros.cli.demo.command import perform
 
     before = dict(os.environ)
     assert perform(tmp_path / 'out', last_s=LAST_S, domain=domain) == 0
@@ -65,7 +65,7 @@ def test_end_to_end(domain: int, tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 def test_the_live_predictions_are_those_of_the_recording(domain: int, tmp_path: Path) -> None:
     """Every prediction carries the stamp of a hand pose that was sent, each stamp once, in order."""
-    from foc_ros.demo.command import perform
+    from foc_ros.cli.demo.command import perform
 
     perform(tmp_path / 'out', last_s=1.0, domain=domain)
     stamps: dict[str, list[int]] = {'/hand_pose': [], '/foc/prediction': []}

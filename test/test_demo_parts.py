@@ -16,18 +16,18 @@ import pytest
 from report_samples import START_NS, prediction
 from rich.console import Console
 
-from foc_ros.bags import TYPESTORE, Item
-from foc_ros.command_line import main
-from foc_ros.conversions.outputs import likelihood_array, prediction_cloud
-from foc_ros.conversions.types import RosbagsTypes
-from foc_ros.demo import command, environment, node_process
-from foc_ros.demo.display import Display
-from foc_ros.demo.ledger import Ledger
-from foc_ros.foc.config import Config
-from foc_ros.foc.errors import InputError
-from foc_ros.foc.records import Prediction
-from foc_ros.input_messages import goal_poses, hand_pose, obstacle_cloud
-from foc_ros.moments import moment_of
+from foc_ros.cli.demo import command, environment, node_process
+from foc_ros.cli.demo.display import Display
+from foc_ros.cli.demo.recorder import Ledger
+from foc_ros.cli.main import main
+from foc_ros.core.config import Config
+from foc_ros.core.errors import InputError
+from foc_ros.core.types import Prediction
+from foc_ros.io.bags import TYPESTORE, Item
+from foc_ros.reporting.snapshots import moment_of
+from foc_ros.ros.messages.input_messages import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.ros.messages.outputs import likelihood_array, prediction_cloud
+from foc_ros.ros.messages.types import RosbagsTypes
 
 TYPES = RosbagsTypes(TYPESTORE)
 STEP_NS = 20_000_000

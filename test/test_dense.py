@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from foc_ros.foc import dense
-from foc_ros.foc.compiled import compiled
+from foc_ros.core import linear_algebra as dense
+from foc_ros.core.kernels import compiled
 
 GENERATOR = np.random.default_rng(4)
 A, B = GENERATOR.normal(size=(5, 7)), GENERATOR.normal(size=(3, 7))

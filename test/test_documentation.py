@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from foc_ros.command_line import COMMANDS
-from foc_ros.foc.config import parameters
+from foc_ros.cli.main import COMMANDS
+from foc_ros.core.config import parameters
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'doc').glob('**/*.md')])

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.doubt import lateness, waiting
-from foc_ros.foc.dynamics import horizon, triple_integrator, triple_integrator_horizon
-from foc_ros.foc.forward import forward
-from foc_ros.foc.memory import Memory
-from foc_ros.foc.predictor import predict
-from foc_ros.foc.problem import rest_to_goal
-from foc_ros.foc.records import HandState, Solution, make_obstacles
-from foc_ros.foc.replanning import goal_map, triple_integrator_goal_map
-from foc_ros.foc.start import cold
+from foc_ros.core.config import Config, updated
+from foc_ros.core.dynamics.plants import horizon, triple_integrator, triple_integrator_horizon
+from foc_ros.core.dynamics.predictive_covariance import lateness, waiting
+from foc_ros.core.dynamics.replanning import goal_map, triple_integrator_goal_map
+from foc_ros.core.memory import Memory
+from foc_ros.core.ocp.problem import rest_to_goal
+from foc_ros.core.ocp.solve import forward
+from foc_ros.core.ocp.warm_start import cold
+from foc_ros.core.predictor import predict
+from foc_ros.core.types import HandState, Solution, make_obstacles
 
 STEPS = 50
 S = np.arange(STEPS + 1) / STEPS

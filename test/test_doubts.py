@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from evaluation_samples import TWO_WAYS, H, observation, recorded
 
-from foc_ros.evaluation.observations import TIMES_S
-from foc_ros.fitting.densities import DOUBTS, NO_DOUBT, Doubt, log_densities, widened
-from foc_ros.fitting.doubts import coverage, density_table, doubt_estimates, doubts
-from foc_ros.foc.config import Config
+from foc_ros.analysis.evaluation.observations import TIMES_S
+from foc_ros.analysis.fitting.densities import DOUBTS, NO_DOUBT, Doubt, log_densities, widened
+from foc_ros.analysis.fitting.doubts import coverage, density_table, doubt_estimates, doubts
+from foc_ros.core.config import Config
 
 S = np.array(TIMES_S)
 TO_GOAL = 10 * S**3 - 15 * S**4 + 6 * S**5

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foc_ros.foc.config import DurationConfig
-from foc_ros.foc.duration import movement_time, times_to_go
-from foc_ros.foc.records import NANOSECONDS, HandState
+from foc_ros.core.config import DurationConfig
+from foc_ros.core.estimation.duration import movement_time, times_to_go
+from foc_ros.core.types import NANOSECONDS, HandState
 
 FITTS = DurationConfig(
     model='fitts', fitts_a_s=0.2, fitts_b_s=0.25, target_width=0.02, min_time_to_go_s=0.3, max_time_to_go_s=10.0

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from foc_ros.foc.dynamics import Plant, damped_mass, horizon, states_at_goal, triple_integrator, triple_integrator_horizon
-from foc_ros.foc.errors import InputError
-from foc_ros.foc.replanning import replanned_error_map, triple_integrator_error_map
+from foc_ros.core.dynamics.plants import Plant, damped_mass, horizon, states_at_goal, triple_integrator, triple_integrator_horizon
+from foc_ros.core.dynamics.replanning import replanned_error_map, triple_integrator_error_map
+from foc_ros.core.errors import InputError
 
 
 def zero_order_hold(a: np.ndarray, b: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:

@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from foc_ros.foc.config import EstimatorConfig
-from foc_ros.foc.effort import LEAST_TIME_S, Effort, advanced
-from foc_ros.foc.estimator import update
-from foc_ros.foc.records import Array, HandSample
+from foc_ros.core.config import EstimatorConfig
+from foc_ros.core.estimation.effort import LEAST_TIME_S, Effort, advanced
+from foc_ros.core.estimation.kalman_filter import update
+from foc_ros.core.types import Array, HandSample
 
 STDDEV = 1e-3
 

@@ -9,9 +9,9 @@ import pytest
 from reach_helpers import bowed, case_guess, case_problem, random_scene, reach, reference_cases, solved
 from varied_reaches import varied_reach
 
-from foc_ros.foc.homotopy import path_sides
-from foc_ros.foc.problem import Problem
-from foc_ros.foc.records import Solution, Status
+from foc_ros.core.homotopy import path_sides
+from foc_ros.core.ocp.problem import Problem
+from foc_ros.core.types import Solution, Status
 
 STRATEGIES = ('lv', 'hc', 'optimal')
 EVERY = pytest.mark.parametrize('strategy', STRATEGIES)

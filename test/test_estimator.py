@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foc_ros.foc.config import EstimatorConfig
-from foc_ros.foc.estimator import Track, gramian, transition, update
-from foc_ros.foc.records import NANOSECONDS, Array, HandSample
-from foc_ros.foc.verdict import Verdict
+from foc_ros.core.config import EstimatorConfig
+from foc_ros.core.estimation.kalman_filter import Track, gramian, transition, update
+from foc_ros.core.sample_status import Verdict
+from foc_ros.core.types import NANOSECONDS, Array, HandSample
 
 CONFIG = EstimatorConfig(position_stddev=0.001, jerk_density=5.0, onset_speed=0.05, gap_s=0.5)
 START = 100 * NANOSECONDS

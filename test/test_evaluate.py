@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from evaluation_samples import reach, write_tables
 
-from foc_ros.command_line import main
+from foc_ros.cli.main import main
 
 ASIDE = {'left': 0.06, 'right': -0.06, 'left too': 0.05}
 OBSTACLE = [(0.15, 0.0, 0.03)]
@@ -21,7 +21,7 @@ GOAL = [(0.3, 0.0)]
 def at_hand(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Work is done in this process, where it is not the processes that are tested: to start one takes a second."""
     if 'workers' not in request.fixturenames:
-        monkeypatch.setattr('foc_ros.evaluation.command.workers', lambda _: ThreadPoolExecutor(1))
+        monkeypatch.setattr('foc_ros.cli.evaluate.workers', lambda _: ThreadPoolExecutor(1))
 
 
 @pytest.fixture

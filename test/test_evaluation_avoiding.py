@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from homotopy_scenes import AVOIDING
 
-from foc_ros.evaluation.labels import check_labels, gaps
-from foc_ros.evaluation.observe import observe
-from foc_ros.evaluation.questions import GAP, GOAL, WAY, question, relevant
-from foc_ros.evaluation.recordings import find_recordings
-from foc_ros.foc.config import updated
-from foc_ros.parameters import load_parameter_file
+from foc_ros.analysis.evaluation.labels import check_labels, gaps
+from foc_ros.analysis.evaluation.observe import observe
+from foc_ros.analysis.evaluation.questions import GAP, GOAL, WAY, question, relevant
+from foc_ros.analysis.evaluation.recordings import find_recordings
+from foc_ros.core.config import updated
+from foc_ros.ros.parameters import load_parameter_file
 
 PARAMETERS = Path(__file__).parents[1] / 'doc' / 'examples' / 'thumb_stick.yaml'
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from evaluation_samples import TWO_WAYS, observation, recorded, ways
 
-from foc_ros.evaluation.families import families
-from foc_ros.evaluation.forecasts import (
+from foc_ros.analysis.evaluation.families import families
+from foc_ros.analysis.evaluation.forecasts import (
     boltzmann,
     constant_velocity,
     nearest_gap,
@@ -17,12 +17,12 @@ from foc_ros.evaluation.forecasts import (
     shortest_path,
     straight_minimum_jerk,
 )
-from foc_ros.evaluation.heldout import asked, log_likelihoods
-from foc_ros.evaluation.minimum_jerk import straight_cost, straight_positions
-from foc_ros.evaluation.observations import TIMES_S
-from foc_ros.evaluation.questions import GOAL, WAY, question
-from foc_ros.foc.config import LikelihoodConfig
-from foc_ros.foc.records import LEFT, RIGHT
+from foc_ros.analysis.evaluation.heldout import asked, log_likelihoods
+from foc_ros.analysis.evaluation.minimum_jerk import straight_cost, straight_positions
+from foc_ros.analysis.evaluation.observations import TIMES_S
+from foc_ros.analysis.evaluation.questions import GOAL, WAY, question
+from foc_ros.core.config import LikelihoodConfig
+from foc_ros.core.types import LEFT, RIGHT
 
 L, R = LEFT, RIGHT
 

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 from evaluation_samples import reach, write_tables
 
-from foc_ros.bags import TYPESTORE, BagReader, Item
-from foc_ros.conversions.types import RosbagsTypes
-from foc_ros.convert import EPOCH_NS, read_goals, read_movements, read_obstacles, write_movement
-from foc_ros.evaluation.forecasts import power_rule
-from foc_ros.evaluation.observations import Observations
-from foc_ros.evaluation.observe import observe
-from foc_ros.evaluation.questions import GAP, GOAL, WAY, question, relevant
-from foc_ros.evaluation.recordings import BagRecording, find_recordings
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.records import LEFT
-from foc_ros.input_messages import goal_poses
-from foc_ros.replay import Replay
+from foc_ros.analysis.evaluation.forecasts import power_rule
+from foc_ros.analysis.evaluation.observations import Observations
+from foc_ros.analysis.evaluation.observe import observe
+from foc_ros.analysis.evaluation.questions import GAP, GOAL, WAY, question, relevant
+from foc_ros.analysis.evaluation.recordings import BagRecording, find_recordings
+from foc_ros.analysis.replay import Replay
+from foc_ros.analysis.csv_recordings import EPOCH_NS, read_goals, read_movements, read_obstacles, write_movement
+from foc_ros.core.config import Config, updated
+from foc_ros.core.types import LEFT
+from foc_ros.io.bags import TYPESTORE, BagReader, Item
+from foc_ros.ros.messages.input_messages import goal_poses
+from foc_ros.ros.messages.types import RosbagsTypes
 
 FAST = {'rate_hz': 4.0, 'foc.steps': 20, 'foc.strategy': 'fixed', 'foc.tau': 1e-4, 'foc.lam': 0.0, 'homotopy.max_candidates': 6}
 PLAIN = updated(Config(), FAST)

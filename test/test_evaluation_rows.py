@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from foc_ros.evaluation.path import Path, reached
-from foc_ros.evaluation.rows import axis, lines, rows, to_pass
+from foc_ros.analysis.evaluation.path import Path, reached
+from foc_ros.analysis.evaluation.rows import axis, lines, rows, to_pass
 
 ALONG = np.array([1.0, 0.0])
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from evaluation_samples import TWO_WAYS, observation, recorded, ways
 
-from foc_ros.evaluation.forecasts import DOUBT, of_guess, of_shares, published, uniform
-from foc_ros.evaluation.heldout import chosen
-from foc_ros.evaluation.observations import TIMES_S
-from foc_ros.evaluation.positions import position_scores
-from foc_ros.evaluation.questions import GAP, GOAL, WAY, question, relevant
-from foc_ros.evaluation.scores import Judged, calibration_error, judge, leads_from, reliability, summary, tenth
-from foc_ros.foc.records import LEFT, RIGHT
+from foc_ros.analysis.evaluation.forecasts import DOUBT, of_guess, of_shares, published, uniform
+from foc_ros.analysis.evaluation.heldout import chosen
+from foc_ros.analysis.evaluation.observations import TIMES_S
+from foc_ros.analysis.evaluation.positions import position_scores
+from foc_ros.analysis.evaluation.questions import GAP, GOAL, WAY, question, relevant
+from foc_ros.analysis.evaluation.scores import Judged, calibration_error, judge, leads_from, reliability, summary, tenth
+from foc_ros.core.types import LEFT, RIGHT
 
 L, R = LEFT, RIGHT
 TWO_ROWS = {'centre': [(1.0, 0.2), (1.0, -0.2), (2.0, 0.0)], 'row': (0, 0, 1)}

@@ -14,11 +14,11 @@ import ros_helpers
 from bag_helpers import write_bag
 from fit_recordings import write_tables
 
-from foc_ros.command_line import main
-from foc_ros.fitting import fit as fitting
-from foc_ros.fitting import movements
-from foc_ros.foc.config import Config, flatten, updated
-from foc_ros.parameters import dump_parameter_file, load_parameter_file
+from foc_ros.analysis.fitting import fit as fitting
+from foc_ros.analysis.fitting import movements
+from foc_ros.cli.main import main
+from foc_ros.core.config import Config, flatten, updated
+from foc_ros.ros.parameters import dump_parameter_file, load_parameter_file
 
 QUICK = {'foc.steps': 15, 'homotopy.max_candidates': 2, 'duration.fitts_a_s': 0.3}
 

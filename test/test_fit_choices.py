@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from fit_recordings import demonstration, write_tables
 
-from foc_ros.evaluation.lanes import Lanes
-from foc_ros.evaluation.recordings import find_recordings
-from foc_ros.fitting import search as searching
-from foc_ros.fitting.duration_fit import fit_duration, other_models
-from foc_ros.fitting.fading_fit import NAME, fit_fading
-from foc_ros.fitting.found import Fit
-from foc_ros.fitting.movements import DURATIONS, movements
-from foc_ros.fitting.replays import Replays
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.estimator import transition
-from foc_ros.foc.records import Array, make_obstacles
+from foc_ros.analysis.evaluation.lanes import Lanes
+from foc_ros.analysis.evaluation.recordings import find_recordings
+from foc_ros.analysis.fitting import search as searching
+from foc_ros.analysis.fitting.duration_fit import fit_duration, other_models
+from foc_ros.analysis.fitting.fading_fit import NAME, fit_fading
+from foc_ros.analysis.fitting.found import Fit
+from foc_ros.analysis.fitting.movements import DURATIONS, movements
+from foc_ros.analysis.fitting.replays import Replays
+from foc_ros.core.config import Config, updated
+from foc_ros.core.estimation.kalman_filter import transition
+from foc_ros.core.types import Array, make_obstacles
 
 CONFIG = updated(Config(), {'foc.steps': 15, 'homotopy.max_candidates': 2, 'rate_hz': 4.0})
 GOAL = np.array([[0.3, 0.0]])
@@ -163,5 +163,5 @@ def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twic
         replays = Replays(recordings, {}, executor)
         scores = replays.scores([hopeless, CONFIG], names, 'both')
         assert scores.shape == (2, 2, 4) and scores[0, 1].mean() > scores[0, 0].mean() + 0.1
-        monkeypatch.setattr('foc_ros.fitting.replays._foretold', None)
+        monkeypatch.setattr('foc_ros.analysis.fitting.replays._foretold', None)
         assert np.array_equal(replays.scores([CONFIG, hopeless], names, 'again'), scores[:, ::-1])

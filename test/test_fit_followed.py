@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from foc_ros.fitting.demonstrations import Demonstration
-from foc_ros.fitting.followed import MOST, NAME, fit_followed, ways
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.records import make_obstacles
+from foc_ros.analysis.fitting.demonstrations import Demonstration
+from foc_ros.analysis.fitting.followed import MOST, NAME, fit_followed, ways
+from foc_ros.core.config import Config, updated
+from foc_ros.core.types import make_obstacles
 
 
 def demonstration(centres, goals=((1.0, 0.0),)) -> Demonstration:

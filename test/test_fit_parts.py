@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from fit_recordings import GOALS, demonstration, reach
 
-from foc_ros.fitting.duration_fit import fit_duration
-from foc_ros.fitting.estimator_fit import fit_estimator
-from foc_ros.fitting.innovations import Innovations
-from foc_ros.fitting.resampling import quadratic
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.estimator import gramian, transition, update
-from foc_ros.foc.records import HandSample, make_obstacles
+from foc_ros.analysis.fitting.duration_fit import fit_duration
+from foc_ros.analysis.fitting.estimator_fit import fit_estimator
+from foc_ros.analysis.fitting.innovations import Innovations
+from foc_ros.analysis.fitting.resampling import quadratic
+from foc_ros.core.config import Config, updated
+from foc_ros.core.estimation.kalman_filter import gramian, transition, update
+from foc_ros.core.types import HandSample, make_obstacles
 
 
 def _drifting(seed: int, stddev: float, density: float, count: int = 6) -> list:

@@ -8,8 +8,8 @@ import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
-from foc_ros.fitting.report import write_report
-from foc_ros.foc.errors import InputError
+from foc_ros.core.errors import InputError
+from foc_ros.reporting.fit_report import write_report
 
 ANSWER = {
     'parameters': {

@@ -5,9 +5,9 @@ from itertools import islice, pairwise
 import numpy as np
 import pytest
 
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.pipeline import Pipeline
-from foc_ros.foc.records import HandSample, make_obstacles
+from foc_ros.core.config import Config, updated
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.types import HandSample, make_obstacles
 
 PERIOD_NS = 10_000_000
 SAMPLES = 1000

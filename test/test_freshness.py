@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.records import NANOSECONDS
-from foc_ros.freshness import Freshness
-from foc_ros.topics import CLOUD, HAND, MARKERS
+from foc_ros.core.config import Config, updated
+from foc_ros.core.types import NANOSECONDS
+from foc_ros.io.topics import CLOUD, HAND, MARKERS
+from foc_ros.ros.freshness import Freshness
 
 CONFIG = updated(Config(), {'estimator.hand_timeout_s': 0.5, 'scene.timeout_s': 2.0})
 NEVER = updated(Config(), {'estimator.hand_timeout_s': 0.0, 'scene.timeout_s': 0.0})

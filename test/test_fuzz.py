@@ -17,11 +17,11 @@ from hypothesis import strategies as st
 from message_helpers import SECOND, STORE, RosbagsTypes, cloud, obstacle_table, pose_array
 from ros_helpers import graph, require_ros
 
-from foc_ros import topics
-from foc_ros.conversions.outputs import output_messages
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.pipeline import Pipeline
-from foc_ros.intake import Intake
+from foc_ros.core.config import Config, updated
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.io import topics
+from foc_ros.ros.intake import Intake
+from foc_ros.ros.messages.outputs import output_messages
 
 COUNT = int(os.environ.get('FOC_ROS_FUZZ', '2000'))
 LENGTH = 20

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from reach_helpers import one_obstacle, random_scene, reach
 
-from foc_ros.foc.config import FocConfig
-from foc_ros.foc.dynamics import damped_mass, horizon, triple_integrator
-from foc_ros.foc.forward import forward
-from foc_ros.foc.optimal import surrogate_qp
-from foc_ros.foc.problem import Problem, rest_to_goal
-from foc_ros.foc.qp import Cost, effort_cost, half_planes
-from foc_ros.foc.records import make_obstacles
-from foc_ros.foc.solver import WorkingSet
-from foc_ros.foc.start import cold
+from foc_ros.core.config import FocConfig
+from foc_ros.core.dynamics.plants import damped_mass, horizon, triple_integrator
+from foc_ros.core.ocp.problem import Problem, rest_to_goal
+from foc_ros.core.ocp.qp import Cost, effort_cost, half_planes
+from foc_ros.core.ocp.solve import forward
+from foc_ros.core.ocp.strategies.optimal import surrogate_qp
+from foc_ros.core.ocp.warm_start import cold
+from foc_ros.core.ocp.working_set import WorkingSet
+from foc_ros.core.types import make_obstacles
 
 STEPS, LAMBDA = 12, 3e4
 PLANTS = {'jerk': triple_integrator(0.05), 'force': damped_mass(0.05, 1.5, 4.0)}

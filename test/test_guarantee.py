@@ -13,10 +13,10 @@ import pytest
 from reach_helpers import solved
 from varied_reaches import STEPS, VariedReach, feasible_reaches
 
-from foc_ros.foc.chance import k_of_eta
-from foc_ros.foc.monte_carlo import monte_carlo, wilson
-from foc_ros.foc.problem import Problem
-from foc_ros.foc.records import Solution, Status
+from foc_ros.core.obstacles.chance_constraint import k_of_eta
+from foc_ros.core.ocp.monte_carlo import monte_carlo, wilson
+from foc_ros.core.ocp.problem import Problem
+from foc_ros.core.types import Solution, Status
 
 REACHES = 200
 SAMPLES = 2000

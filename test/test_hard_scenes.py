@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.memory import Memory
-from foc_ros.foc.predictor import predict
-from foc_ros.foc.records import HandState, Obstacles, Prediction, Status, make_obstacles
+from foc_ros.core.config import Config, updated
+from foc_ros.core.memory import Memory
+from foc_ros.core.predictor import predict
+from foc_ros.core.types import HandState, Obstacles, Prediction, Status, make_obstacles
 
 GOAL = np.array([[0.3, 0.0]])
 CONFIG = updated(Config(), {'foc.steps': 30})

@@ -5,7 +5,7 @@ import pytest
 from homotopy_brute_force import shortest_by_pattern
 from homotopy_scenes import CLEARANCE, GOAL, find, patterns, random_scene
 
-from foc_ros.foc.records import make_obstacles
+from foc_ros.core.types import make_obstacles
 
 K = 6
 TIE = 0.01

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from homotopy_scenes import CLEARANCE, GOAL, find, gap_to_circles
 
-from foc_ros.foc.config import HomotopyConfig
-from foc_ros.foc.errors import SceneError
-from foc_ros.foc.homotopy import path_sides, search
-from foc_ros.foc.records import LEFT, RIGHT, make_obstacles
+from foc_ros.core.config import HomotopyConfig
+from foc_ros.core.errors import SceneError
+from foc_ros.core.homotopy import path_sides, search
+from foc_ros.core.types import LEFT, RIGHT, make_obstacles
 
 NOTHING = make_obstacles()
 

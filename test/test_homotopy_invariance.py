@@ -5,8 +5,8 @@ from homotopy_scenes import GOAL, find, gap_to_circles, random_scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foc_ros.foc.homotopy import path_sides
-from foc_ros.foc.records import make_obstacles
+from foc_ros.core.homotopy import path_sides
+from foc_ros.core.types import make_obstacles
 
 scenes = st.tuples(st.integers(0, 2**32 - 1), st.integers(1, 9))
 ALL = settings(max_examples=60, deadline=None, derandomize=True)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from homotopy_scenes import GOAL, find
 
-from foc_ros.foc.homotopy import classes, levels, roadmap
-from foc_ros.foc.homotopy.tangents import LENGTH
-from foc_ros.foc.homotopy.ways import shortest_ways
-from foc_ros.foc.records import make_obstacles
+from foc_ros.core.homotopy import classes, levels, roadmap
+from foc_ros.core.homotopy.tangents import LENGTH
+from foc_ros.core.homotopy.ways import shortest_ways
+from foc_ros.core.types import make_obstacles
 
 
 def crowd(seed, n, size, wide):

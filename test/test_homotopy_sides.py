@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foc_ros.foc.errors import SceneError
-from foc_ros.foc.homotopy import path_sides, swept_angles
-from foc_ros.foc.records import LEFT, RIGHT, make_obstacles
+from foc_ros.core.errors import SceneError
+from foc_ros.core.homotopy import path_sides, swept_angles
+from foc_ros.core.types import LEFT, RIGHT, make_obstacles
 
 CASES = Path(__file__).parents[2] / 'shared' / 'reference' / 'cases.json'
 ABEAM = make_obstacles([[0.5, 0.0]], 0.1, ids=('post',))

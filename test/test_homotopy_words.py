@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from foc_ros.foc.homotopy.heap import pop, push
-from foc_ros.foc.homotopy.signatures import DIGITS, ZERO, among, count, equal, masked, packed, winds
+from foc_ros.core.homotopy.heap import pop, push
+from foc_ros.core.homotopy.signatures import DIGITS, ZERO, among, count, equal, masked, packed, winds
 
 
 def words(counts):

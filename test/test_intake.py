@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_array, pose_stamped
 
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.pipeline import Pipeline, Verdict
-from foc_ros.intake import Intake
+from foc_ros.core.config import Config, updated
+from foc_ros.core.pipeline import Pipeline, Verdict
+from foc_ros.ros.intake import Intake
 
 TYPES = message_types('rosbags')
 

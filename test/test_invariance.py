@@ -8,10 +8,10 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from reach_helpers import bowed, random_scene, reach
 
-from foc_ros.foc.config import FocConfig
-from foc_ros.foc.forward import forward
-from foc_ros.foc.records import Obstacles, Solution, Status
-from foc_ros.foc.start import cold
+from foc_ros.core.config import FocConfig
+from foc_ros.core.ocp.solve import forward
+from foc_ros.core.ocp.warm_start import cold
+from foc_ros.core.types import Obstacles, Solution, Status
 
 SEEDS = st.integers(0, 10_000)
 STRATEGIES = pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])

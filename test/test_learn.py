@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from bag_helpers import messages, write_bag
 
-from foc_ros.command_line import main
-from foc_ros.foc.library import demonstrated
-from foc_ros.foc.records import make_obstacles
-from foc_ros.library_file import MOST_WAYS, load_library, save_library
+from foc_ros.cli.main import main
+from foc_ros.core.homotopy.demonstrations import demonstrated
+from foc_ros.core.types import make_obstacles
+from foc_ros.io.class_library import MOST_WAYS, load_library, save_library
 
 PARAMETERS = '/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 20, homotopy.library: "%s"}}'
 

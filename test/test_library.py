@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foc_ros.foc.config import Config, HomotopyConfig, updated
-from foc_ros.foc.errors import FocError
-from foc_ros.foc.homotopy import path_sides
-from foc_ros.foc.library import MOST, POINTS, demonstrated, recall, same
-from foc_ros.foc.memory import Memory
-from foc_ros.foc.predictor import predict
-from foc_ros.foc.records import HandState, make_obstacles
-from foc_ros.library_file import load_library, save_library
+from foc_ros.core.config import Config, HomotopyConfig, updated
+from foc_ros.core.errors import FocError
+from foc_ros.core.homotopy import path_sides
+from foc_ros.core.homotopy.demonstrations import MOST, POINTS, demonstrated, recall, same
+from foc_ros.core.memory import Memory
+from foc_ros.core.predictor import predict
+from foc_ros.core.types import HandState, make_obstacles
+from foc_ros.io.class_library import load_library, save_library
 
 OBSTACLES = make_obstacles([[0.15, 0.0], [0.15, 0.06], [0.15, -0.06]], 0.015)
 GOAL = np.array([[0.3, 0.0]])

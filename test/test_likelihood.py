@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foc_ros.foc.config import LikelihoodConfig
-from foc_ros.foc.errors import InputError
-from foc_ros.foc.likelihood import COST_FLOOR, likelihoods, most_likely
+from foc_ros.core.config import LikelihoodConfig
+from foc_ros.core.errors import InputError
+from foc_ros.core.likelihood import COST_FLOOR, likelihoods, most_likely
 
 COSTS = st.lists(st.floats(0.0, 1.7e308), min_size=1, max_size=12)
 BETA = st.floats(0.0, 100.0)

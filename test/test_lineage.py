@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from foc_ros.foc.records import make_obstacles
-from foc_ros.lineage import lineages, sides_of, slots
-from foc_ros.moments import Moment, Way
+from foc_ros.core.types import make_obstacles
+from foc_ros.reporting.snapshots import Moment, Way
+from foc_ros.reporting.track_association import lineages, sides_of, slots
 
 IDS = ('1', '12', 'post-2', '+')
 STEP_NS = 20_000_000

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foc_ros.evaluation.path import reached
-from foc_ros.evaluation.recordings import find_recordings
+from foc_ros.analysis.evaluation.path import reached
+from foc_ros.analysis.evaluation.recordings import find_recordings
 
 SCRIPT = Path(__file__).parents[1] / 'scripts' / 'make_reaches.py'
 

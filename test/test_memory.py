@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from foc_ros.foc import outcomes
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.deadline import Deadline, OutOfTimeError
-from foc_ros.foc.estimator import update
-from foc_ros.foc.forward import forward
-from foc_ros.foc.memory import RETRY, Memory
-from foc_ros.foc.outcomes import Earlier
-from foc_ros.foc.predictor import predict
-from foc_ros.foc.records import LEFT, RIGHT, Candidate, HandSample, HandState, Status, make_obstacles
+from foc_ros.core import candidates as outcomes
+from foc_ros.core.candidates import Earlier
+from foc_ros.core.config import Config, updated
+from foc_ros.core.deadline import Deadline, OutOfTimeError
+from foc_ros.core.estimation.kalman_filter import update
+from foc_ros.core.memory import RETRY, Memory
+from foc_ros.core.ocp.solve import forward
+from foc_ros.core.predictor import predict
+from foc_ros.core.types import LEFT, RIGHT, Candidate, HandSample, HandState, Status, make_obstacles
 
 CONFIG = updated(Config(), {'foc.steps': 20})
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from report_samples import START_NS, prediction, predictions, samples, scene
 
-from foc_ros.foc.records import HandSample
-from foc_ros.moments import Track, moment_of, movements, track_of
+from foc_ros.core.types import HandSample
+from foc_ros.reporting.snapshots import Track, moment_of, movements, track_of
 
 
 def test_moment_keeps_the_numbers() -> None:

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from reach_helpers import bowed, make_obstacles, one_obstacle, reach
 
-from foc_ros.foc.contacts import Contacts
-from foc_ros.foc.newton import held, joined, stays
-from foc_ros.foc.qp import effort_cost
-from foc_ros.foc.sequential import converge
-from foc_ros.foc.settled import settled
-from foc_ros.foc.solver import WorkingSet
+from foc_ros.core.ocp.contacts.checks import held, joined, stays
+from foc_ros.core.ocp.contacts.contacts import Contacts
+from foc_ros.core.ocp.contacts.kkt_point import settled
+from foc_ros.core.ocp.qp import effort_cost
+from foc_ros.core.ocp.sqp import converge
+from foc_ros.core.ocp.working_set import WorkingSet
 
 TAU, LAM = 5e-4, 1e4
 BOWED = bowed((0.0, 0.0), (0.3, 0.0), 50, 0.06)

@@ -17,7 +17,7 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from ros_helpers import Graph  # noqa: E402
 from test_node_process import running  # noqa: E402
 
-from foc_ros.foc.config import parameters  # noqa: E402
+from foc_ros.core.config import parameters  # noqa: E402
 
 
 def test_every_parameter_is_listed_described_read_and_set(ros: Graph) -> None:
@@ -51,7 +51,7 @@ def test_the_state_is_changed_and_every_topic_is_heard(ros: Graph) -> None:
     from lifecycle_msgs.msg import TransitionEvent
     from sensor_msgs.msg import PointCloud2
 
-    from foc_ros.endpoints import OUTPUTS
+    from foc_ros.ros.endpoints import OUTPUTS
 
     client = ros.node('client')
     kinds = {f'foc/{name}': kind for name, kind in OUTPUTS.items()}

@@ -16,7 +16,7 @@ from node_helpers import GOALS, QUICK, ROWS, TYPES, Bench, figures, hand_path  #
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParametersAtomically  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
-from foc_ros.foc.config import Config, flatten, parameters, updated  # noqa: E402
+from foc_ros.core.config import Config, flatten, parameters, updated  # noqa: E402
 
 NAN = math.nan
 BAD_INPUTS = {
@@ -153,7 +153,7 @@ def test_a_silent_hand_is_told(ros: Graph) -> None:
 def test_an_error_inside_is_counted_and_told_and_the_node_goes_on(
     ros: Graph, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:
-    from foc_ros import node as module
+    from foc_ros.ros import node as module
 
     def broken(*_: Any) -> None:
         raise ZeroDivisionError('made for this test')

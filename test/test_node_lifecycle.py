@@ -117,7 +117,7 @@ def test_a_node_that_is_shut_down_stays_so(ros: Graph) -> None:
 
 
 def test_a_node_that_cannot_be_configured_says_why_and_can_be_later(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
-    from foc_ros import node
+    from foc_ros.ros import node
 
     bench = Bench(ros, outputs=[], connected=False, parameters={'autostart': False})
     with monkeypatch.context() as patch:

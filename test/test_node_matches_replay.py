@@ -15,10 +15,10 @@ import pytest
 from bag_helpers import CONFIG, TYPES, messages, write_bag, write_parameters
 from ros_helpers import Graph
 
-from foc_ros.bags import BagReader, Item
-from foc_ros.conversions.outputs import output_messages
-from foc_ros.foc.config import Config, updated
-from foc_ros.replay import Replay
+from foc_ros.analysis.replay import Replay
+from foc_ros.core.config import Config, updated
+from foc_ros.io.bags import BagReader, Item
+from foc_ros.ros.messages.outputs import output_messages
 
 ROOT = Path(__file__).parents[1]
 SECONDS = 0.3

@@ -15,10 +15,10 @@ from node_helpers import GOALS, QUICK, ROWS, TYPES, Bench, figures, hand_path  #
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
-from foc_ros.conversions.outputs import output_messages  # noqa: E402
-from foc_ros.foc.config import Config, updated  # noqa: E402
-from foc_ros.foc.pipeline import Pipeline  # noqa: E402
-from foc_ros.intake import Intake  # noqa: E402
+from foc_ros.core.config import Config, updated  # noqa: E402
+from foc_ros.core.pipeline import Pipeline  # noqa: E402
+from foc_ros.ros.intake import Intake  # noqa: E402
+from foc_ros.ros.messages.outputs import output_messages  # noqa: E402
 
 
 def stamps(messages: list[Any]) -> list[int]:
@@ -132,7 +132,7 @@ def test_a_bag_that_loops_starts_anew(ros: Graph) -> None:
 
 
 def test_only_what_is_listened_to_is_made(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
-    from foc_ros import node
+    from foc_ros.ros import node
 
     asked: list[list[str]] = []
     monkeypatch.setattr(node, 'output_messages', lambda *args: asked.append(list(args[-1])) or output_messages(*args))
@@ -197,7 +197,7 @@ def test_a_scene_published_once_is_heard_later_where_durability_says_so(ros: Gra
 
     from rclpy.parameter import Parameter
 
-    from foc_ros.node import FocNode
+    from foc_ros.ros.node import FocNode
 
     given = [Parameter(name, value=value) for name, value in overrides.items()]
     node = ros.add(FocNode(context=ros.context, parameter_overrides=given))

@@ -34,7 +34,7 @@ def entry_point(name: str) -> str:
 
 
 LAUNCHES = {
-    'module': [sys.executable, '-m', 'foc_ros.node_main'],
+    'module': [sys.executable, '-m', 'foc_ros.ros.main'],
     'command': [sys.executable, '-m', 'foc_ros', 'node'],
     'entry point': [entry_point('foc_node')],
 }
@@ -158,7 +158,7 @@ def test_a_request_that_rclpy_cannot_digest_does_not_end_the_node(ros: Graph) ->
 
 def test_nothing_is_left_behind(ros: Graph, tmp_path: Path) -> None:
     watcher = ros.node('watcher')
-    command = [sys.executable, '-m', 'foc_ros.node_main']
+    command = [sys.executable, '-m', 'foc_ros.ros.main']
     environment = ros.environment | {'ROS_LOG_DIR': str(tmp_path / 'log'), 'PYTHONPATH': str(ROOT)}
     with subprocess.Popen(command, cwd=tmp_path, env=environment) as process:
         ros.spin_until(lambda: 'foc' in watcher.get_node_names(), 'the node', 30.0)

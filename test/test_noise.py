@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from foc_ros.foc.dynamics import damped_mass, horizon, triple_integrator
-from foc_ros.foc.noise import noise_per_step, stacked_noise, state_covariance
-from foc_ros.foc.stacked import spread, squares
+from foc_ros.core.dynamics.condensed import spread, squares
+from foc_ros.core.dynamics.noise import noise_per_step, stacked_noise, state_covariance
+from foc_ros.core.dynamics.plants import damped_mass, horizon, triple_integrator
 
 PLANTS = pytest.mark.parametrize('plant', [triple_integrator(0.03), damped_mass(0.04, 1.5, 4.0)], ids=['jerk', 'force'])
 

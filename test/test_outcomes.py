@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from reach_helpers import bowed, one_obstacle, solved
 
-from foc_ros.foc import outcomes
-from foc_ros.foc.config import FocConfig, LikelihoodConfig
-from foc_ros.foc.outcomes import Earlier, solve_candidates
-from foc_ros.foc.records import LEFT, Candidate, Status
+from foc_ros.core import candidates as outcomes
+from foc_ros.core.candidates import Earlier, solve_candidates
+from foc_ros.core.config import FocConfig, LikelihoodConfig
+from foc_ros.core.types import LEFT, Candidate, Status
 
 GUESS = bowed((0.0, 0.0), (0.3, 0.0), 50, 0.06)
 WAY = Candidate('goal0:+0', 0, (('0', LEFT),), GUESS, 0.33)

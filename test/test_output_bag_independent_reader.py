@@ -7,8 +7,8 @@ import pytest
 import yaml
 from bag_helpers import CONFIG, GOAL, messages, ns, reach, write_bag, write_parameters
 
-from foc_ros.command_line import main
-from foc_ros.replay import replay
+from foc_ros.analysis.replay import replay
+from foc_ros.cli.main import main
 
 mcap_reader = pytest.importorskip('mcap.reader', reason='the mcap library is not installed')
 mcap_decoder = pytest.importorskip('mcap_ros2.decoder', reason='mcap-ros2-support is not installed')

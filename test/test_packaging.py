@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 import foc_ros
-from foc_ros.command_line import COMMANDS
+from foc_ros.cli.main import COMMANDS
 
 ROOT = Path(__file__).parents[1]
 SKIPPED = shutil.ignore_patterns('.*', '__pycache__', 'build', 'dist', 'install', 'log', '*_output', '*.egg-info')

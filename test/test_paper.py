@@ -12,11 +12,11 @@ import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
-from foc_ros.foc.records import Status
-from foc_ros.paper.command import perform
-from foc_ros.paper.reaching import clearance, path_length, speed
-from foc_ros.paper.studies import PAPER_ETA, QUICK, EffortCurve, RatioCurve, Studies
-from foc_ros.paper.trends import crossings, trends
+from foc_ros.analysis.paper.reaching import clearance, path_length, speed
+from foc_ros.analysis.paper.studies import PAPER_ETA, QUICK, EffortCurve, RatioCurve, Studies
+from foc_ros.analysis.paper.trends import crossings, trends
+from foc_ros.cli.paper import perform
+from foc_ros.core.types import Status
 
 FILES = {f'study{number}.{suffix}' for number in range(1, 8) for suffix in ('png', 'pdf')} | {'numbers.json', 'table.md'}
 
@@ -140,7 +140,7 @@ def test_files_hold_what_was_computed(found: Studies, output: Path) -> None:
 
 def test_same_files_each_time(found: Studies, output: Path, tmp_path: Path) -> None:
     """Figures, too, to the byte: without dates, in the order of the studies."""
-    from foc_ros.paper import figures
+    from foc_ros.reporting import paper_figures as figures
 
     figures.write(found, tmp_path, ('png', 'pdf'))
     for file in tmp_path.iterdir():

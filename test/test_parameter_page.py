@@ -4,7 +4,7 @@ import importlib.util
 import re
 from pathlib import Path
 
-from foc_ros.foc.config import parameters
+from foc_ros.core.config import parameters
 
 ROOT = Path(__file__).parents[1]
 

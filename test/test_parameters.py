@@ -15,10 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ros_helpers import Graph
 
-from foc_ros import parameters as module
-from foc_ros.foc.config import Config, flatten, parameters, updated
-from foc_ros.foc.errors import FocError, ParameterError, RecordingError
-from foc_ros.parameters import config_of, declare_all, dump_parameter_file, load_parameter_file
+from foc_ros.core.config import Config, flatten, parameters, updated
+from foc_ros.core.errors import FocError, ParameterError, RecordingError
+from foc_ros.ros import parameters as module
+from foc_ros.ros.parameters import config_of, declare_all, dump_parameter_file, load_parameter_file
 
 ROOT = Path(__file__).parents[1]
 NAMES = [parameter.name for parameter in parameters()]
@@ -32,9 +32,9 @@ def load(folder: Path, text: str) -> Config:
 
 def test_the_shipped_file_is_current() -> None:
     made = subprocess.run(
-        [sys.executable, '-m', 'foc_ros.parameters'], cwd=ROOT, capture_output=True, text=True, check=True
+        [sys.executable, '-m', 'foc_ros.ros.parameters'], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout
-    assert made == (ROOT / 'config' / 'foc.yaml').read_text('utf-8'), 'run: python -m foc_ros.parameters > config/foc.yaml'
+    assert made == (ROOT / 'config' / 'foc.yaml').read_text('utf-8'), 'run: python -m foc_ros.ros.parameters > config/foc.yaml'
 
 
 def test_the_shipped_file_holds_the_defaults() -> None:

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from foc_ros.foc.config import LikelihoodConfig
-from foc_ros.foc.likelihood import likelihoods, shared_cost
-from foc_ros.foc.partings import Partings, partings
-from foc_ros.foc.records import Array, Candidate, Outcome, Solution, Status, make_obstacles
+from foc_ros.core.config import LikelihoodConfig
+from foc_ros.core.homotopy.branch_times import Partings, partings
+from foc_ros.core.likelihood import likelihoods, shared_cost
+from foc_ros.core.types import Array, Candidate, Outcome, Solution, Status, make_obstacles
 
 STEPS = 40
 

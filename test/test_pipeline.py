@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foc_ros.foc import pipeline as module
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.errors import SceneError
-from foc_ros.foc.library import Way
-from foc_ros.foc.memory import Memory
-from foc_ros.foc.pipeline import Pipeline, Verdict
-from foc_ros.foc.records import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction, make_obstacles
+from foc_ros.core import pipeline as module
+from foc_ros.core.config import Config, updated
+from foc_ros.core.errors import SceneError
+from foc_ros.core.homotopy.demonstrations import Way
+from foc_ros.core.memory import Memory
+from foc_ros.core.pipeline import Pipeline, Verdict
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction, make_obstacles
 
 START = 1000 * NANOSECONDS
 MS = NANOSECONDS // 1000

@@ -15,12 +15,12 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Ellipse
 from report_samples import START_NS, prediction, predictions, samples, scene
 
-from foc_ros.drawing import CLASS_COLOURS, CLASSES, ELLIPSES_PER_WAY, LIKELIHOOD_COLOURS, stddev_ellipse
-from foc_ros.foc.errors import InputError
-from foc_ros.foc.records import make_obstacles
-from foc_ros.lineage import lineages, slots
-from foc_ros.moments import moment_of, movements, track_of, ways_of
-from foc_ros.plots import Around, bounds_of, moment_figure, plot_outcomes, save, scene_figure
+from foc_ros.core.errors import InputError
+from foc_ros.core.types import make_obstacles
+from foc_ros.reporting.drawing import CLASS_COLOURS, CLASSES, ELLIPSES_PER_WAY, LIKELIHOOD_COLOURS, stddev_ellipse
+from foc_ros.reporting.plots import Around, bounds_of, moment_figure, plot_outcomes, save, scene_figure
+from foc_ros.reporting.snapshots import moment_of, movements, track_of, ways_of
+from foc_ros.reporting.track_association import lineages, slots
 
 ROOT = Path(__file__).resolve().parents[1]
 PNG = b'\x89PNG\r\n\x1a\n'

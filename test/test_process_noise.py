@@ -3,13 +3,13 @@
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.dynamics import horizon, triple_integrator
-from foc_ros.foc.estimator import gramian
-from foc_ros.foc.memory import Memory
-from foc_ros.foc.predictor import predict
-from foc_ros.foc.records import HandState, make_obstacles
-from foc_ros.foc.replanning import replanned_error_map, triple_integrator_process_covariance
+from foc_ros.core.config import Config, updated
+from foc_ros.core.dynamics.plants import horizon, triple_integrator
+from foc_ros.core.dynamics.replanning import replanned_error_map, triple_integrator_process_covariance
+from foc_ros.core.estimation.kalman_filter import gramian
+from foc_ros.core.memory import Memory
+from foc_ros.core.predictor import predict
+from foc_ros.core.types import HandState, make_obstacles
 
 
 def test_it_begins_as_the_filter_expects_and_ends_near_the_goal() -> None:

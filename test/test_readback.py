@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from report_samples import START_NS, prediction, scene
 
-from foc_ros.bags import TYPESTORE
-from foc_ros.conversions.outputs import likelihood_array, prediction_cloud
-from foc_ros.conversions.types import RosbagsTypes
-from foc_ros.foc.errors import MessageError
-from foc_ros.foc.records import Prediction
-from foc_ros.moments import moment_of
-from foc_ros.readback import belong_together, moment_of_messages
+from foc_ros.core.errors import MessageError
+from foc_ros.core.types import Prediction
+from foc_ros.io.bags import TYPESTORE
+from foc_ros.reporting.readback import belong_together, moment_of_messages
+from foc_ros.reporting.snapshots import moment_of
+from foc_ros.ros.messages.outputs import likelihood_array, prediction_cloud
+from foc_ros.ros.messages.types import RosbagsTypes
 
 TYPES = RosbagsTypes(TYPESTORE)
 PLANES = ('xy', 'xz', 'yz')

@@ -14,7 +14,7 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from report_samples import predictions, samples, scene
 
-from foc_ros.moments import moment_of, movements, track_of
+from foc_ros.reporting.snapshots import moment_of, movements, track_of
 
 ROOT = Path(__file__).resolve().parents[1]
 

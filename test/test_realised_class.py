@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from homotopy_scenes import GOAL, random_scene
 
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.memory import Memory
-from foc_ros.foc.predictor import predict
-from foc_ros.foc.records import HandState, Obstacles, Prediction, make_obstacles
+from foc_ros.core.config import Config, updated
+from foc_ros.core.memory import Memory
+from foc_ros.core.predictor import predict
+from foc_ros.core.types import HandState, Obstacles, Prediction, make_obstacles
 
 SCENES = int(os.environ.get('FOC_ROS_SCENES', '40'))
 BATCHES = 4

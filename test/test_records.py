@@ -5,10 +5,10 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import pytest
 
-from foc_ros.foc.config import Config
-from foc_ros.foc.memory import Memory
-from foc_ros.foc.predictor import predict
-from foc_ros.foc.records import Array, HandState, Prediction, Record, Solution, fixed, make_obstacles
+from foc_ros.core.config import Config
+from foc_ros.core.memory import Memory
+from foc_ros.core.predictor import predict
+from foc_ros.core.types import Array, HandState, Prediction, Record, Solution, fixed, make_obstacles
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from fit_recordings import demonstration
 
-from foc_ros.fitting.plans import planned, positions_at, reach
-from foc_ros.fitting.recovery import fit_plans
-from foc_ros.fitting.trials import CONFIG, demonstrations, trial
-from foc_ros.foc.config import Config, FocConfig
-from foc_ros.foc.errors import RecordingError
-from foc_ros.foc.records import make_obstacles
+from foc_ros.analysis.fitting.plans import planned, positions_at, reach
+from foc_ros.analysis.fitting.recovery import fit_plans
+from foc_ros.analysis.fitting.trials import CONFIG, demonstrations, trial
+from foc_ros.core.config import Config, FocConfig
+from foc_ros.core.errors import RecordingError
+from foc_ros.core.types import make_obstacles
 
 
 @pytest.mark.parametrize('seed', [1, 2, 3])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from reach_helpers import case_guess, case_problem, reference_cases, solved
 
-from foc_ros.foc.homotopy import path_sides
-from foc_ros.foc.records import Status
+from foc_ros.core.homotopy import path_sides
+from foc_ros.core.types import Status
 
 CASES = pytest.mark.parametrize('case', reference_cases())
 

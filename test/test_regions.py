@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from evaluation_samples import H, observation, recorded, ways
 
-from foc_ros.evaluation.positions import position_scores
-from foc_ros.evaluation.regions import denser
-from foc_ros.foc.records import LEFT, RIGHT
+from foc_ros.analysis.evaluation.positions import position_scores
+from foc_ros.analysis.evaluation.regions import denser
+from foc_ros.core.types import LEFT, RIGHT
 
 
 def test_of_one_gaussian_it_is_its_ellipse() -> None:

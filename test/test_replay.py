@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from bag_helpers import CONFIG, FRAME, TYPES, messages, ns, reach, write_bag, write_parameters
 
-from foc_ros.bags import BagReader
-from foc_ros.command_line import main
-from foc_ros.foc.config import updated
-from foc_ros.input_messages import goal_poses, hand_pose, obstacle_cloud
-from foc_ros.replay import Replay, replay
+from foc_ros.analysis.replay import Replay, replay
+from foc_ros.cli.main import main
+from foc_ros.core.config import updated
+from foc_ros.io.bags import BagReader
+from foc_ros.ros.messages.input_messages import goal_poses, hand_pose, obstacle_cloud
 
 FEW = 0.12
 """Seconds of a reach that are enough for a few predictions."""

@@ -16,12 +16,12 @@ pytest.importorskip('plotly', reason='plotly is not installed')
 
 from report_samples import OBSTACLES, START_NS, prediction, predictions, samples, scene
 
-from foc_ros.foc.errors import InputError
-from foc_ros.foc.records import HandSample, Prediction
-from foc_ros.moments import moment_of, track_of
-from foc_ros.page import plotly_script
-from foc_ros.report import write_report
-from foc_ros.report_data import MOST_SHOWN
+from foc_ros.core.errors import InputError
+from foc_ros.core.types import HandSample, Prediction
+from foc_ros.reporting.page import plotly_script
+from foc_ros.reporting.report import write_report
+from foc_ros.reporting.report_data import MOST_SHOWN
+from foc_ros.reporting.snapshots import moment_of, track_of
 
 
 class Page(HTMLParser):

@@ -15,9 +15,9 @@ pytest.importorskip('plotly', reason='plotly is not installed')
 from browser_helpers import check_report, chromium, screenshot, show
 from report_samples import predictions, samples, scene
 
-from foc_ros.moments import moment_of, track_of
-from foc_ros.report import write_report
-from foc_ros.report_data import MOST_SHOWN
+from foc_ros.reporting.report import write_report
+from foc_ros.reporting.report_data import MOST_SHOWN
+from foc_ros.reporting.snapshots import moment_of, track_of
 
 HOSTILE = '</script><img src=x onerror=alert(1)><b>&amp;'
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from foc_ros.foc.records import NANOSECONDS, make_obstacles
-from foc_ros.foc.scene import Part, Scene
+from foc_ros.core.obstacles.scene import Part, Scene
+from foc_ros.core.types import NANOSECONDS, make_obstacles
 
 NOW = 50 * NANOSECONDS
 

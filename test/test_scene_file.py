@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from foc_ros.foc.config import Config
-from foc_ros.foc.errors import FocError, RecordingError, SceneError
-from foc_ros.guess import guess_path
-from foc_ros.scene_file import load_scene, parse_scene
+from foc_ros.core.config import Config
+from foc_ros.core.errors import FocError, RecordingError, SceneError
+from foc_ros.io.guess import guess_path
+from foc_ros.io.scene_file import load_scene, parse_scene
 
 SCENE: dict[str, Any] = {
     'start': [0.0, 0.1],

@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 import ros_helpers
 
-from foc_ros import documents, tables
-from foc_ros.documents import read_document
-from foc_ros.foc.errors import RecordingError
+from foc_ros.core.errors import RecordingError
+from foc_ros.io import csv_tables as tables
+from foc_ros.io import documents
+from foc_ros.io.documents import read_document
 
 ROOT = Path(__file__).parents[1]
 PERMISSIONS = ROOT / 'config' / 'sros2_policy.xml'
@@ -49,7 +50,7 @@ def allowed(kind: str, action: str) -> set[str]:
 
 def test_the_permissions_are_what_the_node_has(ros: ros_helpers.Graph) -> None:
     """Neither less, or it does not run, nor more."""
-    from foc_ros.node import FocNode
+    from foc_ros.ros.node import FocNode
 
     node = ros.add(FocNode(context=ros.context))
 

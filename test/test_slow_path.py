@@ -9,13 +9,13 @@ import pytest
 from reach_helpers import solved
 from varied_reaches import varied_reach
 
-from foc_ros.foc.between import place, place_row
-from foc_ros.foc.chance import k_of_eta
-from foc_ros.foc.optimal import surrogate_qp
-from foc_ros.foc.problem import Problem
-from foc_ros.foc.qp import ReachingQP, clearance_qp, effort_cost
-from foc_ros.foc.records import Solution, Status
-from foc_ros.foc.solver import WorkingSet, solve_full
+from foc_ros.core.obstacles.chance_constraint import k_of_eta
+from foc_ros.core.ocp.contacts.hermite import place, place_row
+from foc_ros.core.ocp.problem import Problem
+from foc_ros.core.ocp.qp import ReachingQP, clearance_qp, effort_cost
+from foc_ros.core.ocp.strategies.optimal import surrogate_qp
+from foc_ros.core.ocp.working_set import WorkingSet, solve_full
+from foc_ros.core.types import Solution, Status
 
 SCENES = 300
 AGREE_M = 1e-6

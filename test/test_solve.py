@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from foc_ros.command_line import main
+from foc_ros.cli.main import main
 
 CASES = Path(__file__).parents[2] / 'shared' / 'reference' / 'cases.json'
 SCENE: dict[str, Any] = {

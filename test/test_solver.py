@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from reach_helpers import bowed, case_guess, case_problem, one_obstacle, random_scene, reach, reference_cases
 
-from foc_ros.foc.backend import DenseQP, solve_named, solve_piqp
-from foc_ros.foc.qp import clearance_qp, effort_cost, half_planes
-from foc_ros.foc.records import make_obstacles
-from foc_ros.foc.solver import WorkingSet, solve, solve_full, united
+from foc_ros.core.ocp.backend import DenseQP, solve_named, solve_piqp
+from foc_ros.core.ocp.qp import clearance_qp, effort_cost, half_planes
+from foc_ros.core.ocp.working_set import WorkingSet, solve, solve_full, united
+from foc_ros.core.types import make_obstacles
 
 
 def random_qp(seed: int, **weights):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from foc_ros.foc.config import Config, updated
-from foc_ros.foc.memory import Memory
-from foc_ros.foc.predictor import predict, rehearse
-from foc_ros.foc.records import HandState, make_obstacles
+from foc_ros.core.config import Config, updated
+from foc_ros.core.memory import Memory
+from foc_ros.core.predictor import predict, rehearse
+from foc_ros.core.types import HandState, make_obstacles
 
 MEAN = np.array([0.0, 0.0, 0.2, 0.1, -0.4, 1.0])
 

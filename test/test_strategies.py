@@ -7,21 +7,21 @@ import numpy as np
 import pytest
 from reach_helpers import bowed, one_obstacle, random_scene, reach, solved
 
-from foc_ros.foc.algorithm1 import algorithm1
-from foc_ros.foc.assess import achieved, assess
-from foc_ros.foc.chance import eta_of_k
-from foc_ros.foc.config import FocConfig
-from foc_ros.foc.deadline import Deadline, OutOfTimeError
-from foc_ros.foc.dynamics import damped_mass, horizon, triple_integrator_horizon
-from foc_ros.foc.errors import SceneError
-from foc_ros.foc.forward import forward
-from foc_ros.foc.least_k import assess_between
-from foc_ros.foc.monte_carlo import monte_carlo
-from foc_ros.foc.optimal import surrogate_qp
-from foc_ros.foc.problem import rest_to_goal
-from foc_ros.foc.records import Status, make_obstacles
-from foc_ros.foc.solver import WorkingSet
-from foc_ros.foc.start import cold, led, warm
+from foc_ros.core.config import FocConfig
+from foc_ros.core.deadline import Deadline, OutOfTimeError
+from foc_ros.core.dynamics.plants import damped_mass, horizon, triple_integrator_horizon
+from foc_ros.core.errors import SceneError
+from foc_ros.core.obstacles.chance_constraint import eta_of_k
+from foc_ros.core.ocp.chance_evaluation import achieved, assess
+from foc_ros.core.ocp.minimum_k import assess_between
+from foc_ros.core.ocp.monte_carlo import monte_carlo
+from foc_ros.core.ocp.problem import rest_to_goal
+from foc_ros.core.ocp.solve import forward
+from foc_ros.core.ocp.strategies.algorithm1 import algorithm1
+from foc_ros.core.ocp.strategies.optimal import surrogate_qp
+from foc_ros.core.ocp.warm_start import cold, led, warm
+from foc_ros.core.ocp.working_set import WorkingSet
+from foc_ros.core.types import Status, make_obstacles
 
 BOWED = bowed((0, 0), (0.3, 0), 50, 0.05)
 EVERY = pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
@@ -176,7 +176,7 @@ def test_gradient_of_the_surrogate_rows_is_that_of_finite_differences():
 
 def assessed(problem, control, k):
     """Return -f, the slack of the surrogate, for every obstacle and step."""
-    from foc_ros.foc.chance import variance
+    from foc_ros.core.obstacles.chance_constraint import variance
 
     offset = problem.positions(control)[None] - problem.centres
     var = variance(offset, problem.position_variance(control), problem.size[1], problem.obstacles.centre_covariance)
@@ -244,7 +244,7 @@ def test_a_deadline_in_the_middle_leaves_the_best_so_far(strategy, monkeypatch):
         if next(calls) == 3:
             raise OutOfTimeError
 
-    monkeypatch.setattr('foc_ros.foc.deadline.Deadline.check', check)
+    monkeypatch.setattr('foc_ros.core.deadline.Deadline.check', check)
     solution = solved(one_obstacle(0.94), BOWED, strategy)
     assert solution.status is Status.DEADLINE
     assert 0 <= solution.eta < 0.94

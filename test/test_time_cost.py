@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from reach_helpers import bowed, reach
 
-from foc_ros.foc.config import Config, FocConfig, updated
-from foc_ros.foc.duration import way_times
-from foc_ros.foc.estimator import gramian, transition
-from foc_ros.foc.forward import forward
-from foc_ros.foc.memory import Memory
-from foc_ros.foc.predictor import predict
-from foc_ros.foc.records import Candidate, HandState, make_obstacles
-from foc_ros.foc.start import cold
-from foc_ros.foc.time_cost import effort_along, least_cost_time
+from foc_ros.core.config import Config, FocConfig, updated
+from foc_ros.core.estimation.duration import way_times
+from foc_ros.core.estimation.kalman_filter import gramian, transition
+from foc_ros.core.estimation.time_cost import effort_along, least_cost_time
+from foc_ros.core.memory import Memory
+from foc_ros.core.ocp.solve import forward
+from foc_ros.core.ocp.warm_start import cold
+from foc_ros.core.predictor import predict
+from foc_ros.core.types import Candidate, HandState, make_obstacles
 
 OBSTACLE = make_obstacles([[0.15, 0.02]], 0.04, 0.002)
 AT_REST = HandState(0, np.zeros(6), 1e-8 * np.eye(6))

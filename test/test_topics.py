@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from foc_ros.foc.errors import RecordingError
-from foc_ros.topics import assign
+from foc_ros.core.errors import RecordingError
+from foc_ros.io.topics import assign
 
 POSE, CLOUD, MARKERS, POSES = (
     'geometry_msgs/msg/PoseStamped',

@@ -5,9 +5,9 @@ import pytest
 from evaluation_samples import reach
 from fit_recordings import demonstration
 
-from foc_ros.fitting.wait_fit import fit_wait
-from foc_ros.foc.config import Config
-from foc_ros.foc.records import make_obstacles
+from foc_ros.analysis.fitting.wait_fit import fit_wait
+from foc_ros.core.config import Config
+from foc_ros.core.types import make_obstacles
 
 GOAL = np.array([[0.3, 0.0]])
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 import worker_tasks
 
-from foc_ros.evaluation.lanes import Lanes
-from foc_ros.evaluation.workers import Failure, add_worker_arguments, run, workers
-from foc_ros.foc.errors import InputError
+from foc_ros.analysis.evaluation.lanes import Lanes
+from foc_ros.analysis.evaluation.workers import Failure, add_worker_arguments, run, workers
+from foc_ros.core.errors import InputError
 
 ITEMS = [(f'r{number}', number) for number in range(8)]
 SQUARES = [(name, number**2) for name, number in ITEMS]
@@ -93,7 +93,7 @@ def test_a_wrong_number_of_workers_is_refused(given: tuple[str, ...]) -> None:
 
 def test_a_scheduler_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip('distributed', reason='the extra cluster is not installed')
-    monkeypatch.setattr('foc_ros.evaluation.cluster.CONNECT_S', 0.3)
+    monkeypatch.setattr('foc_ros.analysis.evaluation.cluster.CONNECT_S', 0.3)
     for address in ('tcp://127.0.0.1:9', 'nonsense://host'):
         with pytest.raises(InputError, match='--scheduler: expected the address of a Dask scheduler'):
             workers(_arguments('--scheduler', address))

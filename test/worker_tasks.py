@@ -4,7 +4,7 @@ import os
 import signal
 import time
 
-from foc_ros.foc.errors import InputError
+from foc_ros.core.errors import InputError
 
 
 def squared(number: int) -> int:

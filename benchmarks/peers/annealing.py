@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import dual_annealing
 
-from foc_ros.foc.problem import Problem
+from foc_ros.core.ocp.problem import Problem
 
 from .dense import Array, dense
 from .naive import achieved

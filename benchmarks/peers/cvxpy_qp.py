@@ -5,7 +5,7 @@ from __future__ import annotations
 import cvxpy
 import numpy as np
 
-from foc_ros.foc.qp import ReachingQP
+from foc_ros.core.ocp.qp import ReachingQP
 
 from .dense import Array
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.foc.problem import Problem
+from foc_ros.core.ocp.problem import Problem
 
 Array = NDArray[np.float64]
 

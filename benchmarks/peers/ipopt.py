@@ -13,7 +13,7 @@ from typing import Any
 import casadi
 import numpy as np
 
-from foc_ros.foc.problem import Problem
+from foc_ros.core.ocp.problem import Problem
 
 from .dense import Array, control_along, dense
 

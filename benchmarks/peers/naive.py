@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from qpsolvers import solve_qp
 
-from foc_ros.foc.problem import Problem
+from foc_ros.core.ocp.problem import Problem
 
 from .dense import Array, Dense, dense
 

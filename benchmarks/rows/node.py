@@ -27,7 +27,7 @@ def node(quick: bool) -> Result:
     seconds = 5.0 if quick else 60.0
     reach = tick_4x8()
     os.environ.update({'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'})
-    command = [sys.executable, '-m', 'foc_ros.node_main', *_arguments(reach)]
+    command = [sys.executable, '-m', 'foc_ros.ros.main', *_arguments(reach)]
     with subprocess.Popen(command) as process:
         try:
             player = Player(reach)
@@ -54,7 +54,7 @@ def node(quick: bool) -> Result:
 
 
 def _arguments(reach: Reach) -> list[str]:
-    from foc_ros.foc.config import flatten
+    from foc_ros.core.config import flatten
 
     values = flatten(reach.config) | {'budget_s': BUDGET_S}
     return ['--ros-args', *(part for name in (*PARAMETERS, 'budget_s') for part in ('-p', f'{name}:={values[name]}'))]
@@ -70,7 +70,7 @@ class Player:
         from rclpy.executors import SingleThreadedExecutor
         from sensor_msgs.msg import PointCloud2
 
-        from foc_ros.conversions.types import RclpyTypes
+        from foc_ros.ros.messages.types import RclpyTypes
 
         rclpy.init()
         self.reach, self.types = reach, RclpyTypes()
@@ -112,7 +112,7 @@ class Player:
         return [self.arrived[stamp] - at for stamp, at in sent.items() if stamp in self.arrived], count
 
     def _show_scene(self, stamp_ns: int) -> None:
-        from foc_ros.input_messages import goal_poses, obstacle_cloud
+        from foc_ros.ros.messages.input_messages import goal_poses, obstacle_cloud
 
         circles = self.reach.obstacles
         table = zip(circles.centre, circles.radius, circles.radius_stddev, strict=True)
@@ -122,7 +122,7 @@ class Player:
 
     def _move(self, stamp_ns: int, tick: int) -> None:
         """Send a hand that circles slowly around its start: all classes stay open."""
-        from foc_ros.input_messages import hand_pose
+        from foc_ros.ros.messages.input_messages import hand_pose
 
         angle = 2 * np.pi * tick * PERIOD_S / 3.0
         place = (0.005 * (1 - np.cos(angle)), 0.005 * np.sin(angle), 0.0)

@@ -9,13 +9,13 @@ from measure import interleaved, median_ms
 from results import Result, Target, at_least
 from scenes import guess_left, one_class
 
-from foc_ros.foc.config import FocConfig
-from foc_ros.foc.forward import forward
-from foc_ros.foc.problem import Problem
-from foc_ros.foc.qp import ReachingQP, clearance_qp, effort_cost
-from foc_ros.foc.records import Solution, Status
-from foc_ros.foc.solver import WorkingSet, solve
-from foc_ros.foc.start import cold, warm
+from foc_ros.core.config import FocConfig
+from foc_ros.core.ocp.problem import Problem
+from foc_ros.core.ocp.qp import ReachingQP, clearance_qp, effort_cost
+from foc_ros.core.ocp.solve import forward
+from foc_ros.core.ocp.warm_start import cold, warm
+from foc_ros.core.ocp.working_set import WorkingSet, solve
+from foc_ros.core.types import Solution, Status
 
 GUESS = guess_left()
 DELTA, GROWTH, XI = 5e-5, 1.5, 1.0

@@ -10,9 +10,9 @@ import numpy as np
 from measure import median_ms
 from results import Result, at_least
 
-from foc_ros.foc.config import Config
-from foc_ros.foc.records import NANOSECONDS, Prediction
-from foc_ros.replay import replay as predictions_of
+from foc_ros.analysis.replay import replay as predictions_of
+from foc_ros.core.config import Config
+from foc_ros.core.types import NANOSECONDS, Prediction
 
 
 def replay(quick: bool) -> Result:

@@ -9,7 +9,8 @@ from measure import Stopwatch, median_ms, replaced, watched
 from results import Result, Target, at_least, at_most
 from scenes import Reach, clusters, tick_4x8, with_far
 
-from foc_ros.foc import backend, predictor
+from foc_ros.core import predictor
+from foc_ros.core.ocp import backend
 
 from .ticking import Ticking
 

@@ -9,9 +9,9 @@ import numpy as np
 from measure import Times
 from scenes import Reach
 
-from foc_ros.foc.memory import Memory
-from foc_ros.foc.predictor import predict
-from foc_ros.foc.records import Prediction
+from foc_ros.core.memory import Memory
+from foc_ros.core.predictor import predict
+from foc_ros.core.types import Prediction
 
 
 class Ticking:

@@ -13,15 +13,15 @@ from scenes import Reach, with_far
 from scenes import tick_4x8 as four_classes
 from scenes import tick_8x16 as eight_classes
 
-from foc_ros.foc import predictor
-from foc_ros.foc.config import FocConfig
-from foc_ros.foc.forward import forward
-from foc_ros.foc.memory import Memory
-from foc_ros.foc.outcomes import solve_candidates
-from foc_ros.foc.predictor import predict
-from foc_ros.foc.problem import Problem
-from foc_ros.foc.records import Candidate, Outcome
-from foc_ros.foc.start import cold
+from foc_ros.core import predictor
+from foc_ros.core.candidates import solve_candidates
+from foc_ros.core.config import FocConfig
+from foc_ros.core.memory import Memory
+from foc_ros.core.ocp.problem import Problem
+from foc_ros.core.ocp.solve import forward
+from foc_ros.core.ocp.warm_start import cold
+from foc_ros.core.predictor import predict
+from foc_ros.core.types import Candidate, Outcome
 
 from .ticking import Ticking, alternating
 

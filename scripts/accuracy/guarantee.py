@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from foc_ros.drawing import class_style, new_figure
-from foc_ros.foc.chance import k_of_eta
-from foc_ros.foc.monte_carlo import monte_carlo
-from foc_ros.foc.records import Array, Status
+from foc_ros.core.obstacles.chance_constraint import k_of_eta
+from foc_ros.core.ocp.monte_carlo import monte_carlo
+from foc_ros.core.types import Array, Status
+from foc_ros.reporting.drawing import class_style, new_figure
 
 from .page import table
 from .scenes import feasible_reaches, solved

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 
-from foc_ros.drawing import LIKELIHOOD_COLOURS, class_style, new_figure
-from foc_ros.foc.records import Array, Solution, Status
+from foc_ros.core.types import Array, Solution, Status
+from foc_ros.reporting.drawing import LIKELIHOOD_COLOURS, class_style, new_figure
 
 from .page import table
 from .scenes import Scene, one_obstacle, random_scene

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from foc_ros.drawing import class_style, new_figure
-from foc_ros.foc.records import Array, Status
+from foc_ros.core.types import Array, Status
+from foc_ros.reporting.drawing import class_style, new_figure
 
 from .page import table
 from .scenes import Scene, one_obstacle, random_scene

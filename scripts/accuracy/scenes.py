@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.foc.problem import Problem
-from foc_ros.foc.records import Array, Solution
+from foc_ros.core.ocp.problem import Problem
+from foc_ros.core.types import Array, Solution
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / 'test'))

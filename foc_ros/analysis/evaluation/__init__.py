@@ -1,0 +1,1 @@
+"""Evaluation: recordings and predictions enter; scores beside simple baselines leave."""

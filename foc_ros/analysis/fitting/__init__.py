@@ -1,0 +1,1 @@
+"""Fitting: recordings of an operator enter; the parameters that explain them best leave."""

@@ -1,0 +1,1 @@
+"""The paper's studies redone: scenes enter; efforts, ratios and trends leave."""

@@ -1,0 +1,115 @@
+"""One way through one scene, solved: the unit that every study is made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from foc_ros.core.config import FocConfig
+from foc_ros.core.dynamics.plants import triple_integrator_horizon
+from foc_ros.core.homotopy import path_sides
+from foc_ros.core.ocp.problem import Problem, rest_to_goal
+from foc_ros.core.ocp.solve import forward
+from foc_ros.core.ocp.warm_start import cold
+from foc_ros.core.types import Array, Obstacles, Solution, Status, make_obstacles
+from foc_ros.io.guess import guess_path
+
+STEPS, DURATION_S = 50, 1.0
+EQUALLY_NEAR = 1e-6
+"""Difference of two distances that is none [m]."""
+HORIZON = triple_integrator_horizon(DURATION_S / STEPS, STEPS)
+
+
+@dataclass(frozen=True)
+class Way:
+    """One way round: the bow of its guess to the left [m], and the side on which it passes obstacles, by id."""
+
+    name: str
+    amplitude: float
+    sides: tuple[tuple[str, int], ...]
+
+
+@dataclass(frozen=True)
+class PaperScene:
+    """A reach from rest at the origin to rest at a goal on the x axis, in DURATION_S.
+
+    goal_x [m]; circles: x, y, mean and standard deviation of the radius [m] of each obstacle; ways: those that are studied.
+    """
+
+    goal_x: float
+    circles: tuple[tuple[float, float, float, float], ...]
+    ways: tuple[Way, ...]
+
+    @cached_property
+    def obstacles(self) -> Obstacles:
+        """The circles as obstacles, with ids counted from 0."""
+        table = np.array(self.circles)
+        return make_obstacles(table[:, :2], table[:, 2], table[:, 3])
+
+    @cached_property
+    def goal(self) -> Array:
+        """The goal, (2,) [m]."""
+        return np.array([self.goal_x, 0.0])
+
+    def problem(self, noise: float, eta: float) -> Problem:
+        """Return the problem with noise c on both axes, per step, and a wanted eta."""
+        return rest_to_goal(HORIZON, np.zeros(6), self.goal, self.obstacles, np.full(2, noise), eta)
+
+
+@dataclass(frozen=True)
+class Method:
+    """How a problem is solved: strategy with its settings, where they are not the defaults; noise c per step."""
+
+    noise: float
+    strategy: str
+    settings: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def config(self) -> FocConfig:
+        """The settings that the forward optimal control takes."""
+        return replace(FocConfig(strategy=self.strategy), **dict(self.settings))  # type: ignore[arg-type]
+
+
+def solve_way(scene: PaperScene, way: Way, method: Method, eta: float) -> Solution:
+    """Solve one way from its guess, on its own: no study depends on the order of its solutions.
+
+    A solution that slid into another way has the status LEFT_CLASS.
+    """
+    guess = guess_path(np.zeros(2), scene.goal, STEPS, way.amplitude)
+    solution = forward(scene.problem(method.noise, eta), cold(guess), method.config)
+    sides = path_sides(solution.path, scene.obstacles)
+    if solution.status is Status.SOLVED and any(sides.get(identity) != side for identity, side in way.sides):
+        return replace(solution, status=Status.LEFT_CLASS, message='the solution slid into another class')
+    return solution
+
+
+def clearance(scene: PaperScene, solution: Solution) -> float:
+    """Return the least distance of the mean path from the mean edge of an obstacle [m]."""
+    away = np.linalg.norm(solution.path[:, None] - scene.obstacles.centre[None], axis=-1)
+    return float((away - scene.obstacles.radius).min())
+
+
+def speed(solution: Solution) -> Array:
+    """Return the speed of the mean, (N + 1,) [m/s]."""
+    along: Array = np.linalg.norm(solution.mean[:, 2:4], axis=1)
+    return along
+
+
+def speed_to_obstacles(scene: PaperScene, solution: Solution) -> float:
+    """Return the speed of the mean up to where it is nearest to the edge of an obstacle, over time [m/s]."""
+    away = np.linalg.norm(solution.path[:, None] - scene.obstacles.centre[None], axis=-1) - scene.obstacles.radius
+    nearest = away.min(axis=1)
+    last = np.flatnonzero(nearest < nearest.min() + EQUALLY_NEAR)[-1]  # the mean often touches a circle at two steps
+    return float(speed(solution)[: last + 1].mean())
+
+
+def path_length(solution: Solution) -> float:
+    """Return the length of the mean path [m]."""
+    return float(np.linalg.norm(np.diff(solution.path, axis=0), axis=1).sum())
+
+
+def largest_stddev(solution: Solution) -> float:
+    """Return the root of the largest sum over the axes of the position's variance along the way [m]."""
+    return float(np.sqrt(solution.covariance[:, 0, 0] + solution.covariance[:, 1, 1]).max())

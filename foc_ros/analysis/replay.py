@@ -1,0 +1,58 @@
+"""A recording through the predictor in its own time: no ROS, no clock, no waiting; the same answer each time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from foc_ros.core.config import Config
+from foc_ros.core.obstacles.scene import Scene
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.types import HandSample, Prediction
+from foc_ros.io.bags import BagReader, Item
+from foc_ros.io.class_library import load_library
+from foc_ros.io.topics import HAND
+from foc_ros.ros.intake import Intake
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one recorded message led to.
+
+    item: the message; sample: the hand sample it was, None for other messages and for one that was refused; prediction: made
+    upon it, None where none was due or possible; scene: that it was made in.
+    """
+
+    item: Item
+    sample: HandSample | None
+    prediction: Prediction | None
+    scene: Scene
+
+
+class Replay:
+    """Feeds recorded messages to a pipeline as the node does live; `intake` keeps the counts.
+
+    Raises RecordingError or InputError where the class library cannot be used.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self.pipeline = Pipeline(config, load_library(config.homotopy.library))
+        self.intake = Intake(self.pipeline)
+
+    def steps(self, items: Iterable[Item]) -> Iterator[Step]:
+        """Take the messages in their order and yield what each led to."""
+        for item in items:
+            verdict = self.intake.take(item.role, item.message)
+            is_hand = item.role == HAND
+            prediction = self.pipeline.predict() if is_hand and self.pipeline.due else None
+            sample = self.intake.sample if is_hand and verdict is not None and verdict.taken else None
+            yield Step(item, sample, prediction, self.pipeline.scene)
+
+
+def replay(bag: Path | str, config: Config, chosen: Mapping[str, str] | None = None) -> Iterator[Prediction]:
+    """Yield every prediction of a recording; chosen: topic by input name. Raises RecordingError."""
+    with BagReader(bag, chosen) as reader:
+        for step in Replay(config).steps(reader):
+            if step.prediction is not None:
+                yield step.prediction

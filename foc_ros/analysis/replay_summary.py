@@ -1,0 +1,73 @@
+"""What a replay amounts to: how much was predicted, what was refused, what failed, and how long it took."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from foc_ros.io.topics import HAND
+
+from .replay import Step
+
+FAILED = 'candidate_'
+"""The pipeline counts a candidate that was not solved under this and its status."""
+
+
+@dataclass
+class Summary:
+    """Counts over the steps of one replay.
+
+    samples: hand poses read; predictions; solved: those with a solved candidate; seconds: wall time of each prediction.
+    """
+
+    samples: int = 0
+    predictions: int = 0
+    solved: int = 0
+    seconds: list[float] = field(default_factory=list)
+
+    def add(self, step: Step) -> None:
+        """Count one step."""
+        self.samples += step.item.role == HAND
+        if step.prediction is not None:
+            self.predictions += 1
+            self.solved += bool(step.prediction.solved)
+            self.seconds.append(step.prediction.solve_s)
+
+    def answer(self, counts: Mapping[str, int], duration_s: float) -> dict[str, Any]:
+        """Return all as plain values; counts: of the intake; duration_s: of the recording.
+
+        refused: messages, samples and predictions that came to nothing, and restarts, by kind; failures: candidates by status.
+        """
+        failures = Counter({name.removeprefix(FAILED): count for name, count in counts.items() if name.startswith(FAILED)})
+        p50, p99 = np.percentile(self.seconds, (50, 99)) if self.seconds else (None, None)
+        return {
+            'samples': self.samples,
+            'predictions': self.predictions,
+            'solved': self.solved,
+            'refused': {name: count for name, count in sorted(counts.items()) if not name.startswith(FAILED)},
+            'failures': dict(sorted(failures.items())),
+            'prediction_ms': {'p50': None if p50 is None else 1e3 * p50, 'p99': None if p99 is None else 1e3 * p99},
+            'duration_s': duration_s,
+        }
+
+
+def facts(answer: Mapping[str, Any]) -> dict[str, str]:
+    """Return a summary's answer in words, for a table or a report."""
+    times = answer['prediction_ms']
+    return {
+        'recording': f'{answer["duration_s"]:.1f} s',
+        'hand poses': str(answer['samples']),
+        'predictions': f'{answer["predictions"]}, {answer["solved"]} with a solved candidate',
+        'refused': _listed(answer['refused']),
+        'candidates not solved': _listed(answer['failures']),
+        **({'ways learned': str(answer['learned'])} if 'learned' in answer else {}),
+        'time per prediction': '-' if times['p50'] is None else f'{times["p50"]:.1f} ms median, {times["p99"]:.1f} ms p99',
+    }
+
+
+def _listed(counts: Mapping[str, int]) -> str:
+    return ', '.join(f'{name} {count}' for name, count in counts.items()) or 'none'

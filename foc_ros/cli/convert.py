@@ -1,0 +1,48 @@
+"""`convert`: motion capture in CSV tables to bags, one per recording, as a tracker and a perception node would have left them."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+
+from foc_ros.analysis.csv_recordings import Movement, read_goals, read_movements, read_obstacles, write_movement
+from foc_ros.core.errors import RecordingError
+from foc_ros.io.terminal import track
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument('csv', type=Path, metavar='CSV', help='recordings: columns recording, t_s, x_m, y_m[, z_m]')
+    parser.add_argument(
+        '--obstacles', type=Path, metavar='CSV', required=True, help='columns x_m, y_m, radius_m[, radius_stddev_m, id, z_m]'
+    )
+    parser.add_argument('--goals', type=Path, metavar='CSV', help='columns x_m, y_m[, z_m]')
+    parser.add_argument('--output', type=Path, metavar='DIR', required=True, help='folder for the bags, one per recording')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Convert; all tables are checked before the first bag is written."""
+    movements = read_movements(arguments.csv)
+    obstacles = read_obstacles(arguments.obstacles)
+    goals = None if arguments.goals is None else read_goals(arguments.goals)
+    bags = {arguments.output / name: movement for name, movement in _folders(movements).items()}
+    for bag in bags:
+        if bag.exists():
+            raise RecordingError(f'{bag}: exists already and is not overwritten; choose another --output')
+    for bag, movement in track(bags.items(), 'convert', len(bags)):
+        write_movement(bag, movement, obstacles, goals)
+    count = sum(len(movement.stamps_ns) for movement in movements)
+    print(f'{len(bags)} bags with {count} hand poses and {len(obstacles)} obstacles written to {arguments.output}')
+    return 0
+
+
+def _folders(movements: list[Movement]) -> dict[str, Movement]:
+    """Return the recordings by a name that any file system takes; two that would share one are refused."""
+    folders: dict[str, Movement] = {}
+    for movement in movements:
+        name = re.sub(r'[^A-Za-z0-9._-]', '_', movement.name).lstrip('.-') or '_'
+        if name in folders:
+            raise RecordingError(f'recordings {folders[name].name!r} and {movement.name!r} would both be written to {name}')
+        folders[name] = movement
+    return folders

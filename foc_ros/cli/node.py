@@ -1,0 +1,22 @@
+"""`node`: the node as a command; all arguments are ROS's."""
+
+from __future__ import annotations
+
+import argparse
+from importlib.util import find_spec
+
+from foc_ros.core.errors import FocError
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare nothing: what rclpy takes is rclpy's affair."""
+    parser.usage = '%(prog)s [-h] [--ros-args ...]'
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the node until it is told to stop."""
+    if find_spec('rclpy') is None:
+        raise FocError('rclpy is not installed: source a ROS 2 installation, or install the extra `ros`')
+    from foc_ros.ros.main import main
+
+    return main(arguments.rest)

@@ -1,0 +1,125 @@
+"""Effort that a movement has taken so far: the integral of its squared jerk [m^2/s^5], from noisy positions.
+
+A minimum-jerk movement between two states is the quintic that joins them, and its effort has a closed form: over a stretch of
+duration T, with positions sum_k c_k s^k (s = t / T in [0, 1], k = 0..5),
+
+    J = c' H c / T^5,  H_jk = j(j-1)(j-2) k(k-1)(k-2) / (j + k - 5),  e.g. 720 D^2 / T^5 from rest to rest over a distance D.
+
+Jerk is a third derivative, so states of a filter at two nearby stamps give mostly noise. Instead the quintic is fitted to all
+samples of a stretch, and a stretch is as long as one quintic explains it: then noise does not grow with the sampling rate, nor
+with the slowness of the movement. The samples enter by sums alone, so a step costs the same however long the stretch is.
+
+Only what the samples show to be jerk is counted. In coordinates y = L' c that are uncorrelated (L L': the sums of powers, so that
+y_k is what degree k adds), each degree k >= 3 is shrunk by max(0, 1 - 12 E / |y_k|^2), where E = 2 sigma^2 is what noise alone
+gives; and it waits until noise alone would add less than a tenth of the effort of a straight reach as long as the stretch. So
+the estimate starts at zero and stays low, never noise.
+
+Measured over 0.3 m from rest to rest in 0.6 to 4 s, at 15, 50 and 200 Hz, with 1 mm or 0.1 mm of noise: near the end 0.4 to 0.8
+of the true effort so far in the median (0.35 to 0.9 with a detour of 60 mm on the way); a third of it is lost before onset, where
+the jerk is highest. At no time more than 1.03 of the whole effort. With 1 mm of noise it is near zero up to half way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from foc_ros.core.kernels import Matrix, Vector, compiled
+from foc_ros.core.linear_algebra import cholesky, combined, lower_solved
+from foc_ros.core.types import NANOSECONDS, Array, Record, fixed
+
+DEGREE = 5
+LEAST_SAMPLES = 8
+LEAST_TIME_S = 0.2
+"""A stretch is judged from here on. With shorter ones an outlier of 10 mm at 200 Hz made 1e5 times the true effort."""
+SHRINKAGE = 12.0
+"""Noise exceeds it once in exp(12) = 2e5 times; with 8, a spike of 38 times the final effort came in one movement of 40."""
+NOISE_SHARE = 0.1
+MISFIT = 2.0
+"""Root mean square of the residuals, in standard deviations of a position, beyond which a quintic does not explain a stretch."""
+
+ROUNDING = 1e-12
+"""Share of the sum of squares that rounding leaves in the residuals; 2e-13 was seen with 20000 samples."""
+
+TOLD_APART = 1e-9
+"""Share of its own sum of squares that a degree has to add to those below it: bunched stamps do not tell them apart."""
+
+_K = np.arange(DEGREE + 1)
+_THIRD = _K * (_K - 1.0) * (_K - 2.0)
+_H: Array = np.outer(_THIRD, _THIRD) / np.maximum(_K[:, None] + _K - 5.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Effort(Record):
+    """What is known of a movement's effort.
+
+    spent: so far [m^2/s^5]; before: of it, before the present stretch. The present stretch, as sums over its samples at times
+    t [s] since start_ns (None: no sample yet) and positions z (2,) [m] from origin: powers (11,) of t^0..t^10, products (6, 2) of
+    t^k z, square of |z|^2; last_s: time of the last sample [s].
+    """
+
+    spent: float = 0.0
+    before: float = 0.0
+    start_ns: int | None = None
+    last_s: float = 0.0
+    origin: Array = field(default_factory=lambda: np.zeros(2))
+    powers: Array = field(default_factory=lambda: np.zeros(2 * DEGREE + 1))
+    products: Array = field(default_factory=lambda: np.zeros((DEGREE + 1, 2)))
+    square: float = 0.0
+
+
+def advanced(effort: Effort, stamp_ns: int, position: Array, stddev: float) -> Effort:
+    """Take the movement's next sample; stddev: of a measured position [m].
+
+    A sample that the stretch's quintic does not explain ends the stretch, and belongs to none: it may be an outlier.
+    """
+    start_ns, origin = (stamp_ns, position) if effort.start_ns is None else (effort.start_ns, effort.origin)
+    seconds, z = (stamp_ns - start_ns) / NANOSECONDS, position - origin
+    powers, products = map(fixed, summed(effort.powers, effort.products, seconds, z))
+    square, spent = effort.square + float(z @ z), effort.spent
+    if powers[0] >= LEAST_SAMPLES and seconds >= LEAST_TIME_S:
+        told, added, explained = fitted(powers, products, square, seconds, stddev)
+        if told and not explained:
+            return Effort(spent=effort.spent, before=effort.spent)
+        spent = effort.before + added if told else spent
+    return Effort(spent, effort.before, start_ns, seconds, origin, powers, products, square)
+
+
+@compiled
+def summed(powers: Vector, products: Matrix, seconds: float, z: Vector) -> tuple[Vector, Matrix]:
+    """Return the sums of `Effort` with one more sample."""
+    powers, products, power = powers.copy(), products.copy(), 1.0
+    for k in range(len(powers)):
+        powers[k] += power
+        if k < len(products):
+            products[k] += power * z
+        power *= seconds
+    return powers, products
+
+
+@compiled
+def fitted(powers: Vector, products: Matrix, square: float, T: float, stddev: float) -> tuple[bool, float, bool]:
+    """Return whether a stretch of T [s] tells the degrees apart, its effort [m^2/s^5], and whether its quintic explains it."""
+    n, count = len(products), powers[0]
+    gram, right = np.empty((n, n)), np.empty((n, 2))
+    for j in range(n):
+        right[j] = products[j] / T**j
+        for k in range(n):
+            gram[j, k] = powers[j + k] / T ** (j + k)
+    root = cholesky(gram, 0.0)
+    for k in range(n):
+        if not root[k, k] ** 2 > TOLD_APART * gram[k, k]:
+            return False, 0.0, False
+    y = lower_solved(root, right)
+    energy = (y**2).sum(axis=1)
+    freedom = 2.0 * (count - n)
+    residual, rounding = max(square - energy.sum(), 0.0) / freedom, ROUNDING * square / freedom
+    noise = 2.0 * max(stddev**2, residual, rounding)
+    jerk = lower_solved(root, np.ascontiguousarray(lower_solved(root, _H).T))
+    length_squared = 12.0 * energy[1:].sum() / count
+    for k in range(n):
+        told = k >= 3 and noise * jerk[k, k] <= NOISE_SHARE * 720.0 * length_squared
+        y[k] *= max(1.0 - SHRINKAGE * noise / max(energy[k], noise), 0.0) if told else 0.0
+    spent = max((y * combined(jerk, y)).sum(), 0.0) / T**5
+    return True, spent, residual <= (MISFIT * stddev) ** 2 + rounding

@@ -1,0 +1,96 @@
+"""Small dense linear algebra for the kernels: products of rows, Cholesky factors, triangular solves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .kernels import Matrix, Vector, compiled
+
+
+@compiled
+def row_products(a: Matrix, b: Matrix) -> Matrix:
+    """Return a b', (m, n), for rows a (m, q) and b (n, q)."""
+    m, n, q = a.shape[0], b.shape[0], a.shape[1]
+    product = np.empty((m, n))
+    for i in range(m):
+        for j in range(n):
+            total = 0.0
+            for k in range(q):
+                total += a[i, k] * b[j, k]
+            product[i, j] = total
+    return product
+
+
+@compiled
+def combined(weights: Matrix, rows: Matrix) -> Matrix:
+    """Return weights @ rows, (m, q), for weights (m, n) and rows (n, q)."""
+    m, n, q = weights.shape[0], rows.shape[0], rows.shape[1]
+    total = np.zeros((m, q))
+    for i in range(m):
+        for j in range(n):
+            weight = weights[i, j]
+            for k in range(q):
+                total[i, k] += weight * rows[j, k]
+    return total
+
+
+@compiled
+def values(matrix: Matrix, vector: Vector) -> Vector:
+    """Return matrix @ vector, (m,)."""
+    m, q = matrix.shape
+    product = np.empty(m)
+    for i in range(m):
+        total = 0.0
+        for k in range(q):
+            total += matrix[i, k] * vector[k]
+        product[i] = total
+    return product
+
+
+@compiled
+def cholesky(matrix: Matrix, floor: float) -> Matrix:
+    """Return the lower L with L L' = matrix (n, n), every squared pivot at least the floor.
+
+    With floor 0, a matrix that is not positive definite gives a NaN.
+    """
+    n = matrix.shape[0]
+    factor = np.zeros((n, n))
+    for i in range(n):
+        for j in range(i + 1):
+            left = matrix[i, j]
+            for k in range(j):
+                left -= factor[i, k] * factor[j, k]
+            if i > j:
+                factor[i, j] = left / factor[j, j]
+            elif left > floor:
+                factor[i, i] = np.sqrt(left)
+            else:
+                factor[i, i] = np.sqrt(floor) if floor > 0 else np.nan
+    return factor
+
+
+@compiled
+def lower_solved(factor: Matrix, right: Matrix) -> Matrix:
+    """Return L^-1 right, (n, q), for a lower L (n, n)."""
+    n, q = right.shape
+    solved = right.copy()
+    for i in range(n):
+        for j in range(i):
+            weight = factor[i, j]
+            for k in range(q):
+                solved[i, k] -= weight * solved[j, k]
+        for k in range(q):
+            solved[i, k] /= factor[i, i]
+    return solved
+
+
+@compiled
+def upper_solved(factor: Matrix, right: Vector) -> Vector:
+    """Return L'^-1 right, (n,), for a lower L (n, n)."""
+    n = right.shape[0]
+    solved = right.copy()
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            solved[i] -= factor[j, i] * solved[j]
+        solved[i] /= factor[i, i]
+    return solved

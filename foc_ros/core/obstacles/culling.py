@@ -1,0 +1,24 @@
+"""Of many obstacles, those that can be in the way: what a prediction costs stays bounded, whatever a scene holds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from foc_ros.core.types import Array, Obstacles
+
+
+def relevant(obstacles: Obstacles, hand: Array, goals: Array, duration_s: float, most: int) -> Obstacles:
+    """Return at most `most` obstacles, in their order: those that the shortest way to a goal touches with the least detour.
+
+    hand (2,), goals (g, 2) [m], g >= 1. The detour over a circle is |hand - o| + |o - goal| - 2 r - |hand - goal|, for the goal
+    where that is least; a circle that moves may come nearer by its speed times duration_s [s], at both ends. Of equal ones the
+    first rows are kept.
+    """
+    if len(obstacles) <= most:
+        return obstacles
+    from_hand = np.linalg.norm(obstacles.centre - hand, axis=1)
+    from_goal = np.linalg.norm(obstacles.centre - goals[:, None], axis=2)
+    detour = (from_goal - np.linalg.norm(goals - hand, axis=1)[:, None]).min(axis=0) + from_hand
+    reach = obstacles.radius + duration_s * np.linalg.norm(obstacles.velocity, axis=1)
+    kept = np.argsort(detour - 2.0 * reach, kind='stable')[:most]
+    return obstacles.take(np.sort(kept))

@@ -1,1 +1,0 @@
-"""The numeric core: hand state and scene in, prediction out. Knows numpy and PIQP, never ROS."""

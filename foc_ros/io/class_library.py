@@ -1,0 +1,103 @@
+"""The class library as a JSON file: demonstrated ways, read with all bounds checked, written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from foc_ros.core.errors import InputError, RecordingError
+from foc_ros.core.homotopy.demonstrations import POINTS, Way
+from foc_ros.core.types import LEFT, RIGHT, Array
+
+from .documents import read_document
+
+SIDES = {'left': LEFT, 'right': RIGHT}
+MOST_WAYS, MOST_OBSTACLES = 500, 4096
+FARTHEST = 1e6
+"""Greatest coordinate [m]."""
+
+
+def load_library(name: str) -> tuple[Way, ...]:
+    """Return the ways of a library file, none for an empty name.
+
+    Raises RecordingError where it cannot be read, InputError naming field, value and bound where it is no library.
+    """
+    if not name:
+        return ()
+    document = read_document(Path(name))
+    ways = document.get('ways') if isinstance(document, Mapping) else None
+    if not isinstance(ways, list) or len(ways) > MOST_WAYS:
+        got = f'{len(ways)} of them' if isinstance(ways, list) else type(ways).__name__
+        raise InputError(f'{name}: ways', f'a list of at most {MOST_WAYS} ways', got)
+    return tuple(_way(f'{name}: ways[{k}]', way) for k, way in enumerate(ways))
+
+
+def save_library(file: Path, ways: Sequence[Way]) -> None:
+    """Write a library in place of what the file held.
+
+    Raises RecordingError where it cannot be written, InputError for too many ways.
+    """
+    if len(ways) > MOST_WAYS:
+        raise InputError(f'{file}: ways', f'at most {MOST_WAYS}', f'{len(ways)} with the new ones')
+    document = {'ways': [_plain(way) for way in ways]}
+    unfinished = file.with_name(file.name + '.unfinished')
+    try:
+        unfinished.write_text(json.dumps(document, allow_nan=False) + '\n', encoding='utf-8')
+        unfinished.replace(file)
+    except OSError as error:
+        unfinished.unlink(missing_ok=True)
+        raise RecordingError(f'{file}: cannot be written: {error.strerror}') from error
+
+
+def _plain(way: Way) -> dict[str, Any]:
+    sides = {side: word for word, side in SIDES.items()}
+    passed = [
+        {'id': identity, 'x': x, 'y': y, 'side': sides[side]}
+        for identity, (x, y), side in zip(way.ids, way.centre.tolist(), way.sides, strict=True)
+    ]
+    return {'frame_id': way.frame_id, 'passed': passed, 'path': way.path.tolist()}
+
+
+def _way(field: str, way: object) -> Way:
+    if not isinstance(way, Mapping) or set(way) != {'frame_id', 'passed', 'path'}:
+        raise InputError(field, 'frame_id, passed and path', _short(way))
+    frame_id, passed, path = way['frame_id'], way['passed'], way['path']
+    if not isinstance(frame_id, str):
+        raise InputError(f'{field}.frame_id', 'a text', _short(frame_id))
+    if not isinstance(passed, list) or len(passed) > MOST_OBSTACLES:
+        raise InputError(f'{field}.passed', f'a list of at most {MOST_OBSTACLES} obstacles', _short(passed))
+    if not isinstance(path, list) or len(path) != POINTS:
+        raise InputError(f'{field}.path', f'{POINTS} points', _short(path))
+    rows = [_passed(f'{field}.passed[{k}]', row) for k, row in enumerate(passed)]
+    ids = tuple(identity for identity, _, _ in rows)
+    if len(set(ids)) != len(ids):
+        raise InputError(f'{field}.passed', 'each obstacle once', _short(ids))
+    points = np.array([_point(f'{field}.path[{k}]', point) for k, point in enumerate(path)])
+    centre: Array = np.array([point for _, point, _ in rows], dtype=float).reshape(-1, 2)
+    return Way(frame_id, ids, tuple(side for _, _, side in rows), centre, points)
+
+
+def _passed(field: str, row: object) -> tuple[str, tuple[float, float], int]:
+    if not isinstance(row, Mapping) or set(row) != {'id', 'x', 'y', 'side'} or not isinstance(row['id'], str):
+        raise InputError(field, 'id (a text), x, y and side', _short(row))
+    if row['side'] not in ('left', 'right'):
+        raise InputError(f'{field}.side', 'left or right', _short(row['side']))
+    return row['id'], _point(field, [row['x'], row['y']]), SIDES[row['side']]
+
+
+def _point(field: str, point: object) -> tuple[float, float]:
+    if isinstance(point, list) and len(point) == 2 and all(_is_coordinate(value) for value in point):
+        return float(point[0]), float(point[1])
+    raise InputError(field, f'two numbers within {FARTHEST:g} m', _short(point))
+
+
+def _is_coordinate(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and -FARTHEST <= value <= FARTHEST
+
+
+def _short(value: object) -> str:
+    return repr(value)[:100]
