@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from evaluation_samples import reach, write_tables
 
+from foc_ros.analysis.csv_recordings import EPOCH_NS, read_goals, read_movements, read_obstacles, write_movement
 from foc_ros.analysis.evaluation.forecasts import power_rule
 from foc_ros.analysis.evaluation.observations import Observations
 from foc_ros.analysis.evaluation.observe import observe
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, WAY, question, relevant
 from foc_ros.analysis.evaluation.recordings import BagRecording, find_recordings
 from foc_ros.analysis.replay import Replay
-from foc_ros.analysis.csv_recordings import EPOCH_NS, read_goals, read_movements, read_obstacles, write_movement
 from foc_ros.core.config import Config, updated
 from foc_ros.core.types import LEFT
 from foc_ros.io.bags import TYPESTORE, BagReader, Item
