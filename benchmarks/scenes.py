@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from foc_ros.core.config import Config, updated
 from foc_ros.core.dynamics.plants import triple_integrator_horizon
-from foc_ros.core.estimation.kalman_filter import Track, update
+from foc_ros.core.estimation.kalman_filter import FilterState, update
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.types import HandSample, Obstacles, make_obstacles
 
@@ -77,7 +77,7 @@ class Reach:
     config: Config
     obstacles: Obstacles
     goals: Array
-    hands: tuple[Track, ...]
+    hands: tuple[FilterState, ...]
 
     def changed(self, values: dict[str, object]) -> Reach:
         """Return the reach with other parameters, by dotted name."""
@@ -89,7 +89,7 @@ def drifting(obstacles: Obstacles, candidates: int, goals: Array = GOAL[None], t
     values = {'foc.noise_x': NOISE, 'foc.noise_y': NOISE, 'foc.eta': ETA, 'homotopy.max_candidates': candidates}
     config = updated(Config(), values | {'duration.model': 'fixed', 'duration.fixed_s': DURATION_S, 'rate_hz': RATE_HZ})
     generator = np.random.default_rng(seed)
-    state: Track | None = None
+    state: FilterState | None = None
     hands = []
     for tick in range(ticks):
         place = DRIFT * tick / RATE_HZ + generator.normal(0, TRACKER_STDDEV, 2)

@@ -21,7 +21,7 @@ from itertools import product
 
 import numpy as np
 
-from foc_ros.analysis.paper.reaching import Method, PaperScene, Way, solve_way, speed_to_obstacles
+from foc_ros.analysis.paper.reaching import Method, PaperScene, PathClass, solve_class, speed_to_obstacles
 from foc_ros.analysis.paper.scenes import NOISE, SMALL_NOISE, STRATEGY_SCENE, WAYS_SCENE
 from foc_ros.analysis.paper.studies import PAPER_ETA, PAPER_RATIOS
 from foc_ros.core.types import LEFT, RIGHT, Array, Status
@@ -45,11 +45,11 @@ HOPELESS = 12.0
 Faults = Callable[[PaperScene], Iterator[float]]
 
 
-def log_ratio(scene: PaperScene, eta: float, over: tuple[Way, Method], under: tuple[Way, Method]) -> float:
+def log_ratio(scene: PaperScene, eta: float, over: tuple[PathClass, Method], under: tuple[PathClass, Method]) -> float:
     """Return the logarithm of the ratio of two efforts, NaN where one is not solved."""
     efforts = []
     for way, method in (over, under):
-        solution = solve_way(scene, way, method, eta)
+        solution = solve_class(scene, way, method, eta)
         if solution.status is not Status.SOLVED:
             return np.nan
         efforts.append(solution.effort)
@@ -60,7 +60,7 @@ def strategies_scene(generator: np.random.Generator) -> PaperScene:
     """Return a random scene with one way, to the left of most of its circles."""
     n = int(generator.integers(1, 4))
     circles = generator.uniform((0.04, -0.06, 0.015, 0.001), (0.18, 0.04, 0.035, 0.004), (n, 4))
-    return _scene(circles, (Way('left', 0.06, ()),))
+    return _scene(circles, (PathClass('left', 0.06, ()),))
 
 
 def strategies_faults(scene: PaperScene) -> Iterator[float]:
@@ -74,7 +74,7 @@ def strategies_faults(scene: PaperScene) -> Iterator[float]:
     if np.isfinite([*rising, *low]).all():
         yield 10 * np.maximum(-np.diff(rising), 0).sum() + 10 * max(rising[0] + 0.02, 0) + max(0.5 - rising[ETAS.index(0.95)], 0)
         yield 10 * max(low[-1] + 0.05, 0) + 2 * np.maximum(np.diff(low), 0).sum()
-    slow, fast = (speed_to_obstacles(scene, solve_way(scene, way, Method(NOISE, strategy), 0.94)) for strategy in ('lv', 'hc'))
+    slow, fast = (speed_to_obstacles(scene, solve_class(scene, way, Method(NOISE, strategy), 0.94)) for strategy in ('lv', 'hc'))
     yield 3 * max(slow / fast - 0.75, 0)
 
 
@@ -87,7 +87,7 @@ def ways_scene(generator: np.random.Generator) -> PaperScene:
         below = np.sqrt(max((radius + wide + gap) ** 2 - ahead**2, 0.0))
         others.append((x + ahead, y - below, wide, generator.uniform(0.001, 0.004)))
     circles = np.array([(x, y, radius, generator.uniform(0.001, 0.004)), *others])
-    return _scene(circles, (Way('H1', 0.06, (('0', LEFT),)), Way('H2', -0.05, (('0', RIGHT), ('1', LEFT)))))
+    return _scene(circles, (PathClass('H1', 0.06, (('0', LEFT),)), PathClass('H2', -0.05, (('0', RIGHT), ('1', LEFT)))))
 
 
 def ways_faults(scene: PaperScene) -> Iterator[float]:
@@ -112,10 +112,10 @@ def ways_faults(scene: PaperScene) -> Iterator[float]:
         yield 2 * float(np.maximum(np.diff(late), 0).sum()) if np.isfinite(late).all() else 0.0
 
 
-def crowding(scene: PaperScene, way: Way, method: Method) -> float:
+def crowding(scene: PaperScene, way: PathClass, method: Method) -> float:
     """Return the logarithm of what the circles after the first multiply a way's effort by at PAPER_ETA; 0 if unsolved."""
-    alone = PaperScene(scene.goal_x, scene.circles[:1], (Way(way.name, way.amplitude, way.sides[:1]),))
-    efforts = [solve_way(each, each_way, method, PAPER_ETA) for each, each_way in ((scene, way), (alone, alone.ways[0]))]
+    alone = PaperScene(scene.goal_x, scene.circles[:1], (PathClass(way.name, way.amplitude, way.sides[:1]),))
+    efforts = [solve_class(each, each_way, method, PAPER_ETA) for each, each_way in ((scene, way), (alone, alone.ways[0]))]
     solved = all(each.status is Status.SOLVED for each in efforts)
     return float(np.log(efforts[0].effort / efforts[1].effort)) if solved else 0.0
 
@@ -141,7 +141,7 @@ def climbed(scene: PaperScene, faults: Faults, generator: np.random.Generator) -
     return best, scene
 
 
-def _scene(circles: Array, ways: tuple[Way, ...]) -> PaperScene:
+def _scene(circles: Array, ways: tuple[PathClass, ...]) -> PaperScene:
     held = np.clip(circles, LOW, HIGH)
     return PaperScene(GOAL_X, tuple((x, y, radius, stddev) for x, y, radius, stddev in held.round(4).tolist()), ways)
 

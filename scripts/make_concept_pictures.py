@@ -14,24 +14,24 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from foc_ros.analysis.paper.reaching import Method, solve_way
+from foc_ros.analysis.paper.reaching import Method, solve_class
 from foc_ros.analysis.paper.scenes import NOISE as PAPER_NOISE
 from foc_ros.analysis.paper.scenes import STRATEGY_SCENE
 from foc_ros.cli.solve import scene_problems, solve_scene
 from foc_ros.core.config import FocConfig, LikelihoodConfig
-from foc_ros.core.dynamics.noise import noise_per_step, stacked_noise
+from foc_ros.core.dynamics.noise import scale_noise, stack_noise
 from foc_ros.core.dynamics.plants import triple_integrator_horizon
-from foc_ros.core.likelihood import likelihoods
+from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
-from foc_ros.core.ocp.solve import forward
-from foc_ros.core.ocp.warm_start import cold
+from foc_ros.core.ocp.solve import solve_problem
+from foc_ros.core.ocp.warm_start import cold_start
 from foc_ros.core.types import Array, Obstacles, Solution, make_obstacles
 from foc_ros.io.guess import guess_path
 from foc_ros.io.scene_file import load_scene
 from foc_ros.reporting.drawing import class_style, draw_legend, draw_scene, draw_ways, new_figure, stddev_ellipse, tag
 from foc_ros.reporting.plots import bounds_of, save
-from foc_ros.reporting.snapshots import ways_of
+from foc_ros.reporting.snapshots import candidate_views
 
 PICTURES = Path(__file__).resolve().parents[1] / 'doc' / 'images'
 SCENE = Path(__file__).resolve().parents[1] / 'doc' / 'examples' / 'scene.yaml'
@@ -50,16 +50,16 @@ def reach(
 ) -> tuple[Problem, Solution]:
     """Return a reach from rest to rest at a goal, past the obstacles on the left, and its problem."""
     horizon = triple_integrator_horizon(seconds / STEPS, STEPS)
-    c = noise_per_step(np.full(2, NOISE), REFERENCE_S, horizon.dt)
+    c = scale_noise(np.full(2, NOISE), REFERENCE_S, horizon.dt)
     problem = rest_to_goal(horizon, np.zeros(6), goal, obstacles, c, eta)
-    return problem, forward(problem, cold(guess_path(np.zeros(2), goal, STEPS, 0.05)), FocConfig(strategy=strategy))
+    return problem, solve_problem(problem, cold_start(guess_path(np.zeros(2), goal, STEPS, 0.05)), FocConfig(strategy=strategy))
 
 
 def rolled(problem: Problem, solution: Solution, count: int) -> Array:
     """Return noisy movements under the control of a solution, (count, N, 2) [m]."""
     control = solution.control.T.ravel()
     draws = np.random.default_rng(0).standard_normal((count, control.size))
-    noise = stacked_noise(problem.noise, STEPS) * np.abs(control) * draws
+    noise = stack_noise(problem.noise, STEPS) * np.abs(control) * draws
     movements: Array = problem.positions(control) + np.einsum('atu,su->sta', problem.horizon.position, noise)
     return movements
 
@@ -115,7 +115,7 @@ def strategies() -> Figure:
         draw_scene(paths, scene.obstacles, scene.goal[None], (-0.02, 0.32, -0.06, 0.14), named=False)
         for number, name in enumerate(('lv', 'hc', 'optimal')):
             colour, dash = class_style(number)
-            solution = solve_way(scene, scene.ways[0], Method(PAPER_NOISE, name), 0.94)
+            solution = solve_class(scene, scene.ways[0], Method(PAPER_NOISE, name), 0.94)
             paths.plot(*solution.path.T, color=colour, linestyle=dash, linewidth=2.0)
             for row in range(5, STEPS, 8):
                 _ellipse(paths, solution, row, colour)
@@ -129,7 +129,7 @@ def strategies() -> Figure:
 def classes() -> Figure:
     """Return the ways that the search finds through the scene of the examples, solved."""
     scene = load_scene(SCENE)
-    ways = ways_of(solve_scene(scene, scene_problems(scene)))
+    ways = candidate_views(solve_scene(scene, scene_problems(scene)))
     letters = {way.label: number for number, way in enumerate(ways)}
     with new_figure(7.4, 5.6) as figure:
         axes, legend = figure.subplots(2, 1, height_ratios=(5.0, 0.2 * len(ways)))
@@ -149,9 +149,9 @@ def likelihood() -> Figure:
             colour, dash = class_style(number)
             config = LikelihoodConfig(beta=beta)
             places = np.arange(len(costs)) + 0.27 * (number - 1)
-            shares.bar(places, likelihoods(costs, config), 0.25, color=colour, label=f'β = {beta:g}')
+            shares.bar(places, compute_likelihoods(costs, config), 0.25, color=colour, label=f'β = {beta:g}')
             ratios = np.geomspace(1.0, 10.0, 60)
-            first = [likelihoods(np.array([1.0, ratio]), config)[0] for ratio in ratios]
+            first = [compute_likelihoods(np.array([1.0, ratio]), config)[0] for ratio in ratios]
             pair.plot(ratios, first, color=colour, linestyle=dash, linewidth=2.0)
             tag(pair, (ratios[40], first[40]), f'{beta:g}', colour)
         shares.set_xticks(range(len(costs)), [f'{cost:g}' for cost in costs])

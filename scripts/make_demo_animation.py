@@ -20,8 +20,8 @@ from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.reporting.drawing import CLASS_COLOURS, CLASSES, draw_hand, draw_likelihoods, draw_scene, draw_ways, new_figure
 from foc_ros.reporting.plots import bounds_of
-from foc_ros.reporting.snapshots import Moment, Track, movements
-from foc_ros.reporting.track_association import lineages, slots
+from foc_ros.reporting.snapshots import Snapshot, Track, movements
+from foc_ros.reporting.track_association import associate_tracks, slots
 
 ANIMATION = Path(__file__).resolve().parents[1] / 'doc' / 'images' / 'demo.gif'
 MOVEMENTS = (0, 4, 6)
@@ -39,14 +39,14 @@ def main() -> None:
     save(list(pictures(*replayed())), file)
 
 
-def pictures(track: Track, moments: list[Moment], chosen: tuple[int, ...] = MOVEMENTS) -> Iterator[tuple[Figure, int]]:
+def pictures(track: Track, moments: list[Snapshot], chosen: tuple[int, ...] = MOVEMENTS) -> Iterator[tuple[Figure, int]]:
     """Yield the pictures, each with the time it stays [ms]."""
     spans = movements(track, Config().estimator.onset_speed)
     goals = np.unique(np.concatenate([moment.goals for moment in moments]), axis=0)
     bounds = bounds_of(moments[0].obstacles, goals, (), track.positions)
     for start_ns, end_ns in (spans[number] for number in chosen):
         inside = [moment for moment in moments if start_ns <= moment.stamp_ns <= end_ns and moment.ways]
-        lines = lineages(inside)
+        lines = associate_tracks(inside)
         letters = slots(inside, lines, CLASSES, len(CLASS_COLOURS))
         rows = np.unique(np.linspace(0, len(inside) - 1, PICTURES).round().astype(int))
         for row in rows:

@@ -17,7 +17,7 @@ from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io.bags import BagReader
 from foc_ros.reporting.drawing import draw_colour_bar, draw_hand, draw_legend, draw_scene, draw_ways, new_figure
 from foc_ros.reporting.plots import bounds_of, save
-from foc_ros.reporting.snapshots import Moment, Track, moment_of, movements, track_of
+from foc_ros.reporting.snapshots import Snapshot, Track, movements, snapshot_of_prediction, track_of
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORDING = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'
@@ -26,21 +26,21 @@ MOVEMENT, AFTER_S = 5, 0.02
 """Which movement, counted from 1, and how long after its beginning [s]: when most is still open."""
 
 
-def replayed() -> tuple[Track, list[Moment]]:
+def replayed() -> tuple[Track, list[Snapshot]]:
     """Return the hand's track and all predictions of the recording up to the wanted one and the end of its movement."""
     samples: list[HandSample] = []
-    moments: list[Moment] = []
+    moments: list[Snapshot] = []
     with BagReader(RECORDING) as reader:
         for step in Replay(Config()).steps(reader):
             if step.sample is not None:
                 samples.append(step.sample)
             if step.prediction is not None and step.scene.goals is not None:
                 obstacles = step.scene.obstacles(step.prediction.stamp_ns)
-                moments.append(moment_of(step.prediction, obstacles, step.scene.goals))
+                moments.append(snapshot_of_prediction(step.prediction, obstacles, step.scene.goals))
     return track_of(samples), moments
 
 
-def picture(track: Track, moments: list[Moment]) -> Figure:
+def picture(track: Track, moments: list[Snapshot]) -> Figure:
     """Return the picture of the wanted moment."""
     span = movements(track, Config().estimator.onset_speed)[MOVEMENT - 1]
     wanted_ns = span[0] + int(AFTER_S * NANOSECONDS)

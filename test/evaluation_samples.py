@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from foc_ros.analysis.evaluation.observations import TIMES_S, Observation, Observations, Truth, Ways
-from foc_ros.core.homotopy.branch_times import Partings
+from foc_ros.core.homotopy.branch_times import BranchTimes
 from foc_ros.core.types import LEFT, RIGHT
 
 H = len(TIMES_S)
@@ -33,7 +33,7 @@ def ways(sides, goal=None, likelihood=None, to_go=None, solved=None, price=0.0) 
         mean=np.zeros((k, H, 2)),
         covariance=np.tile(np.eye(2), (k, H, 1, 1)),
         late=np.zeros((k, H, 2)),
-        partings=Partings(np.where(np.eye(k, dtype=bool), np.inf, 0.0), np.arange(k)),
+        partings=BranchTimes(np.where(np.eye(k, dtype=bool), np.inf, 0.0), np.arange(k)),
     )
 
 

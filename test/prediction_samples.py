@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.types import Candidate, Outcome, Prediction, Solution, Status, make_obstacles
+from foc_ros.core.types import Candidate, PredictedCandidate, Prediction, Solution, Status, make_obstacles
 
 STEPS, DT = 4, 0.05
 
 
-def outcome(label: str = 'goal0:+l1', likelihood: float = 0.6, bend: float = 0.1, cost: float = 2.0, **changes: Any) -> Outcome:
+def outcome(
+    label: str = 'goal0:+l1', likelihood: float = 0.6, bend: float = 0.1, cost: float = 2.0, **changes: Any
+) -> PredictedCandidate:
     """Return a candidate from (0, 0) to (0.3, 0) that bends to the left; changes: to the solution."""
     shape = np.sin(np.linspace(0, np.pi, STEPS + 1))
     mean = np.zeros((STEPS + 1, 6))
@@ -37,12 +39,12 @@ def outcome(label: str = 'goal0:+l1', likelihood: float = 0.6, bend: float = 0.1
     solution = Solution(**(values | changes))
     side = 1 if bend > 0 else -1
     candidate = Candidate(label, 0, (('1', side),), mean[:, :2].copy(), 0.31)
-    return Outcome(candidate, solution, {'1': side}, cost, likelihood if solution.status is Status.SOLVED else 0.0)
+    return PredictedCandidate(candidate, solution, {'1': side}, cost, likelihood if solution.status is Status.SOLVED else 0.0)
 
 
-def prediction(*outcomes: Outcome, stamp_ns: int = 5_000_000_000, **changes: Any) -> Prediction:
+def prediction(*outcomes: PredictedCandidate, stamp_ns: int = 5_000_000_000, **changes: Any) -> Prediction:
     """Return a prediction of these outcomes, the first being the most likely."""
-    solved = [each.candidate.label for each in outcomes if each.solved]
+    solved = [each.candidate.label for each in outcomes if each.is_solved]
     values = {'frame_id': 'world', 'height': 0.2, 'most_likely': solved[0] if solved else None}
     return Prediction(stamp_ns=stamp_ns, outcomes=outcomes, **(values | changes))
 

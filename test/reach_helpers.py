@@ -9,8 +9,8 @@ import pytest
 from foc_ros.core.config import FocConfig
 from foc_ros.core.dynamics.plants import triple_integrator_horizon
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
-from foc_ros.core.ocp.solve import forward
-from foc_ros.core.ocp.warm_start import cold
+from foc_ros.core.ocp.solve import solve_problem
+from foc_ros.core.ocp.warm_start import cold_start
 from foc_ros.core.types import Obstacles, Solution, make_obstacles
 
 REFERENCE = Path(__file__).resolve().parents[2] / 'shared' / 'reference' / 'cases.json'
@@ -69,7 +69,7 @@ def one_obstacle(eta=0.9, noise=(0.15, 0.15), **rest) -> Problem:
 
 def solved(problem: Problem, guess: np.ndarray, strategy: str = 'lv', **settings) -> Solution:
     """Solve from a guess (N + 1, 2)."""
-    return forward(problem, cold(guess), FocConfig(strategy=strategy, **settings))
+    return solve_problem(problem, cold_start(guess), FocConfig(strategy=strategy, **settings))
 
 
 def random_scene(generator: np.random.Generator, obstacles: int | None = None) -> tuple[Obstacles, np.ndarray, float]:

@@ -10,7 +10,7 @@ from foc_ros.core.types import (
     Candidate,
     HandSample,
     Obstacles,
-    Outcome,
+    PredictedCandidate,
     Prediction,
     Solution,
     Status,
@@ -38,7 +38,9 @@ def samples(reaches: int = 1, seconds: float = 1.0, rest: float = 0.5) -> list[H
     return made
 
 
-def outcome(label: str, goal: int, bow: float, likelihood: float, start: Array, status: Status = Status.SOLVED) -> Outcome:
+def outcome(
+    label: str, goal: int, bow: float, likelihood: float, start: Array, status: Status = Status.SOLVED
+) -> PredictedCandidate:
     s = np.linspace(0.0, 1.0, 21)
     path = start + quintic(s)[:, None] * (GOALS[goal] - start) + np.outer(np.sin(np.pi * s), [0.0, bow])
     dt = 0.05
@@ -47,7 +49,7 @@ def outcome(label: str, goal: int, bow: float, likelihood: float, start: Array, 
     covariance[:, 0, 0] = (0.001 + 0.01 * s) ** 2
     covariance[:, 1, 1] = (0.001 + 0.004 * s) ** 2
     solution = Solution(status, '', dt, mean, covariance, np.zeros((20, 2)), 100.0 * (2 - likelihood), {}, 0.0, 1.0, 0.9)
-    return Outcome(
+    return PredictedCandidate(
         Candidate(label, goal, (), path, 0.3),
         solution,
         {},

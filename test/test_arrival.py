@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from foc_ros.core.config import Config, updated
-from foc_ros.core.dynamics.plants import horizon, triple_integrator
+from foc_ros.core.dynamics.plants import condense, triple_integrator
 from foc_ros.core.dynamics.replanning import (
     replanned_error_map,
     triple_integrator_error_map,
@@ -28,7 +28,7 @@ def hand(*mean: float) -> HandState:
 
 
 def test_a_hand_that_keeps_its_speed_passes_without_effort() -> None:
-    (found,) = predict(PASSING, hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0), FREE, np.array([[0.3, 0.1]]), Memory())[0].solved
+    (found,) = predict(PASSING, hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0), FREE, np.array([[0.3, 0.1]]), Memory())[0].solved_candidates
     assert found.solution.effort == pytest.approx(0.0, abs=1e-12)
     assert_allclose(found.solution.mean[-1], [0.3, 0.1, 0.3, 0.1, 0.0, 0.0], atol=1e-9)
 
@@ -36,7 +36,7 @@ def test_a_hand_that_keeps_its_speed_passes_without_effort() -> None:
 def test_the_effort_is_the_least_that_leads_to_the_goal_without_acceleration() -> None:
     start = np.array([0.0, 0.0, 0.2, -0.1, 0.5, 1.0])
     config = updated(PASSING, {'foc.steps': 400})
-    (found,) = predict(config, hand(*start), FREE, np.array([[0.3, 0.1]]), Memory())[0].solved
+    (found,) = predict(config, hand(*start), FREE, np.array([[0.3, 0.1]]), Memory())[0].solved_candidates
     along = [effort_along(way, *start[2 + axis :: 2], np.array([1.0]), True)[0] for axis, way in enumerate((0.3, 0.1))]
     assert found.solution.effort * found.solution.dt == pytest.approx(sum(along), rel=1e-3)
     assert_allclose(found.solution.mean[-1, [0, 1, 4, 5]], [0.3, 0.1, 0.0, 0.0], atol=1e-9)
@@ -56,7 +56,7 @@ def test_effort_along_a_line_is_that_of_least_energy(length: float, speed: float
 def test_errors_are_corrected_but_for_the_velocity() -> None:
     dt, steps = 0.05, 20
     error_map = triple_integrator_error_map(dt, steps, True)
-    assert_allclose(error_map, replanned_error_map(horizon(triple_integrator(dt), steps), True), atol=1e-9)
+    assert_allclose(error_map, replanned_error_map(condense(triple_integrator(dt), steps), True), atol=1e-9)
     assert_allclose(error_map[-1][[0, 1, 4, 5]], 0.0, atol=1e-9)
     kept = error_map[-1][2, 2]
     assert kept == pytest.approx(error_map[-1][3, 3]) and abs(kept) > 0.1
@@ -67,8 +67,8 @@ def test_errors_are_corrected_but_for_the_velocity() -> None:
 def test_where_the_hand_ends_it_is_as_unsure_as_it_passes() -> None:
     scene = FREE, np.array([[0.3, 0.1]]), Memory()
     now = hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0)
-    passing = predict(PASSING, now, *scene)[0].solved[0].solution
-    resting = predict(updated(PASSING, {'duration.arrival': 'rest'}), now, *scene)[0].solved[0].solution
+    passing = predict(PASSING, now, *scene)[0].solved_candidates_candidates[0].solution
+    resting = predict(updated(PASSING, {'duration.arrival': 'rest'}), now, *scene)[0].solved_candidates[0].solution
     assert_allclose(resting.mean[-1, 2:], 0.0, atol=1e-9)
     assert resting.effort > 1.0
     assert passing.covariance[-1, 2, 2] > 2.0 * resting.covariance[-1, 2, 2]
@@ -76,7 +76,7 @@ def test_where_the_hand_ends_it_is_as_unsure_as_it_passes() -> None:
 
 def test_past_an_obstacle_the_goal_is_passed_on_the_way_on() -> None:
     scene = make_obstacles([[0.15, 0.04]], 0.05), np.array([[0.3, 0.1]])
-    solved = predict(PASSING, hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0), *scene, Memory())[0].solved
+    solved = predict(PASSING, hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0), *scene, Memory())[0].solved_candidates
     assert len(solved) == 2
     for each in solved:
         assert_allclose(each.solution.mean[-1, [0, 1, 4, 5]], [0.3, 0.1, 0.0, 0.0], atol=1e-6)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from foc_ros.core.candidates import Earlier
+from foc_ros.core.candidates import EarlierSolutions
 from foc_ros.core.config import Config, updated
 from foc_ros.core.deadline import OutOfTimeError
 from foc_ros.core.estimation.kalman_filter import update
@@ -25,43 +25,47 @@ def predicted(tick: int, memory: Memory, budget_s: float = 0.0):
 
 
 def statuses(prediction) -> list[Status]:
-    return [outcome.solution.status for outcome in prediction.outcomes]
+    return [outcome.solution.status for outcome in prediction.candidates]
 
 
 def test_a_budget_that_is_not_reached_changes_nothing():
     (free, memory), (ample, other) = predicted(0, Memory()), predicted(0, Memory(), 60.0)
     for one, two in ((free, ample), (predicted(1, memory)[0], predicted(1, other, 60.0)[0])):
         assert one.most_likely == two.most_likely
-        for a, b in zip(one.outcomes, two.outcomes, strict=True):
+        for a, b in zip(one.candidates, two.candidates, strict=True):
             assert (a.candidate.label, a.likelihood) == (b.candidate.label, b.likelihood)
             np.testing.assert_array_equal(a.solution.mean, b.solution.mean)
 
 
 def test_no_time_at_all_is_an_empty_answer_and_forgets_nothing():
     before, memory = predicted(0, Memory())
-    assert len(before.solved) > 1
+    assert len(before.solved_candidates) > 1
     late, memory = predicted(1, memory, 1e-9)
     assert set(statuses(late)) == {Status.DEADLINE}
     assert late.most_likely is None
-    assert all(np.isfinite(outcome.solution.mean).all() for outcome in late.outcomes)
-    told = {each.candidate.label: each.solution.message for each in late.outcomes}
+    assert all(np.isfinite(outcome.solution.mean).all() for outcome in late.candidates)
+    told = {each.candidate.label: each.solution.message for each in late.candidates}
     assert all('out of time' in message for message in told.values())
-    assert all('last solved 0.02 s ago' in told[each.candidate.label] for each in before.solved)
+    assert all('last solved 0.02 s ago' in told[each.candidate.label] for each in before.solved_candidates)
     after, _ = predicted(2, memory)
-    assert [each.candidate.label for each in after.solved] == [each.candidate.label for each in before.solved]
-    assert max(each.solution.qp_solves for each in after.solved) <= 3, 'warm, from before the late one'
+    assert [each.candidate.label for each in after.solved_candidates] == [
+        each.candidate.label for each in before.solved_candidates
+    ]
+    assert max(each.solution.qp_solves for each in after.solved_candidates) <= 3, 'warm, from before the late one'
 
 
 def test_a_way_that_never_had_time_says_so():
-    assert 'never solved yet' in predicted(0, Memory(), 1e-9)[0].outcomes[0].solution.message
+    assert 'never solved yet' in predicted(0, Memory(), 1e-9)[0].candidates[0].solution.message
 
 
 @pytest.mark.parametrize('turned', [False, True])
 def test_the_likeliest_of_last_time_comes_first(monkeypatch, turned):
     before, memory = predicted(0, Memory())
-    wanted = before.solved[-1 if turned else 0].candidate.label
-    likelihoods = {each.candidate.label: float(each.candidate.label == wanted) for each in before.outcomes}
-    memory = Memory(memory.most_likely, memory.candidates, Earlier(memory.earlier.solutions, likelihoods), memory.solved_ns)
+    wanted = before.solved_candidates[-1 if turned else 0].candidate.label
+    likelihoods = {each.candidate.label: float(each.candidate.label == wanted) for each in before.candidates}
+    memory = Memory(
+        memory.most_likely, memory.candidates, EarlierSolutions(memory.earlier.solutions, likelihoods), memory.solved_ns
+    )
     asked = []
 
     def forward_with_time_for_one(problem, start, settings, deadline):
@@ -75,9 +79,9 @@ def test_the_likeliest_of_last_time_comes_first(monkeypatch, turned):
 
     from foc_ros.core import candidates as outcomes
 
-    real = outcomes.forward
+    real = outcomes.solve_problem
     monkeypatch.setattr(outcomes, 'forward', forward_with_time_for_one)
     late, _ = predicted(1, memory, 60.0)
-    assert [each.candidate.label for each in late.solved] == [wanted]
-    assert late.solved[0].likelihood == 1.0, 'likelihoods are of what was solved; the others are unknown'
-    assert statuses(late)[1:] == [Status.DEADLINE] * (len(late.outcomes) - 1)
+    assert [each.candidate.label for each in late.solved_candidates] == [wanted]
+    assert late.solved_candidates[0].likelihood == 1.0, 'likelihoods are of what was solved; the others are unknown'
+    assert statuses(late)[1:] == [Status.DEADLINE] * (len(late.candidates) - 1)

@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 
 from foc_ros.core.obstacles.chance_constraint import (
     CERTAIN_K,
-    achieved_k,
-    centres,
+    centres_by_obstacle,
     eta_of_k,
-    expectation,
+    expected_values,
     k_of_eta,
+    safety_factors,
     size_moments,
-    variance,
+    variances,
 )
 from foc_ros.core.types import make_obstacles
 
@@ -28,7 +28,7 @@ def test_a_violated_surrogate_guarantees_nothing():
 
 
 def test_without_variance_k_is_certain_either_way():
-    np.testing.assert_array_equal(achieved_k(np.array([[-1.0, 1.0]]), np.zeros((1, 2))), [[CERTAIN_K, -CERTAIN_K]])
+    np.testing.assert_array_equal(safety_factors(np.array([[-1.0, 1.0]]), np.zeros((1, 2))), [[CERTAIN_K, -CERTAIN_K]])
 
 
 def test_moments_are_those_of_samples_for_correlated_axes_and_uncertain_centres():
@@ -40,8 +40,8 @@ def test_moments_are_those_of_samples_for_correlated_axes_and_uncertain_centres(
     mean, guess = np.array([0.16, 0.02]), np.array([0.17, 0.015])
     d = (guess - obstacle.centre[0]).reshape(1, 1, 2)
     size_mean, size_variance = size_moments(obstacle)
-    E = expectation(d, (mean - guess)[None], size_mean)[0, 0]
-    V = variance(d, covariance[[0, 1, 0], [0, 1, 1]].reshape(3, 1), size_variance, obstacle.centre_covariance)[0, 0]
+    E = expected_values(d, (mean - guess)[None], size_mean)[0, 0]
+    V = variances(d, covariance[[0, 1, 0], [0, 1, 1]].reshape(3, 1), size_variance, obstacle.centre_covariance)[0, 0]
     position = generator.multivariate_normal(mean, covariance, samples)
     centre = generator.multivariate_normal(obstacle.centre[0], centre_covariance, samples)
     radius = generator.normal(0.03, 0.004, samples)
@@ -55,10 +55,10 @@ def test_moments_are_those_of_samples_for_correlated_axes_and_uncertain_centres(
 def test_linearisation_is_an_upper_bound_of_the_constraint():
     generator = np.random.default_rng(6)
     guess, position = generator.normal(size=(2, 200, 2))
-    linear = expectation(guess[None], position - guess, np.array([0.5]))[0]
+    linear = expected_values(guess[None], position - guess, np.array([0.5]))[0]
     assert (0.5 - (position**2).sum(axis=1) <= linear + 1e-12).all()
 
 
 def test_centres_move_on_at_their_velocity():
-    moved = centres(np.array([[1.0, 2.0]]), 0.1 * np.array([[0.5, -1.0]]), 3)
+    moved = centres_by_obstacle(np.array([[1.0, 2.0]]), 0.1 * np.array([[0.5, -1.0]]), 3)
     np.testing.assert_allclose(moved, [[[1.05, 1.9], [1.1, 1.8], [1.15, 1.7]]])

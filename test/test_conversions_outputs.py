@@ -12,7 +12,7 @@ from message_helpers import STORE, both_kinds, message_types
 from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction, three_ways
 
 from foc_ros.core.errors import FocError
-from foc_ros.core.types import Outcome, Prediction, Status, make_obstacles
+from foc_ros.core.types import PredictedCandidate, Prediction, Status, make_obstacles
 from foc_ros.ros.messages.outputs import OUTPUTS, output_messages
 from foc_ros.ros.messages.plane import lift
 from foc_ros.ros.messages.ranking import MAX_RATIO
@@ -49,7 +49,7 @@ def test_the_cloud_holds_every_solved_candidate(types: MessageTypes, plane: str)
         2 * (STEPS + 1) * 60,
     )
     assert (cloud.header.stamp.sec, cloud.header.stamp.nanosec, cloud.header.frame_id) == (5, 0, 'world')
-    for index, each in enumerate(ways.solved):
+    for index, each in enumerate(ways.solved_candidates):
         rows = table['candidate'] == index
         solution = each.solution
         np.testing.assert_allclose(table['t'][rows], DT * np.arange(STEPS + 1), rtol=1e-6)
@@ -81,7 +81,7 @@ def test_the_path_is_the_most_likely_one_with_stamps_in_the_future(types: Messag
     stamps = [pose.header.stamp.sec * 10**9 + pose.header.stamp.nanosec for pose in message.poses]
     assert stamps == [5_000_000_000 + 50_000_000 * i for i in range(STEPS + 1)]
     points = [(pose.pose.position.x, pose.pose.position.y, pose.pose.position.z) for pose in message.poses]
-    np.testing.assert_array_equal(points, lift(ways.solved[0].solution.path, 0.2, 'xz'))
+    np.testing.assert_array_equal(points, lift(ways.solved_candidates[0].solution.path, 0.2, 'xz'))
     assert {pose.header.frame_id for pose in message.poses} == {'world'} == {message.header.frame_id}
     assert {pose.pose.orientation.w for pose in message.poses} == {1.0}
 
@@ -96,7 +96,7 @@ def test_the_one_called_most_likely_comes_first_even_if_another_has_overtaken_it
 
 @both_kinds
 @pytest.mark.parametrize('outcomes', [(), (outcome(status=Status.DEADLINE),)])
-def test_nothing_solved_is_an_empty_answer(types: MessageTypes, outcomes: tuple[Outcome, ...]) -> None:
+def test_nothing_solved_is_an_empty_answer(types: MessageTypes, outcomes: tuple[PredictedCandidate, ...]) -> None:
     messages = output_messages(prediction(*outcomes), OBSTACLES, 'xy', types)
     assert (messages['prediction'].width, len(messages['prediction'].data)) == (0, 0)
     assert [field.name for field in messages['prediction'].fields] == NAMES
@@ -200,7 +200,7 @@ def test_any_prediction_comes_back_from_its_cloud(
     outcomes = [outcome(f'c{i}', p, bend, cost, status=status) for i, (p, bend, cost, status) in enumerate(rows)]
     given_prediction = prediction(*outcomes, height=height)
     table = columns(made('prediction', given_prediction, plane=plane))
-    solved = given_prediction.solved
+    solved = given_prediction.solved_candidates
     assert set(table['candidate']) == set(range(len(solved)))
     for index, each in enumerate(solved):
         rows_ = table['candidate'] == index

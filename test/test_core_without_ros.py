@@ -40,7 +40,7 @@ from foc_ros.foc.records import HandState, make_obstacles
 hand = HandState(0, np.zeros(6), np.zeros((6, 6)))
 scene = make_obstacles([[0.15, 0.0]], [0.03], 0.002)
 prediction, _ = predict(Config(), hand, scene, np.array([[0.3, 0.0]]), Memory())
-sides = sorted(outcome.sides['0'] for outcome in prediction.solved)
+sides = sorted(outcome.sides['0'] for outcome in prediction.solved_candidates)
 assert sides == [-1, 1], sides
 """
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foc_ros.core.obstacles.culling import relevant
+from foc_ros.core.obstacles.culling import cull_obstacles
 from foc_ros.core.types import make_obstacles
 
 HAND, GOALS = np.zeros(2), np.array([[0.3, 0.0], [0.0, 0.3]])
@@ -13,12 +13,12 @@ FAR = np.array([2.0, 2.0]) + RNG.uniform(-1.0, 1.0, (50, 2))
 
 
 def kept(centre: object, radius: object = 0.02, velocity: object = 0.0, most: int = 2) -> tuple[str, ...]:
-    return relevant(make_obstacles(centre, radius, velocity=velocity), HAND, GOALS, 1.0, most).ids
+    return cull_obstacles(make_obstacles(centre, radius, velocity=velocity), HAND, GOALS, 1.0, most).ids
 
 
 def test_few_are_all_kept_as_they_are() -> None:
     obstacles = make_obstacles(FAR, 0.02)
-    assert relevant(obstacles, HAND, GOALS, 1.0, 50) is obstacles
+    assert cull_obstacles(obstacles, HAND, GOALS, 1.0, 50) is obstacles
 
 
 def test_those_on_the_way_to_any_goal_are_kept_in_their_order() -> None:

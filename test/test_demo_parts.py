@@ -18,13 +18,13 @@ from rich.console import Console
 
 from foc_ros.cli.demo import command, environment, node_process
 from foc_ros.cli.demo.display import Display
-from foc_ros.cli.demo.recorder import Ledger
+from foc_ros.cli.demo.recorder import Recorder
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
 from foc_ros.core.types import Prediction
 from foc_ros.io.bags import TYPESTORE, Item
-from foc_ros.reporting.snapshots import moment_of
+from foc_ros.reporting.snapshots import snapshot_of_prediction
 from foc_ros.ros.messages.input_messages import goal_poses, hand_pose, obstacle_cloud
 from foc_ros.ros.messages.outputs import likelihood_array, prediction_cloud
 from foc_ros.ros.messages.types import RosbagsTypes
@@ -33,14 +33,14 @@ TYPES = RosbagsTypes(TYPESTORE)
 STEP_NS = 20_000_000
 
 
-def send_scene(ledger: Ledger) -> None:
+def send_scene(ledger: Recorder) -> None:
     goals = goal_poses(TYPES, START_NS, 'world', np.array([[0.3, 0.0, 0.1], [0.3, 0.12, 0.1]]))
     cloud = obstacle_cloud(TYPES, START_NS, 'world', [(0.15, 0.0, 0.1, 0.03, 0.003, 7)])
     for role, message in (('goals', goals), ('obstacles', cloud)):
         ledger.sent(Item(role, f'/{role}', START_NS, message, b''), 0.0)
 
 
-def send_hand(ledger: Ledger, number: int, now: float) -> None:
+def send_hand(ledger: Recorder, number: int, now: float) -> None:
     stamp_ns = START_NS + number * STEP_NS
     ledger.sent(Item('hand_pose', '/hand_pose', stamp_ns, hand_pose(TYPES, stamp_ns, 'world', (0.0, 0.0, 0.1)), b''), now)
 
@@ -50,8 +50,8 @@ def answer(number: int) -> tuple[object, object, Prediction]:
     return prediction_cloud(made, 'xy', TYPES), likelihood_array(made, TYPES), made
 
 
-def filled(count: int = 5) -> Ledger:
-    ledger = Ledger(Config())
+def filled(count: int = 5) -> Recorder:
+    ledger = Recorder(Config())
     send_scene(ledger)
     for number in range(count):
         send_hand(ledger, number, now=0.02 * number)
@@ -66,7 +66,7 @@ def test_ledger_keeps_every_answer_with_its_scene() -> None:
     assert [sample.stamp_ns for sample in ledger.samples] == [START_NS + n * STEP_NS for n in range(5)]
     assert [moment.stamp_ns for moment in ledger.moments] == [START_NS + n * STEP_NS for n in range(5)]
     moment = ledger.moments[3]
-    expected = moment_of(answer(3)[2], moment.obstacles, moment.goals)
+    expected = snapshot_of_prediction(answer(3)[2], moment.obstacles, moment.goals)
     assert [(way.label, way.likelihood) for way in moment.ways] == [(way.label, way.likelihood) for way in expected.ways]
     assert moment.obstacles.ids == ('7',)
     np.testing.assert_allclose(moment.goals, [[0.3, 0.0], [0.3, 0.12]])
@@ -75,7 +75,7 @@ def test_ledger_keeps_every_answer_with_its_scene() -> None:
 
 @pytest.mark.parametrize('lost', ['prediction', 'likelihoods'])
 def test_ledger_pairs_on_after_a_loss(lost: str) -> None:
-    ledger = Ledger(Config())
+    ledger = Recorder(Config())
     send_scene(ledger)
     for number in range(6):
         send_hand(ledger, number, now=0.02 * number)
@@ -88,7 +88,7 @@ def test_ledger_pairs_on_after_a_loss(lost: str) -> None:
 
 
 def test_ledger_counts_the_last_second() -> None:
-    ledger = Ledger(Config())
+    ledger = Recorder(Config())
     send_scene(ledger)
     for number in range(100):
         send_hand(ledger, number, now=0.025 * number)
@@ -96,7 +96,7 @@ def test_ledger_counts_the_last_second() -> None:
     assert ledger.hand_rate(0.025 * 99 + 2.0) == 0
 
 
-def shown(ledger: Ledger, terminal: bool, times: np.ndarray) -> str:
+def shown(ledger: Recorder, terminal: bool, times: np.ndarray) -> str:
     screen = io.StringIO()
     console = Console(file=screen, force_terminal=terminal, width=110)
     with Display(ledger, START_NS, 5.0, console) as display:
@@ -123,7 +123,7 @@ def test_on_a_terminal_a_table() -> None:
 
 @pytest.mark.parametrize('terminal', [False, True])
 def test_nothing_solved_is_shown(terminal: bool) -> None:
-    ledger = Ledger(Config())
+    ledger = Recorder(Config())
     send_scene(ledger)
     send_hand(ledger, 0, 0.0)
     made = Prediction(START_NS, 'world', 0.1, (), None)
@@ -133,7 +133,7 @@ def test_nothing_solved_is_shown(terminal: bool) -> None:
 
 
 def test_display_waits_for_the_first_answer() -> None:
-    assert shown(Ledger(Config()), False, np.array([0.0, 2.0])) == ''
+    assert shown(Recorder(Config()), False, np.array([0.0, 2.0])) == ''
 
 
 def test_output_directory_is_made_and_what_a_demo_left_is_replaced(tmp_path: Path) -> None:

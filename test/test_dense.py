@@ -13,28 +13,28 @@ LOWER = np.linalg.cholesky(POSITIVE)
 
 
 def test_products():
-    np.testing.assert_allclose(dense.row_products(A, B), A @ B.T, atol=1e-14)
-    np.testing.assert_allclose(dense.combined(A.T.copy(), A), A.T @ A, atol=1e-14)
-    np.testing.assert_allclose(dense.values(A, B[0]), A @ B[0], atol=1e-14)
+    np.testing.assert_allclose(dense.multiply_transposed(A, B), A @ B.T, atol=1e-14)
+    np.testing.assert_allclose(dense.multiply(A.T.copy(), A), A.T @ A, atol=1e-14)
+    np.testing.assert_allclose(dense.multiply_vector(A, B[0]), A @ B[0], atol=1e-14)
 
 
 def test_cholesky_and_its_solves():
-    np.testing.assert_allclose(dense.cholesky(POSITIVE, 0.0), LOWER, atol=1e-13)
-    np.testing.assert_allclose(LOWER @ dense.lower_solved(LOWER, A), A, atol=1e-13)
-    np.testing.assert_allclose(LOWER.T @ dense.upper_solved(LOWER, A[:, 0].copy()), A[:, 0], atol=1e-13)
+    np.testing.assert_allclose(dense.factorise_cholesky(POSITIVE, 0.0), LOWER, atol=1e-13)
+    np.testing.assert_allclose(LOWER @ dense.solve_lower(LOWER, A), A, atol=1e-13)
+    np.testing.assert_allclose(LOWER.T @ dense.solve_lower_transposed(LOWER, A[:, 0].copy()), A[:, 0], atol=1e-13)
 
 
 def test_a_matrix_that_is_not_positive_gives_nan_or_the_floor():
     singular = np.ones((2, 2))
-    assert np.isnan(dense.cholesky(singular, 0.0)[1, 1])
-    assert dense.cholesky(singular, 1e-14)[1, 1] == pytest.approx(1e-7)
+    assert np.isnan(dense.factorise_cholesky(singular, 0.0)[1, 1])
+    assert dense.factorise_cholesky(singular, 1e-14)[1, 1] == pytest.approx(1e-7)
 
 
 def test_read_only_and_empty_arrays_are_taken():
     frozen = A.copy()
     frozen.flags.writeable = False
-    np.testing.assert_allclose(dense.row_products(frozen, frozen), POSITIVE, atol=1e-14)
-    assert dense.row_products(np.empty((0, 7)), A).shape == (0, 5)
+    np.testing.assert_allclose(dense.multiply_transposed(frozen, frozen), POSITIVE, atol=1e-14)
+    assert dense.multiply_transposed(np.empty((0, 7)), A).shape == (0, 5)
 
 
 def test_a_kernel_that_cannot_be_kept_is_compiled_all_the_same():

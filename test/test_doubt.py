@@ -5,13 +5,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from foc_ros.core.config import Config, updated
-from foc_ros.core.dynamics.plants import horizon, triple_integrator, triple_integrator_horizon
-from foc_ros.core.dynamics.predictive_covariance import lateness, waiting
+from foc_ros.core.dynamics.plants import condense, triple_integrator, triple_integrator_horizon
+from foc_ros.core.dynamics.predictive_covariance import duration_sensitivity, onset_delay_covariance
 from foc_ros.core.dynamics.replanning import goal_map, triple_integrator_goal_map
 from foc_ros.core.memory import Memory
 from foc_ros.core.ocp.problem import rest_to_goal
-from foc_ros.core.ocp.solve import forward
-from foc_ros.core.ocp.warm_start import cold
+from foc_ros.core.ocp.solve import solve_problem
+from foc_ros.core.ocp.warm_start import cold_start
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import HandState, Solution, make_obstacles
 
@@ -25,7 +25,7 @@ def _plan(duration_s: float, passing: bool, mean: np.ndarray) -> Solution:
     """Plan a movement without obstacles."""
     stacked = triple_integrator_horizon(duration_s / STEPS, STEPS)
     problem = rest_to_goal(stacked, mean, GOAL, make_obstacles([], []), np.array([0.05, 0.05]), 0.9, passing=passing)
-    return forward(problem, cold(np.linspace(mean[:2], GOAL, STEPS + 1)), Config().foc)
+    return solve_problem(problem, cold_start(np.linspace(mean[:2], GOAL, STEPS + 1)), Config().foc)
 
 
 def test_a_goal_elsewhere_is_reached_by_a_minimum_jerk_movement_to_it() -> None:
@@ -33,7 +33,7 @@ def test_a_goal_elsewhere_is_reached_by_a_minimum_jerk_movement_to_it() -> None:
     assert_allclose(moved[:, 0, 0], 10 * S**3 - 15 * S**4 + 6 * S**5, atol=2e-3)
     assert_allclose(moved[:, 0, 4], S**3 * (1 - S) ** 2 / 2, atol=2e-4)
     assert_allclose(moved[-1], np.eye(6), atol=1e-9)
-    assert_allclose(moved, goal_map(horizon(triple_integrator(0.02), STEPS)), atol=1e-9)
+    assert_allclose(moved, goal_map(condense(triple_integrator(0.02), STEPS)), atol=1e-9)
     assert_array_equal(moved[0], 0.0)
 
 
@@ -55,7 +55,7 @@ def test_lateness_is_the_difference_that_a_longer_duration_makes(passing: bool, 
         early, late = (np.interp(now.times, each.times, each.mean[:, axis]) for each in (sooner, later))
         expected[:, axis] = (early - late) / (2.0 * share)
     middle = slice(0, int(0.95 * STEPS))  # the sooner one ends before the end
-    found = lateness(now, passing)[:, :2]
+    found = duration_sensitivity(now, passing)[:, :2]
     assert np.abs(found).max() > 0.05
     # the velocity that is left open changes, too, which is no part of the map
     assert_allclose(found[middle], expected[middle], atol=(0.04 if passing else 0.015) * np.abs(found).max())
@@ -65,14 +65,14 @@ def test_predictions_widen_about_the_goal_and_along_the_way_and_means_and_likeli
     scene = make_obstacles([[0.2, 0.0]], 0.02), np.array([GOAL, [0.4, -0.1]])
     sure = predict(Config(), HAND, *scene, Memory())[0]
     unsure = predict(updated(Config(), {'foc.endpoint_stddev': 0.006, 'duration.spread': 0.3}), HAND, *scene, Memory())[0]
-    assert len(sure.solved) == len(unsure.solved) >= 3
-    for before, after in zip(sure.outcomes, unsure.outcomes, strict=True):
+    assert len(sure.solved_candidates) == len(unsure.solved_candidates) >= 3
+    for before, after in zip(sure.candidates, unsure.candidates, strict=True):
         assert_array_equal(before.solution.mean, after.solution.mean)
         assert before.likelihood == after.likelihood
         added = after.solution.covariance - before.solution.covariance
         assert_allclose(added[-1, :2, :2], 0.006**2 * np.eye(2), atol=1e-9)
         assert_allclose(added, added.swapaxes(1, 2), atol=1e-12)
-        late = lateness(before.solution, False)[STEPS // 2, :2]
+        late = duration_sensitivity(before.solution, False)[STEPS // 2, :2]
         across = np.array([-late[1], late[0]]) / np.hypot(*late)
         half_way = triple_integrator_goal_map(before.solution.dt, STEPS)[STEPS // 2, 0, 0]
         assert across @ added[STEPS // 2, :2, :2] @ across == pytest.approx((0.006 * half_way) ** 2)
@@ -82,7 +82,7 @@ def test_predictions_widen_about_the_goal_and_along_the_way_and_means_and_likeli
 def test_a_wait_before_the_movement_is_as_drawn() -> None:
     plan, wait_s = _plan(0.8, False, np.zeros(6)), 0.15
     delays = np.random.default_rng(4).exponential(wait_s, 20_000)
-    found = waiting(plan, wait_s)
+    found = onset_delay_covariance(plan, wait_s)
     for step in (5, 20, 40, STEPS):
         began = np.maximum(plan.times[step] - delays, 0.0)
         away = np.stack(
@@ -99,7 +99,7 @@ def test_only_of_a_hand_at_rest_it_is_unknown_when_it_begins() -> None:
     scene = make_obstacles([], []), GOAL[None]
     waiting_hand = updated(Config(), {'duration.wait_s': 0.2})
     for hand, widens in ((HandState(0, np.zeros(6), 1e-6 * np.eye(6)), True), (HAND, False)):
-        plain, unsure = (predict(config, hand, *scene, Memory())[0].outcomes[0] for config in (Config(), waiting_hand))
+        plain, unsure = (predict(config, hand, *scene, Memory())[0].candidates[0] for config in (Config(), waiting_hand))
         assert_array_equal(plain.solution.mean, unsure.solution.mean)
         added = (unsure.solution.covariance - plain.solution.covariance)[STEPS // 2, :2, :2]
         assert (np.trace(added) > 0.05**2) == widens and (widens or not added.any())

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foc_ros.core.config import DurationConfig
-from foc_ros.core.estimation.duration import movement_time, times_to_go
+from foc_ros.core.estimation.duration import estimate_times_to_go, movement_time
 from foc_ros.core.types import NANOSECONDS, HandState
 
 FITTS = DurationConfig(
@@ -28,7 +28,7 @@ def hand(x: float, onset: float | None = None, since_s: float = 0.0, speed: floa
 
 
 def time_to_go(state: HandState, goal: np.ndarray, config: DurationConfig) -> float:
-    return times_to_go(state, goal[None], config)[0]
+    return estimate_times_to_go(state, goal[None], config)[0]
 
 
 def test_fitts_law_at_whole_bits() -> None:
@@ -94,7 +94,7 @@ def test_the_frame_does_not_matter() -> None:
 def test_of_several_goals_the_one_that_the_speed_fits_best_tells_how_slow_the_operator_is() -> None:
     """Near one goal and slow, the hand gets no more time for the others than for this one."""
     goals = np.array([[0.3, 0.0], [-0.3, 0.0]])
-    near = times_to_go(hand(0.28, onset=0.0, since_s=1.3, speed=0.1), goals, FIXED)
+    near = estimate_times_to_go(hand(0.28, onset=0.0, since_s=1.3, speed=0.1), goals, FIXED)
     assert near == pytest.approx([0.3, 0.3])
-    late = times_to_go(hand(0.2, onset=0.0, since_s=3.0, speed=0.05), goals, FIXED)
+    late = estimate_times_to_go(hand(0.2, onset=0.0, since_s=3.0, speed=0.05), goals, FIXED)
     assert late == pytest.approx([2.0, 2.0])

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from foc_ros.core.dynamics.plants import Plant, damped_mass, horizon, states_at_goal, triple_integrator, triple_integrator_horizon
+from foc_ros.core.dynamics.plants import (
+    Plant,
+    condense,
+    damped_mass,
+    states_at_goal,
+    triple_integrator,
+    triple_integrator_horizon,
+)
 from foc_ros.core.dynamics.replanning import replanned_error_map, triple_integrator_error_map
 from foc_ros.core.errors import InputError
 
@@ -39,7 +46,7 @@ def test_horizon_is_what_the_plant_does_step_by_step(plant):
     generator = np.random.default_rng(1)
     steps, n = 12, len(plant.A)
     control, state = generator.standard_normal((steps, 2)), generator.standard_normal(n)
-    stacked = horizon(plant, steps)
+    stacked = condense(plant, steps)
     predicted = stacked.powers @ state
     predicted[1:] += stacked.response @ control.T.ravel()
     for t in range(steps):
@@ -49,7 +56,7 @@ def test_horizon_is_what_the_plant_does_step_by_step(plant):
 
 
 def test_scaled_horizon_is_the_direct_one():
-    direct, scaled = horizon(triple_integrator(0.037), 30), triple_integrator_horizon(0.037, 30)
+    direct, scaled = condense(triple_integrator(0.037), 30), triple_integrator_horizon(0.037, 30)
     np.testing.assert_allclose(scaled.powers, direct.powers, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(scaled.response, direct.response, rtol=1e-12, atol=1e-18)
     np.testing.assert_allclose(scaled.maps, direct.maps, rtol=1e-12, atol=1e-24)
@@ -95,5 +102,5 @@ def test_a_control_that_leads_back_ends_at_the_goal_and_nearer_to_the_path(passi
     np.testing.assert_allclose(stacked.response[-1, fixed] @ control, state[fixed], atol=1e-8)
     straight = stacked.returning(np.zeros((40, 2)), state, fixed)
     assert np.linalg.norm((stacked.position @ control).T - path) < np.linalg.norm((stacked.position @ straight).T - path)
-    own = horizon(triple_integrator(0.02), 40).returning(path, state, fixed)
+    own = condense(triple_integrator(0.02), 40).returning(path, state, fixed)
     np.testing.assert_allclose(stacked.position @ control, stacked.position @ own, atol=1e-9)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import EstimatorConfig
-from foc_ros.core.estimation.effort import LEAST_TIME_S, Effort, advanced
+from foc_ros.core.estimation.effort import LEAST_TIME_S, Effort, add_sample
 from foc_ros.core.estimation.kalman_filter import update
 from foc_ros.core.types import Array, HandSample
 
@@ -25,7 +25,7 @@ def reach(t: Array) -> Array:
 def fed(times: Array, positions: Array, stddev: float = STDDEV) -> Effort:
     effort = Effort()
     for t, position in zip(times, positions, strict=True):
-        effort = advanced(effort, round(t * 1e9), position, stddev)
+        effort = add_sample(effort, round(t * 1e9), position, stddev)
     return effort
 
 
@@ -93,7 +93,7 @@ def test_noise_on_uniform_motion_is_not_taken_for_effort(rate: float) -> None:
     t = np.arange(0.0, 2.0, 1.0 / rate)
     effort, highest = Effort(), 0.0
     for time, noise in zip(t, STDDEV * rng.standard_normal((len(t), 2)), strict=True):
-        effort = advanced(effort, round(time * 1e9), np.array([0.2 * time, 0.1]) + noise, STDDEV)
+        effort = add_sample(effort, round(time * 1e9), np.array([0.2 * time, 0.1]) + noise, STDDEV)
         highest = max(highest, effort.spent)
     assert highest == 0.0
 

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foc_ros.core.config import EstimatorConfig
-from foc_ros.core.estimation.kalman_filter import Track, gramian, transition, update
-from foc_ros.core.sample_status import Verdict
+from foc_ros.core.estimation.kalman_filter import FilterState, gramian, transition, update
+from foc_ros.core.sample_status import SampleStatus
 from foc_ros.core.types import NANOSECONDS, Array, HandSample
 
 CONFIG = EstimatorConfig(position_stddev=0.001, jerk_density=5.0, onset_speed=0.05, gap_s=0.5)
@@ -21,8 +21,8 @@ def sample(seconds: float, x: float = 0.0, y: float = 0.0, height: float = 0.0) 
     return HandSample(START + round(seconds * 1e9), np.array([x, y]), height, 'world')
 
 
-def run(times: Array, positions: Array, config: EstimatorConfig = CONFIG) -> list[Track]:
-    states: list[Track] = []
+def run(times: Array, positions: Array, config: EstimatorConfig = CONFIG) -> list[FilterState]:
+    states: list[FilterState] = []
     for t, (x, y) in zip(times, positions, strict=True):
         states.append(update(states[-1] if states else None, sample(t, x, y), config).state)
     return states
@@ -132,7 +132,7 @@ def test_stays_finite_and_positive_for_any_configuration(
 
 def test_duplicates_and_late_samples_change_nothing() -> None:
     state = run(np.arange(0.0, 1.0, 0.02), np.zeros((50, 2)))[-1]
-    for seconds, verdict in [(0.0, Verdict.DUPLICATE), (-1e-9, Verdict.LATE), (-0.5, Verdict.LATE)]:
+    for seconds, verdict in [(0.0, SampleStatus.DUPLICATE), (-1e-9, SampleStatus.LATE), (-0.5, SampleStatus.LATE)]:
         answer = update(state, sample(0.98 + seconds, 9.0, 9.0), CONFIG)
         assert answer.verdict is verdict
         assert answer.state is state
@@ -141,14 +141,18 @@ def test_duplicates_and_late_samples_change_nothing() -> None:
 def test_jumps_back_and_gaps_start_anew() -> None:
     state = run(np.arange(0.0, 1.0, 0.02), np.outer(np.arange(0.0, 1.0, 0.02), [0.5, 0.0]))[-1]
     assert state.onset_ns is not None
-    for seconds, verdict in [(-0.501, Verdict.RESTARTED_BACKWARD), (0.501, Verdict.RESTARTED_GAP), (1e9, Verdict.RESTARTED_GAP)]:
+    for seconds, verdict in [
+        (-0.501, SampleStatus.RESTARTED_BACKWARD),
+        (0.501, SampleStatus.RESTARTED_GAP),
+        (1e9, SampleStatus.RESTARTED_GAP),
+    ]:
         jump = sample(0.98 + seconds, 0.7, 0.1)
         answer, fresh = update(state, jump, CONFIG), update(None, jump, CONFIG).state
         assert answer.verdict is verdict
         np.testing.assert_array_equal(answer.state.mean, fresh.mean)
         np.testing.assert_array_equal(answer.state.covariance, fresh.covariance)
         assert answer.state.onset_ns is None
-    assert update(state, sample(0.98 + 0.5), CONFIG).verdict is Verdict.ACCEPTED
+    assert update(state, sample(0.98 + 0.5), CONFIG).verdict is SampleStatus.ACCEPTED
 
 
 def test_a_movement_begins_above_the_onset_speed_and_ends_below_half_of_it() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from evaluation_samples import TWO_WAYS, observation, recorded, ways
 
-from foc_ros.analysis.evaluation.families import families
+from foc_ros.analysis.evaluation.families import baseline_grids
 from foc_ros.analysis.evaluation.forecasts import (
     boltzmann,
     constant_velocity,
@@ -109,7 +109,7 @@ def test_straight_minimum_jerk_weighs_goals_by_the_ratio_of_efforts() -> None:
 def test_every_family_forecasts_every_setting() -> None:
     recording = recorded(observation(ways([[L], [R]], to_go=[1.0, 3.0])))
     pairs = asked(recording)
-    compared = families([recording], LikelihoodConfig())
+    compared = baseline_grids([recording], LikelihoodConfig())
     assert len({family.name for family in compared}) == len(compared) == 9
     for family in compared:
         logs = log_likelihoods(pairs, family)

@@ -67,7 +67,7 @@ def test_a_bag_is_observed_as_replay_predicts_it(data: Path, tmp_path: Path) -> 
         predictions = [step.prediction for step in Replay(PLAIN).steps(reader) if step.prediction is not None]
     for each, prediction in zip(recording.each, predictions, strict=False):
         assert each.stamp_ns == prediction.stamp_ns and each.most_likely == prediction.most_likely
-        assert each.ways.likelihood.tolist() == [outcome.likelihood for outcome in prediction.outcomes]
+        assert each.ways.likelihood.tolist() == [outcome.likelihood for outcome in prediction.candidates]
     assert pickle.dumps(recording.each[0].ways) == pickle.dumps(seen(data, PLAIN).each[0].ways)
 
 

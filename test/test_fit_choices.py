@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fit_recordings import demonstration, write_tables
 
-from foc_ros.analysis.evaluation.lanes import Lanes
+from foc_ros.analysis.evaluation.lanes import IsolatedProcessPool
 from foc_ros.analysis.evaluation.recordings import find_recordings
 from foc_ros.analysis.fitting import search as searching
 from foc_ros.analysis.fitting.duration_fit import fit_duration, other_models
@@ -159,7 +159,7 @@ def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twic
     recordings = find_recordings(write_tables(tmp_path / 'data', count=4, hz=30.0))
     names = list(recordings)
     hopeless = updated(CONFIG, {'foc.noise_x': 2.0, 'foc.noise_y': 2.0})
-    with Lanes(1) as executor:
+    with IsolatedProcessPool(1) as executor:
         replays = Replays(recordings, {}, executor)
         scores = replays.scores([hopeless, CONFIG], names, 'both')
         assert scores.shape == (2, 2, 4) and scores[0, 1].mean() > scores[0, 0].mean() + 0.1

@@ -37,7 +37,7 @@ def changes(values):
 def test_a_symmetric_obstacle_does_not_make_the_choice_flicker(strategy):
     made = list(predictions(**{'foc.strategy': strategy}))
     assert len(made) == SAMPLES
-    assert all({outcome.candidate.label for outcome in one.solved} == {'goal0:+0', 'goal0:-0'} for one in made)
+    assert all({outcome.candidate.label for outcome in one.solved_candidates} == {'goal0:+0', 'goal0:-0'} for one in made)
     assert changes([one.most_likely for one in made]) <= 1
 
 

@@ -22,7 +22,7 @@ def heard(**times: float) -> Freshness:
 
 
 def test_what_never_came_is_not_silent() -> None:
-    assert Freshness().obstruction(1e6, CONFIG, ()) is None
+    assert Freshness().not_ready_reason(1e6, CONFIG, ()) is None
 
 
 @pytest.mark.parametrize(
@@ -35,21 +35,21 @@ def test_what_never_came_is_not_silent() -> None:
     ],
 )
 def test_one_silent_input_is_enough(times: dict[str, float], words: str | None) -> None:
-    found = heard(**times).obstruction(10.0, CONFIG, BOTH)
+    found = heard(**times).not_ready_reason(10.0, CONFIG, BOTH)
     assert (found and found[1]) == words
-    assert heard(**times).obstruction(10.0, NEVER, BOTH) is None
+    assert heard(**times).not_ready_reason(10.0, NEVER, BOTH) is None
 
 
 def test_a_source_that_is_heard_again_is_silent_no_more() -> None:
     freshness = heard(hand_pose=10.0, obstacles=1.0)
-    assert freshness.obstruction(10.0, CONFIG, ['cloud']) is not None
+    assert freshness.not_ready_reason(10.0, CONFIG, ['cloud']) is not None
     freshness.heard(CLOUD, 10.0)
-    assert freshness.obstruction(10.0, CONFIG, ['cloud']) is None
+    assert freshness.not_ready_reason(10.0, CONFIG, ['cloud']) is None
 
 
 def pose(freshness: Freshness, stamp_s: float, clock_s: float, *, restarted: bool = False) -> str | None:
     freshness.pose(round(stamp_s * NANOSECONDS), round(clock_s * NANOSECONDS), 0.5, restarted=restarted)
-    found = freshness.obstruction(0.0, CONFIG, ())
+    found = freshness.not_ready_reason(0.0, CONFIG, ())
     return found and found[1]
 
 
@@ -60,7 +60,7 @@ def test_poses_of_the_nodes_own_time_are_judged_by_it() -> None:
     assert pose(freshness, 100.1, 100.7) == words
     assert 'newer' in (pose(freshness, 101.3, 100.7) or '')
     assert pose(freshness, 101.4, 101.4) is None
-    assert freshness.obstruction(0.0, NEVER, ()) is None
+    assert freshness.not_ready_reason(0.0, NEVER, ()) is None
 
 
 def test_a_recordings_own_stamps_are_not_judged_until_a_movement_begins_in_the_present() -> None:

@@ -7,12 +7,12 @@ import pytest
 from reach_helpers import one_obstacle, random_scene, reach
 
 from foc_ros.core.config import FocConfig
-from foc_ros.core.dynamics.plants import damped_mass, horizon, triple_integrator
+from foc_ros.core.dynamics.plants import condense, damped_mass, triple_integrator
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.qp import Cost, effort_cost, half_planes
-from foc_ros.core.ocp.solve import forward
+from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.strategies.optimal import surrogate_qp
-from foc_ros.core.ocp.warm_start import cold
+from foc_ros.core.ocp.warm_start import cold_start
 from foc_ros.core.ocp.working_set import WorkingSet
 from foc_ros.core.types import make_obstacles
 
@@ -27,7 +27,7 @@ def weighted_problem(plant: str, seed: int = 0) -> Problem:
     n = len(PLANTS[plant].A)
     root = 1e-2 * generator.standard_normal((n, n))
     made = rest_to_goal(
-        horizon(PLANTS[plant], STEPS),
+        condense(PLANTS[plant], STEPS),
         0.1 * generator.standard_normal(n),
         np.array([0.3, 0.1]),
         make_obstacles(),
@@ -117,7 +117,7 @@ def test_goal_rows_are_the_end_of_a_simulation(plant):
 @EVERY_PLANT
 def test_terms_reported_for_a_solution_sum_to_the_simulated_cost(plant):
     problem = weighted_problem(plant)
-    solution = forward(problem, cold(np.zeros((STEPS + 1, 2))), FocConfig(strategy='fixed', tau=0.0, lam=LAMBDA))
+    solution = solve_problem(problem, cold_start(np.zeros((STEPS + 1, 2))), FocConfig(strategy='fixed', tau=0.0, lam=LAMBDA))
     end, cost = simulated(problem, plant, solution.control.T.ravel())
     assert sum(solution.costs.values()) == pytest.approx(cost, rel=1e-9)
     np.testing.assert_allclose(end[:2], problem.goal[:2], atol=1e-9)

@@ -17,12 +17,12 @@ CONFIG = updated(Config(), {'foc.steps': 30})
 def predicted(obstacles: Obstacles, goals: np.ndarray = GOAL, config: Config = CONFIG) -> Prediction:
     hand = HandState(1, np.zeros(6), np.diag([1e-6, 1e-6, 1e-4, 1e-4, 1e-2, 1e-2]))
     prediction, memory = predict(config, hand, obstacles, goals, Memory())
-    for outcome in prediction.outcomes:
+    for outcome in prediction.candidates:
         solution = outcome.solution
         for array in (solution.mean, solution.covariance, solution.control):
             assert np.isfinite(array).all()
-        assert outcome.solved or outcome.likelihood == 0.0
-    shares = [outcome.likelihood for outcome in prediction.solved]
+        assert outcome.is_solved or outcome.likelihood == 0.0
+    shares = [outcome.likelihood for outcome in prediction.solved_candidates]
     assert not shares or sum(shares) == pytest.approx(1.0)
     assert (prediction.most_likely is None) == (not shares)
     assert memory.most_likely == prediction.most_likely
@@ -30,7 +30,7 @@ def predicted(obstacles: Obstacles, goals: np.ndarray = GOAL, config: Config = C
 
 
 def test_an_empty_scene_is_the_straight_way() -> None:
-    (only,) = predicted(make_obstacles()).solved
+    (only,) = predicted(make_obstacles()).solved_candidates
     assert only.likelihood == 1.0
     assert abs(only.solution.path[:, 1]).max() < 1e-9
 
@@ -38,27 +38,27 @@ def test_an_empty_scene_is_the_straight_way() -> None:
 def test_a_hand_inside_an_obstacle_leaves_it_or_says_why_not() -> None:
     prediction = predicted(make_obstacles([[0.01, 0.0]], [0.03], 0.001))
     assert prediction.notes['hand_inside'] == 1
-    assert prediction.outcomes
-    for outcome in prediction.outcomes:
+    assert prediction.candidates
+    for outcome in prediction.candidates:
         assert 'inside the margin of 0 now' in outcome.solution.message
         assert np.hypot(*(outcome.solution.path[-1] - [0.01, 0.0])) > 0.03
-    assert not [outcome for outcome in prediction.solved if outcome.solution.eta < CONFIG.foc.eta]
+    assert not [outcome for outcome in prediction.solved_candidates if outcome.solution.eta < CONFIG.foc.eta]
 
 
 def test_a_goal_inside_an_obstacle_has_no_way_to_it_and_another_goal_keeps_its_own() -> None:
     obstacle = make_obstacles([[0.3, 0.01]], [0.03], 0.001)
     prediction = predicted(obstacle)
-    assert prediction.outcomes == ()
+    assert prediction.candidates == ()
     assert prediction.notes['goal_inside'] == 1
     prediction = predicted(obstacle, np.array([[0.3, 0.0], [0.0, 0.3]]))
-    assert {outcome.candidate.goal for outcome in prediction.solved} == {1}
+    assert {outcome.candidate.goal for outcome in prediction.solved_candidates} == {1}
 
 
 def test_a_ring_around_the_hand_has_no_way_through() -> None:
     angles = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
     ring = 0.1 * np.stack((np.cos(angles), np.sin(angles)), axis=1)
     prediction = predicted(make_obstacles(ring, np.full(40, 0.02)))
-    assert prediction.outcomes == ()
+    assert prediction.candidates == ()
     assert prediction.notes['no_way'] == 1
 
 
@@ -69,20 +69,22 @@ def test_of_ten_thousand_obstacles_those_near_the_way_decide() -> None:
     few, many = predicted(make_obstacles(near, 0.02, 0.001)), predicted(make_obstacles([*near, *far], 0.02, 0.001))
     assert many.notes['culled'] == 10_000 - CONFIG.scene.max_obstacles
     assert 'culled' not in few.notes
-    assert [outcome.candidate.label for outcome in many.solved] == [outcome.candidate.label for outcome in few.solved]
-    for one, other in zip(many.solved, few.solved, strict=True):
+    assert [outcome.candidate.label for outcome in many.solved_candidates] == [
+        outcome.candidate.label for outcome in few.solved_candidates
+    ]
+    for one, other in zip(many.solved_candidates, few.solved_candidates, strict=True):
         assert one.likelihood == pytest.approx(other.likelihood, rel=1e-6)
         assert np.abs(one.solution.path - other.solution.path).max() < 1e-6
 
 
 def test_a_hand_at_its_goal_stays_there() -> None:
-    (only,) = predicted(make_obstacles([[0.15, 0.0]], [0.03]), np.zeros((1, 2))).solved
+    (only,) = predicted(make_obstacles([[0.15, 0.0]], [0.03]), np.zeros((1, 2))).solved_candidates
     assert abs(only.solution.path).max() < 0.01
 
 
 def test_an_eta_out_of_reach_is_said_with_the_one_that_is_reached() -> None:
     config = updated(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0})
     prediction = predicted(make_obstacles([[0.15, 0.0]], [0.03], 0.003), config=config)
-    assert prediction.solved == ()
-    assert {outcome.solution.status for outcome in prediction.outcomes} == {Status.ETA_UNREACHABLE}
-    assert all('eta 0.999 is out of reach: the largest' in outcome.solution.message for outcome in prediction.outcomes)
+    assert prediction.solved_candidates == ()
+    assert {outcome.solution.status for outcome in prediction.candidates} == {Status.ETA_UNREACHABLE}
+    assert all('eta 0.999 is out of reach: the largest' in outcome.solution.message for outcome in prediction.candidates)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foc_ros.core.errors import SceneError
-from foc_ros.core.homotopy import path_sides, swept_angles
+from foc_ros.core.homotopy import compute_swept_angles, path_sides
 from foc_ros.core.types import LEFT, RIGHT, make_obstacles
 
 CASES = Path(__file__).parents[2] / 'shared' / 'reference' / 'cases.json'
@@ -29,9 +29,9 @@ def test_left_of_the_direction_of_travel_is_left():
 
 def test_swept_angle_of_a_quarter_circle_and_of_two_turns():
     angle = np.linspace(0.0, np.pi / 2, 50)
-    assert swept_angles(np.column_stack([np.cos(angle), np.sin(angle)]), np.zeros((1, 2))) == pytest.approx([np.pi / 2])
+    assert compute_swept_angles(np.column_stack([np.cos(angle), np.sin(angle)]), np.zeros((1, 2))) == pytest.approx([np.pi / 2])
     twice = np.column_stack([np.cos(8 * angle), -np.sin(8 * angle)])
-    assert swept_angles(twice, np.array([[0.0, 0.0], [3.0, 0.0]])) == pytest.approx([-4 * np.pi, 0.0])
+    assert compute_swept_angles(twice, np.array([[0.0, 0.0], [3.0, 0.0]])) == pytest.approx([-4 * np.pi, 0.0])
 
 
 def test_obstacles_behind_and_beyond_are_not_passed():

@@ -8,7 +8,7 @@ import pytest
 from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_array, pose_stamped
 
 from foc_ros.core.config import Config, updated
-from foc_ros.core.pipeline import Pipeline, Verdict
+from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.ros.intake import Intake
 
 TYPES = message_types('rosbags')
@@ -19,11 +19,11 @@ def intake() -> Intake:
     return Intake(Pipeline(updated(Config(), {'scene.marker_radius_stddev': 0.004})))
 
 
-def move(intake: Intake, seconds: float, frame_id: str = 'world') -> Verdict | None:
+def move(intake: Intake, seconds: float, frame_id: str = 'world') -> SampleStatus | None:
     return intake.take('hand_pose', pose_stamped(TYPES, (0.0, 0.0, 0.2), round(seconds * SECOND), frame_id))
 
 
-def show(intake: Intake, *markers: Any) -> Verdict | None:
+def show(intake: Intake, *markers: Any) -> SampleStatus | None:
     return intake.take('obstacle_markers', marker_array(TYPES, *markers))
 
 
@@ -34,15 +34,15 @@ def seen(intake: Intake) -> tuple[str, ...]:
 
 
 def test_every_input_reaches_the_pipeline(intake: Intake) -> None:
-    assert move(intake, 1.0) is Verdict.ACCEPTED
+    assert move(intake, 1.0) is SampleStatus.ACCEPTED
     assert intake.sample is not None and intake.sample.height == 0.2
-    assert intake.take('obstacles', cloud(TYPES, obstacle_table([(0.1, 0.2, 0.0, 0.03)]))) is Verdict.ACCEPTED
-    assert show(intake, marker(TYPES, (0.3, 0.1, 0.0), id=5)) is Verdict.ACCEPTED
+    assert intake.take('obstacles', cloud(TYPES, obstacle_table([(0.1, 0.2, 0.0, 0.03)]))) is SampleStatus.ACCEPTED
+    assert show(intake, marker(TYPES, (0.3, 0.1, 0.0), id=5)) is SampleStatus.ACCEPTED
     assert seen(intake) == ('0', 'a/5')
     assert intake.pipeline.scene.obstacles(SECOND).radius_stddev.tolist() == [0.0, 0.004]
-    assert intake.take('goals', pose_array(TYPES, [(0.3, 0.0, 0.0), (0.3, 0.1, 0.0)])) is Verdict.ACCEPTED
+    assert intake.take('goals', pose_array(TYPES, [(0.3, 0.0, 0.0), (0.3, 0.1, 0.0)])) is SampleStatus.ACCEPTED
     assert intake.pipeline.scene.goals.tolist() == [[0.3, 0.0], [0.3, 0.1]]
-    assert intake.take('goal_pose', pose_stamped(TYPES, (0.4, 0.0, 0.0))) is Verdict.ACCEPTED
+    assert intake.take('goal_pose', pose_stamped(TYPES, (0.4, 0.0, 0.0))) is SampleStatus.ACCEPTED
     assert intake.pipeline.scene.goals.tolist() == [[0.4, 0.0]]
     assert intake.counts == {} and intake.last_refusal is None
 
@@ -58,14 +58,14 @@ def test_a_marker_is_gone_when_its_life_is_over_by_the_hands_stamp(intake: Intak
 def test_markers_of_two_publishers_with_different_delays_all_count(intake: Intake) -> None:
     move(intake, 1.0)
     for name, seconds in (('a', 1.0), ('b', 0.9), ('c', 0.8)):
-        assert show(intake, marker(TYPES, ns=name, stamp_ns=round(seconds * SECOND))) is Verdict.ACCEPTED
+        assert show(intake, marker(TYPES, ns=name, stamp_ns=round(seconds * SECOND))) is SampleStatus.ACCEPTED
     assert seen(intake) == ('a/0', 'b/0', 'c/0')
     assert intake.pipeline.scene.parts['markers'].stamp_ns == SECOND
 
 
 def test_deleting_all_markers_is_an_empty_scene(intake: Intake) -> None:
     move(intake, 1.0)
-    assert show(intake, marker(TYPES, action=3, ns='', frame_id='')) is Verdict.ACCEPTED
+    assert show(intake, marker(TYPES, action=3, ns='', frame_id='')) is SampleStatus.ACCEPTED
     assert seen(intake) == () and 'markers' in intake.pipeline.scene.parts
 
 
@@ -74,7 +74,7 @@ def test_markers_in_another_frame_do_not_stay_in_the_way(intake: Intake) -> None
     show(intake, marker(TYPES, id=1, frame_id='camera'))
     move(intake, 1.0)
     assert intake.counts == {'obstacles_wrong_frame': 1}
-    assert show(intake, marker(TYPES, id=2)) is Verdict.ACCEPTED
+    assert show(intake, marker(TYPES, id=2)) is SampleStatus.ACCEPTED
     assert seen(intake) == ('a/2',)
     assert show(intake, marker(TYPES, id=3, frame_id='camera')) is None
     assert seen(intake) == ('a/2',) and "expected 'world'" in intake.last_refusal
@@ -124,7 +124,7 @@ def test_what_cannot_be_converted_changes_nothing_and_is_counted(
 
 def test_rows_that_are_dropped_are_counted(intake: Intake) -> None:
     rows = obstacle_table([(0.1, 0.2, 0.0, 0.03), (float('nan'), 0, 0, 0.1)])
-    assert intake.take('obstacles', cloud(TYPES, rows)) is Verdict.ACCEPTED
+    assert intake.take('obstacles', cloud(TYPES, rows)) is SampleStatus.ACCEPTED
     show(intake, marker(TYPES, type=1), marker(TYPES, (float('inf'), 0, 0), id=3))
     assert intake.counts == {
         'obstacles_dropped_not_finite': 1,
@@ -135,8 +135,8 @@ def test_rows_that_are_dropped_are_counted(intake: Intake) -> None:
 
 def test_what_the_pipeline_refuses_is_told_too(intake: Intake) -> None:
     move(intake, 1.0)
-    assert move(intake, 1.0) is Verdict.DUPLICATE
-    assert move(intake, 1.1, 'camera') is Verdict.WRONG_FRAME
+    assert move(intake, 1.0) is SampleStatus.DUPLICATE
+    assert move(intake, 1.1, 'camera') is SampleStatus.WRONG_FRAME
     assert intake.counts == {'hand_duplicate': 1, 'hand_wrong_frame': 1}
     assert intake.last_refusal == intake.pipeline.last_refusal and 'camera' in intake.last_refusal
 
@@ -146,5 +146,5 @@ def test_a_restart_is_no_refusal_and_leaves_the_last_one_told(intake: Intake) ->
     move(intake, 1.1, 'camera')
     assert intake.take('goals', pose_array(TYPES, [(float('nan'), 0.0, 0.0)])) is None
     told = intake.last_refusal
-    assert move(intake, 60.0) is Verdict.RESTARTED_GAP
+    assert move(intake, 60.0) is SampleStatus.RESTARTED_GAP
     assert intake.last_refusal == told and 'poses[0]' in told

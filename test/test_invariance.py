@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from reach_helpers import bowed, random_scene, reach
 
 from foc_ros.core.config import FocConfig
-from foc_ros.core.ocp.solve import forward
-from foc_ros.core.ocp.warm_start import cold
+from foc_ros.core.ocp.solve import solve_problem
+from foc_ros.core.ocp.warm_start import cold_start
 from foc_ros.core.types import Obstacles, Solution, Status
 
 SEEDS = st.integers(0, 10_000)
@@ -27,7 +27,7 @@ def solve(
     obstacles: Obstacles, goal, guess, strategy: str, duration=1.0, noise=0.1, start=(0.0, 0.0), eta=0.8, **units
 ) -> Solution:
     problem = reach(obstacles, goal=goal, start=start, steps=40, duration=duration, noise=(noise, noise), eta=eta)
-    return forward(problem, cold(guess), replace(FocConfig(strategy=strategy), **units))
+    return solve_problem(problem, cold_start(guess), replace(FocConfig(strategy=strategy), **units))
 
 
 def well_posed(obstacles: Obstacles, goal, guess, strategy: str) -> Solution:

@@ -10,7 +10,7 @@ import pytest
 from bag_helpers import messages, write_bag
 
 from foc_ros.cli.main import main
-from foc_ros.core.homotopy.demonstrations import demonstrated
+from foc_ros.core.homotopy.demonstrations import record_demonstration
 from foc_ros.core.types import make_obstacles
 from foc_ros.io.class_library import MOST_WAYS, load_library, save_library
 
@@ -71,7 +71,7 @@ def test_a_place_that_cannot_be_written_is_exit_2_in_one_line(bag: Path, capsys:
 def test_a_full_library_stays_as_it_was(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / 'ways.json'
     far = make_obstacles([[0.1, 1.0]], 0.01)
-    ways = [demonstrated('other', np.array([[0.0, 0.1 * k], [0.3, 0.1 * k]]), far) for k in range(MOST_WAYS)]
+    ways = [record_demonstration('other', np.array([[0.0, 0.1 * k], [0.3, 0.1 * k]]), far) for k in range(MOST_WAYS)]
     save_library(file, ways)
     held = file.read_bytes()
     assert run(bag, '--learn', str(file)) == 2

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from foc_ros.core.config import Config, HomotopyConfig, updated
 from foc_ros.core.errors import FocError
 from foc_ros.core.homotopy import path_sides
-from foc_ros.core.homotopy.demonstrations import MOST, POINTS, demonstrated, recall, same
+from foc_ros.core.homotopy.demonstrations import MOST, POINTS, is_same_demonstration, recall_demonstrations, record_demonstration
 from foc_ros.core.memory import Memory
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import HandState, make_obstacles
@@ -31,10 +31,12 @@ def hand(at=(0.0, 0.0), frame_id='world'):
 
 def recalled(way, obstacles=OBSTACLES, goals=GOAL, state=None, found=()):
     library = way if isinstance(way, list) else [way]
-    return recall(library, state or hand(), np.asarray(goals), obstacles, HomotopyConfig(), [1.0] * len(goals), 50, found, ())
+    return recall_demonstrations(
+        library, state or hand(), np.asarray(goals), obstacles, HomotopyConfig(), [1.0] * len(goals), 50, found, ()
+    )
 
 
-WAY = demonstrated('world', bow(0.1), OBSTACLES)
+WAY = record_demonstration('world', bow(0.1), OBSTACLES)
 
 
 def test_a_way_is_remembered_by_what_it_passed():
@@ -48,8 +50,8 @@ def test_a_way_beyond_the_shortest_is_solved_too():
     config = updated(Config(), {'homotopy.max_candidates': 2})
     without, _ = predict(config, hand(), OBSTACLES, GOAL, Memory())
     prediction, memory = predict(config, hand(), OBSTACLES, GOAL, Memory(), [WAY])
-    labels = {one.candidate.label for one in prediction.solved}
-    assert 'goal0:+0+1+2' in labels - {one.candidate.label for one in without.outcomes}
+    labels = {one.candidate.label for one in prediction.solved_candidates}
+    assert 'goal0:+0+1+2' in labels - {one.candidate.label for one in without.candidates}
     assert prediction.notes['recalled'] == 1
     assert 'goal0:+0+1+2' in {one.label for one in memory.candidates}
 
@@ -83,16 +85,16 @@ def test_when_a_way_is_recalled(change, kept):
 
 
 def test_no_more_than_a_few_are_recalled_the_shortest():
-    ways = [demonstrated('world', bow(height), OBSTACLES) for height in (-0.1, 0.03, -0.03, 0.1)]
+    ways = [record_demonstration('world', bow(height), OBSTACLES) for height in (-0.1, 0.03, -0.03, 0.1)]
     found = recalled(ways)
     assert [len(one.sides) for one in found] == [3] * MOST
     assert {one.label for one in found} == {'goal0:+0-1+2', 'goal0:-0-1+2'}
 
 
 def test_the_same_demonstration_is_known_again():
-    assert same(WAY, demonstrated('world', bow(0.11), OBSTACLES.take([1, 2, 0])))
-    assert not same(WAY, demonstrated('world', bow(-0.1), OBSTACLES))
-    assert not same(WAY, demonstrated('world', bow(0.1, (0.35, 0.0)), OBSTACLES))
+    assert is_same_demonstration(WAY, record_demonstration('world', bow(0.11), OBSTACLES.take([1, 2, 0])))
+    assert not is_same_demonstration(WAY, record_demonstration('world', bow(-0.1), OBSTACLES))
+    assert not is_same_demonstration(WAY, record_demonstration('world', bow(0.1, (0.35, 0.0)), OBSTACLES))
 
 
 @settings(max_examples=80, deadline=None, derandomize=True)
@@ -102,7 +104,7 @@ def test_the_same_demonstration_is_known_again():
     st.tuples(st.floats(-0.013, 0.013), st.floats(-0.013, 0.013)),
 )
 def test_what_is_recalled_passes_as_it_says(height, at, shift):
-    way = demonstrated('world', bow(height), OBSTACLES)
+    way = record_demonstration('world', bow(height), OBSTACLES)
     goals = GOAL + np.array(shift)
     for one in recalled(way, goals=goals, state=hand(at)):
         sides = path_sides(one.guess, OBSTACLES)
@@ -172,7 +174,7 @@ def test_a_library_that_cannot_be_used(tmp_path, text, words):
 def test_no_class_comes_twice_while_names_hold_on():
     """An obstacle at the edge of the names is in or out alike for what is found and for what is recalled."""
     config = updated(Config(), {'homotopy.max_candidates': 8, 'foc.strategy': 'fixed', 'foc.steps': 20})
-    ways = [demonstrated('world', bow(height), OBSTACLES) for height in (-0.1, 0.03, -0.03, 0.1)]
+    ways = [record_demonstration('world', bow(height), OBSTACLES) for height in (-0.1, 0.03, -0.03, 0.1)]
     rng, memory = np.random.default_rng(4), Memory()
     for x in np.linspace(0.14, 0.16, 80):
         state = hand(rng.normal((x, 0.1), 0.001))

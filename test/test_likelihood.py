@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.errors import InputError
-from foc_ros.core.likelihood import COST_FLOOR, likelihoods, most_likely
+from foc_ros.core.likelihood import COST_FLOOR, compute_likelihoods, select_most_likely
 
 COSTS = st.lists(st.floats(0.0, 1.7e308), min_size=1, max_size=12)
 BETA = st.floats(0.0, 100.0)
@@ -18,29 +18,29 @@ def plain(beta: float) -> LikelihoodConfig:
 
 
 def test_ratio_of_likelihoods_is_the_power_of_the_ratio_of_costs() -> None:
-    p = likelihoods(np.array([1.0, 4.0, 9.0]), plain(0.5))
+    p = compute_likelihoods(np.array([1.0, 4.0, 9.0]), plain(0.5))
     np.testing.assert_allclose(p, np.array([6.0, 3.0, 2.0]) / 11.0, rtol=1e-14)
 
 
 def test_nothing_in_nothing_out() -> None:
-    assert likelihoods(np.zeros(0), plain(0.5)).shape == (0,)
-    assert most_likely({}, 'a', 0.1) is None
+    assert compute_likelihoods(np.zeros(0), plain(0.5)).shape == (0,)
+    assert select_most_likely({}, 'a', 0.1) is None
 
 
 def test_beta_zero_is_uniform_and_large_beta_picks_the_cheapest() -> None:
     costs = np.array([3.0, 2.0, 5.0])
-    np.testing.assert_allclose(likelihoods(costs, plain(0.0)), 1.0 / 3.0)
-    assert likelihoods(costs, plain(100.0))[1] == pytest.approx(1.0)
+    np.testing.assert_allclose(compute_likelihoods(costs, plain(0.0)), 1.0 / 3.0)
+    assert compute_likelihoods(costs, plain(100.0))[1] == pytest.approx(1.0)
 
 
 def test_costs_below_the_floor_count_as_the_floor() -> None:
-    p = likelihoods(np.array([0.0, COST_FLOOR / 10.0, COST_FLOOR, 4.0 * COST_FLOOR]), plain(0.5))
+    p = compute_likelihoods(np.array([0.0, COST_FLOOR / 10.0, COST_FLOOR, 4.0 * COST_FLOOR]), plain(0.5))
     np.testing.assert_allclose(p, np.array([2.0, 2.0, 2.0, 1.0]) / 7.0, rtol=1e-14)
 
 
 @given(COSTS, BETA)
 def test_any_costs_give_a_distribution_in_the_order_of_the_costs(costs: list[float], beta: float) -> None:
-    p = likelihoods(np.array(costs), plain(beta))
+    p = compute_likelihoods(np.array(costs), plain(beta))
     assert np.all((p >= 0.0) & (p <= 1.0))
     assert p.sum() == pytest.approx(1.0)
     assert np.all(np.diff(p[np.argsort(costs, kind='stable')]) <= 0.0)
@@ -49,28 +49,31 @@ def test_any_costs_give_a_distribution_in_the_order_of_the_costs(costs: list[flo
 @given(st.lists(st.floats(1e-3, 1e6), min_size=1, max_size=8), BETA, st.floats(1e-3, 1e3))
 def test_the_unit_of_effort_does_not_matter(costs: list[float], beta: float, unit: float) -> None:
     np.testing.assert_allclose(
-        likelihoods(unit * np.array(costs), plain(beta)), likelihoods(np.array(costs), plain(beta)), rtol=1e-9, atol=1e-12
+        compute_likelihoods(unit * np.array(costs), plain(beta)),
+        compute_likelihoods(np.array(costs), plain(beta)),
+        rtol=1e-9,
+        atol=1e-12,
     )
 
 
 @pytest.mark.parametrize('wrong', [-1.0, np.nan, np.inf])
 def test_a_cost_that_is_none_is_refused_by_name(wrong: float) -> None:
     with pytest.raises(InputError, match=r'costs\[1\]: expected a finite number >= 0'):
-        likelihoods(np.array([1.0, wrong]), plain(0.5))
+        compute_likelihoods(np.array([1.0, wrong]), plain(0.5))
 
 
 def test_most_likely_stays_until_another_leads_by_more_than_the_margin() -> None:
     p = {'a': 0.44, 'b': 0.56}
-    assert most_likely(p, 'a', 0.13) == 'a'
-    assert most_likely(p, 'a', 0.11) == 'b'
-    assert most_likely(p, None, 0.13) == 'b'
-    assert most_likely(p, 'gone', 0.13) == 'b'
-    assert most_likely({'a': 0.0, 'b': 1.0}, 'a', 1.0) == 'a'
+    assert select_most_likely(p, 'a', 0.13) == 'a'
+    assert select_most_likely(p, 'a', 0.11) == 'b'
+    assert select_most_likely(p, None, 0.13) == 'b'
+    assert select_most_likely(p, 'gone', 0.13) == 'b'
+    assert select_most_likely({'a': 0.0, 'b': 1.0}, 'a', 1.0) == 'a'
 
 
 @given(st.permutations(list('abcd')), st.sampled_from([None, *'abcdx']), st.floats(0.0, 1.0))
 def test_the_order_of_the_classes_does_not_matter(order: list[str], previous: str | None, margin: float) -> None:
     p = {'a': 0.2, 'b': 0.3, 'c': 0.3, 'd': 0.2}
-    answer = most_likely({label: p[label] for label in order}, previous, margin)
-    assert answer == most_likely(p, previous, margin)
+    answer = select_most_likely({label: p[label] for label in order}, previous, margin)
+    assert answer == select_most_likely(p, previous, margin)
     assert answer == (previous if previous in ('b', 'c') or (previous in p and margin >= 0.3 - 0.2) else 'b')

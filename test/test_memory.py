@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from foc_ros.core import candidates as outcomes
-from foc_ros.core.candidates import Earlier
+from foc_ros.core.candidates import EarlierSolutions
 from foc_ros.core.config import Config, updated
 from foc_ros.core.deadline import Deadline, OutOfTimeError
 from foc_ros.core.estimation.kalman_filter import update
-from foc_ros.core.memory import RETRY, Memory
-from foc_ros.core.ocp.solve import forward
+from foc_ros.core.memory import RETRY_AFTER, Memory
+from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import LEFT, RIGHT, Candidate, HandSample, HandState, Status, make_obstacles
 
@@ -27,7 +27,7 @@ OVER_BOTH, BETWEEN = way({'a': LEFT, 'b': LEFT}), way({'a': LEFT, 'b': RIGHT})
 @pytest.fixture
 def memory() -> Memory:
     solutions = {one.label: object() for one in (OVER_BOTH, BETWEEN)}
-    return Memory(None, (OVER_BOTH, BETWEEN), Earlier(solutions, {OVER_BOTH.label: 0.2, BETWEEN.label: 0.8}))
+    return Memory(None, (OVER_BOTH, BETWEEN), EarlierSolutions(solutions, {OVER_BOTH.label: 0.2, BETWEEN.label: 0.8}))
 
 
 @pytest.mark.parametrize(
@@ -62,11 +62,11 @@ def test_when_an_obstacle_is_passed_its_ways_go_on_from_where_they_were():
     _, memory = reaching(0.099, Memory())
     warm, _ = reaching(0.101, memory)
     cold, _ = reaching(0.101, Memory())
-    labels = {outcome.candidate.label for outcome in warm.solved}
+    labels = {outcome.candidate.label for outcome in warm.solved_candidates}
     assert labels.isdisjoint(memory.earlier.solutions), 'all names are new ones'
-    assert labels == {outcome.candidate.label for outcome in cold.solved}
-    for one in warm.solved:
-        other = next(each for each in cold.solved if each.candidate.label == one.candidate.label)
+    assert labels == {outcome.candidate.label for outcome in cold.solved_candidates}
+    for one in warm.solved_candidates:
+        other = next(each for each in cold.solved_candidates if each.candidate.label == one.candidate.label)
         assert one.solution.qp_solves < other.solution.qp_solves
         np.testing.assert_allclose(one.solution.path, other.solution.path, atol=1e-4)
 
@@ -82,22 +82,22 @@ def test_a_way_that_was_stopped_goes_on_from_there(monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(Deadline, 'check', stop_after_a_few)
         late, memory = reaching(0.0, Memory(), 60.0)
-    assert {outcome.solution.status for outcome in late.outcomes} == {Status.DEADLINE}
+    assert {outcome.solution.status for outcome in late.candidates} == {Status.DEADLINE}
     assert memory.earlier.solutions, 'the first way got somewhere'
     assert all(solution.lam > 0.0 for solution in memory.earlier.solutions.values())
     after, _ = reaching(0.0, memory)
-    assert set(memory.earlier.solutions) <= {outcome.candidate.label for outcome in after.solved}
+    assert set(memory.earlier.solutions) <= {outcome.candidate.label for outcome in after.solved_candidates}
 
 
 def test_a_way_out_of_reach_is_followed_and_begun_anew_now_and_then(monkeypatch):
     starts = []
-    monkeypatch.setattr(outcomes, 'forward', lambda *given: starts.append(given[1].lam is None) or forward(*given))
+    monkeypatch.setattr(outcomes, 'forward', lambda *given: starts.append(given[1].lam is None) or solve_problem(*given))
     config = updated(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0})
     memory, begun = Memory(), []
-    for tick in range(2 * RETRY + 3):
+    for tick in range(2 * RETRY_AFTER + 3):
         state = HandState(10_000_000 * tick, np.zeros(6), np.zeros((6, 6)))
         starts.clear()
         prediction, memory = predict(config, state, make_obstacles([[0.15, 0.0]], 0.03, 0.003), np.array([[0.3, 0.0]]), memory)
-        assert {outcome.solution.status for outcome in prediction.outcomes} == {Status.ETA_UNREACHABLE}
+        assert {outcome.solution.status for outcome in prediction.candidates} == {Status.ETA_UNREACHABLE}
         begun.append(any(starts))
-    assert [tick for tick, anew in enumerate(begun) if anew] == [0, RETRY + 1, 2 * RETRY + 2]
+    assert [tick for tick, anew in enumerate(begun) if anew] == [0, RETRY_AFTER + 1, 2 * RETRY_AFTER + 2]

@@ -7,23 +7,23 @@ import pytest
 from report_samples import START_NS, prediction, predictions, samples, scene
 
 from foc_ros.core.types import HandSample
-from foc_ros.reporting.snapshots import Track, moment_of, movements, track_of
+from foc_ros.reporting.snapshots import Track, movements, snapshot_of_prediction, track_of
 
 
 def test_moment_keeps_the_numbers() -> None:
     made = prediction(START_NS, np.zeros(2), 0.6)
-    moment = moment_of(made, *scene())
+    moment = snapshot_of_prediction(made, *scene())
     assert [way.label for way in moment.ways] == ['goal0:+1', 'goal0:-1', 'goal1:+1-post']
     assert moment.unsolved == (('goal1:+1+post', 'eta_unreachable'),)
     best = moment.ways[0]
-    np.testing.assert_array_equal(best.path, made.outcomes[0].solution.path)
+    np.testing.assert_array_equal(best.path, made.candidates[0].solution.path)
     np.testing.assert_allclose(best.covariance[-1], np.diag([0.011**2, 0.005**2]))
     assert best.cost_ratio == 1.0
-    assert moment.ways[1].cost_ratio == pytest.approx(made.outcomes[1].cost / made.outcomes[0].cost)
+    assert moment.ways[1].cost_ratio == pytest.approx(made.candidates[1].cost / made.candidates[0].cost)
 
 
 def test_speed_is_that_of_the_velocity() -> None:
-    way = moment_of(prediction(START_NS, np.zeros(2)), *scene()).ways[0]
+    way = snapshot_of_prediction(prediction(START_NS, np.zeros(2)), *scene()).ways[0]
     lengths = np.linalg.norm(np.diff(way.path, axis=0), axis=1)
     assert np.sum((way.speed[1:] + way.speed[:-1]) / 2 * 0.05) == pytest.approx(lengths.sum(), rel=0.02)
 
@@ -68,4 +68,6 @@ def test_trembling_is_no_movement() -> None:
 
 def test_moments_of_the_same_prediction_count() -> None:
     made = samples()
-    assert [moment_of(each, *scene()).stamp_ns for each in predictions(made)] == [each.stamp_ns for each in made[::4]]
+    assert [snapshot_of_prediction(each, *scene()).stamp_ns for each in predictions(made)] == [
+        each.stamp_ns for each in made[::4]
+    ]

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from reach_helpers import bowed, make_obstacles, one_obstacle, reach
 
-from foc_ros.core.ocp.contacts.checks import held, joined, stays
+from foc_ros.core.ocp.contacts.checks import is_fixed_point, merge_contacts, newton_at_fixed_times
 from foc_ros.core.ocp.contacts.contacts import Contacts
-from foc_ros.core.ocp.contacts.kkt_point import settled
+from foc_ros.core.ocp.contacts.kkt_point import solve_kkt_point
 from foc_ros.core.ocp.qp import effort_cost
 from foc_ros.core.ocp.sqp import converge
 from foc_ros.core.ocp.working_set import WorkingSet
@@ -23,7 +23,7 @@ def rough(problem, lam=LAM):
 
 def slid(problem, control, contacts, tau, lam):
     """Return the control and the contacts of what settles, None where nothing does."""
-    found = settled(problem, control, contacts, tau, lam)
+    found = solve_kkt_point(problem, control, contacts, tau, lam)
     return None if found is None else (found.control, found.contacts)
 
 
@@ -31,7 +31,7 @@ def slid(problem, control, contacts, tau, lam):
 def test_held_at_its_steps_it_ends_where_the_qps_end(factor):
     problem = one_obstacle(0.9)
     here, contacts = rough(problem)
-    control, found = held(problem, effort_cost(problem, factor * LAM), here.control, contacts, TAU)
+    control, found = newton_at_fixed_times(problem, effort_cost(problem, factor * LAM), here.control, contacts, TAU)
     there, expected = rough(problem, factor * LAM)
     np.testing.assert_allclose(problem.positions(control), there.positions, atol=1e-7)
     np.testing.assert_array_equal(found.time, expected.time)
@@ -45,24 +45,24 @@ def test_a_contact_that_cannot_hold_at_its_step_holds_where_it_slides():
     assert len(contacts) == 2
     alone = Contacts(contacts.obstacle[:1], contacts.time[:1], contacts.force.sum(keepdims=True))
     cost = effort_cost(problem, LAM)
-    assert held(problem, cost, here.control, alone, TAU) is None
-    control, found = slid(problem, here.control, joined(problem, contacts), TAU, LAM)
+    assert newton_at_fixed_times(problem, cost, here.control, alone, TAU) is None
+    control, found = slid(problem, here.control, merge_contacts(problem, contacts), TAU, LAM)
     assert len(found) == 1
     assert contacts.time[0] < found.time[0] < contacts.time[1]
     assert np.abs(problem.positions(control) - here.positions).max() < 1e-3
-    assert stays(problem, cost, control, found, TAU)
-    assert not stays(problem, effort_cost(problem, 2 * LAM), control, found, TAU)
+    assert is_fixed_point(problem, cost, control, found, TAU)
+    assert not is_fixed_point(problem, effort_cost(problem, 2 * LAM), control, found, TAU)
 
 
 @pytest.mark.parametrize('factor', [2.0**-6, 2.0**6])
 def test_with_more_weight_on_precision_the_contact_slides_to_later_times(factor):
     problem = one_obstacle(0.9)
     here, contacts = rough(problem)
-    control, first = slid(problem, here.control, joined(problem, contacts), TAU, LAM)
+    control, first = slid(problem, here.control, merge_contacts(problem, contacts), TAU, LAM)
     _, last = slid(problem, control, first, TAU, factor * LAM)
     assert (last.time[0] > first.time[0]) == (factor > 1)
     fresh, rows = rough(problem, factor * LAM)
-    _, again = slid(problem, fresh.control, joined(problem, rows), TAU, factor * LAM)
+    _, again = slid(problem, fresh.control, merge_contacts(problem, rows), TAU, factor * LAM)
     assert last.time[0] == pytest.approx(again.time[0], abs=1e-5)
 
 
@@ -71,10 +71,10 @@ def test_the_mean_is_the_least_that_keeps_clear_at_every_time():
     problem = one_obstacle(0.9)
     here, contacts = rough(problem)
     cost = effort_cost(problem, LAM)
-    least, _ = slid(problem, here.control, joined(problem, contacts), TAU, LAM)
+    least, _ = slid(problem, here.control, merge_contacts(problem, contacts), TAU, LAM)
     value = least @ (cost.hessian * least)
     assert here.control @ (cost.hessian * here.control) < value, 'rows at the steps alone let the mean cut the corner'
-    finer, _ = slid(problem, least + 1e-3 * np.sin(np.arange(len(least))), joined(problem, contacts), TAU, LAM)
+    finer, _ = slid(problem, least + 1e-3 * np.sin(np.arange(len(least))), merge_contacts(problem, contacts), TAU, LAM)
     np.testing.assert_allclose(finer, least, atol=1e-6 * np.abs(least).max())
 
 
@@ -83,8 +83,8 @@ def test_the_same_circle_twice_is_touched_once():
     problem = reach(twice, eta=0.9)
     here, contacts = rough(problem)
     once, alone = rough(one_obstacle(0.9))
-    control, found = slid(problem, here.control, joined(problem, contacts), TAU, LAM)
-    expected, single = slid(one_obstacle(0.9), once.control, joined(one_obstacle(0.9), alone), TAU, LAM)
+    control, found = slid(problem, here.control, merge_contacts(problem, contacts), TAU, LAM)
+    expected, single = slid(one_obstacle(0.9), once.control, merge_contacts(one_obstacle(0.9), alone), TAU, LAM)
     assert len(found) == len(single) == 1
     np.testing.assert_allclose(control, expected, atol=1e-6 * np.abs(expected).max())
 
@@ -93,8 +93,8 @@ def test_forces_that_are_not_known_count_as_equal():
     problem = one_obstacle(0.9)
     here, contacts = rough(problem)
     unknown = Contacts(contacts.obstacle, contacts.time, np.full(len(contacts), np.nan))
-    control, found = slid(problem, here.control, joined(problem, unknown), TAU, LAM)
-    _, expected = slid(problem, here.control, joined(problem, contacts), TAU, LAM)
+    control, found = slid(problem, here.control, merge_contacts(problem, unknown), TAU, LAM)
+    _, expected = slid(problem, here.control, merge_contacts(problem, contacts), TAU, LAM)
     np.testing.assert_allclose(found.time, expected.time, atol=1e-6)
     assert np.isfinite(control).all()
 
@@ -106,5 +106,5 @@ def test_where_two_circles_leave_no_gap_there_is_no_way_between_two_steps_either
     straight = bowed((0.0, 0.0), (0.3, 0.0), 10, 0.0)
     leaps = converge(problem, straight[1:], WorkingSet(), 0.0, 0.0)
     assert leaps is not None
-    contacts = joined(problem, leaps.contacts)
+    contacts = merge_contacts(problem, leaps.contacts)
     assert slid(problem, leaps.control, contacts, 0.0, 0.0) is None

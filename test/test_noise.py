@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from foc_ros.core.dynamics.condensed import spread, squares
-from foc_ros.core.dynamics.noise import noise_per_step, stacked_noise, state_covariance
-from foc_ros.core.dynamics.plants import damped_mass, horizon, triple_integrator
+from foc_ros.core.dynamics.condensed import position_variances, variance_weights
+from foc_ros.core.dynamics.noise import propagate_covariance, scale_noise, stack_noise
+from foc_ros.core.dynamics.plants import condense, damped_mass, triple_integrator
 
 PLANTS = pytest.mark.parametrize('plant', [triple_integrator(0.03), damped_mass(0.04, 1.5, 4.0)], ids=['jerk', 'force'])
 
@@ -20,9 +20,9 @@ def test_covariance_is_the_recursion(plant):
     generator = np.random.default_rng(2)
     n, steps, noise = len(plant.A), 20, np.array([0.1, 0.2])
     control, P = generator.standard_normal((steps, 2)), correlated(generator, n)
-    stacked = horizon(plant, steps)
+    stacked = condense(plant, steps)
     free = stacked.powers @ P @ stacked.powers.swapaxes(1, 2)
-    closed = state_covariance(stacked, free, stacked_noise(noise, steps) ** 2, control.T.ravel())
+    closed = propagate_covariance(stacked, free, stack_noise(noise, steps) ** 2, control.T.ravel())
     for t in range(steps):
         np.testing.assert_allclose(closed[t], P, rtol=1e-9, atol=1e-15)
         P = plant.A @ P @ plant.A.T + plant.B @ np.diag((noise * control[t]) ** 2) @ plant.B.T
@@ -32,29 +32,31 @@ def test_covariance_is_the_recursion(plant):
 @PLANTS
 def test_position_variance_is_diagonal_in_the_squared_control(plant):
     generator = np.random.default_rng(3)
-    stacked, noise = horizon(plant, 15), np.array([0.3, 0.1])
+    stacked, noise = condense(plant, 15), np.array([0.3, 0.1])
     control = generator.standard_normal(30)
-    full = state_covariance(stacked, np.zeros((16, len(plant.A), len(plant.A))), stacked_noise(noise, 15) ** 2, control)[1:]
-    xx, yy, xy = spread(stacked.maps, stacked_noise(noise, 15) ** 2, control, np.zeros((3, 15)))
+    full = propagate_covariance(stacked, np.zeros((16, len(plant.A), len(plant.A))), stack_noise(noise, 15) ** 2, control)[1:]
+    xx, yy, xy = position_variances(stacked.maps, stack_noise(noise, 15) ** 2, control, np.zeros((3, 15)))
     np.testing.assert_allclose([xx, yy, xy], [full[:, 0, 0], full[:, 1, 1], full[:, 0, 1]], atol=1e-15)
 
 
 @PLANTS
 def test_weighted_variances_are_sums_of_squared_responses(plant):
     generator = np.random.default_rng(5)
-    stacked, n = horizon(plant, 15), len(plant.A)
+    stacked, n = condense(plant, 15), len(plant.A)
     end, way = generator.uniform(size=(2, n))
     squared = stacked.response**2
-    np.testing.assert_allclose(squares(stacked.states, end, way), end @ squared[-1] + way @ squared[:-1].sum(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(
+        variance_weights(stacked.states, end, way), end @ squared[-1] + way @ squared[:-1].sum(axis=0), rtol=1e-12
+    )
 
 
 def test_covariance_is_that_of_noisy_rollouts():
     generator = np.random.default_rng(4)
     plant, steps, samples, noise = triple_integrator(0.05), 10, 40_000, np.array([0.2, 0.1])
     control, P0 = generator.standard_normal((steps, 2)) * 50, correlated(generator, 6)
-    stacked = horizon(plant, steps)
-    closed = state_covariance(
-        stacked, stacked.powers @ P0 @ stacked.powers.swapaxes(1, 2), stacked_noise(noise, steps) ** 2, control.T.ravel()
+    stacked = condense(plant, steps)
+    closed = propagate_covariance(
+        stacked, stacked.powers @ P0 @ stacked.powers.swapaxes(1, 2), stack_noise(noise, steps) ** 2, control.T.ravel()
     )
     states = generator.multivariate_normal(np.zeros(6), P0, samples, method='eigh')
     for t in range(steps):
@@ -66,4 +68,4 @@ def test_covariance_is_that_of_noisy_rollouts():
 
 
 def test_noise_for_another_step_keeps_the_power_per_second():
-    np.testing.assert_allclose(noise_per_step(np.array([0.1, 0.2]), 0.02, 0.005), [0.2, 0.4])
+    np.testing.assert_allclose(scale_noise(np.array([0.1, 0.2]), 0.02, 0.005), [0.2, 0.4])

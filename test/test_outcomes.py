@@ -7,7 +7,7 @@ import pytest
 from reach_helpers import bowed, one_obstacle, solved
 
 from foc_ros.core import candidates as outcomes
-from foc_ros.core.candidates import Earlier, solve_candidates
+from foc_ros.core.candidates import EarlierSolutions, solve_candidates
 from foc_ros.core.config import FocConfig, LikelihoodConfig
 from foc_ros.core.types import LEFT, Candidate, Status
 
@@ -30,7 +30,7 @@ def test_a_way_that_comes_into_reach_counts_by_its_cheaper_answer(monkeypatch, b
     cold = solved(problem, GUESS)
     answers = {'cold': cold, 'warm': replace(cold, effort=warm * cold.effort)}
     monkeypatch.setattr(outcomes, 'forward', lambda _, start, *rest: answers['cold' if start.lam is None else 'warm'])
-    earlier = Earlier({WAY.label: replace(cold, status=before)}, {})
+    earlier = EarlierSolutions({WAY.label: replace(cold, status=before)}, {})
     (outcome,) = solve_candidates([WAY], [problem], FocConfig(), LikelihoodConfig(), earlier=earlier)
     assert outcome.solution is answers[counts]
     np.testing.assert_allclose(outcome.cost, answers[counts].effort * cold.dt)

@@ -75,12 +75,12 @@ def test_rows_of_the_prediction_are_read_by_field_name(decoded: dict[str, list[o
         assert cloud.header.frame_id == 'world'
         table = rows(cloud)
         assert ' '.join(table.dtype.names) == 'x y z t vx vy vz xx xy xz yy yz zz candidate likelihood'
-        assert len(table) == (steps + 1) * len(prediction.solved) and np.isfinite(table['x']).all()
+        assert len(table) == (steps + 1) * len(prediction.solved_candidates) and np.isfinite(table['x']).all()
         labels = likelihoods.layout.dim[0].label.split(';')
         assert labels[0] == prediction.most_likely and sorted(labels) == sorted(
-            each.candidate.label for each in prediction.solved
+            each.candidate.label for each in prediction.solved_candidates
         )
-        by_label = {outcome.candidate.label: outcome for outcome in prediction.solved}
+        by_label = {outcome.candidate.label: outcome for outcome in prediction.solved_candidates}
         for index, label in enumerate(labels):
             part, solution = table[table['candidate'] == index], by_label[label].solution
             assert np.allclose(np.column_stack([part['x'], part['y']]), solution.path, atol=1e-6)

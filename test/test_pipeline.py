@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from foc_ros.core import pipeline as module
 from foc_ros.core.config import Config, updated
 from foc_ros.core.errors import SceneError
-from foc_ros.core.homotopy.demonstrations import Way
+from foc_ros.core.homotopy.demonstrations import Demonstration
 from foc_ros.core.memory import Memory
-from foc_ros.core.pipeline import Pipeline, Verdict
+from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction, make_obstacles
 
 START = 1000 * NANOSECONDS
@@ -27,7 +27,13 @@ class Recorder:
         self.calls: list[tuple[Config, HandState, Obstacles, Array, Memory]] = []
 
     def __call__(
-        self, config: Config, hand: HandState, obstacles: Obstacles, goals: Array, memory: Memory, library: tuple[Way, ...]
+        self,
+        config: Config,
+        hand: HandState,
+        obstacles: Obstacles,
+        goals: Array,
+        memory: Memory,
+        library: tuple[Demonstration, ...],
     ) -> tuple[Prediction, Memory]:
         assert library == ()
         self.calls.append((config, hand, obstacles, goals, memory))
@@ -61,7 +67,7 @@ def seen(pipeline: Pipeline) -> tuple[object, ...]:
 def test_one_prediction_for_every_sample_that_is_due(recorder: Recorder) -> None:
     pipeline, stamps = ready(), []
     for ms in range(0, 200, 5):
-        assert pipeline.hand(hand(ms)) is Verdict.ACCEPTED
+        assert pipeline.hand(hand(ms)) is SampleStatus.ACCEPTED
         if pipeline.due:
             prediction = pipeline.predict()
             assert prediction is not None
@@ -103,8 +109,8 @@ def test_the_same_sample_is_never_predicted_from_twice(recorder: Recorder) -> No
     assert pipeline.predict() is not None
     assert not pipeline.due
     assert pipeline.predict() is None
-    assert pipeline.hand(hand(0.0)) is Verdict.DUPLICATE
-    assert pipeline.hand(hand(-10.0)) is Verdict.LATE
+    assert pipeline.hand(hand(0.0)) is SampleStatus.DUPLICATE
+    assert pipeline.hand(hand(-10.0)) is SampleStatus.LATE
     assert not pipeline.due
     assert pipeline.predict() is None
     assert pipeline.counts['predict_not_due'] == 2
@@ -145,29 +151,29 @@ def test_a_refused_message_changes_nothing_and_is_counted_with_its_reason(record
     pipeline = ready()
     pipeline.hand(hand(100.0))
     refusals = [
-        (lambda: pipeline.hand(hand(100.0)), Verdict.DUPLICATE, 'hand_duplicate', '0 s behind the newest one'),
-        (lambda: pipeline.hand(hand(90.0)), Verdict.LATE, 'hand_late', '0.01 s behind the newest one'),
+        (lambda: pipeline.hand(hand(100.0)), SampleStatus.DUPLICATE, 'hand_duplicate', '0 s behind the newest one'),
+        (lambda: pipeline.hand(hand(90.0)), SampleStatus.LATE, 'hand_late', '0.01 s behind the newest one'),
         (
             lambda: pipeline.hand(hand(110.0, frame='camera')),
-            Verdict.WRONG_FRAME,
+            SampleStatus.WRONG_FRAME,
             'hand_wrong_frame',
             "hand_pose.header.frame_id: expected the working frame 'world', got 'camera'",
         ),
         (
             lambda: pipeline.set_obstacles('cloud', make_obstacles(), START, 'camera'),
-            Verdict.WRONG_FRAME,
+            SampleStatus.WRONG_FRAME,
             'obstacles_wrong_frame',
             "cloud.header.frame_id: expected the working frame 'world', got 'camera'",
         ),
         (
             lambda: pipeline.set_obstacles('cloud', make_obstacles(), START - MS, 'world'),
-            Verdict.LATE,
+            SampleStatus.LATE,
             'obstacles_late',
             '0.001 s behind the newest one',
         ),
         (
             lambda: pipeline.set_goals(np.zeros((1, 2)), 'camera'),
-            Verdict.WRONG_FRAME,
+            SampleStatus.WRONG_FRAME,
             'goals_wrong_frame',
             "goals.header.frame_id: expected the working frame 'world', got 'camera'",
         ),
@@ -185,7 +191,7 @@ def test_a_refused_message_changes_nothing_and_is_counted_with_its_reason(record
 
 def test_a_scene_much_older_than_the_last_one_is_a_clock_that_jumped(recorder: Recorder) -> None:
     pipeline = ready()
-    assert pipeline.set_obstacles('cloud', make_obstacles(), START - 501 * MS, 'world') is Verdict.ACCEPTED
+    assert pipeline.set_obstacles('cloud', make_obstacles(), START - 501 * MS, 'world') is SampleStatus.ACCEPTED
     assert len(pipeline.scene.obstacles(START)) == 0
 
 
@@ -204,17 +210,17 @@ def test_the_first_hand_sample_fixes_an_open_frame(recorder: Recorder) -> None:
 
 def test_a_frame_given_as_a_parameter_holds_from_the_start(recorder: Recorder) -> None:
     pipeline = Pipeline(updated(CONFIG, {'frame_id': 'base'}))
-    assert pipeline.hand(hand(0.0)) is Verdict.WRONG_FRAME
-    assert pipeline.set_goals(np.zeros((1, 2)), 'world') is Verdict.WRONG_FRAME
+    assert pipeline.hand(hand(0.0)) is SampleStatus.WRONG_FRAME
+    assert pipeline.set_goals(np.zeros((1, 2)), 'world') is SampleStatus.WRONG_FRAME
     assert pipeline.hand_state is None
-    assert pipeline.hand(hand(0.0, frame='base')) is Verdict.ACCEPTED
+    assert pipeline.hand(hand(0.0, frame='base')) is SampleStatus.ACCEPTED
 
 
 @pytest.mark.parametrize(
     ('jump', 'verdict'),
-    [(-600.0, Verdict.RESTARTED_BACKWARD), (600.0, Verdict.RESTARTED_GAP), (-1e5, Verdict.RESTARTED_BACKWARD)],
+    [(-600.0, SampleStatus.RESTARTED_BACKWARD), (600.0, SampleStatus.RESTARTED_GAP), (-1e5, SampleStatus.RESTARTED_BACKWARD)],
 )
-def test_a_jump_of_the_hands_stamp_starts_anew(recorder: Recorder, jump: float, verdict: Verdict) -> None:
+def test_a_jump_of_the_hands_stamp_starts_anew(recorder: Recorder, jump: float, verdict: SampleStatus) -> None:
     pipeline = ready(updated(CONFIG, {'scene.timeout_s': 0.0}))
     pipeline.hand(hand(0.0))
     pipeline.predict()
@@ -244,7 +250,7 @@ def test_the_clutch(recorder: Recorder) -> None:
     pipeline.hand(hand(0.0))
     pipeline.predict()
     pipeline.engage(False)
-    assert pipeline.hand(hand(50.0, 0.02)) is Verdict.DISENGAGED
+    assert pipeline.hand(hand(50.0, 0.02)) is SampleStatus.DISENGAGED
     assert not pipeline.due
     assert pipeline.hand_state is not None
     assert pipeline.hand_state.stamp_ns == START + 50 * MS
@@ -252,7 +258,7 @@ def test_the_clutch(recorder: Recorder) -> None:
     pipeline.engage(True)
     assert not pipeline.due
     assert pipeline.predict() is None
-    assert pipeline.hand(hand(51.0, 0.02)) is Verdict.ACCEPTED
+    assert pipeline.hand(hand(51.0, 0.02)) is SampleStatus.ACCEPTED
     assert pipeline.due
     assert pipeline.predict() is not None
     assert recorder.calls[1][4] == Memory()
@@ -269,7 +275,7 @@ def test_reset_forgets_the_movement_and_keeps_the_scene(recorder: Recorder) -> N
     pipeline.reset()
     assert (pipeline.hand_state, pipeline.scene, pipeline.frame_id, pipeline.counts) == (None, scene, 'world', counts)
     assert pipeline.blocked() == 'no hand pose yet'
-    assert pipeline.hand(hand(0.0)) is Verdict.ACCEPTED
+    assert pipeline.hand(hand(0.0)) is SampleStatus.ACCEPTED
     assert pipeline.predict() is not None
     assert recorder.calls[1][4] == Memory()
 
@@ -337,12 +343,12 @@ class Driver:
     def feed(self, kind: str, value: object, frame: str | None) -> None:
         before, total = seen(self.pipeline), sum(self.pipeline.counts.values())
         verdict = getattr(self, kind)(value, frame)
-        if isinstance(verdict, Verdict) and not verdict.taken:
+        if isinstance(verdict, SampleStatus) and not verdict.taken:
             assert seen(self.pipeline) == before
             assert sum(self.pipeline.counts.values()) == total + 1
         assert sum(self.pipeline.counts.values()) >= total
 
-    def hand(self, ms: int, frame: str) -> Verdict:
+    def hand(self, ms: int, frame: str) -> SampleStatus:
         stamp_ns = self.now_ns + ms * MS
         x = 0.3 * np.sin((stamp_ns - START) / NANOSECONDS)
         verdict = self.pipeline.hand(HandSample(stamp_ns, np.array([x, 0.02]), 0.0, frame))
@@ -352,12 +358,12 @@ class Driver:
             self.last_ns = None
         return verdict
 
-    def obstacles(self, ms: int | None, frame: str) -> Verdict:
+    def obstacles(self, ms: int | None, frame: str) -> SampleStatus:
         stamp_ns = None if ms is None else self.now_ns + ms * MS
         table = make_obstacles([[0.15, 0.0], [0.2, 0.1]], 0.03, 0.003, velocity=[0.01, 0.0])
         return self.pipeline.set_obstacles('cloud' if ms else 'markers', table, stamp_ns, frame)
 
-    def goals(self, count: int, frame: str) -> Verdict:
+    def goals(self, count: int, frame: str) -> SampleStatus:
         return self.pipeline.set_goals(np.array([[0.3, 0.0], [0.3, 0.2]])[:count], frame)
 
     def engage(self, on: bool, _: None) -> None:
@@ -382,7 +388,7 @@ class Driver:
         assert self.pipeline.engaged
         assert prediction.stamp_ns == self.now_ns
         assert self.last_ns is None or prediction.stamp_ns - self.last_ns >= int(1e9 / self.pipeline.config.rate_hz)
-        for outcome in prediction.solved:
+        for outcome in prediction.solved_candidates:
             assert np.all(np.isfinite(outcome.solution.mean))
             assert np.isfinite(outcome.likelihood)
         self.fresh, self.last_ns = False, prediction.stamp_ns
@@ -423,9 +429,9 @@ def test_the_same_messages_give_the_same_predictions() -> None:
         return predictions
 
     first, second = run(), run()
-    assert any(prediction.solved for prediction in first)
+    assert any(prediction.solved_candidates for prediction in first)
     for one, other in zip(first, second, strict=True):
         assert (one.stamp_ns, one.most_likely, one.notes) == (other.stamp_ns, other.most_likely, other.notes)
-        for a, b in zip(one.outcomes, other.outcomes, strict=True):
+        for a, b in zip(one.candidates, other.candidates, strict=True):
             assert (a.candidate.label, a.likelihood, a.cost) == (b.candidate.label, b.likelihood, b.cost)
             np.testing.assert_array_equal(a.solution.mean, b.solution.mean)

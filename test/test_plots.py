@@ -19,8 +19,8 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.types import make_obstacles
 from foc_ros.reporting.drawing import CLASS_COLOURS, CLASSES, ELLIPSES_PER_WAY, LIKELIHOOD_COLOURS, stddev_ellipse
 from foc_ros.reporting.plots import Around, bounds_of, moment_figure, plot_outcomes, save, scene_figure
-from foc_ros.reporting.snapshots import moment_of, movements, track_of, ways_of
-from foc_ros.reporting.track_association import lineages, slots
+from foc_ros.reporting.snapshots import candidate_views, movements, snapshot_of_prediction, track_of
+from foc_ros.reporting.track_association import associate_tracks, slots
 
 ROOT = Path(__file__).resolve().parents[1]
 PNG = b'\x89PNG\r\n\x1a\n'
@@ -63,7 +63,7 @@ def test_class_colours_differ_for_the_colour_blind() -> None:
 
 def test_scene_holds_every_obstacle_goal_and_way() -> None:
     obstacles, goals = scene()
-    ways = ways_of(prediction(START_NS, np.zeros(2)).outcomes)
+    ways = candidate_views(prediction(START_NS, np.zeros(2)).candidates)
     axes = scene_figure(obstacles, goals, ways, bounds_of(obstacles, goals, ways)).axes[0]
     radii = sorted(patch.radius for patch in axes.patches if isinstance(patch, Circle))
     np.testing.assert_allclose(radii, [0.02, 0.02, 0.03, 0.033])
@@ -76,14 +76,14 @@ def test_scene_holds_every_obstacle_goal_and_way() -> None:
 
 
 def test_unsolved_outcomes_are_not_drawn() -> None:
-    outcomes = prediction(START_NS, np.zeros(2)).outcomes
-    assert [way.label for way in ways_of(outcomes)] == [each.candidate.label for each in outcomes if each.solved]
-    assert any(not each.solved for each in outcomes)
+    outcomes = prediction(START_NS, np.zeros(2)).candidates
+    assert [way.label for way in candidate_views(outcomes)] == [each.candidate.label for each in outcomes if each.is_solved]
+    assert any(not each.is_solved for each in outcomes)
 
 
 def test_bounds_hold_the_ellipses() -> None:
     obstacles, goals = scene()
-    ways = ways_of(prediction(START_NS, np.zeros(2)).outcomes)
+    ways = candidate_views(prediction(START_NS, np.zeros(2)).candidates)
     left, right, bottom, top = bounds_of(obstacles, goals, ways)
     assert right > 0.3 + 2 * 0.011
     assert left < 0.0
@@ -95,9 +95,9 @@ def test_moment_shows_past_and_future_of_the_hand() -> None:
     made = samples()
     track = track_of(made)
     (span,) = movements(track, 0.05)
-    around = [moment_of(each, *scene()) for each in predictions(made) if span[0] <= each.stamp_ns <= span[1]]
+    around = [snapshot_of_prediction(each, *scene()) for each in predictions(made) if span[0] <= each.stamp_ns <= span[1]]
     moment = around[len(around) // 3]
-    lines = lineages(around)
+    lines = associate_tracks(around)
     told = Around(tuple(around), tuple(lines), slots(around, lines, CLASSES, len(CLASS_COLOURS)))
     figure = moment_figure(track, moment, told, span, bounds_of(*scene(), moment.ways))
     hand = [line for line in figure.axes[0].lines if line.get_color() == 'black' and len(line.get_xdata()) > 1]
@@ -112,13 +112,13 @@ def test_moment_shows_past_and_future_of_the_hand() -> None:
 @pytest.mark.parametrize('suffix', ['png', 'pdf', 'svg'])
 def test_plot_outcomes(tmp_path: Path, suffix: str) -> None:
     file = tmp_path / f'scene.{suffix}'
-    plot_outcomes(file, *scene(), prediction(START_NS, np.zeros(2)).outcomes)
+    plot_outcomes(file, *scene(), prediction(START_NS, np.zeros(2)).candidates)
     start = {'png': PNG, 'pdf': b'%PDF', 'svg': b'<?xml'}[suffix]
     assert file.read_bytes().startswith(start)
 
 
 def test_plot_without_a_solution_or_an_obstacle(tmp_path: Path) -> None:
-    outcomes = [each for each in prediction(START_NS, np.zeros(2)).outcomes if not each.solved]
+    outcomes = [each for each in prediction(START_NS, np.zeros(2)).candidates if not each.is_solved]
     plot_outcomes(tmp_path / 'none.png', make_obstacles(), scene()[1], outcomes)
     assert (tmp_path / 'none.png').read_bytes().startswith(PNG)
 
@@ -128,13 +128,13 @@ def test_plot_without_a_solution_or_an_obstacle(tmp_path: Path) -> None:
 )
 def test_a_file_that_cannot_be_written(tmp_path: Path, name: str, expected: str) -> None:
     with pytest.raises(InputError, match=expected):
-        plot_outcomes(tmp_path / name, *scene(), prediction(START_NS, np.zeros(2)).outcomes)
+        plot_outcomes(tmp_path / name, *scene(), prediction(START_NS, np.zeros(2)).candidates)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_equal_input_gives_equal_pictures(tmp_path: Path) -> None:
     obstacles, goals = scene()
-    ways = ways_of(prediction(START_NS, np.zeros(2)).outcomes)
+    ways = candidate_views(prediction(START_NS, np.zeros(2)).candidates)
     for name in ('one.png', 'two.png'):
         save(scene_figure(obstacles, goals, ways, bounds_of(obstacles, goals, ways)), tmp_path / name)
     assert (tmp_path / 'one.png').read_bytes() == (tmp_path / 'two.png').read_bytes()

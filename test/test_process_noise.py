@@ -4,7 +4,7 @@ import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
 from foc_ros.core.config import Config, updated
-from foc_ros.core.dynamics.plants import horizon, triple_integrator
+from foc_ros.core.dynamics.plants import condense, triple_integrator
 from foc_ros.core.dynamics.replanning import replanned_error_map, triple_integrator_process_covariance
 from foc_ros.core.estimation.kalman_filter import gramian
 from foc_ros.core.memory import Memory
@@ -32,7 +32,7 @@ def test_it_is_what_a_hand_that_replans_at_each_step_does() -> None:
     for step in range(steps):
         if steps - step < 3:  # too few to bring every state to the goal
             break
-        error = error @ replanned_error_map(horizon(plant, steps - step))[1].T
+        error = error @ replanned_error_map(condense(plant, steps - step))[1].T
         error = error + noise.standard_normal((draws, 6)) @ root.T
         assert_allclose(error.var(axis=0), np.diag(expected[step + 1]), rtol=0.05)
 
@@ -42,8 +42,8 @@ def test_predictions_widen_and_means_and_likelihoods_stay() -> None:
     scene = make_obstacles([[0.15, 0.01]], 0.03), np.array([[0.3, 0.0]])
     narrow = predict(Config(), hand, *scene, Memory())[0]
     wide = predict(updated(Config(), {'foc.process_noise': 2.0}), hand, *scene, Memory())[0]
-    assert len(narrow.solved) == len(wide.solved) == 2
-    for before, after in zip(narrow.outcomes, wide.outcomes, strict=True):
+    assert len(narrow.solved_candidates) == len(wide.solved_candidates) == 2
+    for before, after in zip(narrow.candidates, wide.candidates, strict=True):
         assert_array_equal(before.solution.mean, after.solution.mean)
         assert before.likelihood == after.likelihood
         added = after.solution.covariance - before.solution.covariance

@@ -54,11 +54,11 @@ def test_solved_candidates_pass_as_their_labels_say(batch, strategy, record_test
     for seed in range(batch, SCENES, BATCHES):
         prediction, obstacles = answer(seed, strategy)
         count['merged'] += prediction.notes.get('merged', 0)
-        labels = [outcome.candidate.label for outcome in prediction.solved]
+        labels = [outcome.candidate.label for outcome in prediction.solved_candidates]
         assert len(set(labels)) == len(labels), f'scene {seed}'
-        for outcome in prediction.outcomes:
+        for outcome in prediction.candidates:
             count[outcome.solution.status.value] += 1
-            if outcome.solved:
+            if outcome.is_solved:
                 assert label_of(outcome.solution.path, obstacles) == outcome.candidate.label, f'scene {seed}'
     record_testsuite_property(f'{strategy} {batch}', dict(count))
     assert count['solved'] > SCENES // BATCHES

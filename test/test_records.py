@@ -8,7 +8,7 @@ import pytest
 from foc_ros.core.config import Config
 from foc_ros.core.memory import Memory
 from foc_ros.core.predictor import predict
-from foc_ros.core.types import Array, HandState, Prediction, Record, Solution, fixed, make_obstacles
+from foc_ros.core.types import Array, HandState, Prediction, Record, Solution, as_readonly, make_obstacles
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,19 +35,19 @@ def test_what_is_written_to_an_array_later_does_not_reach_the_record() -> None:
 
 
 def test_an_array_that_was_made_for_a_record_is_taken_as_it_is() -> None:
-    array = fixed(np.zeros(3))
+    array = as_readonly(np.zeros(3))
     assert Kept(array).array is array
     with pytest.raises(ValueError, match='read-only'):
         array[0] = 1.0
 
 
 def test_a_view_across_rows_becomes_contiguous() -> None:
-    kept = Kept(fixed(np.arange(6.0).reshape(3, 2))[:, 0])
+    kept = Kept(as_readonly(np.arange(6.0).reshape(3, 2))[:, 0])
     assert kept.array.flags.c_contiguous and kept.array.tolist() == [0.0, 2.0, 4.0]
 
 
 def test_a_solution_with_another_covariance_is_otherwise_the_same(prediction: Prediction) -> None:
-    solution = prediction.outcomes[0].solution
+    solution = prediction.candidates[0].solution
     covariance = 2.0 * solution.covariance
     found, expected = solution.with_covariance(covariance.copy()), replace(solution, covariance=covariance)
     assert vars(found).keys() == vars(expected).keys() == {field.name for field in fields(Solution)}
@@ -56,7 +56,7 @@ def test_a_solution_with_another_covariance_is_otherwise_the_same(prediction: Pr
 
 
 def test_no_array_of_a_prediction_can_be_written_to(prediction: Prediction) -> None:
-    for outcome in prediction.outcomes:
+    for outcome in prediction.candidates:
         for record in (outcome.solution, outcome.candidate):
             arrays = [value for value in vars(record).values() if isinstance(value, np.ndarray)]
             assert arrays and not any(array.flags.writeable for array in arrays)

@@ -21,7 +21,7 @@ from foc_ros.core.types import HandSample, Prediction
 from foc_ros.reporting.page import plotly_script
 from foc_ros.reporting.report import write_report
 from foc_ros.reporting.report_data import MOST_SHOWN
-from foc_ros.reporting.snapshots import moment_of, track_of
+from foc_ros.reporting.snapshots import snapshot_of_prediction, track_of
 
 
 class Page(HTMLParser):
@@ -49,7 +49,7 @@ class Page(HTMLParser):
 
 def report(directory: Path, reaches: int = 1, title: str = 'A title') -> list[Path]:
     made = samples(reaches)
-    moments = [moment_of(each, *scene()) for each in predictions(made)]
+    moments = [snapshot_of_prediction(each, *scene()) for each in predictions(made)]
     return write_report(directory, title, track_of(made), moments, {'recording': 'some <bag> & more'})
 
 
@@ -101,10 +101,10 @@ def test_page_holds_the_likelihoods_of_all_predictions(tmp_path: Path) -> None:
 def test_paths_on_the_page_are_those_predicted(tmp_path: Path) -> None:
     made = samples()
     expected = predictions(made)
-    write_report(tmp_path, 'x', track_of(made), [moment_of(each, *scene()) for each in expected], {})
+    write_report(tmp_path, 'x', track_of(made), [snapshot_of_prediction(each, *scene()) for each in expected], {})
     data = page_data_of(tmp_path)
     for frame, known in zip(data['frames'], expected, strict=True):
-        for way, outcome in zip(frame['ways'], known.solved, strict=True):
+        for way, outcome in zip(frame['ways'], known.solved_candidates, strict=True):
             drawn = np.cumsum([way['x'], way['y']], axis=1).T * data['unit']['length']
             np.testing.assert_allclose(drawn, outcome.solution.path, atol=0.51e-4)
             spread = np.array(way['ellipses'])[-1, 2:4] * data['unit']['length']
@@ -114,7 +114,7 @@ def test_paths_on_the_page_are_those_predicted(tmp_path: Path) -> None:
 
 def test_a_long_recording_is_thinned_out_and_says_so(tmp_path: Path) -> None:
     made = samples(5)
-    moments = [moment_of(each, *scene()) for each in predictions(made, every=1)]
+    moments = [snapshot_of_prediction(each, *scene()) for each in predictions(made, every=1)]
     write_report(tmp_path, 'x', track_of(made), moments, {})
     data = page_data_of(tmp_path)
     assert len(data['times']) == len(moments) == 750 > len(data['frames']) == MOST_SHOWN
@@ -133,7 +133,7 @@ def page_data_of(directory: Path) -> dict[str, Any]:
 def test_numbers_agree_with_the_predictions(tmp_path: Path) -> None:
     made = samples()
     expected = predictions(made)
-    write_report(tmp_path, 'x', track_of(made), [moment_of(each, *scene()) for each in expected], {})
+    write_report(tmp_path, 'x', track_of(made), [snapshot_of_prediction(each, *scene()) for each in expected], {})
     numbers = json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))
     assert numbers['hand_samples'] == len(made)
     assert len(numbers['predictions']) == len(expected)
@@ -141,11 +141,11 @@ def test_numbers_agree_with_the_predictions(tmp_path: Path) -> None:
         assert told['stamp_ns'] == known.stamp_ns
         assert told['t_s'] == pytest.approx((known.stamp_ns - START_NS) * 1e-9)
         assert told['most_likely'] == known.most_likely
-        assert [each['label'] for each in told['candidates']] == [each.candidate.label for each in known.solved]
+        assert [each['label'] for each in told['candidates']] == [each.candidate.label for each in known.solved_candidates]
         assert [each['likelihood'] for each in told['candidates']] == pytest.approx(
-            [each.likelihood for each in known.solved], rel=1e-5
+            [each.likelihood for each in known.solved_candidates], rel=1e-5
         )
-        assert told['candidates'][0]['end'] == pytest.approx(known.solved[0].solution.path[-1], abs=1e-6)
+        assert told['candidates'][0]['end'] == pytest.approx(known.solved_candidates[0].solution.path[-1], abs=1e-6)
         assert told['unsolved'] == {'goal1:+1+post': 'eta_unreachable'}
 
 
@@ -162,20 +162,22 @@ def test_nothing_predicted_is_said(tmp_path: Path) -> None:
 
 
 def test_nothing_solved_is_said(tmp_path: Path) -> None:
-    lost = [each for each in prediction(START_NS, np.zeros(2)).outcomes if not each.solved]
-    moments = [moment_of(Prediction(START_NS + n, 'world', 0.0, tuple(lost), None), *scene()) for n in range(3)]
+    lost = [each for each in prediction(START_NS, np.zeros(2)).candidates if not each.is_solved]
+    moments = [snapshot_of_prediction(Prediction(START_NS + n, 'world', 0.0, tuple(lost), None), *scene()) for n in range(3)]
     write_report(tmp_path, 'x', track_of(samples()), moments, {})
     assert 'In 3 of 3 predictions no candidate could be solved.' in Page(tmp_path / 'index.html').text
 
 
 def test_a_hand_that_never_moves(tmp_path: Path) -> None:
     still = [HandSample(START_NS + n * 10_000_000, np.zeros(2)) for n in range(50)]
-    write_report(tmp_path, 'x', track_of(still), [moment_of(prediction(still[20].stamp_ns, np.zeros(2)), *scene())], {})
+    write_report(
+        tmp_path, 'x', track_of(still), [snapshot_of_prediction(prediction(still[20].stamp_ns, np.zeros(2)), *scene())], {}
+    )
     assert (tmp_path / 'moment_01.png').exists()
 
 
 def test_numbers_that_json_has_not_become_null(tmp_path: Path) -> None:
-    made = moment_of(prediction(START_NS, np.zeros(2)), *scene())
+    made = snapshot_of_prediction(prediction(START_NS, np.zeros(2)), *scene())
     lost = replace(made, ways=(replace(made.ways[0], eta=float('nan')), *made.ways[1:]))
     write_report(tmp_path, 'x', track_of(samples()), [lost], {})
     text = (tmp_path / 'predictions.json').read_text(encoding='utf-8')

@@ -17,7 +17,7 @@ from report_samples import predictions, samples, scene
 
 from foc_ros.reporting.report import write_report
 from foc_ros.reporting.report_data import MOST_SHOWN
-from foc_ros.reporting.snapshots import moment_of, track_of
+from foc_ros.reporting.snapshots import snapshot_of_prediction, track_of
 
 HOSTILE = '</script><img src=x onerror=alert(1)><b>&amp;'
 
@@ -32,7 +32,11 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made, directory = samples(2), tmp_path_factory.mktemp('report')
     write_report(
-        directory, HOSTILE, track_of(made), [moment_of(each, *scene()) for each in predictions(made)], {HOSTILE: HOSTILE}
+        directory,
+        HOSTILE,
+        track_of(made),
+        [snapshot_of_prediction(each, *scene()) for each in predictions(made)],
+        {HOSTILE: HOSTILE},
     )
     return directory
 
@@ -73,7 +77,9 @@ def test_it_plays_to_the_end_of_a_movement(browser: Any, report: Path) -> None:
 
 def test_a_long_recording_says_where_the_slider_stops(browser: Any, tmp_path: Path) -> None:
     made = samples(5)
-    write_report(tmp_path, 'x', track_of(made), [moment_of(each, *scene()) for each in predictions(made, every=1)], {})
+    write_report(
+        tmp_path, 'x', track_of(made), [snapshot_of_prediction(each, *scene()) for each in predictions(made, every=1)], {}
+    )
     check_report(browser, tmp_path)
     assert f'{MOST_SHOWN} of the 750 predictions' in browser.find_element('id', 'decimated').text
 

@@ -10,7 +10,7 @@ from reach_helpers import solved
 from varied_reaches import varied_reach
 
 from foc_ros.core.obstacles.chance_constraint import k_of_eta
-from foc_ros.core.ocp.contacts.hermite import place, place_row
+from foc_ros.core.ocp.contacts.hermite import interpolate, interpolation_row
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.qp import ReachingQP, clearance_qp, effort_cost
 from foc_ros.core.ocp.strategies.optimal import surrogate_qp
@@ -27,12 +27,12 @@ def at_any_time(problem: Problem, solution: Solution) -> ReachingQP:
     further = np.array([time for _, time, _ in solution.multipliers])
     times = np.concatenate((np.arange(1, steps + 1), further))
     motion, course = problem.horizon.motion, problem.course(solution.control.T.ravel())
-    maps = np.array([[place_row(motion, time, x, y) for time in further] for x, y in ((1.0, 0.0), (0.0, 1.0))])
+    maps = np.array([[interpolation_row(motion, time, x, y) for time in further] for x, y in ((1.0, 0.0), (0.0, 1.0))])
     maps = maps.reshape(2, len(further), 2 * steps)
     centres = problem.obstacles.centre[:, None] + times[None, :, None] * problem.drift[:, None]
-    away = np.array([place(course, time, 0) for time in times]) - centres
+    away = np.array([interpolate(course, time, 0) for time in times]) - centres
     normals = away / np.linalg.norm(away, axis=2, keepdims=True)
-    free = np.array([place(problem.free_course, time, 0) for time in times])
+    free = np.array([interpolate(problem.free_course, time, 0) for time in times])
     limits = np.sqrt(problem.size[0] + solution.tau)[:, None] + np.einsum('mta,mta->mt', normals, centres - free)
     positions = problem.horizon.maps[:2]
     return ReachingQP(effort_cost(problem, solution.lam), positions, np.ones((2, 2 * steps)), normals, limits, maps)
@@ -85,7 +85,7 @@ def test_the_mean_keeps_clear_between_the_steps(strategy):
             continue
         course = problem.course(solution.control.T.ravel())
         times = np.linspace(1.0, problem.horizon.steps, 50 * (problem.horizon.steps - 1) + 1)
-        positions = np.array([place(course, time, 0) for time in times])
+        positions = np.array([interpolate(course, time, 0) for time in times])
         away = positions - problem.obstacles.centre[:, None] - times[:, None] * problem.drift[:, None]
         spare = np.linalg.norm(away, axis=2) - np.sqrt(problem.size[0] + solution.tau)[:, None]
         assert spare.min() > -1e-7 * problem.extent

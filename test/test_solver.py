@@ -8,7 +8,7 @@ from reach_helpers import bowed, case_guess, case_problem, one_obstacle, random_
 
 from foc_ros.core.ocp.backend import DenseQP, solve_named, solve_piqp
 from foc_ros.core.ocp.qp import clearance_qp, effort_cost, half_planes
-from foc_ros.core.ocp.working_set import WorkingSet, solve, solve_full, united
+from foc_ros.core.ocp.working_set import WorkingSet, solve, solve_full, unite_rows
 from foc_ros.core.types import make_obstacles
 
 
@@ -88,7 +88,7 @@ def test_any_working_set_gives_the_same_answer():
     assert expected is not None
     for _ in range(10):
         rows = WorkingSet(generator.integers(0, len(problem.obstacles), 12), generator.integers(0, 25, 12))
-        rows = WorkingSet(*united(*rows.rows, *rows.rows, 25))
+        rows = WorkingSet(*unite_rows(*rows.rows, *rows.rows, 25))
         again = solve(qp, rows)
         assert again is not None
         np.testing.assert_allclose(problem.positions(again.control), problem.positions(expected.control), atol=1e-8)

@@ -9,17 +9,17 @@ from reach_helpers import bowed, one_obstacle, random_scene, reach, solved
 
 from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import Deadline, OutOfTimeError
-from foc_ros.core.dynamics.plants import damped_mass, horizon, triple_integrator_horizon
+from foc_ros.core.dynamics.plants import condense, damped_mass, triple_integrator_horizon
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacles.chance_constraint import eta_of_k
-from foc_ros.core.ocp.chance_evaluation import achieved, assess
+from foc_ros.core.ocp.chance_evaluation import evaluate_chance_constraint, evaluate_safety_factors
 from foc_ros.core.ocp.minimum_k import assess_between
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import rest_to_goal
-from foc_ros.core.ocp.solve import forward
+from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.strategies.algorithm1 import algorithm1
 from foc_ros.core.ocp.strategies.optimal import surrogate_qp
-from foc_ros.core.ocp.warm_start import cold, led, warm
+from foc_ros.core.ocp.warm_start import cold_start, correct_to_goal, warm_start
 from foc_ros.core.ocp.working_set import WorkingSet
 from foc_ros.core.types import Status, make_obstacles
 
@@ -42,14 +42,14 @@ def test_result_is_consistent_with_itself(strategy):
     problem = one_obstacle()
     solution = solved(problem, BOWED, strategy)
     control = solution.control.T.ravel()
-    assessment = assess(problem, control) if strategy == 'optimal' else assess_between(problem, control)
+    assessment = evaluate_chance_constraint(problem, control) if strategy == 'optimal' else assess_between(problem, control)
     assert solution.effort == pytest.approx(control @ control)
     assert solution.eta == pytest.approx(eta_of_k(assessment.smallest_k))
     assert solution.eta >= 0.9 - 1e-6
     assert solution.eta_at is not None
     identity, step = solution.eta_at
     assert identity == '0'
-    assert assessment.smallest_k <= achieved(problem, control).min() * (1 + 1e-12)
+    assert assessment.smallest_k <= evaluate_safety_factors(problem, control).min() * (1 + 1e-12)
     assert (0, step) == assessment.place
     np.testing.assert_allclose(solution.path[1:], problem.positions(control), atol=1e-12)
     np.testing.assert_allclose(solution.mean[0], problem.initial_mean)
@@ -149,10 +149,10 @@ def test_moving_and_uncertain_centres_are_avoided_where_they_will_be(strategy):
 
 @EVERY
 def test_a_damped_mass_goes_through_the_same_door(strategy):
-    stacked = horizon(damped_mass(0.02, 1.0, 2.0), 50)
+    stacked = condense(damped_mass(0.02, 1.0, 2.0), 50)
     obstacles = make_obstacles([[0.12, 0.0]], [0.03], [0.003])
     problem = rest_to_goal(stacked, np.zeros(4), np.array([0.3, 0.0]), obstacles, np.array([0.1, 0.1]), 0.9)
-    solution = forward(problem, cold(BOWED), FocConfig(strategy=strategy))
+    solution = solve_problem(problem, cold_start(BOWED), FocConfig(strategy=strategy))
     assert solution.status is Status.SOLVED
     assert solution.mean.shape == (51, 4)
     assert monte_carlo(problem, solution.control.T.ravel(), 4000).step[2] >= 0.9
@@ -176,10 +176,10 @@ def test_gradient_of_the_surrogate_rows_is_that_of_finite_differences():
 
 def assessed(problem, control, k):
     """Return -f, the slack of the surrogate, for every obstacle and step."""
-    from foc_ros.core.obstacles.chance_constraint import variance
+    from foc_ros.core.obstacles.chance_constraint import variances
 
     offset = problem.positions(control)[None] - problem.centres
-    var = variance(offset, problem.position_variance(control), problem.size[1], problem.obstacles.centre_covariance)
+    var = variances(offset, problem.position_variance(control), problem.size[1], problem.obstacles.centre_covariance)
     return (offset**2).sum(axis=-1) - problem.size[0][:, None] - k * np.sqrt(var)
 
 
@@ -195,14 +195,14 @@ def test_algorithm1_as_printed_overshoots_what_the_continuous_walk_finds():
         assert 'infeasible' in stepped.message or 'not settled' in stepped.message
     gentle = algorithm1(problem, BOWED[1:], 5e-5, 1.5, 1.0)
     assert gentle.status is Status.SOLVED
-    assert assess(problem, gentle.solution.control).eta >= 0.9
+    assert evaluate_chance_constraint(problem, gentle.solution.control).eta >= 0.9
 
 
 @EVERY
 def test_a_warm_start_finds_what_a_cold_one_finds(strategy):
     problem = one_obstacle(0.86)
     first = solved(problem, BOWED, strategy)
-    again = forward(problem, warm(first, problem), FocConfig(strategy=strategy))
+    again = solve_problem(problem, warm_start(first, problem), FocConfig(strategy=strategy))
     assert again.status is Status.SOLVED
     assert again.qp_solves < first.qp_solves
     np.testing.assert_allclose(again.path, first.path, atol=2e-6)
@@ -213,13 +213,13 @@ def test_a_warm_start_is_led_to_the_goal_from_where_the_hand_really_is(strategy)
     before = solved(one_obstacle(0.86), BOWED, strategy)
     state = np.array([0.002, 0.001, 0.03, 0.01, 0.8, 0.2])  # not where the plan would be, and far from its acceleration
     problem = replace(one_obstacle(0.86), initial_mean=state)
-    start = warm(before, problem)
-    control = led(problem, start.control, start.positions)
+    start = warm_start(before, problem)
+    control = correct_to_goal(problem, start.control, start.positions)
     np.testing.assert_allclose(problem.free[-1] + problem.horizon.response[-1] @ control, problem.goal, atol=1e-9)
     left, kept = (np.abs(problem.positions(each) - start.positions).max() for each in (start.control, control))
     assert kept < left / 2
-    found = forward(problem, start, FocConfig(strategy=strategy))
-    fresh = forward(problem, cold(BOWED), FocConfig(strategy=strategy))
+    found = solve_problem(problem, start, FocConfig(strategy=strategy))
+    fresh = solve_problem(problem, cold_start(BOWED), FocConfig(strategy=strategy))
     assert found.status is fresh.status is Status.SOLVED
     np.testing.assert_allclose(found.path, fresh.path, atol=1e-5)
 
@@ -227,11 +227,14 @@ def test_a_warm_start_is_led_to_the_goal_from_where_the_hand_really_is(strategy)
 @pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal', 'fixed', 'algorithm1'])
 def test_a_deadline_ends_the_search_and_one_that_is_not_reached_changes_nothing(strategy):
     problem, settings = one_obstacle(0.94), FocConfig(strategy=strategy, algorithm1_growth=1.5)
-    late = forward(problem, cold(BOWED), settings, Deadline(0.0))
+    late = solve_problem(problem, cold_start(BOWED), settings, Deadline(0.0))
     assert late.status is Status.DEADLINE
     assert 'out of time' in late.message
     assert np.isfinite(late.mean).all()
-    free, ample = forward(problem, cold(BOWED), settings), forward(problem, cold(BOWED), settings, Deadline(1e3))
+    free, ample = (
+        solve_problem(problem, cold_start(BOWED), settings),
+        solve_problem(problem, cold_start(BOWED), settings, Deadline(1e3)),
+    )
     assert ample.status is free.status is Status.SOLVED
     np.testing.assert_array_equal(ample.mean, free.mean)
 

@@ -5,12 +5,12 @@ import pytest
 from reach_helpers import bowed, reach
 
 from foc_ros.core.config import Config, FocConfig, updated
-from foc_ros.core.estimation.duration import way_times
+from foc_ros.core.estimation.duration import candidate_durations
 from foc_ros.core.estimation.kalman_filter import gramian, transition
 from foc_ros.core.estimation.time_cost import effort_along, least_cost_time
 from foc_ros.core.memory import Memory
-from foc_ros.core.ocp.solve import forward
-from foc_ros.core.ocp.warm_start import cold
+from foc_ros.core.ocp.solve import solve_problem
+from foc_ros.core.ocp.warm_start import cold_start
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import Candidate, HandState, make_obstacles
 
@@ -58,11 +58,11 @@ def test_the_law_for_a_way_round_costs_little_more_than_its_true_optimum(bow: fl
     guess = bowed([0.0, 0.0], [0.3, 0.0], 50, bow)
     length = float(np.hypot(*np.diff(guess, axis=0).T).sum())
     config = updated(Config(), {'duration.model': 'cost_of_time', 'duration.time_cost': time_cost}).duration
-    law = way_times(AT_REST, [Candidate('a', 0, (), guess, length)], [1.0], config)[0]
+    law = candidate_durations(AT_REST, [Candidate('a', 0, (), guess, length)], [1.0], config)[0]
 
     def total(duration_s: float) -> float:
         problem = reach(OBSTACLE, duration=duration_s, noise=(0.02, 0.02), eta=0.8)
-        solution = forward(problem, cold(guess), FocConfig(strategy='lv'))
+        solution = solve_problem(problem, cold_start(guess), FocConfig(strategy='lv'))
         return solution.effort * solution.dt + time_cost * duration_s
 
     best = min(total(law * factor) for factor in np.geomspace(0.7, 1.4, 15))
@@ -74,7 +74,7 @@ def test_going_round_takes_longer_and_with_the_other_models_as_long() -> None:
     for model in ('cost_of_time', 'fitts', 'fixed'):
         config = updated(Config(), {'duration.model': model, 'duration.time_cost': 100.0})
         prediction = predict(config, AT_REST, *scene, Memory())[0]
-        lasts = {each.candidate.length: each.solution.times[-1] for each in prediction.solved}
+        lasts = {each.candidate.length: each.solution.times[-1] for each in prediction.solved_candidates}
         assert len(lasts) == 2
         short, long = sorted(lasts)
         if model == 'cost_of_time':
@@ -87,7 +87,7 @@ def test_time_is_part_of_the_cost_where_it_has_a_price() -> None:
     scene = make_obstacles([[0.15, 0.03]], 0.05), np.array([[0.3, 0.0]])
     for model, price in (('cost_of_time', 100.0), ('fitts', 0.0), ('fixed', 0.0)):
         config = updated(Config(), {'duration.model': model, 'duration.time_cost': 100.0})
-        solved = predict(config, AT_REST, *scene, Memory())[0].solved
+        solved = predict(config, AT_REST, *scene, Memory())[0].solved_candidates
         assert len(solved) == 2
         for each in solved:
             solution = each.solution

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import worker_tasks
 
-from foc_ros.analysis.evaluation.lanes import Lanes
+from foc_ros.analysis.evaluation.lanes import IsolatedProcessPool
 from foc_ros.analysis.evaluation.workers import Failure, add_worker_arguments, run, workers
 from foc_ros.core.errors import InputError
 
@@ -38,12 +38,12 @@ def test_any_executor_will_do() -> None:
 
 @pytest.mark.parametrize('count', [1, 2])
 def test_a_killed_worker_fails_what_it_was_doing_and_nothing_else(count: int) -> None:
-    with Lanes(count) as lanes:
+    with IsolatedProcessPool(count) as lanes:
         assert list(run(worker_tasks.deadly, ITEMS, lanes)) == KILLED
 
 
 def test_an_exception_is_the_failure_of_its_item() -> None:
-    with Lanes(1) as lanes:
+    with IsolatedProcessPool(1) as lanes:
         found = dict(run(worker_tasks.faulty, ITEMS[:4], lanes))
     assert found['r0'] == 0 and found['r3'] == 3
     assert found['r1'] == Failure('number: expected another than 1, got 1')
@@ -51,7 +51,7 @@ def test_an_exception_is_the_failure_of_its_item() -> None:
 
 
 def test_workers_work_at_the_same_time() -> None:
-    with Lanes(2) as lanes:
+    with IsolatedProcessPool(2) as lanes:
         assert len({pid for _, pid in run(worker_tasks.worker_pid, ITEMS[:4], lanes)}) == 2
 
 
@@ -79,7 +79,7 @@ def test_workers_end_with_a_parent_that_is_killed() -> None:
 
 
 def _interrupted() -> None:
-    with Lanes(1) as lanes:
+    with IsolatedProcessPool(1) as lanes:
         results = run(worker_tasks.sleepy, [('short', 0.0), ('long', 60.0), ('later', 60.0)], lanes)
         assert next(results) == ('short', 0.0)
         raise KeyboardInterrupt

@@ -12,8 +12,8 @@ from scenes import guess_left, one_class
 from foc_ros.core.config import FocConfig
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.qp import ReachingQP, clearance_qp, effort_cost
-from foc_ros.core.ocp.solve import forward
-from foc_ros.core.ocp.warm_start import cold, warm
+from foc_ros.core.ocp.solve import solve_problem
+from foc_ros.core.ocp.warm_start import cold_start, warm_start
 from foc_ros.core.ocp.working_set import WorkingSet, solve
 from foc_ros.core.types import Solution, Status
 
@@ -26,7 +26,7 @@ GAIN = 'peer / ours'
 
 def _solved(settings: FocConfig, problem: Problem | None = None) -> Solution:
     """Solve from the guess, the problem built anew: what it caches counts."""
-    return forward(one_class() if problem is None else problem, cold(GUESS), settings)
+    return solve_problem(one_class() if problem is None else problem, cold_start(GUESS), settings)
 
 
 def cold_vs_naive_piqp(quick: bool) -> Result:
@@ -103,7 +103,7 @@ def warm_vs_cold(quick: bool) -> Result:
 
     def next_tick() -> Solution:
         problem = replace(moved)
-        return forward(problem, warm(before, problem), LV)
+        return solve_problem(problem, warm_start(before, problem), LV)
 
     times = interleaved({'ours': next_tick, 'peer': lambda: _solved(LV, replace(moved))}, repetitions)
     warmed, fresh = next_tick(), _solved(LV, moved)

@@ -46,7 +46,7 @@ def replay(quick: bool) -> Result:
 
 def _same(one: Prediction, other: Prediction) -> bool:
     """Return whether two predictions have the same ways with the same paths."""
-    return len(one.outcomes) == len(other.outcomes) and all(
+    return len(one.candidates) == len(other.candidates) and all(
         a.candidate.label == b.candidate.label and np.array_equal(a.solution.mean, b.solution.mean)
-        for a, b in zip(one.outcomes, other.outcomes, strict=True)
+        for a, b in zip(one.candidates, other.candidates, strict=True)
     )

@@ -85,7 +85,7 @@ def _search(name: str, reach: Reach, what: str, target: Target, quick: bool) -> 
             searches.append(search.seconds)
             solves.append(solve.seconds)
     ours_ms, peer_ms = median_ms(searches), median_ms(solves)
-    complete = all(each.outcomes and 'search_cut' not in each.notes for each in ticking.predictions)
+    complete = all(each.candidates and 'search_cut' not in each.notes for each in ticking.predictions)
     return Result(
         name,
         f'the search of a warm tick, {what}, 4 classes',

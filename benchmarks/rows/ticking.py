@@ -50,13 +50,15 @@ class Ticking:
         last = self.predictions[-1]
         hand = next(hand for hand in self.reach.hands if hand.stamp_ns == last.stamp_ns)
         fresh, _ = predict(self.reach.config, hand, self.reach.obstacles, self.reach.goals, Memory())
-        paths = {outcome.candidate.label: outcome.solution.path for outcome in fresh.solved}
-        shared = [(each.solution.path, paths[each.candidate.label]) for each in last.solved if each.candidate.label in paths]
+        paths = {outcome.candidate.label: outcome.solution.path for outcome in fresh.solved_candidates}
+        shared = [
+            (each.solution.path, paths[each.candidate.label]) for each in last.solved_candidates if each.candidate.label in paths
+        ]
         return max((float(np.abs(warm - cold).max()) for warm, cold in shared), default=np.inf)
 
     def classes(self) -> str:
         """Return how many classes were solved, of how many, in the middle one of the ticks."""
-        solved = sorted((len(each.solved), len(each.outcomes)) for each in self.predictions)
+        solved = sorted((len(each.solved_candidates), len(each.candidates)) for each in self.predictions)
         return '{} of {}'.format(*solved[len(solved) // 2])
 
 

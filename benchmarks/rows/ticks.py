@@ -18,10 +18,10 @@ from foc_ros.core.candidates import solve_candidates
 from foc_ros.core.config import FocConfig
 from foc_ros.core.memory import Memory
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.ocp.solve import forward
-from foc_ros.core.ocp.warm_start import cold
+from foc_ros.core.ocp.solve import solve_problem
+from foc_ros.core.ocp.warm_start import cold_start
 from foc_ros.core.predictor import predict
-from foc_ros.core.types import Candidate, Outcome
+from foc_ros.core.types import Candidate, PredictedCandidate
 
 from .ticking import Ticking, alternating
 
@@ -53,7 +53,7 @@ def _against_ipopt(name: str, reach: Reach, what: str, target: Target, quick: bo
         began = time.perf_counter()
         peer.solve(start)
         solves.append(time.perf_counter() - began)
-    least = forward(problem, cold(candidate.guess), FocConfig(strategy='optimal')).effort
+    least = solve_problem(problem, cold_start(candidate.guess), FocConfig(strategy='optimal')).effort
     apart = ticking.far_from_cold()
     ours_ms, peer_ms = median_ms(ticks), median_ms(solves)
     return Result(
@@ -77,13 +77,13 @@ def _asked(reach: Reach) -> tuple[Candidate, Problem]:
     """Return the most likely class of the first tick and the problem that the predictor solves for it."""
     asked: dict[str, Problem] = {}
 
-    def listening(candidates: Sequence[Candidate], problems: Sequence[Problem], *rest: Any) -> list[Outcome]:
+    def listening(candidates: Sequence[Candidate], problems: Sequence[Problem], *rest: Any) -> list[PredictedCandidate]:
         asked.update({each.label: problem for each, problem in zip(candidates, problems, strict=True)})
         return solve_candidates(candidates, problems, *rest)
 
     with replaced(predictor, 'solve_candidates', listening):
         prediction, _ = predict(reach.config, reach.hands[0], reach.obstacles, reach.goals, Memory())
-    candidate = prediction.solved[0].candidate
+    candidate = prediction.solved_candidates[0].candidate
     return candidate, asked[candidate.label]
 
 
@@ -118,7 +118,7 @@ def steps_200(quick: bool) -> Result:
     tickings = {'coarse': Ticking(coarse), 'fine': Ticking(coarse.changed({'foc.steps': 200}))}
     times = alternating(tickings, 2 if quick else 30)
     coarse_ms, fine_ms = median_ms(times['coarse']), median_ms(times['fine'])
-    best = [tickings[name].predictions[-1].solved[0].solution.path for name in tickings]
+    best = [tickings[name].predictions[-1].solved_candidates[0].solution.path for name in tickings]
     apart = float(np.abs(best[0] - best[1][::4]).max())
     return Result(
         'steps_200',
@@ -138,5 +138,5 @@ def steps_200(quick: bool) -> Result:
 
 def _apart(one: Ticking, other: Ticking) -> float:
     """Return how far the paths of two last predictions are apart [m], class by class in the order of their likelihoods."""
-    pairs = zip(one.predictions[-1].solved, other.predictions[-1].solved, strict=True)
+    pairs = zip(one.predictions[-1].solved_candidates, other.predictions[-1].solved_candidates, strict=True)
     return max(float(np.abs(a.solution.path - b.solution.path).max()) for a, b in pairs)

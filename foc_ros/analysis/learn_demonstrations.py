@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from foc_ros.core.homotopy.demonstrations import Way, demonstrated, same
+from foc_ros.core.homotopy.demonstrations import Demonstration, is_same_demonstration, record_demonstration
 from foc_ros.core.obstacles.scene import Scene
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import Array
@@ -22,7 +22,7 @@ SHORTEST = 0.05
 class Learner:
     """Takes the steps of a replay. Attributes: ways, those known before and those learned; learned, how many are new."""
 
-    def __init__(self, pipeline: Pipeline, known: Sequence[Way]) -> None:
+    def __init__(self, pipeline: Pipeline, known: Sequence[Demonstration]) -> None:
         self.ways = list(known)
         self.learned = 0
         self._pipeline = pipeline
@@ -52,7 +52,7 @@ class Learner:
         if np.hypot(*np.diff(path, axis=0).T).sum() < SHORTEST or np.hypot(*(goals - path[-1]).T).min() > AT_GOAL:
             return
         goal = goals[int(np.hypot(*(goals - path[-1]).T).argmin())]
-        way = demonstrated(frame_id, np.vstack([path, goal]), self._scene.obstacles(self._stamp_ns))
-        if not any(same(way, known) for known in self.ways):
+        way = record_demonstration(frame_id, np.vstack([path, goal]), self._scene.obstacles(self._stamp_ns))
+        if not any(is_same_demonstration(way, known) for known in self.ways):
             self.ways.append(way)
             self.learned += 1

@@ -34,7 +34,7 @@ class Summary:
         self.samples += step.item.role == HAND
         if step.prediction is not None:
             self.predictions += 1
-            self.solved += bool(step.prediction.solved)
+            self.solved += bool(step.prediction.solved_candidates)
             self.seconds.append(step.prediction.solve_s)
 
     def answer(self, counts: Mapping[str, int], duration_s: float) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 from foc_ros.analysis.paper.numbers import as_json
-from foc_ros.analysis.paper.studies import COUNT, FULL, Grid, Studies, gathered, studies
+from foc_ros.analysis.paper.studies import COUNT, FULL, Grid, Studies, collect_studies, studies
 from foc_ros.analysis.paper.trends import Trend, trends
 from foc_ros.core.errors import InputError
 from foc_ros.io.terminal import show_table, track
@@ -41,7 +41,7 @@ def perform(output: Path, grid: Grid = FULL) -> Studies:
     try:
         output.mkdir(parents=True, exist_ok=True)
         (output / TABLE).write_text('', encoding='utf-8')
-        found = gathered(track(studies(grid), 'paper', COUNT))
+        found = collect_studies(track(studies(grid), 'paper', COUNT))
         figures.write(found, output, FORMATS)
         (output / NUMBERS).write_text(json.dumps(as_json(found), indent=1, allow_nan=False) + '\n', encoding='utf-8')
         (output / TABLE).write_text(markdown(trends(found)), encoding='utf-8')

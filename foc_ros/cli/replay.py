@@ -16,7 +16,7 @@ from foc_ros.analysis.learn_demonstrations import Learner
 from foc_ros.analysis.replay import Replay, Step
 from foc_ros.analysis.replay_summary import Summary, facts
 from foc_ros.core.errors import InputError
-from foc_ros.core.homotopy.demonstrations import Way
+from foc_ros.core.homotopy.demonstrations import Demonstration
 from foc_ros.core.types import HandSample
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
 from foc_ros.io.class_library import load_library, save_library
@@ -137,11 +137,11 @@ class Report:
 
     def __init__(self) -> None:
         from foc_ros.reporting import report  # noqa: F401 (a missing library is told before the work, not after it)
-        from foc_ros.reporting.snapshots import Moment, moment_of
+        from foc_ros.reporting.snapshots import Snapshot, snapshot_of_prediction
 
-        self._moment_of = moment_of
+        self._moment_of = snapshot_of_prediction
         self._samples: list[HandSample] = []
-        self._moments: list[Moment] = []
+        self._moments: list[Snapshot] = []
 
     def add(self, step: Step) -> None:
         """Keep one step."""
@@ -159,7 +159,7 @@ class Report:
         write_report(directory, title, track_of(self._samples), self._moments, words)
 
 
-def _known(file: Path) -> tuple[Way, ...]:
+def _known(file: Path) -> tuple[Demonstration, ...]:
     return load_library(str(file)) if file.exists() else ()
 
 

@@ -10,15 +10,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from foc_ros.core.candidates import ranked, solve_candidates
+from foc_ros.core.candidates import rank_candidates, solve_candidates
 from foc_ros.core.dynamics.replanning import triple_integrator_error_map
 from foc_ros.core.errors import InputError
 from foc_ros.core.estimation.duration import is_passing
 from foc_ros.core.homotopy import path_sides, search
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.predictor import reaching_problem
-from foc_ros.core.types import LEFT, Array, Candidate, Outcome
+from foc_ros.core.predictor import build_problem
+from foc_ros.core.types import LEFT, Array, Candidate, PredictedCandidate
 from foc_ros.io.json_output import candidate_answer, solution_account, table
 from foc_ros.io.scene_file import SceneFile, load_scene
 from foc_ros.io.terminal import show_table
@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(json.dumps({'candidates': answers}, allow_nan=False))
     else:
         _show(answers)
-    if any(outcome.solved for outcome in outcomes):
+    if any(outcome.is_solved for outcome in outcomes):
         return 0
     print(f'foc_ros solve: {_why_not(outcomes)}', file=sys.stderr)
     return 3
@@ -74,14 +74,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 def scene_problems(scene: SceneFile) -> list[Problem]:
     """Return the problem of every goal: noise per step as the file says; the start is as uncertain to the operator as to us."""
-    made = [reaching_problem(scene.config, scene.hand, scene.obstacles, goal, scene.duration_s) for goal in scene.goals]
+    made = [build_problem(scene.config, scene.hand, scene.obstacles, goal, scene.duration_s) for goal in scene.goals]
     steps = scene.config.foc.steps
     error_map = triple_integrator_error_map(scene.duration_s / steps, steps, is_passing(scene.config.duration))
     covariance = scene.hand.covariance
     return [replace(problem, noise=scene.noise, initial_covariance=covariance, error_map=error_map) for problem in made]
 
 
-def solve_scene(scene: SceneFile, problems: Sequence[Problem]) -> list[Outcome]:
+def solve_scene(scene: SceneFile, problems: Sequence[Problem]) -> list[PredictedCandidate]:
     """Solve the class of the guess, or those that are found; solved ones first, most likely first."""
     config = scene.config
     if scene.guess is not None:
@@ -92,7 +92,7 @@ def solve_scene(scene: SceneFile, problems: Sequence[Problem]) -> list[Outcome]:
             scene.hand.mean, scene.goals, scene.obstacles, config.homotopy, durations, config.foc.steps
         ).candidates
     outcomes = solve_candidates(candidates, [problems[each.goal] for each in candidates], config.foc, config.likelihood)
-    return ranked(outcomes, config.likelihood, scene.obstacles)
+    return rank_candidates(outcomes, config.likelihood, scene.obstacles)
 
 
 def _guessed(scene: SceneFile, guess: Array) -> Candidate:
@@ -101,7 +101,7 @@ def _guessed(scene: SceneFile, guess: Array) -> Candidate:
     return Candidate(label, 0, sides, guess, 0.0)
 
 
-def _answer(outcome: Outcome, problem: Problem, samples: int | None) -> dict[str, Any]:
+def _answer(outcome: PredictedCandidate, problem: Problem, samples: int | None) -> dict[str, Any]:
     solution = outcome.solution
     answer = candidate_answer(outcome)
     answer |= {'solve_ms': 1e3 * solution.solve_s, 'velocity': table(solution.mean[:, 2:4])} | solution_account(solution)
@@ -118,7 +118,7 @@ def _show(answers: Sequence[dict[str, Any]]) -> None:
     show_table(shown, rows)
 
 
-def _why_not(outcomes: Sequence[Outcome]) -> str:
+def _why_not(outcomes: Sequence[PredictedCandidate]) -> str:
     if not outcomes:
         return 'no way round was found between the start and any goal'
     return 'no candidate could be solved: ' + '; '.join(f'{each.candidate.label}: {each.solution.message}' for each in outcomes)

@@ -26,7 +26,7 @@ import numpy as np
 
 from .config import LikelihoodConfig
 from .errors import InputError
-from .homotopy.branch_times import Partings
+from .homotopy.branch_times import BranchTimes
 from .kernels import Vector, compiled
 from .types import Array
 
@@ -34,12 +34,12 @@ COST_FLOOR = 1e-9
 """Least cost told apart from none [m^2/s^5]: the effort of a reach of 1 um in 1 s, 720 D^2 / T^5 = 7e-10."""
 
 
-def shared_cost(effort_spent: float, config: LikelihoodConfig) -> float:
+def compute_shared_cost(effort_spent: float, config: LikelihoodConfig) -> float:
     """Return the part of the cost [m^2/s^5] that all classes share, of a movement that has taken effort_spent [m^2/s^5]."""
     return config.spent_share * effort_spent
 
 
-def likelihoods(costs: Array, config: LikelihoodConfig, partings: Partings | None = None) -> Array:
+def compute_likelihoods(costs: Array, config: LikelihoodConfig, partings: BranchTimes | None = None) -> Array:
     """Return the likelihoods (k,) of classes with costs (k,) >= 0 [m^2/s^5], summing to one; none for none.
 
     partings: of these classes, not asked for without a look-ahead. Costs below `COST_FLOOR` count as that. Computed from
@@ -71,7 +71,7 @@ def shares(logs: Vector) -> Vector:
     return weights
 
 
-def _looking_ahead(logs: Array, partings: Partings, lookahead_s: float) -> Array:
+def _looking_ahead(logs: Array, partings: BranchTimes, lookahead_s: float) -> Array:
     """Return u_W + log(J_i^-beta / V_W) of each class, (k,), from the logarithms of J_i^-beta."""
     numbers, way = np.unique(partings.way, return_inverse=True)
     worth = np.full(len(numbers), -np.inf)
@@ -88,7 +88,7 @@ def _looking_ahead(logs: Array, partings: Partings, lookahead_s: float) -> Array
     return weighed
 
 
-def most_likely(likelihoods: Mapping[str, float], previous: str | None, margin: float) -> str | None:
+def select_most_likely(likelihoods: Mapping[str, float], previous: str | None, margin: float) -> str | None:
     """Return the label of the most likely class, which stays `previous` until another leads by more than `margin`.
 
     likelihoods: by label. Of equally likely ones the label first in the alphabet holds, whatever the order of the input. None

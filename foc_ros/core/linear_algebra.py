@@ -8,7 +8,7 @@ from .kernels import Matrix, Vector, compiled
 
 
 @compiled
-def row_products(a: Matrix, b: Matrix) -> Matrix:
+def multiply_transposed(a: Matrix, b: Matrix) -> Matrix:
     """Return a b', (m, n), for rows a (m, q) and b (n, q)."""
     m, n, q = a.shape[0], b.shape[0], a.shape[1]
     product = np.empty((m, n))
@@ -22,7 +22,7 @@ def row_products(a: Matrix, b: Matrix) -> Matrix:
 
 
 @compiled
-def combined(weights: Matrix, rows: Matrix) -> Matrix:
+def multiply(weights: Matrix, rows: Matrix) -> Matrix:
     """Return weights @ rows, (m, q), for weights (m, n) and rows (n, q)."""
     m, n, q = weights.shape[0], rows.shape[0], rows.shape[1]
     total = np.zeros((m, q))
@@ -35,7 +35,7 @@ def combined(weights: Matrix, rows: Matrix) -> Matrix:
 
 
 @compiled
-def values(matrix: Matrix, vector: Vector) -> Vector:
+def multiply_vector(matrix: Matrix, vector: Vector) -> Vector:
     """Return matrix @ vector, (m,)."""
     m, q = matrix.shape
     product = np.empty(m)
@@ -48,7 +48,7 @@ def values(matrix: Matrix, vector: Vector) -> Vector:
 
 
 @compiled
-def cholesky(matrix: Matrix, floor: float) -> Matrix:
+def factorise_cholesky(matrix: Matrix, floor: float) -> Matrix:
     """Return the lower L with L L' = matrix (n, n), every squared pivot at least the floor.
 
     With floor 0, a matrix that is not positive definite gives a NaN.
@@ -70,7 +70,7 @@ def cholesky(matrix: Matrix, floor: float) -> Matrix:
 
 
 @compiled
-def lower_solved(factor: Matrix, right: Matrix) -> Matrix:
+def solve_lower(factor: Matrix, right: Matrix) -> Matrix:
     """Return L^-1 right, (n, q), for a lower L (n, n)."""
     n, q = right.shape
     solved = right.copy()
@@ -85,7 +85,7 @@ def lower_solved(factor: Matrix, right: Matrix) -> Matrix:
 
 
 @compiled
-def upper_solved(factor: Matrix, right: Vector) -> Vector:
+def solve_lower_transposed(factor: Matrix, right: Vector) -> Vector:
     """Return L'^-1 right, (n,), for a lower L (n, n)."""
     n = right.shape[0]
     solved = right.copy()

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from .candidates import NOTHING, Earlier
-from .types import NANOSECONDS, Candidate, Outcome, Prediction, Solution, Status
+from .candidates import NOTHING, EarlierSolutions
+from .types import NANOSECONDS, Candidate, PredictedCandidate, Prediction, Solution, Status
 
-RETRY = 10
+RETRY_AFTER = 10
 """Predictions for which a way that is out of reach, or slid into another class, is only followed."""
 
 
@@ -22,11 +22,11 @@ class Memory:
 
     most_likely: str | None = None
     candidates: tuple[Candidate, ...] = ()
-    earlier: Earlier = NOTHING
+    earlier: EarlierSolutions = NOTHING
     solved_ns: Mapping[str, int] = field(default_factory=dict)
     followed: Mapping[str, int] = field(default_factory=dict)
 
-    def known(self, candidates: Sequence[Candidate]) -> Earlier:
+    def known(self, candidates: Sequence[Candidate]) -> EarlierSolutions:
         """Return what is known of ways by their labels, or by the names that they had before.
 
         A name changes, and those of all ways at once, where an obstacle is passed or comes into reach. A way that passes
@@ -43,9 +43,9 @@ class Memory:
                 if same is not None:
                     solutions[candidate.label] = solutions[same.label]
                     likelihoods[candidate.label] = likelihoods.get(same.label, 0.0)
-        return Earlier(solutions, likelihoods)
+        return EarlierSolutions(solutions, likelihoods)
 
-    def after(self, prediction: Prediction, candidates: tuple[Candidate, ...], tried: Sequence[Outcome]) -> Memory:
+    def after(self, prediction: Prediction, candidates: tuple[Candidate, ...], tried: Sequence[PredictedCandidate]) -> Memory:
         """Keep what the next prediction can start from.
 
         A way that had no time keeps what it had, or begins where it was stopped. One that is out of reach, or slid into another
@@ -60,15 +60,15 @@ class Memory:
                 solutions[label] = last[label]
             elif status is Status.SOLVED or _stopped(outcome.solution):
                 solutions[label] = outcome.solution
-            elif status in (Status.ETA_UNREACHABLE, Status.LEFT_CLASS) and self.followed.get(label, 0) < RETRY:
+            elif status in (Status.ETA_UNREACHABLE, Status.LEFT_CLASS) and self.followed.get(label, 0) < RETRY_AFTER:
                 solutions[label], followed[label] = outcome.solution, self.followed.get(label, 0) + 1
-        likelihoods = {outcome.candidate.label: outcome.likelihood for outcome in prediction.outcomes}
+        likelihoods = {outcome.candidate.label: outcome.likelihood for outcome in prediction.candidates}
         solved = {one.label: self.solved_ns[one.label] for one in candidates if one.label in self.solved_ns}
-        for outcome in prediction.solved:
+        for outcome in prediction.solved_candidates:
             solved[outcome.candidate.label] = prediction.stamp_ns
-        return Memory(prediction.most_likely, candidates, Earlier(solutions, likelihoods), solved, followed)
+        return Memory(prediction.most_likely, candidates, EarlierSolutions(solutions, likelihoods), solved, followed)
 
-    def aged(self, outcome: Outcome, stamp_ns: int) -> Outcome:
+    def aged(self, outcome: PredictedCandidate, stamp_ns: int) -> PredictedCandidate:
         """Say of a way that had no time when it was last solved: how likely it is, nobody knows."""
         if outcome.solution.status is not Status.DEADLINE:
             return outcome

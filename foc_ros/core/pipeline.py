@@ -9,16 +9,16 @@ from collections.abc import Sequence
 
 from .config import Config
 from .errors import FocError
-from .estimation.kalman_filter import Track, update
-from .homotopy.demonstrations import Way
+from .estimation.kalman_filter import FilterState, update
+from .homotopy.demonstrations import Demonstration
 from .memory import Memory
-from .obstacles.scene import Part, Scene
+from .obstacles.scene import ObstacleSource, Scene
 from .predictor import predict
-from .rejections import Refusals
-from .sample_status import Verdict
+from .rejections import Rejections
+from .sample_status import SampleStatus
 from .types import NANOSECONDS, Array, HandSample, Obstacles, Prediction
 
-__all__ = ['Pipeline', 'Verdict']
+__all__ = ['Pipeline', 'SampleStatus']
 
 
 class Pipeline:
@@ -30,14 +30,14 @@ class Pipeline:
     parameter or the first hand sample fixes it.
     """
 
-    def __init__(self, config: Config, library: Sequence[Way] = ()) -> None:
+    def __init__(self, config: Config, library: Sequence[Demonstration] = ()) -> None:
         self.config = config
         self._library = tuple(library)
-        self.hand_state: Track | None = None
+        self.hand_state: FilterState | None = None
         self.scene = Scene()
         self.engaged = True
         self.frame_id = config.frame_id or None
-        self._refusals = Refusals()
+        self._refusals = Rejections()
         self._memory = Memory()
         self._fresh = False
         self._tried = False
@@ -66,10 +66,10 @@ class Pipeline:
         period_ns = int(NANOSECONDS / self.config.rate_hz)
         return self._predicted_ns is None or self.hand_state.stamp_ns - self._predicted_ns >= period_ns
 
-    def hand(self, sample: HandSample) -> Verdict:
+    def hand(self, sample: HandSample) -> SampleStatus:
         """Take a hand sample. The first one fixes the working frame where the parameter leaves it open."""
         if not self._refusals.in_frame('hand_wrong_frame', 'hand_pose', sample.frame_id, self.frame_id):
-            return Verdict.WRONG_FRAME
+            return SampleStatus.WRONG_FRAME
         before, superseded = self.hand_state, self.due and not self._tried and self.blocked() is None
         answer = update(before, sample, self.config.estimator)
         if not answer.verdict.taken:
@@ -86,39 +86,39 @@ class Pipeline:
             self._forget_predictions()
         if not self.engaged:
             self._refusals.refuse('hand_disengaged', 'hand_pose: disengaged, nothing is predicted')
-            return Verdict.DISENGAGED
+            return SampleStatus.DISENGAGED
         return answer.verdict
 
-    def set_obstacles(self, source: str, obstacles: Obstacles, stamp_ns: int | None, frame_id: str) -> Verdict:
+    def set_obstacles(self, source: str, obstacles: Obstacles, stamp_ns: int | None, frame_id: str) -> SampleStatus:
         """Replace what one source ('cloud' or 'markers') says; stamp 0 or None: not judged by age, not moved on.
 
         A table late by no more than `estimator.gap_s` does not replace a newer one of the same source.
         """
         if not self._refusals.in_frame('obstacles_wrong_frame', source, frame_id, self.frame_id):
-            return Verdict.WRONG_FRAME
+            return SampleStatus.WRONG_FRAME
         held = self.scene.parts.get(source)
         newest_ns = held.stamp_ns if held is not None else None
         if stamp_ns and newest_ns and 0 < newest_ns - stamp_ns <= self.config.estimator.gap_s * NANOSECONDS:
             self._refusals.behind('obstacles_late', source, stamp_ns, newest_ns)
-            return Verdict.LATE
-        self.scene = self.scene.with_part(source, Part(obstacles, stamp_ns or None, frame_id))
-        return Verdict.ACCEPTED
+            return SampleStatus.LATE
+        self.scene = self.scene.with_part(source, ObstacleSource(obstacles, stamp_ns or None, frame_id))
+        return SampleStatus.ACCEPTED
 
-    def set_goals(self, goals: Array, frame_id: str) -> Verdict:
+    def set_goals(self, goals: Array, frame_id: str) -> SampleStatus:
         """Replace all goals, (g, 2) [m]; none is a way to take them back."""
         if not self._refusals.in_frame('goals_wrong_frame', 'goals', frame_id, self.frame_id):
-            return Verdict.WRONG_FRAME
+            return SampleStatus.WRONG_FRAME
         self.scene = self.scene.with_goals(goals, frame_id)
-        return Verdict.ACCEPTED
+        return SampleStatus.ACCEPTED
 
     def predict(self) -> Prediction | None:
         """Predict from the newest hand sample; None, counted and explained in `last_refusal`, where that cannot be done."""
         self._tried = True
-        obstruction = self._obstruction()
-        if obstruction is None and not self.due:
-            obstruction = ('not_due', 'no hand pose since the last prediction that is 1/rate_hz after it')
-        if obstruction is not None:
-            self._refusals.refuse(f'predict_{obstruction[0]}', obstruction[1])
+        not_ready_reason = self._not_ready_reason()
+        if not_ready_reason is None and not self.due:
+            not_ready_reason = ('not_due', 'no hand pose since the last prediction that is 1/rate_hz after it')
+        if not_ready_reason is not None:
+            self._refusals.refuse(f'predict_{not_ready_reason[0]}', not_ready_reason[1])
             return None
         assert self.hand_state is not None
         assert self.scene.goals is not None
@@ -131,17 +131,17 @@ class Pipeline:
         except FocError as error:
             self._refusals.refuse('predict_failed', str(error))
             return None
-        for outcome in prediction.outcomes:
-            if not outcome.solved:
+        for outcome in prediction.candidates:
+            if not outcome.is_solved:
                 self._refusals.count(f'candidate_{outcome.solution.status.value}')
-        if not prediction.solved:
+        if not prediction.solved_candidates:
             self._refusals.count('predict_nothing_solved')
         return prediction
 
     def blocked(self) -> str | None:
         """Return why nothing can be predicted now, in words with numbers; None where it can."""
-        obstruction = self._obstruction()
-        return None if obstruction is None else obstruction[1]
+        not_ready_reason = self._not_ready_reason()
+        return None if not_ready_reason is None else not_ready_reason[1]
 
     def engage(self, on: bool) -> None:
         """Close or open the clutch: while disengaged the hand is followed, but nothing is predicted."""
@@ -166,12 +166,12 @@ class Pipeline:
         self.config = config
         self._memory = Memory(self._memory.most_likely)
 
-    def _obstruction(self) -> tuple[str, str] | None:
+    def _not_ready_reason(self) -> tuple[str, str] | None:
         if not self.engaged:
             return 'disengaged', 'disengaged'
         if self.hand_state is None:
             return 'no_hand', 'no hand pose yet'
-        return self.scene.obstruction(self.hand_state.stamp_ns, self.config.scene.timeout_s)
+        return self.scene.not_ready_reason(self.hand_state.stamp_ns, self.config.scene.timeout_s)
 
     def _forget_predictions(self) -> None:
         self._memory, self._predicted_ns = Memory(), None

@@ -8,7 +8,7 @@ from .errors import InputError
 from .types import NANOSECONDS
 
 
-class Refusals:
+class Rejections:
     """Attributes: counts, by kind; refused, how many refusals; last, the text of the last one, None before the first."""
 
     def __init__(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 
 
-class Verdict(StrEnum):
+class SampleStatus(StrEnum):
     """One word for every message taken or refused.
 
     ACCEPTED: taken. RESTARTED_BACKWARD, RESTARTED_GAP: taken, and the movement starts anew from it. DISENGAGED: the hand was
@@ -28,7 +28,7 @@ class Verdict(StrEnum):
     @property
     def restarted(self) -> bool:
         """Whether the movement starts anew from this message."""
-        return self in (Verdict.RESTARTED_BACKWARD, Verdict.RESTARTED_GAP)
+        return self in (SampleStatus.RESTARTED_BACKWARD, SampleStatus.RESTARTED_GAP)
 
 
-REFUSALS = frozenset({Verdict.DUPLICATE, Verdict.LATE, Verdict.WRONG_FRAME})
+REFUSALS = frozenset({SampleStatus.DUPLICATE, SampleStatus.LATE, SampleStatus.WRONG_FRAME})

@@ -18,7 +18,7 @@ LEFT, RIGHT = 1, -1
 """Side on which a path passes an obstacle, seen in the direction of travel."""
 
 
-def fixed(array: Array) -> Array:
+def as_readonly(array: Array) -> Array:
     """Make an array that nobody else holds read-only, so that a record takes it as it is, without a copy."""
     array.setflags(write=False)
     return array
@@ -31,7 +31,7 @@ class Record:
         held = vars(self)
         for name, value in held.items():
             if isinstance(value, np.ndarray) and ((flags := value.flags).writeable or not flags.c_contiguous):
-                held[name] = fixed(value.copy())
+                held[name] = as_readonly(value.copy())
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,7 +203,7 @@ class Solution(Record):
     def with_covariance(self, covariance: Array) -> Solution:
         """Return the solution with another covariance (N + 1, n, n), fresh: `dataclasses.replace` at a tenth of the time."""
         other = object.__new__(Solution)
-        vars(other).update(vars(self), covariance=fixed(covariance))
+        vars(other).update(vars(self), covariance=as_readonly(covariance))
         return other
 
     @property
@@ -218,7 +218,7 @@ class Solution(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class PredictedCandidate:
     """One candidate with its solution; sides: side of every obstacle its path really passes, by id.
 
     cost: effort to go, what its time costs, and what all classes share, as effort spent since onset [m^2/s^5]; likelihood in
@@ -232,7 +232,7 @@ class Outcome:
     likelihood: float
 
     @property
-    def solved(self) -> bool:
+    def is_solved(self) -> bool:
         """Whether this outcome takes part in the likelihood."""
         return self.solution.status is Status.SOLVED
 
@@ -249,12 +249,12 @@ class Prediction:
     stamp_ns: int
     frame_id: str
     height: float
-    outcomes: tuple[Outcome, ...]
+    candidates: tuple[PredictedCandidate, ...]
     most_likely: str | None
     notes: dict[str, int] = field(default_factory=dict)
     solve_s: float = 0.0
 
     @property
-    def solved(self) -> tuple[Outcome, ...]:
+    def solved_candidates(self) -> tuple[PredictedCandidate, ...]:
         """The outcomes that meet the wanted eta, most likely first."""
-        return tuple(outcome for outcome in self.outcomes if outcome.solved)
+        return tuple(outcome for outcome in self.candidates if outcome.is_solved)

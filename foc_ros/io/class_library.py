@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.errors import InputError, RecordingError
-from foc_ros.core.homotopy.demonstrations import POINTS, Way
+from foc_ros.core.homotopy.demonstrations import POINTS, Demonstration
 from foc_ros.core.types import LEFT, RIGHT, Array
 
 from .documents import read_document
@@ -21,7 +21,7 @@ FARTHEST = 1e6
 """Greatest coordinate [m]."""
 
 
-def load_library(name: str) -> tuple[Way, ...]:
+def load_library(name: str) -> tuple[Demonstration, ...]:
     """Return the ways of a library file, none for an empty name.
 
     Raises RecordingError where it cannot be read, InputError naming field, value and bound where it is no library.
@@ -36,7 +36,7 @@ def load_library(name: str) -> tuple[Way, ...]:
     return tuple(_way(f'{name}: ways[{k}]', way) for k, way in enumerate(ways))
 
 
-def save_library(file: Path, ways: Sequence[Way]) -> None:
+def save_library(file: Path, ways: Sequence[Demonstration]) -> None:
     """Write a library in place of what the file held.
 
     Raises RecordingError where it cannot be written, InputError for too many ways.
@@ -53,7 +53,7 @@ def save_library(file: Path, ways: Sequence[Way]) -> None:
         raise RecordingError(f'{file}: cannot be written: {error.strerror}') from error
 
 
-def _plain(way: Way) -> dict[str, Any]:
+def _plain(way: Demonstration) -> dict[str, Any]:
     sides = {side: word for word, side in SIDES.items()}
     passed = [
         {'id': identity, 'x': x, 'y': y, 'side': sides[side]}
@@ -62,7 +62,7 @@ def _plain(way: Way) -> dict[str, Any]:
     return {'frame_id': way.frame_id, 'passed': passed, 'path': way.path.tolist()}
 
 
-def _way(field: str, way: object) -> Way:
+def _way(field: str, way: object) -> Demonstration:
     if not isinstance(way, Mapping) or set(way) != {'frame_id', 'passed', 'path'}:
         raise InputError(field, 'frame_id, passed and path', _short(way))
     frame_id, passed, path = way['frame_id'], way['passed'], way['path']
@@ -78,7 +78,7 @@ def _way(field: str, way: object) -> Way:
         raise InputError(f'{field}.passed', 'each obstacle once', _short(ids))
     points = np.array([_point(f'{field}.path[{k}]', point) for k, point in enumerate(path)])
     centre: Array = np.array([point for _, point, _ in rows], dtype=float).reshape(-1, 2)
-    return Way(frame_id, ids, tuple(side for _, _, side in rows), centre, points)
+    return Demonstration(frame_id, ids, tuple(side for _, _, side in rows), centre, points)
 
 
 def _passed(field: str, row: object) -> tuple[str, tuple[float, float], int]:

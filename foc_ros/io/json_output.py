@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.types import LEFT, Array, Outcome, Prediction, Solution
+from foc_ros.core.types import LEFT, Array, PredictedCandidate, Prediction, Solution
 
 
-def candidate_answer(outcome: Outcome) -> dict[str, Any]:
+def candidate_answer(outcome: PredictedCandidate) -> dict[str, Any]:
     """Return one candidate: which way round, how it ended, its costs, and mean and standard deviation of the path.
 
     goal: position of its goal in the list of goals; effort [m^2/s^6], cost [m^2/s^5], tau [m^2]; mean (N + 1, 2) and stddev
@@ -68,7 +68,7 @@ def _place(place: tuple[str, float] | None) -> dict[str, Any] | None:
 
 def prediction_answer(prediction: Prediction) -> dict[str, Any]:
     """Return one prediction with all its candidates: the most likely first, as in the messages; those not solved last."""
-    outcomes = sorted(prediction.outcomes, key=lambda outcome: outcome.candidate.label != prediction.most_likely)
+    outcomes = sorted(prediction.candidates, key=lambda outcome: outcome.candidate.label != prediction.most_likely)
     return {
         'stamp_ns': prediction.stamp_ns,
         'most_likely': prediction.most_likely,

@@ -15,7 +15,7 @@ import numpy as np
 from foc_ros.core.errors import FocError
 from foc_ros.core.types import NANOSECONDS, Array, Obstacles
 
-from .snapshots import Moment, Track, Way
+from .snapshots import CandidateView, Snapshot, Track
 
 try:
     import matplotlib as mpl
@@ -89,7 +89,7 @@ def draw_movement(axes: Any, positions: Array, number: int) -> None:
     tag(axes, positions[len(positions) * (2 + number % 2) // 6], str(number + 1), colour)
 
 
-def draw_ways(axes: Any, ways: Sequence[Way], numbers: Mapping[str, int]) -> None:
+def draw_ways(axes: Any, ways: Sequence[CandidateView], numbers: Mapping[str, int]) -> None:
     """Draw ways, the most likely on top, coloured by likelihood, with ellipses of one standard deviation of the position."""
     for rank, way in reversed(list(enumerate(ways))):
         colour = LIKELIHOOD_COLOURS(LIKELIHOOD_SCALE(way.likelihood))
@@ -112,7 +112,7 @@ def draw_hand(axes: Any, track: Track, now_ns: int, span: tuple[int, int]) -> No
 
 
 def draw_likelihoods(
-    axes: Any, moments: Sequence[Moment], lines: Sequence[Mapping[str, int]], letters: Mapping[int, int], origin_ns: int
+    axes: Any, moments: Sequence[Snapshot], lines: Sequence[Mapping[str, int]], letters: Mapping[int, int], origin_ns: int
 ) -> None:
     """Draw the likelihood of ways over time; one that is no candidate for a while leaves a gap.
 
@@ -132,7 +132,7 @@ def draw_likelihoods(
     axes.tick_params(labelbottom=False)
 
 
-def draw_speeds(axes: Any, track: Track, moment: Moment, span: tuple[int, int], origin_ns: int) -> None:
+def draw_speeds(axes: Any, track: Track, moment: Snapshot, span: tuple[int, int], origin_ns: int) -> None:
     """Draw the measured speed over a movement and, from the moment on, the predicted ones, coloured by likelihood."""
     rows = track.between(*span)
     times = (track.stamps_ns[rows] - origin_ns) / NANOSECONDS
@@ -146,7 +146,7 @@ def draw_speeds(axes: Any, track: Track, moment: Moment, span: tuple[int, int], 
     axes.set_ylim(bottom=0.0)
 
 
-def draw_legend(axes: Any, ways: Sequence[Way], numbers: Mapping[str, int]) -> None:
+def draw_legend(axes: Any, ways: Sequence[CandidateView], numbers: Mapping[str, int]) -> None:
     """Write the letter, likelihood and label of every way."""
     axes.axis('off')
     if not ways:

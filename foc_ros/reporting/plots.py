@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from foc_ros.core.errors import InputError
-from foc_ros.core.types import NANOSECONDS, Array, Obstacles, Outcome
+from foc_ros.core.types import NANOSECONDS, Array, Obstacles, PredictedCandidate
 
 from .drawing import (
     CLASSES,
@@ -26,7 +26,7 @@ from .drawing import (
     draw_ways,
     new_figure,
 )
-from .snapshots import Moment, Track, Way, ways_of
+from .snapshots import CandidateView, Snapshot, Track, candidate_views
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,16 +36,16 @@ LINE_IN = 0.2
 """Height of a line of the legend [in]."""
 
 
-def plot_outcomes(file: Path | str, obstacles: Obstacles, goals: Array, outcomes: Sequence[Outcome]) -> None:
+def plot_outcomes(file: Path | str, obstacles: Obstacles, goals: Array, outcomes: Sequence[PredictedCandidate]) -> None:
     """Write a picture of the solved outcomes in their scene, in the format that the file's suffix says.
 
     goals (g, 2) [m]. Raises InputError where the file's suffix is no picture format or it cannot be written.
     """
-    ways = ways_of(outcomes)
+    ways = candidate_views(outcomes)
     save(scene_figure(obstacles, goals, ways, bounds_of(obstacles, goals, ways)), file)
 
 
-def scene_figure(obstacles: Obstacles, goals: Array, ways: Sequence[Way], bounds: Bounds) -> Figure:
+def scene_figure(obstacles: Obstacles, goals: Array, ways: Sequence[CandidateView], bounds: Bounds) -> Figure:
     """Return a figure of one scene: obstacles, goals, ways coloured by likelihood; letters and a legend name them."""
     numbers = _numbered([way.label for way in ways])
     heights = [_scene_height(bounds), LINE_IN * max(1, len(ways))]
@@ -73,12 +73,12 @@ def track_figure(track: Track, obstacles: Obstacles, goals: Array, spans: Sequen
 class Around:
     """The predictions of one movement; lines: number of the line of each way of each, by label; letters: number by line."""
 
-    moments: tuple[Moment, ...]
+    moments: tuple[Snapshot, ...]
     lines: tuple[Mapping[str, int], ...]
     letters: Mapping[int, int]
 
 
-def moment_figure(track: Track, moment: Moment, around: Around, span: tuple[int, int], bounds: Bounds) -> Figure:
+def moment_figure(track: Track, moment: Snapshot, around: Around, span: tuple[int, int], bounds: Bounds) -> Figure:
     """Return one movement at one moment: scene above, then likelihoods and speeds over the whole movement.
 
     around: the predictions during the movement, the moment among them; span: its start and end [ns].
@@ -104,7 +104,7 @@ def moment_figure(track: Track, moment: Moment, around: Around, span: tuple[int,
     return figure
 
 
-def bounds_of(obstacles: Obstacles, goals: Array, ways: Sequence[Way], *points: Array) -> Bounds:
+def bounds_of(obstacles: Obstacles, goals: Array, ways: Sequence[CandidateView], *points: Array) -> Bounds:
     """Return x and y limits [m] that hold obstacles, goals, ways with their ellipses, and other points (m, 2), with a margin."""
     reach = (obstacles.radius + STDDEVS * obstacles.radius_stddev)[:, None]
     spread = [(way.path, STDDEVS * np.sqrt(np.diagonal(way.covariance, axis1=1, axis2=2))) for way in ways]

@@ -12,7 +12,7 @@ from foc_ros.ros.messages.inputs import stamp_of
 from foc_ros.ros.messages.outputs import CLOUD_ROW, LIKELIHOOD_COLUMNS
 from foc_ros.ros.messages.plane import project
 
-from .snapshots import Moment, Way
+from .snapshots import CandidateView, Snapshot
 
 
 def belong_together(cloud: Any, likelihoods: Any) -> bool:
@@ -22,7 +22,7 @@ def belong_together(cloud: Any, likelihoods: Any) -> bool:
     return np.array_equal(table['likelihood'][first], rows[:, 0].astype(np.float32))
 
 
-def moment_of_messages(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles, goals: Array) -> Moment:
+def snapshot_of_messages(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles, goals: Array) -> Snapshot:
     """Return what `~/prediction` and `~/likelihoods` of one hand sample say; obstacles and goals are those at its stamp.
 
     Raises MessageError where the two do not belong together.
@@ -34,10 +34,10 @@ def moment_of_messages(cloud: Any, likelihoods: Any, plane: str, obstacles: Obst
     ways = tuple(
         _way(label, row, table[table['candidate'] == i], plane) for i, (label, row) in enumerate(zip(labels, rows, strict=True))
     )
-    return Moment(stamp_of(cloud.header), obstacles, goals, ways, ways[0].label if ways else None)
+    return Snapshot(stamp_of(cloud.header), obstacles, goals, ways, ways[0].label if ways else None)
 
 
-def _way(label: str, row: Array, samples: Any, plane: str) -> Way:
+def _way(label: str, row: Array, samples: Any, plane: str) -> CandidateView:
     likelihood, effort, cost_ratio, eta = (float(value) for value in row)
     path, _ = project(_columns(samples, 'x y z'), plane)
     velocity, _ = project(_columns(samples, 'vx vy vz'), plane)
@@ -45,7 +45,7 @@ def _way(label: str, row: Array, samples: Any, plane: str) -> Way:
     half, _ = project(space, plane)
     covariance, _ = project(half.swapaxes(1, 2), plane)
     times = samples['t'].astype(float)
-    return Way(label, likelihood, effort, cost_ratio, eta, times, path, np.linalg.norm(velocity, axis=1), covariance)
+    return CandidateView(label, likelihood, effort, cost_ratio, eta, times, path, np.linalg.norm(velocity, axis=1), covariance)
 
 
 def _columns(samples: Any, names: str) -> Array:

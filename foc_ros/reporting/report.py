@@ -17,8 +17,8 @@ from . import plots
 from .drawing import CLASS_COLOURS, CLASSES
 from .report_data import page_data, rounded
 from .report_page import report_page
-from .snapshots import Moment, Track, movements
-from .track_association import lineages, slots
+from .snapshots import Snapshot, Track, movements
+from .track_association import associate_tracks, slots
 
 MOST_PICTURES = 8
 FRACTIONS_OF_ONE = (0.1, 0.3, 0.5, 0.7)
@@ -28,7 +28,9 @@ ONSET_SPEED = 0.05
 """Speed [m/s] above which the pictures take the hand to be moving."""
 
 
-def write_report(directory: Path, title: str, track: Track, moments: Sequence[Moment], summary: Mapping[str, str]) -> list[Path]:
+def write_report(
+    directory: Path, title: str, track: Track, moments: Sequence[Snapshot], summary: Mapping[str, str]
+) -> list[Path]:
     """Write index.html (which needs nothing else), predictions.json and pictures; return the files.
 
     track: the measured hand; moments: the predictions in order; summary: facts to put on top, in words. Files of those names are
@@ -49,12 +51,12 @@ def write_report(directory: Path, title: str, track: Track, moments: Sequence[Mo
     return [page, numbers, *pictures]
 
 
-def _write_pictures(directory: Path, track: Track, moments: Sequence[Moment], spans: Sequence[tuple[int, int]]) -> list[Path]:
+def _write_pictures(directory: Path, track: Track, moments: Sequence[Snapshot], spans: Sequence[tuple[int, int]]) -> list[Path]:
     """Return the files, the overview first."""
     shown = [moment for moment in moments if moment.ways]
     if not shown:
         return []
-    lines = lineages(moments)
+    lines = associate_tracks(moments)
     letters = slots(moments, lines, CLASSES, len(CLASS_COLOURS))
     chosen = _chosen(shown, spans)
     ways = [way for _, moment in chosen for way in moment.ways]
@@ -71,7 +73,7 @@ def _write_pictures(directory: Path, track: Track, moments: Sequence[Moment], sp
     return files
 
 
-def _chosen(shown: Sequence[Moment], spans: Sequence[tuple[int, int]]) -> list[tuple[int, Moment]]:
+def _chosen(shown: Sequence[Snapshot], spans: Sequence[tuple[int, int]]) -> list[tuple[int, Snapshot]]:
     """Return the moments that get a picture, each with the number of its movement."""
     numbers = np.unique(np.linspace(0, len(spans) - 1, min(len(spans), MOST_PICTURES)).round().astype(int))
     wanted = [
@@ -87,7 +89,7 @@ def _chosen(shown: Sequence[Moment], spans: Sequence[tuple[int, int]]) -> list[t
     return [(number, shown[row]) for row, number in chosen.items()]
 
 
-def _facts(moments: Sequence[Moment]) -> dict[str, str]:
+def _facts(moments: Sequence[Snapshot]) -> dict[str, str]:
     solve_ms = [1e3 * moment.solve_s for moment in moments if moment.solve_s is not None]
     facts = {'predictions': str(len(moments)), 'candidates solved': str(sum(len(moment.ways) for moment in moments))}
     if solve_ms:
@@ -96,7 +98,7 @@ def _facts(moments: Sequence[Moment]) -> dict[str, str]:
     return facts
 
 
-def _warnings(moments: Sequence[Moment]) -> list[str]:
+def _warnings(moments: Sequence[Snapshot]) -> list[str]:
     empty = sum(not moment.ways for moment in moments)
     statuses = Counter(status for moment in moments for _, status in moment.unsolved)
     warnings = [] if moments else ['There is no prediction.']
@@ -105,7 +107,7 @@ def _warnings(moments: Sequence[Moment]) -> list[str]:
     return warnings
 
 
-def _numbers(title: str, track: Track, moments: Sequence[Moment], summary: Mapping[str, str]) -> dict[str, Any]:
+def _numbers(title: str, track: Track, moments: Sequence[Snapshot], summary: Mapping[str, str]) -> dict[str, Any]:
     return {
         'title': title,
         'summary': {**_facts(moments), **summary},

@@ -15,8 +15,8 @@ import numpy as np
 from foc_ros.core.types import NANOSECONDS, Array
 
 from .drawing import CLASS_COLOURS, CLASSES
-from .snapshots import Moment, Track, Way
-from .track_association import lineages, slots
+from .snapshots import CandidateView, Snapshot, Track
+from .track_association import associate_tracks, slots
 
 LENGTH, SPEED = 1e-4, 1e-3
 """Units [m], [m/s]."""
@@ -47,14 +47,14 @@ class Rows(Generic[Kept]):
         return list(self._rows)
 
 
-def page_data(track: Track, moments: Sequence[Moment], spans: Sequence[tuple[int, int]]) -> dict[str, Any]:
+def page_data(track: Track, moments: Sequence[Snapshot], spans: Sequence[tuple[int, int]]) -> dict[str, Any]:
     """Return what the page draws; spans: start and end [ns] of the movements.
 
     times [s] from the first hand sample on, of every prediction, with its solve_ms and the likelihoods of every line: a way as
     it goes on from one prediction to the next, `first` and `share` of it, and the `slot` that gives letter and colour.
     """
     origin_ns = int(track.stamps_ns[0])
-    lines = lineages(moments)
+    lines = associate_tracks(moments)
     scenes, goals, labels = Rows[str](), Rows[str](), Rows[str]()
     shown = evenly(len(moments), MOST_SHOWN)
     frames = [_frame(row, moments[row], lines[row], scenes, goals, labels) for row in shown.tolist()]
@@ -85,7 +85,7 @@ def evenly(count: int, most: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
 
 
 def _frame(
-    row: int, moment: Moment, numbers: Mapping[str, int], scenes: Rows[str], goals: Rows[str], labels: Rows[str]
+    row: int, moment: Snapshot, numbers: Mapping[str, int], scenes: Rows[str], goals: Rows[str], labels: Rows[str]
 ) -> dict[str, Any]:
     obstacles = moment.obstacles
     discs = np.column_stack([obstacles.centre, obstacles.radius, obstacles.radius_stddev])
@@ -99,7 +99,7 @@ def _frame(
     }
 
 
-def _way(way: Way) -> dict[str, Any]:
+def _way(way: CandidateView) -> dict[str, Any]:
     """Return one way; ellipses: x, y, greater and smaller standard deviation, angle of the greater [degrees] of each."""
     points, marks = evenly(len(way.path), PATH_POINTS), evenly(len(way.path), ELLIPSES + 1)[1:]
     variances, vectors = np.linalg.eigh(way.covariance[marks])
@@ -119,7 +119,7 @@ def _way(way: Way) -> dict[str, Any]:
     }
 
 
-def _lines(moments: Sequence[Moment], lines: Sequence[Mapping[str, int]], slot: Mapping[int, int]) -> list[dict[str, Any]]:
+def _lines(moments: Sequence[Snapshot], lines: Sequence[Mapping[str, int]], slot: Mapping[int, int]) -> list[dict[str, Any]]:
     """Return every line with its likelihoods from its first prediction to its last, None where it was no candidate."""
     found: dict[int, dict[int, float | None]] = {}
     for row, (moment, numbers) in enumerate(zip(moments, lines, strict=True)):
@@ -141,7 +141,7 @@ def _hand(track: Track, origin_ns: int) -> dict[str, Any]:
     }
 
 
-def _bounds(track: Track, moments: Sequence[Moment]) -> list[float]:
+def _bounds(track: Track, moments: Sequence[Snapshot]) -> list[float]:
     """Return limits of x, then of y [m], that hold hand, goals, obstacles and nearly all of the paths."""
     points = [track.positions]
     for moment in moments:

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from foc_ros.core.types import NANOSECONDS, Array, HandSample, Obstacles, Outcome, Prediction, Record
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, Obstacles, PredictedCandidate, Prediction, Record
 from foc_ros.ros.messages.ranking import cost_ratios, ranked
 
 
 @dataclass(frozen=True, eq=False)
-class Way(Record):
+class CandidateView(Record):
     """One candidate that was solved.
 
     times (m,): seconds from the moment; path (m, 2) [m]; speed (m,) [m/s]; covariance (m, 2, 2) of the position [m^2];
@@ -31,7 +31,7 @@ class Way(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Moment(Record):
+class Snapshot(Record):
     """One prediction and the scene it was made in.
 
     ways: most likely first; unsolved: (label, status) of the candidates that could not be solved; most_likely: label, None where
@@ -41,7 +41,7 @@ class Moment(Record):
     stamp_ns: int
     obstacles: Obstacles
     goals: Array
-    ways: tuple[Way, ...]
+    ways: tuple[CandidateView, ...]
     most_likely: str | None
     unsolved: tuple[tuple[str, str], ...] = ()
     solve_s: float | None = None
@@ -82,15 +82,15 @@ def track_of(samples: Sequence[HandSample]) -> Track:
     return Track(stamps[fresh], positions[fresh])
 
 
-def ways_of(outcomes: Sequence[Outcome]) -> tuple[Way, ...]:
+def candidate_views(outcomes: Sequence[PredictedCandidate]) -> tuple[CandidateView, ...]:
     """Return the solved ones of the outcomes, in their order."""
-    solved = tuple(outcome for outcome in outcomes if outcome.solved)
+    solved = tuple(outcome for outcome in outcomes if outcome.is_solved)
     return tuple(_way(outcome, ratio) for outcome, ratio in zip(solved, cost_ratios(solved), strict=True))
 
 
-def _way(outcome: Outcome, cost_ratio: float) -> Way:
+def _way(outcome: PredictedCandidate, cost_ratio: float) -> CandidateView:
     solution = outcome.solution
-    return Way(
+    return CandidateView(
         outcome.candidate.label,
         outcome.likelihood,
         solution.effort,
@@ -103,15 +103,15 @@ def _way(outcome: Outcome, cost_ratio: float) -> Way:
     )
 
 
-def moment_of(prediction: Prediction, obstacles: Obstacles, goals: Array) -> Moment:
+def snapshot_of_prediction(prediction: Prediction, obstacles: Obstacles, goals: Array) -> Snapshot:
     """Return a prediction with the scene it was made in. Raises FocError where it holds a number that is not finite."""
-    return Moment(
+    return Snapshot(
         prediction.stamp_ns,
         obstacles,
         goals,
-        ways_of(ranked(prediction)),
+        candidate_views(ranked(prediction)),
         prediction.most_likely,
-        tuple((each.candidate.label, each.solution.status.value) for each in prediction.outcomes if not each.solved),
+        tuple((each.candidate.label, each.solution.status.value) for each in prediction.candidates if not each.is_solved),
         prediction.solve_s,
     )
 

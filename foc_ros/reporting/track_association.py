@@ -11,7 +11,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from .snapshots import Moment, Way
+from .snapshots import CandidateView, Snapshot
 
 PAUSE_NS = 300_000_000
 """For so long a way may be missing, because it was not solved, say, and go on all the same."""
@@ -27,7 +27,7 @@ def sides_of(label: str, ids: Collection[str]) -> tuple[str, Sides]:
     return goal, {name: side for side, name in found}
 
 
-def lineages(moments: Sequence[Moment]) -> list[dict[str, int]]:
+def associate_tracks(moments: Sequence[Snapshot]) -> list[dict[str, int]]:
     """Return, for every moment, the number of the line that each of its ways belongs to, by label.
 
     A way goes on in one with the same goals and the same label, else in one with the same goal that passes no obstacle on another
@@ -36,7 +36,7 @@ def lineages(moments: Sequence[Moment]) -> list[dict[str, int]]:
     numbered: list[dict[str, int]] = []
     lines = 0
     open_lines: dict[int, tuple[int, str]] = {}
-    before: Moment | None = None
+    before: Snapshot | None = None
     for moment in moments:
         if before is None or not np.array_equal(before.goals, moment.goals):
             open_lines = {}
@@ -52,7 +52,7 @@ def lineages(moments: Sequence[Moment]) -> list[dict[str, int]]:
     return numbered
 
 
-def slots(moments: Sequence[Moment], lines: Sequence[Mapping[str, int]], count: int, colours: int) -> dict[int, int]:
+def slots(moments: Sequence[Snapshot], lines: Sequence[Mapping[str, int]], count: int, colours: int) -> dict[int, int]:
     """Return a slot in [0, count), which gives letter and colour, of each line: no two lines of one time share one.
 
     Lines that begin together take theirs in order of likelihood. First come slots of a colour (slot modulo colours) that no line
@@ -73,7 +73,7 @@ def slots(moments: Sequence[Moment], lines: Sequence[Mapping[str, int]], count: 
     return given
 
 
-def _continued(moment: Moment, earlier: dict[int, str]) -> dict[str, int]:
+def _continued(moment: Snapshot, earlier: dict[int, str]) -> dict[str, int]:
     """Return the line of every way that goes on, by label; no line goes on twice."""
     went_on: dict[str, int] = {}
     for way in moment.ways:
@@ -87,7 +87,7 @@ def _continued(moment: Moment, earlier: dict[int, str]) -> dict[str, int]:
     return went_on
 
 
-def _best(way: Way, earlier: dict[int, str], ids: Collection[str]) -> int | None:
+def _best(way: CandidateView, earlier: dict[int, str], ids: Collection[str]) -> int | None:
     """Return the first of the earlier lines that agree most with a way; None where none agrees."""
     goal, sides = sides_of(way.label, ids)
     agreeing: dict[int, int] = {}

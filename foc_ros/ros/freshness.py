@@ -17,7 +17,7 @@ SOURCES = {'cloud': CLOUD, 'markers': MARKERS}
 
 
 class Freshness:
-    """Told of every message taken; :meth:`obstruction` says why nothing is to be predicted now. Times: steady clock [s]."""
+    """Told of every message taken; :meth:`not_ready_reason` says why nothing is to be predicted now. Times: steady clock [s]."""
 
     def __init__(self) -> None:
         self._heard_s: dict[str, float] = {}
@@ -44,7 +44,7 @@ class Freshness:
         """Forget by which clock the poses are stamped."""
         self._same_clock = self._moving = False
 
-    def obstruction(self, now_s: float, config: Config, sources: Iterable[str]) -> tuple[str, str] | None:
+    def not_ready_reason(self, now_s: float, config: Config, sources: Iterable[str]) -> tuple[str, str] | None:
         """Return why nothing can be predicted, as (kind, words with numbers); None where it can.
 
         sources: of obstacles, of which one that is silent is enough; silence does not mean that its obstacles have gone.

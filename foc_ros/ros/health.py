@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import Outcome, Prediction
+from foc_ros.core.types import PredictedCandidate, Prediction
 
 from .intake import Intake
 from .messages.diagnostics import ERROR, OK, WARN, Health
@@ -68,15 +68,15 @@ class Monitor:
         self._own['internal_errors'] += 1
         self._error = f'{type(error).__name__}: {error}'
 
-    def health(self, now_s: float, intake: Intake, state: str, obstruction: str | None) -> Health:
+    def health(self, now_s: float, intake: Intake, state: str, not_ready_reason: str | None) -> Health:
         """Return level, message and figures, with everything that the intake and its pipeline counted.
 
-        state: of the managed node; obstruction: why nothing is to be predicted by the clocks.
+        state: of the managed node; not_ready_reason: why nothing is to be predicted by the clocks.
         """
         pipeline, seconds = intake.pipeline, max(now_s - self._asked_s, 1e-3)
         totals = Counter(intake.counts) + self._own
         recent = totals - self._before
-        level, message = self._judged(pipeline, recent, state, obstruction)
+        level, message = self._judged(pipeline, recent, state, not_ready_reason)
         values = {
             'state': state,
             'engaged': str(pipeline.engaged),
@@ -98,7 +98,7 @@ class Monitor:
             entry.received_before = entry.received
         return Health(level, message, values)
 
-    def _judged(self, pipeline: Pipeline, recent: Counter[str], state: str, obstruction: str | None) -> tuple[int, str]:
+    def _judged(self, pipeline: Pipeline, recent: Counter[str], state: str, not_ready_reason: str | None) -> tuple[int, str]:
         if recent['internal_errors']:
             return ERROR, f'{recent["internal_errors"]} internal errors, the last: {self._error}'
         if state != 'active':
@@ -107,7 +107,7 @@ class Monitor:
             return OK, 'disengaged'
         faults = {name: count for name, count in recent.items() if name in FAULTS or not name.startswith(HARMLESS)}
         words = [f'{name} {count}' for name, count in sorted(faults.items())]
-        blocked = pipeline.blocked() or obstruction
+        blocked = pipeline.blocked() or not_ready_reason
         if blocked is not None:
             words.insert(0, f'no prediction: {blocked}')
         return (WARN, '; '.join(words)) if words else (OK, 'predicting')
@@ -130,14 +130,14 @@ def _scene_values(pipeline: Pipeline) -> dict[str, str]:
 def _candidate_values(prediction: Prediction | None) -> dict[str, str]:
     if prediction is None:
         return {}
-    values = {f'candidate {outcome.candidate.label}': _described(outcome) for outcome in prediction.outcomes}
+    values = {f'candidate {outcome.candidate.label}': _described(outcome) for outcome in prediction.candidates}
     notes = {f'note {name}': str(count) for name, count in sorted(prediction.notes.items())}
     return {'most likely': prediction.most_likely or 'none', **values, **notes}
 
 
-def _described(outcome: Outcome) -> str:
+def _described(outcome: PredictedCandidate) -> str:
     solution = outcome.solution
-    if not outcome.solved:
+    if not outcome.is_solved:
         return f'{solution.status.value}: {solution.message}'
     return f'{solution.status.value}, likelihood {outcome.likelihood:.3f}, eta {solution.eta:.3f}, effort {solution.effort:.4g}'
 

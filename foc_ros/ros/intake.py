@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from foc_ros.core.errors import MessageError
-from foc_ros.core.pipeline import Pipeline, Verdict
+from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
 
@@ -32,7 +32,7 @@ class Intake:
         self._markers_ns = 0
         self._markers_hold = (-math.inf, math.inf)
         self._counts: Counter[str] = Counter()
-        self._takers: dict[str, Callable[[Any], Verdict]] = {
+        self._takers: dict[str, Callable[[Any], SampleStatus]] = {
             topics.HAND: self._hand,
             topics.CLOUD: self._cloud,
             topics.MARKERS: self._marker_array,
@@ -45,7 +45,7 @@ class Intake:
         """How often each kind of refusal, drop, restart or failure occurred here and in the pipeline, by name."""
         return {**self.pipeline.counts, **self._counts}
 
-    def take(self, role: str, message: Any) -> Verdict | None:
+    def take(self, role: str, message: Any) -> SampleStatus | None:
         """Take one message; None where it cannot be converted."""
         before = self.pipeline.refused
         try:
@@ -58,7 +58,7 @@ class Intake:
             self.last_refusal = self.pipeline.last_refusal
         return verdict
 
-    def _hand(self, message: Any) -> Verdict:
+    def _hand(self, message: Any) -> SampleStatus:
         sample = hand_sample(message, self.pipeline.config.plane)
         self.sample = sample
         verdict = self.pipeline.hand(sample)
@@ -67,13 +67,13 @@ class Intake:
             self._show(self._markers)
         return verdict
 
-    def _cloud(self, message: Any) -> Verdict:
+    def _cloud(self, message: Any) -> SampleStatus:
         scene = cloud_obstacles(message, self.pipeline.config.plane)
         verdict = self.pipeline.set_obstacles('cloud', scene.obstacles, scene.stamp_ns, scene.frame_id)
         self._count_dropped(topics.CLOUD, scene.dropped if verdict.taken else {})
         return verdict
 
-    def _marker_array(self, message: Any) -> Verdict:
+    def _marker_array(self, message: Any) -> SampleStatus:
         config = self.pipeline.config
         # markers that came before the working frame was known, and turned out to be in another one, are none of the scene's
         held = self._markers if self.pipeline.frame_id in (None, self._markers.frame_id) else MarkerScene()
@@ -82,7 +82,7 @@ class Intake:
         self._count_dropped(topics.MARKERS, dict(updated.dropped) if verdict.taken else {})
         return verdict
 
-    def _show(self, markers: MarkerScene) -> Verdict:
+    def _show(self, markers: MarkerScene) -> SampleStatus:
         """Hand over the markers that live now.
 
         Several publishers may add to the table, each with its own delay: a stamp a little behind the newest does not make the
@@ -97,10 +97,10 @@ class Intake:
             self._markers, self._markers_ns, self._markers_hold = markers, stamp_ns, markers.unchanged(self._now_ns())
         return verdict
 
-    def _goals(self, message: Any) -> Verdict:
+    def _goals(self, message: Any) -> SampleStatus:
         return self.pipeline.set_goals(*goals_of_pose_array(message, self.pipeline.config.plane))
 
-    def _goal(self, message: Any) -> Verdict:
+    def _goal(self, message: Any) -> SampleStatus:
         return self.pipeline.set_goals(*goal_of_pose(message, self.pipeline.config.plane))
 
     def _now_ns(self) -> int:

@@ -25,8 +25,8 @@ from std_srvs.srv import SetBool, Trigger
 
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError
-from foc_ros.core.pipeline import Pipeline, Verdict
-from foc_ros.core.predictor import rehearse
+from foc_ros.core.pipeline import Pipeline, SampleStatus
+from foc_ros.core.predictor import warm_up
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import CLOUD, GOAL, GOALS, HAND, MARKERS
 
@@ -77,7 +77,7 @@ class FocNode(LifecycleNode):
         """Begin to listen."""
         self._begin()
         try:
-            rehearse(self._live.config)
+            warm_up(self._live.config)
             self._outputs = advertise(self)
             self._inputs = subscribe(self, self._receive)
         except Exception as error:
@@ -161,20 +161,20 @@ class FocNode(LifecycleNode):
             self._loggers[role].warning(text, throttle_duration_sec=THROTTLE_S)
         return taken
 
-    def _note_pose(self, verdict: Verdict) -> None:
+    def _note_pose(self, verdict: SampleStatus) -> None:
         sample, clock_ns = self.intake.sample, self.get_clock().now().nanoseconds
         assert sample is not None
         timeout_s = self.pipeline.config.estimator.hand_timeout_s
         self._freshness.pose(sample.stamp_ns, clock_ns, timeout_s, restarted=verdict.restarted)
 
-    def _obstruction(self) -> tuple[str, str] | None:
-        return self._freshness.obstruction(monotonic(), self.pipeline.config, self.pipeline.scene.parts)
+    def _not_ready_reason(self) -> tuple[str, str] | None:
+        return self._freshness.not_ready_reason(monotonic(), self.pipeline.config, self.pipeline.scene.parts)
 
     def _predict(self) -> None:
         began_s = monotonic()
-        obstruction = self._obstruction()
-        if obstruction is not None:
-            self._monitor.withheld(obstruction[0])
+        not_ready_reason = self._not_ready_reason()
+        if not_ready_reason is not None:
+            self._monitor.withheld(not_ready_reason[0])
             return
         try:
             prediction = self.pipeline.predict()
@@ -198,8 +198,8 @@ class FocNode(LifecycleNode):
         self.get_logger().error(f'internal error: {text}', throttle_duration_sec=THROTTLE_S)
 
     def _publish_health(self) -> None:
-        obstruction = self._obstruction()
-        words = None if obstruction is None else obstruction[1]
+        not_ready_reason = self._not_ready_reason()
+        words = None if not_ready_reason is None else not_ready_reason[1]
         health = self._monitor.health(monotonic(), self.intake, self._state, words)
         name = self.get_fully_qualified_name()
         stamp_ns = self.get_clock().now().nanoseconds

@@ -15,7 +15,7 @@ from foc_ros.core.errors import RecordingError
 from foc_ros.core.types import Array
 from foc_ros.io.terminal import track
 
-from .families import families
+from .families import baseline_grids
 from .heldout import Family, asked_about, chosen, log_likelihoods
 from .observations import Observation, Observations
 from .positions import position_scores
@@ -42,7 +42,7 @@ class Evaluation:
 
 def evaluate(recordings: Sequence[Observations], published: LikelihoodConfig, executor: Executor) -> Evaluation:
     """Judge all predictors on recordings, one at least; published: the likelihood that they were replayed with."""
-    compared = families(recordings, published)
+    compared = baseline_grids(recordings, published)
     tables = tabulated(recordings, compared, executor)
     names = [recording.name for recording in recordings]
     judged: dict[str, dict[str, Judged]] = {}

@@ -25,7 +25,7 @@ RATES = tuple(float(rate) for rate in np.geomspace(0.01, 100.0, 25))
 """Inverse temperatures tried, in parts of one over the median effort to go."""
 
 
-def families(recordings: Sequence[Observations], published: LikelihoodConfig) -> tuple[Family, ...]:
+def baseline_grids(recordings: Sequence[Observations], published: LikelihoodConfig) -> tuple[Family, ...]:
     """Return all predictors; published: the parameters that the recordings were replayed with."""
     effort = float(np.median([seen.ways.to_go[seen.ways.solved].min() for each in recordings for seen in each.each]))
     return (

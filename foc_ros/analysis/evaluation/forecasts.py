@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from foc_ros.core.config import LikelihoodConfig
-from foc_ros.core.likelihood import likelihoods, shared_cost
+from foc_ros.core.likelihood import compute_likelihoods, compute_shared_cost
 from foc_ros.core.types import LEFT, RIGHT, Array, Record
 
 from .minimum_jerk import straight_cost
@@ -81,7 +81,9 @@ def power_rule(seen: Observation, config: LikelihoodConfig) -> Array:
     """Return what the node would publish with other parameters of the likelihood."""
     solved, ways = np.flatnonzero(seen.ways.solved), seen.ways
     partings = ways.partings.take(solved)
-    return _with_unknown(seen, likelihoods(shared_cost(ways.spent, config) + ways.to_go[solved], config, partings))
+    return _with_unknown(
+        seen, compute_likelihoods(compute_shared_cost(ways.spent, config) + ways.to_go[solved], config, partings)
+    )
 
 
 def boltzmann(seen: Observation, inverse_temperature: float) -> Array:
@@ -138,7 +140,7 @@ def straight_minimum_jerk(seen: Observation, question: Question, beta: float, co
 
     confidence: in the whole of it, in [0, 1 - DOUBT].
     """
-    shares = likelihoods(straight_cost(seen), LikelihoodConfig(beta=beta))
+    shares = compute_likelihoods(straight_cost(seen), LikelihoodConfig(beta=beta))
     ways = seen.goals - seen.hand[:2]
     given = [(goal,) if question.name == GOAL else _straight(seen, question, way) for goal, way in enumerate(ways)]
     total = np.zeros(len(question.answers))

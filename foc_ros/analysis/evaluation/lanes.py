@@ -20,7 +20,7 @@ P = ParamSpec('P')
 T = TypeVar('T')
 
 
-class Lanes(Executor):
+class IsolatedProcessPool(Executor):
     """A number of worker processes, started when they are needed.
 
     A call whose worker is killed raises BrokenProcessPool from its future; no other call is touched. Left by an exception, the

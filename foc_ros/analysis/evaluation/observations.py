@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.homotopy.branch_times import Partings
+from foc_ros.core.homotopy.branch_times import BranchTimes
 from foc_ros.core.types import Array, Record
 
 TIMES_S = tuple(0.125 * step for step in range(1, 9))
@@ -48,7 +48,7 @@ class Ways(Record):
     mean: Array
     covariance: Array
     late: Array
-    partings: Partings
+    partings: BranchTimes
 
     def __len__(self) -> int:
         return len(self.labels)

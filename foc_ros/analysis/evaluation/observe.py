@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from foc_ros.analysis.replay import Replay, Step
 from foc_ros.core.config import Config, DurationConfig
-from foc_ros.core.dynamics.predictive_covariance import lateness
+from foc_ros.core.dynamics.predictive_covariance import duration_sensitivity
 from foc_ros.core.errors import RecordingError
 from foc_ros.core.estimation.duration import is_passing, time_price
-from foc_ros.core.homotopy import swept_angles
-from foc_ros.core.homotopy.branch_times import partings
-from foc_ros.core.obstacles.chance_constraint import courses
-from foc_ros.core.types import LEFT, NANOSECONDS, RIGHT, Array, HandState, Obstacles, Outcome, Prediction
+from foc_ros.core.homotopy import compute_swept_angles
+from foc_ros.core.homotopy.branch_times import compute_branch_times
+from foc_ros.core.obstacles.chance_constraint import centre_trajectories
+from foc_ros.core.types import LEFT, NANOSECONDS, RIGHT, Array, HandState, Obstacles, PredictedCandidate, Prediction
 
 from .observations import TIMES_S, Observation, Observations, Truth, Ways
 from .path import Path
@@ -31,7 +31,7 @@ def observe(recording: Recording, config: Config) -> Observations:
         if step.sample is not None:
             stamps.append(step.sample.stamp_ns)
             path.append(step.sample.position)
-        if step.prediction is not None and step.prediction.solved:
+        if step.prediction is not None and step.prediction.solved_candidates:
             assert replayed.pipeline.hand_state is not None
             made.append((step, replayed.pipeline.hand_state))
     if not made:
@@ -69,14 +69,14 @@ def _observation(step: Step, hand: HandState, past: Path, duration: DurationConf
 
 
 def _ways(prediction: Prediction, obstacles: Obstacles, spent: float, duration: DurationConfig) -> Ways:
-    outcomes, price, passing = prediction.outcomes, time_price(duration), is_passing(duration)
+    outcomes, price, passing = prediction.candidates, time_price(duration), is_passing(duration)
     solutions = [outcome.solution for outcome in outcomes]
     steps = [np.minimum(np.rint(np.array(TIMES_S) / each.dt).astype(int), len(each.mean) - 1) for each in solutions]
     named = [[identity in dict(outcome.candidate.sides) for identity in obstacles.ids] for outcome in outcomes]
     return Ways(
         labels=tuple(outcome.candidate.label for outcome in outcomes),
         goal=np.array([outcome.candidate.goal for outcome in outcomes]),
-        solved=np.array([outcome.solved for outcome in outcomes]),
+        solved=np.array([outcome.is_solved for outcome in outcomes]),
         spent=spent,
         to_go=np.array([each.effort * each.dt + price * each.times[-1] for each in solutions]),
         likelihood=np.array([outcome.likelihood for outcome in outcomes]),
@@ -87,22 +87,22 @@ def _ways(prediction: Prediction, obstacles: Obstacles, spent: float, duration: 
         sides=np.array([_predicted_sides(outcome, obstacles) for outcome in outcomes]),
         mean=np.array([each.mean[at, :2] for each, at in zip(solutions, steps, strict=True)]),
         covariance=np.array([each.covariance[at, :2, :2] for each, at in zip(solutions, steps, strict=True)]),
-        late=np.array([lateness(each, passing)[at, :2] for each, at in zip(solutions, steps, strict=True)]),
-        partings=partings(outcomes, obstacles),
+        late=np.array([duration_sensitivity(each, passing)[at, :2] for each, at in zip(solutions, steps, strict=True)]),
+        partings=compute_branch_times(outcomes, obstacles),
     )
 
 
-def _predicted_sides(outcome: Outcome, obstacles: Obstacles) -> NDArray[np.int8]:
+def _predicted_sides(outcome: PredictedCandidate, obstacles: Obstacles) -> NDArray[np.int8]:
     """Return the sides (n,) on which a candidate runs: those in its name where it could not be solved, else its path's own."""
     solution = outcome.solution
-    sides = _sides(solution.path, courses(obstacles.centre, solution.dt * obstacles.velocity, len(solution.mean) - 1))
-    named = {} if outcome.solved else dict(outcome.candidate.sides)
+    sides = _sides(solution.path, centre_trajectories(obstacles.centre, solution.dt * obstacles.velocity, len(solution.mean) - 1))
+    named = {} if outcome.is_solved else dict(outcome.candidate.sides)
     return np.array([named.get(identity, side) for identity, side in zip(obstacles.ids, sides, strict=True)], dtype=np.int8)
 
 
 def _sides(path: Array, where: Array) -> NDArray[np.int8]:
     """Return the sides (n,) of obstacles, where (m, n, 2) [m], on which a path (m, 2) [m] runs: by the angle that it sweeps."""
-    return np.where(swept_angles(path, where) < 0.0, LEFT, RIGHT).astype(np.int8)
+    return np.where(compute_swept_angles(path, where) < 0.0, LEFT, RIGHT).astype(np.int8)
 
 
 def _truth(stamp_ns: int, past: Path, obstacles: Obstacles, row: NDArray[np.int64], along: Array, goals: Array) -> Truth:

@@ -19,7 +19,7 @@ from foc_ros.core.errors import FocError, InputError, RecordingError
 from foc_ros.io.terminal import track
 
 from .cluster import Cluster
-from .lanes import Lanes
+from .lanes import IsolatedProcessPool
 
 T = TypeVar('T')
 R = TypeVar('R')
@@ -107,4 +107,4 @@ def workers(arguments: argparse.Namespace) -> Executor:
         return Cluster(arguments.scheduler)
     if not 1 <= arguments.workers <= MOST_WORKERS:
         raise InputError('--workers', f'a whole number in [1, {MOST_WORKERS}]', arguments.workers)
-    return Lanes(arguments.workers)
+    return IsolatedProcessPool(arguments.workers)

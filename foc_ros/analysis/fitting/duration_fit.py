@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 
 from foc_ros.analysis.evaluation.path import Path
 from foc_ros.core.config import Config, DurationConfig, updated
-from foc_ros.core.estimation.duration import times_to_go
+from foc_ros.core.estimation.duration import estimate_times_to_go
 from foc_ros.core.types import NANOSECONDS, Array, HandState
 
 from .demonstrations import Demonstration
@@ -54,7 +54,7 @@ class TimesToGo:
         """Return the mean absolute error of the time to go in each recording, (n,) [s]."""
         return np.array(
             [
-                np.mean([abs(times_to_go(hand, goal[None], duration)[0] - left) for hand, goal, left in each])
+                np.mean([abs(estimate_times_to_go(hand, goal[None], duration)[0] - left) for hand, goal, left in each])
                 for each in self.samples
             ]
         )

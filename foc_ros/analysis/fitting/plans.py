@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from foc_ros.core.config import REFERENCE_STEP_S, Config
-from foc_ros.core.dynamics.noise import noise_per_step
+from foc_ros.core.dynamics.noise import scale_noise
 from foc_ros.core.dynamics.plants import triple_integrator_horizon
 from foc_ros.core.errors import RecordingError
 from foc_ros.core.estimation.duration import is_passing
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
-from foc_ros.core.ocp.solve import forward
-from foc_ros.core.ocp.warm_start import Start, cold
+from foc_ros.core.ocp.solve import solve_problem
+from foc_ros.core.ocp.warm_start import Start, cold_start
 from foc_ros.core.types import Array, Record, Solution, Status
 
 from .demonstrations import FEWEST, Demonstration
@@ -55,12 +55,12 @@ def reach(demonstration: Demonstration, config: Config) -> Reach:
         np.concatenate([_start(times, demonstration.positions), np.zeros(4)]),
         goal,
         demonstration.obstacles,
-        noise_per_step(np.array([config.foc.noise_x, config.foc.noise_y]), REFERENCE_STEP_S, dt),
+        scale_noise(np.array([config.foc.noise_x, config.foc.noise_y]), REFERENCE_STEP_S, dt),
         config.foc.eta,
         passing=is_passing(config.duration),
     )
     guess = np.column_stack([np.interp(dt * np.arange(steps + 1), times, axis) for axis in demonstration.positions.T])
-    return Reach(demonstration.name, times, demonstration.positions, problem, cold(guess))
+    return Reach(demonstration.name, times, demonstration.positions, problem, cold_start(guess))
 
 
 def _start(times: Array, positions: Array) -> Array:
@@ -73,7 +73,7 @@ def _start(times: Array, positions: Array) -> Array:
 
 def planned(reach: Reach, tau: float, lam: float, config: Config) -> Solution | None:
     """Return the plan of strategy `fixed` on the side on which the recorded path runs; None where there is none."""
-    solution = forward(reach.problem, reach.start, replace(config.foc, strategy='fixed', tau=tau, lam=lam))
+    solution = solve_problem(reach.problem, reach.start, replace(config.foc, strategy='fixed', tau=tau, lam=lam))
     return solution if solution.status is Status.SOLVED else None
 
 

@@ -11,8 +11,8 @@ from foc_ros.core.config import FocConfig
 from foc_ros.core.dynamics.plants import triple_integrator_horizon
 from foc_ros.core.homotopy import path_sides
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
-from foc_ros.core.ocp.solve import forward
-from foc_ros.core.ocp.warm_start import cold
+from foc_ros.core.ocp.solve import solve_problem
+from foc_ros.core.ocp.warm_start import cold_start
 from foc_ros.core.types import Array, Obstacles, Solution, Status, make_obstacles
 from foc_ros.io.guess import guess_path
 
@@ -23,7 +23,7 @@ HORIZON = triple_integrator_horizon(DURATION_S / STEPS, STEPS)
 
 
 @dataclass(frozen=True)
-class Way:
+class PathClass:
     """One way round: the bow of its guess to the left [m], and the side on which it passes obstacles, by id."""
 
     name: str
@@ -40,7 +40,7 @@ class PaperScene:
 
     goal_x: float
     circles: tuple[tuple[float, float, float, float], ...]
-    ways: tuple[Way, ...]
+    ways: tuple[PathClass, ...]
 
     @cached_property
     def obstacles(self) -> Obstacles:
@@ -72,13 +72,13 @@ class Method:
         return replace(FocConfig(strategy=self.strategy), **dict(self.settings))  # type: ignore[arg-type]
 
 
-def solve_way(scene: PaperScene, way: Way, method: Method, eta: float) -> Solution:
+def solve_class(scene: PaperScene, way: PathClass, method: Method, eta: float) -> Solution:
     """Solve one way from its guess, on its own: no study depends on the order of its solutions.
 
     A solution that slid into another way has the status LEFT_CLASS.
     """
     guess = guess_path(np.zeros(2), scene.goal, STEPS, way.amplitude)
-    solution = forward(scene.problem(method.noise, eta), cold(guess), method.config)
+    solution = solve_problem(scene.problem(method.noise, eta), cold_start(guess), method.config)
     sides = path_sides(solution.path, scene.obstacles)
     if solution.status is Status.SOLVED and any(sides.get(identity) != side for identity, side in way.sides):
         return replace(solution, status=Status.LEFT_CLASS, message='the solution slid into another class')

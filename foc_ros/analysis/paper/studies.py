@@ -14,7 +14,7 @@ import numpy as np
 from foc_ros.core.ocp.monte_carlo import MonteCarlo, monte_carlo
 from foc_ros.core.types import Array, Solution, Status
 
-from .reaching import Method, PaperScene, Way, solve_way
+from .reaching import Method, PaperScene, PathClass, solve_class
 from .scenes import NOISE, SMALL_NOISE, STRATEGY_SCENE, WAYS_SCENE
 
 PAPER_ETA = 0.9615
@@ -142,7 +142,7 @@ def studies(grid: Grid = FULL) -> Iterator[Study | OptimalStudy]:
 COUNT = 7
 
 
-def gathered(computed: Iterable[Study | OptimalStudy]) -> Studies:
+def collect_studies(computed: Iterable[Study | OptimalStudy]) -> Studies:
     """Return all studies together."""
     each = list(computed)
     paper = tuple(one for one in each if isinstance(one, Study))
@@ -153,7 +153,7 @@ def gathered(computed: Iterable[Study | OptimalStudy]) -> Studies:
 def _strategies_shown(number: int, title: str, etas: tuple[float, ...]) -> Study:
     scene = STRATEGY_SCENE
     methods = {'LV': Method(NOISE, 'lv'), 'HC': Method(NOISE, 'hc')}
-    shown = {eta: {name: solve_way(scene, scene.ways[0], method, eta) for name, method in methods.items()} for eta in etas}
+    shown = {eta: {name: solve_class(scene, scene.ways[0], method, eta) for name, method in methods.items()} for eta in etas}
     return Study(number, title, scene, NOISE, shown)
 
 
@@ -181,7 +181,7 @@ def _ways_compared(number: int, name: str, strategy: str, delta: float, grid: Gr
         'continuous': (Method(NOISE, strategy), grid.fine),
         **{_stepped_name(growth): (_stepping(NOISE, delta, growth), grid.stepped) for growth in (PRINTED_GROWTH, GENTLE_GROWTH)},
     }
-    shown = {eta: {way.name: solve_way(scene, way, Method(NOISE, strategy), eta) for way in scene.ways} for eta in (0.9, 0.965)}
+    shown = {eta: {way.name: solve_class(scene, way, Method(NOISE, strategy), eta) for way in scene.ways} for eta in (0.9, 0.965)}
     ratios = tuple(
         RatioCurve(label, *(_curve(way.name, scene, way, method, etas) for way in scene.ways))
         for label, (method, etas) in methods.items()
@@ -207,13 +207,13 @@ def _optimal_beside(grid: Grid) -> OptimalStudy:
 def _reported() -> dict[str, Solution]:
     scene, way = STRATEGY_SCENE, STRATEGY_SCENE.ways[0]
     return {
-        name: solve_way(scene, way, Method(NOISE, 'fixed', (('tau', tau), ('lam', lam))), 0.94)
+        name: solve_class(scene, way, Method(NOISE, 'fixed', (('tau', tau), ('lam', lam))), 0.94)
         for name, (tau, lam) in REPORTED.items()
     }
 
 
-def _curve(name: str, scene: PaperScene, way: Way, method: Method, etas: tuple[float, ...]) -> EffortCurve:
-    return EffortCurve(name, etas, tuple(solve_way(scene, way, method, eta) for eta in etas))
+def _curve(name: str, scene: PaperScene, way: PathClass, method: Method, etas: tuple[float, ...]) -> EffortCurve:
+    return EffortCurve(name, etas, tuple(solve_class(scene, way, method, eta) for eta in etas))
 
 
 def _stepping(noise: float, delta: float, growth: float) -> Method:

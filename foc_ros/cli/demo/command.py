@@ -24,7 +24,7 @@ from foc_ros.reporting.snapshots import track_of
 
 from .environment import free_domain, held, private_environment
 from .node_process import NodeDiedError, NodeProcess
-from .recorder import Ledger
+from .recorder import Recorder
 
 RECORDING = Path(__file__).resolve().parents[2] / 'recordings' / 'reaching.mcap'
 MARK = '.foc_ros_demo'
@@ -52,7 +52,7 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf, d
     last_s: seconds of the recording that are played; domain: of the ROS graph, a free one by default.
     """
     items = _items(recording, last_s)
-    ledger = Ledger(Config())
+    ledger = Recorder(Config())
     prepare(output)
     try:
         with _interruption() as stopped, BagWriter(output / 'bag') as bag:
@@ -72,7 +72,7 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf, d
     return 0
 
 
-def _play(items: list[Item], bag: BagWriter, ledger: Ledger, domain: int, stopped: threading.Event) -> None:
+def _play(items: list[Item], bag: BagWriter, ledger: Recorder, domain: int, stopped: threading.Event) -> None:
     from .display import Display
     from .player import Player
 
@@ -130,7 +130,7 @@ def _interruption() -> Iterator[threading.Event]:
             signal.signal(number, handler)
 
 
-def _summary(ledger: Ledger, duration_s: float) -> dict[str, str]:
+def _summary(ledger: Recorder, duration_s: float) -> dict[str, str]:
     median, late = 1e3 * np.percentile(ledger.delays, [50, 99])
     counts = [f'{name.removeprefix("count ")} {value}' for name, value in ledger.health.items() if name.startswith('count ')]
     return {
@@ -141,7 +141,7 @@ def _summary(ledger: Ledger, duration_s: float) -> dict[str, str]:
     }
 
 
-def _tell(output: Path, ledger: Ledger, summary: Mapping[str, str]) -> None:
+def _tell(output: Path, ledger: Recorder, summary: Mapping[str, str]) -> None:
     print(f'{len(ledger.moments)} predictions from {summary["hand samples"]} hand samples in {summary["recording"]};')
     print(f'from hand sample to prediction {summary["from hand sample to prediction"]}')
     print(f'left in {output}: bag (inputs and outputs, MCAP), report/index.html')

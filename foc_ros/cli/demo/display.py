@@ -11,9 +11,9 @@ from rich.live import Live
 from rich.table import Table
 
 from foc_ros.core.types import NANOSECONDS
-from foc_ros.reporting.snapshots import Moment
+from foc_ros.reporting.snapshots import Snapshot
 
-from .recorder import Ledger
+from .recorder import Recorder
 
 REDRAW_S = 0.125
 LINE_S = 1.0
@@ -24,7 +24,7 @@ ROWS = 4
 class Display:
     """Shows the newest moment of a ledger. Use as a context manager; call :meth:`update` as often as you like."""
 
-    def __init__(self, ledger: Ledger, first_ns: int, duration_s: float, console: Console | None = None) -> None:
+    def __init__(self, ledger: Recorder, first_ns: int, duration_s: float, console: Console | None = None) -> None:
         self._ledger, self._first_ns, self._duration_s = ledger, first_ns, duration_s
         self._console = console or Console()
         self._live = Live(console=self._console, auto_refresh=False) if self._console.is_terminal else None
@@ -50,18 +50,18 @@ class Display:
         else:
             self._live.update(self._table(moment, now), refresh=True)
 
-    def _heading(self, moment: Moment, now: float) -> str:
+    def _heading(self, moment: Snapshot, now: float) -> str:
         rates = f'hand {self._ledger.hand_rate(now)}/s, predictions {self._ledger.prediction_rate(now)}/s'
         delay = 1e3 * float(np.median(self._ledger.delays[-50:]))
         return (
             f'{(moment.stamp_ns - self._first_ns) / NANOSECONDS:4.1f} of {self._duration_s:.1f} s   {rates}, after {delay:.0f} ms'
         )
 
-    def _line(self, moment: Moment, now: float) -> str:
+    def _line(self, moment: Snapshot, now: float) -> str:
         ways = '   '.join(f'{100 * way.likelihood:.0f} % {way.label}' for way in moment.ways)
         return f'{self._heading(moment, now)}   {ways or "no way solved"}'
 
-    def _table(self, moment: Moment, now: float) -> Table:
+    def _table(self, moment: Snapshot, now: float) -> Table:
         table = Table(title=self._heading(moment, now), title_justify='left', caption_justify='left', expand=False)
         table.caption = '+ passes the obstacle on the left, - on the right'
         table.add_column('way', width=24, no_wrap=True)

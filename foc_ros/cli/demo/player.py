@@ -20,7 +20,7 @@ from foc_ros.io.bags import TYPESTORE, BagWriter, Item
 from foc_ros.ros.messages.outputs import OUTPUTS
 
 from .node_process import NodeDiedError
-from .recorder import Ledger
+from .recorder import Recorder
 
 NODE = '/foc'
 READ = ('prediction', 'likelihoods', 'diagnostics')
@@ -43,7 +43,7 @@ class Player:
     sent and received; ledger: told of all that passes. Use as a context manager.
     """
 
-    def __init__(self, items: Sequence[Item], bag: BagWriter, ledger: Ledger, domain: int) -> None:
+    def __init__(self, items: Sequence[Item], bag: BagWriter, ledger: Recorder, domain: int) -> None:
         self._items, self._bag, self._ledger, self._domain = items, bag, ledger, domain
         self._began: float | None = None
         self._heard = 0.0

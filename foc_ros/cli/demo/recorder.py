@@ -11,8 +11,8 @@ from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import HandSample
 from foc_ros.io import topics
 from foc_ros.io.bags import Item
-from foc_ros.reporting.readback import belong_together, moment_of_messages
-from foc_ros.reporting.snapshots import Moment
+from foc_ros.reporting.readback import belong_together, snapshot_of_messages
+from foc_ros.reporting.snapshots import Snapshot
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.inputs import stamp_of
 
@@ -22,7 +22,7 @@ KEPT = 20
 """Messages kept to be paired: a table of likelihoods has no stamp, and may come before or after its prediction."""
 
 
-class Ledger:
+class Recorder:
     """Told of every message by the player.
 
     Attributes: samples, the hand samples sent; moments, the predictions received; delays [s], from sending a hand sample to
@@ -31,7 +31,7 @@ class Ledger:
 
     def __init__(self, config: Config) -> None:
         self.samples: list[HandSample] = []
-        self.moments: list[Moment] = []
+        self.moments: list[Snapshot] = []
         self.delays: list[float] = []
         self.health: dict[str, str] = {}
         # never asked to predict: it reads the messages and knows which scene held at each of them
@@ -90,7 +90,7 @@ class Ledger:
         _, scene = self._sent.get(stamp_ns, (0.0, self._intake.pipeline.scene))
         if scene.goals is not None:
             plane = self._intake.pipeline.config.plane
-            self.moments.append(moment_of_messages(cloud, table, plane, scene.obstacles(stamp_ns), scene.goals))
+            self.moments.append(snapshot_of_messages(cloud, table, plane, scene.obstacles(stamp_ns), scene.goals))
 
 
 def _within(times: deque[float], now: float) -> int:

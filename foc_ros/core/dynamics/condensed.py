@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from foc_ros.core.kernels import Flags, Indices, Matrix, Tensor, Vector, compiled
-from foc_ros.core.obstacles.chance_constraint import k_of, variance_of
+from foc_ros.core.obstacles.chance_constraint import safety_factor, variance_at
 
-from .impulse_response import driven
+from .impulse_response import apply_impulse_response
 
 
 @compiled
-def extent(way_x: float, way_y: float, radius: Vector) -> float:
+def scene_extent(way_x: float, way_y: float, radius: Vector) -> float:
     """Return the length of the way to the goal, or the largest radius (m,) if that is more [m]; never zero."""
     largest = max(float(np.hypot(way_x, way_y)), 1e-6)
     for j in range(len(radius)):
@@ -20,7 +20,7 @@ def extent(way_x: float, way_y: float, radius: Vector) -> float:
 
 
 @compiled
-def without_control(powers: Tensor, mean: Vector, dt: float) -> tuple[Matrix, Matrix, Matrix]:
+def propagate_without_control(powers: Tensor, mean: Vector, dt: float) -> tuple[Matrix, Matrix, Matrix]:
     """Return states (N + 1, n), positions (N, 2) and course (4, N + 1), velocities per step of dt [s], of a mean (n,) alone."""
     times, n, _ = powers.shape
     states, positions, course = np.zeros((times, n)), np.empty((times - 1, 2)), np.empty((4, times))
@@ -36,7 +36,7 @@ def without_control(powers: Tensor, mean: Vector, dt: float) -> tuple[Matrix, Ma
 
 
 @compiled
-def squares(states: Tensor, end: Vector, way: Vector) -> Vector:
+def variance_weights(states: Tensor, end: Vector, way: Vector) -> Vector:
     """Return d (2N,), where d.u^2 is what a control's noise u adds to sum_i end_i X_i(N)^2 + way_i sum_{t < N} X_i(t)^2.
 
     states (n, 2, N + 1): responses as in `driven`; end, way (n,).
@@ -57,7 +57,7 @@ def squares(states: Tensor, end: Vector, way: Vector) -> Vector:
 
 
 @compiled
-def end_rows(last: Matrix, missing: Vector, fixed: Flags, weights: Vector) -> tuple[Matrix, Vector, Vector]:
+def build_goal_rows(last: Matrix, missing: Vector, fixed: Flags, weights: Vector) -> tuple[Matrix, Vector, Vector]:
     """Return the goal rows of the last step: those of fixed states (n,), then those with a weight (n,); targets and softness.
 
     last (n, 2N): what the states there owe to the control; missing (n,): what they are short of the goal without any.
@@ -78,7 +78,7 @@ def end_rows(last: Matrix, missing: Vector, fixed: Flags, weights: Vector) -> tu
 
 
 @compiled
-def inside(
+def find_inside_margin(
     position: Vector, covariance: Matrix, centre: Matrix, size_mean: Vector, size_variance: Vector, own: Tensor, wanted_k: float
 ) -> Flags:
     """Tell for each circle (m,) whether a position (n,) of a covariance (n, n) has less than the wanted k, with own (m, 2, 2)."""
@@ -86,40 +86,42 @@ def inside(
     for j in range(len(centre)):
         x, y = position[0] - centre[j, 0], position[1] - centre[j, 1]
         xx, yy, xy = covariance[0, 0] + own[j, 0, 0], covariance[1, 1] + own[j, 1, 1], covariance[0, 1] + own[j, 0, 1]
-        flags[j] = k_of(size_mean[j] - x * x - y * y, variance_of(x, y, xx, yy, xy, size_variance[j])) < wanted_k
+        flags[j] = safety_factor(size_mean[j] - x * x - y * y, variance_at(x, y, xx, yy, xy, size_variance[j])) < wanted_k
     return flags
 
 
 @compiled
-def first_alike(centre: Matrix, drift: Matrix, reach: Vector, tolerance: float) -> Indices:
+def find_duplicates(centre: Matrix, drift: Matrix, reach: Vector, tolerance: float) -> Indices:
     """Return for each circle the first that differs by less than a tolerance [m] in place, drift per step and reach, (m,)."""
     first = np.arange(len(reach))
     for i in range(len(reach)):
         for j in range(i):
-            apart = abs(reach[i] - reach[j])
+            largest_difference = abs(reach[i] - reach[j])
             for axis in range(2):
-                apart = max(apart, abs(centre[i, axis] - centre[j, axis]), abs(drift[i, axis] - drift[j, axis]))
-            if apart < tolerance:
+                largest_difference = max(
+                    largest_difference, abs(centre[i, axis] - centre[j, axis]), abs(drift[i, axis] - drift[j, axis])
+                )
+            if largest_difference < tolerance:
                 first[i] = j
                 break
     return first
 
 
 @compiled
-def moved(position: Tensor, control: Vector, free: Matrix) -> Matrix:
+def mean_positions(position: Tensor, control: Vector, free: Matrix) -> Matrix:
     """Return free + S u, (N, 2), for the responses (2, 2, N + 1) of the position."""
-    positions: Matrix = free + driven(position, control)[:, 1:].T
+    positions: Matrix = free + apply_impulse_response(position, control)[:, 1:].T
     return positions
 
 
 @compiled
 def apart(position: Tensor, control: Vector, other: Vector) -> float:
     """Return the largest difference in x or y between the means of two controls (2N,) [m]; position (2, 2, N + 1)."""
-    return float(np.abs(driven(position, control - other)).max())
+    return float(np.abs(apply_impulse_response(position, control - other)).max())
 
 
 @compiled
-def spread(maps: Tensor, noise_variance: Vector, control: Vector, free: Matrix) -> Matrix:
+def position_variances(maps: Tensor, noise_variance: Vector, control: Vector, free: Matrix) -> Matrix:
     """Return the rows xx, yy, xy of free + V u^2, (3, N), for `Horizon.maps` (5, 2, N + 1) and c^2 (2N,)."""
-    variance: Matrix = free + driven(maps[2:], noise_variance * control * control)[:, 1:]
+    variance: Matrix = free + apply_impulse_response(maps[2:], noise_variance * control * control)[:, 1:]
     return variance

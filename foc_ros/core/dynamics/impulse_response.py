@@ -13,7 +13,7 @@ from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled
 
 
 @compiled
-def driven(responses: Tensor, control: Vector) -> Matrix:
+def apply_impulse_response(responses: Tensor, control: Vector) -> Matrix:
     """Return the q quantities at steps 0..N, (q, N + 1), from responses (q, 2, N + 1) and a stacked control (2N,)."""
     quantities, _, times = responses.shape
     moved = np.zeros((quantities, times))

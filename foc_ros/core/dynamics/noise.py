@@ -15,24 +15,24 @@ from foc_ros.core.types import Array
 from .plants import Horizon
 
 
-def stacked_noise(noise: Array, steps: int) -> Array:
+def stack_noise(noise: Array, steps: int) -> Array:
     """Return c for every entry of u, (2N,): noise (2,) per channel, drawn once per step."""
     return np.repeat(np.asarray(noise, dtype=float), steps)
 
 
-def noise_per_step(noise_at_reference: Array, reference_step: float, dt: float) -> Array:
+def scale_noise(noise_at_reference: Array, reference_step: float, dt: float) -> Array:
     """Scale c from a reference step [s] to dt [s]: c sqrt(reference / dt), so that the noise power per second stays."""
     scaled: Array = np.asarray(noise_at_reference, dtype=float) * np.sqrt(reference_step / dt)
     return scaled
 
 
-def state_covariance(horizon: Horizon, free: Array, noise_variance: Array, control: Array) -> Array:
+def propagate_covariance(horizon: Horizon, free: Array, noise_variance: Array, control: Array) -> Array:
     """Return P at steps 0..N, (N + 1, n, n): free part (N + 1, n, n), c^2 (2N,), control stacked (2N,)."""
-    return accumulated(horizon.powers[1], np.ascontiguousarray(horizon.states[..., 1]), noise_variance, control, free)
+    return accumulate_covariance(horizon.powers[1], np.ascontiguousarray(horizon.states[..., 1]), noise_variance, control, free)
 
 
 @compiled
-def accumulated(A: Matrix, B: Matrix, noise_variance: Vector, control: Vector, free: Tensor) -> Tensor:
+def accumulate_covariance(A: Matrix, B: Matrix, noise_variance: Vector, control: Vector, free: Tensor) -> Tensor:
     """Return P(t + 1) = A P(t) A' + B diag(c^2 u_t^2) B' from P(0) = 0, plus a free part, (N + 1, n, n): A (n, n), B (n, 2)."""
     n, steps, variance = len(A), len(control) // 2, noise_variance * control * control
     covariance, moved = np.zeros((steps + 1, n, n)), np.empty((n, n))

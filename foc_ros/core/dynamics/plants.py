@@ -140,7 +140,7 @@ def _returning(stacked: Horizon, fixed: bytes) -> tuple[Array, Array]:
     return back - to_goal @ (E @ back), of_each_state
 
 
-def horizon(plant: Plant, steps: int) -> Horizon:
+def condense(plant: Plant, steps: int) -> Horizon:
     """Stack a plant over `steps` >= 1 steps."""
     n = len(plant.A)
     powers = np.empty((steps + 1, n, n))
@@ -174,7 +174,7 @@ class _Scaled(Horizon):
 
 @lru_cache(maxsize=CACHED_HORIZONS)
 def _unit_horizon(steps: int) -> Horizon:
-    return horizon(triple_integrator(1.0), steps)
+    return condense(triple_integrator(1.0), steps)
 
 
 @lru_cache(maxsize=CACHED_HORIZONS)

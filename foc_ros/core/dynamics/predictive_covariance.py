@@ -36,7 +36,7 @@ from foc_ros.core.types import Array, HandState, Solution
 from .replanning import triple_integrator_error_covariance, triple_integrator_goal_map, triple_integrator_process_covariance
 
 
-def doubt(hand: HandState, dt: float, steps: int, config: Config) -> Array:
+def predictive_covariance(hand: HandState, dt: float, steps: int, config: Config) -> Array:
     """Return the covariance (N + 1, 6, 6) at steps 0..N that plans of one duration have in common: all but that of the time."""
     kind = dt, steps, is_passing(config.duration)
     unsure = triple_integrator_error_covariance(hand.covariance, *kind)
@@ -48,16 +48,16 @@ def doubt(hand: HandState, dt: float, steps: int, config: Config) -> Array:
     return unsure
 
 
-def timing_doubts(solution: Solution, at_rest: bool, config: DurationConfig) -> Iterator[Array]:
+def timing_covariances(solution: Solution, at_rest: bool, config: DurationConfig) -> Iterator[Array]:
     """Yield the covariances (N + 1, 6, 6) at steps 0..N that come of not knowing when a plan begins and how long it takes."""
     if config.spread > 0.0:
-        moved = config.spread * lateness(solution, is_passing(config))
+        moved = config.spread * duration_sensitivity(solution, is_passing(config))
         yield moved[:, :, None] * moved[:, None, :]
     if at_rest and config.wait_s > 0.0:
-        yield waiting(solution, config.wait_s)
+        yield onset_delay_covariance(solution, config.wait_s)
 
 
-def waiting(solution: Solution, wait_s: float) -> Array:
+def onset_delay_covariance(solution: Solution, wait_s: float) -> Array:
     """Return the covariance (N + 1, 6, 6), about a plan from rest, of beginning it after an exponentially distributed time."""
     states = solution.mean - solution.mean[0]
     products = states[:, :, None] * states[:, None, :]
@@ -70,7 +70,7 @@ def waiting(solution: Solution, wait_s: float) -> Array:
     return covariance
 
 
-def lateness(solution: Solution, passing: bool) -> Array:
+def duration_sensitivity(solution: Solution, passing: bool) -> Array:
     """Return by how much a plan's states at steps 0..N, (N + 1, 6), lag behind for each share of T that it takes longer."""
     # the control is that of the middle of its step: in 50 steps of a reach from rest, the last is 7 % below the jerk at the end
     jerk = 1.5 * solution.control[-1] - 0.5 * solution.control[-2]

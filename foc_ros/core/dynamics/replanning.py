@@ -25,7 +25,7 @@ from foc_ros.core.estimation.kalman_filter import gramian
 from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled
 from foc_ros.core.types import Array
 
-from .plants import CACHED_HORIZONS, Horizon, horizon, state_scale, states_at_goal, triple_integrator
+from .plants import CACHED_HORIZONS, Horizon, condense, state_scale, states_at_goal, triple_integrator
 
 STATES = 6
 """Of the triple integrator: a number that the compiler knows makes `carried` twice as fast."""
@@ -53,12 +53,12 @@ def replanned_error_map(stacked: Horizon, passing: bool = False) -> Array:
 
 @lru_cache(maxsize=CACHED_HORIZONS)
 def _unit_goal_map(steps: int, passing: bool) -> Array:
-    return goal_map(horizon(triple_integrator(1.0), steps), passing)
+    return goal_map(condense(triple_integrator(1.0), steps), passing)
 
 
 @lru_cache(maxsize=CACHED_HORIZONS)
 def _unit_error_map(steps: int, passing: bool) -> Array:
-    return replanned_error_map(horizon(triple_integrator(1.0), steps), passing)
+    return replanned_error_map(condense(triple_integrator(1.0), steps), passing)
 
 
 def triple_integrator_goal_map(dt: float, steps: int, passing: bool = False) -> Array:
@@ -109,7 +109,7 @@ def _unit_process_covariance(steps: int, passing: bool) -> Array:
     covariance = np.zeros((steps + 1, 6, 6))
     for step in range(steps):
         left = steps - step - 1
-        error_map = replanned_error_map(horizon(triple_integrator(1.0), left), passing) if left else np.eye(6)[None]
+        error_map = replanned_error_map(condense(triple_integrator(1.0), left), passing) if left else np.eye(6)[None]
         covariance[step + 1 :] += error_map @ added @ error_map.swapaxes(1, 2)
     return covariance
 

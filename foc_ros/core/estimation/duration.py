@@ -52,13 +52,13 @@ def is_passing(config: DurationConfig) -> bool:
     return config.arrival == 'passing'
 
 
-def way_times(
+def candidate_durations(
     hand: HandState, candidates: Sequence[Candidate], goal_times: Sequence[float], config: DurationConfig
 ) -> list[float]:
     """Return the time [s] of each way round: that of its goal (g,) [s], or with model `cost_of_time` its own."""
     if config.model != 'cost_of_time':
         return [goal_times[candidate.goal] for candidate in candidates]
-    return [_least_cost(hand, each.length, _heading(each.guess), config) for each in candidates]
+    return [_least_cost_duration(hand, each.length, _heading(each.guess), config) for each in candidates]
 
 
 def time_price(config: DurationConfig) -> float:
@@ -72,13 +72,13 @@ def _heading(guess: Array) -> Array:
     return way / max(math.hypot(*way), SHORTEST_M)
 
 
-def _least_cost(hand: HandState, length: float, heading: Array, config: DurationConfig) -> float:
+def _least_cost_duration(hand: HandState, length: float, heading: Array, config: DurationConfig) -> float:
     speed, acceleration = float(hand.mean[2:4] @ heading), float(hand.mean[4:6] @ heading)
     bounds = config.min_time_to_go_s, config.max_time_to_go_s
     return least_cost_time(length, speed, acceleration, config.time_cost, *bounds, is_passing(config))
 
 
-def times_to_go(hand: HandState, goals: Array, config: DurationConfig) -> list[float]:
+def estimate_times_to_go(hand: HandState, goals: Array, config: DurationConfig) -> list[float]:
     """Return the time [s] until the hand would reach each goal (g, 2) [m], between `min_time_to_go_s` and `max_time_to_go_s`.
 
     In a movement: the duration from where it began, less the time since then; after `PACE_AFTER` of it the durations are
@@ -89,7 +89,7 @@ def times_to_go(hand: HandState, goals: Array, config: DurationConfig) -> list[f
     distances = [math.dist(here, goal) for goal in places]
     if config.model == 'cost_of_time':
         lines = [np.linspace(hand.mean[:2], goal, 6) for goal in goals]
-        return [_least_cost(hand, away, _heading(line), config) for away, line in zip(distances, lines, strict=True)]
+        return [_least_cost_duration(hand, away, _heading(line), config) for away, line in zip(distances, lines, strict=True)]
     if hand.onset_ns is None or hand.onset_position is None:
         expected = [movement_time(distance, config) for distance in distances]
     else:

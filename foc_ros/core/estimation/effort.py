@@ -26,8 +26,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from foc_ros.core.kernels import Matrix, Vector, compiled
-from foc_ros.core.linear_algebra import cholesky, combined, lower_solved
-from foc_ros.core.types import NANOSECONDS, Array, Record, fixed
+from foc_ros.core.linear_algebra import factorise_cholesky, multiply, solve_lower
+from foc_ros.core.types import NANOSECONDS, Array, Record, as_readonly
 
 DEGREE = 5
 LEAST_SAMPLES = 8
@@ -69,17 +69,17 @@ class Effort(Record):
     square: float = 0.0
 
 
-def advanced(effort: Effort, stamp_ns: int, position: Array, stddev: float) -> Effort:
+def add_sample(effort: Effort, stamp_ns: int, position: Array, stddev: float) -> Effort:
     """Take the movement's next sample; stddev: of a measured position [m].
 
     A sample that the stretch's quintic does not explain ends the stretch, and belongs to none: it may be an outlier.
     """
     start_ns, origin = (stamp_ns, position) if effort.start_ns is None else (effort.start_ns, effort.origin)
     seconds, z = (stamp_ns - start_ns) / NANOSECONDS, position - origin
-    powers, products = map(fixed, summed(effort.powers, effort.products, seconds, z))
+    powers, products = map(as_readonly, add_to_sums(effort.powers, effort.products, seconds, z))
     square, spent = effort.square + float(z @ z), effort.spent
     if powers[0] >= LEAST_SAMPLES and seconds >= LEAST_TIME_S:
-        told, added, explained = fitted(powers, products, square, seconds, stddev)
+        told, added, explained = fit_quintic(powers, products, square, seconds, stddev)
         if told and not explained:
             return Effort(spent=effort.spent, before=effort.spent)
         spent = effort.before + added if told else spent
@@ -87,7 +87,7 @@ def advanced(effort: Effort, stamp_ns: int, position: Array, stddev: float) -> E
 
 
 @compiled
-def summed(powers: Vector, products: Matrix, seconds: float, z: Vector) -> tuple[Vector, Matrix]:
+def add_to_sums(powers: Vector, products: Matrix, seconds: float, z: Vector) -> tuple[Vector, Matrix]:
     """Return the sums of `Effort` with one more sample."""
     powers, products, power = powers.copy(), products.copy(), 1.0
     for k in range(len(powers)):
@@ -99,7 +99,7 @@ def summed(powers: Vector, products: Matrix, seconds: float, z: Vector) -> tuple
 
 
 @compiled
-def fitted(powers: Vector, products: Matrix, square: float, T: float, stddev: float) -> tuple[bool, float, bool]:
+def fit_quintic(powers: Vector, products: Matrix, square: float, T: float, stddev: float) -> tuple[bool, float, bool]:
     """Return whether a stretch of T [s] tells the degrees apart, its effort [m^2/s^5], and whether its quintic explains it."""
     n, count = len(products), powers[0]
     gram, right = np.empty((n, n)), np.empty((n, 2))
@@ -107,19 +107,19 @@ def fitted(powers: Vector, products: Matrix, square: float, T: float, stddev: fl
         right[j] = products[j] / T**j
         for k in range(n):
             gram[j, k] = powers[j + k] / T ** (j + k)
-    root = cholesky(gram, 0.0)
+    root = factorise_cholesky(gram, 0.0)
     for k in range(n):
         if not root[k, k] ** 2 > TOLD_APART * gram[k, k]:
             return False, 0.0, False
-    y = lower_solved(root, right)
+    y = solve_lower(root, right)
     energy = (y**2).sum(axis=1)
     freedom = 2.0 * (count - n)
     residual, rounding = max(square - energy.sum(), 0.0) / freedom, ROUNDING * square / freedom
     noise = 2.0 * max(stddev**2, residual, rounding)
-    jerk = lower_solved(root, np.ascontiguousarray(lower_solved(root, _H).T))
+    jerk = solve_lower(root, np.ascontiguousarray(solve_lower(root, _H).T))
     length_squared = 12.0 * energy[1:].sum() / count
     for k in range(n):
         told = k >= 3 and noise * jerk[k, k] <= NOISE_SHARE * 720.0 * length_squared
         y[k] *= max(1.0 - SHRINKAGE * noise / max(energy[k], noise), 0.0) if told else 0.0
-    spent = max((y * combined(jerk, y)).sum(), 0.0) / T**5
+    spent = max((y * multiply(jerk, y)).sum(), 0.0) / T**5
     return True, spent, residual <= (MISFIT * stddev) ** 2 + rounding

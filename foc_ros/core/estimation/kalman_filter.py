@@ -30,17 +30,17 @@ import numpy as np
 
 from foc_ros.core.config import EstimatorConfig
 from foc_ros.core.kernels import Matrix, Vector, compiled
-from foc_ros.core.linear_algebra import combined, row_products
-from foc_ros.core.sample_status import Verdict
-from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, fixed
+from foc_ros.core.linear_algebra import multiply, multiply_transposed
+from foc_ros.core.sample_status import SampleStatus
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, as_readonly
 
-from .effort import Effort, advanced
+from .effort import Effort, add_sample
 
 ONSET_STDDEVS = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class Track(HandState):
+class FilterState(HandState):
     """A hand state, and what else the estimator remembers.
 
     root (3, 3): lower triangular root of one axis' covariance; effort: the samples since onset, as far as the effort needs them.
@@ -54,28 +54,28 @@ class Track(HandState):
 class Update:
     """The estimator's answer: the state to hand in next time, and what became of the sample."""
 
-    state: Track
-    verdict: Verdict
+    state: FilterState
+    verdict: SampleStatus
 
 
-def update(state: Track | None, sample: HandSample, config: EstimatorConfig) -> Update:
+def update(state: FilterState | None, sample: HandSample, config: EstimatorConfig) -> Update:
     """Take one sample into the filter.
 
     state: of the last update, None at the start. A sample of the same stamp, or late by no more than `gap_s`, is dropped: the
     state is returned as it was. A stamp farther back, or farther ahead than `gap_s`, starts the filter anew.
     """
     if state is None:
-        return Update(_first(sample, config), Verdict.ACCEPTED)
+        return Update(_first(sample, config), SampleStatus.ACCEPTED)
     dt = (sample.stamp_ns - state.stamp_ns) / NANOSECONDS
     if dt == 0.0:
-        return Update(state, Verdict.DUPLICATE)
+        return Update(state, SampleStatus.DUPLICATE)
     if dt < -config.gap_s:
-        return Update(_first(sample, config), Verdict.RESTARTED_BACKWARD)
+        return Update(_first(sample, config), SampleStatus.RESTARTED_BACKWARD)
     if dt < 0.0:
-        return Update(state, Verdict.LATE)
+        return Update(state, SampleStatus.LATE)
     if dt > config.gap_s:
-        return Update(_first(sample, config), Verdict.RESTARTED_GAP)
-    return Update(_followed(state, sample, dt, config), Verdict.ACCEPTED)
+        return Update(_first(sample, config), SampleStatus.RESTARTED_GAP)
+    return Update(_followed(state, sample, dt, config), SampleStatus.ACCEPTED)
 
 
 @compiled
@@ -100,7 +100,7 @@ _UNIT_ROOT = np.linalg.cholesky(gramian(1.0))
 
 
 @compiled
-def triangular(columns: Matrix) -> Matrix:
+def triangularise(columns: Matrix) -> Matrix:
     """Return the lower triangular L (n, n) with L L' = M M' for columns M (n, q), q >= n: M turned by plane rotations."""
     turned = columns.copy()
     n, q = turned.shape
@@ -125,45 +125,45 @@ def both_axes(covariance: Matrix) -> Matrix:
 
 
 @compiled
-def filtered(
+def filter_step(
     mean: Vector, root: Matrix, dt: float, jerk_density: float, stddev: float, position: Vector
 ) -> tuple[Vector, Matrix, Matrix]:
     """Return mean (6,), covariance (6, 6) and root (3, 3) a time dt [s] on, corrected by a position (2,) of a deviation [m]."""
     step, columns = transition(dt), np.empty((3, 6))
-    columns[:, :3] = combined(step, root)
+    columns[:, :3] = multiply(step, root)
     for i in range(3):
         columns[i, 3:] = jerk_density * dt ** (2.5 - i) * _UNIT_ROOT[i]
-    corrected = triangular(columns)
+    corrected = triangularise(columns)
     first = corrected[0, 0]
     deviation = np.hypot(first, stddev)
-    states = combined(step, mean.reshape(3, 2))
+    states = multiply(step, mean.reshape(3, 2))
     missed = position - states[0]
     for i in range(3):
         states[i] += corrected[i, 0] * (first / deviation / deviation) * missed
         corrected[i, 0] *= stddev / deviation
-    return states.ravel(), both_axes(row_products(corrected, corrected)), corrected
+    return states.ravel(), both_axes(multiply_transposed(corrected, corrected)), corrected
 
 
-def _first(sample: HandSample, config: EstimatorConfig) -> Track:
+def _first(sample: HandSample, config: EstimatorConfig) -> FilterState:
     """Start from one position."""
     root = np.zeros((3, 3))
     root[0, 0] = config.position_stddev
     root[1:, 1:] = config.jerk_density * np.linalg.cholesky(gramian(config.gap_s)[1:, 1:])
     mean = np.concatenate([sample.position, np.zeros(4)])
-    return Track(sample.stamp_ns, mean, both_axes(root @ root.T), sample.height, sample.frame_id, root=root)
+    return FilterState(sample.stamp_ns, mean, both_axes(root @ root.T), sample.height, sample.frame_id, root=root)
 
 
-def _followed(state: Track, sample: HandSample, dt: float, config: EstimatorConfig) -> Track:
+def _followed(state: FilterState, sample: HandSample, dt: float, config: EstimatorConfig) -> FilterState:
     """Predict to the sample's stamp, correct by its position, and see what becomes of the movement."""
     settings = config.jerk_density, config.position_stddev
-    mean, covariance, root = map(fixed, filtered(state.mean, state.root, dt, *settings, sample.position))
+    mean, covariance, root = map(as_readonly, filter_step(state.mean, state.root, dt, *settings, sample.position))
     onset_ns, onset_position, effort = _movement(state, sample, mean, covariance, config)
     hand = sample.stamp_ns, mean, covariance, sample.height, sample.frame_id
-    return Track(*hand, onset_ns, onset_position, effort.spent, root, effort)
+    return FilterState(*hand, onset_ns, onset_position, effort.spent, root, effort)
 
 
 def _movement(
-    state: Track, sample: HandSample, mean: Array, covariance: Array, config: EstimatorConfig
+    state: FilterState, sample: HandSample, mean: Array, covariance: Array, config: EstimatorConfig
 ) -> tuple[int | None, Array | None, Effort]:
     """Begin, go on with, or end a movement: return its onset and where that was, None at rest, and its effort."""
     onset_ns, onset_position, speed = state.onset_ns, state.onset_position, math.hypot(mean[2], mean[3])
@@ -173,4 +173,4 @@ def _movement(
         onset_ns, onset_position = sample.stamp_ns, mean[:2]
     elif speed < config.onset_speed / 2.0:
         return None, None, Effort()
-    return onset_ns, onset_position, advanced(state.effort, sample.stamp_ns, sample.position, config.position_stddev)
+    return onset_ns, onset_position, add_sample(state.effort, sample.stamp_ns, sample.position, config.position_stddev)

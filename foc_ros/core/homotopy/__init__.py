@@ -2,6 +2,6 @@
 
 from .search import Search, search
 from .shown import named_obstacles, timed
-from .sides import path_sides, same_way, swept, swept_angles
+from .sides import compute_swept_angles, is_same_class, path_sides, sweep_angles
 
-__all__ = ['Search', 'named_obstacles', 'path_sides', 'same_way', 'search', 'swept', 'swept_angles', 'timed']
+__all__ = ['Search', 'compute_swept_angles', 'is_same_class', 'named_obstacles', 'path_sides', 'search', 'sweep_angles', 'timed']

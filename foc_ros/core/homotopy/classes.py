@@ -13,10 +13,10 @@ from foc_ros.core.kernels import Matrix
 from foc_ros.core.types import LEFT, RIGHT
 
 from .circles import GRAZE
-from .levels import MOST, Level, Levels
+from .levels import MOST, IncrementalRoadmap, RoadmapLevel
 from .names import Names
-from .scene import Scene
-from .sides import swept_angles
+from .scene import SearchScene
+from .sides import compute_swept_angles
 from .taut import spaced
 from .ways import shortest_ways
 
@@ -51,7 +51,7 @@ class Quest(NamedTuple):
     ways to one goal are usually asked for.
     """
 
-    scene: Scene
+    scene: SearchScene
     velocity: complex
     names: Names
     states: int
@@ -64,7 +64,7 @@ class Classes:
     none: whether none has been found so far.
     """
 
-    def __init__(self, quest: Quest, levels: Levels, goal: int, notes: dict[str, int]) -> None:
+    def __init__(self, quest: Quest, levels: IncrementalRoadmap, goal: int, notes: dict[str, int]) -> None:
         self._quest, self._levels, self._goal, self._notes, self.none = quest, levels, goal, notes, True
         named, names = quest.scene.named[goal].tolist(), quest.names
         self._named = [row for row in names.order if named[row]]
@@ -101,7 +101,7 @@ class Classes:
                     return
                 level = levels.more(level, named)
 
-    def _ranked(self, level: Level, places: list[int], bound: float, everyone: int) -> Iterator[Found]:
+    def _ranked(self, level: RoadmapLevel, places: list[int], bound: float, everyone: int) -> Iterator[Found]:
         """Yield the ways over a level, in which the named circles have these places, by their rank."""
         scene, velocity, _, states, usual = self._quest
         circles, runs, *_ = level.roadmap
@@ -125,17 +125,17 @@ class Classes:
                 return
             given, most = len(keys), 2 * most
 
-    def _completed(self, told: list[int], level: Level, pieces: Matrix) -> list[int]:
+    def _completed(self, told: list[int], level: RoadmapLevel, pieces: Matrix) -> list[int]:
         """Return sides of all named circles: of those that a level does not hold, by the angle that the path sweeps."""
         line, centres = spaced(pieces, FINENESS), self._quest.scene.centre[self._named]
-        swept = swept_angles(line.view(float).reshape(-1, 2), centres.view(float).reshape(-1, 2)).tolist()
+        swept = compute_swept_angles(line.view(float).reshape(-1, 2), centres.view(float).reshape(-1, 2)).tolist()
         known = iter(told)
         return [
             next(known) if row in level.place else LEFT if angle < 0.0 else RIGHT
             for row, angle in zip(self._named, swept, strict=True)
         ]
 
-    def _met(self, found: Found, level: Level) -> list[int]:
+    def _met(self, found: Found, level: RoadmapLevel) -> list[int]:
         """Return the circles that a path meets and its roadmap does not hold."""
         scene = self._quest.scene
         others = np.delete(np.arange(len(scene.centre)), list(level.place))

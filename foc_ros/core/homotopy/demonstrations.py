@@ -29,7 +29,7 @@ MOST = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Way(Record):
+class Demonstration(Record):
     """A demonstration: frame; ids, centre (n, 2) [m] of the obstacles that the path (m, 2) [m] passed, and on which sides."""
 
     frame_id: str
@@ -47,7 +47,7 @@ class Way(Record):
         return bool((np.hypot(*apart.T) <= NEAR).all())
 
 
-def demonstrated(frame_id: str, path: Array, obstacles: Obstacles) -> Way:
+def record_demonstration(frame_id: str, path: Array, obstacles: Obstacles) -> Demonstration:
     """Remember a path (m, 2) [m], m >= 2, by POINTS points at equal distances, with the sides that it really took."""
     length = _lengths(path)
     at = np.linspace(0.0, length[-1], POINTS)
@@ -55,10 +55,10 @@ def demonstrated(frame_id: str, path: Array, obstacles: Obstacles) -> Way:
     sides = path_sides(evenly, obstacles)
     rows = sorted((row for row, identity in enumerate(obstacles.ids) if identity in sides), key=obstacles.ids.__getitem__)
     ids = tuple(obstacles.ids[row] for row in rows)
-    return Way(frame_id, ids, tuple(sides[identity] for identity in ids), obstacles.centre[rows].round(DIGITS), evenly)
+    return Demonstration(frame_id, ids, tuple(sides[identity] for identity in ids), obstacles.centre[rows].round(DIGITS), evenly)
 
 
-def same(one: Way, other: Way) -> bool:
+def is_same_demonstration(one: Demonstration, other: Demonstration) -> bool:
     """Tell whether two demonstrations say the same: obstacles, sides and end."""
     if (one.frame_id, one.ids, one.sides) != (other.frame_id, other.ids, other.sides):
         return False
@@ -66,8 +66,8 @@ def same(one: Way, other: Way) -> bool:
     return bool((np.hypot(*ends.T) <= NEAR).all())
 
 
-def recall(
-    library: Sequence[Way],
+def recall_demonstrations(
+    library: Sequence[Demonstration],
     hand: HandState,
     goals: Array,
     obstacles: Obstacles,
@@ -100,7 +100,7 @@ def recall(
 
 
 def _deformed(
-    way: Way,
+    way: Demonstration,
     hand: HandState,
     goals: Array,
     goal: int,

@@ -7,17 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from foc_ros.core.kernels import Flags, FlagTable, Indices, Matrix, Points, PointTable, Vector, compiled_exactly
-from foc_ros.core.types import Array, fixed
+from foc_ros.core.types import Array, as_readonly
 
 from .classes import Found
-from .scene import Scene
+from .scene import SearchScene
 from .taut import AT, HEADING_X, HEADING_Y, points_at, progress
 
 SLOPE = 0.5
 """A hand in a margin leaves it by this much for each metre on its way, and enters the margin of its goal likewise."""
 
 
-def guesses(scene: Scene, velocity: complex, chosen: Sequence[Found], duration_s: Sequence[float], steps: int) -> Array:
+def guesses(scene: SearchScene, velocity: complex, chosen: Sequence[Found], duration_s: Sequence[float], steps: int) -> Array:
     """Return positions of each class at steps 0..N, (w, N + 1, 2) [m], read-only.
 
     duration_s: to each goal [s]. Along the taut path, clear of all circles; a path that begins or ends in a margin gets out of
@@ -38,7 +38,7 @@ def guesses(scene: Scene, velocity: complex, chosen: Sequence[Found], duration_s
         scene.held,
         scene.near,
     )
-    return fixed(points.view(float).reshape(len(chosen), steps + 1, 2))
+    return as_readonly(points.view(float).reshape(len(chosen), steps + 1, 2))
 
 
 @compiled_exactly

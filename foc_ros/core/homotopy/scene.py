@@ -25,7 +25,7 @@ TOUCH = 1e-6
 """A circle that holds the hand or a goal shrinks to this part less than its distance."""
 
 
-class Scene(NamedTuple):
+class SearchScene(NamedTuple):
     """n obstacles as circles of radius + clearance, g goals, as seen from the hand.
 
     hand, goals (g,), centre (n,): complex [m]; wanted (n,): radius + clearance [m]; radius (g, n) on the way to each goal [m],
@@ -49,11 +49,11 @@ class Scene(NamedTuple):
     close: int
 
 
-def scene(hand: complex, goals: Complex, obstacles: Obstacles, clearance: float, previous: Sequence[Candidate]) -> Scene:
+def scene(hand: complex, goals: Complex, obstacles: Obstacles, clearance: float, previous: Sequence[Candidate]) -> SearchScene:
     """Look at the obstacles from the hand; previous: the candidates of the tick before."""
     centre: Complex = obstacles.centre.view(complex)[:, 0]
     before = passed_before(names_of(obstacles.ids), previous)
-    return Scene(hand, centre, *looked_at(hand, goals, centre, obstacles.radius, clearance, *before))
+    return SearchScene(hand, centre, *looked_at(hand, goals, centre, obstacles.radius, clearance, *before))
 
 
 @compiled_exactly

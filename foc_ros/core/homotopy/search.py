@@ -13,7 +13,7 @@ from foc_ros.core.types import Array, Candidate, Obstacles
 
 from .classes import NOTES, Classes, Quest
 from .guesses import guesses
-from .levels import Levels
+from .levels import IncrementalRoadmap
 from .names import names_of
 from .scene import scene
 from .selection import select
@@ -65,7 +65,7 @@ def search(
     hand, velocity, names = complex(x, y), complex(v_x, v_y), names_of(obstacles.ids)
     view = scene(hand, np.ascontiguousarray(goals, dtype=float).view(complex)[:, 0], obstacles, config.clearance, previous)
     sizes = [radius.tobytes() for radius in view.radius]
-    levels = {size: Levels(view, radius) for size, radius in zip(sizes, view.radius, strict=True)}
+    levels = {size: IncrementalRoadmap(view, radius) for size, radius in zip(sizes, view.radius, strict=True)}
     reachable = [goal for goal, inside in enumerate(view.inside.tolist()) if not inside]
     # a goal without a candidate could never be foretold
     count = max(config.max_candidates, min(len(reachable), MOST_CANDIDATES))

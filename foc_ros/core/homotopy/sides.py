@@ -11,13 +11,13 @@ from foc_ros.core.types import LEFT, RIGHT, Array, Obstacles
 from .crossing import TURN, direction, straight
 
 
-def swept_angles(path: Array, centres: Array) -> Array:
+def compute_swept_angles(path: Array, centres: Array) -> Array:
     """Angle that a path sweeps about each centre, anticlockwise positive.
 
     path (m, 2) [m], m >= 1; centres (n, 2), or (m, n, 2) where they move: the centre at each point of the path. Returns (n,)
     [rad]: exact where no step turns by pi or more about a centre.
     """
-    return swept(*_checked(path, centres))
+    return sweep_angles(*_checked(path, centres))
 
 
 def path_sides(path: Array, obstacles: Obstacles, centres: Array | None = None) -> dict[str, int]:
@@ -30,13 +30,13 @@ def path_sides(path: Array, obstacles: Obstacles, centres: Array | None = None) 
     not.
     """
     path, centres = _checked(path, obstacles.centre if centres is None else centres)
-    angles = swept(path, centres)
+    angles = sweep_angles(path, centres)
     sides = zip(obstacles.ids, angles.tolist(), passed(path, centres, angles).tolist(), strict=True)
     return {identity: LEFT if angle < 0.0 else RIGHT for identity, angle, is_passed in sides if is_passed}
 
 
 @compiled_exactly
-def swept(path: Matrix, centres: Tensor) -> Vector:
+def sweep_angles(path: Matrix, centres: Tensor) -> Vector:
     """Return the angle (n,) [rad] that a path (m, 2) sweeps about centres (m, n, 2), or (1, n, 2) where they stand still.
 
     It is the difference of the directions at the ends, and a turn for each crossing of the ray from the centre along -x.
@@ -56,7 +56,7 @@ def swept(path: Matrix, centres: Tensor) -> Vector:
 
 
 @compiled_exactly
-def same_way(angles: Vector, others: Vector) -> bool:
+def is_same_class(angles: Vector, others: Vector) -> bool:
     """Tell whether two paths with the same ends, which sweep angles (n,) each, pass all centres on the same sides."""
     return bool((np.abs(angles - others) < np.pi).all())
 

@@ -29,7 +29,7 @@ def eta_of_k(k: float) -> float:
 
 
 @compiled
-def courses(centre: Matrix, drift: Matrix, steps: int) -> Tensor:
+def centre_trajectories(centre: Matrix, drift: Matrix, steps: int) -> Tensor:
     """Mean centres at steps 0..N, step by step, (N + 1, n, 2) [m]; centre (n, 2): now; drift (n, 2): in a step."""
     moved = np.empty((steps + 1, len(centre), 2))
     for t in range(steps + 1):
@@ -40,9 +40,9 @@ def courses(centre: Matrix, drift: Matrix, steps: int) -> Tensor:
 
 
 @compiled
-def centres(centre: Matrix, drift: Matrix, steps: int) -> Tensor:
+def centres_by_obstacle(centre: Matrix, drift: Matrix, steps: int) -> Tensor:
     """Mean centres at steps 1..N, circle by circle, (n, N, 2) [m]: `courses`."""
-    return np.ascontiguousarray(courses(centre, drift, steps)[1:].transpose((1, 0, 2)))
+    return np.ascontiguousarray(centre_trajectories(centre, drift, steps)[1:].transpose((1, 0, 2)))
 
 
 def size_moments(obstacles: Obstacles) -> tuple[Array, Array]:
@@ -52,7 +52,7 @@ def size_moments(obstacles: Obstacles) -> tuple[Array, Array]:
 
 
 @compiled
-def expectation(offset: Tensor, position_minus_guess: Matrix, size_mean: Vector) -> Matrix:
+def expected_values(offset: Tensor, position_minus_guess: Matrix, size_mean: Vector) -> Matrix:
     """E[C] (n, N) [m^2]: offset d (n, N, 2), position_minus_guess (N, 2), size_mean E[R^2] (n,)."""
     n, steps, _ = offset.shape
     value = np.empty((n, steps))
@@ -64,13 +64,13 @@ def expectation(offset: Tensor, position_minus_guess: Matrix, size_mean: Vector)
 
 
 @compiled
-def variance_of(x: float, y: float, xx: float, yy: float, xy: float, size_variance: float) -> float:
+def variance_at(x: float, y: float, xx: float, yy: float, xy: float, size_variance: float) -> float:
     """Var[C] of one circle at one time: d = (x, y), and xx, yy, xy the covariance of the position relative to the centre."""
     return float(size_variance + 4 * (x * x * xx + y * y * yy + 2 * x * y * xy))
 
 
 @compiled
-def variance(offset: Tensor, covariance: Matrix, size_variance: Vector, centre_covariance: Tensor) -> Matrix:
+def variances(offset: Tensor, covariance: Matrix, size_variance: Vector, centre_covariance: Tensor) -> Matrix:
     """Var[C] (n, N) [m^4]: offset d (n, N, 2); covariance (3, N) of the position, xx, yy, xy; centre_covariance (n, 2, 2)."""
     n, steps, _ = offset.shape
     value = np.empty((n, steps))
@@ -78,12 +78,12 @@ def variance(offset: Tensor, covariance: Matrix, size_variance: Vector, centre_c
         own_xx, own_yy, own_xy = centre_covariance[j, 0, 0], centre_covariance[j, 1, 1], centre_covariance[j, 0, 1]
         for t in range(steps):
             xx, yy, xy = covariance[0, t] + own_xx, covariance[1, t] + own_yy, covariance[2, t] + own_xy
-            value[j, t] = variance_of(offset[j, t, 0], offset[j, t, 1], xx, yy, xy, size_variance[j])
+            value[j, t] = variance_at(offset[j, t, 0], offset[j, t, 1], xx, yy, xy, size_variance[j])
     return value
 
 
 @compiled
-def k_of(mean: float, variance: float) -> float:
+def safety_factor(mean: float, variance: float) -> float:
     """k = -E / sqrt(Var) of one circle at one time; +-CERTAIN_K where the variance is zero."""
     if variance > 0:
         return float(min(max(-mean / np.sqrt(variance), -CERTAIN_K), CERTAIN_K))
@@ -91,18 +91,18 @@ def k_of(mean: float, variance: float) -> float:
 
 
 @compiled
-def achieved_k(mean: Matrix, variance: Matrix) -> Matrix:
+def safety_factors(mean: Matrix, variance: Matrix) -> Matrix:
     """`k_of`, elementwise."""
     n, steps = mean.shape
     k = np.empty((n, steps))
     for j in range(n):
         for t in range(steps):
-            k[j, t] = k_of(mean[j, t], variance[j, t])
+            k[j, t] = safety_factor(mean[j, t], variance[j, t])
     return k
 
 
 @compiled
-def k_at(
+def safety_factors_at(
     positions: Matrix,
     covariance: Matrix,
     centres: Tensor,
@@ -112,5 +112,5 @@ def k_at(
 ) -> Matrix:
     """k achieved at mean positions (N, 2), linearised there: (n, N). centres (n, N, 2), covariance (3, N) of the position."""
     offset = np.expand_dims(positions, 0) - centres
-    mean = expectation(offset, np.zeros_like(positions), size_mean)
-    return achieved_k(mean, variance(offset, covariance, size_variance, centre_covariance))
+    mean = expected_values(offset, np.zeros_like(positions), size_mean)
+    return safety_factors(mean, variances(offset, covariance, size_variance, centre_covariance))

@@ -7,7 +7,7 @@ import numpy as np
 from foc_ros.core.types import Array, Obstacles
 
 
-def relevant(obstacles: Obstacles, hand: Array, goals: Array, duration_s: float, most: int) -> Obstacles:
+def cull_obstacles(obstacles: Obstacles, hand: Array, goals: Array, duration_s: float, most: int) -> Obstacles:
     """Return at most `most` obstacles, in their order: those that the shortest way to a goal touches with the least detour.
 
     hand (2,), goals (g, 2) [m], g >= 1. The detour over a circle is |hand - o| + |o - goal| - 2 r - |hand - goal|, for the goal

@@ -10,7 +10,7 @@ from foc_ros.core.types import NANOSECONDS, Array, Obstacles, Record, make_obsta
 
 
 @dataclass(frozen=True)
-class Part:
+class ObstacleSource:
     """What one source said last: its obstacles, each id once, the stamp they hold for (None: always), the frame they are in."""
 
     obstacles: Obstacles
@@ -26,11 +26,11 @@ class Part:
 class Scene(Record):
     """Obstacles by source, in order of arrival, and the goals (g, 2) [m], None until some were received."""
 
-    parts: dict[str, Part] = field(default_factory=dict)
+    parts: dict[str, ObstacleSource] = field(default_factory=dict)
     goals: Array | None = None
     goals_frame: str = ''
 
-    def with_part(self, source: str, part: Part) -> Scene:
+    def with_part(self, source: str, part: ObstacleSource) -> Scene:
         """Return the scene with one source's obstacles replaced; that source is now the latest."""
         parts = {name: held for name, held in self.parts.items() if name != source}
         return replace(self, parts=parts | {source: part})
@@ -48,7 +48,7 @@ class Scene(Record):
         latest = {name: row for row, name in enumerate(ids)}
         return _stacked(tables, ids).take(sorted(latest.values()))
 
-    def obstruction(self, stamp_ns: int, timeout_s: float) -> tuple[str, str] | None:
+    def not_ready_reason(self, stamp_ns: int, timeout_s: float) -> tuple[str, str] | None:
         """Return why nothing can be predicted at a hand's stamp [ns], as (kind, words with numbers); None where it can.
 
         A source is stale where its stamp is more than timeout_s [s] from the hand's, either way; 0: never. One stale source is

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from foc_ros.core.obstacles.chance_constraint import CERTAIN_K, eta_of_k, k_at
+from foc_ros.core.obstacles.chance_constraint import CERTAIN_K, eta_of_k, safety_factors_at
 from foc_ros.core.types import Array
 
 from .problem import Problem
@@ -29,9 +29,9 @@ class Assessment:
         return eta_of_k(self.smallest_k)
 
 
-def assess(problem: Problem, control: Array) -> Assessment:
+def evaluate_chance_constraint(problem: Problem, control: Array) -> Assessment:
     """Evaluate `achieved` at the control's own mean, at the steps. control: stacked (2N,)."""
-    k = achieved(problem, control)
+    k = evaluate_safety_factors(problem, control)
     if not k.size:
         return assessed(problem, CERTAIN_K, (0, 1.0))
     row, column = np.unravel_index(int(k.argmin()), k.shape)
@@ -46,12 +46,12 @@ def assessed(problem: Problem, smallest_k: float, place: tuple[int, float]) -> A
     return Assessment(smallest_k, place, tuple(identity for identity, is_inside in inside if is_inside))
 
 
-def achieved(problem: Problem, control: Array) -> Array:
+def evaluate_safety_factors(problem: Problem, control: Array) -> Array:
     """Return k = -E[C] / sqrt(Var[C]) per obstacle and step (m, N), linearised at the mean of a control (2N,).
 
     It is infinite where the hand is still leaving a margin (paper, equation 8).
     """
-    k = k_at(
+    k = safety_factors_at(
         problem.positions(control),
         problem.position_variance(control),
         problem.centres,

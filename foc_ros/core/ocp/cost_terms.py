@@ -5,29 +5,29 @@ from __future__ import annotations
 import numpy as np
 
 from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled
-from foc_ros.core.obstacles.chance_constraint import variance
+from foc_ros.core.obstacles.chance_constraint import variances
 from foc_ros.core.types import Array
 
 from .contacts.contacts import Contacts
 from .problem import Problem
-from .qp import depths, wanted_distance
+from .qp import compute_depths, wanted_distance
 
 NO_VIOLATION = 1e-7
 """Shortfall of a distance that is rounding [m]."""
 
 
-def costs(problem: Problem, control: Array, mean: Array, covariance: Array, lam: float) -> dict[str, float]:
+def compute_cost_terms(problem: Problem, control: Array, mean: Array, covariance: Array, lam: float) -> dict[str, float]:
     """Return every term of J_aug by name [m^2/s^6]: effort, weighted mean errors and variances, and the lambda term.
 
     control (2N,); mean (N + 1, n) and covariance (N + 1, n, n) that follow from it.
     """
-    mean_error, variance, summed = weighed(mean, covariance, problem.goal, problem.end_weights, problem.way_weights)
+    mean_error, variance, summed = weigh_errors(mean, covariance, problem.goal, problem.end_weights, problem.way_weights)
     effort = float(control @ control)
     return {'effort': effort, 'mean_error': mean_error, 'variance': variance, 'lambda_variance': lam * summed}
 
 
 @compiled
-def weighed(mean: Matrix, covariance: Tensor, goal: Vector, end: Vector, way: Vector) -> tuple[float, float, float]:
+def weigh_errors(mean: Matrix, covariance: Tensor, goal: Vector, end: Vector, way: Vector) -> tuple[float, float, float]:
     """Return the squared errors of a mean (N + 1, n) and the variances, with weights (n,), and the sum of those of x and y."""
     times, n = mean.shape
     squared, variance, summed = 0.0, 0.0, 0.0
@@ -40,20 +40,20 @@ def weighed(mean: Matrix, covariance: Tensor, goal: Vector, end: Vector, way: Ve
     return squared, variance, summed
 
 
-def shortfall(problem: Problem, mean: Array, tau: float) -> tuple[float, tuple[int, int] | None]:
+def compute_violation(problem: Problem, mean: Array, tau: float) -> tuple[float, tuple[int, int] | None]:
     """Return by how much a mean (N + 1, n) comes too near [m], and where: row of the obstacle and step (1..N) of the largest.
 
     Too near is less than sqrt(E[R^2] + tau) from a centre, or less than a hand that is leaving a margin has to keep; 0 and None
     where it never is.
     """
-    missing, row, step = nearest(mean, problem.centres, wanted_distance(problem, tau))
+    missing, row, step = find_deepest(mean, problem.centres, wanted_distance(problem, tau))
     return (missing, (row, step)) if missing > NO_VIOLATION else (0.0, None)
 
 
 @compiled
-def nearest(mean: Matrix, centres: Tensor, wanted: Matrix) -> tuple[float, int, int]:
+def find_deepest(mean: Matrix, centres: Tensor, wanted: Matrix) -> tuple[float, int, int]:
     """Return the largest `depths` of a mean (N + 1, n) [m], its circle, and its step 1..N."""
-    depth = depths(mean[1:, :2].copy(), centres, wanted)
+    depth = compute_depths(mean[1:, :2].copy(), centres, wanted)
     deepest, row, step = -np.inf, 0, 0
     for j in range(depth.shape[0]):
         for t in range(depth.shape[1]):
@@ -62,14 +62,14 @@ def nearest(mean: Matrix, centres: Tensor, wanted: Matrix) -> tuple[float, int, 
     return deepest, row, step
 
 
-def asked_for(problem: Problem, control: Array, contacts: Contacts, k: float) -> list[tuple[float, float]]:
+def equivalent_weights(problem: Problem, control: Array, contacts: Contacts, k: float) -> list[tuple[float, float]]:
     """Return the (tau [m^2], lambda [1/s^6]) of each contact, all at steps, that holds the surrogate at k.
 
     tau = k sqrt(Var[C]) is what E[C] has to be below zero by; lambda = y k |d| / sqrt(Var[C]), for a contact's force y [m/s^6],
     is what a variance along its normal, at its step, costs.
     """
     offset = problem.positions(control)[None] - problem.centres
-    var = variance(offset, problem.position_variance(control), problem.size[1], problem.obstacles.centre_covariance)
+    var = variances(offset, problem.position_variance(control), problem.size[1], problem.obstacles.centre_covariance)
     rows = contacts.obstacle, np.rint(contacts.time).astype(np.intp) - 1
     stddev, distance = np.sqrt(var[rows]), np.hypot(*offset[rows].T)
     lams = contacts.force * k * distance / np.maximum(stddev, 1e-12)

@@ -6,13 +6,13 @@ from typing import TypeAlias
 
 import numpy as np
 
-from foc_ros.core.dynamics.condensed import spread
+from foc_ros.core.dynamics.condensed import position_variances
 from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled
-from foc_ros.core.obstacles.chance_constraint import CERTAIN_K, k_of, variance
+from foc_ros.core.obstacles.chance_constraint import CERTAIN_K, safety_factor, variances
 from foc_ros.core.types import Array
 
 from .chance_evaluation import Assessment, assessed
-from .contacts.hermite import blend, place, place_row
+from .contacts.hermite import basis, interpolate, interpolation_row
 from .problem import Problem
 
 PARABOLAS = 8
@@ -22,21 +22,21 @@ MUCH_MORE = 0.5
 """By how much of 1 + k a step's k may be above the smallest that the smallest between the steps is looked for beside it."""
 
 
-Least: TypeAlias = tuple[float, int, float]
+MinimumSafetyFactor: TypeAlias = tuple[float, int, float]
 """The smallest k, with its obstacle row and time in steps."""
 
 
-def assess_between(problem: Problem, control: Array, least: Least | None = None) -> Assessment:
+def assess_between(problem: Problem, control: Array, least: MinimumSafetyFactor | None = None) -> Assessment:
     """Assess a control (2N,) at the steps and between them; least: the `smallest`, where it is known."""
-    k, row, time = smallest(problem, control) if least is None else least
+    k, row, time = find_minimum_safety_factor(problem, control) if least is None else least
     return assessed(problem, k, (row, time))
 
 
-def smallest(problem: Problem, control: Array) -> Least:
+def find_minimum_safety_factor(problem: Problem, control: Array) -> MinimumSafetyFactor:
     """Return the smallest k of a control (2N,), at the steps and between them; CERTAIN_K without obstacles."""
     control = np.ascontiguousarray(control, dtype=float)
     motion, _, centre, drift = problem.circles
-    return least_k(motion, problem.course(control), centre, drift, *problem.chances, control)
+    return minimum_safety_factor(motion, problem.course(control), centre, drift, *problem.chances, control)
 
 
 @compiled
@@ -45,7 +45,7 @@ def _carried(error_course: Tensor, initial_covariance: Matrix, time: float, x: f
     if not initial_covariance.any():
         return 0.0
     t = min(int(time), error_course.shape[1] - 2)
-    weight, total = blend(time - t, 0), 0.0
+    weight, total = basis(time - t, 0), 0.0
     row = np.zeros(len(initial_covariance))
     for axis in range(2):
         p, v, direction = error_course[axis], error_course[2 + axis], (x, y)[axis]
@@ -70,15 +70,15 @@ def _k_at_time(
     time: float,
 ) -> float:
     """Return k for one circle, its centre (2,) where it is at a time, from what the course's position owes to each control."""
-    at = place(course, time, 0)
+    at = interpolate(course, time, 0)
     x, y = at[0] - centre[0], at[1] - centre[1]
     # the variance of the distance's square along d is that of d.p: one row for both axes
-    row = place_row(motion, time, x, y)
+    row = interpolation_row(motion, time, x, y)
     var = x * x * centre_covariance[0, 0] + 2 * x * y * centre_covariance[0, 1] + y * y * centre_covariance[1, 1]
     for u in range(len(row)):
         var += row[u] * row[u] * control_variance[u]
     var += _carried(error_course, initial_covariance, time, x, y)
-    return float(k_of(size_mean - x * x - y * y, size_variance + 4 * var))
+    return float(safety_factor(size_mean - x * x - y * y, size_variance + 4 * var))
 
 
 @compiled
@@ -99,7 +99,7 @@ def _moments(
             x, y = course[0, t + 1] - centres[j, t, 0], course[1, t + 1] - centres[j, t, 1]
             offset[j, t, 0], offset[j, t, 1] = x, y
             mean[j, t] = size_mean[j] - x * x - y * y if t + 1.0 >= leaving[j] else -np.inf
-    return mean, variance(offset, covariance, size_variance, centre_covariance)
+    return mean, variances(offset, covariance, size_variance, centre_covariance)
 
 
 @compiled
@@ -109,7 +109,7 @@ def _is_above(bound: float, mean: float, variance: float) -> bool:
 
 
 @compiled
-def least_k(
+def minimum_safety_factor(
     motion: Tensor,
     course: Matrix,
     centre: Matrix,
@@ -132,14 +132,14 @@ def least_k(
     three times, closer and closer. leaving (m,): steps from now in which a circle does not count.
     """
     control_variance = noise_variance * control * control
-    covariance = spread(maps, noise_variance, control, free_variance)
+    covariance = position_variances(maps, noise_variance, control, free_variance)
     m, steps, _ = centres.shape
     mean, var = _moments(course, covariance, centres, size_mean, size_variance, centre_covariance, leaving)
     least, row, moment = np.inf, 0, 1.0
     for j in range(m):
         for t in range(steps):
             if not _is_above(least, mean[j, t], var[j, t]):
-                k = k_of(mean[j, t], var[j, t])
+                k = safety_factor(mean[j, t], var[j, t])
                 if k < least:
                     least, row, moment = k, j, t + 1.0
     near = least + MUCH_MORE * (1.0 + abs(least))
@@ -147,7 +147,11 @@ def least_k(
         for t in range(1, steps - 1):
             if _is_above(near, mean[j, t], var[j, t]):
                 continue
-            ka, kb, kc = k_of(mean[j, t - 1], var[j, t - 1]), k_of(mean[j, t], var[j, t]), k_of(mean[j, t + 1], var[j, t + 1])
+            ka, kb, kc = (
+                safety_factor(mean[j, t - 1], var[j, t - 1]),
+                safety_factor(mean[j, t], var[j, t]),
+                safety_factor(mean[j, t + 1], var[j, t + 1]),
+            )
             if not (kb <= ka and kb < kc and kb < near and ka < CERTAIN_K and kc < CERTAIN_K):
                 continue
             a, b, c = float(t), t + 1.0, t + 2.0

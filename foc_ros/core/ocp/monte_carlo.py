@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from foc_ros.core.dynamics.noise import stacked_noise
+from foc_ros.core.dynamics.noise import stack_noise
 from foc_ros.core.types import Array
 
 from .problem import Problem
@@ -56,7 +56,7 @@ def monte_carlo(problem: Problem, control: Array, samples: int, seed: int = 0) -
 def _clear(problem: Problem, control: Array, samples: int, generator: np.random.Generator) -> Array:
     """Whether each roll-out is outside each circle at each step, (samples, m, N) bool."""
     steps, obstacles = problem.horizon.steps, problem.obstacles
-    noise = stacked_noise(problem.noise, steps) * np.abs(control) * generator.standard_normal((samples, 2 * steps))
+    noise = stack_noise(problem.noise, steps) * np.abs(control) * generator.standard_normal((samples, 2 * steps))
     positions = problem.positions(control) + np.einsum('atu,su->sta', problem.horizon.position, noise)
     errors = _gaussian(problem.initial_covariance[None], samples, generator)[:, 0]
     positions += np.einsum('tij,sj->sti', problem.error_map[1:, :2], errors)

@@ -9,14 +9,23 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.dynamics.condensed import end_rows, extent, first_alike, inside, moved, spread, squares, without_control
-from foc_ros.core.dynamics.noise import stacked_noise
+from foc_ros.core.dynamics.condensed import (
+    build_goal_rows,
+    find_duplicates,
+    find_inside_margin,
+    mean_positions,
+    position_variances,
+    propagate_without_control,
+    scene_extent,
+    variance_weights,
+)
+from foc_ros.core.dynamics.noise import stack_noise
 from foc_ros.core.dynamics.plants import Horizon, states_at_goal
 from foc_ros.core.errors import SceneError
-from foc_ros.core.obstacles.chance_constraint import centres, courses, k_of_eta, size_moments
+from foc_ros.core.obstacles.chance_constraint import centre_trajectories, centres_by_obstacle, k_of_eta, size_moments
 from foc_ros.core.types import Array, Obstacles, Record
 
-from .contacts.hermite import course_of
+from .contacts.hermite import compute_trajectory
 
 BOTH = np.ones(2)
 ALIKE = 1e-6
@@ -66,12 +75,12 @@ class Problem(Record):
     def extent(self) -> float:
         """Size of the scene that tolerances are relative to: the way to the goal, or the largest circle if that is more [m]."""
         way_x, way_y, *_ = (self.goal - self.initial_mean).tolist()
-        return extent(way_x, way_y, self.obstacles.radius)
+        return scene_extent(way_x, way_y, self.obstacles.radius)
 
     @cached_property
     def without_control(self) -> tuple[Array, Array, Array]:
         """The mean without control: states at steps 0..N (N + 1, n), positions at steps 1..N (N, 2) [m], and `free_course`."""
-        return without_control(self.horizon.powers, self.initial_mean, self.horizon.dt)
+        return propagate_without_control(self.horizon.powers, self.initial_mean, self.horizon.dt)
 
     @property
     def free(self) -> Array:
@@ -138,17 +147,17 @@ class Problem(Record):
     @cached_property
     def centres(self) -> Array:
         """Mean centres of the obstacles at steps 1..N, (m, N, 2) [m]."""
-        return centres(self.obstacles.centre, self.drift, self.horizon.steps)
+        return centres_by_obstacle(self.obstacles.centre, self.drift, self.horizon.steps)
 
     @cached_property
     def courses(self) -> Array:
         """Mean centres of the obstacles at steps 0..N, step by step, (N + 1, m, 2) [m]."""
-        return courses(self.obstacles.centre, self.drift, self.horizon.steps)
+        return centre_trajectories(self.obstacles.centre, self.drift, self.horizon.steps)
 
     @cached_property
     def first_alike(self) -> NDArray[np.intp]:
         """For each obstacle the first one that is the same circle, (m,): a mean that touches both is held by one of them."""
-        return first_alike(self.obstacles.centre, self.drift, np.sqrt(self.size[0]), ALIKE * self.extent)
+        return find_duplicates(self.obstacles.centre, self.drift, np.sqrt(self.size[0]), ALIKE * self.extent)
 
     @cached_property
     def centres_from_free(self) -> Array:
@@ -167,7 +176,7 @@ class Problem(Record):
         if self.recovery_s <= 0 or not len(self.obstacles):
             return np.zeros(len(self.obstacles), dtype=np.bool_)
         circles = self.obstacles.centre, *self.size, self.obstacles.centre_covariance
-        return inside(self.initial_mean, self.initial_covariance, *circles, k_of_eta(self.eta))
+        return find_inside_margin(self.initial_mean, self.initial_covariance, *circles, k_of_eta(self.eta))
 
     @cached_property
     def leaving(self) -> Array:
@@ -183,7 +192,7 @@ class Problem(Record):
     @cached_property
     def noise_variance(self) -> Array:
         """c^2 for every entry of the stacked control, (2N,)."""
-        return stacked_noise(self.noise**2, self.horizon.steps)
+        return stack_noise(self.noise**2, self.horizon.steps)
 
     @cached_property
     def unweighted(self) -> Array:
@@ -193,13 +202,13 @@ class Problem(Record):
     @cached_property
     def summed_variance(self) -> Array:
         """(2N,): sum over steps of the variances of x and y is this times u^2, plus the free part."""
-        summed: Array = squares(self.horizon.states[:2], BOTH, BOTH) * self.noise_variance
+        summed: Array = variance_weights(self.horizon.states[:2], BOTH, BOTH) * self.noise_variance
         return summed
 
     @cached_property
     def weighted_variance(self) -> Array:
         """(2N,): the variance terms of J_X are this times u^2, plus the free part."""
-        weighted: Array = squares(self.horizon.states, self.end_weights, self.way_weights) * self.noise_variance
+        weighted: Array = variance_weights(self.horizon.states, self.end_weights, self.way_weights) * self.noise_variance
         return weighted
 
     @cached_property
@@ -208,7 +217,7 @@ class Problem(Record):
 
         Softness 0 is an equality; 1 / (2 w) is a term w (X_i - goal_i)^2 of the cost.
         """
-        rows, targets, softness = end_rows(self.horizon.last, self.goal - self.free[-1], self.at_goal, self.end_weights)
+        rows, targets, softness = build_goal_rows(self.horizon.last, self.goal - self.free[-1], self.at_goal, self.end_weights)
         if not self.way_weights.any():
             return rows, targets, softness
         way, steps = np.flatnonzero(self.way_weights > 0), self.horizon.steps
@@ -221,15 +230,17 @@ class Problem(Record):
 
     def positions(self, control: Array) -> Array:
         """Mean positions at steps 1..N from the stacked control, (N, 2) [m]."""
-        return moved(self.horizon.maps[:2], np.ascontiguousarray(control, dtype=float), self.free_position)
+        return mean_positions(self.horizon.maps[:2], np.ascontiguousarray(control, dtype=float), self.free_position)
 
     def course(self, control: Array) -> Array:
         """Mean position and velocity per step from the stacked control, x, y, vx, vy at steps 0..N, (4, N + 1) [m]."""
-        return course_of(self.horizon.motion, self.free_course, np.ascontiguousarray(control, dtype=float))
+        return compute_trajectory(self.horizon.motion, self.free_course, np.ascontiguousarray(control, dtype=float))
 
     def position_variance(self, control: Array) -> Array:
         """Rows xx, yy, xy of the position covariance at steps 1..N, (3, N) [m^2]."""
-        return spread(self.horizon.maps, self.noise_variance, np.ascontiguousarray(control, dtype=float), self.free_variance)
+        return position_variances(
+            self.horizon.maps, self.noise_variance, np.ascontiguousarray(control, dtype=float), self.free_variance
+        )
 
 
 def rest_to_goal(

@@ -12,12 +12,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.dynamics.impulse_response import driven
+from foc_ros.core.dynamics.impulse_response import apply_impulse_response
 from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled
-from foc_ros.core.linear_algebra import cholesky, combined, lower_solved, row_products, values
+from foc_ros.core.linear_algebra import factorise_cholesky, multiply, multiply_transposed, multiply_vector, solve_lower
 from foc_ros.core.types import Array
 
-from .contacts.hermite import kept_at, place, place_row
+from .contacts.hermite import interpolate, interpolation_row, required_distances
 from .problem import Problem
 
 SMALLEST_PIVOT = 1e-14
@@ -50,7 +50,7 @@ class Cost:
         """The minimiser without obstacle rows, (2N,)."""
         inverse, root, factor = self.factors
         if self.linear is None:
-            return to_goal(root, factor, self.goal_targets)
+            return control_to_goal(root, factor, self.goal_targets)
         return pulled_to_goal(inverse, root, factor, self.goal_rows, self.goal_targets, self.linear)
 
 
@@ -60,7 +60,7 @@ def goal_factors(hessian: Vector, goal_rows: Matrix, softness: Vector) -> tuple[
     r = len(softness)
     inverse = 1.0 / hessian
     weighted = goal_rows * inverse
-    gram = row_products(weighted, goal_rows)
+    gram = multiply_transposed(weighted, goal_rows)
     # unit diagonal: the goal rows mix metres, metres per second and their like
     scale = np.zeros((r, r))
     for i in range(r):
@@ -69,14 +69,14 @@ def goal_factors(hessian: Vector, goal_rows: Matrix, softness: Vector) -> tuple[
     for i in range(r):
         for j in range(r):
             gram[i, j] *= scale[i, i] * scale[j, j]
-    root = lower_solved(cholesky(gram, SMALLEST_PIVOT), scale)
-    return inverse, root, combined(root, weighted)
+    root = solve_lower(factorise_cholesky(gram, SMALLEST_PIVOT), scale)
+    return inverse, root, multiply(root, weighted)
 
 
 @compiled
-def to_goal(root: Matrix, factor: Matrix, missing: Vector) -> Vector:
+def control_to_goal(root: Matrix, factor: Matrix, missing: Vector) -> Vector:
     """Return the least control (2N,) that makes up for what the goal rows are missing (r,)."""
-    control: Vector = combined(np.expand_dims(values(root, missing), 0), factor)[0]
+    control: Vector = multiply(np.expand_dims(multiply_vector(root, missing), 0), factor)[0]
     return control
 
 
@@ -86,19 +86,19 @@ def pulled_to_goal(
 ) -> Vector:
     """Return the control (2N,) of least cost with a linear term (2N,) that meets the goal alone."""
     free = inverse * linear
-    control: Vector = free + to_goal(root, factor, goal_targets - values(goal_rows, free))
+    control: Vector = free + control_to_goal(root, factor, goal_targets - multiply_vector(goal_rows, free))
     return control
 
 
 @compiled
-def compliance(rows: Matrix, inverse: Vector, factor: Matrix) -> tuple[Matrix, Matrix]:
+def schur_complement(rows: Matrix, inverse: Vector, factor: Matrix) -> tuple[Matrix, Matrix]:
     """Return rows M (k, 2N) times P: what their multipliers do to the control (k, 2N), and M P M' (k, k) to the rows' values."""
-    held = row_products(rows, factor)
-    pressed = combined(held, factor)
+    held = multiply_transposed(rows, factor)
+    pressed = multiply(held, factor)
     for i in range(rows.shape[0]):
         for j in range(rows.shape[1]):
             pressed[i, j] = rows[i, j] * inverse[j] - pressed[i, j]
-    return pressed, row_products(pressed, rows)
+    return pressed, multiply_transposed(pressed, rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ class ReachingQP:
 
     def rows(self, obstacle: NDArray[np.intp], step: NDArray[np.intp]) -> Array:
         """Return obstacle rows (k, 2N) for k pairs of obstacle and step index."""
-        return gathered(self.responses, self.further, self.weights, self.coefficients, obstacle, step)
+        return collect_rows(self.responses, self.further, self.weights, self.coefficients, obstacle, step)
 
 
 @compiled
@@ -137,9 +137,9 @@ def row_values(responses: Tensor, further: Tensor, weights: Matrix, coefficients
     steps, moved, found = responses.shape[2] - 1, np.empty((q, times)), np.zeros((m, times))
     for a in range(q):
         weighted = weights[a] * control
-        moved[a, :steps] = driven(responses[a : a + 1], weighted)[0, 1:]
+        moved[a, :steps] = apply_impulse_response(responses[a : a + 1], weighted)[0, 1:]
         if times > steps:
-            moved[a, steps:] = values(further[a], weighted)
+            moved[a, steps:] = multiply_vector(further[a], weighted)
     for j in range(m):
         for t in range(times):
             for a in range(q):
@@ -148,7 +148,7 @@ def row_values(responses: Tensor, further: Tensor, weights: Matrix, coefficients
 
 
 @compiled
-def peaks(violation: Matrix, known_obstacle: Indices, known_step: Indices, tolerance: float) -> tuple[Indices, Indices]:
+def find_peaks(violation: Matrix, known_obstacle: Indices, known_step: Indices, tolerance: float) -> tuple[Indices, Indices]:
     """Return the worst row of every stretch of violated steps (m, N), as obstacle and step index; rows known count as met."""
     m, steps = violation.shape
     left = violation.copy()
@@ -165,7 +165,7 @@ def peaks(violation: Matrix, known_obstacle: Indices, known_step: Indices, toler
 
 
 @compiled
-def violated(
+def find_violated(
     responses: Tensor,
     further: Tensor,
     weights: Matrix,
@@ -177,11 +177,13 @@ def violated(
     tolerance: float,
 ) -> tuple[Indices, Indices]:
     """Return the worst row of every stretch of steps at which a control (2N,) violates a circle's; known ones (k,) are met."""
-    return peaks(limits - row_values(responses, further, weights, coefficients, control), known_obstacle, known_step, tolerance)
+    return find_peaks(
+        limits - row_values(responses, further, weights, coefficients, control), known_obstacle, known_step, tolerance
+    )
 
 
 @compiled
-def gathered(
+def collect_rows(
     responses: Tensor, further: Tensor, weights: Matrix, coefficients: Tensor, obstacle: Indices, step: Indices
 ) -> Matrix:
     """Return the rows of k pairs of obstacle and step, (k, 2N)."""
@@ -246,13 +248,13 @@ def wanted_distance(problem: Problem, tau: float) -> Array:
     Less where the hand is nearer now: what is missing now may be missing still, falling to zero over the recovery time as a
     minimum-jerk movement does, so that the problem asks for a way out, not for a jump.
     """
-    reach, missing, pace = margins(problem, tau)
+    reach, missing, pace = required_margins(problem, tau)
     if problem.recovery_s <= 0 or missing.max(initial=0.0) <= 0:
         return reach[:, None]
-    return kept_at(reach, missing, pace, np.arange(1.0, problem.horizon.steps + 1.0))
+    return required_distances(reach, missing, pace, np.arange(1.0, problem.horizon.steps + 1.0))
 
 
-def margins(problem: Problem, tau: float) -> tuple[Array, Array, float]:
+def required_margins(problem: Problem, tau: float) -> tuple[Array, Array, float]:
     """Return the same as functions of time, `between.kept`: reach (m,) and what of it is missing now (m,) [m], pace [1/step]."""
     reach: Array = np.sqrt(problem.size[0] + tau)
     if problem.recovery_s <= 0:
@@ -261,7 +263,7 @@ def margins(problem: Problem, tau: float) -> tuple[Array, Array, float]:
 
 
 @compiled
-def depths(positions: Matrix, centres: Tensor, wanted: Matrix) -> Matrix:
+def compute_depths(positions: Matrix, centres: Tensor, wanted: Matrix) -> Matrix:
     """Return how much nearer than wanted the positions (N, 2) are to each centre, (m, N) [m]."""
     m, steps, _ = centres.shape
     depth = np.empty((m, steps))
@@ -298,10 +300,12 @@ def clearance_qp(
 
 def _half_planes_at(problem: Problem, guess: Array, tau: float, times: Array) -> tuple[Array, Array, Array]:
     """Return the position's maps (2, e, 2N), and `half_planes` of a guess (N, 2), straight between the steps, at times (e,)."""
-    maps = np.array([[place_row(problem.horizon.motion, time, x, y) for time in times] for x, y in ((1.0, 0.0), (0.0, 1.0))])
-    free = np.array([place(problem.free_course, time, 0) for time in times])
+    maps = np.array(
+        [[interpolation_row(problem.horizon.motion, time, x, y) for time in times] for x, y in ((1.0, 0.0), (0.0, 1.0))]
+    )
+    free = np.array([interpolate(problem.free_course, time, 0) for time in times])
     centres = problem.obstacles.centre[:, None] + times[:, None] * problem.drift[:, None]
     path = np.concatenate((problem.initial_mean[None, :2], guess))
     there = np.stack([np.interp(times, np.arange(len(path)), axis) for axis in path.T], axis=1)
     normals, _, limits = normals_at(there, centres, centres - free)
-    return maps, normals, limits + kept_at(*margins(problem, tau), times)
+    return maps, normals, limits + required_distances(*required_margins(problem, tau), times)

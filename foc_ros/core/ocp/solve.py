@@ -10,21 +10,21 @@ import numpy as np
 
 from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
-from foc_ros.core.dynamics.impulse_response import driven
-from foc_ros.core.dynamics.noise import state_covariance
-from foc_ros.core.types import Array, Solution, Status, fixed
+from foc_ros.core.dynamics.impulse_response import apply_impulse_response
+from foc_ros.core.dynamics.noise import propagate_covariance
+from foc_ros.core.types import Array, Solution, Status, as_readonly
 
-from .chance_evaluation import Assessment, assess
+from .chance_evaluation import Assessment, evaluate_chance_constraint
 from .contacts.contacts import Contacts
-from .cost_terms import asked_for, costs, shortfall
-from .minimum_k import Least, assess_between
+from .cost_terms import compute_cost_terms, compute_violation, equivalent_weights
+from .minimum_k import MinimumSafetyFactor, assess_between
 from .problem import Problem
 from .qp import clearance_qp, effort_cost
 from .sqp import converge
 from .strategies.algorithm1 import algorithm1
-from .strategies.lv_hc import walk
+from .strategies.lv_hc import follow_path
 from .strategies.optimal import optimise
-from .strategies.penalty_path import Curve
+from .strategies.penalty_path import PenaltyPath
 from .warm_start import Start
 from .working_set import WorkingSet, solve
 
@@ -45,10 +45,10 @@ class _Ended:
     contacts: Contacts
     iterations: int | None = None
     slope: float = 0.0
-    least: Least | None = None
+    least: MinimumSafetyFactor | None = None
 
 
-def forward(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline = NEVER) -> Solution:
+def solve_problem(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline = NEVER) -> Solution:
     """Solve one problem in the class in which it starts.
 
     deadline: looked at before each QP. Never raises for a problem that has no solution: the status
@@ -61,7 +61,9 @@ def forward(problem: Problem, start: Start, settings: FocConfig, deadline: Deadl
         control, message = effort_cost(problem, 0.0).goal_control, 'out of time: the movement shown looks at no obstacle'
         ended = _Ended(Status.DEADLINE, message, control, 0.0, 0.0, 0, Contacts())
     continuous = _STRATEGIES[settings.strategy] is _continuous
-    assessment = assess_between(problem, ended.control, ended.least) if continuous else assess(problem, ended.control)
+    assessment = (
+        assess_between(problem, ended.control, ended.least) if continuous else evaluate_chance_constraint(problem, ended.control)
+    )
     if ended.status is Status.SOLVED and settings.strategy != 'fixed' and assessment.eta < problem.eta - SHORT_OF_ETA:
         message = f'the solution achieves eta {assessment.eta:.6g} only'
         ended = replace(ended, status=Status.ITERATION_LIMIT, message=message)
@@ -70,8 +72,8 @@ def forward(problem: Problem, start: Start, settings: FocConfig, deadline: Deadl
 
 def _continuous(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline) -> _Ended:
     delta = settings.lv_delta if settings.strategy == 'lv' else settings.hc_delta
-    curve = Curve(delta, settings.growth, settings.lam)
-    walked = walk(problem, start, curve, deadline)
+    curve = PenaltyPath(delta, settings.growth, settings.lam)
+    walked = follow_path(problem, start, curve, deadline)
     if walked.status is Status.DEADLINE and walked.point is None:
         raise OutOfTimeError
     if walked.point is None:
@@ -127,21 +129,21 @@ _STRATEGIES = {'lv': _continuous, 'hc': _continuous, 'optimal': _optimal, 'algor
 
 def _solution(problem: Problem, ended: _Ended, assessment: Assessment, seconds: float, *, optimal: bool) -> Solution:
     horizon, ids = problem.horizon, problem.obstacles.ids
-    mean = problem.free + driven(horizon.states, ended.control).T
-    covariance = state_covariance(horizon, problem.free_covariance, problem.noise_variance, ended.control)
-    violation, violated = shortfall(problem, mean, ended.tau)
+    mean = problem.free + apply_impulse_response(horizon.states, ended.control).T
+    covariance = propagate_covariance(horizon, problem.free_covariance, problem.noise_variance, ended.control)
+    violation, violated = compute_violation(problem, mean, ended.tau)
     held = [(ended.tau, ended.lam)] * len(ended.contacts)
     if optimal:
-        held = asked_for(problem, ended.control, ended.contacts, max(assessment.smallest_k, 0.0))
+        held = equivalent_weights(problem, ended.control, ended.contacts, max(assessment.smallest_k, 0.0))
     return Solution(
         status=ended.status,
         message=_words(problem, ended, assessment, violation),
         dt=horizon.dt,
-        mean=fixed(mean),
-        covariance=fixed(covariance),
+        mean=as_readonly(mean),
+        covariance=as_readonly(covariance),
         control=ended.control.reshape(2, -1).T,
         effort=float(ended.control @ ended.control),
-        costs=costs(problem, ended.control, mean, covariance, ended.lam),
+        costs=compute_cost_terms(problem, ended.control, mean, covariance, ended.lam),
         tau=ended.tau,
         lam=ended.lam,
         eta=assessment.eta,

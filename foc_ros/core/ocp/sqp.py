@@ -16,9 +16,9 @@ import numpy as np
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.types import Array
 
-from .contacts.checks import STAYS, held
+from .contacts.checks import STAYS, newton_at_fixed_times
 from .contacts.contacts import Contacts
-from .contacts.kkt_point import Settled
+from .contacts.kkt_point import KktPoint
 from .problem import Problem
 from .qp import NO_TIMES, Cost, clearance_qp, effort_cost
 from .working_set import WorkingSet, solve
@@ -35,7 +35,7 @@ LARGEST_STRETCH = 15.0
 """Most moves that the next linearisation is taken ahead."""
 
 
-Jump: TypeAlias = Callable[[Array, Contacts], Settled | None]
+Jump: TypeAlias = Callable[[Array, Contacts], KktPoint | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class Converged:
     qp_solves: int
     linearisations: int
     stays: bool
-    jumped: Settled | None = None
+    jumped: KktPoint | None = None
 
 
 def converge(
@@ -98,7 +98,7 @@ def converge(
         rows = (working.obstacle.tobytes(), working.step.tobytes())
         better = None
         if len(working) and (rows == previous or move < NEAR):
-            better = held(problem, cost, solution.control, contacts, tau)
+            better = newton_at_fixed_times(problem, cost, solution.control, contacts, tau)
         if better is not None and _cost(cost, better[0]) <= _cost(cost, solution.control) * (1 + 1e-12):
             control, contacts = better
             positions = problem.positions(control)

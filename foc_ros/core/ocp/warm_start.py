@@ -28,19 +28,19 @@ class Start:
     slope: float = 0.0
 
 
-def cold(guess: Array) -> Start:
+def cold_start(guess: Array) -> Start:
     """Start at a guess (N + 1, 2) [m] at steps 0..N."""
     return Start(np.asarray(guess, dtype=float)[1:])
 
 
-def warm(previous: Solution, problem: Problem) -> Start:
+def warm_start(previous: Solution, problem: Problem) -> Start:
     """Start at an earlier solution, read off at the new steps so that both reach their goal at the same time.
 
     Before its beginning the hand is where it began, after its end it rests at its goal.
     """
     steps, dt = problem.horizon.steps, problem.horizon.dt
     elapsed_s = previous.dt * len(previous.control) - dt * steps
-    positions, control = read_off(previous.mean, previous.control, previous.dt, elapsed_s, dt, steps)
+    positions, control = resample_solution(previous.mean, previous.control, previous.dt, elapsed_s, dt, steps)
     row = {identity: index for index, identity in enumerate(problem.obstacles.ids)}
     kept = [
         (row[identity], moved, force)
@@ -53,7 +53,9 @@ def warm(previous: Solution, problem: Problem) -> Start:
 
 
 @compiled
-def read_off(mean: Matrix, control: Matrix, before: float, elapsed_s: float, dt: float, steps: int) -> tuple[Matrix, Vector]:
+def resample_solution(
+    mean: Matrix, control: Matrix, before: float, elapsed_s: float, dt: float, steps: int
+) -> tuple[Matrix, Vector]:
     """Return positions (steps, 2) and the stacked control (2 steps,) at new steps of dt [s], the first elapsed_s later.
 
     mean (n + 1, states), its position first, and control (n, 2) at steps of `before` [s]; without control before they begin, and
@@ -73,7 +75,7 @@ def read_off(mean: Matrix, control: Matrix, before: float, elapsed_s: float, dt:
     return positions, stacked
 
 
-def led(problem: Problem, control: Array, path: Array) -> Array:
+def correct_to_goal(problem: Problem, control: Array, path: Array) -> Array:
     """Lead a control (2N,) back to a path (N, 2) and to the goal: the hand is never quite where it was to be."""
     missing = problem.goal - problem.free[-1] - problem.horizon.last @ control
     led: Array = control + problem.horizon.returning(path - problem.positions(control), missing, problem.at_goal)

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled
-from foc_ros.core.linear_algebra import cholesky, combined, lower_solved, upper_solved, values
+from foc_ros.core.linear_algebra import factorise_cholesky, multiply, multiply_vector, solve_lower, solve_lower_transposed
 from foc_ros.core.types import Array
 
 from .backend import DenseQP, solve_named, solve_piqp
-from .qp import Cost, ReachingQP, compliance, gathered, violated
+from .qp import Cost, ReachingQP, collect_rows, find_violated, schur_complement
 
 Index = NDArray[np.intp]
 
@@ -90,60 +90,62 @@ def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False, thoroug
     for solves in range(1, MAX_ROUNDS + 1):
         if len(working):
             softness = ELASTICITY if elastic else 0.0
-            space = reduced(*qp.terms, *working.rows, inverse, factor, goal_control, softness)
+            space = reduce_to_range_space(*qp.terms, *working.rows, inverse, factor, goal_control, softness)
             pressing = multipliers_of(*space[1:], elastic=elastic)
-            if pressing is Verdict.CONTRADICTION:
+            if pressing is DualStatus.CONTRADICTION:
                 return None
-            if pressing is Verdict.UNSOLVED:
+            if pressing is DualStatus.UNSOLVED:
                 break
-            multipliers, control = pressing, pushed(pressing, space[0], goal_control)
+            multipliers, control = pressing, apply_multipliers(pressing, space[0], goal_control)
         # rows just solved for are met but for rounding; an elastic row may stay violated
-        obstacle, step = violated(*qp.terms, control, *working.rows, TOLERANCE)
+        obstacle, step = find_violated(*qp.terms, control, *working.rows, TOLERANCE)
         if not len(obstacle) or (elastic and len(working) > MOST_ELASTIC):
             active = multipliers > 0
             return QPSolution(control, working.only(active), multipliers[active], solves)
         kept = working if elastic else working.only(multipliers > 0)
-        working = WorkingSet(*united(*kept.rows, obstacle, step, qp.limits.shape[1]))
+        working = WorkingSet(*unite_rows(*kept.rows, obstacle, step, qp.limits.shape[1]))
     return solve_full(qp) if thorough and not elastic else None
 
 
 @compiled
-def united(obstacle: Indices, step: Indices, other_obstacle: Indices, other_step: Indices, steps: int) -> tuple[Indices, Indices]:
+def unite_rows(
+    obstacle: Indices, step: Indices, other_obstacle: Indices, other_step: Indices, steps: int
+) -> tuple[Indices, Indices]:
     """Return the rows of two sets, each once, in order of obstacle and step (0..steps - 1)."""
     flat = np.unique(np.concatenate((obstacle * steps + step, other_obstacle * steps + other_step)))
     return flat // steps, flat % steps
 
 
-class Verdict(Enum):
+class DualStatus(Enum):
     """Why there is no control for a working set: its rows contradict each other, or the solver failed."""
 
     CONTRADICTION = 'contradiction'
     UNSOLVED = 'unsolved'
 
 
-Failed: TypeAlias = Literal[Verdict.CONTRADICTION, Verdict.UNSOLVED]
+Failed: TypeAlias = Literal[DualStatus.CONTRADICTION, DualStatus.UNSOLVED]
 
 
-def with_rows(cost: Cost, rows: Array, limits: Array) -> Array | Failed:
+def solve_with_rows(cost: Cost, rows: Array, limits: Array) -> Array | Failed:
     """Return the control (2N,) of the least cost with rows (k, 2N) u >= limits (k,)."""
     inverse, _, factor = cost.factors
     space = range_space(rows, inverse, factor, limits, cost.goal_control, 0.0)
     pressing = multipliers_of(*space[1:], elastic=False)
-    return pressing if isinstance(pressing, Verdict) else pushed(pressing, space[0], cost.goal_control)
+    return pressing if isinstance(pressing, DualStatus) else apply_multipliers(pressing, space[0], cost.goal_control)
 
 
 def multipliers_of(gram: Array, missing: Array, unit: Array, stuck: float, *, elastic: bool) -> Array | Failed:
     """Return the multipliers y (k,) >= 0 of least 1/2 y'Ky - m'y, given as of `range_space`."""
     if stuck > TOLERANCE and not elastic:
-        return Verdict.CONTRADICTION
+        return DualStatus.CONTRADICTION
     answer = solve_piqp(DenseQP(gram.T, -missing, lower=np.zeros(len(missing))))
     if not answer.solved:
         # Farkas: a combination y >= 0 of the rows that moves nothing and yet is missing something
         ray = answer.x / max(float(answer.x.max()), 1e-300)
-        return Verdict.CONTRADICTION if np.abs(gram @ ray).max() < FARKAS * float(missing @ ray) else Verdict.UNSOLVED
-    multipliers, largest, short, slack = sharpened(gram, missing, unit, answer.x)
+        return DualStatus.CONTRADICTION if np.abs(gram @ ray).max() < FARKAS * float(missing @ ray) else DualStatus.UNSOLVED
+    multipliers, largest, short, slack = refine_multipliers(gram, missing, unit, answer.x)
     if short > RESIDUAL * (largest if elastic else 1.0) or slack > RESIDUAL * largest**2:
-        return Verdict.UNSOLVED
+        return DualStatus.UNSOLVED
     return multipliers
 
 
@@ -156,9 +158,9 @@ def range_space(
     M P (k, 2N); K (k, k), softness added to its diagonal; what the goal's control misses (k,); the unit of each multiplier (k,);
     and the most that is missing in a row which the goal alone decides [m]: such a row has no part in the rest.
     """
-    pressed, gram = compliance(rows, inverse, factor)
+    pressed, gram = schur_complement(rows, inverse, factor)
     k, stuck = len(limits), -np.inf
-    scaled, scale = limits - values(rows, goal_control), np.ones(k)
+    scaled, scale = limits - multiply_vector(rows, goal_control), np.ones(k)
     for i in range(k):
         wanted = 0.0
         for u in range(rows.shape[1]):
@@ -179,7 +181,7 @@ def range_space(
 
 
 @compiled
-def reduced(
+def reduce_to_range_space(
     responses: Tensor,
     further: Tensor,
     weights: Matrix,
@@ -196,12 +198,12 @@ def reduced(
     wanted = np.empty(len(step))
     for i in range(len(step)):
         wanted[i] = limits[obstacle[i], step[i]]
-    rows = gathered(responses, further, weights, coefficients, obstacle, step)
+    rows = collect_rows(responses, further, weights, coefficients, obstacle, step)
     return range_space(rows, inverse, factor, wanted, goal_control, softness)
 
 
 @compiled
-def sharpened(gram: Matrix, missing: Vector, unit: Vector, answer: Vector) -> tuple[Vector, float, float, float]:
+def refine_multipliers(gram: Matrix, missing: Vector, unit: Vector, answer: Vector) -> tuple[Vector, float, float, float]:
     """Sharpen an interior-point answer: solve for the multipliers that are not zero, if that keeps their signs.
 
     Returns them (k,) without their units, the largest in its unit, but at least 1, the most that a row misses, and the largest
@@ -215,8 +217,8 @@ def sharpened(gram: Matrix, missing: Vector, unit: Vector, answer: Vector) -> tu
         multipliers[active[i]], wanted[i, 0] = answer[active[i]], missing[active[i]]
         for j in range(n):
             inner[i, j] = gram[active[i], active[j]]
-    factor = cholesky(inner, 0.0)
-    sharp = upper_solved(factor, lower_solved(factor, wanted)[:, 0].copy())
+    factor = factorise_cholesky(inner, 0.0)
+    sharp = solve_lower_transposed(factor, solve_lower(factor, wanted)[:, 0].copy())
     off = 0.0  # infinite where a sign is lost, or the rows are not independent: then the answer stays as it is
     for i in range(n):
         left = -wanted[i, 0]
@@ -236,9 +238,9 @@ def sharpened(gram: Matrix, missing: Vector, unit: Vector, answer: Vector) -> tu
 
 
 @compiled
-def pushed(multipliers: Vector, pressed: Matrix, goal_control: Vector) -> Vector:
+def apply_multipliers(multipliers: Vector, pressed: Matrix, goal_control: Vector) -> Vector:
     """Return the control (2N,) that multipliers (k,) of rows make of the goal's: u_goal + P M'y, for M P (k, 2N)."""
-    control: Vector = goal_control + combined(np.expand_dims(multipliers, 0), pressed)[0]
+    control: Vector = goal_control + multiply(np.expand_dims(multipliers, 0), pressed)[0]
     return control
 
 

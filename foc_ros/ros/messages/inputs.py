@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.errors import MessageError
-from foc_ros.core.types import NANOSECONDS, Array, HandSample, fixed
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, as_readonly
 
 from .plane import project
 
@@ -31,7 +31,7 @@ def hand_sample(message: Any, plane: str) -> HandSample:
     if stamp_ns == 0:
         raise MessageError('header.stamp', 'a time after 0', '0 s')
     position, height = project(_point(message.pose.position, 'pose.position'), plane)
-    return HandSample(stamp_ns, fixed(position), float(height), str(message.header.frame_id))
+    return HandSample(stamp_ns, as_readonly(position), float(height), str(message.header.frame_id))
 
 
 def goals_of_pose_array(message: Any, plane: str) -> tuple[Array, str]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.types import Array, Obstacles, Outcome, Prediction
+from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Prediction
 
 from .plane import lift
 from .ranking import ranked
@@ -42,7 +42,7 @@ def marker_array(prediction: Prediction, obstacles: Obstacles, plane: str, types
     """Return the MarkerArray. Unsolved candidates are grey and carry their status; obstacles are those at the stamp."""
     pen = _Pen(prediction, plane, types)
     solved = ranked(prediction)
-    unsolved = [outcome for outcome in prediction.outcomes if not outcome.solved]
+    unsolved = [outcome for outcome in prediction.candidates if not outcome.is_solved]
     drawn = [pen.clear()]
     for index, outcome in enumerate([*solved, *unsolved]):
         drawn.extend(pen.candidate(index, outcome))
@@ -68,10 +68,10 @@ class _Pen:
     def clear(self) -> Any:
         return self._marker('', 0, 0, action=DELETE_ALL)
 
-    def candidate(self, index: int, outcome: Outcome) -> Iterator[Any]:
+    def candidate(self, index: int, outcome: PredictedCandidate) -> Iterator[Any]:
         solution, likelihood = outcome.solution, outcome.likelihood
         line = solution.path if np.isfinite(solution.path).all() and len(solution.path) else outcome.candidate.guess
-        if outcome.solved:
+        if outcome.is_solved:
             red, green, blue = UNLIKELY + likelihood * (LIKELY - UNLIKELY)
             colour, words = (red, green, blue, 0.4 + 0.6 * likelihood), f'{100 * likelihood:.0f} %'
             yield from self._ellipses(index, outcome, colour)
@@ -83,7 +83,7 @@ class _Pen:
         text = f'{outcome.candidate.label} {words}'
         yield self._marker('label', index, TEXT, colour, (0, 0, TEXT_HEIGHT), points[len(points) // 2], text=text)
 
-    def _ellipses(self, index: int, outcome: Outcome, colour: Colour) -> Iterator[Any]:
+    def _ellipses(self, index: int, outcome: PredictedCandidate, colour: Colour) -> Iterator[Any]:
         """Draw one standard deviation about the mean at steps spread over the path."""
         steps = _spread(len(outcome.solution.mean))
         variances, axes = np.linalg.eigh(outcome.solution.covariance[steps, :2, :2])
@@ -105,9 +105,9 @@ class _Pen:
                 yield self._marker(name, i, CYLINDER, colour, (diameter, diameter, 10 * THICKNESS), centre)
 
     def _nearest(self, obstacles: Obstacles) -> Obstacles:
-        if len(obstacles) <= MAX_DRAWN or not self.prediction.outcomes:
+        if len(obstacles) <= MAX_DRAWN or not self.prediction.candidates:
             return obstacles.take(list(range(min(len(obstacles), MAX_DRAWN))))
-        hand = self.prediction.outcomes[0].candidate.guess[0]
+        hand = self.prediction.candidates[0].candidate.guess[0]
         gaps = np.linalg.norm(obstacles.centre - hand, axis=1) - obstacles.radius
         return obstacles.take(np.argsort(gaps, kind='stable')[:MAX_DRAWN])
 

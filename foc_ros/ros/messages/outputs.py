@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.types import NANOSECONDS, Obstacles, Outcome, Prediction
+from foc_ros.core.types import NANOSECONDS, Obstacles, PredictedCandidate, Prediction
 
 from .markers import marker_array
 from .plane import lift
@@ -53,7 +53,7 @@ def _fields(types: MessageTypes) -> list[Any]:
     ]
 
 
-def _rows(outcomes: Sequence[Outcome], height: float, plane: str) -> NDArray[np.void]:
+def _rows(outcomes: Sequence[PredictedCandidate], height: float, plane: str) -> NDArray[np.void]:
     """Return the rows of all outcomes, one after the other, filled column by column."""
     solutions = [outcome.solution for outcome in outcomes]
     lengths = [len(solution.mean) for solution in solutions]

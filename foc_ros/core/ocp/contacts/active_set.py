@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled
-from foc_ros.core.ocp.qp import goal_factors, to_goal
+from foc_ros.core.ocp.qp import control_to_goal, goal_factors
 
-from .hermite import course_of, entered
-from .newton import touching
+from .hermite import compute_trajectory, find_penetrations
+from .newton import newton_on_contacts
 
 SETTLED = 1e-5
 """Largest move of a contact at which the steps end, relative to the scene: they converge quadratically, so 1e-9 is left."""
@@ -21,7 +21,7 @@ NEW = 1e-6
 
 
 @compiled
-def slide(
+def update_active_contacts(
     motion: Tensor,
     free: Matrix,
     centre: Matrix,
@@ -47,11 +47,11 @@ def slide(
     course, and its contacts' obstacles, times and forces.
     """
     inverse, root, factor = goal_factors(hessian, goal_rows, softness)
-    goal_control = to_goal(root, factor, goal_targets)
+    goal_control = control_to_goal(root, factor, goal_targets)
     control, obstacle, time, force = near.copy(), obstacle.copy(), time.copy(), force.copy()
     for count in range(CHANGES + 1):
         if len(force):
-            found, control, time, force = touching(
+            found, control, time, force = newton_on_contacts(
                 motion,
                 free,
                 inverse,
@@ -77,8 +77,8 @@ def slide(
         if len(pushing) < len(force):
             obstacle, time, force = obstacle[pushing], time[pushing], force[pushing]
             continue
-        course = course_of(motion, free, control)
-        new = entered(course, centre, drift, reach, short, pace, CLEAR * extent)
+        course = compute_trajectory(motion, free, control)
+        new = find_penetrations(course, centre, drift, reach, short, pace, CLEAR * extent)
         if len(new) == 0:
             return True, count > 0, control, course, obstacle, time, force
         slight = NEW * (force.max() if len(force) else 1.0)

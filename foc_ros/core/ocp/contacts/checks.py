@@ -9,16 +9,16 @@ from __future__ import annotations
 import numpy as np
 
 from foc_ros.core.dynamics.condensed import apart
-from foc_ros.core.homotopy import same_way, swept_angles
+from foc_ros.core.homotopy import compute_swept_angles, is_same_class
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.ocp.qp import NO_TIMES, Cost, depths, margins, wanted_distance
-from foc_ros.core.ocp.working_set import Verdict, with_rows
+from foc_ros.core.ocp.qp import NO_TIMES, Cost, compute_depths, required_margins, wanted_distance
+from foc_ros.core.ocp.working_set import DualStatus, solve_with_rows
 from foc_ros.core.types import Array
 
 from .active_set import CLEAR, SETTLED
-from .contacts import Contacts, merged
-from .hermite import entered
-from .newton import half_planes_between, touching
+from .contacts import Contacts, merge
+from .hermite import find_penetrations
+from .newton import half_planes_between, newton_on_contacts
 
 STAYS = 3e-7
 """Largest move of the mean that counts as staying, relative to the scene's extent."""
@@ -26,11 +26,13 @@ LEAP = 0.1
 """Depth in a circle between two steps, relative to the smallest, from which on the mean may be on the wrong side of it."""
 
 
-def held(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: float) -> tuple[Array, Contacts] | None:
+def newton_at_fixed_times(
+    problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: float
+) -> tuple[Array, Contacts] | None:
     """Find the solution near a control (2N,) that touches at the given steps; None where it is none, or enters a circle."""
     inverse, _, factor = cost.factors
     motion, free, centre, drift = problem.circles
-    found, control, time, force = touching(
+    found, control, time, force = newton_on_contacts(
         motion,
         free,
         inverse,
@@ -38,7 +40,7 @@ def held(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: 
         cost.goal_control,
         centre,
         drift,
-        *margins(problem, tau),
+        *required_margins(problem, tau),
         *contacts.columns,
         np.ascontiguousarray(control, dtype=float),
         0,
@@ -46,41 +48,45 @@ def held(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: 
     )
     if not found or (force <= 0).any():
         return None
-    depth = depths(problem.positions(control), problem.centres, wanted_distance(problem, tau))
+    depth = compute_depths(problem.positions(control), problem.centres, wanted_distance(problem, tau))
     return None if depth.max(initial=0.0) > CLEAR * problem.extent else (control, Contacts(contacts.obstacle, time, force))
 
 
-def joined(problem: Problem, contacts: Contacts) -> Contacts:
+def merge_contacts(problem: Problem, contacts: Contacts) -> Contacts:
     """Return contacts that came from rows at steps, or from another problem, as they slide: one for each place."""
-    return Contacts(*merged(*contacts.columns, problem.first_alike))
+    return Contacts(*merge(*contacts.columns, problem.first_alike))
 
 
-def leapt(problem: Problem, control: Array, tau: float) -> Array:
+def find_crossings(problem: Problem, control: Array, tau: float) -> Array:
     """Return the times at which the mean of a control (2N,) is much too near a circle between the steps."""
-    reach, missing, pace = margins(problem, tau)
+    reach, missing, pace = required_margins(problem, tau)
     if not len(reach):
         return NO_TIMES
     much = LEAP * float(reach.min())
-    times: Array = entered(problem.course(control), problem.obstacles.centre, problem.drift, reach, missing, pace, much)[:, 1]
+    times: Array = find_penetrations(
+        problem.course(control), problem.obstacles.centre, problem.drift, reach, missing, pace, much
+    )[:, 1]
     return times
 
 
-def way_of(problem: Problem, control: Array) -> Array:
+def class_angles(problem: Problem, control: Array) -> Array:
     """Return the angles (m,) that the mean of a control (2N,) sweeps about the centres, which tell its class."""
-    return swept_angles(problem.course(control)[:2].T, problem.courses)
+    return compute_swept_angles(problem.course(control)[:2].T, problem.courses)
 
 
-def goes(problem: Problem, control: Array, way: Array) -> bool:
+def is_in_class(problem: Problem, control: Array, way: Array) -> bool:
     """Whether the mean of a control (2N,) passes every circle on the same side as a way (m,), as of `way_of`."""
-    return same_way(way_of(problem, control), way)
+    return is_same_class(class_angles(problem, control), way)
 
 
-def stays(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: float) -> bool:
+def is_fixed_point(problem: Problem, cost: Cost, control: Array, contacts: Contacts, tau: float) -> bool:
     """Whether the QP linearised at a control (2N,), with a row for each contact, has that control as its solution."""
     if not len(contacts):
         return True
-    rows, limits = half_planes_between(*problem.circles, *margins(problem, tau), control, contacts.obstacle, contacts.time)
-    answer = with_rows(cost, rows, limits)
-    if isinstance(answer, Verdict):
+    rows, limits = half_planes_between(
+        *problem.circles, *required_margins(problem, tau), control, contacts.obstacle, contacts.time
+    )
+    answer = solve_with_rows(cost, rows, limits)
+    if isinstance(answer, DualStatus):
         return False
     return apart(problem.horizon.maps[:2], control, answer) < STAYS * problem.extent

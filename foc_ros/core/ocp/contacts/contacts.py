@@ -45,7 +45,7 @@ class Contacts:
 
 
 @compiled
-def merged(obstacle: Indices, time: Vector, force: Vector, first_alike: Indices) -> tuple[Indices, Vector, Vector]:
+def merge(obstacle: Indices, time: Vector, force: Vector, first_alike: Indices) -> tuple[Indices, Vector, Vector]:
     """Return contacts (k,) in order, neighbours with the same circle as one: at the centre of their forces, with their sum.
 
     first_alike (m,): for each circle the first that is the same. Forces that are not known, as the full QP leaves them, count

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foc_ros.core.dynamics.impulse_response import driven
+from foc_ros.core.dynamics.impulse_response import apply_impulse_response
 from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled
 
 ROOT_STEPS = 40
@@ -18,7 +18,7 @@ ROOT_CLOSE = 1e-12
 
 
 @compiled
-def blend(a: float, order: int) -> Vector:
+def basis(a: float, order: int) -> Vector:
     """Return the weights (4,) of p_t, v_t, p_(t+1), v_(t+1) in the position, or its first or second derivative by time."""
     weight = np.empty(4)
     if order == 0:
@@ -35,10 +35,10 @@ def blend(a: float, order: int) -> Vector:
 
 
 @compiled
-def place(course: Matrix, time: float, order: int) -> Vector:
+def interpolate(course: Matrix, time: float, order: int) -> Vector:
     """Return the position (2,), or its derivative, on a course (4, N + 1) of x, y and their velocities at steps 0..N."""
     t = min(int(time), course.shape[1] - 2)
-    weight, point = blend(time - t, order), np.empty(2)
+    weight, point = basis(time - t, order), np.empty(2)
     for axis in range(2):
         point[axis] = (
             weight[0] * course[axis, t]
@@ -50,11 +50,11 @@ def place(course: Matrix, time: float, order: int) -> Vector:
 
 
 @compiled
-def place_row(motion: Tensor, time: float, x: float, y: float) -> Vector:
+def interpolation_row(motion: Tensor, time: float, x: float, y: float) -> Vector:
     """Return what the control (2N,) adds to x p_x + y p_y at a time; motion (4, 2, N + 1): the course's responses to it."""
     steps = motion.shape[2] - 1
     t = min(int(time), steps - 1)
-    weight, direction = blend(time - t, 0), (x, y)
+    weight, direction = basis(time - t, 0), (x, y)
     row = np.zeros(2 * steps)
     for channel in range(2):
         for axis in range(2):
@@ -85,7 +85,7 @@ def contact_rows(motion: Tensor, time: float, x: float, y: float, turn: float) -
     """Return what the control adds at a time, (3, 2N): to n.p; to n.v + turn t.p; to t.p. n = (x, y), t = (-y, x)."""
     steps = motion.shape[2] - 1
     step = min(int(time), steps - 1)
-    p, v = blend(time - step, 0), blend(time - step, 1)
+    p, v = basis(time - step, 0), basis(time - step, 1)
     rows = np.zeros((3, 2 * steps))
     for channel in range(2):
         response = motion[:, channel]
@@ -101,14 +101,14 @@ def contact_rows(motion: Tensor, time: float, x: float, y: float, turn: float) -
 
 
 @compiled
-def course_of(motion: Tensor, free: Matrix, control: Vector) -> Matrix:
+def compute_trajectory(motion: Tensor, free: Matrix, control: Vector) -> Matrix:
     """Return the course (4, N + 1) of a control (2N,); free (4, N + 1): without it."""
-    course: Matrix = free + driven(motion, control)
+    course: Matrix = free + apply_impulse_response(motion, control)
     return course
 
 
 @compiled
-def kept(reach: float, missing: float, pace: float, time: float) -> tuple[float, float, float]:
+def required_distance(reach: float, missing: float, pace: float, time: float) -> tuple[float, float, float]:
     """Return the distance to be kept from a centre at a time, and its first and second derivative.
 
     reach [m], less what was missing of it at first [m] and still is: a minimum-jerk movement over 1 / pace steps takes it to 0.
@@ -122,32 +122,32 @@ def kept(reach: float, missing: float, pace: float, time: float) -> tuple[float,
 
 
 @compiled
-def kept_at(reach: Vector, missing: Vector, pace: float, times: Vector) -> Matrix:
+def required_distances(reach: Vector, missing: Vector, pace: float, times: Vector) -> Matrix:
     """Return the distances (m, q) to be kept from m centres at times (q,)."""
     wanted = np.empty((len(reach), len(times)))
     for j in range(len(reach)):
         for t in range(len(times)):
-            wanted[j, t] = kept(reach[j], missing[j], pace, times[t])[0]
+            wanted[j, t] = required_distance(reach[j], missing[j], pace, times[t])[0]
     return wanted
 
 
 @compiled
-def spared(
+def clearance(
     x: float, y: float, vx: float, vy: float, reach: float, missing: float, pace: float, time: float
 ) -> tuple[float, float]:
     """Return how much farther than wanted (x, y) is from a centre at a time [m], and the rate of that; both relative to it."""
     distance = max(np.sqrt(x * x + y * y), 1e-12)
-    wanted, faster, _ = kept(reach, missing, pace, time)
+    wanted, faster, _ = required_distance(reach, missing, pace, time)
     return distance - wanted, (x * vx + y * vy) / distance - faster
 
 
 @compiled
-def spared_at(
+def clearance_at(
     course: Matrix, cx: float, cy: float, dx: float, dy: float, reach: float, missing: float, pace: float, time: float
 ) -> tuple[float, float]:
     """Return the same on a course (4, N + 1), of a circle that is at (cx, cy) now and moves by (dx, dy) per step."""
-    p, v = place(course, time, 0), place(course, time, 1)
-    spare, rate = spared(p[0] - cx - time * dx, p[1] - cy - time * dy, v[0] - dx, v[1] - dy, reach, missing, pace, time)
+    p, v = interpolate(course, time, 0), interpolate(course, time, 1)
+    spare, rate = clearance(p[0] - cx - time * dx, p[1] - cy - time * dy, v[0] - dx, v[1] - dy, reach, missing, pace, time)
     return spare, rate
 
 
@@ -170,7 +170,7 @@ def _closest(
     time = begin
     for i in range(ROOT_STEPS):
         time = (low + high) / 2 if i % 3 == 2 else (low * above - high * below) / (above - below)
-        _, rate = spared_at(course, cx, cy, dx, dy, reach, missing, pace, time)
+        _, rate = clearance_at(course, cx, cy, dx, dy, reach, missing, pace, time)
         if rate < 0.0:
             low, below = time, rate
         else:
@@ -204,7 +204,7 @@ def _is_far(course: Matrix, cx: float, cy: float, dx: float, dy: float, distance
 
 
 @compiled
-def entered(
+def find_penetrations(
     course: Matrix, centre: Matrix, drift: Matrix, reach: Vector, missing: Vector, pace: float, tolerance: float
 ) -> Matrix:
     """Return the moments of closest approach (q, 2) at which the mean is too near: row of the circle, time in steps.
@@ -224,7 +224,7 @@ def entered(
         spare_before, rate_before = 0.0, 0.0
         for t in range(1, last + 1):
             x, y = course[0, t] - cx - t * dx, course[1, t] - cy - t * dy
-            spare, rate = spared(x, y, course[2, t] - dx, course[3, t] - dy, margin, short, pace, float(t))
+            spare, rate = clearance(x, y, course[2, t] - dx, course[3, t] - dy, margin, short, pace, float(t))
             time = -1.0
             if t == 1 and rate >= 0.0:
                 time = 1.0
@@ -233,7 +233,7 @@ def entered(
             if t == last and rate < 0.0:
                 time = float(last)
             if time > 0.0:
-                nearest, _ = spared_at(course, cx, cy, dx, dy, margin, short, pace, time)
+                nearest, _ = clearance_at(course, cx, cy, dx, dy, margin, short, pace, time)
                 if nearest < -tolerance:
                     found[count, 0], found[count, 1] = j, time
                     count += 1

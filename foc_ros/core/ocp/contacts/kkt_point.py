@@ -6,40 +6,40 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from foc_ros.core.homotopy import same_way, swept
+from foc_ros.core.homotopy import is_same_class, sweep_angles
 from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled
-from foc_ros.core.ocp.minimum_k import Least, least_k
+from foc_ros.core.ocp.minimum_k import MinimumSafetyFactor, minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.ocp.qp import margins
+from foc_ros.core.ocp.qp import required_margins
 from foc_ros.core.types import Array
 
-from .active_set import slide
+from .active_set import update_active_contacts
 from .contacts import Contacts
-from .hermite import course_of
+from .hermite import compute_trajectory
 
 ITS_OWN = np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
+class KktPoint:
     """A control (2N,), the contacts that hold it, and the smallest k that it achieves, with its place."""
 
     control: Array
     contacts: Contacts
-    least: Least
+    least: MinimumSafetyFactor
 
 
-def settled(
+def solve_kkt_point(
     problem: Problem, control: Array, contacts: Contacts, tau: float, lam: float, way: Array | None = None
-) -> Settled | None:
+) -> KktPoint | None:
     """Find the solution at (tau, lambda) near a control (2N,) that keeps out of circles between the steps too.
 
     contacts: to begin with; way (m,): the class that it has to be in, as of `newton.way_of`; that of the control if not given.
     None where there is none in that class.
     """
-    found, solution, obstacle, time, force, least = settle(
+    found, solution, obstacle, time, force, least = kkt_point_kernel(
         *problem.circles,
-        *margins(problem, tau),
+        *required_margins(problem, tau),
         *problem.costs,
         lam,
         *contacts.columns,
@@ -49,7 +49,7 @@ def settled(
         problem.courses,
         ITS_OWN if way is None else way,
     )
-    return Settled(solution, Contacts(obstacle, time, force), least) if found else None
+    return KktPoint(solution, Contacts(obstacle, time, force), least) if found else None
 
 
 @compiled
@@ -59,7 +59,7 @@ def path(course: Matrix) -> Matrix:
 
 
 @compiled
-def settle(
+def kkt_point_kernel(
     motion: Tensor,
     free: Matrix,
     centre: Matrix,
@@ -93,7 +93,7 @@ def settle(
 ) -> tuple[bool, Vector, Indices, Vector, Vector, tuple[float, int, float]]:
     """Return whether there is a point, its control, its contacts' obstacles, times and forces, and `least_k`: see `settled`."""
     hessian = 2.0 * (1.0 + weighted_variance + lam * summed_variance)
-    found, changed, control, course, obstacle, time, force = slide(
+    found, changed, control, course, obstacle, time, force = update_active_contacts(
         motion,
         free,
         centre,
@@ -112,11 +112,11 @@ def settle(
         extent,
     )
     if found and (changed or len(way) > 0):  # with the same contacts it is in the class of the control
-        wanted = way if len(way) > 0 else swept(path(course_of(motion, free, near)), courses)
-        found = same_way(swept(path(course), courses), wanted)
+        wanted = way if len(way) > 0 else sweep_angles(path(compute_trajectory(motion, free, near)), courses)
+        found = is_same_class(sweep_angles(path(course), courses), wanted)
     if not found:
         return False, control, obstacle, time, force, (0.0, 0, 0.0)
-    least = least_k(
+    least = minimum_safety_factor(
         motion,
         course,
         centre,

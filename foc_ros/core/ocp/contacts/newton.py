@@ -5,10 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled
-from foc_ros.core.linear_algebra import cholesky, combined, lower_solved, row_products, upper_solved, values
-from foc_ros.core.ocp.qp import compliance
+from foc_ros.core.linear_algebra import (
+    factorise_cholesky,
+    multiply,
+    multiply_transposed,
+    multiply_vector,
+    solve_lower,
+    solve_lower_transposed,
+)
+from foc_ros.core.ocp.qp import schur_complement
 
-from .hermite import around, contact_rows, course_of, kept, place, place_row
+from .hermite import around, compute_trajectory, contact_rows, interpolate, interpolation_row, required_distance
 
 MAX_STEPS = 12
 UNSETTLED = 4
@@ -43,20 +50,20 @@ def half_planes_between(
     """Return `qp.half_planes` for contacts at any time: rows (k, 2N) n.S(s) and limits (k,) on them [m]; see `touching`."""
     k = len(obstacle)
     rows, limits = np.empty((k, len(control))), np.empty(k)
-    course = course_of(motion, free, control)
+    course = compute_trajectory(motion, free, control)
     for i in range(k):
         j, s = obstacle[i], time[i]
-        at, without = place(course, s, 0), place(free, s, 0)
+        at, without = interpolate(course, s, 0), interpolate(free, s, 0)
         cx, cy = centre[j, 0] + s * drift[j, 0], centre[j, 1] + s * drift[j, 1]
         distance = np.hypot(at[0] - cx, at[1] - cy)
         x, y = (at[0] - cx) / distance, (at[1] - cy) / distance
-        rows[i] = place_row(motion, s, x, y)
-        limits[i] = kept(reach[j], short[j], pace, s)[0] + x * (cx - without[0]) + y * (cy - without[1])
+        rows[i] = interpolation_row(motion, s, x, y)
+        limits[i] = required_distance(reach[j], short[j], pace, s)[0] + x * (cx - without[0]) + y * (cy - without[1])
     return rows, limits
 
 
 @compiled
-def _pushed(
+def newton_step(
     give: Matrix, missing: Matrix, bend: Vector, distance: Vector, force: Vector, slides: Indices
 ) -> tuple[bool, Matrix, Vector]:
     """One step of `touching`: whether it has an answer, the weights (1, 3k) of the rows y, m, f, and y (k,)."""
@@ -84,8 +91,8 @@ def _pushed(
         A[i, i] += SHARED
         B[i] *= unit[i]
         wanted[i] *= unit[i]
-    normal = cholesky(A, 0.0)
-    eased, along = lower_solved(normal, B), lower_solved(normal, wanted)[:, 0].copy()
+    normal = factorise_cholesky(A, 0.0)
+    eased, along = solve_lower(normal, B), solve_lower(normal, wanted)[:, 0].copy()
     stiffness, pull = np.empty((k, k)), np.empty((k, 1))
     for i in range(k):
         pull[i, 0] = -missing[2 * k + i, 0]
@@ -100,22 +107,22 @@ def _pushed(
         pull[i] *= np.sqrt(force[i] / distance[i])
         for j in range(k):
             stiffness[i, j] *= np.sqrt(force[i] / distance[i] * force[j] / distance[j])
-    tangent = cholesky(stiffness, 0.0)
-    across = upper_solved(tangent, lower_solved(tangent, pull)[:, 0].copy())
+    tangent = factorise_cholesky(stiffness, 0.0)
+    across = solve_lower_transposed(tangent, solve_lower(tangent, pull)[:, 0].copy())
     weights = np.empty((1, 3 * k))
     for i in range(k):
         across[i] *= np.sqrt(force[i] / distance[i])
         weights[0, 2 * k + i] = across[i]
         for q in range(2 * k):
             along[q] -= eased[q, i] * across[i]
-    along = upper_solved(normal, along)
+    along = solve_lower_transposed(normal, along)
     for i in range(2 * k):
         weights[0, i] = along[i] * unit[i]
     return bool(np.isfinite(weights).all()), weights, weights[0, :k].copy()
 
 
 @compiled
-def touching(
+def newton_on_contacts(
     motion: Tensor,
     free: Matrix,
     inverse: Vector,
@@ -161,10 +168,14 @@ def touching(
         flat = False
         for i in range(k):
             j, s = obstacle[i], time[i]
-            wanted, faster, harder = kept(reach[j], short[j], pace, s)
+            wanted, faster, harder = required_distance(reach[j], short[j], pace, s)
             t = min(int(s), motion.shape[2] - 2)
             course = around(motion, free, control, t)
-            at, velocity, acceleration = place(course, s - t, 0), place(course, s - t, 1), place(course, s - t, 2)
+            at, velocity, acceleration = (
+                interpolate(course, s - t, 0),
+                interpolate(course, s - t, 1),
+                interpolate(course, s - t, 2),
+            )
             x, y = at[0] - centre[j, 0] - s * drift[j, 0], at[1] - centre[j, 1] - s * drift[j, 1]
             distance[i] = np.hypot(x, y)
             x, y = x / distance[i], y / distance[i]
@@ -180,10 +191,10 @@ def touching(
             missing[i, 0], missing[k + i, 0], missing[2 * k + i, 0] = wanted - distance[i], -rate, 0.0
         if count == 0:
             first[:] = normal
-        missing += row_products(rows, np.expand_dims(control - goal_control, 0))
-        pressed, give = compliance(rows, inverse, factor)
+        missing += multiply_transposed(rows, np.expand_dims(control - goal_control, 0))
+        pressed, give = schur_complement(rows, inverse, factor)
         at_least = np.maximum(pressing, SLIGHT * pressing.max())
-        found, weights, pressing = _pushed(give, missing, bend, distance, at_least, slides)
+        found, weights, pressing = newton_step(give, missing, bend, distance, at_least, slides)
         if not found:
             break
         if pressing.min() < 0.0:
@@ -191,8 +202,8 @@ def touching(
             kept_force[pressing.argmin()] = pressing.min()
             return True, near.copy(), begin.copy(), kept_force
         before = control
-        control = goal_control + combined(weights, pressed)[0]
-        moved, move = values(rows, control - before), 0.0
+        control = goal_control + multiply(weights, pressed)[0]
+        moved, move = multiply_vector(rows, control - before), 0.0
         for i in range(k):
             move = max(move, abs(moved[i]), abs(moved[2 * k + i]))
             if slides[i] == 1:

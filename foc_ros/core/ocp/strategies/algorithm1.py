@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.obstacles.chance_constraint import k_of_eta
-from foc_ros.core.ocp.chance_evaluation import assess
+from foc_ros.core.ocp.chance_evaluation import evaluate_chance_constraint
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.qp import clearance_qp, effort_cost
 from foc_ros.core.ocp.working_set import QPSolution, WorkingSet, solve
@@ -44,7 +44,7 @@ def algorithm1(problem: Problem, guess: Array, delta: float, growth: float, xi: 
     solves = 0
     for iteration in range(1, MAX_ITERATIONS + 1):
         before, last = (tau, lam), solution
-        if last is not None and assess(problem, last.control).smallest_k < wanted:
+        if last is not None and evaluate_chance_constraint(problem, last.control).smallest_k < wanted:
             tau, lam = tau + delta, lam * growth
         if lam > LARGEST_LAMBDA:
             message = f'lambda = {lam:.3g} after {iteration - 1} QPs, and the surrogate is still violated'
@@ -58,7 +58,7 @@ def algorithm1(problem: Problem, guess: Array, delta: float, growth: float, xi: 
         solves += solution.solves
         guess = problem.positions(solution.control)
         change = abs(solution.control @ solution.control - last.control @ last.control) if last else float('inf')
-        if change < xi and assess(problem, solution.control).smallest_k >= wanted:
+        if change < xi and evaluate_chance_constraint(problem, solution.control).smallest_k >= wanted:
             return Stepped(Status.SOLVED, 'solved', solution, tau, lam, iteration, solves)
     message = f'not settled after {MAX_ITERATIONS} QPs at tau = {tau:.3g}, lambda = {lam:.3g}'
     return Stepped(Status.ITERATION_LIMIT, message, solution, tau, lam, MAX_ITERATIONS, solves)

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
-from foc_ros.core.homotopy import swept_angles
+from foc_ros.core.homotopy import compute_swept_angles
 from foc_ros.core.obstacles.chance_constraint import eta_of_k, k_of_eta
-from foc_ros.core.ocp.contacts.checks import joined
+from foc_ros.core.ocp.contacts.checks import merge_contacts
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.ocp.warm_start import Start, led
+from foc_ros.core.ocp.warm_start import Start, correct_to_goal
 from foc_ros.core.types import Status
 
-from .penalty_path import STRIDE, Curve, Point, Walker
+from .penalty_path import STRIDE, PathFollower, PathPoint, PenaltyPath
 
 WARM_STRIDE = 0.5
 """The longest first look around the s of a warm start."""
@@ -43,56 +43,58 @@ MAX_TRIALS = 60
 
 
 @dataclass(frozen=True, eq=False)
-class Walk:
+class PathResult:
     """How a walk ended: status, words, the point it ended at (None: no feasible point at all), QPs solved, dk/ds there or 0."""
 
     status: Status
     message: str
-    point: Point | None
+    point: PathPoint | None
     qp_solves: int
     slope: float = 0.0
 
 
-def walk(problem: Problem, start: Start, curve: Curve, deadline: Deadline = NEVER) -> Walk:
+def follow_path(problem: Problem, start: Start, curve: PenaltyPath, deadline: Deadline = NEVER) -> PathResult:
     """Find the smallest s whose converged solution meets the surrogate.
 
     A warm start follows what was found before: it looks around the s it had, and where there is nothing, from the beginning of
     the curve on. It goes by Newton steps alone, and ends where they do.
     """
-    walker = Walker(problem, curve, deadline, follows=start.lam is not None)
+    walker = PathFollower(problem, curve, deadline, follows=start.lam is not None)
     try:
         return _walk(walker, start)
     except OutOfTimeError:
         reached = 'nothing' if walker.best is None else f'eta {eta_of_k(walker.best.k):.4g}'
-        return Walk(Status.DEADLINE, f'out of time, with {reached} found', walker.best, walker.qp_solves)
+        return PathResult(Status.DEADLINE, f'out of time, with {reached} found', walker.best, walker.qp_solves)
 
 
-def _walk(walker: Walker, start: Start) -> Walk:
+def _walk(walker: PathFollower, start: Start) -> PathResult:
     problem, curve, wanted = walker.problem, walker.curve, k_of_eta(walker.problem.eta)
     stride, patience = STRIDE, math.inf
     if start.control is None or start.lam is None:
         first = walker.beginning(start.positions)
     else:
-        way = swept_angles(np.concatenate((problem.initial_mean[None, :2], start.positions)), problem.courses)
-        control = led(problem, start.control, start.positions)
-        first = walker.followed(curve.s_of(start.lam), control, joined(problem, start.contacts), way)
+        way = compute_swept_angles(np.concatenate((problem.initial_mean[None, :2], start.positions)), problem.courses)
+        control = correct_to_goal(problem, start.control, start.positions)
+        first = walker.followed(curve.s_of(start.lam), control, merge_contacts(problem, start.contacts), way)
         if first is None:
             first = walker.beginning(start.positions, way)
         else:
             stride, patience = _ahead(first, wanted, start.slope or USUAL_SLOPE, WARM_STRIDE), PATIENCE
     if first is None:
-        return Walk(Status.INFEASIBLE, 'no way between the obstacles keeps clear of them', None, walker.qp_solves)
+        return PathResult(Status.INFEASIBLE, 'no way between the obstacles keeps clear of them', None, walker.qp_solves)
     low, high = _bracket(walker, first, wanted, stride, patience)
     if high is None:
         message = f'eta {problem.eta:g} is out of reach: the largest on the curve is {eta_of_k(low.k):.4g}, at s = {low.s:.3g}'
-        return Walk(Status.ETA_UNREACHABLE, message, low, walker.qp_solves)
+        return PathResult(Status.ETA_UNREACHABLE, message, low, walker.qp_solves)
     point, slope = (high, start.slope) if low is high else _root(walker, low, high, wanted, guided=start.lam is not None)
     if not walker.verified(point):
-        return Walk(Status.ITERATION_LIMIT, 'the QP linearised at the solution has another one', point, walker.qp_solves)
-    return Walk(Status.SOLVED, 'solved', point, walker.qp_solves, slope)
+        return PathResult(Status.ITERATION_LIMIT, 'the QP linearised at the solution has another one', point, walker.qp_solves)
+    return PathResult(Status.SOLVED, 'solved', point, walker.qp_solves, slope)
 
 
-def _bracket(walker: Walker, first: Point, wanted: float, stride: float, patience: float) -> tuple[Point, Point | None]:
+def _bracket(
+    walker: PathFollower, first: PathPoint, wanted: float, stride: float, patience: float
+) -> tuple[PathPoint, PathPoint | None]:
     """Return the last point below the wanted k and the first at or above it; or else any point, and one after it that is close.
 
     Both the same where the first is close enough, or the curve's beginning is enough; no upper one where the wanted k is out of
@@ -121,7 +123,7 @@ def _bracket(walker: Walker, first: Point, wanted: float, stride: float, patienc
     return best, None
 
 
-def _strides(walker: Walker, first: Point, wanted: float, stride: float) -> Iterator[Point]:
+def _strides(walker: PathFollower, first: PathPoint, wanted: float, stride: float) -> Iterator[PathPoint]:
     """Yield points further and further along the curve, or back for a negative stride; towards an infeasible end in quarters.
 
     Warm ones go by the slope of k. Cold ones go the same way whatever k is wanted, so that more eta never comes out cheaper.
@@ -143,14 +145,14 @@ def _strides(walker: Walker, first: Point, wanted: float, stride: float) -> Iter
         yield point
 
 
-def _next_stride(before: Point, point: Point, wanted: float, stride: float) -> float:
+def _next_stride(before: PathPoint, point: PathPoint, wanted: float, stride: float) -> float:
     """Go to where k would be the wanted one if it went on as it does, on the same way; at most four times the last stride."""
     largest = min(4 * abs(stride), STRIDE)
     slope = (point.k - before.k) / (point.s - before.s)
     return math.copysign(_ahead(point, wanted, slope, largest) if slope > 0 else largest, stride)
 
 
-def _ahead(point: Point, wanted: float, slope: float, most: float) -> float:
+def _ahead(point: PathPoint, wanted: float, slope: float, most: float) -> float:
     """Return how far from a point k is the wanted one if it grows with a slope, in the middle of what counts as close."""
     return min(max(abs(_aim(wanted) - point.k) / slope, TINY), most)
 
@@ -159,11 +161,11 @@ def _aim(wanted: float) -> float:
     return wanted * (1 + CLOSE / 2)
 
 
-def _is_close(point: Point, wanted: float) -> bool:
+def _is_close(point: PathPoint, wanted: float) -> bool:
     return wanted <= point.k <= wanted * (1 + CLOSE)
 
 
-def _root(walker: Walker, low: Point, high: Point, wanted: float, *, guided: bool) -> tuple[Point, float]:
+def _root(walker: PathFollower, low: PathPoint, high: PathPoint, wanted: float, *, guided: bool) -> tuple[PathPoint, float]:
     """Find k(s) = wanted between a point below and one at or above, by Illinois steps; returns one at or above, and dk/ds.
 
     Comes from below only: of several solutions at the same s, those that are met first as s grows. A wide bracket is halved

@@ -17,10 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
-from foc_ros.core.dynamics.condensed import apart, moved, spread
+from foc_ros.core.dynamics.condensed import apart, mean_positions, position_variances
 from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled
-from foc_ros.core.obstacles.chance_constraint import eta_of_k, k_of_eta, variance
-from foc_ros.core.ocp.chance_evaluation import assess
+from foc_ros.core.obstacles.chance_constraint import eta_of_k, k_of_eta, variances
+from foc_ros.core.ocp.chance_evaluation import evaluate_chance_constraint
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.qp import Cost, ReachingQP, effort_cost, row_values, wanted_distance
 from foc_ros.core.ocp.sqp import converge
@@ -99,7 +99,7 @@ class _Search:
             return Status.INFEASIBLE, 'no control meets every linearised obstacle row'
         self.qp_solves += free.qp_solves
         self.iterate = _Iterate(free.control, free.active, free.contacts.force)
-        self.reached = assess(self.problem, free.control).smallest_k
+        self.reached = evaluate_chance_constraint(self.problem, free.control).smallest_k
         if self.reached >= self.wanted:
             return Status.SOLVED, 'solved'
         return self.raised(self.iterate)
@@ -182,7 +182,7 @@ def linearised(
     """
     m, steps, _ = offset.shape
     slopes, surplus = np.empty((m, steps, 5)), np.empty((m, steps))
-    var = variance(offset, covariance, size_variance, centre_covariance)
+    var = variances(offset, covariance, size_variance, centre_covariance)
     for j in range(m):
         for t in range(steps):
             distance = max(np.hypot(offset[j, t, 0], offset[j, t, 1]), 1e-9)
@@ -215,8 +215,8 @@ def surrogate_rows(
     turning: float,
 ) -> tuple[Tensor, Matrix, Matrix]:
     """Return `linearised` at a control (2N,) as rows on u: slopes (m, N, 5), limits (m, N) and the maps' weights (5, 2N)."""
-    offset = np.expand_dims(moved(maps[:2], control, free_position), 0) - centres
-    covariance = spread(maps, noise_variance, control, free_variance)
+    offset = np.expand_dims(mean_positions(maps[:2], control, free_position), 0) - centres
+    covariance = position_variances(maps, noise_variance, control, free_variance)
     slopes, surplus = linearised(offset, covariance, size_variance, centre_covariance, wanted, k, turning)
     weights = np.ones((5, len(control)))
     weights[2:] = noise_variance * control

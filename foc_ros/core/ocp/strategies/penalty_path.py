@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.ocp.contacts.checks import goes, joined, leapt, stays, way_of
+from foc_ros.core.ocp.contacts.checks import class_angles, find_crossings, is_fixed_point, is_in_class, merge_contacts
 from foc_ros.core.ocp.contacts.contacts import Contacts
-from foc_ros.core.ocp.contacts.kkt_point import Settled, settled
-from foc_ros.core.ocp.minimum_k import Least, smallest
+from foc_ros.core.ocp.contacts.kkt_point import KktPoint, solve_kkt_point
+from foc_ros.core.ocp.minimum_k import MinimumSafetyFactor, find_minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.qp import NO_TIMES, effort_cost
 from foc_ros.core.ocp.sqp import MAX_QPS, Converged, Jump, converge
@@ -35,7 +35,7 @@ FURTHER_QPS = 16
 
 
 @dataclass(frozen=True)
-class Curve:
+class PenaltyPath:
     """tau = delta s [m^2], lambda = first_lambda growth^s."""
 
     delta: float
@@ -59,7 +59,7 @@ class Curve:
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class PathPoint:
     """One converged solution on the curve: control (2N,), the contacts that hold it, the smallest k with its place.
 
     least: as of `least_k.smallest`; rough: held by the rows of QPs, and so perhaps slightly inside a circle between two of them.
@@ -68,7 +68,7 @@ class Point:
     s: float
     control: Array
     contacts: Contacts
-    least: Least
+    least: MinimumSafetyFactor
     rough: bool = False
 
     @property
@@ -77,37 +77,39 @@ class Point:
         return self.least[0]
 
 
-class Walker:
+class PathFollower:
     """Evaluates points, each from a neighbour's solution, and counts."""
 
-    def __init__(self, problem: Problem, curve: Curve, deadline: Deadline, *, follows: bool) -> None:
+    def __init__(self, problem: Problem, curve: PenaltyPath, deadline: Deadline, *, follows: bool) -> None:
         self.problem, self.curve, self.end, self.deadline = problem, curve, curve.end(problem), deadline
         self.follows = follows
         self.qp_solves = 0
-        self.best: Point | None = None
+        self.best: PathPoint | None = None
 
-    def beginning(self, guess: Array, way: Array | None = None) -> Point | None:
+    def beginning(self, guess: Array, way: Array | None = None) -> PathPoint | None:
         """Converge at the beginning of the curve, from a guess (N, 2)."""
         return self.point(0.0, guess, WorkingSet(), way, thorough=True)
 
-    def point(self, s: float, guess: Array, working: WorkingSet, way: Array | None, *, thorough: bool) -> Point | None:
+    def point(self, s: float, guess: Array, working: WorkingSet, way: Array | None, *, thorough: bool) -> PathPoint | None:
         """Converge at s from a guess (N, 2): by QPs, until sliding contacts find it from there; else where the QPs settle.
 
         way: the class that it has to be in, any if it is None; thorough: spare no effort.
         """
         tau, lam = self.curve.at(s)
 
-        def jump(control: Array, contacts: Contacts) -> Settled | None:
-            return settled(self.problem, control, joined(self.problem, contacts), tau, lam, way)
+        def jump(control: Array, contacts: Contacts) -> KktPoint | None:
+            return solve_kkt_point(self.problem, control, merge_contacts(self.problem, contacts), tau, lam, way)
 
         found = self.sequence(guess, working, tau, lam, jump, thorough=thorough)
         if found is None or not found.stays:
             return None
         if found.jumped is not None:
             return self.reached(s, found.jumped)
-        if way is not None and not goes(self.problem, found.control, way):
+        if way is not None and not is_in_class(self.problem, found.control, way):
             return None
-        return self.reached(s, Settled(found.control, found.contacts, smallest(self.problem, found.control)), rough=True)
+        return self.reached(
+            s, KktPoint(found.control, found.contacts, find_minimum_safety_factor(self.problem, found.control)), rough=True
+        )
 
     def sequence(
         self, guess: Array, working: WorkingSet, tau: float, lam: float, jump: Jump, *, thorough: bool
@@ -132,7 +134,7 @@ class Walker:
             if found is None:
                 return None
             self.qp_solves += found.qp_solves
-            leaps = NO_TIMES if found.jumped is not None else leapt(self.problem, found.control, tau)
+            leaps = NO_TIMES if found.jumped is not None else find_crossings(self.problem, found.control, tau)
             if not len(leaps):
                 return found
             most -= found.linearisations
@@ -141,29 +143,29 @@ class Walker:
             between, working = np.union1d(between, leaps), found.active.within(self.problem.horizon.steps)
         return None
 
-    def beside(self, s: float, neighbour: Point) -> Point | None:
+    def beside(self, s: float, neighbour: PathPoint) -> PathPoint | None:
         """Converge at s from a neighbour, in its class: by Newton steps; by QPs where these fail, unless it only follows."""
         self.deadline.check()
-        contacts = joined(self.problem, neighbour.contacts) if neighbour.rough else neighbour.contacts
+        contacts = merge_contacts(self.problem, neighbour.contacts) if neighbour.rough else neighbour.contacts
         point = self.followed(s, neighbour.control, contacts)
         if point is not None or self.follows:
             return point
         guess, (working, _) = self.problem.positions(neighbour.control), contacts.rows(self.problem.horizon.steps)
-        return self.point(s, guess, working, way_of(self.problem, neighbour.control), thorough=False)
+        return self.point(s, guess, working, class_angles(self.problem, neighbour.control), thorough=False)
 
-    def followed(self, s: float, control: Array, contacts: Contacts, way: Array | None = None) -> Point | None:
+    def followed(self, s: float, control: Array, contacts: Contacts, way: Array | None = None) -> PathPoint | None:
         """Converge at s from a control (2N,) by Newton steps, in its class or that of a way."""
-        found = settled(self.problem, control, contacts, *self.curve.at(s), way)
+        found = solve_kkt_point(self.problem, control, contacts, *self.curve.at(s), way)
         return None if found is None else self.reached(s, found)
 
-    def reached(self, s: float, found: Settled, *, rough: bool = False) -> Point:
+    def reached(self, s: float, found: KktPoint, *, rough: bool = False) -> PathPoint:
         """Return the point, and remember it if its k is the largest so far."""
-        point = Point(s, found.control, found.contacts, found.least, rough)
+        point = PathPoint(s, found.control, found.contacts, found.least, rough)
         self.best = point if self.best is None or point.k > self.best.k else self.best
         return point
 
-    def verified(self, point: Point) -> bool:
+    def verified(self, point: PathPoint) -> bool:
         """Whether the QP linearised at a point has the same solution."""
         self.qp_solves += 1
         tau, lam = self.curve.at(point.s)
-        return stays(self.problem, effort_cost(self.problem, lam), point.control, point.contacts, tau)
+        return is_fixed_point(self.problem, effort_cost(self.problem, lam), point.control, point.contacts, tau)
