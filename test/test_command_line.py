@@ -96,7 +96,7 @@ def test_what_follows_node_is_left_to_ros(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_a_reader_that_went_away_is_no_traceback() -> None:
     program = (
-        'import sys\nfrom foc_ros import command_line\n'
+        'import sys\nfrom foc_ros.cli import main as command_line\n'
         'class Loud:\n'
         ' add_arguments = staticmethod(lambda parser: None)\n'
         ' @staticmethod\n'

@@ -33,10 +33,10 @@ assert 'foc_ros.core.predictor' in names, names
 
 PREDICT = """
 import numpy as np
-from foc_ros.foc.config import Config
-from foc_ros.foc.memory import Memory
-from foc_ros.foc.predictor import predict
-from foc_ros.foc.records import HandState, make_obstacles
+from foc_ros.core.config import Config
+from foc_ros.core.memory import Memory
+from foc_ros.core.predictor import predict
+from foc_ros.core.types import HandState, make_obstacles
 hand = HandState(0, np.zeros(6), np.zeros((6, 6)))
 scene = make_obstacles([[0.15, 0.0]], [0.03], 0.002)
 prediction, _ = predict(Config(), hand, scene, np.array([[0.3, 0.0]]), Memory())
@@ -66,7 +66,7 @@ def test_core_imports_and_predicts_without_ros_and_rosbags() -> None:
 def test_replay_runs_without_ros(tmp_path: Path) -> None:
     (tmp_path / 'slow.yaml').write_text('/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 10}}', 'utf-8')
     program = f"""
-from foc_ros.command_line import main
+from foc_ros.cli.main import main
 from importlib.resources import files
 bag = files('foc_ros') / 'recordings' / 'reaching.mcap'
 sys.exit(main(['replay', str(bag), '--params', {str(tmp_path / 'slow.yaml')!r}, '--json']))

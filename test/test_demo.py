@@ -84,7 +84,7 @@ def start(domain: int, output: Path) -> tuple[subprocess.Popen[str], int]:
     program = f"""
 import sys
 from pathlib import Path
-from foc_ros.demo import command, node_process
+from foc_ros.cli.demo import command, node_process
 entered = node_process.NodeProcess.__enter__
 def enter(self):
     node = entered(self)

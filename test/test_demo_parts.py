@@ -246,7 +246,7 @@ def test_the_node_does_not_outlive_a_killed_demo(tmp_path: Path) -> None:
 import os, sys, time
 sys.path.insert(0, {str(root)!r})
 from pathlib import Path
-from foc_ros.demo.node_process import NodeProcess
+from foc_ros.cli.demo.node_process import NodeProcess
 os.chdir({str(package.parent)!r})
 with NodeProcess(os.environ | {{'PYTHONPATH': {str(package.parent)!r}}}, Path({str(tmp_path / 'log.txt')!r})) as node:
     print(node.pid, flush=True)

@@ -25,13 +25,15 @@ def test_imports_run_downward() -> None:
 @pytest.mark.parametrize(
     ('module', 'line'),
     [
-        ('foc/records.py', 'import rclpy'),
-        ('foc/predictor.py', 'from sensor_msgs.msg import PointCloud2'),
-        ('foc/likelihood.py', 'import rosbags'),
-        ('foc/chance.py', 'from . import pipeline'),
-        ('foc/errors.py', 'from .records import Record'),
-        ('foc/config.py', 'from ..parameters import config_of'),
-        ('parameters.py', 'from .node import FocNode'),
+        ('core/types.py', 'import rclpy'),
+        ('core/predictor.py', 'from sensor_msgs.msg import PointCloud2'),
+        ('core/likelihood.py', 'import rosbags'),
+        ('core/obstacles/chance_constraint.py', 'from foc_ros.core import pipeline'),
+        ('core/types.py', 'from foc_ros.core.estimation import duration'),
+        ('core/homotopy/search.py', 'from foc_ros.core.ocp import problem'),
+        ('io/bags.py', 'from foc_ros.ros import intake'),
+        ('analysis/replay.py', 'from foc_ros.reporting import plots'),
+        ('ros/parameters.py', 'from foc_ros.analysis import replay'),
     ],
 )
 def test_an_import_that_runs_upward_is_seen(tmp_path: Path, module: str, line: str) -> None:

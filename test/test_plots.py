@@ -147,9 +147,9 @@ import importlib.util, sys
 sys.modules['{missing}'] = None
 find_spec = importlib.util.find_spec
 importlib.util.find_spec = lambda name, *rest: None if name == '{missing}' else find_spec(name, *rest)
-from foc_ros.foc.errors import FocError
+from foc_ros.core.errors import FocError
 try:
-    import foc_ros.{module}
+    import foc_ros.reporting.{module}
 except FocError as error:
     print(error)
 """

@@ -65,8 +65,8 @@ def test_left_by_an_exception_the_workers_are_killed() -> None:
 def test_workers_end_with_a_parent_that_is_killed() -> None:
     script = """if __name__ == '__main__':
         import worker_tasks
-        from foc_ros.evaluation.lanes import Lanes
-        lanes = Lanes(1)
+        from foc_ros.analysis.evaluation.lanes import IsolatedProcessPool
+        lanes = IsolatedProcessPool(1)
         print(lanes.submit(worker_tasks.worker_pid, 0).result(), flush=True)
         lanes.submit(worker_tasks.sleepy, 60.0).result()"""
     with subprocess.Popen([sys.executable, '-c', script], cwd=Path(__file__).parent, stdout=subprocess.PIPE, text=True) as parent:
