@@ -5,8 +5,8 @@
 
 Nothing of `foc_ros` is imported: dynamics, constraints and costs are written down again, from the equations of `doc/model.md`.
 
-- `converged_qp`: the reformulated problem at a given (tau, lambda). quadprog solves the full condensed QP; the obstacle constraint is
-  linearised again at each solution until the mean stays.
+- `converged_qp`: the reformulated problem at a given (tau, lambda). quadprog solves the full condensed QP; the obstacle constraint
+  is linearised again at each solution until the mean stays.
 - `min_effort_at_eta`: the least effort subject to the un-linearised surrogate E + k sqrt(Var) <= 0 at every step, by IPOPT with
   exact derivatives from CasADi.
 """
