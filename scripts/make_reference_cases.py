@@ -3,10 +3,10 @@
     pip install numpy quadprog casadi
     python scripts/make_reference_cases.py
 
-Nothing of `foc_ros` is imported: dynamics, constraints and costs are written down again, from the equations of `doc/model.md`.
+The script does not import `foc_ros`. It implements dynamics, constraints and costs again, from the equations of `doc/model.md`.
 
-- `converged_qp`: the reformulated problem at a given (tau, lambda). quadprog solves the full condensed QP; the obstacle constraint
-  is linearised again at each solution until the mean stays.
+- `converged_qp`: the reformulated problem at a given (tau, lambda). quadprog solves the full condensed QP, and the obstacle
+  constraint is linearised at each solution until the mean converges.
 - `min_effort_at_eta`: the least effort subject to the un-linearised surrogate E + k sqrt(Var) <= 0 at every step, by IPOPT with
   exact derivatives from CasADi.
 """
@@ -46,7 +46,7 @@ def condensed_maps(steps: int, dt: float) -> tuple[Array, Array]:
 
 
 def random_case(generator: np.random.Generator, number: int) -> dict[str, Any]:
-    """Return a scene with one to four obstacles near the straight way, and the side of its guess."""
+    """Return a scene with one to four obstacles near the straight line, and the amplitude of its guess."""
     count = int(generator.integers(1, 5))
     goal = round(float(generator.uniform(0.28, 0.42)), 4)
     obstacles = [
@@ -136,7 +136,7 @@ def solve_least_effort(case: dict[str, Any], eta: float) -> dict[str, Any] | Non
     """Return the least effort whose surrogate holds with eta at every step, or None where IPOPT does not converge."""
     steps, dt = case['steps'], case['duration_s'] / case['steps']
     positions, last = condensed_maps(steps, dt)
-    # the unit of jerk makes the variables about one
+    # in this unit of jerk the variables are about one
     unit = 60.0 * case['goal'][0] / case['duration_s'] ** 3
     k = float(np.sqrt(eta / (1 - eta)))
     u = casadi.SX.sym('u', 2 * steps)
@@ -172,7 +172,7 @@ def solve_least_effort(case: dict[str, Any], eta: float) -> dict[str, Any] | Non
 
 
 def main() -> None:
-    """Draw scenes until ten of them are solved by both solvers on the same sides."""
+    """Draw scenes until both solvers have solved ten of them and pass the obstacles on the same sides."""
     generator, cases = np.random.default_rng(SEED), list[dict[str, Any]]()
     settings = [(0.0, 1.0), (0.0, 1e4), (2e-4, 1e5), (5e-4, 1e6)]
     while len(cases) < CASES:
