@@ -22,7 +22,7 @@ FOLDER = Path(__file__).resolve().parent
 LONG = (
     # studies of the solver over many scenes
     'test_effort_over_eta.py::test_effort_is_continuous*',
-    'test_effort_over_eta.py::test_nothing_in_the_same_class_needs_less_than_optimal',
+    'test_effort_over_eta.py::test_no_strategy_needs_less_effort_than_optimal_in_the_same_class',
     'test_flicker.py::test_a_symmetric_obstacle_does_not_make_the_choice_flicker',
     'test_guarantee.py::*',
     'test_slow_path.py::*',
