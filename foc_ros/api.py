@@ -24,8 +24,16 @@ from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.predictor import predict
 from foc_ros.core.reaching_scene import ReachingScene, build_scene_problems, check_outside, solve_scene
 from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
-from foc_ros.core.sample_status import SampleStatus
-from foc_ros.core.types import NANOSECONDS, Candidate, HandSample, HandState, Obstacles, PredictedCandidate, make_obstacles
+from foc_ros.core.types import (
+    NANOSECONDS,
+    Candidate,
+    HandSample,
+    HandState,
+    Obstacles,
+    PredictedCandidate,
+    SampleStatus,
+    make_obstacles,
+)
 
 LATEST_S = 9e9
 """Bound on a time [s]: stamps are 64-bit numbers of nanoseconds."""
@@ -185,10 +193,10 @@ class Predictor:
         if self._goals is None:
             raise SceneError('goals', 'at least one, by set_goals', 'none')
         updated = update(self._hand, sample, self.config.estimator)
-        if updated.verdict is SampleStatus.RESTARTED_BACKWARD or not updated.verdict.taken:
+        if updated.status is SampleStatus.RESTARTED_BACKWARD or not updated.status.taken:
             last = '' if self._hand is None else f', {self._hand.stamp_ns / NANOSECONDS:.9g} s'
             raise InputError('t', f'a time after the last one{last}', t)
-        if updated.verdict.restarted:
+        if updated.status.restarted:
             self._memory = Memory()
         self._hand = updated.state
         if self._obstacles.stamp_ns is None:

@@ -14,7 +14,7 @@ from .deadline import Deadline
 from .dynamics.noise import scale_noise
 from .dynamics.plant_models import make_plant_model
 from .dynamics.predictive_covariance import predictive_covariance, timing_covariances
-from .estimation.duration import candidate_durations, estimate_times_to_go, is_passing
+from .estimation.duration import choose_candidate_durations, estimate_times_to_go, is_passing
 from .homotopy import search
 from .homotopy.demonstrations import Demonstration, recall_demonstrations
 from .likelihood import make_cost_model, select_most_likely
@@ -96,7 +96,7 @@ def build_problems(
     goal_times: Sequence[float],
 ) -> dict[str, Problem]:
     """Return the problem of each candidate by its label; candidates with the same goal and duration share a problem."""
-    times = candidate_durations(hand, candidates, goal_times, config.duration)
+    times = choose_candidate_durations(hand, candidates, goal_times, config.duration)
     kinds = [(candidate.goal, duration_s) for candidate, duration_s in zip(candidates, times, strict=True)]
     built = {kind: build_problem(config, hand, obstacles, goals[kind[0]], kind[1]) for kind in dict.fromkeys(kinds)}
     return {candidate.label: built[kind] for candidate, kind in zip(candidates, kinds, strict=True)}

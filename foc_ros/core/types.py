@@ -6,7 +6,7 @@ message -> HandSample -> HandState -> Candidates -> Solutions -> Prediction -> m
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from enum import Enum
+from enum import Enum, StrEnum
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,6 +48,32 @@ class HandSample(Record):
     position: Array
     height: float = 0.0
     frame_id: str = ''
+
+
+class SampleStatus(StrEnum):
+    """What became of a message that was given to the predictor.
+
+    ACCEPTED: used. RESTARTED_BACKWARD, RESTARTED_GAP: used, and the movement restarts from it. DISENGAGED: the hand was followed,
+    but nothing is predicted from it. DUPLICATE, LATE, WRONG_FRAME: rejected, without any change.
+    """
+
+    ACCEPTED = 'accepted'
+    DUPLICATE = 'duplicate'
+    LATE = 'late'
+    RESTARTED_BACKWARD = 'restarted_backward'
+    RESTARTED_GAP = 'restarted_gap'
+    WRONG_FRAME = 'wrong_frame'
+    DISENGAGED = 'disengaged'
+
+    @property
+    def taken(self) -> bool:
+        """Whether the message was used."""
+        return self not in (SampleStatus.DUPLICATE, SampleStatus.LATE, SampleStatus.WRONG_FRAME)
+
+    @property
+    def restarted(self) -> bool:
+        """Whether the movement restarts from this message."""
+        return self in (SampleStatus.RESTARTED_BACKWARD, SampleStatus.RESTARTED_GAP)
 
 
 @dataclass(frozen=True, eq=False)
