@@ -68,7 +68,7 @@ def test_the_likeliest_of_last_time_comes_first(monkeypatch, turned):
     )
     asked = []
 
-    def forward_with_time_for_one(problem, start, settings, deadline):
+    def solve_with_time_for_one(problem, start, settings, deadline):
         asked.append(problem)
         if len(asked) > 1:
             monkeypatch.setattr('foc_ros.core.deadline.Deadline.check', out_of_time)
@@ -80,7 +80,7 @@ def test_the_likeliest_of_last_time_comes_first(monkeypatch, turned):
     from foc_ros.core import candidates as outcomes
 
     real = outcomes.solve_problem
-    monkeypatch.setattr(outcomes, 'forward', forward_with_time_for_one)
+    monkeypatch.setattr(outcomes, 'solve_problem', solve_with_time_for_one)
     late, _ = predicted(1, memory, 60.0)
     assert [each.candidate.label for each in late.solved_candidates] == [wanted]
     assert late.solved_candidates[0].likelihood == 1.0, 'likelihoods are of what was solved; the others are unknown'

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foc_ros.core.config import DurationConfig
-from foc_ros.core.estimation.duration import estimate_times_to_go, movement_time
+from foc_ros.core.estimation.duration import estimate_times_to_go, compute_movement_time
 from foc_ros.core.types import NANOSECONDS, HandState
 
 FITTS = DurationConfig(
@@ -34,7 +34,7 @@ def time_to_go(state: HandState, goal: np.ndarray, config: DurationConfig) -> fl
 def test_fitts_law_at_whole_bits() -> None:
     for bits in range(8):
         distance = 0.02 * (2.0**bits - 1.0)
-        assert movement_time(distance, FITTS) == pytest.approx(0.2 + 0.25 * bits)
+        assert compute_movement_time(distance, FITTS) == pytest.approx(0.2 + 0.25 * bits)
 
 
 def test_at_rest_the_whole_duration_from_here() -> None:

@@ -12,7 +12,7 @@ from foc_ros.core.dynamics.plants import (
     triple_integrator,
     triple_integrator_horizon,
 )
-from foc_ros.core.dynamics.replanning import replanned_error_map, triple_integrator_error_map
+from foc_ros.core.dynamics.replanning import compute_error_map, triple_integrator_error_map
 from foc_ros.core.errors import InputError
 
 
@@ -60,7 +60,7 @@ def test_scaled_horizon_is_the_direct_one():
     np.testing.assert_allclose(scaled.powers, direct.powers, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(scaled.response, direct.response, rtol=1e-12, atol=1e-18)
     np.testing.assert_allclose(scaled.maps, direct.maps, rtol=1e-12, atol=1e-24)
-    np.testing.assert_allclose(triple_integrator_error_map(0.037, 30), replanned_error_map(direct), atol=1e-10)
+    np.testing.assert_allclose(triple_integrator_error_map(0.037, 30), compute_error_map(direct), atol=1e-10)
 
 
 def test_a_replanning_operator_ends_at_the_goal_and_starts_where_the_hand_is():

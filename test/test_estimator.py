@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from foc_ros.core.config import EstimatorConfig
 from foc_ros.core.estimation.kalman_filter import FilterState, gramian, transition, update
-from foc_ros.core.sample_status import SampleStatus
-from foc_ros.core.types import NANOSECONDS, Array, HandSample
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, SampleStatus
 
 CONFIG = EstimatorConfig(position_stddev=0.001, jerk_density=5.0, onset_speed=0.05, gap_s=0.5)
 START = 100 * NANOSECONDS
@@ -134,7 +133,7 @@ def test_duplicates_and_late_samples_change_nothing() -> None:
     state = run(np.arange(0.0, 1.0, 0.02), np.zeros((50, 2)))[-1]
     for seconds, verdict in [(0.0, SampleStatus.DUPLICATE), (-1e-9, SampleStatus.LATE), (-0.5, SampleStatus.LATE)]:
         answer = update(state, sample(0.98 + seconds, 9.0, 9.0), CONFIG)
-        assert answer.verdict is verdict
+        assert answer.status is verdict
         assert answer.state is state
 
 
@@ -148,11 +147,11 @@ def test_jumps_back_and_gaps_start_anew() -> None:
     ]:
         jump = sample(0.98 + seconds, 0.7, 0.1)
         answer, fresh = update(state, jump, CONFIG), update(None, jump, CONFIG).state
-        assert answer.verdict is verdict
+        assert answer.status is verdict
         np.testing.assert_array_equal(answer.state.mean, fresh.mean)
         np.testing.assert_array_equal(answer.state.covariance, fresh.covariance)
         assert answer.state.onset_ns is None
-    assert update(state, sample(0.98 + 0.5), CONFIG).verdict is SampleStatus.ACCEPTED
+    assert update(state, sample(0.98 + 0.5), CONFIG).status is SampleStatus.ACCEPTED
 
 
 def test_a_movement_begins_above_the_onset_speed_and_ends_below_half_of_it() -> None:

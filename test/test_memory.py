@@ -44,7 +44,7 @@ def memory() -> Memory:
     ],
 )
 def test_a_way_is_known_by_its_name_or_the_one_it_had(memory, now, before):
-    found = memory.known([now]).solutions.get(now.label)
+    found = memory.find_earlier([now]).solutions.get(now.label)
     assert found is (None if before is None else memory.earlier.solutions[before.label])
 
 
@@ -91,7 +91,7 @@ def test_a_way_that_was_stopped_goes_on_from_there(monkeypatch):
 
 def test_a_way_out_of_reach_is_followed_and_begun_anew_now_and_then(monkeypatch):
     starts = []
-    monkeypatch.setattr(outcomes, 'forward', lambda *given: starts.append(given[1].lam is None) or solve_problem(*given))
+    monkeypatch.setattr(outcomes, 'solve_problem', lambda *given: starts.append(given[1].lam is None) or solve_problem(*given))
     config = updated(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0})
     memory, begun = Memory(), []
     for tick in range(2 * RETRY_AFTER + 3):

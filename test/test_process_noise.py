@@ -5,7 +5,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from foc_ros.core.config import Config, updated
 from foc_ros.core.dynamics.plants import condense, triple_integrator
-from foc_ros.core.dynamics.replanning import replanned_error_map, triple_integrator_process_covariance
+from foc_ros.core.dynamics.replanning import compute_error_map, triple_integrator_process_covariance
 from foc_ros.core.estimation.kalman_filter import gramian
 from foc_ros.core.memory import Memory
 from foc_ros.core.predictor import predict
@@ -32,7 +32,7 @@ def test_it_is_what_a_hand_that_replans_at_each_step_does() -> None:
     for step in range(steps):
         if steps - step < 3:  # too few to bring every state to the goal
             break
-        error = error @ replanned_error_map(condense(plant, steps - step))[1].T
+        error = error @ compute_error_map(condense(plant, steps - step))[1].T
         error = error + noise.standard_normal((draws, 6)) @ root.T
         assert_allclose(error.var(axis=0), np.diag(expected[step + 1]), rtol=0.05)
 

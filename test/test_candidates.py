@@ -8,7 +8,7 @@ from reach_helpers import bowed, one_obstacle, solved
 
 from foc_ros.core import candidates as outcomes
 from foc_ros.core.candidates import EarlierSolutions, solve_candidates
-from foc_ros.core.config import FocConfig, LikelihoodConfig
+from foc_ros.core.config import FocConfig
 from foc_ros.core.types import LEFT, Candidate, Status
 
 GUESS = bowed((0.0, 0.0), (0.3, 0.0), 50, 0.06)
@@ -29,8 +29,8 @@ def test_a_way_that_comes_into_reach_counts_by_its_cheaper_answer(monkeypatch, b
     problem = one_obstacle()
     cold = solved(problem, GUESS)
     answers = {'cold': cold, 'warm': replace(cold, effort=warm * cold.effort)}
-    monkeypatch.setattr(outcomes, 'forward', lambda _, start, *rest: answers['cold' if start.lam is None else 'warm'])
+    monkeypatch.setattr(outcomes, 'solve_problem', lambda _, start, *rest: answers['cold' if start.lam is None else 'warm'])
     earlier = EarlierSolutions({WAY.label: replace(cold, status=before)}, {})
-    (outcome,) = solve_candidates([WAY], [problem], FocConfig(), LikelihoodConfig(), earlier=earlier)
+    (outcome,) = solve_candidates([WAY], [problem], FocConfig(), earlier=earlier)
     assert outcome.solution is answers[counts]
     np.testing.assert_allclose(outcome.cost, answers[counts].effort * cold.dt)

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from foc_ros.core.config import Config, updated
 from foc_ros.core.dynamics.plants import condense, triple_integrator, triple_integrator_horizon
 from foc_ros.core.dynamics.predictive_covariance import duration_sensitivity, onset_delay_covariance
-from foc_ros.core.dynamics.replanning import goal_map, triple_integrator_goal_map
+from foc_ros.core.dynamics.replanning import compute_goal_map, triple_integrator_goal_map
 from foc_ros.core.memory import Memory
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
@@ -33,7 +33,7 @@ def test_a_goal_elsewhere_is_reached_by_a_minimum_jerk_movement_to_it() -> None:
     assert_allclose(moved[:, 0, 0], 10 * S**3 - 15 * S**4 + 6 * S**5, atol=2e-3)
     assert_allclose(moved[:, 0, 4], S**3 * (1 - S) ** 2 / 2, atol=2e-4)
     assert_allclose(moved[-1], np.eye(6), atol=1e-9)
-    assert_allclose(moved, goal_map(condense(triple_integrator(0.02), STEPS)), atol=1e-9)
+    assert_allclose(moved, compute_goal_map(condense(triple_integrator(0.02), STEPS)), atol=1e-9)
     assert_array_equal(moved[0], 0.0)
 
 
