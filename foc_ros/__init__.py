@@ -10,78 +10,42 @@ from typing import TYPE_CHECKING, Any
 __version__ = '0.1.0'
 
 if TYPE_CHECKING:
-    from foc_ros.analysis.evaluation import register_baseline
-    from foc_ros.api import (
-        Prediction,
-        Predictor,
-        Solution,
-        load_config,
-        monte_carlo,
-        plot_candidates,
-        register_likelihood_rule,
-        register_plant,
-        register_qp_backend,
-        register_strategy,
-        replay,
-        solve,
-        solve_classes,
-    )
-    from foc_ros.core.config import Config
-    from foc_ros.core.dynamics.plant_models import PlantModel
-    from foc_ros.core.dynamics.plants import Plant
-    from foc_ros.core.errors import FocError, InputError, MessageError, ParameterError, RecordingError, SceneError
-    from foc_ros.core.obstacles.shapes import Circle
-    from foc_ros.core.ocp.monte_carlo import MonteCarlo
-    from foc_ros.core.types import Candidate, HandState, Obstacles, PredictedCandidate, Status
+    from foc_ros.analysis.evaluation import register_baseline as register_baseline
+    from foc_ros.api import *  # noqa: F403
+    from foc_ros.core.config import Config as Config
+    from foc_ros.core.dynamics.plant_models import PlantModel as PlantModel
+    from foc_ros.core.dynamics.plants import Plant as Plant
+    from foc_ros.core.errors import FocError as FocError
+    from foc_ros.core.errors import InputError as InputError
+    from foc_ros.core.errors import MessageError as MessageError
+    from foc_ros.core.errors import ParameterError as ParameterError
+    from foc_ros.core.errors import RecordingError as RecordingError
+    from foc_ros.core.errors import SceneError as SceneError
+    from foc_ros.core.obstacles.shapes import Circle as Circle
+    from foc_ros.core.ocp.monte_carlo import MonteCarlo as MonteCarlo
+    from foc_ros.core.types import Candidate as Candidate
+    from foc_ros.core.types import HandState as HandState
+    from foc_ros.core.types import Obstacles as Obstacles
+    from foc_ros.core.types import PredictedCandidate as PredictedCandidate
+    from foc_ros.core.types import Status as Status
 
 _MODULES = {
-    'foc_ros.api': (
+    'api': (
         'Prediction Predictor Solution load_config monte_carlo plot_candidates register_likelihood_rule register_plant'
         ' register_qp_backend register_strategy replay solve solve_classes'
     ),
-    'foc_ros.core.config': 'Config',
-    'foc_ros.core.dynamics.plant_models': 'PlantModel',
-    'foc_ros.core.dynamics.plants': 'Plant',
-    'foc_ros.core.errors': 'FocError InputError MessageError ParameterError RecordingError SceneError',
-    'foc_ros.core.obstacles.shapes': 'Circle',
-    'foc_ros.core.ocp.monte_carlo': 'MonteCarlo',
-    'foc_ros.core.types': 'Candidate HandState Obstacles PredictedCandidate Status',
-    'foc_ros.analysis.evaluation': 'register_baseline',
+    'analysis.evaluation': 'register_baseline',
+    'core.config': 'Config',
+    'core.dynamics.plant_models': 'PlantModel',
+    'core.dynamics.plants': 'Plant',
+    'core.errors': 'FocError InputError MessageError ParameterError RecordingError SceneError',
+    'core.obstacles.shapes': 'Circle',
+    'core.ocp.monte_carlo': 'MonteCarlo',
+    'core.types': 'Candidate HandState Obstacles PredictedCandidate Status',
 }
-_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names.split()}
+_MODULE_OF = {name: f'{__name__}.{module}' for module, names in _MODULES.items() for name in names.split()}
 
-__all__ = [
-    'Candidate',
-    'Circle',
-    'Config',
-    'FocError',
-    'HandState',
-    'InputError',
-    'MessageError',
-    'MonteCarlo',
-    'Obstacles',
-    'ParameterError',
-    'Plant',
-    'PlantModel',
-    'PredictedCandidate',
-    'Prediction',
-    'Predictor',
-    'RecordingError',
-    'SceneError',
-    'Solution',
-    'Status',
-    'load_config',
-    'monte_carlo',
-    'plot_candidates',
-    'register_baseline',
-    'register_likelihood_rule',
-    'register_plant',
-    'register_qp_backend',
-    'register_strategy',
-    'replay',
-    'solve',
-    'solve_classes',
-]
+__all__ = list(_MODULE_OF)
 
 
 def __getattr__(name: str) -> Any:

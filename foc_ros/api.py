@@ -45,21 +45,16 @@ class Prediction(types.Prediction):
 
     Attributes
     ----------
-    t : float
-        Time of the hand sample [s].
+    t, solve_s : float
+        Time of the hand sample, and wall time of the prediction [s].
     candidates : tuple of PredictedCandidate
         Solved ones first, the most likely first; then those that could not be solved, with their status.
     most_likely : str or None
-        Label of the most likely homotopy class; it changes only when another class leads by `likelihood.margin`. None if no
-        candidate was solved.
-    obstacles : Obstacles
-        Obstacles at time `t`.
-    goals : ndarray of shape (g, 2)
-        Goals [m].
+        Label of the most likely class, which changes only when another one leads by `likelihood.margin`; None if none was solved.
+    obstacles, goals : Obstacles, ndarray of shape (g, 2)
+        The scene at time `t`.
     notes : dict
-        Counts of what happened on the way, such as merged classes and culled obstacles.
-    solve_s : float
-        Wall time of the prediction [s].
+        Counts of events such as merged classes and culled obstacles.
     """
 
     def plot(self, axes: Any = None) -> Any:
@@ -74,11 +69,6 @@ class Prediction(types.Prediction):
         -------
         matplotlib.axes.Axes
             The axes that hold the drawing.
-
-        Raises
-        ------
-        FocError
-            If matplotlib is not installed.
         """
         from foc_ros.reporting.plots import plot_prediction
 
@@ -135,12 +125,7 @@ class Predictor:
         Parameters
         ----------
         goals : array_like of shape (g, 2)
-            Positions [m], at least one. Labels number them in this order.
-
-        Raises
-        ------
-        SceneError
-            For no goal, a wrong shape or a number that is not finite.
+            Positions [m], at least one. Labels number them in this order. `SceneError` is raised for anything else.
         """
         points = check_array('goals', goals, (None, 2))
         if not len(points):
@@ -148,19 +133,12 @@ class Predictor:
         self._goals = points
 
     def set_obstacles(self, obstacles: Iterable[Circle] | Obstacles) -> None:
-        """Replace the obstacles.
-
-        Their positions hold at the next update; from then on each moves on at its velocity.
+        """Replace the obstacles. Their positions hold at the next update; from then on each moves on at its velocity.
 
         Parameters
         ----------
         obstacles : iterable of Circle, or Obstacles
-            The obstacles; none for a free scene.
-
-        Raises
-        ------
-        SceneError
-            For an element that is no `Circle`, or a name that occurs twice.
+            The obstacles, none for a free scene. `SceneError` is raised if a name occurs twice.
         """
         self._obstacles = ObstacleSource(collect_obstacles(obstacles), None, '')
 
@@ -220,18 +198,12 @@ class Solution(types.Solution):
         Result in words and numbers. Only `Status.SOLVED` meets the wanted eta.
     label : str
         Name of the homotopy class, such as ``goal0:+0-1``: + passes an obstacle on the left.
-    times, mean, covariance : ndarray of shape (N + 1,), (N + 1, n), (N + 1, n, n)
-        Times [s], and mean and covariance of the state: position, velocity and, for the triple integrator, acceleration.
-    path : ndarray of shape (N + 1, 2)
-        Mean positions [m].
-    control : ndarray of shape (N, 2)
-        Control: jerk [m/s^3] for the triple integrator, force [N] for the damped mass.
-    effort : float
-        Sum of the squared control.
+    times, path, mean, covariance : ndarray of shape (N + 1,), (N + 1, 2), (N + 1, n), (N + 1, n, n)
+        Times [s], mean positions [m], and mean and covariance of the state: position, velocity and what else the plant has.
+    control, effort : ndarray of shape (N, 2), float
+        Jerk [m/s^3] for the triple integrator, force [N] for the damped mass; the sum of its squares.
     eta : float
         Probability of avoidance that the solution achieves for each obstacle and step.
-    problem : Problem
-        The problem of the core that was solved.
     """
 
     label: str = ''
@@ -323,7 +295,7 @@ def solve_classes(
     Parameters
     ----------
     start, obstacles, eta, strategy, duration_s, config
-        As for `solve`.
+        As for `solve`, which also lists the errors.
     goal : array_like of shape (2,) or (g, 2)
         One goal or several [m].
 
@@ -331,11 +303,7 @@ def solve_classes(
     -------
     tuple of PredictedCandidate
         Solved ones first, the most likely first; then those that could not be solved. The solution of each is a `Solution`.
-
-    Raises
-    ------
-    InputError
-        As for `solve`; but if no path leads to a goal, the tuple is empty.
+        Empty if no path leads to a goal.
 
     Examples
     --------
@@ -427,12 +395,7 @@ def plot_candidates(candidates: Sequence[PredictedCandidate], axes: Any = None) 
     candidates : sequence of PredictedCandidate
         Result of `solve_classes`, not empty.
     axes : matplotlib.axes.Axes, optional
-        Axes to draw on; new ones by default.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes that hold the drawing.
+        Axes to draw on; new ones by default. They are returned.
     """
     problems = [each.solution.problem for each in candidates if isinstance(each.solution, Solution) and each.solution.problem]
     if not problems:
@@ -448,7 +411,7 @@ def replay(recording: str | Path, config: Config | None = None, topics: Mapping[
     Parameters
     ----------
     recording : path
-        A bag: MCAP or SQLite file, or its folder.
+        A bag: MCAP or SQLite file, or its folder. `RecordingError` is raised if it cannot be read.
     config : Config, optional
         Parameters; the defaults if not given.
     topics : mapping, optional
@@ -458,11 +421,6 @@ def replay(recording: str | Path, config: Config | None = None, topics: Mapping[
     ------
     Prediction
         One for every hand pose that is due, in their order.
-
-    Raises
-    ------
-    RecordingError
-        If the recording cannot be read.
     """
     from foc_ros.analysis.replay import replay as replay_bag
 
@@ -472,16 +430,6 @@ def replay(recording: str | Path, config: Config | None = None, topics: Mapping[
 
 def load_config(file: str | Path) -> Config:
     """Return the configuration of a ROS 2 parameter file such as `foc.yaml`; parameters that it does not set keep their defaults.
-
-    Parameters
-    ----------
-    file : path
-        The YAML file.
-
-    Returns
-    -------
-    Config
-        The configuration.
 
     Raises
     ------
@@ -501,14 +449,9 @@ def register_strategy(name: str, function: Callable[..., Any]) -> None:
     Parameters
     ----------
     name : str
-        Its name.
+        A new name; `InputError` is raised if it is taken.
     function : callable
         ``function(problem, start, settings, deadline)``, which returns the result that `foc_ros.core.ocp.strategies` describes.
-
-    Raises
-    ------
-    InputError
-        If the name is taken.
     """
     STRATEGIES.register(name, function)
 
@@ -519,14 +462,9 @@ def register_plant(name: str, factory: Callable[..., Any]) -> None:
     Parameters
     ----------
     name : str
-        Its name.
+        A new name; `InputError` is raised if it is taken.
     factory : callable
         ``factory(settings)``, which returns a `PlantModel`; `settings` are the parameters of the group `foc`.
-
-    Raises
-    ------
-    InputError
-        If the name is taken.
 
     Examples
     --------
@@ -552,14 +490,9 @@ def register_qp_backend(name: str, solver: Callable[..., Any]) -> None:
     Parameters
     ----------
     name : str
-        Its name.
+        A new name; `InputError` is raised if it is taken.
     solver : callable
         ``solver(qp)``, from a `foc_ros.core.ocp.backend.DenseQP` to an `Answer`.
-
-    Raises
-    ------
-    InputError
-        If the name is taken.
     """
     QP_BACKENDS.register(name, solver)
 
@@ -570,15 +503,10 @@ def register_likelihood_rule(name: str, function: Callable[..., Any]) -> None:
     Parameters
     ----------
     name : str
-        Its name.
+        A new name; `InputError` is raised if it is taken.
     function : callable
         ``function(costs, config)``: from the costs (k,) of k classes and the parameters of the group `likelihood` to the
         logarithms (k,) of their weights, which need no normalisation.
-
-    Raises
-    ------
-    InputError
-        If the name is taken.
 
     Examples
     --------

@@ -39,25 +39,10 @@ def solve_candidates(
     earlier: EarlierSolutions = NOTHING,
     deadline: Deadline = NEVER,
 ) -> list[PredictedCandidate]:
-    """Solve every candidate, in the order of their earlier likelihoods.
+    """Solve every candidate, those that were most likely before first; return them in their own order, with likelihoods 0.
 
-    Parameters
-    ----------
-    candidates, problems
-        The homotopy classes, and the problem of each.
-    settings
-        Strategy and its parameters.
-    costs
-        Parts of the cost besides the effort to go.
-    earlier
-        Results of the prediction before, to start from.
-    deadline
-        Candidates that are not solved in time get the status DEADLINE.
-
-    Returns
-    -------
-    list of PredictedCandidate
-        In the order of the candidates, with likelihoods 0.
+    problems: one for each candidate; costs: parts of the cost besides the effort to go; earlier: results of the prediction
+    before, to start from. Candidates that are not solved before the deadline get the status DEADLINE.
     """
     solved = {}
     for row in sorted(range(len(candidates)), key=lambda row: -earlier.likelihoods.get(candidates[row].label, 0.0)):

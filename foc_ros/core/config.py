@@ -19,6 +19,8 @@ DURATION_MODELS = ('fixed', 'fitts', 'cost_of_time')
 ARRIVALS = ('rest', 'passing')
 MOST_CANDIDATES = 64
 """Largest number of homotopy classes that are solved in one prediction."""
+WIDENS = 'widens the predicted covariance, not the chance constraint'
+JERK_ONLY = 'plant triple_integrator'
 REFERENCE_STEP_S = 0.02
 """Step for which the noise parameters are quoted (doc/model.md): c is scaled by sqrt(0.02 / dt)."""
 
@@ -53,21 +55,9 @@ class FocConfig:
     noise_x: float = _p(0.05, 'motor noise per unit of control along the first axis, at a step of 0.02 s', '', 0.0, 2.0)
     noise_y: float = _p(0.05, 'motor noise per unit of control along the second axis, at a step of 0.02 s', '', 0.0, 2.0)
     process_noise: float = _p(
-        0.0,
-        'root of the spectral density of unplanned control: it widens the predicted covariance only, not the chance constraint;'
-        ' in N s^0.5 for damped_mass',
-        'm/s^2.5',
-        0.0,
-        1e3,
+        0.0, f'root of the spectral density of unplanned control, which {WIDENS}; N s^0.5 for damped_mass', 'm/s^2.5', 0.0, 1e3
     )
-    endpoint_stddev: float = _p(
-        0.0,
-        'standard deviation, along each axis, of the end points of movements about their goal: it widens the predicted'
-        ' covariance only',
-        'm',
-        0.0,
-        1.0,
-    )
+    endpoint_stddev: float = _p(0.0, f'standard deviation of end points about their goal, per axis; it {WIDENS}', 'm', 0.0, 1.0)
     lv_delta: float = _p(5e-5, 'tau per unit of s for strategy lv', 'm^2', 0.0, 1.0)
     hc_delta: float = _p(1e-4, 'tau per unit of s for strategy hc', 'm^2', 0.0, 1.0)
     growth: float = _p(2.0, 'factor on lambda per unit of s (Delta)', '', 1.0001, 1e6)
@@ -77,12 +67,8 @@ class FocConfig:
     algorithm1_growth: float = _p(10.0, 'factor on lambda per step of strategy algorithm1 (Delta)', '', 1.0, 1e6)
     algorithm1_xi: float = _p(1.0, 'change of effort at which strategy algorithm1 ends (xi)', 'm^2/s^6', 0.0, 1e12)
     goal_weight: float = _p(0.0, 'weight of the position variance at the goal, in effort per m^2', '1/s^6', 0.0, 1e15)
-    recovery_s: float = _p(
-        0.2, 'time within which a hand that is inside the margin of an obstacle has to leave it', 's', 0.0, 10.0
-    )
-    qp_backend: str = _p(
-        'piqp', 'QP solver: piqp, the name of another solver of qpsolvers, or a registered one', choices=QP_BACKENDS
-    )
+    recovery_s: float = _p(0.2, 'time within which a hand inside the margin of an obstacle has to leave it', 's', 0.0, 10.0)
+    qp_backend: str = _p('piqp', 'QP solver: piqp, a solver of qpsolvers by its name, or a registered one', choices=QP_BACKENDS)
 
 
 @dataclass(frozen=True)
@@ -90,37 +76,18 @@ class DurationConfig:
     """Duration of the movement, and how it ends."""
 
     model: str = _p(
-        'fitts',
-        'how the duration of a movement is found: fixed, by Fitts law, or as the optimum where time has a cost',
-        choices=DURATION_MODELS,
+        'fitts', 'duration of a movement: fixed, by Fitts law, or optimal if time has a cost', choices=DURATION_MODELS
     )
     fixed_s: float = _p(1.0, 'duration of model fixed', 's', 0.05, 60.0)
     fitts_a_s: float = _p(0.2, 'intercept of Fitts law', 's', 0.0, 60.0)
     fitts_b_s: float = _p(0.25, 'slope of Fitts law, per bit', 's', 0.0, 60.0)
     target_width: float = _p(0.02, 'target width of Fitts law', 'm', 1e-4, 10.0)
     time_cost: float = _p(
-        100.0,
-        'cost of time of model cost_of_time: longer paths get longer durations; it is part of the cost of a class for the plant'
-        ' triple_integrator only',
-        'm^2/s^6',
-        1e-9,
-        1e9,
+        100.0, f'cost of time of model cost_of_time, for {JERK_ONLY} also in the cost of a class', 'm^2/s^6', 1e-9, 1e9
     )
     min_time_to_go_s: float = _p(0.3, 'lower limit of the time to go', 's', 0.01, 60.0)
-    spread: float = _p(
-        0.0,
-        'standard deviation of the time to go, as a fraction of it: it widens the predicted covariance only',
-        '',
-        0.0,
-        2.0,
-    )
-    wait_s: float = _p(
-        0.0,
-        'mean time until a hand at rest starts to move: it widens the predicted covariance of a hand at rest only',
-        's',
-        0.0,
-        60.0,
-    )
+    spread: float = _p(0.0, f'standard deviation of the time to go, as a fraction of it; it {WIDENS}', '', 0.0, 2.0)
+    wait_s: float = _p(0.0, f'mean time until a hand at rest starts to move; it {WIDENS}', 's', 0.0, 60.0)
     arrival: str = _p('rest', 'how the hand arrives at its goal: it comes to rest, or passes at any speed', choices=ARRIVALS)
     max_time_to_go_s: float = _p(10.0, 'upper limit of the time to go', 's', 0.05, 120.0)
 
@@ -133,17 +100,10 @@ class EstimatorConfig:
     jerk_density: float = _p(5.0, 'root of the spectral density of the jerk that the filter expects', 'm/s^2.5', 1e-6, 1e6)
     onset_speed: float = _p(0.05, 'speed above which a movement begins; it ends below half of this speed', 'm/s', 1e-4, 10.0)
     acceleration_time_s: float = _p(
-        0.0,
-        'time constant with which an acceleration decays: predictions then start at the speed that it leads to; 0: predictions'
-        ' start with the estimated acceleration',
-        's',
-        0.0,
-        10.0,
+        0.0, 'decay time of an acceleration: predictions start at the speed that it leads to; 0: no decay', 's', 0.0, 10.0
     )
     gap_s: float = _p(0.5, 'gap between samples after which the filter restarts', 's', 0.001, 60.0)
-    hand_timeout_s: float = _p(
-        0.5, 'timeout after which a missing or stale hand pose stops prediction in the node; 0: never', 's', 0.0, 1e6
-    )
+    hand_timeout_s: float = _p(0.5, 'timeout after which a missing or stale hand pose stops prediction; 0: never', 's', 0.0, 1e6)
 
 
 @dataclass(frozen=True)
@@ -151,11 +111,9 @@ class HomotopyConfig:
     """Homotopy classes that are considered."""
 
     max_candidates: int = _p(
-        4, 'number of homotopy classes that are solved, over all goals; each goal gets at least one', '', 1, MOST_CANDIDATES
+        4, 'number of homotopy classes to solve, over all goals; each goal gets at least one', '', 1, MOST_CANDIDATES
     )
-    clearance: float = _p(
-        0.005, 'distance that the hand needs from an obstacle: gaps narrower than twice this count as closed', 'm', 0.0, 1.0
-    )
+    clearance: float = _p(0.005, 'distance that the hand needs from every obstacle: narrower gaps are closed', 'm', 0.0, 1.0)
     library: str = _p('', 'file of demonstrated paths that replay --learn wrote; empty: none', read_only=True)
 
 
@@ -165,19 +123,9 @@ class LikelihoodConfig:
 
     rule: str = _p('cost_ratio', 'rule that gives the weight of a class from its cost', choices=LIKELIHOOD_RULES)
     beta: float = _p(0.5, 'exponent of the cost ratio', '', 0.0, 100.0)
-    spent_share: float = _p(
-        1.0,
-        'fraction of the effort since movement onset that is added to every cost, for the plant triple_integrator only',
-        '',
-        0.0,
-        1.0,
-    )
+    spent_share: float = _p(1.0, f'fraction of the effort since onset that every cost contains, for {JERK_ONLY}', '', 0.0, 1.0)
     lookahead_s: float = _p(
-        0.0,
-        'mean time that the operator looks ahead: beta decays with the time until a choice; 0: beta does not decay',
-        's',
-        0.0,
-        60.0,
+        0.0, 'mean look-ahead of the operator: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
     )
     margin: float = _p(0.05, 'lead in likelihood that another class needs to become the most likely one', '', 0.0, 1.0)
 
@@ -187,15 +135,9 @@ class SceneConfig:
     """Use of the scene topics."""
 
     timeout_s: float = _p(
-        2.0,
-        'age after which obstacles stop prediction, by their stamp and, in the node, by the time without a message; 0: never',
-        's',
-        0.0,
-        1e6,
+        2.0, 'age of obstacles, by stamp and in the node by arrival, after which prediction stops; 0: never', 's', 0.0, 1e6
     )
-    max_obstacles: int = _p(
-        64, 'number of obstacles that are considered; of more, those farthest from the straight paths are left out', '', 1, 4096
-    )
+    max_obstacles: int = _p(64, 'number of obstacles to consider: those farthest from the paths are left out', '', 1, 4096)
     marker_radius_stddev: float = _p(0.0, 'standard deviation of the radius of obstacles from markers', 'm', 0.0, 1.0)
 
 
@@ -236,17 +178,7 @@ class Config:
         return f'<Config {", ".join(changed) or "of defaults"}>'
 
     def with_values(self, values: Mapping[str, object]) -> Config:
-        """Return the config with some values changed.
-
-        Parameters
-        ----------
-        values
-            New values by dotted name, such as ``'foc.eta'``.
-
-        Returns
-        -------
-        Config
-            The changed config; this one stays as it is.
+        """Return the config with other values, by dotted name such as ``'foc.eta'``.
 
         Raises
         ------

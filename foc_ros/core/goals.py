@@ -8,23 +8,10 @@ from .types import Array
 
 
 def find_reached_goal(positions: Array, goals: Array, within_m: float | None = None) -> tuple[int | None, int]:
-    """Return the goal that a path reached.
+    """Return the row of the goal (g, 2) [m] that a path (m, 2) [m] reached, and the index of the position nearest to it.
 
-    Parameters
-    ----------
-    positions
-        The path, (m, 2) [m].
-    goals
-        The goals, (g, 2) [m].
-    within_m
-        Distance [m] within which a goal is reached. By default half of the distance of a goal to its nearest neighbour, and any
-        distance for a single goal.
-
-    Returns
-    -------
-    goal, index
-        Row of the last goal that the path came near, and the index of the position nearest to it. None and the last index if
-        the path came near no goal.
+    It is the last goal to which the path came within a distance [m]: by default half of the distance of the goal to its nearest
+    neighbour, and any distance for a single goal. None and the last index if there is none.
     """
     distance = np.hypot(*(positions[:, None] - goals).transpose(2, 0, 1))
     between = np.hypot(*(goals[:, None] - goals).transpose(2, 0, 1))

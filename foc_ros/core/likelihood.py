@@ -64,26 +64,10 @@ def compute_shared_cost(effort_spent: float, config: LikelihoodConfig) -> float:
 
 
 def compute_likelihoods(costs: Array, config: LikelihoodConfig, branch_times: BranchTimes | None = None) -> Array:
-    """Return the likelihoods of classes by the rule that `likelihood.rule` names.
+    """Return the likelihoods (k,) of classes by the rule that `likelihood.rule` names; they sum to one.
 
-    Parameters
-    ----------
-    costs
-        Costs of k classes, (k,) >= 0 [m^2/s^5]. Costs below `COST_FLOOR` count as `COST_FLOOR`.
-    config
-        Rule, beta and look-ahead.
-    branch_times
-        Branch times of these classes; needed for a look-ahead only.
-
-    Returns
-    -------
-    Array
-        Likelihoods (k,) that sum to one; empty for no class. They are computed from logarithms, so that nothing overflows.
-
-    Raises
-    ------
-    InputError
-        For a cost that is negative or not finite.
+    costs (k,) >= 0 [m^2/s^5], of which those below `COST_FLOOR` count as `COST_FLOOR`; branch_times: of these classes, for a
+    look-ahead only. Logarithms keep numbers in range. Raises InputError for a cost that is negative or not finite.
     """
     values = np.ascontiguousarray(costs, dtype=float)
     for row, value in enumerate(values.tolist()):

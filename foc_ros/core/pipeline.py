@@ -23,25 +23,9 @@ __all__ = ['Pipeline', 'SampleStatus']
 class Pipeline:
     """Follow the hand, keep the scene, and predict when a new hand sample is due.
 
-    Parameters
-    ----------
-    config
-        All parameters.
-    library
-        Demonstrated paths.
-
-    Attributes
-    ----------
-    config
-        All parameters.
-    hand_state
-        State after the last hand sample; None before the first.
-    scene
-        Obstacles and goals.
-    engaged
-        Whether predictions are made.
-    frame_id
-        The working frame; None until the parameter or the first hand sample fixes it.
+    library: demonstrated paths. Attributes: config; hand_state, None before the first hand sample; scene, obstacles and goals;
+    engaged, whether predictions are made; frame_id, the working frame, None until the parameter or the first hand sample fixes
+    it.
     """
 
     def __init__(self, config: Config, library: Sequence[Demonstration] = ()) -> None:

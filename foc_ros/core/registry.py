@@ -16,12 +16,8 @@ from .errors import InputError
 class Registry:
     """Parts of one kind by name.
 
-    Parameters
-    ----------
-    kind
-        What the parts are, for messages: ``'strategy'``.
-    locations
-        ``'module:attribute'`` of every built-in part by name. A part is imported when it is first asked for.
+    kind: what the parts are, for messages, such as 'strategy'; locations: 'module:attribute' of every built-in part by name. A
+    part is imported when it is first used.
     """
 
     def __init__(self, kind: str, locations: dict[str, str]) -> None:
@@ -36,13 +32,7 @@ class Registry:
         return name in self._locations or name in self._parts
 
     def register(self, name: str, part: Callable[..., Any]) -> None:
-        """Add a part under a new name.
-
-        Raises
-        ------
-        InputError
-            If the name is taken or empty, or the part cannot be called.
-        """
+        """Add a part under a new name; raise InputError if the name is taken or empty, or the part cannot be called."""
         if not name or name in self:
             raise InputError(self.kind, f'a new name besides {", ".join(self)}', repr(name))
         if not callable(part):

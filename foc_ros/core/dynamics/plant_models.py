@@ -90,11 +90,11 @@ class PlantModel:
         """Return E_t, (N + 1, n, n): what remains at steps 0..N of an error of the initial state that the operator corrects."""
         return compute_error_map(self.build_horizon(dt, steps), passing)
 
-    def propagate_error(self, hand_covariance: Array, dt: float, steps: int, passing: bool) -> Array:
+    def propagate_error(self, covariance: Array, dt: float, steps: int, passing: bool) -> Array:
         """Return the covariance (N + 1, n, n) at steps 0..N that an estimate of covariance (6, 6) leads to."""
         error_map = self.compute_error_map(dt, steps, passing)
-        covariance: Array = error_map @ self.project_covariance(hand_covariance) @ error_map.swapaxes(1, 2)
-        return covariance
+        propagated: Array = error_map @ self.project_covariance(covariance) @ error_map.swapaxes(1, 2)
+        return propagated
 
     def compute_process_covariance(self, dt: float, steps: int, passing: bool) -> Array:
         """Return the covariance (N + 1, n, n) that white control noise of unit spectral density causes at steps 0..N."""
@@ -121,20 +121,11 @@ class TripleIntegratorModel(PlantModel):
     def __init__(self, _: FocConfig | None = None) -> None:
         super().__init__(triple_integrator)
 
-    def build_horizon(self, dt: float, steps: int) -> Horizon:  # noqa: D102
-        return triple_integrator_horizon(dt, steps)
-
-    def compute_goal_map(self, dt: float, steps: int, passing: bool) -> Array:  # noqa: D102
-        return triple_integrator_goal_map(dt, steps, passing)
-
-    def compute_error_map(self, dt: float, steps: int, passing: bool) -> Array:  # noqa: D102
-        return triple_integrator_error_map(dt, steps, passing)
-
-    def propagate_error(self, hand_covariance: Array, dt: float, steps: int, passing: bool) -> Array:  # noqa: D102
-        return triple_integrator_error_covariance(hand_covariance, dt, steps, passing)
-
-    def compute_process_covariance(self, dt: float, steps: int, passing: bool) -> Array:  # noqa: D102
-        return triple_integrator_process_covariance(dt, steps, passing)
+    build_horizon = staticmethod(triple_integrator_horizon)
+    compute_goal_map = staticmethod(triple_integrator_goal_map)
+    compute_error_map = staticmethod(triple_integrator_error_map)
+    propagate_error = staticmethod(triple_integrator_error_covariance)
+    compute_process_covariance = staticmethod(triple_integrator_process_covariance)
 
     def compute_end_rate(self, solution: Solution) -> Array:  # noqa: D102
         # the control belongs to the middle of its step: in 50 steps of a reach from rest, the last one is 7 % below the jerk at
