@@ -1,4 +1,4 @@
-"""A goal that the hand passes: any velocity there, and none of the effort that stopping takes."""
+"""Goals that the hand passes: the velocity there is free, and no effort is spent on stopping."""
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def test_effort_along_a_line_is_that_of_least_energy(length: float, speed: float
     assert find_least_cost_time(0.4, (0.5, 0.0), 0.1, (0.05, 20.0), True) == pytest.approx(0.8, rel=0.05)
 
 
-def test_errors_are_corrected_but_for_the_velocity() -> None:
+def test_all_errors_but_those_of_the_velocity_are_corrected() -> None:
     dt, steps = 0.05, 20
     error_map = triple_integrator_error_map(dt, steps, True)
     assert_allclose(error_map, compute_error_map(condense(triple_integrator(dt), steps), True), atol=1e-9)
@@ -64,7 +64,7 @@ def test_errors_are_corrected_but_for_the_velocity() -> None:
     assert passed[-1, 2, 2] > 2.0 * rest[-1, 2, 2]
 
 
-def test_where_the_hand_ends_it_is_as_unsure_as_it_passes() -> None:
+def test_the_velocity_at_a_passed_goal_is_more_uncertain_than_at_rest() -> None:
     scene = FREE, np.array([[0.3, 0.1]]), Memory()
     now = hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0)
     passing = predict(PASSING, now, *scene)[0].solved_candidates[0].solution
@@ -74,7 +74,7 @@ def test_where_the_hand_ends_it_is_as_unsure_as_it_passes() -> None:
     assert passing.covariance[-1, 2, 2] > 2.0 * resting.covariance[-1, 2, 2]
 
 
-def test_past_an_obstacle_the_goal_is_passed_on_the_way_on() -> None:
+def test_a_goal_behind_an_obstacle_is_passed_with_velocity() -> None:
     scene = make_obstacles([[0.15, 0.04]], 0.05), np.array([[0.3, 0.1]])
     solved = predict(PASSING, hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0), *scene, Memory())[0].solved_candidates
     assert len(solved) == 2

@@ -1,4 +1,4 @@
-"""Which of two answers counts: that of a way followed from the tick before, or that from its own guess."""
+"""The choice between two solutions: one from the previous solution, one from the own guess of the candidate."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from foc_ros.core.config import FocConfig
 from foc_ros.core.types import LEFT, Candidate, Status
 
 GUESS = bowed((0.0, 0.0), (0.3, 0.0), 50, 0.06)
-WAY = Candidate('goal0:+0', 0, (('0', LEFT),), GUESS, 0.33)
+CANDIDATE = Candidate('goal0:+0', 0, (('0', LEFT),), GUESS, 0.33)
 
 
 @pytest.mark.parametrize(
@@ -24,13 +24,13 @@ WAY = Candidate('goal0:+0', 0, (('0', LEFT),), GUESS, 0.33)
         (Status.DEADLINE, 1000.0, 'warm'),
     ],
 )
-def test_a_way_that_comes_into_reach_counts_by_its_cheaper_answer(monkeypatch, before, warm, counts):
-    """It may come from far along the curve, past the first place where k is the wanted one; what was solved is only followed."""
+def test_a_candidate_that_becomes_reachable_takes_its_cheaper_solution(monkeypatch, before, warm, counts):
+    """The warm solution may lie far along the penalty path, beyond the first point with the wanted k."""
     problem = one_obstacle()
     cold = solved(problem, GUESS)
-    answers = {'cold': cold, 'warm': replace(cold, effort=warm * cold.effort)}
-    monkeypatch.setattr(outcomes, 'solve_problem', lambda _, start, *rest: answers['cold' if start.lam is None else 'warm'])
-    earlier = EarlierSolutions({WAY.label: replace(cold, status=before)}, {})
-    (outcome,) = solve_candidates([WAY], [problem], FocConfig(), earlier=earlier)
-    assert outcome.solution is answers[counts]
-    np.testing.assert_allclose(outcome.cost, answers[counts].effort * cold.dt)
+    solutions = {'cold': cold, 'warm': replace(cold, effort=warm * cold.effort)}
+    monkeypatch.setattr(outcomes, 'solve_problem', lambda _, start, *rest: solutions['cold' if start.lam is None else 'warm'])
+    earlier = EarlierSolutions({CANDIDATE.label: replace(cold, status=before)}, {})
+    (outcome,) = solve_candidates([CANDIDATE], [problem], FocConfig(), earlier=earlier)
+    assert outcome.solution is solutions[counts]
+    np.testing.assert_allclose(outcome.cost, solutions[counts].effort * cold.dt)

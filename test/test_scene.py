@@ -1,4 +1,4 @@
-"""The merged scene: union over sources, motion to a stamp, and why it may not be predicted from."""
+"""The merged scene: union over sources, motion to a stamp, and reasons not to predict from it."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_a_source_replaces_its_whole_table() -> None:
     assert len(Scene().obstacles(NOW)) == 0
 
 
-def test_obstacles_move_on_to_the_stamp_asked_for() -> None:
+def test_obstacles_move_on_to_the_given_stamp() -> None:
     moving = make_obstacles([[0.1, 0.2]], 0.1, velocity=[0.5, -1.0])
     stamped = Scene().with_source('cloud', ObstacleSource(moving, NOW - NANOSECONDS // 5, 'w'))
     np.testing.assert_allclose(stamped.obstacles(NOW).centre, [[0.2, 0.0]])
@@ -51,7 +51,7 @@ def test_obstacles_move_on_to_the_stamp_asked_for() -> None:
         ([None], 2.0, None),
     ],
 )
-def test_staleness_is_judged_by_stamps(ages: list[float | None], timeout: float, words: str | None) -> None:
+def test_stale_sources_are_found_by_their_stamps(ages: list[float | None], timeout: float, words: str | None) -> None:
     scene = Scene().with_goals(np.zeros((1, 2)), 'w')
     for i, age in enumerate(ages):
         stamp = None if age is None else NOW - round(age * 1e9)
@@ -74,7 +74,7 @@ def test_what_is_missing_is_named() -> None:
     assert scene.with_goals(np.zeros((1, 2)), 'w').not_ready_reason(NOW, 2.0) is None
 
 
-def test_goals_are_the_scenes_own() -> None:
+def test_the_scene_copies_its_goals() -> None:
     given = np.zeros((1, 2))
     scene = Scene().with_goals(given, 'w')
     given[0, 0] = 7.0
