@@ -91,12 +91,12 @@ slider.dispatchEvent(new Event('input'));
 return Number(slider.value);
 """
 TABLE = """
-return [...document.querySelectorAll('#ways tr[data-line]')].map(
+return [...document.querySelectorAll('#candidates tr[data-line]')].map(
   (row) => [row.cells[3].textContent, Number(row.dataset.share), row.cells[1].textContent]);
 """
 PATHS = """
 const box = document.getElementById('scene');
-return [box.data.filter((trace) => trace.meta && trace.meta.way !== undefined).length,
+return [box.data.filter((trace) => trace.meta && trace.meta.candidate !== undefined).length,
         [...box.querySelectorAll('.scatterlayer .trace .js-line')].filter((line) => line.getAttribute('d')).length];
 """
 

@@ -14,7 +14,7 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from report_samples import predictions, samples, scene
 
-from foc_ros.reporting.snapshots import movements, snapshot_of_prediction, track_of
+from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot, movements
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -39,7 +39,9 @@ def test_the_pictures_are_in_the_readme(name: str, start: bytes) -> None:
 def test_the_moving_picture_goes_through_a_movement(tmp_path: Path) -> None:
     moving = script('make_demo_animation')
     made = samples(1)
-    drawn = list(moving.pictures(track_of(made), [snapshot_of_prediction(each, *scene()) for each in predictions(made)], (0,)))
+    drawn = list(
+        moving.pictures(build_hand_trajectory(made), [build_snapshot(each, *scene()) for each in predictions(made)], (0,))
+    )
     assert 10 < len(drawn) <= moving.PICTURES
     lengths = [len(figure.axes[1].lines[0].get_xdata()) for figure, _ in drawn]
     assert all(np.diff(lengths) > 0)
@@ -50,11 +52,11 @@ def test_the_moving_picture_goes_through_a_movement(tmp_path: Path) -> None:
 def test_the_script_draws_the_beginning_of_its_movement() -> None:
     still = script('make_readme_picture')
     made = samples(still.MOVEMENT)
-    track, moments = track_of(made), [snapshot_of_prediction(each, *scene()) for each in predictions(made, every=2)]
+    track, snapshots = build_hand_trajectory(made), [build_snapshot(each, *scene()) for each in predictions(made, every=2)]
     start_ns = movements(track, 0.05)[still.MOVEMENT - 1][0]
-    shown = min(moments, key=lambda each: abs(each.stamp_ns - start_ns - still.AFTER_S * 1e9))
-    drawn = [line.get_xydata() for line in still.picture(track, moments).axes[0].lines]
-    for way in shown.ways:
+    shown = min(snapshots, key=lambda each: abs(each.stamp_ns - start_ns - still.AFTER_S * 1e9))
+    drawn = [line.get_xydata() for line in still.picture(track, snapshots).axes[0].lines]
+    for way in shown.candidates:
         assert any(np.array_equal(line, way.path) for line in drawn)
     # the hand's past, its future, and where it is
     assert sum(np.isin(line[:, 0], track.positions[:, 0]).all() for line in drawn) >= 3

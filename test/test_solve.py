@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from foc_ros.cli.main import main
+from foc_ros.core.types import Candidate, PredictedCandidate, Solution, Status
+from foc_ros.io.json_output import encode_candidate, encode_solution
 
 CASES = Path(__file__).parents[2] / 'shared' / 'reference' / 'cases.json'
 SCENE: dict[str, Any] = {
@@ -169,3 +171,13 @@ def test_json_of_what_could_not_be_solved_says_how_far_it_got(tmp_path: Path, ca
     (shut,) = candidates(tmp_path, capsys, {**SCENE, 'obstacles': walls, 'guess': {'amplitude': 0.0}}, code=3)
     assert shut['status'] == 'infeasible' and shut['violation'] > 0.005
     assert shut['violation_at']['obstacle'] in ('0', '1')
+
+
+def test_a_state_without_acceleration_is_encoded_with_null() -> None:
+    mean, covariance = np.zeros((3, 4)), np.zeros((3, 4, 4))
+    solution = Solution(Status.SOLVED, '', 0.1, mean, covariance, np.ones((2, 2)), 1.0, {}, 0.0, 1.0, 0.9)
+    encoded = encode_solution(solution)
+    assert encoded['acceleration'] is None
+    assert np.shape(encoded['velocity']) == (3, 2) and np.shape(encoded['covariance']) == (3, 4, 4)
+    candidate = PredictedCandidate(Candidate('goal0:', 0, (), mean[:, :2], 0.0), solution, {}, 1.0, 1.0)
+    assert np.shape(encode_candidate(candidate)['stddev']) == (3, 2)
