@@ -29,7 +29,7 @@ from foc_ros.core.scene_solver import scene_problems, solve_scene
 from foc_ros.core.types import Array, Obstacles, Solution, make_obstacles
 from foc_ros.io.guess import guess_path
 from foc_ros.io.scene_file import load_scene
-from foc_ros.reporting.drawing import class_style, draw_candidates, draw_legend, draw_scene, draw_tag, new_figure, stddev_ellipse
+from foc_ros.reporting.drawing import class_style, draw_candidates, draw_scene, draw_tag, new_figure, stddev_ellipse
 from foc_ros.reporting.plots import bounds_of, number_labels, save
 from foc_ros.reporting.snapshots import build_candidate_views
 
@@ -130,13 +130,11 @@ def classes() -> Figure:
     """Return the solved candidates of the scene of the examples."""
     scene = load_scene(SCENE)
     candidates = build_candidate_views(solve_scene(scene, scene_problems(scene)))
-    slots = number_labels(candidates)
     with new_figure(7.4, 5.6) as figure:
-        axes, legend = figure.subplots(2, 1, height_ratios=(5.0, 0.2 * len(candidates)))
+        axes = figure.subplots()
         draw_scene(axes, scene.obstacles, scene.goals, bounds_of(scene.obstacles, scene.goals, candidates))
-        draw_candidates(axes, candidates, slots)
+        draw_candidates(axes, candidates, number_labels(candidates))
         axes.plot(*scene.hand.mean[:2], marker='o', color='black')
-        draw_legend(legend, candidates, slots)
     return figure
 
 

@@ -15,7 +15,7 @@ from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import BagReader
-from foc_ros.reporting.drawing import draw_candidates, draw_hand, draw_legend, draw_scene, new_figure
+from foc_ros.reporting.drawing import draw_candidates, draw_hand, draw_scene, new_figure
 from foc_ros.reporting.plots import bounds_of, number_labels, save
 from foc_ros.reporting.report import ReportCollector
 from foc_ros.reporting.snapshots import HandTrajectory, Snapshot, build_hand_trajectory
@@ -41,14 +41,12 @@ def picture(hand: HandTrajectory, snapshots: list[Snapshot]) -> Figure:
     span = hand.find_movements(Config().estimator.onset_speed)[MOVEMENT - 1]
     wanted_ns = span[0] + int(AFTER_S * NANOSECONDS)
     snapshot = min(snapshots, key=lambda each: abs(each.stamp_ns - wanted_ns))
-    slots = number_labels(snapshot.candidates)
     bounds = bounds_of(snapshot.obstacles, snapshot.goals, snapshot.candidates, hand.positions[hand.between(*span)])
     with new_figure(7.6, 6.6) as figure:
-        scene, legend = figure.subplots(2, 1, height_ratios=[5.6, 0.8])
+        scene = figure.subplots()
         draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
-        draw_candidates(scene, snapshot.candidates, slots)
+        draw_candidates(scene, snapshot.candidates, number_labels(snapshot.candidates))
         draw_hand(scene, hand, snapshot.stamp_ns, span)
-        draw_legend(legend, snapshot.candidates, slots)
     return figure
 
 

@@ -76,7 +76,7 @@ def test_class_colours_differ_for_the_colour_blind() -> None:
 def test_scene_holds_every_obstacle_goal_and_candidate() -> None:
     obstacles, goals = scene()
     candidates = build_candidate_views(prediction(START_NS, np.zeros(2)).candidates)
-    axes = make_scene_figure(obstacles, goals, candidates, bounds_of(obstacles, goals, candidates)).axes[0]
+    axes = make_scene_figure(obstacles, goals, candidates).axes[0]
     radii = sorted(patch.radius for patch in axes.patches if isinstance(patch, Circle))
     np.testing.assert_allclose(radii, [0.02, 0.02, 0.03, 0.033])
     drawn = [line.get_xydata() for line in axes.lines]
@@ -118,7 +118,7 @@ def test_a_snapshot_figure_shows_past_and_future_of_the_hand() -> None:
     assert [line.get_linestyle() for line in drawn] == ['-', ':']
     now = hand.positions[hand.stamps_ns == snapshot.stamp_ns][0]
     np.testing.assert_array_equal(drawn[0].get_xydata()[-1], now)
-    likelihoods = [line.get_ydata() for line in figure.axes[2].lines if len(line.get_ydata()) == len(during)]
+    likelihoods = [line.get_ydata() for line in figure.axes[1].lines if len(line.get_ydata()) == len(during)]
     expected = sorted(each.likelihood for each in snapshot.candidates)
     np.testing.assert_array_equal(sorted(values[row] for values in likelihoods), expected)
 
@@ -150,7 +150,7 @@ def test_equal_input_gives_equal_pictures(tmp_path: Path) -> None:
     obstacles, goals = scene()
     candidates = build_candidate_views(prediction(START_NS, np.zeros(2)).candidates)
     for name in ('one.png', 'two.png'):
-        save(make_scene_figure(obstacles, goals, candidates, bounds_of(obstacles, goals, candidates)), tmp_path / name)
+        save(make_scene_figure(obstacles, goals, candidates), tmp_path / name)
     assert (tmp_path / 'one.png').read_bytes() == (tmp_path / 'two.png').read_bytes()
 
 

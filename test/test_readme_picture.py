@@ -14,7 +14,7 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from report_samples import predictions, samples, scene
 
-from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot, movements
+from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -52,14 +52,14 @@ def test_the_moving_picture_goes_through_a_movement(tmp_path: Path) -> None:
 def test_the_script_draws_the_beginning_of_its_movement() -> None:
     still = script('make_readme_picture')
     made = samples(still.MOVEMENT)
-    track, snapshots = build_hand_trajectory(made), [build_snapshot(each, *scene()) for each in predictions(made, every=2)]
-    start_ns = movements(track, 0.05)[still.MOVEMENT - 1][0]
+    hand, snapshots = build_hand_trajectory(made), [build_snapshot(each, *scene()) for each in predictions(made, every=2)]
+    start_ns = hand.find_movements(0.05)[still.MOVEMENT - 1][0]
     shown = min(snapshots, key=lambda each: abs(each.stamp_ns - start_ns - still.AFTER_S * 1e9))
-    drawn = [line.get_xydata() for line in still.picture(track, snapshots).axes[0].lines]
-    for way in shown.candidates:
-        assert any(np.array_equal(line, way.path) for line in drawn)
+    drawn = [line.get_xydata() for line in still.picture(hand, snapshots).axes[0].lines]
+    for each in shown.candidates:
+        assert any(np.array_equal(line, each.path) for line in drawn)
     # the hand's past, its future, and where it is
-    assert sum(np.isin(line[:, 0], track.positions[:, 0]).all() for line in drawn) >= 3
+    assert sum(np.isin(line[:, 0], hand.positions[:, 0]).all() for line in drawn) >= 3
 
 
 @pytest.mark.parametrize('name', ['noise', 'surrogate', 'strategies', 'classes', 'likelihood'])

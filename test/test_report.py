@@ -18,7 +18,7 @@ from report_samples import OBSTACLES, START_NS, prediction, predictions, samples
 
 from foc_ros.core.errors import InputError
 from foc_ros.core.types import HandSample, Prediction
-from foc_ros.reporting.page import plotly_script
+from foc_ros.reporting.page import load_plotly
 from foc_ros.reporting.report import write_report
 from foc_ros.reporting.report_data import MOST_FRAMES
 from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
@@ -122,7 +122,7 @@ def test_a_long_recording_is_thinned_out(tmp_path: Path) -> None:
     # Obstacles and goals that do not change are stored once.
     assert len(data['scenes']) == len(data['goals']) == 1
     size = (tmp_path / 'index.html').stat().st_size
-    assert size - len(plotly_script()) < 700 * len(data['frames']) * 3
+    assert size - len(load_plotly()) < 700 * len(data['frames']) * 3
 
 
 def page_data_of(directory: Path) -> dict[str, Any]:

@@ -71,6 +71,11 @@ def class_style(number: int) -> tuple[str, str]:
     return CLASS_COLOURS[number % len(CLASS_COLOURS)], ('-', '--')[number // len(CLASS_COLOURS) % 2]
 
 
+def get_letter(slot: int | None) -> str:
+    """Return the letter of a slot, a blank if there is no slot."""
+    return ' ' if slot is None else ascii_uppercase[slot]
+
+
 def candidate_style(slot: int | None, likelihood: float) -> dict[str, Any]:
     """Return the line style of a candidate: colour and dash of its slot, the thicker the more likely."""
     colour, dash = (NO_CLASS_COLOUR, '-') if slot is None else class_style(slot)
@@ -111,17 +116,23 @@ def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, na
 
 
 def draw_candidates(axes: Any, candidates: Sequence[CandidateView], slots: Mapping[str, int]) -> None:
-    """Draw candidates, the most likely on top, with ellipses of the position's standard deviation; slots: by label."""
+    """Draw candidates, the most likely on top, with ellipses of the position's standard deviation, and a legend below the axes.
+
+    slots: by label; a candidate without a slot has no letter.
+    """
     for rank, each in reversed(list(enumerate(candidates))):
-        style = candidate_style(slots.get(each.label), each.likelihood)
+        style, letter = candidate_style(slots.get(each.label), each.likelihood), get_letter(slots.get(each.label))
         for row in np.unique(np.linspace(0, len(each.path) - 1, ELLIPSES_PER_WAY).astype(int)):
             ellipse = stddev_ellipse(each.path[row], each.covariance[row])
             ellipse.set(facecolor=to_rgba(style['color'], 0.1), edgecolor=to_rgba(style['color'], 0.5), linewidth=0.6, zorder=2)
             axes.add_patch(ellipse)
-        axes.plot(*each.path.T, zorder=3, **style)
-        if each.label in slots:
-            row = int((0.45 + 0.12 * (rank % 3)) * (len(each.path) - 1))
-            draw_tag(axes, each.path[row], ascii_uppercase[slots[each.label]], style['color'])
+        axes.plot(*each.path.T, zorder=3, label=f'{letter}  {100 * each.likelihood:3.0f} %  {each.label}', **style)
+        row = int((0.45 + 0.12 * (rank % 3)) * (len(each.path) - 1))
+        draw_tag(axes, each.path[row], letter, style['color'])
+    lines, labels = axes.get_legend_handles_labels()
+    look = {'loc': 'upper left', 'frameon': False, 'borderaxespad': 3.5, 'prop': {'family': 'monospace', 'size': 8}}
+    title = None if candidates else 'no candidate could be solved'
+    axes.legend(lines[::-1], labels[::-1], title=title, bbox_to_anchor=(0.0, 0.0), **look)
 
 
 def draw_hand(axes: Any, hand: HandTrajectory, now_ns: int, span: tuple[int, int]) -> None:
@@ -150,7 +161,7 @@ def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None
         axes.plot(times, values, color=colour, linestyle=dash, linewidth=1.8, marker='.', markersize=2.5)
         known = np.flatnonzero(np.isfinite(values))
         row = known[(2 * rank + 1) * len(known) // (2 * len(drawn))]
-        draw_tag(axes, (times[row], values[row]), ascii_uppercase[tracks.slots[track]], colour)
+        draw_tag(axes, (times[row], values[row]), get_letter(tracks.slots[track]), colour)
     axes.set(ylim=(-0.03, 1.03), ylabel='likelihood')
     axes.tick_params(labelbottom=False)
 
@@ -169,18 +180,9 @@ def draw_speeds(
     axes.set_ylim(bottom=0.0)
 
 
-def draw_legend(axes: Any, candidates: Sequence[CandidateView], slots: Mapping[str, int]) -> None:
-    """Write letter, likelihood and label of every candidate."""
-    axes.axis('off')
-    if not candidates:
-        axes.text(0.0, 0.5, 'no candidate could be solved', transform=axes.transAxes, va='center')
-    for row, each in enumerate(candidates):
-        letter = ascii_uppercase[slots[each.label]] if each.label in slots else ' '
-        text, height = f'{letter}  {100 * each.likelihood:3.0f} %  {each.label}', 1.0 - (row + 0.5) / len(candidates)
-        axes.text(0.0, height, text, transform=axes.transAxes, va='center', family='monospace', fontsize=8)
-
-
 def draw_tag(axes: Any, position: Any, text: str, colour: str) -> None:
-    """Write a letter or a number in a small circle at a position (2,)."""
+    """Write a letter or a number, unless it is empty, in a small circle at a position (2,)."""
+    if not text.strip():
+        return
     box = {'boxstyle': 'circle,pad=0.18', 'facecolor': 'white', 'edgecolor': colour, 'linewidth': 1.4}
     axes.text(*position, text, fontsize=7.5, ha='center', va='center', zorder=7, bbox=box, clip_on=True)

@@ -18,7 +18,6 @@ from .drawing import (
     Bounds,
     draw_candidates,
     draw_hand,
-    draw_legend,
     draw_likelihoods,
     draw_movement,
     draw_scene,
@@ -60,11 +59,9 @@ def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
     bounds = bounds_of(obstacles, goals, candidates)
     with plt.rc_context(STYLE):
         if axes is None:
-            axes = plt.figure(figsize=(WIDTH_IN, _scene_height(bounds) + LINE_IN * len(candidates) + 0.6)).subplots()
+            axes = plt.figure(figsize=(WIDTH_IN, _get_height(bounds, candidates)), layout='constrained').subplots()
         draw_scene(axes, obstacles, goals, bounds)
         draw_candidates(axes, candidates, number_labels(candidates))
-        legend = axes.inset_axes((0.0, -0.25 - 0.06 * len(candidates), 1.0, 0.06 * max(1, len(candidates))))
-        draw_legend(legend, candidates, number_labels(candidates))
     return axes
 
 
@@ -73,19 +70,16 @@ def plot_outcomes(file: Path | str, obstacles: Obstacles, goals: Array, outcomes
 
     goals (g, 2) [m]. Raises InputError if the suffix is not that of a picture format or the file cannot be written.
     """
-    candidates = build_candidate_views(outcomes)
-    save(make_scene_figure(obstacles, goals, candidates, bounds_of(obstacles, goals, candidates)), file)
+    save(make_scene_figure(obstacles, goals, build_candidate_views(outcomes)), file)
 
 
-def make_scene_figure(obstacles: Obstacles, goals: Array, candidates: Sequence[CandidateView], bounds: Bounds) -> Figure:
-    """Return a figure of one scene with the candidates in it and a legend of their letters."""
-    slots = number_labels(candidates)
-    heights = [_scene_height(bounds), LINE_IN * max(1, len(candidates))]
-    with new_figure(WIDTH_IN, sum(heights) + 0.8) as figure:
-        scene, legend = figure.subplots(2, 1, height_ratios=heights)
-        draw_scene(scene, obstacles, goals, bounds)
-        draw_candidates(scene, candidates, slots)
-        draw_legend(legend, candidates, slots)
+def make_scene_figure(obstacles: Obstacles, goals: Array, candidates: Sequence[CandidateView]) -> Figure:
+    """Return a figure of one scene with the candidates in it and a legend."""
+    bounds = bounds_of(obstacles, goals, candidates)
+    with new_figure(WIDTH_IN, _get_height(bounds, candidates)) as figure:
+        axes = figure.subplots()
+        draw_scene(axes, obstacles, goals, bounds)
+        draw_candidates(axes, candidates, number_labels(candidates))
     return figure
 
 
@@ -93,7 +87,7 @@ def make_recording_figure(
     hand: HandTrajectory, obstacles: Obstacles, goals: Array, spans: Sequence[tuple[int, int]], bounds: Bounds
 ) -> Figure:
     """Return a figure of all movements of a recording, numbered; spans: start and end [ns] of each movement."""
-    with new_figure(WIDTH_IN, _scene_height(bounds) + 0.6) as figure:
+    with new_figure(WIDTH_IN, _get_height(bounds)) as figure:
         axes = figure.subplots()
         draw_scene(axes, obstacles, goals, bounds, named=False)
         axes.plot(*hand.positions.T, color='0.8', linewidth=0.8)
@@ -112,13 +106,12 @@ def make_snapshot_figure(
     snapshot, slots = tracks.snapshots[row], tracks.slots_at(row)
     origin_ns = int(hand.stamps_ns[0])
     now_s, begin_s, end_s = ((stamp - origin_ns) / NANOSECONDS for stamp in (snapshot.stamp_ns, *span))
-    heights = [_scene_height(bounds), LINE_IN * max(1, len(snapshot.candidates)), 2.0, 1.6]
-    with new_figure(WIDTH_IN, sum(heights) + 1.2) as figure:
-        scene, legend, likelihoods, speeds = figure.subplots(4, 1, height_ratios=heights)
+    heights = [_get_height(bounds, snapshot.candidates), 2.1, 1.9]
+    with new_figure(WIDTH_IN, sum(heights)) as figure:
+        scene, likelihoods, speeds = figure.subplots(3, 1, height_ratios=heights)
         draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
         draw_candidates(scene, snapshot.candidates, slots)
         draw_hand(scene, hand, snapshot.stamp_ns, span)
-        draw_legend(legend, snapshot.candidates, slots)
         draw_likelihoods(likelihoods, tracks.between(*span), origin_ns)
         draw_speeds(speeds, hand, snapshot, slots, span, origin_ns)
         for axes in (likelihoods, speeds):
@@ -157,6 +150,7 @@ def save(figure: Figure, file: Path | str) -> None:
         raise InputError('picture file', 'a file that can be written', f'{file}: {error.strerror or error}') from error
 
 
-def _scene_height(bounds: Bounds) -> float:
-    """Return the height [in] of a scene with equal axes."""
-    return float(np.clip(0.9 * WIDTH_IN * (bounds[3] - bounds[2]) / (bounds[1] - bounds[0]), 2.0, 7.0))
+def _get_height(bounds: Bounds, candidates: Sequence[CandidateView] = ()) -> float:
+    """Return the height [in] of a scene with equal axes, its axis labels and a legend of candidates."""
+    height = 0.9 * WIDTH_IN * (bounds[3] - bounds[2]) / (bounds[1] - bounds[0])
+    return float(np.clip(height, 2.0, 7.0)) + 0.6 + LINE_IN * len(candidates)

@@ -63,18 +63,3 @@ def picture(file: Path, caption: str) -> str:
 def pictures(figures: Iterable[str]) -> str:
     """Return figures as HTML, as many side by side as the screen has room for."""
     return str(_PARTS.pictures(figures))
-
-
-def data_script(name: str, value: Any) -> str:
-    """Return a value as JSON in a script element; no text in it can end the element."""
-    return str(_PARTS.data_script(name, value))
-
-
-def own_scripts(*names: str) -> str:
-    """Return scripts of this folder as one script element that runs after those of the frame."""
-    return str(_PARTS.own_scripts(names))
-
-
-def plotly_script() -> str:
-    """Return plotly.js as a script element."""
-    return str(_PARTS.plotly_script())
