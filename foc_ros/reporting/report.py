@@ -58,30 +58,10 @@ class ReportCollector:
 def write_report(
     directory: Path, title: str, hand: HandTrajectory, snapshots: Sequence[Snapshot], summary: Mapping[str, str]
 ) -> list[Path]:
-    """Write index.html, predictions.json and pictures into a directory, replacing files of those names.
+    """Write index.html, predictions.json and pictures into a directory, replacing files of those names; return the files.
 
-    Parameters
-    ----------
-    directory : Path
-        Made if it does not exist.
-    title : str
-        Title of the page.
-    hand : HandTrajectory
-        The measured movement.
-    snapshots : sequence of Snapshot
-        The predictions, in order of their stamps.
-    summary : mapping of str to str
-        Facts about the recording, for a table of the page.
-
-    Returns
-    -------
-    list of Path
-        The files written.
-
-    Raises
-    ------
-    InputError
-        If the directory cannot be written or the hand has no sample.
+    hand: the measured movement; snapshots: the predictions in order of their stamps; summary: facts for a table of the page.
+    Raises InputError if the directory cannot be written or the hand has no sample.
     """
     if not len(hand.stamps_ns):
         raise InputError('report', 'a recording with a hand pose', 'none')
@@ -165,10 +145,7 @@ def _encode_snapshot(snapshot: Snapshot, origin_ns: int) -> dict[str, Any]:
         'candidates': [
             {
                 'label': each.label,
-                'likelihood': round_number(each.likelihood),
-                'effort': round_number(each.effort),
-                'cost_ratio': round_number(each.cost_ratio),
-                'eta': round_number(each.eta),
+                **{name: round_number(getattr(each, name)) for name in ('likelihood', 'effort', 'cost_ratio', 'eta')},
                 'end': [round_number(value) for value in each.path[-1]],
             }
             for each in snapshot.candidates

@@ -115,20 +115,14 @@ def build_hand_trajectory(samples: Sequence[HandSample]) -> HandTrajectory:
 def build_candidate_views(candidates: Sequence[PredictedCandidate]) -> tuple[CandidateView, ...]:
     """Return views of the solved candidates, in their order."""
     solved = tuple(each for each in candidates if each.is_solved)
-    return tuple(
-        CandidateView(
-            each.candidate.label,
-            each.likelihood,
-            each.solution.effort,
-            ratio,
-            each.solution.eta,
-            each.solution.times,
-            each.solution.path,
-            np.linalg.norm(each.solution.mean[:, 2:4], axis=1),
-            each.solution.covariance[:, :2, :2],
-        )
-        for each, ratio in zip(solved, cost_ratios(solved), strict=True)
-    )
+    return tuple(_build_candidate_view(each, ratio) for each, ratio in zip(solved, cost_ratios(solved), strict=True))
+
+
+def _build_candidate_view(candidate: PredictedCandidate, cost_ratio: float) -> CandidateView:
+    label, likelihood, solution = candidate.candidate.label, candidate.likelihood, candidate.solution
+    speed, covariance = np.linalg.norm(solution.mean[:, 2:4], axis=1), solution.covariance[:, :2, :2]
+    values = label, likelihood, solution.effort, cost_ratio, solution.eta
+    return CandidateView(*values, solution.times, solution.path, speed, covariance)
 
 
 def build_snapshot(prediction: Prediction, obstacles: Obstacles, goals: Array) -> Snapshot:
@@ -136,15 +130,9 @@ def build_snapshot(prediction: Prediction, obstacles: Obstacles, goals: Array) -
 
     Raises FocError if the prediction holds a number that is not finite.
     """
-    return Snapshot(
-        prediction.stamp_ns,
-        obstacles,
-        goals,
-        build_candidate_views(ranked(prediction)),
-        prediction.most_likely,
-        tuple((each.candidate.label, each.solution.status.value) for each in prediction.candidates if not each.is_solved),
-        prediction.solve_s,
-    )
+    unsolved = tuple((each.candidate.label, each.solution.status.value) for each in prediction.candidates if not each.is_solved)
+    candidates = build_candidate_views(ranked(prediction))
+    return Snapshot(prediction.stamp_ns, obstacles, goals, candidates, prediction.most_likely, unsolved, prediction.solve_s)
 
 
 def is_same_prediction(cloud: Any, likelihoods: Any) -> bool:

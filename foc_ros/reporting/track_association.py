@@ -15,7 +15,7 @@ import numpy as np
 from foc_ros.core.types import Array
 
 from .drawing import CLASS_COLOURS, CLASSES
-from .snapshots import CandidateView, Snapshot
+from .snapshots import Snapshot
 
 LONGEST_GAP_NS = 300_000_000
 """A track continues after a gap of up to this length, in which its candidate was not solved."""
@@ -56,7 +56,7 @@ class CandidateTracks:
 def build_candidate_tracks(snapshots: Sequence[Snapshot]) -> CandidateTracks:
     """Associate the candidates of successive snapshots and give the tracks their letters and colours."""
     tracks = associate_tracks(snapshots)
-    return CandidateTracks(snapshots, tracks, assign_slots(snapshots, tracks, CLASSES, len(CLASS_COLOURS)))
+    return CandidateTracks(snapshots, tracks, assign_slots(snapshots, tracks))
 
 
 def parse_label(label: str, ids: Collection[str]) -> tuple[str, Sides]:
@@ -70,9 +70,8 @@ def parse_label(label: str, ids: Collection[str]) -> tuple[str, Sides]:
 def associate_tracks(snapshots: Sequence[Snapshot]) -> list[dict[str, int]]:
     """Return the number of the track of each candidate, by label, for each snapshot.
 
-    A candidate continues the track with the same label; if there is none, the track of the same goal that passes no common
-    obstacle on the other side. Of several such tracks it continues the one that shares most sides, then the latest, then the most
-    likely. All tracks end when the goals change.
+    A candidate continues a track of the same goal that passes no common obstacle on the other side: preferably the one with the
+    same label, then the one that shares most sides, then the latest, then the most likely. All tracks end when the goals change.
     """
     associated: list[dict[str, int]] = []
     count = 0
@@ -93,7 +92,9 @@ def associate_tracks(snapshots: Sequence[Snapshot]) -> list[dict[str, int]]:
     return associated
 
 
-def assign_slots(snapshots: Sequence[Snapshot], tracks: Sequence[Mapping[str, int]], count: int, colours: int) -> dict[int, int]:
+def assign_slots(
+    snapshots: Sequence[Snapshot], tracks: Sequence[Mapping[str, int]], count: int = CLASSES, colours: int = len(CLASS_COLOURS)
+) -> dict[int, int]:
     """Return the slot in [0, count) of each track; simultaneous tracks have different slots.
 
     Tracks that begin together receive their slots in order of likelihood. A slot whose colour (slot modulo colours) is unused at
@@ -116,24 +117,16 @@ def assign_slots(snapshots: Sequence[Snapshot], tracks: Sequence[Mapping[str, in
 
 def _continue_tracks(snapshot: Snapshot, labels: Mapping[int, str]) -> dict[str, int]:
     """Return the track of each candidate that continues one, by label; labels: of the earlier tracks. No track is split."""
+    ids = snapshot.obstacles.ids
+    parsed = {track: parse_label(label, ids) for track, label in labels.items()}
+    pairs = []
+    for each in snapshot.candidates:
+        goal, sides = parse_label(each.label, ids)
+        for track, (other_goal, others) in parsed.items():
+            if other_goal == goal and all(sides.get(name, side) == side for name, side in others.items()):
+                pairs.append((each.label == labels[track], len(sides.items() & others.items()), each.label, track))
     continued: dict[str, int] = {}
-    for each in snapshot.candidates:
-        same = [track for track, label in labels.items() if label == each.label and track not in continued.values()]
-        continued.update({each.label: same[0]} if same else {})
-    for each in snapshot.candidates:
-        if each.label not in continued:
-            left = {track: label for track, label in labels.items() if track not in continued.values()}
-            best = _find_compatible_track(each, left, snapshot.obstacles.ids)
-            continued.update({} if best is None else {each.label: best})
+    for *_, label, track in sorted(pairs, key=lambda pair: pair[:2], reverse=True):
+        if label not in continued and track not in continued.values():
+            continued[label] = track
     return continued
-
-
-def _find_compatible_track(candidate: CandidateView, labels: Mapping[int, str], ids: Collection[str]) -> int | None:
-    """Return the first of the tracks that share most sides with a candidate, None if none is compatible with it."""
-    goal, sides = parse_label(candidate.label, ids)
-    shared: dict[int, int] = {}
-    for track, label in labels.items():
-        other_goal, others = parse_label(label, ids)
-        if other_goal == goal and all(sides.get(name, side) == side for name, side in others.items()):
-            shared[track] = len(sides.items() & others.items())
-    return max(shared, key=lambda track: shared[track]) if shared else None
