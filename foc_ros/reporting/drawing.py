@@ -130,7 +130,7 @@ def draw_candidates(axes: Any, candidates: Sequence[CandidateView], slots: Mappi
         row = int((0.45 + 0.12 * (rank % 3)) * (len(each.path) - 1))
         draw_tag(axes, each.path[row], letter, style['color'])
     lines, labels = axes.get_legend_handles_labels()
-    look = {'loc': 'upper left', 'frameon': False, 'borderaxespad': 3.5, 'prop': {'family': 'monospace', 'size': 8}}
+    look = {'loc': 'upper left', 'frameon': False, 'borderaxespad': 4.5, 'prop': {'family': 'monospace', 'size': 8}}
     title = None if candidates else 'no candidate could be solved'
     axes.legend(lines[::-1], labels[::-1], title=title, bbox_to_anchor=(0.0, 0.0), **look)
 

@@ -126,15 +126,18 @@ def number_labels(candidates: Sequence[CandidateView]) -> dict[str, int]:
     return {each.label: number for number, each in enumerate(candidates[:CLASSES])}
 
 
-def bounds_of(obstacles: Obstacles, goals: Array, ways: Sequence[CandidateView], *points: Array) -> Bounds:
-    """Return limits of x and y [m] around obstacles, goals, candidates with their ellipses, and further points (m, 2)."""
+def bounds_of(obstacles: Obstacles, goals: Array, ways: Sequence[CandidateView], *points: Array, margin: float = 0.04) -> Bounds:
+    """Return limits of x and y [m] around obstacles, goals, candidates with their ellipses, and further points (m, 2).
+
+    margin: as a share of the greater side.
+    """
     reach = (obstacles.radius + STDDEVS * obstacles.radius_stddev)[:, None]
     spread = [(each.path, STDDEVS * np.sqrt(np.diagonal(each.covariance, axis1=1, axis2=2))) for each in ways]
     edges = [centre + sign * width for centre, width in [(obstacles.centre, reach), *spread] for sign in (-1.0, 1.0)]
     enclosed = np.concatenate([*edges, np.reshape(goals, (-1, 2)), *points])
     low, high = (enclosed.min(axis=0), enclosed.max(axis=0)) if len(enclosed) else (np.zeros(2), np.ones(2))
-    margin = 0.04 * max(*(high - low), 0.05)
-    return float(low[0] - margin), float(high[0] + margin), float(low[1] - margin), float(high[1] + margin)
+    added = margin * max(*(high - low), 0.05)
+    return float(low[0] - added), float(high[0] + added), float(low[1] - added), float(high[1] + added)
 
 
 def save(figure: Figure, file: Path | str) -> None:

@@ -105,7 +105,7 @@ def bounds_of_recording(hand: HandTrajectory, snapshots: Sequence[Snapshot]) -> 
         points += [each.goals, each.obstacles.centre - reach, each.obstacles.centre + reach]
     paths = [candidate.path for each in snapshots for candidate in each.candidates]
     points += [np.percentile(np.concatenate(paths), DRAWN_PERCENTILES, axis=0)] if paths else []
-    return bounds_of(make_obstacles(), np.zeros((0, 2)), (), *points)
+    return bounds_of(make_obstacles(), np.zeros((0, 2)), (), *points, margin=0.06)
 
 
 def round_number(value: float) -> float | None:

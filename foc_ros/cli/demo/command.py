@@ -20,6 +20,7 @@ from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import BagReader, BagWriter, Item
+from foc_ros.io.terminal import show_table
 from foc_ros.reporting.snapshots import build_hand_trajectory
 
 from .environment import NodeDiedError, NodeProcess, free_domain, private_environment, set_environment
@@ -58,18 +59,18 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf, d
     try:
         with _catch_interrupts() as stopped, BagWriter(output / 'bag') as bag:
             _play(items, bag, recorder, free_domain() if domain is None else domain, stopped)
+        if not recorder.snapshots and not stopped.is_set():
+            raise NodeDiedError('the node sent no prediction')
     except NodeDiedError as error:
-        return _fail(str(error))
+        print(f'foc_ros demo: {error}', file=sys.stderr)
+        return 1
     if stopped.is_set():
         print(f'interrupted; the messages recorded so far are in {output / "bag"}')
         return 130
-    if not recorder.snapshots:
-        return _fail('the node sent no prediction')
     facts = _collect_facts(recorder, items)
     title, hand = 'Reaching among obstacles, live', build_hand_trajectory(recorder.samples)
     write_report(output / 'report', title, hand, recorder.snapshots, facts)
-    print(f'{len(recorder.snapshots)} predictions from {facts["hand samples"]} hand samples')
-    print(f'delay from hand sample to prediction: {facts["delay from hand sample to prediction"]}')
+    show_table(('', str(output)), [('predictions', str(len(recorder.snapshots))), *facts.items()])
     print(f'written to {output}: bag (inputs and outputs, MCAP), report/index.html')
     return 0
 
@@ -113,9 +114,6 @@ def _play(items: list[Item], bag: BagWriter, recorder: Recorder, domain: int, st
 def _catch_interrupts() -> Iterator[threading.Event]:
     """Yield an event that SIGINT and SIGTERM set within the context, in place of their usual effect."""
     stopped = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield stopped
-        return
     before = {number: signal.signal(number, lambda *_: stopped.set()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield stopped
@@ -137,8 +135,3 @@ def _collect_facts(recorder: Recorder, items: list[Item]) -> dict[str, str]:
 
 def _duration_s(items: list[Item]) -> float:
     return (items[-1].log_ns - items[0].log_ns) / NANOSECONDS
-
-
-def _fail(reason: str) -> int:
-    print(f'foc_ros demo: {reason}', file=sys.stderr)
-    return 1
