@@ -75,8 +75,8 @@ DRAWN = """
 const box = document.getElementById('likelihoods');
 const [xaxis, yaxis] = [box._fullLayout.xaxis, box._fullLayout.yaxis];
 const traces = [...box.querySelectorAll('.scatterlayer .trace')];
-return box.data.map((trace, row) => !trace.meta || trace.meta.line === undefined ? null : {
-  line: trace.meta.line,
+return box.data.map((trace, row) => !trace.meta || trace.meta.track === undefined ? null : {
+  track: trace.meta.track,
   points: [...traces[row].querySelectorAll('.points path')].map((mark) => {
     const place = mark.transform.baseVal.consolidate().matrix;
     return [xaxis.p2d(place.e), yaxis.p2d(place.f)];
@@ -91,7 +91,7 @@ slider.dispatchEvent(new Event('input'));
 return Number(slider.value);
 """
 TABLE = """
-return [...document.querySelectorAll('#candidates tr[data-line]')].map(
+return [...document.querySelectorAll('#candidates tr[data-track]')].map(
   (row) => [row.cells[3].textContent, Number(row.dataset.share), row.cells[1].textContent]);
 """
 PATHS = """

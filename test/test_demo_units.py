@@ -17,7 +17,7 @@ from report_samples import START_NS, prediction
 from rich.console import Console
 
 from foc_ros.cli.demo import command, environment
-from foc_ros.cli.demo.recorder import Display, Recorder
+from foc_ros.cli.demo.recorder import Recorder, show_live
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
@@ -100,9 +100,9 @@ def test_recorder_counts_messages_of_the_last_second() -> None:
 def shown(recorder: Recorder, terminal: bool, times: np.ndarray) -> str:
     screen = io.StringIO()
     console = Console(file=screen, force_terminal=terminal, width=110)
-    with Display(recorder, START_NS, 5.0, console) as display:
+    with show_live(recorder, START_NS, 5.0, console) as show:
         for now in times:
-            display.update(float(now))
+            show(float(now))
     return screen.getvalue()
 
 

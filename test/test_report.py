@@ -93,8 +93,8 @@ def test_page_holds_the_likelihoods_of_all_predictions(tmp_path: Path) -> None:
         assert frame['at'] == row
         shares = {}
         for way in frame['candidates']:
-            line = data['lines'][way['line']]
-            shares[data['labels'][way['label']]] = line['share'][row - line['first']]
+            track = data['tracks'][way['track']]
+            shares[data['labels'][way['label']]] = track['share'][row - track['first']]
         assert shares == {each['label']: each['likelihood'] for each in numbers[row]['candidates']}
 
 

@@ -86,7 +86,7 @@ def test_a_long_recording_says_where_the_slider_stops(browser: Any, tmp_path: Pa
 
 def test_a_candidate_can_be_highlighted(browser: Any, report: Path) -> None:
     show(browser, report / 'index.html')
-    row = browser.find_element('css selector', '#candidates tr[data-line]')
+    row = browser.find_element('css selector', '#candidates tr[data-track]')
     browser.execute_script('arguments[0].click()', row)
     assert len(browser.find_elements('css selector', '#candidates tr.faded')) == 2
 

@@ -42,11 +42,11 @@ class PageData:
     def build(self, spans: list[tuple[int, int]], bounds: Bounds) -> dict[str, Any]:
         """Return everything that the page draws; spans: start and end [ns] of the movements.
 
-        times [s] after the first hand sample and solve_ms of every prediction; lines: for every track its slot, the row of its
+        times [s] after the first hand sample and solve_ms of every prediction; tracks: for each its slot, the row of its
         first prediction and its likelihoods from there on; frames: the predictions at which the slider stops.
         """
         snapshots = self._tracks.snapshots
-        frames = [self._frame(row) for row in spread_rows(len(snapshots), MOST_FRAMES).tolist()]
+        frames = [self._encode_frame(row) for row in spread_rows(len(snapshots), MOST_FRAMES).tolist()]
         return {
             'unit': {'length': LENGTH, 'speed': SPEED, 'time': TIME},
             'colours': CLASS_COLOURS,
@@ -54,16 +54,16 @@ class PageData:
             'bounds': [round(each, 4) for each in bounds],
             'times': [self._seconds(each.stamp_ns) for each in snapshots],
             'solve_ms': [None if each.solve_s is None else round(1e3 * each.solve_s, 2) for each in snapshots],
-            'lines': [self._line(track, values) for track, values in self._tracks.likelihoods().items()],
+            'tracks': [self._encode_track(track, values) for track, values in self._tracks.likelihoods().items()],
             'movements': [[self._seconds(stamp) for stamp in span] for span in spans],
-            'hand': self._hand_samples(),
+            'hand': self._encode_hand(),
             'scenes': [json.loads(scene) for scene in self._scenes],
             'goals': [json.loads(goals) for goals in self._goals],
             'labels': list(self._labels),
             'frames': frames,
         }
 
-    def _frame(self, row: int) -> dict[str, Any]:
+    def _encode_frame(self, row: int) -> dict[str, Any]:
         snapshot, tracks = self._tracks.snapshots[row], self._tracks.tracks[row]
         obstacles = snapshot.obstacles
         discs = np.column_stack([obstacles.centre, obstacles.radius, STDDEVS * obstacles.radius_stddev])
@@ -73,18 +73,18 @@ class PageData:
             'scene': _row_of(json.dumps(scene), self._scenes),
             'goals': _row_of(json.dumps([_quantise(goal, LENGTH) for goal in snapshot.goals]), self._goals),
             'candidates': [
-                {'line': tracks[each.label], 'label': _row_of(each.label, self._labels), **_encode_candidate(each)}
+                {'track': tracks[each.label], 'label': _row_of(each.label, self._labels), **_encode_candidate(each)}
                 for each in snapshot.candidates
             ],
             'unsolved': [[_row_of(text, self._labels) for text in pair] for pair in snapshot.unsolved],
         }
 
-    def _line(self, track: int, values: Array) -> dict[str, Any]:
+    def _encode_track(self, track: int, values: Array) -> dict[str, Any]:
         known = np.flatnonzero(np.isfinite(values))
         share = [round_number(value) for value in values[known[0] : known[-1] + 1]]
         return {'slot': self._tracks.slots.get(track), 'first': int(known[0]), 'share': share}
 
-    def _hand_samples(self) -> dict[str, Any]:
+    def _encode_hand(self) -> dict[str, Any]:
         rows = spread_rows(len(self._hand.stamps_ns), MOST_HAND_SAMPLES)
         return {
             't': _quantise_differences(self._hand.seconds_after(self._origin_ns)[rows], TIME),

@@ -24,7 +24,7 @@ from foc_ros.io.terminal import show_table
 from foc_ros.reporting.snapshots import build_hand_trajectory
 
 from .environment import NodeDiedError, NodeProcess, free_domain, private_environment, set_environment
-from .recorder import Display, Recorder
+from .recorder import Recorder, show_live
 
 RECORDING = Path(__file__).resolve().parents[2] / 'recordings' / 'reaching.mcap'
 MARK = '.foc_ros_demo'
@@ -98,12 +98,12 @@ def _play(items: list[Item], bag: BagWriter, recorder: Recorder, domain: int, st
             set_environment(environment),
             NodeProcess(environment, Path(logs) / 'node.txt') as node,
             Player(items, bag, recorder, domain) as player,
-            Display(recorder, items[0].log_ns, _duration_s(items)) as display,
+            show_live(recorder, items[0].log_ns, _duration_s(items)) as show,
         ):
 
             def tick() -> bool:
                 node.check()
-                display.update(time.monotonic())
+                show(time.monotonic())
                 return not stopped.is_set()
 
             if player.connect(tick):

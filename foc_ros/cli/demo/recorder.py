@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from types import TracebackType
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -98,42 +99,35 @@ class Recorder:
             self.snapshots.append(read_snapshot(cloud, likelihoods, pipeline.config.plane, obstacles, scene.goals))
 
 
-class Display:
-    """Shows the newest snapshot of a recorder: as a live table on a terminal, else as a line of text each second."""
+@contextmanager
+def show_live(
+    recorder: Recorder, first_ns: int, duration_s: float, console: Console | None = None
+) -> Iterator[Callable[[float], None]]:
+    """Yield a function that shows the newest snapshot: as a live table on a terminal, else as a line of text each second.
 
-    def __init__(self, recorder: Recorder, first_ns: int, duration_s: float, console: Console | None = None) -> None:
-        self._recorder, self._first_ns, self._duration_s = recorder, first_ns, duration_s
-        self._console = console or Console()
-        self._live = Live(console=self._console, auto_refresh=False) if self._console.is_terminal else None
-        self._updated = -np.inf
+    The function takes the time [s] of the recorder's clock and may be called often; first_ns and duration_s: of the recording.
+    """
+    console = console or Console()
+    live = Live(console=console, auto_refresh=False) if console.is_terminal else None
+    next_update = -np.inf
 
-    def __enter__(self) -> Display:
-        if self._live is not None:
-            self._live.__enter__()
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        if self._live is not None:
-            self._live.__exit__(kind, error, trace)
-
-    def update(self, now: float) -> None:
-        """Show the newest snapshot if the last update is long enough ago; now [s]: of the recorder's clock."""
-        if now - self._updated < (LINE_S if self._live is None else REDRAW_S) or not self._recorder.snapshots:
+    def update(now: float) -> None:
+        nonlocal next_update
+        if now < next_update or not recorder.snapshots:
             return
-        self._updated = now
-        snapshot, heading = self._recorder.snapshots[-1], self._describe_progress(now)
-        if self._live is not None:
-            self._live.update(_make_table(snapshot, heading), refresh=True)
+        next_update = now + (LINE_S if live is None else REDRAW_S)
+        snapshot, rates = recorder.snapshots[-1], 'hand samples {}/s, predictions {}/s'.format(*recorder.rates(now))
+        delay_ms = 1e3 * float(np.median(recorder.delays[-50:]))
+        progress = f'{(snapshot.stamp_ns - first_ns) / NANOSECONDS:4.1f} of {duration_s:.1f} s'
+        heading = f'{progress}   {rates}, delay {delay_ms:.0f} ms'
+        if live is not None:
+            live.update(_make_table(snapshot, heading), refresh=True)
             return
         shares = '   '.join(f'{100 * each.likelihood:.0f} % {each.label}' for each in snapshot.candidates)
-        self._console.print(f'{heading}   {shares or "no solved candidate"}', highlight=False, soft_wrap=True, markup=False)
+        console.print(f'{heading}   {shares or "no solved candidate"}', highlight=False, soft_wrap=True, markup=False)
 
-    def _describe_progress(self, now: float) -> str:
-        elapsed_s = (self._recorder.snapshots[-1].stamp_ns - self._first_ns) / NANOSECONDS
-        sent, received = self._recorder.rates(now)
-        delay_ms = 1e3 * float(np.median(self._recorder.delays[-50:]))
-        progress = f'{elapsed_s:4.1f} of {self._duration_s:.1f} s'
-        return f'{progress}   hand samples {sent}/s, predictions {received}/s, delay {delay_ms:.0f} ms'
+    with live or nullcontext():
+        yield update
 
 
 def _make_table(snapshot: Snapshot, title: str) -> Table:

@@ -8,8 +8,8 @@ const goals = data.goals.map((places) => places.map(([x, y]) => [LENGTH * x, LEN
 const scenes = data.scenes.map((rows) => rows.map(([name, ...disc]) => [name, ...disc.map((value) => LENGTH * value)]));
 const frameTimes = data.frames.map((frame) => data.times[frame.at]);
 const mostCandidates = Math.max(...data.frames.map((frame) => frame.candidates.length));
-const slotOf = (line) => data.lines[line].slot;
-const letterOf = (line) => (slotOf(line) === null ? '' : String.fromCharCode(65 + slotOf(line)));
+const slotOf = (track) => data.tracks[track].slot;
+const letterOf = (track) => (slotOf(track) === null ? '' : String.fromCharCode(65 + slotOf(track)));
 // Above this number of points, the likelihoods are drawn without marks.
 const MOST_MARKS = 3000;
 const state = { frame: 0, from: 0, to: 0, playing: false, focus: null };
@@ -17,7 +17,7 @@ const state = { frame: 0, from: 0, to: 0, playing: false, focus: null };
 // The row of the first value that is not below a bound.
 const first = (values, least) => { const row = values.findIndex((value) => value >= least); return row < 0 ? values.length : row; };
 const span = () => [frameTimes[state.from], frameTimes[state.to]];
-const shareOf = (line, row) => { const value = data.lines[line].share[row - data.lines[line].first]; return value === undefined ? null : value; };
+const shareOf = (track, row) => { const value = data.tracks[track].share[row - data.tracks[track].first]; return value === undefined ? null : value; };
 
 // Returns the outlines of ellipses [x, y, half axes, angle] as one trace: a closed line for each, with gaps between them.
 function outlines(ellipses, points = 36) {
@@ -37,26 +37,26 @@ function outlines(ellipses, points = 36) {
 }
 
 const alpha = (colour, share) => colour + Math.round(255 * share).toString(16).padStart(2, '0');
-const faded = (line) => state.focus !== null && state.focus !== line;
+const faded = (track) => state.focus !== null && state.focus !== track;
 
 function candidateTraces(frame, candidate) {
-  const colour = colourOf(slotOf(candidate.line));
-  const share = shareOf(candidate.line, frame.at);
-  const weight = faded(candidate.line) ? 0.15 : 1;
+  const colour = colourOf(slotOf(candidate.track));
+  const share = shareOf(candidate.track, frame.at);
+  const weight = faded(candidate.track) ? 0.15 : 1;
   const [x, y] = [sums(candidate.x, LENGTH), sums(candidate.y, LENGTH)];
   const discs = candidate.ellipses.map(([cx, cy, a, b, angle]) => [LENGTH * cx, LENGTH * cy, LENGTH * a, LENGTH * b, (Math.PI * angle) / 180]);
   const solid = colour.startsWith('#') && colour.length === 7;
   const spread = {
     ...outlines(discs), fill: 'toself', fillcolor: solid ? alpha(colour, weight * (0.02 + 0.1 * share)) : 'rgba(0,0,0,0)',
-    line: { color: colour, width: 1 }, opacity: weight * (0.25 + 0.6 * share), meta: { spread: candidate.line },
+    line: { color: colour, width: 1 }, opacity: weight * (0.25 + 0.6 * share), meta: { spread: candidate.track },
   };
-  const middle = Math.floor(x.length * (0.45 + 0.12 * (candidate.line % 3)));
+  const middle = Math.floor(x.length * (0.45 + 0.12 * (candidate.track % 3)));
   const path = {
-    x, y, type: 'scatter', mode: 'lines', line: { color: colour, dash: dashOf(slotOf(candidate.line)), width: 1.5 + 4 * share },
-    opacity: weight, hoverinfo: 'text', text: plain(`${letterOf(candidate.line)} ${percent(share)} ${data.labels[candidate.label]}`), meta: { candidate: candidate.line },
+    x, y, type: 'scatter', mode: 'lines', line: { color: colour, dash: dashOf(slotOf(candidate.track)), width: 1.5 + 4 * share },
+    opacity: weight, hoverinfo: 'text', text: plain(`${letterOf(candidate.track)} ${percent(share)} ${data.labels[candidate.label]}`), meta: { candidate: candidate.track },
   };
   const tag = {
-    x: [x[middle]], y: [y[middle]], type: 'scatter', mode: 'markers+text', text: letterOf(candidate.line), textfont: { size: 11, color: ink('--ink') },
+    x: [x[middle]], y: [y[middle]], type: 'scatter', mode: 'markers+text', text: letterOf(candidate.track), textfont: { size: 11, color: ink('--ink') },
     marker: { size: 17, color: ink('--page'), line: { color: colour, width: 2 } }, opacity: weight, hoverinfo: 'skip',
   };
   return { spread, path, tag };
@@ -110,19 +110,19 @@ function drawScene() {
   }), { ...CONFIG, displayModeBar: !TOUCH, modeBarButtons: [['toImage', 'zoom2d', 'pan2d', 'resetScale2d']] });
 }
 
-// Returns the parts of all lines within the visible time span. Drawing the rest would take time and not be visible.
-function shownLines() {
+// Returns the parts of all tracks within the visible time span. Drawing the rest would take time and not be visible.
+function visibleTracks() {
   const [from, to] = [first(data.times, span()[0]), first(data.times, span()[1] + 1e-9)];
-  return data.lines.flatMap((line, number) => {
-    const [begin, end] = [Math.max(from, line.first), Math.min(to, line.first + line.share.length)];
-    const share = line.share.slice(begin - line.first, end - line.first);
+  return data.tracks.flatMap((track, number) => {
+    const [begin, end] = [Math.max(from, track.first), Math.min(to, track.first + track.share.length)];
+    const share = track.share.slice(begin - track.first, end - track.first);
     return begin < end && share.some((value) => value !== null) ? [{ number, times: data.times.slice(begin, end), share }] : [];
   });
 }
 
-// Returns a trace with a letter on each line that has at least three points.
-function letters(lines) {
-  const places = lines.flatMap(({ number, times, share }) => {
+// Returns a trace with a letter on each track that has at least three points.
+function letters(tracks) {
+  const places = tracks.flatMap(({ number, times, share }) => {
     const known = share.flatMap((value, row) => (value === null ? [] : [row]));
     const row = known[Math.floor((((number % 4) + 0.5) * known.length) / 4)];
     return known.length < 3 || slotOf(number) === null ? [] : [[times[row], share[row], number]];
@@ -135,14 +135,14 @@ function letters(lines) {
 }
 
 function drawLikelihoods() {
-  const lines = shownLines();
-  const marks = lines.reduce((sum, { share }) => sum + share.length, 0) <= MOST_MARKS;
-  const traces = lines.map(({ number, times, share }) => ({
+  const tracks = visibleTracks();
+  const marks = tracks.reduce((sum, { share }) => sum + share.length, 0) <= MOST_MARKS;
+  const traces = tracks.map(({ number, times, share }) => ({
     x: times, y: share, type: 'scatter', mode: marks ? 'lines+markers' : 'lines', marker: { size: 3 }, connectgaps: false, hoverinfo: 'text',
     line: { color: colourOf(slotOf(number)), dash: dashOf(slotOf(number)), width: 2 }, opacity: faded(number) ? 0.15 : 1,
-    text: share.map((value) => `${letterOf(number)} ${percent(value)}`), meta: { line: number },
+    text: share.map((value) => `${letterOf(number)} ${percent(value)}`), meta: { track: number },
   }));
-  Plotly.react(byId('likelihoods'), [...traces, letters(lines)], layoutOf({
+  Plotly.react(byId('likelihoods'), [...traces, letters(tracks)], layoutOf({
     height: 210, xaxis: timeAxis(''), yaxis: { range: [-0.03, 1.03], title: { text: 'likelihood', standoff: 4 } }, shapes: [now()], hovermode: 'closest',
   }), CONFIG);
 }
@@ -153,8 +153,8 @@ function drawSpeeds() {
   const measured = { type: 'scatter', mode: 'lines', hoverinfo: 'skip' };
   const predicted = filled([...frame.candidates].reverse().map((candidate) => ({
     x: sums(candidate.t, TIME).map((t) => t + data.times[frame.at]), y: sums(candidate.v, SPEED), type: 'scatter', mode: 'lines', hoverinfo: 'text',
-    text: plain(`${letterOf(candidate.line)} ${data.labels[candidate.label]}`), opacity: faded(candidate.line) ? 0.15 : 1,
-    line: { color: colourOf(slotOf(candidate.line)), dash: dashOf(slotOf(candidate.line)), width: 1.2 + 2.5 * shareOf(candidate.line, frame.at) },
+    text: plain(`${letterOf(candidate.track)} ${data.labels[candidate.label]}`), opacity: faded(candidate.track) ? 0.15 : 1,
+    line: { color: colourOf(slotOf(candidate.track)), dash: dashOf(slotOf(candidate.track)), width: 1.2 + 2.5 * shareOf(candidate.track, frame.at) },
   })));
   Plotly.react(byId('speeds'), [
     ...predicted,
@@ -189,22 +189,22 @@ function fillTable() {
   const body = byId('candidates').tBodies[0];
   body.replaceChildren();
   for (const candidate of frame.candidates) {
-    const share = shareOf(candidate.line, frame.at);
+    const share = shareOf(candidate.track, frame.at);
     const row = body.insertRow();
-    row.dataset.line = candidate.line;
+    row.dataset.track = candidate.track;
     row.dataset.share = share;
-    row.classList.toggle('faded', faded(candidate.line));
-    row.addEventListener('click', () => { state.focus = state.focus === candidate.line ? null : candidate.line; drawLikelihoods(); show(state.frame); });
+    row.classList.toggle('faded', faded(candidate.track));
+    row.addEventListener('click', () => { state.focus = state.focus === candidate.track ? null : candidate.track; drawLikelihoods(); show(state.frame); });
     const letter = document.createElement('span');
     letter.className = 'letter';
-    letter.textContent = letterOf(candidate.line);
-    letter.style.borderColor = colourOf(slotOf(candidate.line));
+    letter.textContent = letterOf(candidate.track);
+    letter.style.borderColor = colourOf(slotOf(candidate.track));
     cell(row, '').append(letter);
     cell(row, percent(share), 'number');
     const bar = document.createElement('span');
     bar.className = 'bar';
     const filling = document.createElement('i');
-    filling.style.cssText = `width: ${100 * share}%; background: ${colourOf(slotOf(candidate.line))}`;
+    filling.style.cssText = `width: ${100 * share}%; background: ${colourOf(slotOf(candidate.track))}`;
     bar.append(filling);
     cell(row, '').append(bar);
     cell(row, data.labels[candidate.label]);
