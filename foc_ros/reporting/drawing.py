@@ -156,12 +156,14 @@ def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None
     """Draw the likelihoods of the tracks that have a slot over time [s]; a track has a gap where it has no candidate."""
     times = (np.array([each.stamp_ns for each in tracks.snapshots]) - origin_ns) / NANOSECONDS
     drawn = {track: values for track, values in tracks.likelihoods().items() if track in tracks.slots}
-    for rank, (track, values) in enumerate(drawn.items()):
+    for rank, (track, (first, values)) in enumerate(drawn.items()):
         colour, dash = class_style(tracks.slots[track])
-        axes.plot(times, values, color=colour, linestyle=dash, linewidth=1.8, marker='.', markersize=2.5)
+        axes.plot(
+            times[first : first + len(values)], values, color=colour, linestyle=dash, linewidth=1.8, marker='.', markersize=2.5
+        )
         known = np.flatnonzero(np.isfinite(values))
         row = known[(2 * rank + 1) * len(known) // (2 * len(drawn))]
-        draw_tag(axes, (times[row], values[row]), get_letter(tracks.slots[track]), colour)
+        draw_tag(axes, (times[first + row], values[row]), get_letter(tracks.slots[track]), colour)
     axes.set(ylim=(-0.03, 1.03), ylabel='likelihood')
     axes.tick_params(labelbottom=False)
 

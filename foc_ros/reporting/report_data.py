@@ -54,7 +54,10 @@ class PageData:
             'bounds': [round(each, 4) for each in bounds],
             'times': [self._seconds(each.stamp_ns) for each in snapshots],
             'solve_ms': [None if each.solve_s is None else round(1e3 * each.solve_s, 2) for each in snapshots],
-            'tracks': [self._encode_track(track, values) for track, values in self._tracks.likelihoods().items()],
+            'tracks': [
+                {'slot': self._tracks.slots.get(track), 'first': first, 'share': [round_number(value) for value in values]}
+                for track, (first, values) in self._tracks.likelihoods().items()
+            ],
             'movements': [[self._seconds(stamp) for stamp in span] for span in spans],
             'hand': self._encode_hand(),
             'scenes': [json.loads(scene) for scene in self._scenes],
@@ -78,11 +81,6 @@ class PageData:
             ],
             'unsolved': [[_row_of(text, self._labels) for text in pair] for pair in snapshot.unsolved],
         }
-
-    def _encode_track(self, track: int, values: Array) -> dict[str, Any]:
-        known = np.flatnonzero(np.isfinite(values))
-        share = [round_number(value) for value in values[known[0] : known[-1] + 1]]
-        return {'slot': self._tracks.slots.get(track), 'first': int(known[0]), 'share': share}
 
     def _encode_hand(self) -> dict[str, Any]:
         rows = spread_rows(len(self._hand.stamps_ns), MOST_HAND_SAMPLES)

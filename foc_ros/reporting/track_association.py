@@ -44,13 +44,16 @@ class CandidateTracks:
         """Return the slots of the candidates of one snapshot, by label."""
         return {label: self.slots[track] for label, track in self.tracks[row].items() if track in self.slots}
 
-    def likelihoods(self) -> dict[int, Array]:
-        """Return the likelihoods (number of snapshots,) of each track, NaN where it has no candidate."""
-        table: dict[int, Array] = {}
+    def likelihoods(self) -> dict[int, tuple[int, Array]]:
+        """Return, for each track, its first row and its likelihoods from there on, NaN where it has no candidate."""
+        known: dict[int, dict[int, float]] = {}
         for row, (snapshot, tracks) in enumerate(zip(self.snapshots, self.tracks, strict=True)):
             for each in snapshot.candidates:
-                table.setdefault(tracks[each.label], np.full(len(self.snapshots), np.nan))[row] = each.likelihood
-        return dict(sorted(table.items()))
+                known.setdefault(tracks[each.label], {})[row] = each.likelihood
+        return {
+            track: (min(rows), np.array([rows.get(row, np.nan) for row in range(min(rows), max(rows) + 1)]))
+            for track, rows in sorted(known.items())
+        }
 
 
 def build_candidate_tracks(snapshots: Sequence[Snapshot]) -> CandidateTracks:
