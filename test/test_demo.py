@@ -1,4 +1,4 @@
-"""The demo end to end: the real node in its own process, fed over DDS, on the beginning of the packaged recording."""
+"""The demo end to end: the real node in its own process receives the first seconds of the packaged recording over DDS."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_end_to_end(domain: int, tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 
 def test_the_live_predictions_are_those_of_the_recording(domain: int, tmp_path: Path) -> None:
-    """Every prediction carries the stamp of a hand pose that was sent, each stamp once, in order."""
+    """Every prediction has the stamp of a hand pose that was sent; the stamps increase."""
     from foc_ros.cli.demo.command import perform
 
     perform(tmp_path / 'out', last_s=1.0, domain=domain)

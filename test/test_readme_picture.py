@@ -1,4 +1,4 @@
-"""The pictures of README and concepts are there, and their scripts draw what they say; so are the tables of the examples."""
+"""The pictures of README and concepts exist and their scripts draw the described contents; the tables of the examples are current."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def script(name: str) -> ModuleType:
-    """Import a file of scripts/, which is no package."""
+    """Import a file of scripts/, which is not a package."""
     sys.path.insert(0, str(ROOT / 'scripts'))
     try:
         return importlib.import_module(name)
@@ -36,7 +36,7 @@ def test_the_pictures_are_in_the_readme(name: str, start: bytes) -> None:
     assert len(picture) < 2_000_000
 
 
-def test_the_moving_picture_goes_through_a_movement(tmp_path: Path) -> None:
+def test_the_animation_covers_a_movement(tmp_path: Path) -> None:
     moving = script('make_demo_animation')
     made = samples(1)
     drawn = list(
@@ -49,7 +49,7 @@ def test_the_moving_picture_goes_through_a_movement(tmp_path: Path) -> None:
     assert (tmp_path / 'demo.gif').read_bytes().startswith(b'GIF89a')
 
 
-def test_the_script_draws_the_beginning_of_its_movement() -> None:
+def test_the_readme_picture_shows_the_beginning_of_its_movement() -> None:
     still = script('make_readme_picture')
     made = samples(still.MOVEMENT)
     hand, snapshots = build_hand_trajectory(made), [build_snapshot(each, *scene()) for each in predictions(made, every=2)]
@@ -72,7 +72,7 @@ def test_concepts_have_their_pictures(name: str, monkeypatch: pytest.MonkeyPatch
     assert (ROOT / 'doc' / 'images' / f'concept_{name}.png').exists()
 
 
-def test_example_tables_are_those_of_the_script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_example_tables_equal_those_of_the_script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tables = script('make_example_tables')
     monkeypatch.setattr(sys, 'argv', ['make_example_tables.py', str(tmp_path)])
     tables.main()

@@ -1,4 +1,4 @@
-"""The report: one page that needs nothing else, and numbers that agree with the predictions."""
+"""The report: a page that needs no other file, and numbers that agree with the predictions."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
 
 
 class Page(HTMLParser):
-    """What a browser would find: tags with attributes, and text."""
+    """Parser of a page: its tags with attributes, and its text."""
 
     def __init__(self, file: Path) -> None:
         super().__init__()
@@ -53,7 +53,7 @@ def report(directory: Path, reaches: int = 1, title: str = 'A title') -> list[Pa
     return write_report(directory, title, build_hand_trajectory(made), snapshots, {'recording': 'some <bag> & more'})
 
 
-def test_files_are_there(tmp_path: Path) -> None:
+def test_all_files_are_written(tmp_path: Path) -> None:
     files = report(tmp_path / 'new' / 'report')
     assert {file.name for file in files} == {
         'index.html',
@@ -64,7 +64,7 @@ def test_files_are_there(tmp_path: Path) -> None:
     assert set((tmp_path / 'new' / 'report').iterdir()) == set(files)
 
 
-def test_page_needs_nothing_else(tmp_path: Path) -> None:
+def test_the_page_refers_to_no_other_file(tmp_path: Path) -> None:
     report(tmp_path)
     page = Page(tmp_path / 'index.html')
     for _, attributes in page.tags:
@@ -92,9 +92,9 @@ def test_page_holds_the_likelihoods_of_all_predictions(tmp_path: Path) -> None:
     for row, frame in enumerate(data['frames']):
         assert frame['at'] == row
         shares = {}
-        for way in frame['candidates']:
-            track = data['tracks'][way['track']]
-            shares[data['labels'][way['label']]] = track['share'][row - track['first']]
+        for candidate in frame['candidates']:
+            track = data['tracks'][candidate['track']]
+            shares[data['labels'][candidate['label']]] = track['share'][row - track['first']]
         assert shares == {each['label']: each['likelihood'] for each in numbers[row]['candidates']}
 
 
@@ -104,10 +104,10 @@ def test_paths_on_the_page_are_those_predicted(tmp_path: Path) -> None:
     write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each, *scene()) for each in expected], {})
     data = page_data_of(tmp_path)
     for frame, known in zip(data['frames'], expected, strict=True):
-        for way, outcome in zip(frame['candidates'], known.solved_candidates, strict=True):
-            drawn = np.cumsum([way['x'], way['y']], axis=1).T * data['unit']['length']
+        for candidate, outcome in zip(frame['candidates'], known.solved_candidates, strict=True):
+            drawn = np.cumsum([candidate['x'], candidate['y']], axis=1).T * data['unit']['length']
             np.testing.assert_allclose(drawn, outcome.solution.path, atol=0.51e-4)
-            spread = np.array(way['ellipses'])[-1, 2:4] * data['unit']['length']
+            spread = np.array(candidate['ellipses'])[-1, 2:4] * data['unit']['length']
             wanted = np.sqrt(np.linalg.eigvalsh(outcome.solution.covariance[-1, :2, :2]))[::-1]
             np.testing.assert_allclose(spread, wanted, atol=0.51e-4)
 

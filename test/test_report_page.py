@@ -45,7 +45,7 @@ def test_the_page_shows_the_numbers(browser: Any, report: Path) -> None:
     check_report(browser, report)
 
 
-def test_text_stays_text(browser: Any, report: Path) -> None:
+def test_hostile_text_is_escaped(browser: Any, report: Path) -> None:
     show(browser, report / 'index.html')
     assert browser.title == HOSTILE
     assert browser.find_elements('tag name', 'img') == []
@@ -53,8 +53,8 @@ def test_text_stays_text(browser: Any, report: Path) -> None:
 
 
 @pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
-def test_a_phone_shows_all_of_it(browser: Any, report: Path, tmp_path: Path, dark: bool) -> None:
-    """Nothing is wider than a screen of 390 px; dark and light come from the system and can be changed."""
+def test_the_page_fits_on_a_phone(browser: Any, report: Path, tmp_path: Path, dark: bool) -> None:
+    """The page fits into a width of 390 px; it follows the dark or light mode of the system, and a button changes it."""
     assert show(browser, report / 'index.html', 390, 844, dark) == []
     assert browser.execute_script('return document.documentElement.scrollWidth') == 390
     pages = [browser.execute_script('return getComputedStyle(document.body).backgroundColor')]
@@ -65,7 +65,7 @@ def test_a_phone_shows_all_of_it(browser: Any, report: Path, tmp_path: Path, dar
     assert pages == (['rgb(20, 24, 28)', 'rgb(255, 255, 255)'] if dark else ['rgb(255, 255, 255)', 'rgb(20, 24, 28)'])
 
 
-def test_it_plays_to_the_end_of_a_movement(browser: Any, report: Path) -> None:
+def test_playing_stops_at_the_end_of_a_movement(browser: Any, report: Path) -> None:
     from selenium.webdriver.support.ui import WebDriverWait
 
     show(browser, report / 'index.html')
@@ -92,7 +92,7 @@ def test_a_candidate_can_be_highlighted(browser: Any, report: Path) -> None:
 
 
 def changed(report: Path, copy: Path, old: str, new: str) -> Path:
-    """Return a copy of a report with one thing in its page another."""
+    """Return a copy of a report with one text of its page replaced."""
     page = (report / 'index.html').read_text(encoding='utf-8')
     assert old in page
     (copy / 'index.html').write_text(page.replace(old, new, 1), encoding='utf-8')

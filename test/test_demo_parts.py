@@ -106,7 +106,7 @@ def shown(recorder: Recorder, terminal: bool, times: np.ndarray) -> str:
     return screen.getvalue()
 
 
-def test_without_a_terminal_one_plain_line_a_second() -> None:
+def test_without_a_terminal_a_line_is_printed_each_second() -> None:
     lines = shown(filled(), False, np.arange(0.0, 3.0, 0.01)).splitlines()
     assert len(lines) == 3
     assert lines[0].startswith(' 0.1 of 5.0 s   hand samples 5/s, predictions 5/s, delay 5 ms')
@@ -115,7 +115,7 @@ def test_without_a_terminal_one_plain_line_a_second() -> None:
     assert '\x1b' not in ''.join(lines)
 
 
-def test_on_a_terminal_a_table() -> None:
+def test_on_a_terminal_a_table_is_shown() -> None:
     text = shown(filled(), True, np.array([0.2]))
     for part in ('likelihood', 'effort', 'eta', 'goal0:-1', '56 %', 'goal1:+1-post', '0.90', 'x 1.15'):
         assert part in text
@@ -189,7 +189,7 @@ def test_environment_is_private(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
 
 
 def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: str) -> environment.NodeProcess:
-    """Return a process of another program under the node's name."""
+    """Return a process that runs another program in place of the node."""
     package = tmp_path / 'foc_ros'
     package.mkdir()
     (package / '__init__.py').touch()
@@ -227,7 +227,7 @@ def test_a_node_that_dies_is_reported_with_its_output(monkeypatch: pytest.Monkey
         'import signal, time; signal.signal(15, lambda *_: None); [time.sleep(1) for _ in range(60)]',
     ],
 )
-def test_the_node_never_survives(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: str) -> None:
+def test_the_node_ends_with_its_context(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: str) -> None:
     monkeypatch.setattr(environment, 'STOP_S', 0.3)
     with pytest.raises(KeyboardInterrupt), stand_in(monkeypatch, tmp_path, 'print("up", flush=True);' + program) as node:  # noqa: PT012
         until(lambda: 'up' in (tmp_path / 'log.txt').read_text())
