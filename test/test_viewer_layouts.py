@@ -1,4 +1,4 @@
-"""The RViz configuration and the Foxglove layout parse, and show topics that the node has, as the types they are."""
+"""The RViz configuration and the Foxglove layout can be parsed and show topics of the node with their types."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def foxglove() -> Any:
     return json.loads((CONFIG / 'foxglove.json').read_text('utf-8'))
 
 
-def test_rviz_shows_every_output_that_it_can() -> None:
+def test_rviz_shows_every_output_it_can_display() -> None:
     shown = {}
     for display in rviz()['Displays']:
         if 'Topic' in display:
@@ -42,7 +42,7 @@ def test_rviz_shows_every_output_that_it_can() -> None:
     assert cloud['Channel Name'] == 'likelihood'
 
 
-def test_rviz_listens_and_sends_with_a_quality_of_service_that_fits() -> None:
+def test_rviz_uses_a_compatible_quality_of_service() -> None:
     for display in rviz()['Displays']:
         if 'Topic' in display:
             wanted = 'Best Effort' if display['Topic']['Value'] == '/hand_pose' else 'Reliable'
@@ -59,7 +59,7 @@ def leaves(layout: Any) -> Iterator[str]:
             yield from leaves(layout[side])
 
 
-def test_foxglove_shows_our_topics_in_panels_that_it_lays_out() -> None:
+def test_foxglove_shows_topics_of_the_node_in_its_panels() -> None:
     layout = foxglove()
     assert set(leaves(layout['layout'])) == set(layout['configById'])
     scene = layout['configById']['3D!foc']
