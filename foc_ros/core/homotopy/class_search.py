@@ -46,7 +46,10 @@ class PathClass(NamedTuple):
 
 
 class ClassQuery(NamedTuple):
-    """The goal (row) whose classes to find, the ids (n,) of the obstacles, the velocity (2,) of the hand [m/s], the most states."""
+    """Which classes to find.
+
+    goal: row; ids (n,) of the obstacles; velocity (2,): of the hand [m/s]; max_states: number that a path search may look at.
+    """
 
     goal: int
     ids: tuple[str, ...]
@@ -79,7 +82,7 @@ def find_classes(scene: SearchScene, query: ClassQuery, notes: Counter[str]) -> 
     """Yield each class to a goal once, in the order of their rank; notes: counts of what is decided, see `search.Search`."""
     named = sorted(np.flatnonzero(scene.is_named[query.goal]).tolist(), key=query.ids.__getitem__)
     nearest: list[int] = np.argsort(scene.excess, kind='stable').tolist()
-    rows, given, is_any_free = _choose_circles(scene, named, nearest), set[str](), False
+    rows, given = _choose_circles(scene, named, nearest), set[str]()
     while True:
         partial = _build_partial_graph(scene, query.goal, sorted(rows), named)
         most = _count_classes(partial)
@@ -94,13 +97,11 @@ def find_classes(scene: SearchScene, query: ClassQuery, notes: Counter[str]) -> 
             if met:
                 notes['left_out'] += 1
             else:
-                is_any_free = True
                 yield found
             if len(given) == most:
                 return
         else:
             if math.isinf(partial.max_key):
-                notes['no_way'] += not is_any_free
                 return
             rows = nearest[: min(2 * len(rows), MOST)]
 
@@ -122,13 +123,11 @@ def _build_partial_graph(scene: SearchScene, goal: int, rows: list[int], named: 
 def _count_classes(partial: PartialGraph) -> int:
     """Return the largest number of classes: two for each cluster of named circles that overlap."""
     clusters = {cluster for row, cluster in zip(partial.rows, partial.graph.circles.cluster, strict=True) if row in partial.named}
-    return 2 ** (len(clusters) + len(set(partial.named).difference(partial.rows)))
+    return 1 << len(clusters) + len(set(partial.named).difference(partial.rows))
 
 
-def _find_named_paths(
-    scene: SearchScene, partial: PartialGraph, query: ClassQuery, notes: Counter[str]
-) -> Iterator[PathClass]:
-    """Yield the classes of the paths over a graph, by their rank; several may be of one class if the graph lacks named circles."""
+def _find_named_paths(scene: SearchScene, partial: PartialGraph, query: ClassQuery, notes: Counter[str]) -> Iterator[PathClass]:
+    """Yield the classes of the paths over a graph, by their rank. A class may come again if the graph lacks named circles."""
     place = {row: place for place, row in enumerate(partial.rows)}
     held = [row for row in partial.named if row in place]
     bearing_change, is_complete = scene.bearing_change[query.goal, held], len(held) == len(partial.named)

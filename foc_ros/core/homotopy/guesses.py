@@ -44,7 +44,8 @@ class TautPath(NamedTuple):
         ahead = np.where(bend == 0.0, step, np.sin(angle) / safe_bend)
         aside = (1.0 - np.cos(angle)) / safe_bend
         x, y = self.heading[piece].T
-        return self.start[piece] + np.stack((ahead * x - aside * y, ahead * y + aside * x), axis=1)
+        points: Array = self.start[piece] + np.stack((ahead * x - aside * y, ahead * y + aside * x), axis=1)
+        return points
 
     def space_points(self, count: int) -> Array:
         """Return points (count, 2) at equal distances from the beginning to the end."""
@@ -101,6 +102,6 @@ def build_guess(scene: SearchScene, path: TautPath, goal: int, velocity: Array, 
             wanted = np.minimum(wanted, distance[0] + SLOPE * along)
         if scene.holds_goal[goal, k]:
             wanted = np.minimum(wanted, distance[-1] + SLOPE * (along[-1] - along))
-        is_pushed = (0.0 < distance) & (distance < wanted)
+        is_pushed = (distance > 0.0) & (distance < wanted)
         points[is_pushed] = scene.centre[k] + apart[is_pushed] * (wanted / np.maximum(distance, 1e-300))[is_pushed, None]
     return as_readonly(points)

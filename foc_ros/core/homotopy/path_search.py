@@ -1,9 +1,9 @@
 """Best-first search over the tangent graph for the shortest path of each homotopy class.
 
-A state is a run and a signature: for every named obstacle, how often the path has crossed the ray from its centre. Two paths between
-the same ends pass the named obstacles on the same sides if and only if their signatures agree (Bhattacharya, Likhachev and Kumar,
-"Topological constraints in search-based robot path planning", 2012). The first path that arrives with a signature is therefore the
-shortest one of its class.
+A state is a run and a signature: for every named obstacle, how often the path has crossed the ray from its centre. Two paths
+between the same ends pass the named obstacles on the same sides if and only if their signatures agree (Bhattacharya, Likhachev
+and Kumar, "Topological constraints in search-based robot path planning", 2012). The first path that arrives with a signature is
+therefore the shortest one of its class.
 """
 
 from __future__ import annotations
@@ -113,7 +113,8 @@ class SignatureCounter:
     """Counts how often paths cross the rays of some circles of a graph."""
 
     def __init__(self, graph: TangentGraph, circles: list[int]) -> None:
-        self._runs, self._crossings, self._holds = graph.runs, graph.runs.crossings[:, :, circles], graph.circles.holds[:, circles]
+        self._runs = graph.runs
+        self._crossings, self._holds = graph.runs.crossings[:, :, circles], graph.circles.holds[:, circles]
 
     def extend(self, signature: Signature, path: tuple[int, ...]) -> Signature:
         """Return the signature of a path; signature: of the path without its last run."""

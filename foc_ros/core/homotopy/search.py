@@ -102,7 +102,7 @@ def search(
         goal_inside=len(goals) - len(reachable),
     )
     classes = [find_classes(scene, ClassQuery(goal, obstacles.ids, velocity, max_states), notes) for goal in reachable]
-    chosen = _select_classes(classes, count, {candidate.label for candidate in previous})
+    chosen = _select_classes(classes, count, {candidate.label for candidate in previous}, notes)
     candidates = []
     for one in chosen:
         guess = build_guess(scene, one.path, one.goal, velocity, duration_s[one.goal], steps)
@@ -110,13 +110,17 @@ def search(
     return Search(tuple(candidates), {name: number for name, number in notes.items() if number})
 
 
-def _select_classes(streams: Sequence[Iterator[PathClass]], count: int, previous: Collection[str]) -> list[PathClass]:
+def _select_classes(
+    streams: Sequence[Iterator[PathClass]], count: int, previous: Collection[str], notes: Counter[str]
+) -> list[PathClass]:
     """Choose `count` classes from those to each goal, which come in the order of their rank.
 
     The best class to each goal is chosen first, the shortest of these if there is no room for all. The rest is chosen by
     length, multiplied by REPEAT or STAY where they apply. previous: labels of the previous prediction.
     """
-    firsts = sorted([found for stream in streams for found in islice(stream, 1)])[:count]
+    firsts = sorted([found for stream in streams for found in islice(stream, 1)])
+    notes['no_way'] = len(streams) - len(firsts)
+    firsts = firsts[:count]
     room = count - len(firsts)
     goal_of_course = {found.course: found.goal for found in firsts}
     awaited = {*previous} - {found.label for found in firsts}

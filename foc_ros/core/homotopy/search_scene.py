@@ -40,7 +40,7 @@ class SearchScene(NamedTuple):
     way to each goal [m], smaller if they would hold the hand (holds_hand (n,)) or the goal (holds_goal (g, n)).
     is_goal_inside (g,): whether an obstacle, without the clearance, holds the goal. is_named (g, n): whether the names of the
     paths to a goal contain an obstacle. bearing_change (g, n): direction of the goal less direction of the hand, as seen from
-    each centre [rad]. excess (n,): least length of a path to any goal that touches a circle, over the length of the straight line.
+    each centre [rad]. excess (n,): least length of a path to any goal that touches a circle, as a multiple of the straight line.
     """
 
     hand: Vector
@@ -64,7 +64,7 @@ def build_search_scene(
     centre, wanted = obstacles.centre, np.maximum(obstacles.radius + clearance, MIN_SIZE)
     wanted = _keep_gaps_open(centre, wanted, clearance, sides)
     on_hand = np.hypot(*(goals - hand).T) < OFF_HAND
-    goals = np.where(on_hand[:, None], hand + [OFF_HAND, 0.0], goals)
+    goals = np.where(on_hand[:, None], hand + np.array([OFF_HAND, 0.0]), goals)
     straight = np.maximum(np.hypot(*(goals - hand).T), MIN_SIZE)[:, None]
     to_hand, to_goal = hand - centre, goals[:, None] - centre
     hand_distance, goal_distance = np.hypot(*to_hand.T), np.hypot(to_goal[..., 0], to_goal[..., 1])
@@ -81,7 +81,7 @@ def build_search_scene(
         radius,
         holds_hand,
         holds_goal,
-        (goal_distance < obstacles.radius).any(axis=1),
+        np.any(goal_distance < obstacles.radius, axis=1),
         _find_named(to_hand, to_goal, radius, straight, slack),
         _compute_bearings(to_goal) - _compute_bearings(to_hand),
         detour.min(axis=0, initial=np.inf),
@@ -103,10 +103,10 @@ def _find_named(to_hand: Matrix, to_goal: Array, radius: Matrix, straight: Matri
     """Tell which obstacles the names to each goal contain (g, n).
 
     An obstacle is named if the foot of its centre lies between hand and goal, and it either blocks the straight line or its far
-    side is within reach. The shortest path round one circle consists of two tangents and an arc of angle - acos(r / a) - acos(r / b),
-    where a and b are the distances of the ends from the centre and `angle` is the angle between them. The circle blocks the
-    straight line if the arc is positive. On the far side 2 pi - angle takes the place of the angle. As no other obstacle has an
-    influence, a name stays the same if other obstacles appear, vanish or move.
+    side is within reach. The shortest path round one circle consists of two tangents and an arc of the angle p - acos(r / a) -
+    acos(r / b), where a and b are the distances of the ends from the centre and p is the angle between them. The circle blocks
+    the straight line if this is positive. On the far side, 2 pi - p takes the place of p. As no other obstacle has an influence,
+    a name stays the same if other obstacles appear, vanish or move.
 
     to_hand (n, 2), to_goal (g, n, 2): from the centres [m]; straight (g, 1): distance of the goals [m]; slack (g, n) [m].
     """
@@ -129,8 +129,12 @@ def _compute_bearings(seen: Array) -> Array:
 
 def _tabulate_sides(ids: tuple[str, ...], previous: Sequence[Candidate]) -> Table:
     """Return on which side each previous candidate passes each obstacle (p, n), 0 if its name does not contain the obstacle."""
-    passed = [dict(candidate.sides) for candidate in previous]
-    return np.array([[sides.get(identity, 0) for identity in ids] for sides in passed], dtype=np.intp).reshape(len(previous), len(ids))
+    table, row = np.zeros((len(previous), len(ids)), dtype=np.intp), {identity: row for row, identity in enumerate(ids)}
+    for p, candidate in enumerate(previous):
+        for identity, side in candidate.sides:
+            if identity in row:
+                table[p, row[identity]] = side
+    return table
 
 
 def _compute_slack(goals: int, previous: Sequence[Candidate], sides: Table) -> Matrix:
@@ -148,6 +152,6 @@ def _keep_gaps_open(centre: Matrix, radius: Vector, clearance: float, sides: Tab
     apart = centre[:, None] - centre
     missing = radius[:, None] + radius - np.hypot(apart[..., 0], apart[..., 1])
     is_between = (sides[:, :, None] * sides[:, None, :]).min(axis=0) < 0
-    is_kept = is_between & (-OPEN < missing) & (missing < min(NARROWER, clearance))
+    is_kept = is_between & (missing > -OPEN) & (missing < min(NARROWER, clearance))
     reduced: Vector = radius - np.where(is_kept, missing / 2.0 + OPEN, 0.0).max(axis=1, initial=0.0)
     return reduced

@@ -1,7 +1,7 @@
 """The tangent graph: a shortest path among circles consists of straight runs that touch circles, joined by arcs along them.
 
-Node 2 k + 1 is circle k passed anticlockwise, node 2 k the same circle passed clockwise. Goals and hand are circles of radius 0 behind
-the others, passed anticlockwise. A run from circle i to circle j, with D = c_j - c_i and w = s_j r_j - s_i r_i where s is 1
+Node 2 k + 1 is circle k passed anticlockwise, node 2 k the same circle passed clockwise. Goals and hand follow as circles of
+radius 0, passed anticlockwise. A run from circle i to circle j, with D = c_j - c_i and w = s_j r_j - s_i r_i where s is 1
 (anticlockwise) or -1, has the length l = sqrt(|D|^2 - w^2), and its heading u is D turned by the angle -atan2(w, l). It leaves
 circle i at c_i + s_i r_i n and reaches circle j at c_j + s_j r_j n, where n is u turned by -90 degrees.
 """
@@ -28,9 +28,9 @@ TURN_BACK = 1e-9
 class Circles(NamedTuple):
     """n circles.
 
-    centre (n, 2) and radius (n,) [m]; is_outer (n,): whether a circle lies in no other one (of equal circles the first is outer);
-    holds (n, n): whether a circle holds the centre of another; overlap_bearing (n, n): direction of the outer circles that overlap
-    a circle [rad], NaN for other circles; cluster (n,): equal numbers for circles that are linked by overlaps.
+    centre (n, 2) and radius (n,) [m]; is_outer (n,): whether a circle lies in no other one (the first of equal ones is outer);
+    holds (n, n): whether a circle holds the centre of another one; overlap_bearing (n, n): direction of the outer circles that
+    overlap a circle [rad], NaN for other circles; cluster (n,): equal numbers for circles that are linked by overlaps.
     """
 
     centre: Matrix
@@ -38,19 +38,20 @@ class Circles(NamedTuple):
     is_outer: Flags
     holds: FlagTable
     overlap_bearing: Matrix
-    cluster: tuple[int, ...]
+    cluster: list[int]
 
 
 class Runs(NamedTuple):
-    """m straight runs that no circle blocks.
+    """m straight runs that no circle blocks, from a circle, a goal or the hand to another.
 
-    head (m,): node at the end; start, end, heading (m, 2): positions [m] and unit vectors; length (m,) [m]; leave_angle,
-    reach_angle (m,): where the run leaves the circle at its start and reaches the one at its end, in [0, 2 pi]; clear_angle (m,):
-    angle of the arc from the end along the circle to the next overlapping circle. crossings (m, 2, n): crossings of the ray of
-    each circle on the way from angle 0 of the circle at the start along the run to its end, and on the way from angle 0 of the
-    circle at the end to the end of the run.
+    tail, head (m,): nodes at start and end; start, end, heading (m, 2): positions [m] and unit vectors; length (m,) [m];
+    leave_angle, reach_angle (m,): where the run leaves the circle at its start and reaches the one at its end, in [0, 2 pi];
+    clear_angle (m,): angle of the arc from the end along the circle to the next overlapping circle [rad]. crossings (m, 2, n):
+    of the ray of each circle, on the way from angle 0 of the circle at the start along the run to its end, and on the way from
+    angle 0 of the circle at the end to the end of the run.
     """
 
+    tail: Indices
     head: Indices
     start: Matrix
     end: Matrix
@@ -59,11 +60,11 @@ class Runs(NamedTuple):
     leave_angle: Vector
     reach_angle: Vector
     clear_angle: Vector
-    crossings: Tensor
+    crossings: Indices
 
 
 class TangentGraph(NamedTuple):
-    """Circles, g goals (g, 2), the runs in the order of the nodes that they leave, and the first run of each of the 2 n nodes.
+    """Circles, goals (g, 2) [m], and runs in the order of the nodes that they leave; first_run (2 n + 1,): the first one of each.
 
     The runs from first_run[2 n] on leave the hand.
     """
@@ -71,21 +72,23 @@ class TangentGraph(NamedTuple):
     circles: Circles
     goals: Matrix
     runs: Runs
-    first_run: tuple[int, ...]
+    first_run: list[int]
 
 
 def build_tangent_graph(centre: Array, radius: Array, goals: Array) -> TangentGraph:
-    """Build the graph of circles (n, 2), (n,) and goals (g, 2) [m]. The last ones are kept, for scenes in which only the hand moves."""
+    """Build the graph of circles (n, 2), (n,) and goals (g, 2) [m], without a hand.
+
+    The last graphs are kept, for scenes in which only the hand moves.
+    """
     return _build_from_bytes(centre.tobytes(), radius.tobytes(), goals.tobytes())
 
 
 def connect_hand(graph: TangentGraph, hand: Array) -> TangentGraph:
     """Return the graph with the runs from a hand (2,) [m] to all circles and goals."""
-    n, g = len(graph.circles.radius), len(graph.goals)
-    head = np.concatenate((np.flatnonzero(np.repeat(graph.circles.is_outer, 2)), 2 * (n + np.arange(g)) + 1))
-    points = np.vstack((graph.goals, hand))
-    runs = _measure_runs(graph.circles, points, *_find_free(graph.circles, points, np.full(len(head), 2 * (n + g) + 1), head))
-    return graph._replace(runs=Runs(*map(np.concatenate, zip(graph.runs, runs, strict=True))))
+    circles, n, g = graph.circles, len(graph.circles.radius), len(graph.goals)
+    head = np.append(np.flatnonzero(np.repeat(circles.is_outer, 2)), 2 * (n + np.arange(g)) + 1)
+    runs = _find_runs(circles, np.concatenate((graph.goals, hand[None])), np.full(len(head), 2 * (n + g) + 1), head)
+    return graph._replace(runs=Runs._make(np.concatenate(pair) for pair in zip(graph.runs, runs, strict=True)))
 
 
 def measure_arc(leave_angle: float, reach_angle: float, sense: int) -> float:
@@ -97,14 +100,9 @@ def measure_arc(leave_angle: float, reach_angle: float, sense: int) -> float:
 @lru_cache(maxsize=8)
 def _build_from_bytes(centre: bytes, radius: bytes, goals: bytes) -> TangentGraph:
     circles = _build_circles(np.frombuffer(centre).reshape(-1, 2), np.frombuffer(radius))
-    points, n = np.frombuffer(goals).reshape(-1, 2), len(circles.radius)
-    tail, head = _find_free(circles, points, *_list_pairs(circles.is_outer, len(points)))
-    # the same run backwards touches both circles in the other sense
-    is_between = head < 2 * n
-    tail, head = np.concatenate((tail, head[is_between] ^ 1)), np.concatenate((head, tail[is_between] ^ 1))
-    order = np.argsort(tail, kind='stable')
-    first_run = tuple(np.searchsorted(tail[order], np.arange(2 * n + 1)).tolist())
-    return TangentGraph(circles, points, _measure_runs(circles, points, tail[order], head[order]), first_run)
+    points = np.frombuffer(goals).reshape(-1, 2)
+    runs = _find_runs(circles, points, *_list_pairs(tuple(circles.is_outer.tolist()), len(points)))
+    return TangentGraph(circles, points, runs, np.searchsorted(runs.tail, np.arange(2 * len(circles.radius) + 1)).tolist())
 
 
 def _build_circles(centre: Matrix, radius: Vector) -> Circles:
@@ -119,47 +117,50 @@ def _build_circles(centre: Matrix, radius: Vector) -> Circles:
     bearing = np.where(is_linked & is_outer & is_other, np.arctan2(y, x), np.nan)
     for _ in range(n.bit_length()):
         is_linked = (is_linked.astype(float) @ is_linked) > 0.0
-    cluster = tuple([row.index(True) for row in is_linked.tolist()])
+    cluster = [row.index(True) for row in is_linked.tolist()]
     return Circles(centre, radius, is_outer, distance < radius[:, None], bearing, cluster)
 
 
-def _list_pairs(is_outer: Flags, goals: int) -> tuple[Indices, Indices]:
-    """List the nodes at both ends of possible runs: between outer circles, each pair in one direction, and to goals."""
-    outer, senses = np.flatnonzero(is_outer), np.arange(2)
-    first, second = np.triu_indices(len(outer), 1)
-    tail = np.repeat(2 * outer[first][:, None] + senses, 2, axis=1)
-    head = np.tile(2 * outer[second][:, None] + senses, 2)
-    to_goal = np.repeat(2 * (len(is_outer) + np.arange(goals))[None] + 1, 2, axis=1)
-    from_circle = np.tile(2 * outer[:, None] + senses, goals)
-    return (
-        np.concatenate((tail.ravel(), from_circle.ravel())),
-        np.concatenate((head.ravel(), np.tile(to_goal, (len(outer), 1)).ravel())),
-    )
+@lru_cache(maxsize=8)
+def _list_pairs(is_outer: tuple[bool, ...], goals: int) -> tuple[Indices, Indices]:
+    """List the nodes at both ends of possible runs between outer circles and from these to goals, in the order of the first."""
+    nodes = np.flatnonzero(np.repeat(is_outer, 2))
+    ends = np.append(nodes, 2 * (len(is_outer) + np.arange(goals)) + 1)
+    tail, head = np.repeat(nodes, len(ends)), np.tile(ends, len(nodes))
+    is_pair = tail >> 1 != head >> 1
+    return tail[is_pair], head[is_pair]
 
 
-def _touch(circles: Circles, points: Matrix, tail: Indices, head: Indices) -> tuple[Vector, Matrix, Matrix]:
-    """Return length (m,) [m] and heading (m, 2) of the runs from node to node, and (m, 2, 2) where they touch the two circles.
-
-    points: goals, and hand if there is one. The length is 0 where there is no run; touching points are relative to the centres.
-    """
+def _find_runs(circles: Circles, points: Matrix, tail: Indices, head: Indices) -> Runs:
+    """Find the runs between pairs of nodes, tails (m,) and heads (m,); points: goals, and the hand if there is one."""
     centre, radius = np.concatenate((circles.centre, points)), np.append(circles.radius, np.zeros(len(points)))
-    x, y = (centre[head >> 1] - centre[tail >> 1]).T
-    r_tail, r_head = (radius[node >> 1] * (2 * (node & 1) - 1) for node in (tail, head))
+    ends = np.stack((tail >> 1, head >> 1), axis=1)
+    x, y = (centre[ends[:, 1]] - centre[ends[:, 0]]).T
+    r_tail, r_head = radius[ends[:, 0]] * (2 * (tail & 1) - 1), radius[ends[:, 1]] * (2 * (head & 1) - 1)
     square, w = x * x + y * y, r_head - r_tail
     length = np.sqrt(np.maximum(square - w * w, 0.0))
     square = np.maximum(square, 1e-300)
     u_x, u_y = (length * x + w * y) / square, (length * y - w * x) / square
+    heading = np.stack((u_x, u_y), axis=1)
     touch = np.stack((r_tail * u_y, -r_tail * u_x, r_head * u_y, -r_head * u_x), axis=1).reshape(-1, 2, 2)
-    return length, np.stack((u_x, u_y), axis=1), touch
-
-
-def _find_free(circles: Circles, points: Matrix, tail: Indices, head: Indices) -> tuple[Indices, Indices]:
-    """Return those of the pairs of nodes, tails (m,) and heads (m,), between which there is a run that no circle blocks."""
-    length, heading, touch = _touch(circles, points, tail, head)
-    centre, ends = np.concatenate((circles.centre, points)), np.stack((tail >> 1, head >> 1), axis=1)
     bar = np.maximum(circles.radius - GRAZE, 0.0) ** 2
     is_free = find_unblocked(circles.centre, bar, ends, centre[ends[:, 0]] + touch[:, 0], heading, length)
-    return tail[is_free], head[is_free]
+    tail, head, ends = tail[is_free], head[is_free], ends[is_free]
+    length, heading, touch = length[is_free], heading[is_free], touch[is_free]
+    start, end = (centre[ends] + touch).swapaxes(0, 1)
+    leave_angle, reach_angle = np.arctan2(touch[..., 1], touch[..., 0]).T % TURN
+    clear_angle = _find_clear_angles(circles, head, reach_angle)
+    crossings = count_crossings(centre, circles.radius, circles.holds, ends, touch)
+    return Runs(tail, head, start, end, heading, length, leave_angle, reach_angle, clear_angle, crossings)
+
+
+def _find_clear_angles(circles: Circles, head: Indices, reach_angle: Vector) -> Vector:
+    """Return the angles (m,) [rad] of the arcs from the ends of runs to the next overlapping circle, a turn if there is none."""
+    clear_angle, to_circle = np.full(len(head), TURN), head < 2 * len(circles.radius)
+    node = head[to_circle]
+    ahead = (2 * (node & 1) - 1)[:, None] * (circles.overlap_bearing[node >> 1] - reach_angle[to_circle, None]) % TURN
+    clear_angle[to_circle] = np.fmin.reduce(ahead, axis=1, initial=TURN)
+    return clear_angle
 
 
 @compiled_exactly
@@ -214,18 +215,3 @@ def count_crossings(centre: Matrix, radius: Vector, holds: FlagTable, ends: Tabl
                 east_x, east_y = centre[j, 0] + radius[j] - centre[k, 0], centre[j, 1] - centre[k, 1]
                 crossings[run, 1, k] = count_arc_crossing(east_x, east_y, end_x, end_y, holds[j, k])
     return crossings
-
-
-def _measure_runs(circles: Circles, points: Matrix, tail: Indices, head: Indices) -> Runs:
-    """Return what is known of the runs between nodes, tails (m,) and heads (m,)."""
-    n, centre = len(circles.radius), np.concatenate((circles.centre, points))
-    length, heading, touch = _touch(circles, points, tail, head)
-    ends = np.stack((tail >> 1, head >> 1), axis=1)
-    place = centre[ends] + touch
-    leave_angle, reach_angle = np.arctan2(touch[..., 1], touch[..., 0]).T % TURN
-    clear_angle = np.full(len(head), TURN)
-    if n:
-        ahead = (2 * (head & 1) - 1)[:, None] * (circles.overlap_bearing[np.minimum(ends[:, 1], n - 1)] - reach_angle[:, None]) % TURN
-        clear_angle[ends[:, 1] < n] = np.fmin.reduce(ahead, axis=1, initial=TURN)[ends[:, 1] < n]
-    crossings = count_crossings(centre, circles.radius, circles.holds, ends, touch)
-    return Runs(head, place[:, 0], place[:, 1], heading, length, leave_angle, reach_angle, clear_angle, crossings)
