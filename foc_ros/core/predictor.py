@@ -16,7 +16,7 @@ from .dynamics.plants import triple_integrator_horizon
 from .dynamics.predictive_covariance import predictive_covariance, timing_covariances
 from .estimation.duration import candidate_durations, estimate_times_to_go, is_passing, time_price
 from .homotopy import search
-from .homotopy.demonstrations import Demonstration, recall_demonstrations
+from .homotopy.demonstrations import Demonstration, GuessTiming, recall_demonstrations
 from .likelihood import select_most_likely
 from .memory import Memory
 from .obstacles.culling import cull_obstacles
@@ -37,7 +37,7 @@ def predict(
     durations = estimate_times_to_go(hand, goals, config.duration)
     given, obstacles = obstacles, cull_obstacles(obstacles, hand.mean[:2], goals, max(durations), config.scene.max_obstacles)
     found = search(hand.mean, goals, obstacles, config.homotopy, durations, config.foc.steps, memory.candidates)
-    seen = hand, goals, obstacles, config.homotopy, durations, config.foc.steps
+    seen = hand, goals, obstacles, config.homotopy, GuessTiming(durations, config.foc.steps)
     candidates = recall_demonstrations(library, *seen, found.candidates, memory.candidates)
     problems = build_problems(config, hand, obstacles, goals, candidates, durations)
     deadline = Deadline(config.budget_s or None, began)

@@ -68,11 +68,15 @@ def lay_out(graph: TangentGraph, path: Sequence[int]) -> TautPath:
 
 def timed(path: Array, velocity: Array, duration_s: float, steps: int) -> Array:
     """Return the positions (N + 1, 2) [m] at steps 0..N along a path (m, 2) [m], m >= 2, with the timing of the guesses."""
-    step = np.diff(path, axis=0)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*step.T))])
-    heading = step[0] / max(float(np.hypot(*step[0])), np.finfo(float).tiny)
+    along, step = compute_path_lengths(path), path[1] - path[0]
+    heading = step / max(float(np.hypot(*step)), np.finfo(float).tiny)
     at = compute_progress(float(along[-1]), float(heading @ velocity), duration_s, steps)
     return np.column_stack([np.interp(at, along, axis) for axis in path.T])
+
+
+def compute_path_lengths(path: Array) -> Array:
+    """Compute the lengths (m,) [m] of a path (m, 2) [m] from its beginning to each of its points."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
 
 
 def compute_progress(length: float, speed: float, duration_s: float, steps: int) -> Array:

@@ -71,21 +71,12 @@ def build_search_scene(
     holds_hand, holds_goal = hand_distance <= wanted, goal_distance <= wanted
     radius = np.where(holds_hand, np.maximum(hand_distance * (1.0 - SHRINK), POINT_RADIUS), wanted)
     radius = np.where(holds_goal, np.minimum(np.maximum(goal_distance * (1.0 - SHRINK), POINT_RADIUS), radius), radius)
-    slack = _compute_slack(len(goals), previous, sides)
+    is_inside = np.any(goal_distance < obstacles.radius, axis=1)
+    is_named = _find_named(to_hand, to_goal, radius, straight, _compute_slack(len(goals), previous, sides))
+    bearing_change = _compute_bearings(to_goal) - _compute_bearings(to_hand)
     detour = np.maximum(hand_distance + goal_distance - 2.0 * radius, straight) / straight
-    return SearchScene(
-        hand,
-        goals,
-        centre,
-        wanted,
-        radius,
-        holds_hand,
-        holds_goal,
-        np.any(goal_distance < obstacles.radius, axis=1),
-        _find_named(to_hand, to_goal, radius, straight, slack),
-        _compute_bearings(to_goal) - _compute_bearings(to_hand),
-        detour.min(axis=0, initial=np.inf),
-    )
+    excess, holds = detour.min(axis=0, initial=np.inf), (holds_hand, holds_goal)
+    return SearchScene(hand, goals, centre, wanted, radius, *holds, is_inside, is_named, bearing_change, excess)
 
 
 def named_obstacles(

@@ -16,24 +16,10 @@ TURN = 2.0 * np.pi
 
 
 def compute_swept_angles(path: Array, centres: Array) -> Array:
-    """Compute the angle that a path sweeps about each centre, anticlockwise positive.
+    """Compute the angle (n,) [rad] that a path (m, 2) [m] sweeps about each centre, anticlockwise positive.
 
-    Parameters
-    ----------
-    path : Array
-        Points (m, 2) [m], m >= 1.
-    centres : Array
-        Centres (n, 2) [m], or (m, n, 2) where they move: the centres at each point of the path.
-
-    Returns
-    -------
-    Array
-        Angles (n,) [rad], exact if no step of the path turns by pi or more about a centre.
-
-    Raises
-    ------
-    SceneError
-        If the shapes do not fit each other.
+    centres (n, 2) [m], or (m, n, 2) if they move: the centres at each point of the path. The angle is exact if no step of the
+    path turns by pi or more about a centre. Raises SceneError if the shapes do not fit each other.
     """
     return sweep_angles(*_check_shapes(path, centres))
 
