@@ -1,7 +1,7 @@
 """The homotopy classes of the paths to one goal, in the order of their rank, with their names.
 
-A graph of all circles would be slow in a crowd. There it begins with those that can matter, and grows until no circle outside can
-change the answer.
+A graph of all obstacles would be slow in a crowd. There the graph begins with the obstacles that are likely to matter, and grows
+until no obstacle outside can change the answer.
 """
 
 from __future__ import annotations
@@ -113,6 +113,7 @@ def _choose_circles(scene: SearchScene, named: list[int], nearest: list[int]) ->
 
 
 def _build_partial_graph(scene: SearchScene, goal: int, rows: list[int], named: list[int]) -> PartialGraph:
+    """Build the graph of some obstacles for one goal; a graph without all named ones is one to grow, up to MOST."""
     graph = connect_hand(build_tangent_graph(scene.centre[rows], scene.radius[goal, rows], scene.goals), scene.hand)
     others = np.setdiff1d(np.arange(len(scene.centre)), rows)
     limit = float(scene.excess[others].min(initial=np.inf)) * math.dist(scene.goals[goal], scene.hand)

@@ -64,14 +64,15 @@ def find_shortest_paths(graph: TangentGraph, query: PathQuery, notes: Counter[st
 
     A path that winds about a named circle is not followed. notes: `search_cut` is increased if states are left at the end.
     """
-    runs, n, signatures = graph.runs, len(graph.circles.radius), SignatureCounter(graph, query.named)
-    head, length, radius = runs.head.tolist(), runs.length.tolist(), graph.circles.radius.tolist()
+    runs, radius, signatures = graph.runs, graph.circles.radius.tolist(), SignatureCounter(graph, query.named)
+    head, length, goal_node = runs.head.tolist(), runs.length.tolist(), 2 * (len(radius) + query.goal) + 1
     leave, reach, clear = runs.leave_angle.tolist(), runs.reach_angle.tolist(), runs.clear_angle.tolist()
-    goal_node, to_goal = 2 * (n + query.goal) + 1, np.hypot(*(runs.end - graph.goals[query.goal]).T).tolist()
+    to_goal = _bound_rest(graph, goal_node, query.goal)
+    # estimated key at the goal, number of the entry, key, runs, signature without the last run
     frontier, numbers = list[tuple[float, int, float, tuple[int, ...], Signature]](), count()
-    for run, coasting in enumerate(_compute_coasting(graph, query.velocity), graph.first_run[-1]):
-        if head[run] < 2 * n or head[run] == goal_node:
-            key = length[run] + coasting
+    for run in range(graph.first_run[-1], len(head)):
+        key = length[run] + COAST_S * (math.hypot(*query.velocity) - float(runs.heading[run] @ query.velocity))
+        if to_goal[run] < math.inf:
             heappush(frontier, (key + to_goal[run], next(numbers), key, (run,), (0,) * len(query.named)))
     known, arrived = set[tuple[int, Signature]](), list[Arrival]()
     while frontier and len(known) < query.max_states:
@@ -90,23 +91,22 @@ def find_shortest_paths(graph: TangentGraph, query: PathQuery, notes: Counter[st
             if all(abs(angle) < TURN for angle in swept):
                 arrived.append(Arrival(key, path, swept))
             continue
-        sense = 2 * (node & 1) - 1
         for following in range(graph.first_run[node], graph.first_run[node + 1]):
-            angle = measure_arc(leave[following], reach[run], sense)
-            if angle <= clear[run] and (head[following] < 2 * n or head[following] == goal_node):
-                onward = key + radius[node >> 1] * angle + length[following]
-                if onward + to_goal[following] < query.max_key:
-                    heappush(frontier, (onward + to_goal[following], next(numbers), onward, (*path, following), signature))
+            angle = measure_arc(leave[following], reach[run], 2 * (node & 1) - 1)
+            onward = key + radius[node >> 1] * angle + length[following]
+            if angle <= clear[run] and onward + to_goal[following] < query.max_key:
+                heappush(frontier, (onward + to_goal[following], next(numbers), onward, (*path, following), signature))
     if arrived:
         yield arrived
     notes['search_cut'] += bool(frontier)
 
 
-def _compute_coasting(graph: TangentGraph, velocity: Array) -> list[float]:
-    """Compute what coasting adds to the keys of paths that begin with each of the runs from the hand [m]."""
-    heading = graph.runs.heading[graph.first_run[-1] :]
-    coasting: list[float] = (COAST_S * (math.hypot(*velocity) - heading @ velocity)).tolist()
-    return coasting
+def _bound_rest(graph: TangentGraph, goal_node: int, goal: int) -> list[float]:
+    """Return lower bounds for the lengths from the ends of the runs to a goal [m], infinite for runs to other goals."""
+    rest, head = np.hypot(*(graph.runs.end - graph.goals[goal]).T), graph.runs.head
+    rest[(head >= 2 * len(graph.circles.radius)) & (head != goal_node)] = np.inf
+    bounds: list[float] = rest.tolist()
+    return bounds
 
 
 class SignatureCounter:
