@@ -10,7 +10,7 @@ import numpy as np
 
 from foc_ros.core.config import Config, updated
 from foc_ros.io.bags import TYPESTORE, BagWriter
-from foc_ros.ros.messages.input_messages import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.ros.messages.encode_inputs import goal_poses, hand_pose, obstacle_cloud
 from foc_ros.ros.messages.types import RosbagsTypes
 from foc_ros.ros.parameters import dump_parameter_file
 

@@ -39,7 +39,8 @@ class Bench:
         from sensor_msgs.msg import PointCloud2
         from visualization_msgs.msg import MarkerArray
 
-        from foc_ros.ros.endpoints import OUTPUTS
+        from foc_ros.ros.messages.encode_prediction import OUTPUTS
+        from foc_ros.ros.messages.types import find_message_class
         from foc_ros.ros.node import FocNode
 
         parameters = QUICK | RELIABLE_HAND | options.pop('parameters', {})
@@ -60,7 +61,7 @@ class Bench:
             'goal_pose': PoseStamped,
         }
         self.publishers = {name: self.player.create_publisher(kind, name, 1000) for name, kind in inputs.items()}
-        self.received = {name: ros.collect(self.player, OUTPUTS[name], f'foc/{name}') for name in outputs}
+        self.received = {name: ros.collect(self.player, find_message_class(OUTPUTS[name][0]), f'foc/{name}') for name in outputs}
         self.diagnostics = ros.collect(self.player, DiagnosticArray, '/diagnostics')
         if connected:
             self.connect()

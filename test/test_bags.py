@@ -15,7 +15,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from foc_ros.core.errors import RecordingError
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
-from foc_ros.ros.messages.input_messages import hand_pose
+from foc_ros.ros.messages.encode_inputs import hand_pose
 
 
 def read(path: Path, chosen: dict[str, str] | None = None) -> list[Any]:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from message_helpers import SECOND, both_kinds, message_types, pose_array, pose_stamped
 
 from foc_ros.core.errors import MessageError
-from foc_ros.ros.messages.inputs import MAX_GOALS, goal_of_pose, goals_of_pose_array, hand_sample
+from foc_ros.ros.messages.decode_poses import MAX_GOALS, goal_of_pose, goals_of_pose_array, hand_sample
 from foc_ros.ros.messages.types import MessageTypes
 
 coordinates = st.tuples(*[st.floats(-1e4, 1e4)] * 3)

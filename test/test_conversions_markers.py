@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from message_helpers import SECOND, both_kinds, marker, marker_array, message_types
 
 from foc_ros.core.errors import MessageError
-from foc_ros.ros.messages import marker_scene
-from foc_ros.ros.messages.marker_scene import MarkerScene
+from foc_ros.ros.messages import decode_markers
+from foc_ros.ros.messages.decode_markers import MarkerScene
 from foc_ros.ros.messages.types import MessageTypes
 
 BAGS = message_types('rosbags')
@@ -113,7 +113,7 @@ def test_another_type_replaces_an_obstacle_and_is_counted() -> None:
         ({'scale': (0.1, -0.1, 0.1)}, 'markers[1].scale.y: expected a size in [0, 10000] m, got -0.1'),
         ({'scale': (2e4, 0.1, 0.1)}, 'markers[1].scale.x: expected a size in [0, 10000] m, got 20000'),
         ({'position': (0, 0, 2e4)}, 'markers[1].pose.position.z: expected a coordinate within 10000 m of the origin, got 20000'),
-        ({'lifetime': -1}, 'markers[1].lifetime: expected at least 0 s (0: for ever), got -1 s'),
+        ({'lifetime': -1}, 'markers[1].lifetime: expected at least 0 s (0: no end), got -1 s'),
         ({'stamp_ns': -SECOND}, 'markers[1].header.stamp.sec: expected at least 0, got -1'),
         ({'frame_id': 'base'}, "markers[1].header.frame_id: expected 'world', as the other markers, got 'base'"),
     ],

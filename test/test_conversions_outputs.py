@@ -13,7 +13,7 @@ from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction, three_
 
 from foc_ros.core.errors import FocError
 from foc_ros.core.types import PredictedCandidate, Prediction, Status, make_obstacles
-from foc_ros.ros.messages.outputs import OUTPUTS, output_messages
+from foc_ros.ros.messages.encode_prediction import OUTPUTS, output_messages
 from foc_ros.ros.messages.plane import lift
 from foc_ros.ros.messages.ranking import MAX_RATIO
 from foc_ros.ros.messages.types import MessageTypes

@@ -78,9 +78,3 @@ def test_an_unknown_field_is_named(rclpy_types: RclpyTypes) -> None:
 def test_stamps_split_and_stay_in_range(stamp_ns: int, expected: tuple[int, int]) -> None:
     made = conversion_types.stamp(RosbagsTypes(STORE), stamp_ns)
     assert (made.sec, made.nanosec) == expected
-
-
-def test_defaults_are_not_shared_between_messages() -> None:
-    types = RosbagsTypes(STORE)
-    first, second = (types.make('sensor_msgs/msg/PointCloud2') for _ in range(2))
-    assert first.header is not second.header and first.fields is not second.fields

@@ -73,7 +73,7 @@ def test_every_input_is_moved_into_the_working_frame(ros: Graph) -> None:
     bench.hear('hand_pose', pose_stamped(TYPES, (0.0, 1.0, 0.25), stamp_ns, 'camera'))
     assert bench.node.pipeline.hand_state.stamp_ns == stamp_ns
     assert bench.node.intake.sample.height == 0.25
-    assert ('world', 'camera', stamp_ns) in bench.node._frames._buffer.asked
+    assert ('world', 'camera', stamp_ns) in bench.node._transforms._buffer.asked
     assert {message.header.frame_id for message in bench.wait_for('prediction', 2)} == {'world'}
 
 
@@ -100,7 +100,7 @@ def test_a_frame_that_tf2_does_not_know_is_refused_with_both_names(ros: Graph) -
     bench.hear('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'moon'))
     assert bench.node.pipeline.scene is scene
     assert "the working frame 'world', got 'moon'" in figures(bench.health())['last refusal']
-    assert 'no transform to world: "moon" passed to lookupTransform does not exist' in bench.node._frames.last_error
+    assert 'no transform to world: "moon" passed to lookupTransform does not exist' in bench.node._transforms.last_error
 
 
 @pytest.mark.usefixtures('tf2')

@@ -7,7 +7,7 @@ import pytest
 from foc_ros.core.config import Config, updated
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.topics import CLOUD, HAND, MARKERS
-from foc_ros.ros.freshness import Freshness
+from foc_ros.ros.health import Freshness
 
 CONFIG = updated(Config(), {'estimator.hand_timeout_s': 0.5, 'scene.timeout_s': 2.0})
 NEVER = updated(Config(), {'estimator.hand_timeout_s': 0.0, 'scene.timeout_s': 0.0})
@@ -17,7 +17,7 @@ BOTH = ('cloud', 'markers')
 def heard(**times: float) -> Freshness:
     made = Freshness()
     for role, time_s in times.items():
-        made.heard(role, time_s)
+        made.note_received(role, time_s)
     return made
 
 
@@ -43,12 +43,12 @@ def test_one_silent_input_is_enough(times: dict[str, float], words: str | None) 
 def test_a_source_that_is_heard_again_is_silent_no_more() -> None:
     freshness = heard(hand_pose=10.0, obstacles=1.0)
     assert freshness.not_ready_reason(10.0, CONFIG, ['cloud']) is not None
-    freshness.heard(CLOUD, 10.0)
+    freshness.note_received(CLOUD, 10.0)
     assert freshness.not_ready_reason(10.0, CONFIG, ['cloud']) is None
 
 
 def pose(freshness: Freshness, stamp_s: float, clock_s: float, *, restarted: bool = False) -> str | None:
-    freshness.pose(round(stamp_s * NANOSECONDS), round(clock_s * NANOSECONDS), 0.5, restarted=restarted)
+    freshness.note_pose(round(stamp_s * NANOSECONDS), round(clock_s * NANOSECONDS), 0.5, restarted=restarted)
     found = freshness.not_ready_reason(0.0, CONFIG, ())
     return found and found[1]
 
@@ -70,7 +70,7 @@ def test_a_recordings_own_stamps_are_not_judged_until_a_movement_begins_in_the_p
     assert pose(freshness, 10.0, 1e9) is None
     assert pose(freshness, 1e9, 1e9, restarted=True) is None
     assert pose(freshness, 10.0, 1e9, restarted=True) is not None
-    freshness.forget()
+    freshness.forget_clock()
     assert pose(freshness, 10.0, 1e9) is None
 
 

@@ -21,7 +21,7 @@ from foc_ros.core.config import Config, updated
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.io import topics
 from foc_ros.ros.intake import Intake
-from foc_ros.ros.messages.outputs import output_messages
+from foc_ros.ros.messages.encode_prediction import output_messages
 
 COUNT = int(os.environ.get('FOC_ROS_FUZZ', '2000'))
 LENGTH = 20
@@ -116,14 +116,14 @@ def test_any_messages_through_a_live_node(bench: Any) -> None:
     @given(st.lists(inputs(LIVE_TYPES), min_size=LENGTH, max_size=LENGTH))
     def play(messages: list[tuple[str, Any]]) -> None:
         for role, message in messages:
-            before = int(bench.node._monitor._own['predictions'])
+            before = int(bench.node._monitor._counts['predictions'])
             bench.hear(role, message)
-            made = int(bench.node._monitor._own['predictions']) - before
+            made = int(bench.node._monitor._counts['predictions']) - before
             assert made <= (role == topics.HAND), f'{made} predictions from {role}'
         for received in bench.received.values():
             assert all(np.isfinite(number) for each in received for number in numbers(each))
             received.clear()
-        assert not bench.node._monitor._own['internal_errors'], bench.node._monitor._error
+        assert not bench.node._monitor._counts['internal_errors'], bench.node._monitor._error
 
     play()
     assert bench.health().level in (b'\x00', b'\x01')

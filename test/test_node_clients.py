@@ -51,10 +51,11 @@ def test_the_state_is_changed_and_every_topic_is_heard(ros: Graph) -> None:
     from lifecycle_msgs.msg import TransitionEvent
     from sensor_msgs.msg import PointCloud2
 
-    from foc_ros.ros.endpoints import OUTPUTS
+    from foc_ros.ros.messages.encode_prediction import OUTPUTS
+    from foc_ros.ros.messages.types import find_message_class
 
     client = ros.node('client')
-    kinds = {f'foc/{name}': kind for name, kind in OUTPUTS.items()}
+    kinds = {f'foc/{name}': find_message_class(kind) for name, (kind, _) in OUTPUTS.items()}
     kinds |= {'/diagnostics': DiagnosticArray, 'foc/transition_event': TransitionEvent}
     received: dict[str, list[Any]] = {name: ros.collect(client, kind, name) for name, kind in kinds.items()}
     inputs = {'obstacles': PointCloud2, 'goals': PoseArray, 'hand_pose': PoseStamped}

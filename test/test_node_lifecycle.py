@@ -121,7 +121,7 @@ def test_a_node_that_cannot_be_configured_says_why_and_can_be_later(ros: Graph, 
 
     bench = Bench(ros, outputs=[], connected=False, parameters={'autostart': False})
     with monkeypatch.context() as patch:
-        patch.setattr(node, 'subscribe', lambda *_: 1 / 0)
+        patch.setattr(node, 'create_subscriptions', lambda *_: 1 / 0)
         assert not change(bench, 'configure')
     assert state_of(bench) == 'unconfigured'
     assert change(bench, 'configure')

@@ -18,7 +18,7 @@ from ros_helpers import Graph
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config, updated
 from foc_ros.io.bags import BagReader, Item
-from foc_ros.ros.messages.outputs import output_messages
+from foc_ros.ros.messages.encode_prediction import output_messages
 
 ROOT = Path(__file__).parents[1]
 SECONDS = 0.3

@@ -18,7 +18,7 @@ from ros_helpers import Graph  # noqa: E402
 from foc_ros.core.config import Config, updated  # noqa: E402
 from foc_ros.core.pipeline import Pipeline  # noqa: E402
 from foc_ros.ros.intake import Intake  # noqa: E402
-from foc_ros.ros.messages.outputs import output_messages  # noqa: E402
+from foc_ros.ros.messages.encode_prediction import output_messages  # noqa: E402
 
 
 def stamps(messages: list[Any]) -> list[int]:

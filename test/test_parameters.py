@@ -18,7 +18,7 @@ from ros_helpers import Graph
 from foc_ros.core.config import Config, flatten, parameters, updated
 from foc_ros.core.errors import FocError, ParameterError, RecordingError
 from foc_ros.ros import parameters as module
-from foc_ros.ros.parameters import config_of, declare_all, dump_parameter_file, load_parameter_file
+from foc_ros.ros.parameters import dump_parameter_file, load_parameter_file
 
 ROOT = Path(__file__).parents[1]
 NAMES = [parameter.name for parameter in parameters()]
@@ -152,6 +152,8 @@ def node_with(ros: Graph, **overrides: object) -> Any:
 
 
 def test_a_node_declares_every_parameter_with_its_meaning_and_range(ros: Graph) -> None:
+    from foc_ros.ros.node_parameters import config_of, declare_all
+
     node = node_with(ros)
     assert declare_all(node, Config()) == Config() == config_of(node)
     for parameter in parameters():
@@ -167,6 +169,8 @@ def test_a_node_declares_every_parameter_with_its_meaning_and_range(ros: Graph) 
 
 
 def test_a_node_starts_with_what_it_was_given(ros: Graph) -> None:
+    from foc_ros.ros.node_parameters import config_of, declare_all
+
     node = node_with(ros, rate_hz=20, foc__eta=0.7, use_sim_time=False)
     config = declare_all(node, Config())
     assert config == updated(Config(), {'rate_hz': 20.0, 'foc.eta': 0.7}) == config_of(node)
@@ -174,11 +178,15 @@ def test_a_node_starts_with_what_it_was_given(ros: Graph) -> None:
 
 
 def test_a_node_does_not_start_with_a_value_out_of_bounds(ros: Graph) -> None:
+    from foc_ros.ros.node_parameters import declare_all
+
     with pytest.raises(ParameterError, match=re.escape('foc.eta: expected a number in [0, 0.999], got 2.0')):
         declare_all(node_with(ros, foc__eta=2.0), Config())
 
 
 def test_a_node_reads_the_file_that_replay_reads(tmp_path: Path) -> None:
+    from foc_ros.ros.node_parameters import declare_all
+
     from ros_helpers import graph
 
     config = updated(Config(), {'foc.lv_delta': 5e-5, 'foc.lam': 1e15, 'frame_id': 'base', 'foc.steps': 33})
@@ -189,6 +197,8 @@ def test_a_node_reads_the_file_that_replay_reads(tmp_path: Path) -> None:
 
 
 def test_an_unknown_parameter_of_a_node_is_warned_of(ros: Graph) -> None:
+    from foc_ros.ros.node_parameters import declare_all
+
     class Log:
         def __init__(self) -> None:
             self.lines: list[str] = []
@@ -204,7 +214,7 @@ def test_an_unknown_parameter_of_a_node_is_warned_of(ros: Graph) -> None:
 
 def test_names_in_the_file_are_the_names_of_the_node() -> None:
     tree = yaml.safe_load(dump_parameter_file(Config()))['/**']['ros__parameters']
-    assert dict(module._leaves(tree)) == flatten(Config())
+    assert dict(module._flatten_group(tree)) == flatten(Config())
 
 
 def test_what_is_the_nodes_alone_may_stand_in_the_file(tmp_path: Path) -> None:

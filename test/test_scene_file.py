@@ -12,7 +12,7 @@ import pytest
 
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, RecordingError, SceneError
-from foc_ros.io.guess import guess_path
+from foc_ros.io.scene_file import guess_path
 from foc_ros.io.scene_file import load_scene, parse_scene
 
 SCENE: dict[str, Any] = {
