@@ -131,7 +131,7 @@ def test_an_emptied_table_takes_another_frame() -> None:
 
 
 def test_markers_do_not_pile_up_without_bound(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(marker_scene, 'MAX_ROWS', 3)
+    monkeypatch.setattr(decode_markers, 'MAX_ROWS', 3)
     scene = after(marker_array(BAGS, *[marker(BAGS, id=i) for i in range(3)]))
     with pytest.raises(MessageError, match='markers: expected at most 3 obstacles held at a time, got 4'):
         scene.updated(marker_array(BAGS, marker(BAGS, id=3)), SECOND, 'xy', 0.0)

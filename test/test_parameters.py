@@ -185,9 +185,9 @@ def test_a_node_does_not_start_with_a_value_out_of_bounds(ros: Graph) -> None:
 
 
 def test_a_node_reads_the_file_that_replay_reads(tmp_path: Path) -> None:
-    from foc_ros.ros.node_parameters import declare_all
-
     from ros_helpers import graph
+
+    from foc_ros.ros.node_parameters import declare_all
 
     config = updated(Config(), {'foc.lv_delta': 5e-5, 'foc.lam': 1e15, 'frame_id': 'base', 'foc.steps': 33})
     file = tmp_path / 'params.yaml'

@@ -10,6 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 from foc_ros.core.errors import MessageError
@@ -85,7 +86,7 @@ class MarkerScene:
                 held[key] = _decode_marker(marker, name, stamp_ns or now_ns, plane, radius_stddev)
         if len(held) > MAX_ROWS:
             raise MessageError('markers', f'at most {MAX_ROWS} obstacles held at a time', len(held))
-        return MarkerScene(held, frame_id, newest_ns, dropped)
+        return MarkerScene(MappingProxyType(held), frame_id, newest_ns, MappingProxyType(dropped))
 
     def obstacles(self, now_ns: int) -> Obstacles:
         """Return the obstacles that exist at a time [ns]; the id of an obstacle is ns/id."""

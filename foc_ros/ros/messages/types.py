@@ -1,13 +1,12 @@
 """Creation of messages of two libraries with one call: rclpy's (the node) and rosbags' (bags without ROS).
 
 Neither library checks a field's value unless it is told to, and both serialise the memory as it is: an integer in a float field
-arrives as 5e-324. Every value is therefore converted here to the declared type of its field.
+arrives as 5e-324. Every value is therefore converted here to the type of its field's default.
 """
 
 from __future__ import annotations
 
 import array
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from importlib import import_module
@@ -18,16 +17,8 @@ import numpy as np
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
-Converter = Callable[[Any], Any]
-
-TYPECODES = {np.dtype(code).name: code for code in 'dfbBhHiIqQ'}
-"""Typecode of `array.array` and of numpy for each numeric type of a .msg file; byte (octet), bool and string have none."""
-
 CHECKS = '_check_fields'
 """Slot of rclpy's messages that says whether their properties check the values they are given."""
-
-_IDL_NAMES = {'double': 'float64', 'float': 'float32', 'boolean': 'bool', 'octet': 'byte'}
-_RCLPY_FIELD = re.compile(r'(?P<sequence>sequence<)?(?P<element>[\w/]+)[^\[]*(?P<array>\[)?')
 
 
 class _Layout(NamedTuple):
@@ -35,7 +26,7 @@ class _Layout(NamedTuple):
 
     message_class: type
     is_checked: bool | None
-    fields: dict[str, tuple[str, Converter, Any]]
+    fields: dict[str, tuple[str, Callable[[Any], Any], Any]]
 
 
 class MessageTypes(ABC):
@@ -78,19 +69,14 @@ class RclpyTypes(MessageTypes):
 
     def _find_layout(self, name: str) -> _Layout:
         # values are stored where the fields' properties store them; the properties are used only if they check
-        kind = find_message_class(name)
-        blank = kind()
-        is_checked = getattr(blank, CHECKS)
-        fields = {}
-        for field, declared in kind.get_fields_and_field_types().items():
-            match = _RCLPY_FIELD.match(declared)
-            assert match is not None
-            element = _IDL_NAMES.get(match['element'], match['element'])
-            scalar = _to_octet if element == 'byte' else _find_scalar_converter(element)
-            to_numbers = _to_array if match['sequence'] else _to_numpy
-            convert = _find_converter(element, scalar, to_numbers) if match['sequence'] or match['array'] else scalar
-            fields[field] = (field if is_checked else f'_{field}', convert, getattr(blank, field))
-        return _Layout(kind, is_checked, fields)
+        message_class = find_message_class(name)
+        blank = message_class()
+        is_checked, names = getattr(blank, CHECKS), message_class.get_fields_and_field_types()
+        defaults = {field: getattr(blank, field) for field in names}
+        fields = {
+            field: (field if is_checked else f'_{field}', _find_converter(value), value) for field, value in defaults.items()
+        }
+        return _Layout(message_class, is_checked, fields)
 
 
 class RosbagsTypes(MessageTypes):
@@ -101,24 +87,22 @@ class RosbagsTypes(MessageTypes):
         self.typestore = typestore
 
     def _find_layout(self, name: str) -> _Layout:
-        definitions = self.typestore.fielddefs[name][1]
-        return _Layout(self.typestore.types[name], None, {field: (field, *self._describe(kind)) for field, kind in definitions})
+        defaults = {field: self._find_default(kind) for field, kind in self.typestore.fielddefs[name][1]}
+        fields = {field: (field, _find_converter(value), value) for field, value in defaults.items()}
+        return _Layout(self.typestore.types[name], None, fields)
 
-    def _describe(self, kind: tuple[Any, Any]) -> tuple[Converter, Any]:
-        """Return the converter and the default of a field definition of the typestore."""
+    def _find_default(self, kind: tuple[Any, Any]) -> Any:
+        """Return the default of a field definition of the typestore."""
         node, detail = kind
-        if node.name == 'BASE':
-            scalar = _find_scalar_converter(detail[0])
-            return scalar, scalar('' if scalar is str else 0)
         if node.name == 'NAME':
-            return _keep, self.make(detail)
+            return self.make(detail)
+        if node.name == 'BASE':
+            name = detail[0]
+            return '' if name == 'string' else False if name == 'bool' else 0 if name == 'byte' else np.zeros(1, name)[0].item()
         element, length = detail
-        name = element[1][0] if element[0].name == 'BASE' else element[1]
-        count = length if node.name == 'ARRAY' else 0
-        if name in TYPECODES:
-            return _find_converter(name, _keep, _to_numpy), np.zeros(count, TYPECODES[name])
-        convert, default = self._describe(element)
-        return _find_converter(name, convert, _to_numpy), [default] * count
+        default, count = self._find_default(element), length if node.name == 'ARRAY' else 0
+        is_numeric = isinstance(default, (int, float)) and element[1][0] not in ('bool', 'byte')
+        return np.zeros(count, element[1][0]) if is_numeric else [default] * count
 
 
 def find_message_class(name: str) -> Any:
@@ -127,40 +111,17 @@ def find_message_class(name: str) -> Any:
     return getattr(import_module(f'{package}.msg'), leaf)
 
 
-def _find_scalar_converter(element: str) -> Converter:
-    if '/' in element:
-        return _keep
-    if element.startswith(('string', 'wstring')):
-        return str
-    return float if element.startswith('float') else bool if element == 'bool' else int
-
-
-def _find_converter(element: str, scalar: Converter, to_numbers: Callable[[Any, str], Any]) -> Converter:
-    """Return the converter of an array or a sequence of elements."""
-    if element in TYPECODES:
-        return lambda value: to_numbers(value, TYPECODES[element])
-    return lambda value: [scalar(item) for item in value]
-
-
-def _to_octet(value: Any) -> bytes:
-    """Convert an integer to rclpy's form of a byte field; rosbags takes the integer."""
-    return bytes([value])
-
-
-def _to_array(value: Any, typecode: str) -> array.array[Any]:
-    if isinstance(value, (bytes, bytearray)):
-        return array.array(typecode, bytes(value))
-    return array.array(typecode, np.ascontiguousarray(value, dtype=typecode).tobytes())
-
-
-def _to_numpy(value: Any, typecode: str) -> np.ndarray[Any, Any]:
-    if isinstance(value, (bytes, bytearray)):
-        return np.frombuffer(bytes(value), dtype=typecode)
-    return np.array(value, dtype=typecode)
-
-
-def _keep(value: Any) -> Any:
-    return value
+def _find_converter(default: Any) -> Callable[[Any], Any]:
+    """Return the function that converts a value to the type of a default; messages are kept as they are."""
+    if isinstance(default, array.array):
+        typecode = default.typecode
+        return lambda value: array.array(typecode, value if isinstance(value, bytes) else np.asarray(value, typecode).tobytes())
+    if isinstance(default, np.ndarray):
+        dtype = default.dtype
+        return lambda value: np.frombuffer(value, dtype) if isinstance(value, bytes) else np.array(value, dtype)
+    if isinstance(default, bytes):
+        return lambda value: bytes([value])  # a byte field of rclpy; rosbags takes the integer
+    return type(default) if isinstance(default, (float, int, str, list)) else lambda value: value
 
 
 def stamp(types: MessageTypes, stamp_ns: int) -> Any:
