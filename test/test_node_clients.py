@@ -1,4 +1,4 @@
-"""What the `ros2` tools do, done by plain clients in another process than the node's: parameters, states, topics."""
+"""Services and topics as the `ros2` tools use them: plain clients, and the node in another process."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_every_parameter_is_listed_described_read_and_set(ros: Graph) -> None:
             assert not read_only or 'read-only' in result.reason
 
 
-def test_the_state_is_changed_and_every_topic_is_heard(ros: Graph) -> None:
+def test_the_state_is_changed_and_every_topic_is_received(ros: Graph) -> None:
     from diagnostic_msgs.msg import DiagnosticArray
     from geometry_msgs.msg import PoseArray, PoseStamped
     from lifecycle_msgs.msg import TransitionEvent

@@ -1,4 +1,4 @@
-"""Which topic plays which part, from names and types alone."""
+"""Assignment of topics to inputs, by names and types."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_topics_are_found(topics: dict[str, str], expected: dict[str, str]) -> N
     assert len(set(roles.values())) == len(roles)
 
 
-def test_a_choice_overrules_names() -> None:
+def test_a_choice_overrides_names() -> None:
     topics = {**PLAIN, '/left/measured_cp': POSE, '/right/measured_cp': POSE}
     assert assign(topics, {'hand_pose': '/right/measured_cp'})['hand_pose'] == '/right/measured_cp'
 
@@ -68,6 +68,6 @@ def test_a_choice_overrules_names() -> None:
         (PLAIN, {'goals': '/obstacles'}, f'topic /obstacles chosen for goals: expected type {POSES}, got {CLOUD}'),
     ],
 )
-def test_what_does_not_fit_is_said(topics: dict[str, str], chosen: dict[str, str] | None, message: str) -> None:
+def test_a_wrong_choice_of_topics_is_refused(topics: dict[str, str], chosen: dict[str, str] | None, message: str) -> None:
     with pytest.raises(RecordingError, match=re.escape(message)):
         assign(topics, chosen)

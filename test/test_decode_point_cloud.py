@@ -1,4 +1,4 @@
-"""PointCloud2 as a table of obstacles: layouts, optional columns, and every way in which one can be wrong."""
+"""PointCloud2 as a table of obstacles: layouts, optional columns, and errors."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_rows_become_obstacles(types: MessageTypes) -> None:
 
 
 @both_kinds
-def test_absent_columns_are_zero_and_rows_name_themselves(types: MessageTypes) -> None:
+def test_absent_columns_are_zero_and_row_numbers_are_the_ids(types: MessageTypes) -> None:
     obstacles = decode_point_cloud(cloud(types, obstacle_table([(1, 2, 3, 4), (5, 6, 7, 8)])), 'xy').obstacles
     assert obstacles.ids == ('0', '1')
     assert not obstacles.radius_stddev.any()
@@ -82,14 +82,14 @@ def test_organised_rows_with_padding() -> None:
     np.testing.assert_array_equal(decode_point_cloud(message, 'xy').obstacles.centre[:, 0], range(6))
 
 
-def test_a_single_line_needs_no_row_step() -> None:
+def test_a_single_row_needs_no_row_step() -> None:
     assert len(decode_point_cloud(cloud(BAGS, obstacle_table([(1, 2, 3, 4)] * 2), row_step=0), 'xy').obstacles) == 2
 
 
 @both_kinds
 @pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize('column', ['x', 'y', 'z', 'radius', 'radius_stddev', 'vx'])
-def test_rows_that_are_not_finite_are_left_out_and_counted(types: MessageTypes, column: str, value: float) -> None:
+def test_rows_that_are_not_finite_are_dropped_and_counted(types: MessageTypes, column: str, value: float) -> None:
     table = np.zeros(3, dtype=FULL)
     table['id'] = [10, 11, 12]
     table[column][1] = value
@@ -99,20 +99,20 @@ def test_rows_that_are_not_finite_are_left_out_and_counted(types: MessageTypes, 
 
 
 @pytest.mark.parametrize('order', ['<', '>'])
-def test_a_signalling_nan_is_left_out_without_a_warning(order: str) -> None:
+def test_a_signalling_nan_is_dropped_without_a_warning(order: str) -> None:
     table = np.zeros(2, dtype=[(name, f'{order}f4') for name in ('x', 'y', 'z', 'radius')])
     table['x'].view(f'{order}u4')[1] = 0x7FA00000
     scene = decode_point_cloud(cloud(BAGS, table), 'xy')
     assert (scene.obstacles.ids, scene.dropped) == (('0',), {'not_finite': 1})
 
 
-def test_a_scene_of_which_no_row_is_finite_is_empty_and_says_so() -> None:
+def test_a_scene_without_a_finite_row_is_empty_and_counted() -> None:
     scene = decode_point_cloud(cloud(BAGS, obstacle_table([(math.nan, 0, 0, 1)] * 4)), 'xy')
     assert len(scene.obstacles) == 0
     assert scene.dropped == {'not_finite': 4}
 
 
-def test_of_rows_with_one_id_the_last_finite_one_holds() -> None:
+def test_the_last_finite_row_of_an_id_is_used() -> None:
     table = np.zeros(5, dtype=FULL)
     table['id'] = [3, 1, 3, 2, 1]
     table['x'] = [0, 1, 2, 3, math.nan]
@@ -132,7 +132,7 @@ def test_of_rows_with_one_id_the_last_finite_one_holds() -> None:
         ('vz', 2e4, 'vz[1]: expected a number in [-10000, 10000] m/s, got 20000'),
     ],
 )
-def test_a_number_out_of_bounds_refuses_the_scene(column: str, value: float, words: str) -> None:
+def test_a_scene_with_a_number_out_of_bounds_is_refused(column: str, value: float, words: str) -> None:
     table = np.zeros(3, dtype=FULL)
     table[column][1] = value
     with pytest.raises(MessageError, match=re.escape(words)):
@@ -190,14 +190,14 @@ def test_a_field_of_the_wrong_kind_is_refused(field: str, attribute: str, value:
         decode_point_cloud(message, 'xy')
 
 
-def test_a_negative_stamp_is_refused_and_none_is_not() -> None:
+def test_a_negative_stamp_is_refused_and_an_unset_one_is_accepted() -> None:
     table = obstacle_table([(1, 2, 3, 4)])
     assert decode_point_cloud(cloud(BAGS, table, 0), 'xy').stamp_ns == 0
     with pytest.raises(MessageError, match=re.escape('header.stamp.sec: expected at least 0, got -1')):
         decode_point_cloud(cloud(BAGS, table, -SECOND), 'xy')
 
 
-def test_the_largest_scene_is_taken() -> None:
+def test_the_largest_scene_is_accepted() -> None:
     assert len(decode_point_cloud(cloud(BAGS, np.zeros(MAX_ROWS, dtype=FULL[:4])), 'xy').obstacles) == MAX_ROWS
 
 
@@ -207,7 +207,7 @@ rows = st.lists(st.tuples(finite, finite, finite, size, size, finite, finite, fi
 
 
 @given(rows)
-def test_every_table_in_bounds_comes_back(table: list[tuple[float, ...]]) -> None:
+def test_every_table_in_bounds_is_decoded_as_it_was_encoded(table: list[tuple[float, ...]]) -> None:
     obstacles = decode_point_cloud(cloud(BAGS, obstacle_table(table, FULL)), 'xy').obstacles
     expected = {row[-1]: row for row in table}
     assert set(obstacles.ids) == {str(identity) for identity in expected}
@@ -231,7 +231,7 @@ fields = st.lists(
 @given(
     fields, st.binary(max_size=96), st.integers(0, 4), st.integers(0, 6), st.integers(0, 24), st.integers(0, 48), st.booleans()
 )
-def test_any_bytes_are_obstacles_or_refused(
+def test_any_bytes_are_decoded_or_refused(
     layout: list[tuple[str, int, int, int]], data: bytes, height: int, width: int, step: int, row_step: int, big: bool
 ) -> None:
     made = [
