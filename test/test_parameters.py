@@ -53,7 +53,7 @@ def test_the_file_describes_every_parameter() -> None:
 def values_of(parameter: Any) -> st.SearchStrategy[Any]:
     bound = parameter.bound
     if bound.choices:
-        return st.sampled_from(bound.choices)
+        return st.sampled_from(tuple(bound.choices))
     if isinstance(parameter.default, str):
         return st.text(st.characters(codec='ascii', exclude_categories=['Cc']), max_size=12)
     if isinstance(parameter.default, int):
