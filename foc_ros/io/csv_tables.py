@@ -28,29 +28,24 @@ class Row:
         """Return a cell as a number in [low, high]; default: if the table does not have the column."""
         if column not in self.cells and default is not None:
             return default
-        value = self._parse(column)
+        try:
+            value = float(self.cells[column])
+        except ValueError:
+            value = math.nan
         if not low <= value <= high:
             raise self.fault(column, f'a number in [{low:.12g}, {high:.12g}]')
         return value
 
     def whole(self, column: str, low: int, high: int, default: int) -> int:
         """Return a cell as a whole number in [low, high]; default: if the table does not have the column."""
-        if column not in self.cells:
-            return default
-        value = self._parse(column)
-        if not low <= value <= high or value != int(value):
+        value = self.number(column, low, high, default)
+        if value != int(value):
             raise self.fault(column, f'a whole number in [{low}, {high}]')
         return int(value)
 
     def fault(self, column: str, expected: str) -> RecordingError:
         """Return the error of a cell."""
         return RecordingError(f'{self.file}: row {self.line}, column {column}: expected {expected}, got {self.cells[column]!r}')
-
-    def _parse(self, column: str) -> float:
-        try:
-            return float(self.cells[column])
-        except ValueError:
-            return math.nan
 
 
 def rows(file: Path, needed: tuple[str, ...]) -> Iterator[Row]:

@@ -48,7 +48,7 @@ def _check_choice(topics: Mapping[str, str], role: str, topic: str) -> str:
     if role not in TYPES:
         raise RecordingError(f'no input is named {role!r}: expected one of {", ".join(TYPES)}')
     if topic not in topics:
-        raise RecordingError(f'topic {topic} chosen for {role} is not in it; it has {_list_topics(topics)}')
+        raise RecordingError(f'topic {topic} chosen for {role} is not in the recording, which has {_list_topics(topics)}')
     if topics[topic] != TYPES[role]:
         raise RecordingError(f'topic {topic} chosen for {role}: expected type {TYPES[role]}, got {topics[topic]}')
     return topic
@@ -68,7 +68,7 @@ def _find_by_type(topics: Mapping[str, str], alternatives: tuple[str, ...], role
     fitting = [(role, topic) for role in alternatives if role != GOAL for topic in unused if topics[topic] == TYPES[role]]
     if not fitting:
         wanted = ' or '.join(f'{role} ({TYPES[role]})' for role in alternatives)
-        raise RecordingError(f'no topic for {wanted}; it has {_list_topics(topics)}')
+        raise RecordingError(f'no topic for {wanted}; the recording has {_list_topics(topics)}')
     _check_is_unique(fitting[0][0], [topic for _, topic in fitting])
     return fitting[0]
 

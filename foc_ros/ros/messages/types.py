@@ -1,6 +1,6 @@
 """Creation of messages of two libraries with one call: rclpy's (the node) and rosbags' (bags without ROS).
 
-Neither library checks a field's value unless it is told to, and both serialise the memory as it is: an integer in a float field
+Neither library checks the values of fields by default, and both serialise the memory as it is: an integer in a float field
 arrives as 5e-324. Every value is therefore converted here to the type of its field's default.
 """
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
 CHECKS = '_check_fields'
-"""Slot of rclpy's messages that says whether their properties check the values they are given."""
+"""Slot of rclpy's messages that turns on the checks of their properties."""
 
 
 class _Layout(NamedTuple):
