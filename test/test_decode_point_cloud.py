@@ -1,4 +1,4 @@
-"""PointCloud2 as a table of obstacles: layouts, optional columns, and every way in which one can be wrong."""
+"""PointCloud2 as a table of obstacles: layouts, optional columns, and errors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from message_helpers import SECOND, both_kinds, cloud, message_types, obstacle_table
 
 from foc_ros.core.errors import MessageError
-from foc_ros.ros.messages.obstacle_cloud import MAX_ROWS, cloud_obstacles
+from foc_ros.ros.messages.decode_point_cloud import MAX_ROWS, decode_point_cloud
 from foc_ros.ros.messages.types import MessageTypes
 
 BAGS = message_types('rosbags')
@@ -25,7 +25,7 @@ def test_rows_become_obstacles(types: MessageTypes) -> None:
     table = obstacle_table(
         [(0.5, 0.25, 0.125, 0.0625, 0.5, 1.0, 2.0, 3.0, 7), (1.0, 2.0, 3.0, 4.0, 0.0, 0.0, 0.0, 0.0, 4000000000)], FULL
     )
-    scene = cloud_obstacles(cloud(types, table, 3 * SECOND, 'base'), 'xz')
+    scene = decode_point_cloud(cloud(types, table, 3 * SECOND, 'base'), 'xz')
     assert (scene.stamp_ns, scene.frame_id, scene.dropped) == (3 * SECOND, 'base', {})
     assert scene.obstacles.ids == ('7', '4000000000')
     np.testing.assert_array_equal(scene.obstacles.centre, [[0.5, 0.125], [1.0, 3.0]])
@@ -35,8 +35,8 @@ def test_rows_become_obstacles(types: MessageTypes) -> None:
 
 
 @both_kinds
-def test_absent_columns_are_zero_and_rows_name_themselves(types: MessageTypes) -> None:
-    obstacles = cloud_obstacles(cloud(types, obstacle_table([(1, 2, 3, 4), (5, 6, 7, 8)])), 'xy').obstacles
+def test_absent_columns_are_zero_and_row_numbers_are_the_ids(types: MessageTypes) -> None:
+    obstacles = decode_point_cloud(cloud(types, obstacle_table([(1, 2, 3, 4), (5, 6, 7, 8)])), 'xy').obstacles
     assert obstacles.ids == ('0', '1')
     assert not obstacles.radius_stddev.any()
     assert not obstacles.velocity.any()
@@ -45,7 +45,7 @@ def test_absent_columns_are_zero_and_rows_name_themselves(types: MessageTypes) -
 @both_kinds
 def test_no_rows_are_an_empty_scene(types: MessageTypes) -> None:
     for message in (types.make('sensor_msgs/msg/PointCloud2'), cloud(types, obstacle_table([]))):
-        scene = cloud_obstacles(message, 'xy')
+        scene = decode_point_cloud(message, 'xy')
         assert len(scene.obstacles) == 0
         assert scene.obstacles.centre.shape == (0, 2)
 
@@ -55,7 +55,7 @@ def test_no_rows_are_an_empty_scene(types: MessageTypes) -> None:
 )
 def test_every_number_type_and_byte_order(order: str, real: str, whole: str) -> None:
     dtype = [('id', order + whole), ('y', order + real), ('x', order + real), ('radius', order + real), ('z', order + real)]
-    obstacles = cloud_obstacles(cloud(BAGS, obstacle_table([(100, 0.5, 0.25, 0.125, 9.0)], dtype)), 'xy').obstacles
+    obstacles = decode_point_cloud(cloud(BAGS, obstacle_table([(100, 0.5, 0.25, 0.125, 9.0)], dtype)), 'xy').obstacles
     assert obstacles.ids == ('100',)
     np.testing.assert_array_equal(obstacles.centre, [[0.25, 0.5]])
     np.testing.assert_array_equal(obstacles.radius, [0.125])
@@ -70,7 +70,7 @@ def test_other_fields_and_padding_are_skipped() -> None:
     }
     table = np.zeros(2, dtype=dtype)
     table['x'], table['y'], table['radius'], table['rgb'] = [1, 2], [3, 4], [5, 6], 0xFFFFFFFF
-    obstacles = cloud_obstacles(cloud(BAGS, table), 'xy').obstacles
+    obstacles = decode_point_cloud(cloud(BAGS, table), 'xy').obstacles
     np.testing.assert_array_equal(obstacles.centre, [[1, 3], [2, 4]])
     np.testing.assert_array_equal(obstacles.radius, [5, 6])
 
@@ -79,44 +79,44 @@ def test_organised_rows_with_padding() -> None:
     table = obstacle_table([(i, 0, 0, 1) for i in range(6)])
     lines = [table[:3].tobytes() + b'\xff' * 5, table[3:].tobytes() + b'\xff' * 5]
     message = cloud(BAGS, table, height=2, width=3, row_step=3 * 16 + 5, data=b''.join(lines))
-    np.testing.assert_array_equal(cloud_obstacles(message, 'xy').obstacles.centre[:, 0], range(6))
+    np.testing.assert_array_equal(decode_point_cloud(message, 'xy').obstacles.centre[:, 0], range(6))
 
 
-def test_a_single_line_needs_no_row_step() -> None:
-    assert len(cloud_obstacles(cloud(BAGS, obstacle_table([(1, 2, 3, 4)] * 2), row_step=0), 'xy').obstacles) == 2
+def test_a_single_row_needs_no_row_step() -> None:
+    assert len(decode_point_cloud(cloud(BAGS, obstacle_table([(1, 2, 3, 4)] * 2), row_step=0), 'xy').obstacles) == 2
 
 
 @both_kinds
 @pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize('column', ['x', 'y', 'z', 'radius', 'radius_stddev', 'vx'])
-def test_rows_that_are_not_finite_are_left_out_and_counted(types: MessageTypes, column: str, value: float) -> None:
+def test_rows_that_are_not_finite_are_dropped_and_counted(types: MessageTypes, column: str, value: float) -> None:
     table = np.zeros(3, dtype=FULL)
     table['id'] = [10, 11, 12]
     table[column][1] = value
-    scene = cloud_obstacles(cloud(types, table), 'xy')
+    scene = decode_point_cloud(cloud(types, table), 'xy')
     assert scene.obstacles.ids == ('10', '12')
     assert scene.dropped == {'not_finite': 1}
 
 
 @pytest.mark.parametrize('order', ['<', '>'])
-def test_a_signalling_nan_is_left_out_without_a_warning(order: str) -> None:
+def test_a_signalling_nan_is_dropped_without_a_warning(order: str) -> None:
     table = np.zeros(2, dtype=[(name, f'{order}f4') for name in ('x', 'y', 'z', 'radius')])
     table['x'].view(f'{order}u4')[1] = 0x7FA00000
-    scene = cloud_obstacles(cloud(BAGS, table), 'xy')
+    scene = decode_point_cloud(cloud(BAGS, table), 'xy')
     assert (scene.obstacles.ids, scene.dropped) == (('0',), {'not_finite': 1})
 
 
-def test_a_scene_of_which_no_row_is_finite_is_empty_and_says_so() -> None:
-    scene = cloud_obstacles(cloud(BAGS, obstacle_table([(math.nan, 0, 0, 1)] * 4)), 'xy')
+def test_a_scene_without_a_finite_row_is_empty_and_counted() -> None:
+    scene = decode_point_cloud(cloud(BAGS, obstacle_table([(math.nan, 0, 0, 1)] * 4)), 'xy')
     assert len(scene.obstacles) == 0
     assert scene.dropped == {'not_finite': 4}
 
 
-def test_of_rows_with_one_id_the_last_finite_one_holds() -> None:
+def test_the_last_finite_row_of_an_id_is_used() -> None:
     table = np.zeros(5, dtype=FULL)
     table['id'] = [3, 1, 3, 2, 1]
     table['x'] = [0, 1, 2, 3, math.nan]
-    scene = cloud_obstacles(cloud(BAGS, table), 'xy')
+    scene = decode_point_cloud(cloud(BAGS, table), 'xy')
     assert scene.obstacles.ids == ('1', '3', '2')
     np.testing.assert_array_equal(scene.obstacles.centre[:, 0], [1, 2, 3])
     assert scene.dropped == {'not_finite': 1, 'duplicate_id': 1}
@@ -132,11 +132,11 @@ def test_of_rows_with_one_id_the_last_finite_one_holds() -> None:
         ('vz', 2e4, 'vz[1]: expected a number in [-10000, 10000] m/s, got 20000'),
     ],
 )
-def test_a_number_out_of_bounds_refuses_the_scene(column: str, value: float, words: str) -> None:
+def test_a_scene_with_a_number_out_of_bounds_is_refused(column: str, value: float, words: str) -> None:
     table = np.zeros(3, dtype=FULL)
     table[column][1] = value
     with pytest.raises(MessageError, match=re.escape(words)):
-        cloud_obstacles(cloud(BAGS, table), 'xy')
+        decode_point_cloud(cloud(BAGS, table), 'xy')
 
 
 @pytest.mark.parametrize('missing', ['x', 'y', 'z', 'radius'])
@@ -145,7 +145,7 @@ def test_a_missing_field_is_named(missing: str) -> None:
     table = np.zeros(1, dtype=[(name, '<f4') for name in names])
     words = f'fields: expected a field {missing} (needed are x, y, z, radius), got {", ".join(names)}'
     with pytest.raises(MessageError, match=re.escape(words)):
-        cloud_obstacles(cloud(BAGS, table), 'xy')
+        decode_point_cloud(cloud(BAGS, table), 'xy')
 
 
 @both_kinds
@@ -167,7 +167,7 @@ def test_a_missing_field_is_named(missing: str) -> None:
 )
 def test_a_layout_that_does_not_fit_is_refused(types: MessageTypes, changes: dict[str, object], words: str) -> None:
     with pytest.raises(MessageError, match=re.escape(words)):
-        cloud_obstacles(cloud(types, obstacle_table([(1, 2, 3, 4)] * 2), **changes), 'xy')
+        decode_point_cloud(cloud(types, obstacle_table([(1, 2, 3, 4)] * 2), **changes), 'xy')
 
 
 @pytest.mark.parametrize(
@@ -187,18 +187,18 @@ def test_a_field_of_the_wrong_kind_is_refused(field: str, attribute: str, value:
     entry = next(each for each in message.fields if each.name == field)
     setattr(entry, attribute, value)
     with pytest.raises(MessageError, match=re.escape(words)):
-        cloud_obstacles(message, 'xy')
+        decode_point_cloud(message, 'xy')
 
 
-def test_a_negative_stamp_is_refused_and_none_is_not() -> None:
+def test_a_negative_stamp_is_refused_and_an_unset_one_is_accepted() -> None:
     table = obstacle_table([(1, 2, 3, 4)])
-    assert cloud_obstacles(cloud(BAGS, table, 0), 'xy').stamp_ns == 0
+    assert decode_point_cloud(cloud(BAGS, table, 0), 'xy').stamp_ns == 0
     with pytest.raises(MessageError, match=re.escape('header.stamp.sec: expected at least 0, got -1')):
-        cloud_obstacles(cloud(BAGS, table, -SECOND), 'xy')
+        decode_point_cloud(cloud(BAGS, table, -SECOND), 'xy')
 
 
-def test_the_largest_scene_is_taken() -> None:
-    assert len(cloud_obstacles(cloud(BAGS, np.zeros(MAX_ROWS, dtype=FULL[:4])), 'xy').obstacles) == MAX_ROWS
+def test_the_largest_scene_is_accepted() -> None:
+    assert len(decode_point_cloud(cloud(BAGS, np.zeros(MAX_ROWS, dtype=FULL[:4])), 'xy').obstacles) == MAX_ROWS
 
 
 finite = st.floats(-1e4, 1e4, width=32)
@@ -207,8 +207,8 @@ rows = st.lists(st.tuples(finite, finite, finite, size, size, finite, finite, fi
 
 
 @given(rows)
-def test_every_table_in_bounds_comes_back(table: list[tuple[float, ...]]) -> None:
-    obstacles = cloud_obstacles(cloud(BAGS, obstacle_table(table, FULL)), 'xy').obstacles
+def test_every_table_in_bounds_is_decoded_as_it_was_encoded(table: list[tuple[float, ...]]) -> None:
+    obstacles = decode_point_cloud(cloud(BAGS, obstacle_table(table, FULL)), 'xy').obstacles
     expected = {row[-1]: row for row in table}
     assert set(obstacles.ids) == {str(identity) for identity in expected}
     for i, name in enumerate(obstacles.ids):
@@ -231,7 +231,7 @@ fields = st.lists(
 @given(
     fields, st.binary(max_size=96), st.integers(0, 4), st.integers(0, 6), st.integers(0, 24), st.integers(0, 48), st.booleans()
 )
-def test_any_bytes_are_obstacles_or_refused(
+def test_any_bytes_are_decoded_or_refused(
     layout: list[tuple[str, int, int, int]], data: bytes, height: int, width: int, step: int, row_step: int, big: bool
 ) -> None:
     made = [
@@ -241,7 +241,7 @@ def test_any_bytes_are_obstacles_or_refused(
     sizes = {'height': height, 'width': width, 'point_step': step, 'row_step': row_step}
     message = BAGS.make('sensor_msgs/msg/PointCloud2', fields=made, data=data, is_bigendian=big, **sizes)
     try:
-        scene = cloud_obstacles(message, 'xy')
+        scene = decode_point_cloud(message, 'xy')
     except MessageError:
         return
     assert len(scene.obstacles) + sum(scene.dropped.values()) == height * width

@@ -1,4 +1,4 @@
-"""Other frames: refused without tf2, moved into the working one with it; here with a stand-in for tf2."""
+"""Messages in other frames: refused without tf2, and transformed with it (here with a substitute for tf2)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ QUARTER = {'x': 0.0, 'y': 0.0, 'z': np.sqrt(0.5), 'w': np.sqrt(0.5)}
 
 
 class Buffer:
-    """Knows that the camera stands at (1, 0, 0) in the world, turned by a quarter to the left."""
+    """A transform buffer with the camera at (1, 0, 0) in the world, rotated by 90 degrees to the left."""
 
     asked: list[tuple[str, str, int]]
 
@@ -51,71 +51,71 @@ def seen(bench: Bench) -> np.ndarray:
 
 
 @pytest.mark.usefixtures('tf2')
-def test_every_input_is_moved_into_the_working_frame(ros: Graph) -> None:
+def test_every_input_is_transformed_into_the_working_frame(ros: Graph) -> None:
     bench = Bench(ros)
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(hand_path(1))
     columns = [(name, '<f8') for name in ('x', 'y', 'z', 'radius', 'vx', 'vy', 'vz')]
     moving = obstacle_table([(0.2, 0.3, 0.4, 0.05, 1.0, 0.0, 0.0)], columns)
-    bench.hear('obstacles', cloud(TYPES, moving, 10 * SECOND, 'camera'))
+    bench.deliver('obstacles', cloud(TYPES, moving, 10 * SECOND, 'camera'))
     np.testing.assert_allclose(seen(bench), [[0.7, 0.2]])
     held = bench.node.pipeline.scene.parts['cloud'].obstacles
     np.testing.assert_allclose(held.velocity, [[0.0, 1.0]], atol=1e-12)
     assert held.radius.tolist() == [0.05]
-    bench.hear('obstacle_markers', marker_array(TYPES, marker(TYPES, (0.1, 0.0, 0.0), frame_id='camera'), marker(TYPES, id=9)))
-    bench.hear('obstacle_markers', marker_array(TYPES, marker(TYPES, id=77, action=2, frame_id='')))
+    bench.deliver('obstacle_markers', marker_array(TYPES, marker(TYPES, (0.1, 0.0, 0.0), frame_id='camera'), marker(TYPES, id=9)))
+    bench.deliver('obstacle_markers', marker_array(TYPES, marker(TYPES, id=77, action=2, frame_id='')))
     np.testing.assert_allclose(seen(bench)[1:], [[1.0, 0.1], [0.0, 0.0]], atol=1e-12)
-    bench.hear('goals', pose_array(TYPES, [(0.0, 0.5, 0.0)], 'camera'))
+    bench.deliver('goals', pose_array(TYPES, [(0.0, 0.5, 0.0)], 'camera'))
     np.testing.assert_allclose(bench.node.pipeline.scene.goals, [[0.5, 0.0]])
-    bench.hear('goal_pose', pose_stamped(TYPES, (0.0, 0.4, 0.0), SECOND, 'camera'))
+    bench.deliver('goal_pose', pose_stamped(TYPES, (0.0, 0.4, 0.0), SECOND, 'camera'))
     np.testing.assert_allclose(bench.node.pipeline.scene.goals, [[0.6, 0.0]])
     stamp_ns = round(10.02 * SECOND)
-    bench.hear('hand_pose', pose_stamped(TYPES, (0.0, 1.0, 0.25), stamp_ns, 'camera'))
+    bench.deliver('hand_pose', pose_stamped(TYPES, (0.0, 1.0, 0.25), stamp_ns, 'camera'))
     assert bench.node.pipeline.hand_state.stamp_ns == stamp_ns
     assert bench.node.intake.sample.height == 0.25
-    assert ('world', 'camera', stamp_ns) in bench.node._frames._buffer.asked
+    assert ('world', 'camera', stamp_ns) in bench.node._transforms._buffer.asked
     assert {message.header.frame_id for message in bench.wait_for('prediction', 2)} == {'world'}
 
 
 @pytest.mark.usefixtures('tf2')
-def test_rows_that_are_not_finite_are_left_out_of_a_scene_that_is_moved(ros: Graph) -> None:
+def test_rows_that_are_not_finite_are_dropped_from_a_transformed_scene(ros: Graph) -> None:
     bench = Bench(ros)
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(hand_path(1))
     table = obstacle_table([(0.2, 0.3, 0.0, 0.05), (np.inf, 0.0, 0.0, 0.05), (3e38, 3e38, 0.0, 0.05), (0.0, 0.0, 0.0, 0.05)])
     table['y'].view('<u4')[3] = 0x7FA00000  # a signalling NaN
-    bench.hear('obstacles', cloud(TYPES, table, 10 * SECOND, 'camera'))
+    bench.deliver('obstacles', cloud(TYPES, table, 10 * SECOND, 'camera'))
     assert 'expected a number in [-10000, 10000] m' in figures(bench.health())['last refusal']
-    bench.hear('obstacles', cloud(TYPES, table[[0, 1, 3]], 10 * SECOND, 'camera'))
+    bench.deliver('obstacles', cloud(TYPES, table[[0, 1, 3]], 10 * SECOND, 'camera'))
     np.testing.assert_allclose(seen(bench), [[0.7, 0.2]])
     assert figures(bench.health())['count obstacles_dropped_not_finite'] == '2'
 
 
 @pytest.mark.usefixtures('tf2')
-def test_a_frame_that_tf2_does_not_know_is_refused_with_both_names(ros: Graph) -> None:
+def test_a_frame_unknown_to_tf2_is_refused_with_both_names(ros: Graph) -> None:
     bench = Bench(ros)
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(hand_path(1))
     scene = bench.node.pipeline.scene
-    bench.hear('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'moon'))
+    bench.deliver('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'moon'))
     assert bench.node.pipeline.scene is scene
     assert "the working frame 'world', got 'moon'" in figures(bench.health())['last refusal']
-    assert 'no transform to world: "moon" passed to lookupTransform does not exist' in bench.node._frames.last_error
+    assert 'no transform to world: "moon" passed to lookupTransform does not exist' in bench.node._transforms.last_error
 
 
 @pytest.mark.usefixtures('tf2')
-def test_a_wrong_message_in_another_frame_is_refused_in_words(ros: Graph) -> None:
+def test_a_wrong_message_in_another_frame_is_refused_with_its_reason(ros: Graph) -> None:
     bench = Bench(ros)
     bench.move(hand_path(1))
-    bench.hear('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'camera', data=b'abc'))
+    bench.deliver('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'camera', data=b'abc'))
     assert 'obstacles: data: expected 16 bytes' in figures(bench.health())['last refusal']
 
 
 @pytest.mark.usefixtures('no_tf2')
-def test_without_tf2_all_works_but_that(ros: Graph) -> None:
+def test_without_tf2_other_frames_are_refused(ros: Graph) -> None:
     bench = Bench(ros)
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(hand_path(2))
     bench.wait_for('prediction', 1)
-    bench.hear('goals', pose_array(TYPES, GOALS, 'camera'))
+    bench.deliver('goals', pose_array(TYPES, GOALS, 'camera'))
     assert "the working frame 'world', got 'camera'" in figures(bench.health())['last refusal']

@@ -1,4 +1,4 @@
-"""Hand poses and goals: every number checked, in words with field, value and bound."""
+"""Decoding of hand poses and goals: every number is checked, and errors name field, value and bound."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from message_helpers import SECOND, both_kinds, message_types, pose_array, pose_stamped
 
 from foc_ros.core.errors import MessageError
-from foc_ros.ros.messages.inputs import MAX_GOALS, goal_of_pose, goals_of_pose_array, hand_sample
+from foc_ros.ros.messages.decode_poses import MAX_GOALS, goal_of_pose, goals_of_pose_array, hand_sample
 from foc_ros.ros.messages.types import MessageTypes
 
 coordinates = st.tuples(*[st.floats(-1e4, 1e4)] * 3)
@@ -45,7 +45,9 @@ def test_the_orientation_is_not_used(types: MessageTypes) -> None:
         (1.1e4, r'pose\.position\.[xyz]: expected a coordinate within 10000 m of the origin, got 11000'),
     ],
 )
-def test_a_coordinate_that_is_no_place_is_refused(types: MessageTypes, axis: int, value: float, words: str) -> None:
+def test_a_coordinate_that_is_not_finite_or_too_large_is_refused(
+    types: MessageTypes, axis: int, value: float, words: str
+) -> None:
     position = [0.0, 0.0, 0.0]
     position[axis] = value
     with pytest.raises(MessageError, match=words) as caught:
@@ -66,7 +68,7 @@ def test_a_coordinate_that_is_no_place_is_refused(types: MessageTypes, axis: int
         (1, SECOND, r'header\.stamp\.nanosec: expected below 1000000000, got 1000000000'),
     ],
 )
-def test_a_stamp_that_is_no_time_is_refused(types: MessageTypes, sec: int, nanosec: int, words: str) -> None:
+def test_a_wrong_stamp_is_refused(types: MessageTypes, sec: int, nanosec: int, words: str) -> None:
     message = pose_stamped(types, (0, 0, 0))
     message.header.stamp.sec, message.header.stamp.nanosec = sec, nanosec
     with pytest.raises(MessageError, match=words):
@@ -88,7 +90,7 @@ def test_goals_keep_their_order(types: MessageTypes) -> None:
 
 
 @both_kinds
-def test_no_goals_are_no_goals(types: MessageTypes) -> None:
+def test_an_array_without_poses_has_no_goals(types: MessageTypes) -> None:
     assert goals_of_pose_array(pose_array(types, []), 'xy')[0].shape == (0, 2)
 
 
@@ -100,14 +102,14 @@ def test_too_many_goals_are_refused() -> None:
 
 
 @given(coordinates, st.integers(1, 2**31 * SECOND - 1), st.text(max_size=5))
-def test_every_pose_in_bounds_is_taken_exactly(position: tuple[float, float, float], stamp_ns: int, frame_id: str) -> None:
+def test_every_pose_in_bounds_is_decoded_exactly(position: tuple[float, float, float], stamp_ns: int, frame_id: str) -> None:
     sample = hand_sample(pose_stamped(message_types('rosbags'), position, stamp_ns, frame_id), 'xy')
     assert (*sample.position, sample.height) == position
     assert (sample.stamp_ns, sample.frame_id) == (stamp_ns, frame_id)
 
 
 @given(st.tuples(*[st.floats()] * 3), st.integers(-(2**31), 2**31 - 1), st.integers(0, 2**32 - 1))
-def test_any_pose_is_taken_or_refused_in_words(position: tuple[float, float, float], sec: int, nanosec: int) -> None:
+def test_any_pose_is_decoded_or_refused(position: tuple[float, float, float], sec: int, nanosec: int) -> None:
     message = pose_stamped(message_types('rosbags'), position)
     message.header.stamp.sec, message.header.stamp.nanosec = sec, nanosec
     good = all(abs(value) <= 1e4 for value in position) and sec >= 0 and nanosec < SECOND and (sec, nanosec) != (0, 0)

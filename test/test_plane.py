@@ -1,4 +1,4 @@
-"""Space to task plane and back."""
+"""Projection of points onto the task plane, and its inverse."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def test_axes_of_each_plane(plane: str, position: tuple[float, float], height: f
 
 
 @given(points, st.sampled_from(PLANES))
-def test_lifting_undoes_projecting(table: np.ndarray, plane: str) -> None:
+def test_lift_is_the_inverse_of_project(table: np.ndarray, plane: str) -> None:
     positions, heights = project(table, plane)
     assert positions.shape == (len(table), 2)
     np.testing.assert_array_equal(lift(positions, heights, plane), table)
 
 
-def test_arguments_are_left_alone() -> None:
+def test_arguments_are_not_changed() -> None:
     given_positions = np.ones((2, 2))
     given_positions.flags.writeable = False
     lift(given_positions, 1.0, 'xy')[:] = 5.0

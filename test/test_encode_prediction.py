@@ -1,4 +1,4 @@
-"""A prediction as messages, read back with readers that are not ours."""
+"""Encoding of a prediction, checked with independent readers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction, three_
 
 from foc_ros.core.errors import FocError
 from foc_ros.core.types import PredictedCandidate, Prediction, Status, make_obstacles
-from foc_ros.ros.messages.outputs import OUTPUTS, output_messages
+from foc_ros.ros.messages.encode_prediction import OUTPUTS, output_messages
 from foc_ros.ros.messages.plane import lift
 from foc_ros.ros.messages.ranking import MAX_RATIO
 from foc_ros.ros.messages.types import MessageTypes
@@ -27,7 +27,7 @@ def made(name: str, of: Prediction, types: MessageTypes = BAGS, plane: str = 'xy
 
 
 def columns(cloud: Any) -> dict[str, np.ndarray]:
-    """Read a cloud by its own description, byte by byte."""
+    """Read a cloud by its own field descriptions."""
     raw = np.frombuffer(bytes(cloud.data), np.uint8).reshape(cloud.height * cloud.width, cloud.point_step)
     dtypes = {7: '<f4', 6: '<u4'}
     return {
@@ -37,7 +37,7 @@ def columns(cloud: Any) -> dict[str, np.ndarray]:
 
 @both_kinds
 @pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
-def test_the_cloud_holds_every_solved_candidate(types: MessageTypes, plane: str) -> None:
+def test_the_cloud_contains_every_solved_candidate(types: MessageTypes, plane: str) -> None:
     ways = three_ways()
     cloud = made('prediction', ways, types, plane)
     table = columns(cloud)
@@ -86,7 +86,7 @@ def test_the_path_is_the_most_likely_one_with_stamps_in_the_future(types: Messag
     assert {pose.pose.orientation.w for pose in message.poses} == {1.0}
 
 
-def test_the_one_called_most_likely_comes_first_even_if_another_has_overtaken_it() -> None:
+def test_the_candidate_called_most_likely_is_first_even_if_another_is_likelier() -> None:
     ways = prediction(outcome('a', 0.52, 0.1), outcome('b', 0.48, -0.1), most_likely='b')
     assert made('likelihoods', ways).layout.dim[0].label == 'b;a'
     table = columns(made('prediction', ways))
@@ -113,7 +113,7 @@ def test_cost_ratios_stay_finite() -> None:
 
 @pytest.mark.parametrize('value', [np.nan, np.inf, 1e31])
 @pytest.mark.parametrize('where', ['mean', 'covariance', 'effort', 'eta'])
-def test_no_number_that_is_not_finite_leaves(value: float, where: str) -> None:
+def test_a_number_that_is_not_finite_is_not_encoded(value: float, where: str) -> None:
     good = getattr(outcome().solution, where)
     bad = np.array(good)
     bad.flat[-1] = value
@@ -168,7 +168,7 @@ def test_a_candidate_without_a_path_shows_its_guess() -> None:
     np.testing.assert_allclose([(p.x, p.y) for p in line.points], lost.candidate.guess)
 
 
-def test_of_many_obstacles_the_nearest_are_drawn() -> None:
+def test_the_nearest_of_many_obstacles_are_drawn() -> None:
     crowd = make_obstacles([[0.01 * i, 0.0] for i in range(1000, 0, -1)], 0.001)
     markers = output_messages(three_ways(), crowd, 'xy', BAGS, ['markers'])['markers'].markers
     drawn = [each.pose.position.x for each in markers if each.ns == 'obstacle']
@@ -176,7 +176,7 @@ def test_of_many_obstacles_the_nearest_are_drawn() -> None:
 
 
 @both_kinds
-def test_every_output_survives_the_wire(types: MessageTypes) -> None:
+def test_every_output_is_the_same_after_serialisation(types: MessageTypes) -> None:
     for name, message in output_messages(three_ways(), OBSTACLES, 'xy', types).items():
         kind = OUTPUTS[name][0]
         if hasattr(message, '__msgtype__'):
@@ -194,7 +194,7 @@ ways = st.lists(st.tuples(st.floats(0, 1), st.floats(-0.3, 0.3), st.floats(0, 1e
 
 
 @given(ways, st.sampled_from(['xy', 'xz', 'yz']), st.floats(-1e4, 1e4))
-def test_any_prediction_comes_back_from_its_cloud(
+def test_any_prediction_can_be_read_from_its_cloud(
     rows: list[tuple[float, float, float, Status]], plane: str, height: float
 ) -> None:
     outcomes = [outcome(f'c{i}', p, bend, cost, status=status) for i, (p, bend, cost, status) in enumerate(rows)]
