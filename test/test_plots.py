@@ -11,14 +11,16 @@ import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
+from matplotlib import pyplot as plt
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Ellipse
 from report_samples import START_NS, prediction, predictions, samples, scene
 
 from foc_ros.core.errors import InputError
 from foc_ros.core.types import make_obstacles
 from foc_ros.reporting.drawing import CLASS_COLOURS, CLASSES, ELLIPSES_PER_WAY, LIKELIHOOD_COLOURS, stddev_ellipse
-from foc_ros.reporting.plots import Around, bounds_of, moment_figure, plot_outcomes, save, scene_figure
+from foc_ros.reporting.plots import Around, bounds_of, moment_figure, plot_outcomes, plot_prediction, save, scene_figure
 from foc_ros.reporting.snapshots import candidate_views, movements, snapshot_of_prediction, track_of
 from foc_ros.reporting.track_association import associate_tracks, slots
 
@@ -156,3 +158,13 @@ except FocError as error:
     told = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True, check=True, cwd=ROOT).stdout
     assert 'pip install' in told
     assert told.count('\n') == 1
+
+
+def test_a_prediction_is_drawn_on_given_or_new_axes() -> None:
+    made = prediction(START_NS, np.zeros(2))
+    given = Figure().subplots()
+    assert plot_prediction(made, given) is given
+    for axes in (given, plot_prediction(made)):
+        drawn = [line.get_xydata() for line in axes.lines]
+        assert all(any(np.array_equal(line, each.solution.path) for line in drawn) for each in made.solved_candidates)
+    plt.close('all')

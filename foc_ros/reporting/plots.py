@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from foc_ros.core.errors import InputError
-from foc_ros.core.types import NANOSECONDS, Array, Obstacles, PredictedCandidate
+from foc_ros.core.types import NANOSECONDS, Array, Obstacles, PredictedCandidate, Prediction, make_obstacles
 
 from .drawing import (
     CLASSES,
     STDDEVS,
+    STYLE,
     Bounds,
     draw_colour_bar,
     draw_hand,
@@ -43,6 +44,35 @@ def plot_outcomes(file: Path | str, obstacles: Obstacles, goals: Array, outcomes
     """
     ways = candidate_views(outcomes)
     save(scene_figure(obstacles, goals, ways, bounds_of(obstacles, goals, ways)), file)
+
+
+def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
+    """Draw a prediction with its obstacles and goals.
+
+    Parameters
+    ----------
+    prediction : Prediction
+        Its solved candidates are drawn, coloured by likelihood, with ellipses of one standard deviation of the position.
+    axes : matplotlib.axes.Axes, optional
+        Where to draw; axes of a new pyplot figure by default.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes that hold the drawing.
+    """
+    import matplotlib.pyplot as plt
+
+    candidates = candidate_views(prediction.solved_candidates)
+    obstacles = getattr(prediction, 'obstacles', make_obstacles())
+    goals = np.reshape(getattr(prediction, 'goals', ()), (-1, 2))
+    bounds = bounds_of(obstacles, goals, candidates)
+    with plt.rc_context(STYLE):
+        if axes is None:
+            axes = plt.figure(figsize=(WIDTH_IN, _scene_height(bounds) + 1.0), layout='constrained').subplots()
+        draw_scene(axes, obstacles, goals, bounds)
+        draw_ways(axes, candidates, _numbered([each.label for each in candidates]))
+    return axes
 
 
 def scene_figure(obstacles: Obstacles, goals: Array, ways: Sequence[CandidateView], bounds: Bounds) -> Figure:
