@@ -11,10 +11,10 @@ import numpy as np
 
 import foc_ros
 
-generator = np.random.default_rng(8)
-centres = generator.uniform((0.06, -0.12), (0.34, 0.12), (10, 2))
-obstacles = [foc_ros.Circle(centre, radius=0.018, radius_stddev=0.001, name=f'o{number}') for number, centre in enumerate(centres)]
-config = foc_ros.Config().with_values({'homotopy.max_candidates': 6, 'foc.eta': 0.8, 'foc.noise_x': 0.02, 'foc.noise_y': 0.02})
+generator = np.random.default_rng(5)
+centres = generator.uniform((0.08, -0.12), (0.32, 0.12), (10, 2))
+obstacles = [foc_ros.Circle(centre, radius=0.014, radius_stddev=0.001, name=f'o{number}') for number, centre in enumerate(centres)]
+config = foc_ros.Config().with_values({'homotopy.max_candidates': 6, 'foc.eta': 0.8})
 candidates = foc_ros.solve_classes((0.0, 0.0), [(0.4, 0.05), (0.4, -0.05)], obstacles, config=config)
 for candidate in candidates:
     print(f'{candidate.label:24} {candidate.status.value:16} likelihood {candidate.likelihood:.2f}')

@@ -22,8 +22,8 @@ figure, (paths, efforts) = plt.subplots(1, 2, figsize=(11, 3.6), width_ratios=(1
 paths.add_patch(plt.Circle((0.15, -0.005), RADIUS, color='0.7'))
 for deviation, solution in zip(deviations[::4], solutions[::4], strict=True):
     paths.plot(*solution.path.T, label=f'{1000 * deviation:.0f} mm')
-paths.set(xlabel='x [m]', ylabel='y [m]', aspect='equal')
-paths.legend(title='standard deviation')
+paths.set(xlabel='x [m]', ylabel='y [m]', ylim=(-0.06, 0.06), aspect='equal')
+paths.legend(title='standard deviation', loc='lower right')
 efforts.plot(1000 * deviations, [solution.effort for solution in solutions], marker='o')
 efforts.set(xlabel='standard deviation of the radius [mm]', ylabel='effort [m²/s⁶]', ylim=(0.0, None))
 plt.show()

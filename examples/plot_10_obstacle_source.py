@@ -43,7 +43,7 @@ def detect_boxes(t: float) -> dict[str, tuple[float, float, float, float]]:
 
 
 # %%
-# The hand rests during the first half second and then begins to move. The cart crosses its path in the meantime.
+# The hand rests during the first 0.3 s and then begins to move. The cart crosses its path in the meantime.
 
 tracker, predictor = BoxTracker(), foc_ros.Predictor()
 predictor.set_goals([(0.32, 0.0)])
@@ -53,7 +53,7 @@ for tick, t in enumerate(np.arange(0.0, 0.81, 0.02)):
     s = np.clip(t - 0.3, 0.0, 1.0)
     predictor.set_obstacles(tracker.track(t, detect_boxes(t)))
     prediction = predictor.update(t, (0.32 * (10 * s**3 - 15 * s**4 + 6 * s**5), 0.0))
-    if tick in (1, 20, 40):
+    if tick in (10, 25, 40):
         axes = next(shown)
         prediction.plot(axes)
         axes.set_title(f't = {t:.2f} s: {prediction.most_likely}')

@@ -41,6 +41,6 @@ ratios = [
     if slow.status is best.status is foc_ros.Status.SOLVED and slow.label == best.label
 ]
 figure, axes = plt.subplots(figsize=(6.5, 4), layout='constrained')
-axes.hist(ratios, bins=np.geomspace(0.9, max(ratios) + 0.1, 25))
-axes.set(xscale='log', xlabel='effort of lv / effort of optimal', ylabel='number of scenes')
+axes.hist(ratios, bins=np.linspace(1.0, max(ratios), 25))
+axes.set(xlabel='effort of lv / effort of optimal', ylabel='number of scenes')
 plt.show()
