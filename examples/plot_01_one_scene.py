@@ -2,8 +2,8 @@
 One scene solved
 ================
 
-`foc_ros.solve` finds the movement from a start to a goal that avoids all obstacles with the probability eta. The result contains the
-mean and the covariance of the state at every step.
+`foc_ros.solve` finds the movement from a start to a goal that avoids all obstacles with the probability eta. The result contains
+the mean and the covariance of the state at every step.
 """
 
 import matplotlib.pyplot as plt
@@ -19,8 +19,8 @@ solution = foc_ros.solve(start=(0.0, 0.0), goal=(0.3, 0.0), obstacles=obstacles,
 print(solution.label, solution.status.value, f'effort {solution.effort:.0f} m^2/s^6, eta {solution.eta:.3f}')
 
 # %%
-# The left plot shows the mean path with ellipses of one standard deviation. The right plot shows the speed and the standard deviation of
-# the position. The hand slows down near the obstacles, because noise grows with the effort.
+# The left plot shows the mean path with ellipses of one standard deviation. The right plot shows the speed and the standard
+# deviation of the position. The hand slows down near the obstacles, because noise grows with the effort.
 
 figure, (scene, speeds) = plt.subplots(1, 2, figsize=(11, 3.6), width_ratios=(1.7, 1), layout='constrained')
 solution.plot(scene)

@@ -2,8 +2,8 @@
 Prediction while a hand moves
 =============================
 
-A `foc_ros.Predictor` follows one hand. Each call of `update` takes a measured position and returns a prediction. This example simulates a
-hand that passes an obstacle on the left and reaches the second of three goals.
+A `foc_ros.Predictor` follows one hand. Each call of `update` takes a measured position and returns a prediction. This example
+simulates a hand that passes an obstacle on the left and reaches the second of three goals.
 """
 
 import matplotlib.pyplot as plt
@@ -33,8 +33,8 @@ positions = [measure_hand(t, generator) for t in times]
 predictions = [predictor.update(t, position) for t, position in zip(times, positions, strict=True)]
 
 # %%
-# The left plot shows the prediction after 0.3 s with the path of the hand until then. The right plot shows the likelihood of every goal: the
-# sum over the candidates that lead to it.
+# The left plot shows the prediction after 0.3 s with the path of the hand until then. The right plot shows the likelihood of
+# every goal: the sum over the candidates that lead to it.
 
 figure, (scene, shares) = plt.subplots(1, 2, figsize=(11, 4), width_ratios=(1.5, 1), layout='constrained')
 shown = predictions[round(0.3 * RATE_HZ)]

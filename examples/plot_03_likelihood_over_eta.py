@@ -2,8 +2,8 @@
 Likelihoods over eta
 ====================
 
-The likelihood of a homotopy class follows from the ratio of the efforts. This example solves all classes of one scene for increasing
-eta. The short path has less clearance, so that its effort grows faster.
+The likelihood of a homotopy class follows from the ratio of the efforts. This example solves all classes of one scene for
+increasing eta. The short path has less clearance, so that its effort grows faster.
 """
 
 import matplotlib.pyplot as plt
@@ -15,7 +15,9 @@ obstacles = [
     foc_ros.Circle((0.12, 0.035), radius=0.03, radius_stddev=0.003, name='cup'),
     foc_ros.Circle((0.16, -0.055), radius=0.03, radius_stddev=0.003, name='jar'),
 ]
-config = foc_ros.Config().with_values({'homotopy.max_candidates': 3, 'foc.noise_x': 0.1, 'foc.noise_y': 0.1, 'likelihood.beta': 1.0})
+config = foc_ros.Config().with_values(
+    {'homotopy.max_candidates': 3, 'foc.noise_x': 0.1, 'foc.noise_y': 0.1, 'likelihood.beta': 1.0}
+)
 etas = np.linspace(0.5, 0.95, 19)
 results = [foc_ros.solve_classes((0.0, 0.0), (0.3, 0.0), obstacles, eta=eta, strategy='optimal', config=config) for eta in etas]
 

@@ -2,8 +2,8 @@
 Three strategies
 ================
 
-A strategy trades clearance against precision. `lv` slows down near obstacles, `hc` keeps a larger distance, and `optimal` takes the least
-effort. All three meet the same eta in the same time.
+A strategy trades clearance against precision. `lv` slows down near obstacles, `hc` keeps a larger distance, and `optimal` takes
+the least effort. All three meet the same eta in the same time.
 """
 
 import matplotlib.pyplot as plt

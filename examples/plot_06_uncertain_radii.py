@@ -2,8 +2,8 @@
 Uncertain radii
 ===============
 
-Perception rarely knows the size of an obstacle exactly. `radius_stddev` is the standard deviation of the radius. The movement keeps a larger
-distance from an obstacle whose radius is uncertain, and needs more effort.
+Perception rarely knows the size of an obstacle exactly. `radius_stddev` is the standard deviation of the radius. The movement
+keeps a larger distance from an obstacle whose radius is uncertain, and needs more effort.
 """
 
 import matplotlib.pyplot as plt

@@ -2,9 +2,9 @@
 Monte Carlo
 ===========
 
-The chance constraint holds for each obstacle and each step. It uses a bound on the probability that holds for every distribution, and is therefore
-conservative. `foc_ros.monte_carlo` executes a solution many times with random motor noise and random radii, and counts how often the movement
-keeps clear of the true circles.
+The chance constraint holds for each obstacle and each step. It uses a bound on the probability that holds for every distribution,
+and is therefore conservative. `foc_ros.monte_carlo` executes a solution many times with random motor noise and random radii, and
+counts how often the movement keeps clear of the true circles.
 """
 
 import matplotlib.pyplot as plt
@@ -19,8 +19,8 @@ solutions = [foc_ros.solve((0.0, 0.0), (0.3, 0.0), obstacles, eta=eta, strategy=
 results = [foc_ros.monte_carlo(solution, samples=5000, seed=0) for solution in solutions]
 
 # %%
-# `step` is the fraction that keeps clear at the worst step, `path` is the fraction that keeps clear at all steps. Both come with an interval of
-# 95 %.
+# `step` is the fraction that keeps clear at the worst step, `path` is the fraction that keeps clear at all steps. Both come with
+# an interval of 95 %.
 
 figure, axes = plt.subplots(figsize=(6.5, 4), layout='constrained')
 for name, measured in (('worst step', [each.step for each in results]), ('whole path', [each.path for each in results])):

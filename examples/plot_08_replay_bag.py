@@ -2,8 +2,8 @@
 Replay of a bag
 ===============
 
-`foc_ros.replay` reads a ROS 2 bag and yields the predictions that the node would have made, without ROS. This example replays the packaged
-recording of a simulated operator at 25 predictions a second.
+`foc_ros.replay` reads a ROS 2 bag and yields the predictions that the node would have made, without ROS. This example replays the
+packaged recording of a simulated operator at 25 predictions a second.
 """
 
 from importlib.resources import files
@@ -18,8 +18,9 @@ predictions = list(foc_ros.replay(str(recording), foc_ros.Config().with_values({
 print(f'{len(predictions)} predictions in {predictions[-1].t - predictions[0].t:.1f} s of the recording')
 
 # %%
-# The left plot shows the positions of the hand, coloured by the likelihood of the most likely candidate. The right plot shows the likelihoods of
-# the candidates during the first eight seconds. A candidate ends when its label changes because an obstacle was passed.
+# The left plot shows the positions of the hand, coloured by the likelihood of the most likely candidate. The right plot shows the
+# likelihoods of the candidates during the first eight seconds. A candidate ends when its label changes because an obstacle was
+# passed.
 
 solved = [prediction for prediction in predictions if prediction.solved_candidates]
 figure, (scene, likelihoods) = plt.subplots(1, 2, figsize=(11, 4), width_ratios=(1, 1.2), layout='constrained')

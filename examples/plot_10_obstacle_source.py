@@ -2,8 +2,9 @@
 A custom obstacle source
 ========================
 
-foc_ros needs circles with a centre, a radius and, if the obstacles move, a velocity. This example turns the boxes of an object detector into
-circles. A small tracker estimates the velocity of each object from its last two detections. The prediction moves each circle at this velocity.
+foc_ros needs circles with a centre, a radius and, if the obstacles move, a velocity. This example turns the boxes of an object
+detector into circles. A small tracker estimates the velocity of each object from its last two detections. The prediction moves
+each circle at this velocity.
 """
 
 from dataclasses import dataclass, field

@@ -2,8 +2,8 @@
 A batch of many scenes
 ======================
 
-Studies need many scenes. This example solves sixty random scenes with two strategies and compares their efforts. Expected failures are a status and
-not an exception, so that a batch never stops at a difficult scene.
+Studies need many scenes. This example solves sixty random scenes with two strategies and compares their efforts. Expected
+failures are a status and not an exception, so that a batch never stops at a difficult scene.
 """
 
 from collections import Counter

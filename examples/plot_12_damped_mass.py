@@ -2,8 +2,8 @@
 The damped mass
 ===============
 
-The default plant of the hand is a triple integrator, which is driven by jerk. The plant `damped_mass` is driven by force: it is the second-order
-plant of the paper's discussion. The parameter `foc.plant` selects it, here and in the node.
+The default plant of the hand is a triple integrator, which is driven by jerk. The plant `damped_mass` is driven by force: it is
+the second-order plant of the paper's discussion. The parameter `foc.plant` selects it, here and in the node.
 """
 
 import matplotlib.pyplot as plt
