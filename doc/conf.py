@@ -11,9 +11,9 @@ copyright = f'{author}, Apache-2.0'  # noqa: A001 (the name that Sphinx wants)
 
 extensions = [
     'myst_parser',
+    'numpydoc',
     'sphinx.ext.autodoc',
     'sphinx.ext.mathjax',
-    'sphinx.ext.napoleon',
     'sphinx_gallery.gen_gallery',
 ]
 exclude_patterns = ['examples', 'sg_execution_times.rst']
@@ -29,9 +29,8 @@ nitpick_ignore_regex = [('py:.*', '.*')]
 autodoc_default_options = {'member-order': 'bysource'}
 autodoc_typehints = 'none'
 add_module_names = False
-napoleon_google_docstring = False
-napoleon_use_rtype = False
-napoleon_use_ivar = True
+numpydoc_show_class_members = False
+numpydoc_attributes_as_param_list = True
 # single backticks in docstrings are code
 default_role = 'code'
 
@@ -50,3 +49,14 @@ sphinx_gallery_conf = {
 
 html_theme = 'furo'
 html_title = 'foc_ros'
+
+
+def escape_bars(*arguments: object) -> None:
+    """Let |U| in a docstring be the size of U, and not a substitution of reStructuredText."""
+    lines: list[str] = arguments[-1]  # type: ignore[assignment]
+    lines[:] = [line if '``' in line else line.replace('|', '\\|') for line in lines]
+
+
+def setup(app: object) -> None:
+    """Connect the function to Sphinx."""
+    app.connect('autodoc-process-docstring', escape_bars)  # type: ignore[attr-defined]

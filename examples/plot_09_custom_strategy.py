@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import matplotlib.pyplot as plt
 import numpy as np
+from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 
 import foc_ros
-from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.strategies import StrategyResult
 from foc_ros.core.registry import STRATEGIES
 

@@ -18,6 +18,9 @@ plants = {
     'damped mass, 20 N s/m': {'foc.plant': 'damped_mass', 'foc.plant_mass': 1.0, 'foc.plant_damping': 20.0},
 }
 
+# %%
+# A force may change at once, so that the damped mass starts with an acceleration. The triple integrator starts smoothly.
+
 figure, (paths, speeds) = plt.subplots(1, 2, figsize=(11, 3.6), width_ratios=(1.5, 1), layout='constrained')
 paths.add_patch(plt.Circle(obstacles[0].centre, obstacles[0].radius, color='0.7'))
 for name, values in plants.items():
@@ -26,10 +29,6 @@ for name, values in plants.items():
     print(f'{name}: {solution.mean.shape[1]} states, {solution.status.value}')
     paths.plot(*solution.path.T, label=name)
     speeds.plot(solution.times, np.hypot(*solution.mean[:, 2:4].T), label=name)
-
-# %%
-# A force may change at once, so that the damped mass starts with an acceleration. The triple integrator starts smoothly.
-
 paths.set(xlabel='x [m]', ylabel='y [m]', aspect='equal')
 speeds.set(xlabel='time [s]', ylabel='speed [m/s]')
 speeds.legend()

@@ -1,4 +1,4 @@
-"""The documentation names only files, parameters, commands and tests that exist, and every page can be found from the start page."""
+"""The documentation names only files, parameters, commands and tests that exist, and the start page leads to every page."""
 
 import ast
 import re
