@@ -16,7 +16,7 @@ from .dynamics.plant_models import make_plant_model
 from .dynamics.predictive_covariance import predictive_covariance, timing_covariances
 from .estimation.duration import choose_candidate_durations, estimate_times_to_go, is_passing
 from .homotopy import search
-from .homotopy.demonstrations import Demonstration, recall_demonstrations
+from .homotopy.demonstrations import Demonstration, GuessTiming, recall_demonstrations
 from .likelihood import make_cost_model, select_most_likely
 from .memory import Memory
 from .obstacles.culling import cull_obstacles
@@ -54,7 +54,7 @@ def predict(
     durations = estimate_times_to_go(hand, goals, config.duration)
     given, obstacles = obstacles, cull_obstacles(obstacles, hand.mean[:2], goals, max(durations), config.scene.max_obstacles)
     found = search(hand.mean, goals, obstacles, config.homotopy, durations, config.foc.steps, memory.candidates)
-    scene = hand, goals, obstacles, config.homotopy, durations, config.foc.steps
+    scene = hand, goals, obstacles, config.homotopy, GuessTiming(durations, config.foc.steps)
     candidates = recall_demonstrations(library, *scene, found.candidates, memory.candidates)
     problems = build_problems(config, hand, obstacles, goals, candidates, durations)
     costs, earlier = make_cost_model(hand.effort_spent, config), memory.find_earlier(candidates)
