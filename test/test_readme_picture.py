@@ -1,4 +1,4 @@
-"""The pictures of README and concepts exist and their scripts draw the described contents; the tables of the examples are current."""
+"""The pictures of README and concepts exist, their scripts draw them, and the tables of the examples are current."""
 
 from __future__ import annotations
 
