@@ -1,9 +1,9 @@
 """Kernels: plain functions on numbers, arrays and NamedTuples of them, compiled to machine code by numba.
 
-There are two kinds. An entry kernel (`compiled`, `compiled_exactly`) is called from Python: it is compiled where it is defined, for
-the types that its annotations name, and the machine code is kept beside the source, or in the user's cache directory where that
-cannot be written. An inner kernel (`compiled_with_caller`) is called by other kernels only: it is compiled as part of each entry
-kernel that needs it, for the types of that call, and it may be given NamedTuples that a kernel has built.
+There are two kinds. An entry kernel (`compiled`, `compiled_exactly`) is called from Python: it is compiled where it is defined,
+for the types that its annotations name, and the machine code is kept beside the source, or in the user's cache directory where
+that cannot be written. An inner kernel (`compiled_with_caller`) is called by other kernels only: it is compiled as part of each
+entry kernel that needs it, for the types of that call, and it may be given NamedTuples that a kernel has built.
 
 The first import on a machine compiles all entry kernels, which takes some time. Numba checks only the file of an entry kernel for
 changes, not the files of what it calls, so `forget_outdated` removes machine code that is older than any of these.
@@ -11,6 +11,7 @@ changes, not the files of what it calls, so `forget_outdated` removes machine co
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -65,8 +66,8 @@ _FIELD_TYPES = _TYPES | {'Indices': types.Array(types.intp, 1, 'C', readonly=Tru
 """In a NamedTuple a type has to match exactly: numba converts arrays from writeable to read-only or to any stride, not tuples."""
 MACHINE_CODE = '*.nb[ic]'
 """Numba's files of machine code, named source.kernel-line.python.nbi and .nbc."""
-IMPORT_OF_THIS_MODULE = b'kernels import'
-"""Text of every source that defines a kernel, or a NamedTuple that one takes; this module contains it too."""
+SOURCE_OF_KERNELS = re.compile(rb'@compiled|\(NamedTuple\)')
+"""Text in every source of a kernel, or of a NamedTuple that one takes; it occurs in this module too."""
 REORDERED = {'contract', 'reassoc'}
 """What the compiler may change: the order of sums, and fused products. It may not assume that numbers are finite."""
 
@@ -76,7 +77,7 @@ def forget_outdated(folder: Path) -> None:
     kept = list(folder.glob(f'**/__pycache__/{MACHINE_CODE}'))
     if not kept:
         return
-    sources = [each for each in folder.glob('**/*.py') if IMPORT_OF_THIS_MODULE in each.read_bytes()]
+    sources = [each for each in folder.glob('**/*.py') if SOURCE_OF_KERNELS.search(each.read_bytes())]
     changed = max((each.stat().st_mtime for each in sources), default=0.0)
     for each in kept:
         with suppress(OSError):  # another process was faster, or we may not remove the file
@@ -96,9 +97,9 @@ def compiled(kernel: Kernel) -> Kernel:
     Parameters
     ----------
     kernel
-        A function that writes only to `Scratch` and `Register` arguments and never raises. Each parameter is annotated by a number
-        type, by an alias of this module, or by a NamedTuple class whose fields are annotated so. Numba accepts a NamedTuple only
-        if all its arrays are C-contiguous and read-only: see `freeze`.
+        A function that writes only to `Scratch` and `Register` arguments and never raises. Each parameter is annotated by a
+        number type, by an alias of this module, or by a NamedTuple class whose fields are annotated so. Numba accepts a
+        NamedTuple only if all its arrays are C-contiguous and read-only: see `freeze`.
     """
     return _compile_entry(kernel, REORDERED)
 
@@ -124,7 +125,7 @@ def freeze(group: Group) -> Group:
 
 
 def _compile_entry(kernel: Kernel, freedom: set[str]) -> Kernel:
-    scope = kernel.__globals__  # type: ignore[attr-defined]
+    scope = kernel.__globals__
     signature = tuple(_find_type(each, scope, _TYPES) for name, each in kernel.__annotations__.items() if name != 'return')
     try:
         return cast('Kernel', njit(signature, cache=True, fastmath=freedom, error_model='numpy')(kernel))
@@ -142,4 +143,4 @@ def _find_type(annotation: object, scope: dict[str, Any], known: dict[str, types
     group = scope[name]
     inside = vars(sys.modules[group.__module__])
     fields = [_find_type(each, inside, _FIELD_TYPES) for each in group.__annotations__.values()]
-    return types.BaseTuple.from_types(fields, group)
+    return cast('types.Type', types.BaseTuple.from_types(fields, group))  # type: ignore[no-untyped-call]

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled
+from foc_ros.core.types import Array
 
 from .impulse_response import apply_impulse_response
 
@@ -14,8 +15,8 @@ from .impulse_response import apply_impulse_response
 class PositionNoise(NamedTuple):
     """How a control spreads the position over the horizon.
 
-    responses (5, 2, N + 1): impulse responses of x and y and their products xx, yy, xy (`Horizon.maps`); noise_variance (2N,): c^2
-    for each entry of the stacked control; free (3, N): variances xx, yy, xy that the control does not cause [m^2].
+    responses (5, 2, N + 1): impulse responses of x and y and their products xx, yy, xy (`Horizon.maps`); noise_variance (2N,):
+    c^2 for each entry of the stacked control; free (3, N): variances xx, yy, xy that the control does not cause [m^2].
     """
 
     responses: Tensor
@@ -36,22 +37,12 @@ def largest_shift(position: Tensor, control: Vector, other: Vector) -> float:
     return float(np.abs(apply_impulse_response(position, control - other)).max())
 
 
-@compiled
-def variance_weights(states: Tensor, terminal: Vector, stage: Vector) -> Vector:
+def variance_weights(states: Array, terminal: Array, stage: Array) -> Array:
     """Return d (2N,), where d.u^2 is what a control's noise u adds to sum_i terminal_i X_i(N)^2 + stage_i sum_{t < N} X_i(t)^2.
 
     states (n, 2, N + 1): impulse responses of the states; terminal, stage (n,): weights.
     """
-    n, _, times = states.shape
-    steps = times - 1
-    total = np.zeros(2 * steps)
-    for i in range(n):
-        if terminal[i] == 0.0 and stage[i] == 0.0:
-            continue
-        for channel in range(2):
-            before = 0.0
-            for since in range(1, times):
-                square = states[i, channel, since] ** 2
-                total[channel * steps + steps - since] += terminal[i] * square + stage[i] * before
-                before += square
-    return total
+    squares = states**2
+    latest, before = np.tensordot(terminal, squares, 1), np.tensordot(stage, squares, 1).cumsum(axis=1)
+    weights: Array = latest[:, :0:-1] + before[:, -2::-1]
+    return weights.ravel()

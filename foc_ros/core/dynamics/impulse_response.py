@@ -1,8 +1,8 @@
 """The effect of a control on a linear plant, as sums of impulse responses.
 
-A unit control at step k of one channel changes a quantity at step s by h(s - k), with h(0) = 0 and no effect on earlier steps. One
-response of N + 1 numbers therefore stands for a whole matrix. Responses (q, 2, N + 1) are those of q quantities to both channels;
-a control is stacked, (2N,): the first channel at steps 0..N-1, then the second.
+A unit control at step k of one channel changes a quantity at step s by h(s - k), with h(0) = 0 and no effect on earlier steps.
+One response of N + 1 numbers therefore stands for a whole matrix. Responses (q, 2, N + 1) are those of q quantities to both
+channels; a control is stacked, (2N,): the first channel at steps 0..N-1, then the second.
 """
 
 from __future__ import annotations

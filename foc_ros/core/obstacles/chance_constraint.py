@@ -23,9 +23,9 @@ CERTAIN_K = 1e6
 class UncertainCircles(NamedTuple):
     """m circles whose centres and radii are Gaussian.
 
-    centre (m, 2): mean centres at step 0 [m]; drift (m, 2): how far they move in a step [m]; size_mean, size_variance (m,): E[R^2]
-    [m^2] and Var[R^2] [m^4]; centre_covariance (m, 2, 2) [m^2]; ignored_until (m,): steps from now before which a circle does not
-    count, because the hand is still leaving its margin.
+    centre (m, 2): mean centres at step 0 [m]; drift (m, 2): how far they move in a step [m]; size_mean, size_variance (m,):
+    E[R^2] [m^2] and Var[R^2] [m^4]; centre_covariance (m, 2, 2) [m^2]; ignored_until (m,): steps from now before which a circle
+    does not count, because the hand is still leaving its margin.
     """
 
     centre: Matrix
@@ -52,21 +52,10 @@ def size_moments(obstacles: Obstacles) -> tuple[Array, Array]:
     return mean2 + var, 4 * mean2 * var + 2 * var**2
 
 
-@compiled
-def centre_trajectories(centre: Matrix, drift: Matrix, steps: int) -> Tensor:
+def centre_trajectories(centre: Array, drift: Array, steps: int) -> Array:
     """Return mean centres at steps 0..N, (N + 1, n, 2) [m], from those now (n, 2) [m] and their drift per step (n, 2) [m]."""
-    moved = np.empty((steps + 1, len(centre), 2))
-    for t in range(steps + 1):
-        for j in range(len(centre)):
-            for axis in range(2):
-                moved[t, j, axis] = centre[j, axis] + t * drift[j, axis]
+    moved: Array = centre + np.arange(steps + 1.0)[:, None, None] * drift
     return moved
-
-
-@compiled_with_caller
-def variance_at(x: float, y: float, xx: float, yy: float, xy: float, size_variance: float) -> float:
-    """Return Var[C] of one circle at one time: d = (x, y), and xx, yy, xy the covariance of the position relative to it."""
-    return float(size_variance + 4 * (x * x * xx + y * y * yy + 2 * x * y * xy))
 
 
 @compiled_with_caller
@@ -92,5 +81,5 @@ def constraint_moments(positions: Matrix, covariance: Matrix, circles: Uncertain
             y = positions[t, 1] - (circles.centre[j, 1] + (t + 1) * circles.drift[j, 1])
             xx, yy, xy = covariance[0, t] + own[0, 0], covariance[1, t] + own[1, 1], covariance[2, t] + own[0, 1]
             mean[j, t] = circles.size_mean[j] - x * x - y * y if t + 1.0 >= circles.ignored_until[j] else -np.inf
-            variance[j, t] = variance_at(x, y, xx, yy, xy, circles.size_variance[j])
+            variance[j, t] = circles.size_variance[j] + 4 * (x * x * xx + y * y * yy + 2 * x * y * xy)
     return mean, variance

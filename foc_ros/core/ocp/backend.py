@@ -19,10 +19,10 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.types import Array
 
 ATTEMPTS = ((1e-10, 0.99, False), (1e-9, 0.9, False), (1e-7, 0.9, True))
-"""Settings of PIQP that are tried in this order: accuracy (absolute and relative, for problems scaled to numbers around 1), share of
-the way to the boundary that a step may take, cost scaling. With 0.99 PIQP can oscillate for ever on three variables."""
+"""Settings of PIQP that are tried in this order: accuracy (absolute and relative, for problems scaled to numbers around 1), share
+of the way to the boundary that a step may take, cost scaling. With 0.99 PIQP can oscillate for ever on three variables."""
 INFEASIBLE = 1e-10
-"""Accuracy of PIQP's own proofs of infeasibility. With its default, 1e-4, it takes rows that hardly give way for a contradiction."""
+"""Accuracy of PIQP's proofs of infeasibility. With its default, 1e-4, it takes rows that hardly give way for a contradiction."""
 MAX_ITERATIONS = 100
 """Of one attempt; 5 to 15 are usual."""
 

@@ -74,7 +74,7 @@ class Problem(Record):
 
     @cached_property
     def extent(self) -> float:
-        """Size of the scene, to which tolerances are relative: distance to the goal, or the largest radius if that is more [m]."""
+        """Size of the scene, to which tolerances are relative [m]: distance to the goal, or the largest radius."""
         x, y = (self.goal[:2] - self.initial_mean[:2]).tolist()
         return max(math.hypot(x, y), SMALLEST_EXTENT, float(self.obstacles.radius.max(initial=0.0)))
 
@@ -93,7 +93,7 @@ class Problem(Record):
         )
         motion = Motion(self.horizon.motion, np.ascontiguousarray(self.free[:, :4].T * scale[:, None]))
         cost = CostTerms(self.weighted_variance, self.summed_variance, *self.goal_rows)
-        return freeze(ProblemTerms(motion, cost, chance, self.centre_trajectories, self.extent))
+        return freeze(ProblemTerms(motion, cost, chance, self.courses, self.extent))
 
     @cached_property
     def free(self) -> Array:
@@ -115,19 +115,14 @@ class Problem(Record):
         return drift
 
     @cached_property
-    def centre_trajectories(self) -> Array:
+    def courses(self) -> Array:
         """Mean centres of the obstacles at steps 0..N, (N + 1, m, 2) [m]."""
         return centre_trajectories(self.obstacles.centre, self.drift, self.horizon.steps)
 
     @property
-    def courses(self) -> Array:
-        """Return `centre_trajectories`."""
-        return self.centre_trajectories
-
-    @property
     def centres(self) -> Array:
         """Mean centres of the obstacles at steps 1..N, obstacle by obstacle, (m, N, 2) [m]."""
-        return self.centre_trajectories[1:].swapaxes(0, 1)
+        return self.courses[1:].swapaxes(0, 1)
 
     @cached_property
     def first_alike(self) -> NDArray[np.intp]:

@@ -6,7 +6,7 @@ subject to sum_q coefficient[j, t, q] (map_q(t) * weights[q]) u >= limit[j, t] f
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -32,8 +32,8 @@ NO_FURTHER_ROWS = np.zeros((0, 0, 0))
 class GoalSolution(NamedTuple):
     """The solution of a QP without obstacle rows, and how further rows change it.
 
-    control (2N,): the minimiser; inverse (2N,) and factor (r, 2N): further rows M with multipliers y add P M'y to the control, with
-    P = diag(inverse) - factor' factor. H being the Hessian and E the goal rows, P = H^-1 - H^-1 E'(E H^-1 E' + softness)^-1 E H^-1.
+    control (2N,): the minimiser; inverse (2N,) and factor (r, 2N): further rows M with multipliers y add P M'y to the control,
+    P = diag(inverse) - factor' factor = H^-1 - H^-1 E'(E H^-1 E' + softness)^-1 E H^-1 for the Hessian H and the goal rows E.
     """
 
     control: Vector
@@ -123,24 +123,20 @@ class ObstacleRows(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ReachingQP:
-    """A cost and obstacle rows, with the fields of `ObstacleRows`, and the name of the solver that is to be used."""
+    """A cost, obstacle rows with frozen arrays, and the name of the solver that is to be used."""
 
     cost: Cost
-    responses: Array
-    weights: Array
-    coefficients: Array
-    limits: Array
-    further: Array = field(default_factory=lambda: NO_FURTHER_ROWS)
+    obstacle_rows: ObstacleRows
     backend: str = 'piqp'
 
-    @cached_property
-    def obstacle_rows(self) -> ObstacleRows:
-        """The obstacle rows as kernels take them."""
-        return freeze(ObstacleRows(self.responses, self.further, self.weights, self.coefficients, self.limits))
+    @property
+    def limits(self) -> Array:
+        """Right-hand side of every obstacle row, (m, N + e)."""
+        return self.obstacle_rows.limits
 
     def row_values(self, control: Array) -> Array:
         """Return the left-hand side of every obstacle row for a control (2N,), (m, N + e)."""
-        return evaluate_rows(self.responses, self.further, self.weights, self.coefficients, control)
+        return evaluate_rows(*self.obstacle_rows[:4], control)
 
     def rows(self, obstacle: NDArray[np.intp], step: NDArray[np.intp]) -> Array:
         """Return obstacle rows (k, 2N) for k pairs of obstacle and step index."""
@@ -226,17 +222,16 @@ def clearance_qp(
     between
         (e,): times in steps at which rows hold besides the steps. Their rows follow, as if they were steps N + 1..N + e.
     """
-    steps = problem.horizon.steps
+    steps, further = problem.horizon.steps, NO_FURTHER_ROWS
     normals, limits = half_planes(problem, guess, tau, literal=literal)
-    maps, weights = problem.horizon.maps[:2], np.ones((2, 2 * steps))
-    if not len(between):
-        return ReachingQP(cost, maps, weights, normals, limits, backend=problem.qp_backend)
-    further, free = interpolation_rows(problem.terms.motion, between)
-    path = np.concatenate((problem.initial_mean[None, :2], guess))
-    positions = np.stack([np.interp(between, np.arange(steps + 1.0), axis) for axis in path.T], axis=1)
-    more_normals, more_limits = linearise_clearance(positions, free, between, problem.circles(tau), False)
-    normals, limits = np.concatenate((normals, more_normals), axis=1), np.concatenate((limits, more_limits), axis=1)
-    return ReachingQP(cost, maps, weights, normals, limits, further, problem.qp_backend)
+    if len(between):
+        further, free = interpolation_rows(problem.terms.motion, between)
+        path = np.concatenate((problem.initial_mean[None, :2], guess))
+        positions = np.stack([np.interp(between, np.arange(steps + 1.0), axis) for axis in path.T], axis=1)
+        more_normals, more_limits = linearise_clearance(positions, free, between, problem.circles(tau), False)
+        normals, limits = np.concatenate((normals, more_normals), axis=1), np.concatenate((limits, more_limits), axis=1)
+    rows = ObstacleRows(problem.horizon.maps[:2], further, np.ones((2, 2 * steps)), normals, limits)
+    return ReachingQP(cost, freeze(rows), problem.qp_backend)
 
 
 def half_planes(problem: Problem, guess: Array, tau: float, *, literal: bool = False) -> tuple[Array, Array]:
@@ -256,7 +251,7 @@ def half_planes(problem: Problem, guess: Array, tau: float, *, literal: bool = F
 def linearise_clearance(
     guess: Matrix, free: Matrix, times: Vector, circles: MovingCircles, literal: bool
 ) -> tuple[Tensor, Matrix]:
-    """Return normals (m, q, 2) and limits (m, q) of `half_planes` at q times (q,), for a guess (q, 2) and free positions (q, 2)."""
+    """Return normals (m, q, 2) and limits (m, q) of `half_planes` at times (q,), for a guess (q, 2) and free positions (q, 2)."""
     m, q = len(circles.reach), len(times)
     normals, limits = np.empty((m, q, 2)), np.empty((m, q))
     for j in range(m):

@@ -126,7 +126,7 @@ def compute_cost_terms(problem: Problem, control: Array, mean: Array, covariance
 
 @compiled
 def sum_errors(mean: Matrix, covariance: Tensor, goal: Vector, terminal: Vector, stage: Vector) -> tuple[float, float, float]:
-    """Return the weighted squared errors of a mean (N + 1, n), its weighted variances, and the sum of the variances of x and y."""
+    """Return weighted squared errors of a mean (N + 1, n), weighted variances, and the sum of the variances of x and y."""
     times, n = mean.shape
     squared, variance, summed = 0.0, 0.0, 0.0
     for t in range(1, times):

@@ -57,9 +57,9 @@ class SqpOptions:
 class SqpResult:
     """How a sequence of QPs ended.
 
-    control (2N,), its positions (N, 2) at steps 1..N, its active rows and contacts; qp_solves: QPs solved, each round of a working
-    set counted; linearisations: how many there were; stays: whether the last one returned its own control; jumped: the result of
-    the jump, if that ended the sequence.
+    control (2N,), its positions (N, 2) at steps 1..N, its active rows and contacts; qp_solves: QPs solved, each round of a
+    working set counted; linearisations: how many there were; stays: whether the last one returned its own control; jumped: the
+    result of the jump, if that ended the sequence.
     """
 
     control: Array
@@ -79,7 +79,7 @@ def converge(
     tau: float,
     lam: float,
     deadline: Deadline = NEVER,
-    options: SqpOptions = SqpOptions(),  # noqa: B008  frozen
+    options: SqpOptions = SqpOptions(),
 ) -> SqpResult | None:
     """Solve the reformulated problem at (tau, lambda) by sequential QPs.
 

@@ -1,7 +1,7 @@
 """The data of a problem as kernels take them: NamedTuples of frozen arrays, built once for each problem.
 
-Arrays follow the conventions of the package: stacked controls have 2N entries, the first channel at steps 0..N-1, then the second;
-trajectories have rows x, y, vx, vy at steps 0..N, with velocities in metres per step; m is the number of circles.
+Arrays follow the conventions of the package: stacked controls have 2N entries, the first channel at steps 0..N-1, then the
+second; trajectories have rows x, y, vx, vy at steps 0..N, with velocities in metres per step; m is the number of circles.
 """
 
 from __future__ import annotations

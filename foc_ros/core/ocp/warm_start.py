@@ -58,8 +58,8 @@ def resample_solution(
 ) -> tuple[Matrix, Vector]:
     """Return positions (steps, 2) and the stacked control (2 steps,) at new steps of dt [s], the first elapsed_s later.
 
-    mean (n + 1, states), its position first, and control (n, 2) at steps of `before` [s]; the control is zero before they begin and
-    after they end.
+    mean (n + 1, states), its position first, and control (n, 2) at steps of `before` [s]; the control is zero before they begin
+    and after they end.
     """
     n = len(control)
     positions, stacked = np.empty((steps, 2)), np.zeros(2 * steps)

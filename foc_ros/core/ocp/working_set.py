@@ -1,7 +1,7 @@
 """Solution of the QP of one linearisation in the range space of the few obstacle rows that matter.
 
-A working set of rows M adds multipliers y >= 0, which minimise 1/2 y'Ky - m'y with K = M P M' and m what the goal's control u_goal
-leaves missing, and u = u_goal + P M'y (P: `qp.GoalSolution`). Rows that u violates join the set until there are none: the result is
+A working set of rows M has multipliers y >= 0, which minimise 1/2 y'Ky - m'y with K = M P M' and m what the goal's control u_goal
+leaves missing, and u = u_goal + P M'y (P: `qp.GoalSolution`). Rows that u violates are added until there are none: the result is
 that of the QP with every row.
 """
 
@@ -66,6 +66,11 @@ class WorkingSet:
         """Return the set of the rows to keep (k,)."""
         return WorkingSet(self.obstacle[keep], self.step[keep])
 
+    def unite(self, obstacle: Index, step: Index, steps: int) -> WorkingSet:
+        """Return these rows and others, each once, in order of obstacle and step (0..steps - 1)."""
+        flat = np.union1d(self.obstacle * steps + self.step, obstacle * steps + step)
+        return WorkingSet(*np.divmod(flat, steps))
+
 
 @dataclass(frozen=True, eq=False)
 class QPSolution:
@@ -88,7 +93,7 @@ Failed: TypeAlias = Literal[DualStatus.CONTRADICTION, DualStatus.UNSOLVED]
 
 
 class DualQP(NamedTuple):
-    """The QP for the multipliers of k rows M, in units in which each row's multiplier changes it by one, and at most one is missing.
+    """The QP for the multipliers of k rows M, in units in which a row's multiplier changes it by one, and at most one is missing.
 
     effects: M P (k, 2N), without these units; gram: K (k, k); missing (k,): what the goal's control leaves missing; unit (k,): of
     each multiplier; immovable: the most that is missing in a row which the goal alone decides [m]. Such a row takes no part in K.
@@ -138,17 +143,8 @@ def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False, thoroug
             active = multipliers > 0
             return QPSolution(control, working.only(active), multipliers[active], solves)
         kept = working if elastic else working.only(multipliers > 0)
-        working = WorkingSet(*unite_rows(*kept.rows, obstacle, step, qp.limits.shape[1]))
+        working = kept.unite(obstacle, step, qp.limits.shape[1])
     return solve_full(qp) if thorough and not elastic else None
-
-
-@compiled
-def unite_rows(
-    obstacle: Indices, step: Indices, other_obstacle: Indices, other_step: Indices, steps: int
-) -> tuple[Indices, Indices]:
-    """Return the rows of two sets, each once, in order of obstacle and step (0..steps - 1)."""
-    flat = np.unique(np.concatenate((obstacle * steps + step, other_obstacle * steps + other_step)))
-    return flat // steps, flat % steps
 
 
 def solve_with_rows(goal: GoalSolution, rows: Array, limits: Array, backend: str) -> Array | Failed:

@@ -14,7 +14,8 @@ from .hermite import compute_trajectory
 from .newton import newton_on_contacts
 
 SETTLED = 1e-5
-"""Largest move of a contact, relative to the scene, at which the Newton iteration ends: it converges quadratically, to about 1e-9."""
+"""Largest move of a contact, relative to the scene, at which the Newton iteration ends. Quadratic convergence leaves about
+1e-9."""
 CLEAR = 3e-8
 """Depth in a circle that counts as rounding, relative to the scene."""
 MAX_CHANGES = 8

@@ -17,8 +17,8 @@ MERGE_DISTANCE = 1.5
 class Contacts(NamedTuple):
     """k contacts, with frozen arrays.
 
-    obstacle (k,): row of the circle; time (k,): in steps from now, fractions allowed; multiplier (k,): how much the cost grows with
-    each metre more of distance to keep [m/s^6].
+    obstacle (k,): row of the circle; time (k,): in steps from now, fractions allowed; multiplier (k,): how much the cost grows
+    with each metre more of distance to keep [m/s^6].
     """
 
     obstacle: Indices
@@ -39,7 +39,7 @@ class Contacts(NamedTuple):
         return WorkingSet(*np.divmod(flat, steps)), multiplier
 
     def merge(self, first_alike: Indices) -> Contacts:
-        """Return one contact for each place, where these came from rows at steps or from another problem: see `merge_contacts`."""
+        """Return one contact for each place, where these come from rows at steps or another problem: see `merge_contacts`."""
         return freeze(merge_contacts(self, first_alike))
 
 
@@ -50,7 +50,7 @@ NO_CONTACTS = freeze(Contacts(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(
 def merge_contacts(contacts: Contacts, first_alike: Indices) -> Contacts:
     """Return contacts in order, with neighbours on the same circle as one: at the centre of their multipliers, with their sum.
 
-    first_alike (m,): for each circle the first that is the same. Multipliers that are not known, as after the full QP, count as 1.
+    first_alike (m,): for each circle the first that is the same. Multipliers that are not known, as after a full QP, count as 1.
     """
     k, count = len(contacts.time), 0
     circle, time, weight = np.empty(k, np.intp), np.empty(k), np.empty(k)

@@ -69,7 +69,7 @@ def trajectory_around(motion: Motion, control: Vector, t: int) -> Matrix:
 
 @compiled
 def interpolation_row(responses: Tensor, time: float, x: float, y: float) -> Vector:
-    """Return the row (2N,) whose product with the control is its effect on x p_x + y p_y at a time: responses (4, 2, N + 1)."""
+    """Return the row (2N,) whose product with the control is its effect on x p_x + y p_y at a time; see `Motion.responses`."""
     steps = responses.shape[2] - 1
     t = min(int(time), steps - 1)
     weight, direction = basis(time - t, 0), (x, y)
@@ -86,7 +86,7 @@ def interpolation_row(responses: Tensor, time: float, x: float, y: float) -> Vec
 
 @compiled
 def interpolation_rows(motion: Motion, times: Vector) -> tuple[Tensor, Matrix]:
-    """Return the effect of the control on x and y at e times (e,) as rows (2, e, 2N), and the positions (e, 2) without control."""
+    """Return the effect of the control on x and y at times (e,) as rows (2, e, 2N), and the positions (e, 2) without control."""
     rows, free = np.empty((2, len(times), 2 * (motion.responses.shape[2] - 1))), np.empty((len(times), 2))
     for i in range(len(times)):
         rows[0, i] = interpolation_row(motion.responses, times[i], 1.0, 0.0)

@@ -53,8 +53,8 @@ def solve_kkt_point(
     tau, lam
         Clearance term [m^2] and weight of the variances [1/s^6].
     class_angles
-        (m,): angles that the mean has to sweep about the centres, to within half a turn, which define its homotopy class; those of
-        the control if not given.
+        (m,): angles that the mean has to sweep about the centres, to within half a turn, which define its homotopy class;
+        those of the control if not given.
 
     Returns
     -------
@@ -71,7 +71,7 @@ def solve_kkt_point(
 def _solve_kkt_point(
     terms: ProblemTerms, circles: MovingCircles, lam: float, contacts: Contacts, near: Vector, class_angles: Vector
 ) -> tuple[bool, KktPoint]:
-    """Return whether there is a point near a control (2N,), and the point; class_angles: (m,), or none for those of the control."""
+    """Return whether there is a point near a control (2N,), and the point; class_angles (m,): none for those of the control."""
     cost, motion = terms.cost, terms.motion
     hessian = compute_hessian(cost, lam)
     goal = solve_goal(hessian, np.zeros_like(hessian), cost.goal_rows, cost.goal_targets, cost.softness)
@@ -89,7 +89,7 @@ def _solve_kkt_point(
 def solve_at_fixed_times(
     problem: Problem, control: Array, contacts: Contacts, tau: float, lam: float
 ) -> tuple[Array, Contacts] | None:
-    """Find the solution near a control (2N,) whose contacts hold at the given steps; None where it is none, or enters a circle."""
+    """Find the solution near a control (2N,) whose contacts hold at given steps; None where it is none, or enters a circle."""
     circles = problem.circles(tau)
     found, control, contacts = _solve_at_fixed_times(
         problem.terms, circles, lam, contacts, np.ascontiguousarray(control, dtype=float)
@@ -150,7 +150,7 @@ def find_crossings(problem: Problem, control: Array, tau: float) -> Array:
 
 def compute_class_angles(problem: Problem, control: Array) -> Array:
     """Return the angles (m,) that the mean of a control (2N,) sweeps about the centres, which define its homotopy class."""
-    return compute_swept_angles(problem.trajectory(control)[:2].T, problem.centre_trajectories)
+    return compute_swept_angles(problem.trajectory(control)[:2].T, problem.courses)
 
 
 def is_in_class(problem: Problem, control: Array, class_angles: Array) -> bool:

@@ -1,9 +1,9 @@
 """Newton iteration on the optimality conditions of a mean that is in contact with circles.
 
-The mean behaves like a loaded beam. Let a contact at time s have distance d from the centre and multiplier y along its normal n.
-A multiplier f along its tangent t turns the normal by f d / y. As the mean passes with velocity v and acceleration a, its distance
-falls and rises again with curvature b = n.a + (t.v)^2 / d, so a multiplier m on the rate of the distance moves the contact by m / y
-in time. With the rows
+The mean behaves like a loaded beam. Let a contact at time s have distance d from the centre and multiplier y along its normal
+n. A multiplier f along its tangent t turns the normal by f d / y. As the mean passes with velocity v and acceleration a, its
+distance falls and rises again with curvature b = n.a + (t.v)^2 / d, so that a multiplier m on the rate of the distance moves the
+contact by m / y in time. With the rows
     h = n.S(s),    r = dh/ds = n.S'(s) + (t.v / d) t.S(s),    g = t.S(s),
 S(s) the effect of the control on the position, and C the Schur complement M P M' of rows M, each Newton step solves
     C_hh y + C_hr m + C_hg f = what h misses,

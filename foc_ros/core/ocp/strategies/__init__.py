@@ -70,7 +70,7 @@ class Strategy(Protocol):
     but returns the best that it found (`find_best_effort`) with a status.
     """
 
-    def __call__(self, problem: Problem, start: Start, settings: FocConfig, deadline: Deadline) -> StrategyResult:
+    def __call__(self, problem: Problem, start: Start, settings: FocConfig, deadline: Deadline, /) -> StrategyResult:
         """Return the result for a problem, from a start, with the parameters of the settings."""
 
 

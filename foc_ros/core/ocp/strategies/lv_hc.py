@@ -1,8 +1,8 @@
 """Strategies `lv` and `hc`: the smallest s on a penalty path that meets the surrogate.
 
 tau = delta s, lambda = lambda0 growth^s: a small delta slows the hand down (low velocity, `lv`), a large one leads it past at a
-distance (high clearance, `hc`). The paper steps along the path in whole s (algorithm 1); here s is continuous, so that the effort is
-a continuous function of eta, as ratios of costs need.
+distance (high clearance, `hc`). The paper steps along the path in whole s (algorithm 1); here s is continuous, so that the effort
+is a continuous function of eta, as ratios of costs need.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ may fall for a while. A search from the beginning of the path goes to its end, p
 CLOSE = 1e-5
 """Relative excess of k over the wanted one at which the root is found."""
 CELL = 1.0
-"""Bracket in s down to which it is bisected: k(s) may fall for a while where its minimum is at the goal, and cross a value twice."""
+"""Bracket in s down to which it is bisected: k(s) may fall for a while where its minimum is at the goal, and cross k twice."""
 NARROW = 1e-4
 """Bracket in s at which the search for the root ends: k jumps there, because the mean passes into another minimum."""
 MAX_TRIALS = 60
@@ -88,7 +88,7 @@ def _search(follower: PathFollower, start: Start) -> StrategyResult:
         first = follower.solve_first(start.positions)
     else:
         positions = np.concatenate((problem.initial_mean[None, :2], start.positions))
-        angles = compute_swept_angles(positions, problem.centre_trajectories)
+        angles = compute_swept_angles(positions, problem.courses)
         control, contacts = correct_to_goal(problem, start.control, start.positions), start.contacts.merge(problem.first_alike)
         first = follower.solve_by_newton(follower.path.s_of(start.lam), control, contacts, angles)
         if first is None:
@@ -112,7 +112,7 @@ def _search(follower: PathFollower, start: Start) -> StrategyResult:
 def _bracket(
     follower: PathFollower, first: PathPoint, wanted: float, stride: float, patience: float
 ) -> tuple[PathPoint, PathPoint | None]:
-    """Return the last point below the wanted k and the first at or above it; or else any point and one after it that is close enough.
+    """Return the last point below the wanted k and the first at or above it, or any point and one after it that is close enough.
 
     Both are the same where the first is close enough, or where the beginning of the path meets the wanted k. Where that is out of
     reach, the best point is returned, and None.
@@ -189,9 +189,9 @@ def _find_root(
     """Find k(s) = wanted between a point below and one at or above by the Illinois method; return one at or above, and dk/ds.
 
     Points are solved from the one below, to find those of several solutions at the same s that come first as s grows, and a wide
-    bracket is bisected first, at points that do not depend on the wanted k. A search from a warm start does neither: it solves from
-    the nearer end. The aim is the middle of what counts as close. After three steps on the same side the bracket is bisected, which
-    leads to the jump where k jumps.
+    bracket is bisected first, at points that do not depend on the wanted k. A search from a warm start does neither: it solves
+    from the nearer end. The aim is the middle of what counts as close. After three steps on the same side the bracket is
+    bisected, which leads to the jump where k jumps.
     """
     while high.s - low.s > CELL and not is_warm:
         middle = follower.solve_beside((low.s + high.s) / 2, low)

@@ -1,13 +1,13 @@
 """Strategy `optimal`: the least cost subject to the surrogate itself.
 
-f(u) = E[R^2] - |d(u)|^2 + k sqrt(Var(u)) <= 0 for every obstacle and step, d = mean(p) - mean(o). Each QP linearises f at the last
-u, divided by 2 |d| so that a row is a distance. The multipliers y add the convex part of the curvature of sqrt(Var) to the cost:
-y 2 k / (|d| sqrt(Var)) times the variance map, on the diagonal of the Hessian. That is a lambda for every step and a tau for every
-row.
+f(u) = E[R^2] - |d(u)|^2 + k sqrt(Var(u)) <= 0 for every obstacle and step, d = mean(p) - mean(o). Each QP linearises f at the
+last u, divided by 2 |d| so that a row is a distance. The multipliers y add the convex part of the curvature of sqrt(Var) to the
+cost: y 2 k / (|d| sqrt(Var)) times the variance map, on the diagonal of the Hessian. That is a lambda for every step and a tau
+for every row.
 
 Var itself grows with |d|. Far from the solution the rows leave that out, as the paper's linearisation does: with it, a row whose
-standard deviation exceeds its distance would ask the hand to come nearer, through the obstacle. Once the sequence has settled, the
-rows include it, and the solution is a minimum of the problem as it stands.
+standard deviation exceeds its distance would ask the hand to come nearer, through the obstacle. Once the sequence has settled,
+the rows include it, and the solution is a minimum of the problem as it stands.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ import numpy as np
 from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
 from foc_ros.core.dynamics.condensed import largest_shift, position_variances
-from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled
+from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled, freeze
 from foc_ros.core.obstacles.chance_constraint import constraint_moments, eta_of_k, k_of_eta
 from foc_ros.core.ocp.clearance import required_distance
 from foc_ros.core.ocp.contacts.contacts import Contacts
 from foc_ros.core.ocp.contacts.hermite import compute_trajectory
 from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.ocp.qp import Cost, ReachingQP, effort_cost, evaluate_rows
+from foc_ros.core.ocp.qp import NO_FURTHER_ROWS, Cost, ObstacleRows, ReachingQP, effort_cost, evaluate_rows
 from foc_ros.core.ocp.sqp import SqpOptions, converge
 from foc_ros.core.ocp.terms import ChanceTerms, Motion, MovingCircles
 from foc_ros.core.ocp.warm_start import Start
@@ -47,7 +47,7 @@ SMALLEST_STEP = 1.0 / 16
 """Smallest share of the way to the wanted k that is tried at once before k counts as out of reach."""
 
 
-def solve_optimal(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline = NEVER) -> StrategyResult:  # noqa: ARG001  it has no parameters
+def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadline = NEVER) -> StrategyResult:
     """Find a local minimum from a start."""
     search = _Search(problem, deadline)
     try:
@@ -154,7 +154,8 @@ def surrogate_qp(
         curvature = compute_curvature(chance.noise.responses, slopes, *active.rows, multipliers, chance.noise.noise_variance)
         rows = cost.goal_rows, cost.goal_targets, cost.softness
         cost = Cost(cost.hessian + curvature, curvature * control, *rows)
-    return ReachingQP(cost, problem.horizon.maps, weights, slopes, limits, backend=problem.qp_backend)
+    obstacle_rows = ObstacleRows(problem.horizon.maps, NO_FURTHER_ROWS, weights, slopes, limits)
+    return ReachingQP(cost, freeze(obstacle_rows), problem.qp_backend)
 
 
 @compiled
