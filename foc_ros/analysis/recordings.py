@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from foc_ros.analysis.csv_recordings import messages, movement_of, movement_rows, read_goals, read_obstacles
 from foc_ros.core.errors import RecordingError
 from foc_ros.core.types import Array
 from foc_ros.io.bags import BagReader, Item
 from foc_ros.io.csv_tables import Row
+
+from .csv_recordings import parse_movement, read_goals, read_movement_rows, read_obstacles, recorded_messages
 
 RECORDINGS, OBSTACLES, GOALS, LABELS = 'recordings.csv', 'obstacles.csv', 'goals.csv', 'labels.csv'
 BAG_SUFFIXES = ('.mcap', '.db3')
@@ -31,7 +32,7 @@ class BagRecording:
 
 @dataclass(frozen=True)
 class TableRecording:
-    """One recording of a table; its rows are judged when they are read, so that a bad one is the only one that fails."""
+    """One recording of a table; its rows are checked when they are read, so that a bad row fails its own recording only."""
 
     name: str
     rows: tuple[Row, ...]
@@ -40,7 +41,8 @@ class TableRecording:
 
     def items(self) -> Iterator[Item]:
         """Yield the messages that `convert` would write; raises RecordingError."""
-        for stamp_ns, topic, message in messages(movement_of(self.name, self.rows), list(self.obstacles), self.goals):
+        movement = parse_movement(self.name, self.rows)
+        for stamp_ns, topic, message in recorded_messages(movement, list(self.obstacles), self.goals):
             yield Item(topic.removeprefix('/'), topic, stamp_ns, message, b'')
 
 
@@ -50,35 +52,27 @@ Recording = BagRecording | TableRecording
 def find_recordings(data: Path) -> dict[str, Recording]:
     """Return the recordings of a folder by name.
 
-    data: holds recordings.csv with goals.csv and, unless there are none, obstacles.csv; or bags; or is itself a bag. Raises
-    RecordingError where it holds neither.
+    data: a folder with recordings.csv, goals.csv and, where there are obstacles, obstacles.csv; a folder of bags; or a bag. Raises
+    RecordingError where it is none of these.
     """
     if (data / RECORDINGS).exists():
-        return dict(_of_tables(data))
+        obstacles = tuple(read_obstacles(data / OBSTACLES)) if (data / OBSTACLES).exists() else ()
+        goals = read_goals(data / GOALS)
+        tables = read_movement_rows(data / RECORDINGS)
+        return {name: TableRecording(name, tuple(rows), obstacles, goals) for name, rows in tables.items()}
     if data.is_file() or (data / 'metadata.yaml').exists():
-        return dict(_bags([data.resolve()]))
-    if not data.is_dir():
+        bags = [data.resolve()]
+    elif data.is_dir():
+        bags = [path for path in sorted(data.iterdir()) if _may_be_bag(path)]
+    else:
         raise RecordingError(f'{data}: no such file or directory')
-    bags = dict(_bags([path for path in sorted(data.iterdir()) if _may_be_bag(path)]))
     if not bags:
         raise RecordingError(f'{data}: expected bags, or {RECORDINGS} with {GOALS}, got neither')
-    return bags
-
-
-def _bags(paths: list[Path]) -> Iterator[tuple[str, Recording]]:
-    for path in paths:
-        yield path.name, BagRecording(path.name, path)
-
-
-def _of_tables(data: Path) -> Iterator[tuple[str, Recording]]:
-    obstacles = tuple(read_obstacles(data / OBSTACLES)) if (data / OBSTACLES).exists() else ()
-    goals = read_goals(data / GOALS)
-    for name, table in movement_rows(data / RECORDINGS).items():
-        yield name, TableRecording(name, tuple(table), obstacles, goals)
+    return {path.name: BagRecording(path.name, path) for path in bags}
 
 
 def _may_be_bag(path: Path) -> bool:
-    """Tell bags from what else lies in a folder; a directory without metadata is one, to be named as broken."""
+    """Tell bags from other files; a directory with bag files but without metadata counts, so that it is reported as broken."""
     if path.name.startswith('.'):
         return False
     return path.suffix in BAG_SUFFIXES if path.is_file() else any(file.suffix in BAG_SUFFIXES for file in path.iterdir())

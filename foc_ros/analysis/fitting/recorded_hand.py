@@ -1,4 +1,4 @@
-"""What a recording holds of the hand: its positions as the estimator takes them, and the scene they were moved in."""
+"""The hand in a recording: its positions as the estimator receives them, and the scene in which it moved."""
 
 from __future__ import annotations
 
@@ -8,19 +8,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.analysis.evaluation.recordings import Recording
+from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config
 from foc_ros.core.errors import RecordingError
 from foc_ros.core.estimation.kalman_filter import update
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Record
 
-FEWEST = 10
-"""Samples that a recording needs."""
+MIN_SAMPLES = 10
 
 
 @dataclass(frozen=True, eq=False)
-class Demonstration(Record):
+class RecordedHand(Record):
     """One recording: stamps_ns (m,), rising; positions (m, 2) [m]; obstacles at the first stamp; goals (g, 2) [m]."""
 
     name: str
@@ -35,8 +34,8 @@ class Demonstration(Record):
         seconds: Array = (self.stamps_ns - self.stamps_ns[0]) / NANOSECONDS
         return seconds
 
-    def states(self, config: Config) -> list[HandState]:
-        """Return what the estimator makes of it, state after state."""
+    def estimate_states(self, config: Config) -> list[HandState]:
+        """Return the state that the estimator of a configuration gives at each sample."""
         state, states = None, list[HandState]()
         for stamp_ns, position in zip(self.stamps_ns.tolist(), self.positions, strict=True):
             state = update(state, HandSample(stamp_ns, position), config.estimator).state
@@ -44,21 +43,21 @@ class Demonstration(Record):
         return states
 
 
-def demonstration(recording: Recording, config: Config) -> Demonstration:
-    """Read a recording as a replay would, without predicting; raises RecordingError where it holds no scene or too little."""
+def read_hand(recording: Recording, config: Config) -> RecordedHand:
+    """Read a recording as a replay does, without predicting; raises RecordingError for one without goals or with few samples."""
     replayed = Replay(config)
     samples: list[HandSample] = []
     for item in recording.items():
-        verdict = replayed.intake.take(item.role, item.message)
+        status = replayed.intake.take(item.role, item.message)
         sample = replayed.intake.sample
-        if verdict is not None and verdict.taken and sample is not None and (not samples or sample is not samples[-1]):
+        if status is not None and status.taken and sample is not None and (not samples or sample is not samples[-1]):
             samples = samples if not samples or sample.stamp_ns > samples[-1].stamp_ns else []
             samples.append(sample)
     goals = replayed.pipeline.scene.goals
     if goals is None or not len(goals):
         raise RecordingError(f'{recording.name}: {replayed.pipeline.blocked() or "no goal received"}')
-    if len(samples) < FEWEST:
-        raise RecordingError(f'{recording.name}: expected at least {FEWEST} hand poses, got {len(samples)}')
+    if len(samples) < MIN_SAMPLES:
+        raise RecordingError(f'{recording.name}: expected at least {MIN_SAMPLES} hand poses, got {len(samples)}')
     stamps_ns = np.array([sample.stamp_ns for sample in samples])
     positions = np.array([sample.position for sample in samples])
-    return Demonstration(recording.name, stamps_ns, positions, replayed.pipeline.scene.obstacles(samples[0].stamp_ns), goals)
+    return RecordedHand(recording.name, stamps_ns, positions, replayed.pipeline.scene.obstacles(samples[0].stamp_ns), goals)
