@@ -85,9 +85,7 @@ def write_movement(bag: Path, movement: Movement, obstacles: list[tuple[float, .
             writer.write(topic, message, stamp_ns)
 
 
-def recorded_messages(
-    movement: Movement, obstacles: list[tuple[float, ...]], goals: Array | None
-) -> list[tuple[int, str, Any]]:
+def recorded_messages(movement: Movement, obstacles: list[tuple[float, ...]], goals: Array | None) -> list[tuple[int, str, Any]]:
     """Return the messages of a bag as (stamp [ns], topic, message), in the order of their stamps."""
     types = RosbagsTypes(TYPESTORE)
     found: list[tuple[int, str, Any]] = []

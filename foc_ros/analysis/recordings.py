@@ -52,8 +52,8 @@ Recording = BagRecording | TableRecording
 def find_recordings(data: Path) -> dict[str, Recording]:
     """Return the recordings of a folder by name.
 
-    data: a folder with recordings.csv, goals.csv and, where there are obstacles, obstacles.csv; a folder of bags; or a bag. Raises
-    RecordingError where it is none of these.
+    data: a folder with recordings.csv, goals.csv and, where there are obstacles, obstacles.csv; a folder of bags; or a bag.
+    Raises RecordingError where it is none of these.
     """
     if (data / RECORDINGS).exists():
         obstacles = tuple(read_obstacles(data / OBSTACLES)) if (data / OBSTACLES).exists() else ()

@@ -58,7 +58,7 @@ def register_baseline(name: str, forecast: ForecastFunction, settings: tuple[Any
     name
         A new name, for tables and JSON.
     forecast
-        ``forecast(observation, question, setting) -> Forecast``, built by one of the class methods of :class:`Forecast`. It may use
+        ``forecast(observation, question, setting) -> Forecast``, built by a class method of :class:`Forecast`. It may use
         all of the observation except its ``truth``, and of the question ``answers``, ``given`` and ``obstacles``. It has to be a
         function of a module, so that worker processes can import it.
     settings

@@ -35,7 +35,7 @@ def compute_straight_positions(observation: Observation, goal: int, seconds: Arr
 
 
 def _find_state(observation: Observation) -> Array:
-    """Return position, velocity and acceleration (3, 2); at rest, the last two are noise and taken as 0, as the predictor does."""
+    """Return position, velocity and acceleration (3, 2); at rest the last two are noise, and 0 as in the predictor."""
     state = observation.hand.reshape(3, 2).copy()
     if observation.movement_age_s == 0.0:
         state[1:] = 0.0

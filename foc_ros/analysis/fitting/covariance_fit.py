@@ -64,9 +64,7 @@ FEW_WIDENINGS = tuple(
 """Their best is good enough to compare predictions that differ in other parameters."""
 
 
-def compute_log_densities(
-    observation: Observation, shares: Array, config: Config, widenings: Sequence[Widening]
-) -> Array | None:
+def compute_log_densities(observation: Observation, shares: Array, config: Config, widenings: Sequence[Widening]) -> Array | None:
     """Return the log-density of the true positions, mean over the horizons, under each widening, (q,) [nat, metres].
 
     shares (k,): of the candidates; config: of the replay. None where the movement ends before the first horizon or has not begun,
@@ -80,7 +78,9 @@ def compute_log_densities(
     times = np.array(HORIZONS)[known]
     offset = true[known] - candidates.mean[np.ix_(counted, times)]
     base = candidates.covariance[np.ix_(counted, times)] + EXACT * np.eye(2)
-    jerk, end = np.array([_compute_unit_variances(float(candidates.time_s[row]), config)[:, times] for row in counted]).swapaxes(0, 1)
+    jerk, end = np.array([_compute_unit_variances(float(candidates.time_s[row]), config)[:, times] for row in counted]).swapaxes(
+        0, 1
+    )
     late = candidates.duration_sensitivity[np.ix_(counted, times)]
     squared = np.square(widenings).T
     both = np.multiply.outer(squared[0], jerk) + np.multiply.outer(squared[1], end)
@@ -130,7 +130,9 @@ def estimate_widening(table: SettingTable) -> Estimates:
     best = table.settings[table.find_best(columns)].parameters()
     resampled = [table.settings[column].parameters() for column in table.resample_best(columns)]
     return {
-        name: Estimate.from_resamples(name, float(f'{value:.4g}'), [each[name] for each in resampled], 'density of true positions')
+        name: Estimate.from_resamples(
+            name, float(f'{value:.4g}'), [each[name] for each in resampled], 'density of true positions'
+        )
         for name, value in best.items()
     }
 

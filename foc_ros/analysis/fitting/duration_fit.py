@@ -1,8 +1,8 @@
 """The duration of movements: the constants of the duration models, and how long a hand at rest waits.
 
-The constants minimise the mean absolute error of the time to go, over the samples of a movement and then over the recordings. They
-are the likeliest values where errors follow Laplace's distribution, so that a few slow movements have little weight. With Fitts'
-law, only distances that differ tell intercept and slope apart; otherwise their ratio is kept and one factor is fitted.
+The constants minimise the mean absolute error of the time to go, over the samples of a movement and then over the recordings.
+They are the likeliest values where errors follow Laplace's distribution, so that a few slow movements have little weight. With
+Fitts' law, only distances that differ tell intercept and slope apart; otherwise their ratio is kept and one factor is fitted.
 
 The wait is the mean time to the next movement over all samples at rest. That is the likeliest mean of an exponential
 distribution, which does not depend on how long the hand has waited already.
@@ -99,8 +99,9 @@ def fit_duration(hands: Sequence[RecordedHand], config: Config) -> tuple[Estimat
             value = np.abs(found.x)
         else:
             warnings.append(
-                'duration.fitts_a_s, duration.fitts_b_s: the movements are too alike to tell intercept and slope apart (the index '
-                f'of difficulty has a standard deviation of {spread_bits:.2g} bit, {NARROW_BITS:g} are needed): their ratio is kept'
+                'duration.fitts_a_s, duration.fitts_b_s: the movements are too alike to tell intercept and slope apart '
+                f'(indices of difficulty with a standard deviation of {spread_bits:.2g} bit, {NARROW_BITS:g} are needed): their '
+                'ratio is kept'
             )
     low, high = np.percentile(_resample_best_factor(errors) / best, CENTRAL)
     estimates = {}

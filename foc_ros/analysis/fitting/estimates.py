@@ -19,7 +19,7 @@ BOUNDS = {parameter.name: parameter.bound for parameter in parameters()}
 
 @dataclass(frozen=True)
 class Estimate:
-    """A fitted value by dotted name, its 95 % interval by bootstrap over recordings (nan: none), and the data that it rests on."""
+    """A fitted value by dotted name, its 95 % interval by bootstrap over recordings (nan: none), and its data."""
 
     name: str
     value: float

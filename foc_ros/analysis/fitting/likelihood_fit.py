@@ -58,7 +58,7 @@ def warn_of_missed_classes(recordings: Sequence[ObservedRecording]) -> list[str]
 
 
 def choose_form(table: SettingTable, groups: Sequence[Hashable]) -> list[int]:
-    """Return the columns of the form of the likelihood that is better held out; the plain one, unless the other is by a margin."""
+    """Return the columns of the form of the likelihood that is better held out; the plain one if the gain is small."""
     columns = range(1, len(table.settings))
     ahead = [column for column in columns if table.settings[column].lookahead_s > 0.0]
     plain = [column for column in columns if table.settings[column].lookahead_s <= 0.0]
@@ -81,8 +81,8 @@ def estimate_likelihood(table: SettingTable, columns: Sequence[int]) -> tuple[Es
         tried = {float(getattr(table.settings[column], leaf)) for column in columns}
         if len(tried) > 1 and {min(indistinct), max(indistinct)} == {min(tried), max(tried)}:
             warnings.append(
-                f'{name}: the recordings do not determine it: all values tried, from {min(indistinct):.3g} to {max(indistinct):.3g}, '
-                f'explain the classes taken within {INDISTINCT_NAT:g} nat if other parameters follow'
+                f'{name}: the recordings do not determine it: all values tried, from {min(indistinct):.3g} to '
+                f'{max(indistinct):.3g}, explain the classes taken within {INDISTINCT_NAT:g} nat if other parameters follow'
             )
     return estimates, warnings
 

@@ -157,8 +157,8 @@ def fit_plans(reaches: Sequence[Reach], config: Config) -> tuple[Estimates, list
         for name, value, a, b in zip(NAMES, (found.tau, found.lam), low, high, strict=True)
     }
     warnings = [
-        f'{NAMES[row]}: the movements do not determine it (standard deviation of its logarithm {found.local.deviation[row]:.2g}): '
-        f'{REASONS[row]}'
+        f'{NAMES[row]}: the movements do not determine it (standard deviation of its logarithm '
+        f'{found.local.deviation[row]:.2g}): {REASONS[row]}'
         for row in found.local.undetermined
     ]
     warnings.append('foc.lam: plans depend only on lambda times the square of the noise; the given noise is taken as true')
@@ -176,7 +176,7 @@ def _estimate_start(times: Array, positions: Array) -> Array:
 
 
 def _expand_log_likelihood(reaches: Sequence[Reach], residual: Array, jacobian: Array) -> tuple[Array, Array]:
-    """Return gradient (n, 2) and curvature (n, 2, 2) of the log-likelihoods at the least squares, by the Jacobian of each movement."""
+    """Return gradient (n, 2) and curvature (n, 2, 2) of each log-likelihood, by the Jacobian of the residuals."""
     variance = max(float(residual @ residual) / max(len(residual) - 2, 1), NO_CHANGE)
     jacobian = np.where((jacobian**2).sum(axis=0) > NO_CHANGE, jacobian, 0.0)
     ends = np.cumsum([2 * len(each.times) for each in reaches])[:-1]

@@ -1,10 +1,10 @@
 """Parameters of the predictor itself, by a race of settings: each replays recordings, and its predictions are scored.
 
 A setting has two scores, means over the recordings. The score of classes is the log-likelihood of the homotopy class that was
-taken plus that of the gap taken in the next row, or without obstacles that of the goal. (An assistance acts on the next gap first,
+taken plus that of the gap taken in the next row, or without obstacles that of the goal. (Assistance acts on the next gap first,
 and less chance is in it than in choices that the operator has yet to make.) The score of positions is the log-density of the true
-ones 0.25, 0.5 and 1 s ahead under the mixture of the candidates. Both are proper scores: no setting gains by claiming more or less
-than it knows. What needs no replay, the parameters of the likelihood and the widening of the covariance, is at its best for each.
+ones 0.25, 0.5 and 1 s ahead under the mixture of the candidates. Both are proper scores: no setting gains by claiming more or
+less than it knows. What needs no replay, the parameters of the likelihood and the widening of the covariance, is at its best for each.
 
 The race is successive halving (Jamieson and Talwalkar 2016, arXiv:1502.07943): all settings predict a few recordings, the better
 half of them twice as many, and so on. Settings that are hard to tell apart get the data, and plainly worse ones none.
@@ -113,7 +113,8 @@ def score_observations(recording: ObservedRecording, config: Config) -> ReplaySc
         questions = [question, *([gaps[observation.stamp_ns]] if observation.stamp_ns in gaps else [])]
         shares = [power_rule_shares(observation, rule) for rule in RULES]
         found.classes[key] = np.sum(
-            [[np.log(Forecast.from_shares(each, about).true_probability(about)) for each in shares] for about in questions], axis=0
+            [[np.log(Forecast.from_shares(each, about).true_probability(about)) for each in shares] for about in questions],
+            axis=0,
         )
         found.uniform[key] = -sum(np.log(about.possible) for about in questions)
     for observation in recording.observations:
