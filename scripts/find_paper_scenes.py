@@ -10,8 +10,8 @@ of each search.
 strategies: one class past one to three circles. J_LV / J_HC is below 1 at the first eta and above 1 from 0.94 on, and rises, for
 c = 0.15; for c = 0.05 it is never above 1, and below it at the last eta; and at eta 0.94 LV passes slower than HC.
 classes: two classes about the same circle, one of them between it and others. J_H1 / J_H2 is 1 up to eta 0.9, for LV and HC; at
-0.9615 it is 0.33 for LV and 0.67 for HC; it falls in between; and there the other circles make the second class dearer, because it is
-cluttered. For HC the distances count half: the paper stresses LV.
+0.9615 it is 0.33 for LV and 0.67 for HC; it falls in between; and there the other circles make the second class dearer, because
+it is cluttered. For HC the distances count half: the paper stresses LV.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What worker processes are given to do in tests: importable by name."""
+"""Functions for the worker processes of tests, importable by name."""
 
 import os
 import signal

@@ -20,7 +20,7 @@ def compute_log_likelihoods(questions: Questions, baseline: Baseline) -> Array:
     """Return the sum of the log-likelihoods of the true answers under each setting of a predictor, (s,)."""
 
     def log_likelihood(setting: object) -> float:
-        return sum(np.log(baseline.forecast(*pair, setting).true_probability(pair[1])) for pair in questions)
+        return float(sum(np.log(baseline.forecast(*pair, setting).true_probability(pair[1])) for pair in questions))
 
     return np.array([log_likelihood(setting) for setting in baseline.settings])
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from foc_ros.core.config import Config, parameters, updated
+from foc_ros.core.types import Array
 
 CENTRAL = (2.5, 97.5)
 """Percentiles of an interval of 95 %."""
@@ -28,7 +28,7 @@ class Estimate:
     how: str
 
     @classmethod
-    def from_resamples(cls, name: str, value: float, resampled: ArrayLike, how: str) -> Estimate:
+    def from_resamples(cls, name: str, value: float, resampled: Array | Sequence[float], how: str) -> Estimate:
         """Return the estimate whose interval holds the central values of a bootstrap, (b,)."""
         low, high = np.percentile(resampled, CENTRAL).tolist()
         return cls(name, value, low, high, how)

@@ -11,9 +11,9 @@ is exact (Schweppe 1965, doi:10.1109/TIT.1965.1053737).
 
     v t + tau (t - tau (1 - exp(-t / tau))) a,
 
-the model that predictions start from with `estimator.acceleration_time_s` = tau; where it is 0 the acceleration
-lasts, and the hand moves by v t + a t^2 / 2. The estimate minimises the mean absolute error of the mean velocity until 0.25, 0.5 and 1 s ahead, over
-the samples of a movement and then over the recordings. The acceleration is that of the filter, and so is the noise in it.
+the model that predictions start from with `estimator.acceleration_time_s` = tau. Where that is 0 the acceleration lasts, and the
+hand moves by v t + a t^2 / 2. The estimate minimises the mean absolute error of the mean velocity until 0.25, 0.5 and 1 s ahead,
+over the samples of a movement and then over the recordings. The acceleration is that of the filter, and so is the noise in it.
 """
 
 from __future__ import annotations

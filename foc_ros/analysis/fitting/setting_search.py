@@ -4,7 +4,8 @@ A setting has two scores, means over the recordings. The score of classes is the
 taken plus that of the gap taken in the next row, or without obstacles that of the goal. (Assistance acts on the next gap first,
 and less chance is in it than in choices that the operator has yet to make.) The score of positions is the log-density of the true
 ones 0.25, 0.5 and 1 s ahead under the mixture of the candidates. Both are proper scores: no setting gains by claiming more or
-less than it knows. What needs no replay, the parameters of the likelihood and the widening of the covariance, is at its best for each.
+less than it knows. What needs no replay, the parameters of the likelihood and the widening of the covariance, is at its best for
+each setting.
 
 The race is successive halving (Jamieson and Talwalkar 2016, arXiv:1502.07943): all settings predict a few recordings, the better
 half of them twice as many, and so on. Settings that are hard to tell apart get the data, and plainly worse ones none.
