@@ -22,7 +22,7 @@ from itertools import product
 
 import numpy as np
 
-from foc_ros.analysis.paper.reaching import Method, PaperScene, PathClass, compute_speed_to_obstacles, solve_class
+from foc_ros.analysis.paper.reaching import Method, PaperScene, PathClass, measure_solution, solve_class
 from foc_ros.analysis.paper.scenes import CLASSES_SCENE, NOISE, SMALL_NOISE, STRATEGY_SCENE
 from foc_ros.analysis.paper.studies import PAPER_ETA, PAPER_RATIOS
 from foc_ros.core.types import LEFT, RIGHT, Array, Status
@@ -75,10 +75,8 @@ def strategies_faults(scene: PaperScene) -> Iterator[float]:
     if np.isfinite([*rising, *low]).all():
         yield 10 * np.maximum(-np.diff(rising), 0).sum() + 10 * max(rising[0] + 0.02, 0) + max(0.5 - rising[ETAS.index(0.95)], 0)
         yield 10 * max(low[-1] + 0.05, 0) + 2 * np.maximum(np.diff(low), 0).sum()
-    slow, fast = (
-        compute_speed_to_obstacles(scene, solve_class(scene, path_class, Method(NOISE, strategy), 0.94))
-        for strategy in ('lv', 'hc')
-    )
+    solutions = (solve_class(scene, path_class, Method(NOISE, strategy), 0.94) for strategy in ('lv', 'hc'))
+    slow, fast = (measure_solution(scene, each)['speed_to_obstacles'] for each in solutions)
     yield 3 * max(slow / fast - 0.75, 0)
 
 

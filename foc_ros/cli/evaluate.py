@@ -8,7 +8,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from foc_ros.analysis.evaluation.evaluate import evaluate, find_label_mismatches, make_answer
+from foc_ros.analysis.evaluation.evaluate import evaluate, find_label_mismatches
 from foc_ros.analysis.evaluation.observations import observe
 from foc_ros.analysis.evaluation.tables import make_tables
 from foc_ros.analysis.parallel import add_worker_arguments, collect, open_executor
@@ -41,11 +41,11 @@ def run(arguments: argparse.Namespace) -> int:
         if not recordings:
             print(f'foc_ros evaluate: none of the {len(failed)} recordings could be evaluated', file=sys.stderr)
             return 3
-        evaluation = evaluate(recordings, config.likelihood, executor)
+        answer = evaluate(recordings, config, executor)
     mismatches = find_label_mismatches(arguments.data, recordings)
     for name, words in mismatches.items():
         print(f'foc_ros evaluate: {name}: the label differs from the recorded path: {words}', file=sys.stderr)
-    answer = make_answer(evaluation, recordings, config, failed, mismatches)
+    answer |= {'failed': failed, 'labels_not_taken': mismatches}
     if arguments.report is not None:
         from foc_ros.reporting.evaluation_report import write_report
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from foc_ros.analysis.paper.reaching import PaperScene, compute_speed
-from foc_ros.analysis.paper.studies import PAPER_ETA, PAPER_RATIOS, OptimalStudy, Studies, Study
+from foc_ros.analysis.paper.studies import PAPER_ETA, PAPER_RATIOS, Studies, Study
 from foc_ros.core.types import Solution
 
 from .drawing import ELLIPSES_PER_WAY, Bounds, class_style, draw_scene, new_figure, stddev_ellipse
@@ -37,8 +37,8 @@ LEAST_SPAN = 1.12
 
 def write_figures(studies: Studies, directory: Path, suffixes: Sequence[str]) -> None:
     """Write study1 to study7 in every format; raises InputError where a file cannot be written."""
-    figures = [*(draw_study(study) for study in studies.paper), draw_optimal_study(studies.optimal)]
-    for number, figure in enumerate(figures, 1):
+    for number, study in studies.items():
+        figure = draw_efforts(study) if study.efforts else draw_study(study)
         for suffix in suffixes:
             save(figure, directory / f'study{number}.{suffix}')
 
@@ -66,7 +66,7 @@ def draw_study(study: Study) -> Figure:
     return figure
 
 
-def draw_optimal_study(study: OptimalStudy) -> Figure:
+def draw_efforts(study: Study) -> Figure:
     """Return the figure of study 7: efforts over eta, and the share of roll-outs that stay clear."""
     with new_figure(WIDTH_IN, 3.9) as figure:
         efforts, clear = figure.subplots(1, 2)
@@ -86,7 +86,7 @@ def draw_optimal_study(study: OptimalStudy) -> Figure:
         clear.plot([], [], color='0.3', linestyle=':', marker='v', markersize=4, label='on the whole path')
         clear.set(xlabel='wanted η', ylabel='share of roll-outs that stay clear')
         clear.legend(frameon=False, loc='lower right')
-        figure.suptitle(f'Study 7: strategy optimal beside LV and HC, c = {study.noise:g}')
+        figure.suptitle(f'Study {study.number}: {study.title}')
     return figure
 
 

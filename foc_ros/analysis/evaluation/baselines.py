@@ -102,24 +102,16 @@ def make_boltzmann_rates(recordings: Sequence[ObservedRecording], _: LikelihoodC
     return tuple(rate / effort for rate in RATES)
 
 
-def forecast_published(observation: Observation, question: Question, _: None) -> Forecast:
-    """Forecast by the likelihoods that the node publishes."""
-    return Forecast.from_shares(published_shares(observation), question)
-
-
-def forecast_power_rule(observation: Observation, question: Question, config: LikelihoodConfig) -> Forecast:
-    """Forecast what the node would publish with other parameters of the likelihood."""
-    return Forecast.from_shares(power_rule_shares(observation, config), question)
+def forecast_shares(
+    shares: Callable[[Observation, Any], Array], observation: Observation, question: Question, setting: Any
+) -> Forecast:
+    """Forecast by the shares that a function gives to the candidates."""
+    return Forecast.from_shares(shares(observation, setting), question)
 
 
 def forecast_uniform(_: Observation, question: Question, __: None) -> Forecast:
     """Give all possible answers the same probability."""
     return Forecast.uniform(question)
-
-
-def forecast_boltzmann(observation: Observation, question: Question, rate: float) -> Forecast:
-    """Forecast by the maximum-entropy rule at an inverse temperature [s^5/m^2]."""
-    return Forecast.from_shares(boltzmann_shares(observation, rate), question)
 
 
 def forecast_straight_minimum_jerk(observation: Observation, question: Question, setting: tuple[float, float]) -> Forecast:
@@ -173,12 +165,12 @@ def _answer_of_line(observation: Observation, question: Question, velocity: Arra
     return tuple(np.where(is_left, LEFT, RIGHT).tolist())
 
 
-register_baseline(PUBLISHED, forecast_published)
-register_baseline(REFITTED, forecast_power_rule, make_power_rules)
-register_baseline(PLAIN, forecast_power_rule, make_plain_rules)
+register_baseline(PUBLISHED, partial(forecast_shares, published_shares))
+register_baseline(REFITTED, partial(forecast_shares, power_rule_shares), make_power_rules)
+register_baseline(PLAIN, partial(forecast_shares, power_rule_shares), make_plain_rules)
 register_baseline(UNIFORM, forecast_uniform)
 register_baseline('constant velocity', partial(forecast_answer, guess_constant_velocity), CONFIDENCES)
 register_baseline('nearest gap', partial(forecast_answer, guess_nearest_gap), CONFIDENCES)
 register_baseline('shortest path', partial(forecast_answer, guess_shortest_path), CONFIDENCES)
-register_baseline(BOLTZMANN, forecast_boltzmann, make_boltzmann_rates)
+register_baseline(BOLTZMANN, partial(forecast_shares, boltzmann_shares), make_boltzmann_rates)
 register_baseline('straight minimum jerk', forecast_straight_minimum_jerk, tuple(product(POWERS, CONFIDENCES)))

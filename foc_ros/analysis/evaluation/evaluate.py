@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from foc_ros.analysis.parallel import collect_all
 from foc_ros.analysis.recordings import LABELS
-from foc_ros.core.config import Config, LikelihoodConfig, flatten
+from foc_ros.core.config import Config, flatten
 from foc_ros.core.types import LEFT, Array
 from foc_ros.io.csv_tables import rows
 
@@ -29,38 +29,48 @@ Table = dict[tuple[str, str], Array]
 """Log-likelihood of each recording (r) under each setting (s), (r, s), by question and predictor."""
 
 
-@dataclass(frozen=True)
-class Evaluation:
-    """The result of an evaluation.
+def evaluate(recordings: Sequence[ObservedRecording], config: Config, executor: Executor) -> dict[str, Any]:
+    """Score all predictors on recordings; what is fitted is scored on recordings that it was not fitted to.
 
-    scores: by question, then by predictor; settings: by question that they are fitted to, then by predictor, those that are best
-    on all recordings; positions: scores of predicted positions.
+    Parameters
+    ----------
+    recordings
+        One at least.
+    config
+        That the recordings were replayed with.
+    executor
+        See :func:`foc_ros.analysis.parallel.open_executor`.
+
+    Returns
+    -------
+    dict
+        Plain values for JSON. ``questions``: by question and predictor, the values of `metrics.summarise`; for `gap`, tenths and
+        `right_from_half_way` count from row to row, for the others over the whole movement. ``settings``: by question and
+        predictor, the setting that is best on all recordings. ``positions``: see `position_metrics.compute_position_scores`.
     """
-
-    scores: Mapping[str, Mapping[str, Scores]]
-    settings: Mapping[str, Mapping[str, Any]]
-    positions: Mapping[str, Any]
-
-
-def evaluate(recordings: Sequence[ObservedRecording], published: LikelihoodConfig, executor: Executor) -> Evaluation:
-    """Score all predictors on recordings, one at least; what is fitted is scored on recordings that it was not fitted to.
-
-    published: the likelihood's parameters that the recordings were replayed with.
-    """
-    baselines = make_baselines(recordings, published)
+    baselines = make_baselines(recordings, config.likelihood)
     items = [(recording.name, (recording, baselines)) for recording in recordings]
     tables = collect_all(_tabulate_log_likelihoods, items, executor, 'compare')
     table = {key: np.array([each[key] for each in tables]) for key in tables[0]}
-    scores = {}
-    for name, fitted_to in FITTED_TO.items():
-        if any(ask_all(recording, name) for recording in recordings):
-            scores[name] = {each.name: _score_held_out(each, table[fitted_to, each.name], recordings, name) for each in baselines}
-    settings = {
-        name: {each.name: each.settings[int(table[name, each.name].sum(axis=0).argmax())] for each in baselines}
-        for name in (PATH_CLASS, GOAL)
-        if name in scores
+    asked = [name for name in FITTED_TO if any(ask_all(recording, name) for recording in recordings)]
+    return {
+        'recordings': len(recordings),
+        'predictions': sum(len(recording.observations) for recording in recordings),
+        'questions': {
+            name: {
+                each.name: summarise(_score_held_out(each, table[FITTED_TO[name], each.name], recordings, name))
+                for each in baselines
+            }
+            for name in asked
+        },
+        'settings': {
+            name: {each.name: _make_plain(each.settings[int(table[name, each.name].sum(axis=0).argmax())]) for each in baselines}
+            for name in asked
+            if name != GAP
+        },
+        'positions': compute_position_scores(recordings),
+        'parameters': flatten(config),
     }
-    return Evaluation(scores, settings, compute_position_scores(recordings))
 
 
 def _tabulate_log_likelihoods(item: tuple[ObservedRecording, Sequence[Baseline]]) -> Table:
@@ -71,15 +81,21 @@ def _tabulate_log_likelihoods(item: tuple[ObservedRecording, Sequence[Baseline]]
 
 def _score_held_out(baseline: Baseline, table: Array, recordings: Sequence[ObservedRecording], name: str) -> Scores:
     """Score a predictor, on each recording with the setting that is best for the others by a table (r, s)."""
-    found = []
-    for number, (recording, choice) in enumerate(
-        zip(recordings, choose_held_out(table, [each.name for each in recordings]), strict=True)
-    ):
-        for observation, question in ask_all(recording, name):
-            progress = observation.truth.approach if name == GAP else observation.truth.progress
-            forecast = baseline.forecast(observation, question, baseline.settings[choice])
-            found.append((number, progress, question, forecast))
-    return score_forecasts(found)
+    choices = choose_held_out(table, [each.name for each in recordings])
+    return score_forecasts(
+        (
+            number,
+            observation.truth.approach if name == GAP else observation.truth.progress,
+            question,
+            baseline.forecast(observation, question, baseline.settings[choices[number]]),
+        )
+        for number, recording in enumerate(recordings)
+        for observation, question in ask_all(recording, name)
+    )
+
+
+def _make_plain(setting: Any) -> Any:
+    return asdict(setting) if is_dataclass(setting) and not isinstance(setting, type) else setting
 
 
 def find_label_mismatches(data: Path, recordings: Sequence[ObservedRecording]) -> dict[str, str]:
@@ -110,38 +126,3 @@ def find_gaps(observation: Observation) -> list[int]:
     left_is_low = observation.left[0] < 0.0
     is_higher = (truth.sides == LEFT) != left_is_low
     return [int(is_higher[(row == each) & truth.is_ahead].sum()) for each in np.unique(row[truth.is_ahead])]
-
-
-def make_answer(
-    evaluation: Evaluation,
-    recordings: Sequence[ObservedRecording],
-    config: Config,
-    failed: Mapping[str, str],
-    mismatches: Mapping[str, str],
-) -> dict[str, Any]:
-    """Return all as plain values.
-
-    failed: reason by recording; mismatches: of `find_label_mismatches`. Under `questions`, by question and predictor, are the
-    values of `metrics.summarise`; for `gap`, tenths and `right_from_half_way` count from row to row, for the others over the
-    whole movement.
-    """
-    return {
-        'recordings': len(recordings),
-        'predictions': sum(len(recording.observations) for recording in recordings),
-        'failed': dict(failed),
-        'labels_not_taken': dict(mismatches),
-        'questions': {
-            name: {predictor: summarise(scores) for predictor, scores in by_predictor.items()}
-            for name, by_predictor in evaluation.scores.items()
-        },
-        'settings': {
-            question: {name: _make_plain(setting) for name, setting in by_predictor.items()}
-            for question, by_predictor in evaluation.settings.items()
-        },
-        'positions': dict(evaluation.positions),
-        'parameters': flatten(config),
-    }
-
-
-def _make_plain(setting: Any) -> Any:
-    return asdict(setting) if is_dataclass(setting) and not isinstance(setting, type) else setting

@@ -67,7 +67,7 @@ class Forecast(Record):
         return float(is_likeliest[question.truth] / (is_likeliest.sum() + unlisted))
 
 
-def published_shares(observation: Observation) -> Array:
+def published_shares(observation: Observation, _: None = None) -> Array:
     """Return the shares (k,) of the candidates by the likelihoods that the node publishes."""
     return _add_unsolved(observation, observation.candidates.likelihood[observation.candidates.is_solved])
 

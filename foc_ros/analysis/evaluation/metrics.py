@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.types import Array, Record
+from foc_ros.core.types import Array
 
 from .forecasts import Forecast
 from .questions import Question
@@ -17,16 +16,15 @@ from .questions import Question
 TENTHS, BINS = 10, 10
 
 
-@dataclass(frozen=True, eq=False)
-class Scores(Record):
-    """Scores of the m forecasts of one predictor for one question.
+class Scores(NamedTuple):
+    """The m forecasts of one predictor for one question.
 
     recording (m,): its number; progress (m,) in [0, 1]; possible (m,): number of possible answers; log_likelihood (m,): of the
     true answer; confidence (m,): probability of the likeliest answer; correct (m,): whether that is the true one, a part of 1
     if one of several; brier (m,).
     """
 
-    recording: NDArray[np.int64]
+    recording: Array
     progress: Array
     possible: Array
     log_likelihood: Array
@@ -34,23 +32,22 @@ class Scores(Record):
     correct: Array
     brier: Array
 
-    def __len__(self) -> int:
-        return len(self.recording)
 
-
-def score_forecasts(rows: Sequence[tuple[int, float, Question, Forecast]]) -> Scores:
-    """Score forecasts, given with the number of the recording, progress and question."""
-    numbers, progress, questions, forecasts = zip(*rows, strict=True) if rows else ((), (), (), ())
-    pairs = list(zip(forecasts, questions, strict=True))
-    return Scores(
-        np.array(numbers, dtype=np.int64),
-        np.array(progress, dtype=float),
-        np.array([question.possible for question in questions], dtype=float),
-        np.log([forecast.true_probability(question) for forecast, question in pairs]),
-        np.array([forecast.confidence() for forecast in forecasts], dtype=float),
-        np.array([forecast.correctness(question) for forecast, question in pairs], dtype=float),
-        np.array([compute_brier_score(forecast, question) for forecast, question in pairs], dtype=float),
-    )
+def score_forecasts(rows: Iterable[tuple[int, float, Question, Forecast]]) -> Scores:
+    """Score forecasts, at least one, given with the number of the recording, progress and question."""
+    scored = [
+        (
+            number,
+            progress,
+            question.possible,
+            np.log(forecast.true_probability(question)),
+            forecast.confidence(),
+            forecast.correctness(question),
+            compute_brier_score(forecast, question),
+        )
+        for number, progress, question, forecast in rows
+    ]
+    return Scores(*np.array(scored, dtype=float).T)
 
 
 def compute_brier_score(forecast: Forecast, question: Question) -> float:
@@ -63,7 +60,7 @@ def compute_brier_score(forecast: Forecast, question: Question) -> float:
 def summarise(scores: Scores) -> dict[str, Any]:
     """Return all scores as plain values: means over the predictions and by tenths, reliability, and the final lead."""
     return {
-        **_compute_means(scores, np.ones(len(scores), dtype=bool)),
+        **_compute_means(scores, np.ones(len(scores.recording), dtype=bool)),
         'expected_calibration_error': compute_calibration_error(scores),
         'right_from_half_way': _mean(scores.correct[scores.progress >= 0.5]),
         'leads_for_good_from': _mean(np.array(list(find_final_leads(scores).values()))),
@@ -93,21 +90,19 @@ def compute_reliability(scores: Scores) -> list[dict[str, Any]]:
     ]
 
 
-def compute_calibration_error(scores: Scores) -> float | None:
+def compute_calibration_error(scores: Scores) -> float:
     """Return the expected calibration error: the mean distance of confidence and share correct over the bins, by their counts.
 
     Naeini, Cooper and Hauskrecht 2015.
     """
-    if not len(scores):
-        return None
     bins = [each for each in compute_reliability(scores) if each['count']]
-    return float(sum(each['count'] * abs(each['confidence'] - each['right']) for each in bins) / len(scores))
+    return float(sum(each['count'] * abs(each['confidence'] - each['right']) for each in bins) / len(scores.confidence))
 
 
 def find_final_leads(scores: Scores) -> dict[int, float]:
     """Return, for each recording, the progress from which on the likeliest answer was the true one to the end; 1 for never."""
     found = {}
-    for recording in np.unique(scores.recording).tolist():
+    for recording in np.unique(scores.recording).astype(int).tolist():
         rows = np.flatnonzero(scores.recording == recording)
         wrong = np.flatnonzero(scores.correct[rows] < 1.0)
         first = int(wrong[-1]) + 1 if len(wrong) else 0

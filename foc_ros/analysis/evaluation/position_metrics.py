@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from scipy.special import logsumexp
 
 from foc_ros.core.types import Array
 
@@ -118,10 +119,8 @@ def log_mixture_density(weight: Array, offset: Array, xx: Array, yy: Array, xy: 
     """
     x, y, determinant = offset[..., 0], offset[..., 1], xx * yy - xy**2
     distance = (yy * x**2 - 2.0 * xy * x * y + xx * y**2) / determinant
-    logs = np.log(weight)[:, None] + (-0.5 * (distance + np.log(determinant)) - np.log(2.0 * np.pi))
-    greatest = logs.max(axis=-2)
-    density: Array = greatest + np.log(np.exp(logs - greatest[..., None, :]).sum(axis=-2))
-    return density
+    logs = np.log(weight)[:, None] - 0.5 * (distance + np.log(determinant)) - np.log(2.0 * np.pi)
+    return np.asarray(logsumexp(logs, axis=-2))
 
 
 def _make_points() -> Array:

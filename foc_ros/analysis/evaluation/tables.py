@@ -24,7 +24,7 @@ REGIONS = {
 
 
 def make_tables(answer: Mapping[str, Any]) -> Iterator[Table]:
-    """Yield the tables of an answer of `evaluate.make_answer`."""
+    """Yield the tables of an answer of `evaluate --json`."""
     questions = answer['questions']
     tenths = ('', *(str(tenth + 1) for tenth in range(TENTHS)))
     for name, title in GAIN_TITLES.items():

@@ -70,35 +70,32 @@ def compute_log_densities(observation: Observation, shares: Array, config: Confi
     shares (k,): of the candidates; config: of the replay. None where the movement ends before the first horizon or has not begun,
     because a hand at rest shows how long it waits, not how it moves.
     """
-    candidates, true = observation.candidates, observation.truth.positions[HORIZONS]
+    true = observation.truth.positions[HORIZONS]
     known = np.isfinite(true[:, 0])
     counted = np.flatnonzero(shares > 0.0)
     if observation.movement_age_s == 0.0 or not known.any() or not len(counted):
         return None
-    times = np.array(HORIZONS)[known]
-    offset = true[known] - candidates.mean[np.ix_(counted, times)]
-    base = candidates.covariance[np.ix_(counted, times)] + EXACT * np.eye(2)
-    jerk, end = np.array([_compute_unit_variances(float(candidates.time_s[row]), config)[:, times] for row in counted]).swapaxes(
-        0, 1
-    )
-    late = candidates.duration_sensitivity[np.ix_(counted, times)]
-    squared = np.square(widenings).T
-    both = np.multiply.outer(squared[0], jerk) + np.multiply.outer(squared[1], end)
-    xx, yy, xy = (
-        base[..., i, j] + (both if i == j else 0.0) + np.multiply.outer(squared[2], late[..., i] * late[..., j])
-        for i, j in ((0, 0), (1, 1), (0, 1))
-    )
-    density: Array = np.maximum(log_mixture_density(shares[counted], offset, xx, yy, xy), FURTHEST).mean(axis=1)
+    rows, times = np.ix_(counted, np.array(HORIZONS)[known])
+    covariance = _widen_covariances(observation, np.array(widenings), config)[:, rows, times] + EXACT * np.eye(2)
+    offset = true[known] - observation.candidates.mean[rows, times]
+    entries = covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1]
+    density: Array = np.maximum(log_mixture_density(shares[counted], offset, *entries), FURTHEST).mean(axis=1)
     return density
 
 
 def widen_covariance(observation: Observation, widening: Widening, config: Config) -> Array:
     """Return the covariance (k, h, 2, 2) [m^2] of the candidates' positions at `TIMES_S` with a widening."""
-    candidates = observation.candidates
+    covariance: Array = _widen_covariances(observation, np.array([widening]), config)[0]
+    return covariance
+
+
+def _widen_covariances(observation: Observation, widenings: Array, config: Config) -> Array:
+    """Return the covariance (q, k, h, 2, 2) [m^2] with each of some widenings (q, 3)."""
+    candidates, late = observation.candidates, observation.candidates.duration_sensitivity
     unit = np.array([_compute_unit_variances(float(time_s), config) for time_s in candidates.time_s])
-    both = widening.process_noise**2 * unit[:, 0] + widening.endpoint_stddev**2 * unit[:, 1]
-    late = widening.spread * candidates.duration_sensitivity
-    covariance: Array = candidates.covariance + both[..., None, None] * np.eye(2) + late[..., :, None] * late[..., None, :]
+    both = np.tensordot(widenings[:, :2] ** 2, unit, (1, 1))
+    spread = np.multiply.outer(widenings[:, 2] ** 2, late[..., :, None] * late[..., None, :])
+    covariance: Array = candidates.covariance + both[..., None, None] * np.eye(2) + spread
     return covariance
 
 

@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.baselines import Baseline, forecast_power_rule, make_power_rules
+from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, make_power_rules
 from foc_ros.analysis.evaluation.cross_validation import compute_log_likelihoods
+from foc_ros.analysis.evaluation.forecasts import power_rule_shares
 from foc_ros.analysis.evaluation.observations import ObservedRecording
 from foc_ros.analysis.evaluation.questions import ask_main
 from foc_ros.analysis.parallel import collect_all
@@ -37,7 +38,7 @@ MISSED = 0.1
 def tabulate_likelihoods(recordings: Sequence[ObservedRecording], config: Config, executor: Executor) -> SettingTable:
     """Try every setting of the likelihood on every recording; the given settings are the first."""
     settings = (config.likelihood, *make_power_rules(recordings, config.likelihood))
-    rule = Baseline('foc', forecast_power_rule, settings)
+    rule = Baseline('foc', partial(forecast_shares, power_rule_shares), settings)
     rows = collect_all(partial(_tabulate, rule=rule), [(each.name, each) for each in recordings], executor, 'likelihood')
     return SettingTable(np.array(rows), settings)
 

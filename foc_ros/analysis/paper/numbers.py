@@ -10,20 +10,20 @@ import numpy as np
 from foc_ros.core.types import Solution
 
 from .reaching import PaperScene, measure_solution
-from .studies import PAPER_ETA, PAPER_RATIOS, EffortCurve, Studies, Study
+from .studies import COUNT, PAPER_ETA, PAPER_RATIOS, EffortCurve, Studies, Study, solve_reported
 from .trends import check_trends
 
 
 def as_json(studies: Studies) -> dict[str, Any]:
     """Return every number of the studies, to six significant digits; null where nothing was solved."""
-    last = studies.optimal
+    last = studies[COUNT]
     return {
         'trends': [asdict(each) for each in check_trends(studies)],
         f'ratio_at_eta_{PAPER_ETA:g}': {
             name: {'paper': PAPER_RATIOS[number], 'ours': _round(studies[number].ratios[0].at(PAPER_ETA))}
             for name, number in (('LV', 5), ('HC', 6))
         },
-        'studies': [_list_study(each) for each in studies.paper],
+        'studies': [_list_study(each) for each in studies.values() if each is not last],
         'study_7': {
             'scene': _list_scene(last.scene, last.noise),
             'efforts': [_list_curve(each) for each in last.efforts],
@@ -35,7 +35,7 @@ def as_json(studies: Studies) -> dict[str, Any]:
                 for name, rolled in last.rolled_out.items()
             },
         },
-        'reported_tau_and_lambda': {name: _list_solution(studies[1].scene, each) for name, each in studies.reported.items()},
+        'reported_tau_and_lambda': {name: _list_solution(studies[1].scene, each) for name, each in solve_reported().items()},
     }
 
 

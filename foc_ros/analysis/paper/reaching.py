@@ -86,50 +86,29 @@ def solve_class(scene: PaperScene, path_class: PathClass, method: Method, eta: f
 
 
 def measure_solution(scene: PaperScene, solution: Solution) -> dict[str, float]:
-    """Return the numbers by which solutions are compared, by name."""
+    """Return the numbers by which solutions are compared, by name.
+
+    clearance: least distance of the mean path from the mean edge of an obstacle [m]; path_length: of the mean path [m];
+    largest_stddev: root of the largest sum over the axes of the position's variance [m]; speed_to_obstacles: mean speed up to
+    where the mean is nearest to the edge of an obstacle [m/s].
+    """
+    speed, obstacles = compute_speed(solution), scene.obstacles
+    distance = (np.linalg.norm(solution.path[:, None] - obstacles.centre, axis=-1) - obstacles.radius).min(axis=1)
+    nearest = np.flatnonzero(distance < distance.min() + EQUAL_M)[-1]  # the mean often touches a circle at two steps
     return {
         'effort': solution.effort,
         'eta': solution.eta,
         'tau': solution.tau,
         'lambda': solution.lam,
-        'clearance': compute_clearance(scene, solution),
-        'path_length': compute_path_length(solution),
-        'largest_stddev': compute_largest_stddev(solution),
-        'peak_speed': float(compute_speed(solution).max()),
-        'speed_to_obstacles': compute_speed_to_obstacles(scene, solution),
+        'clearance': float(distance.min()),
+        'path_length': float(np.linalg.norm(np.diff(solution.path, axis=0), axis=1).sum()),
+        'largest_stddev': float(np.sqrt(solution.covariance[:, 0, 0] + solution.covariance[:, 1, 1]).max()),
+        'peak_speed': float(speed.max()),
+        'speed_to_obstacles': float(speed[: nearest + 1].mean()),
     }
-
-
-def compute_clearance(scene: PaperScene, solution: Solution) -> float:
-    """Return the least distance of the mean path from the mean edge of an obstacle [m]."""
-    return float(_compute_edge_distance(scene, solution).min())
 
 
 def compute_speed(solution: Solution) -> Array:
     """Return the speed of the mean, (N + 1,) [m/s]."""
     speed: Array = np.linalg.norm(solution.mean[:, 2:4], axis=1)
     return speed
-
-
-def compute_speed_to_obstacles(scene: PaperScene, solution: Solution) -> float:
-    """Return the mean speed over time up to where the mean is nearest to the edge of an obstacle [m/s]."""
-    distance = _compute_edge_distance(scene, solution).min(axis=1)
-    last = np.flatnonzero(distance < distance.min() + EQUAL_M)[-1]  # the mean often touches a circle at two steps
-    return float(compute_speed(solution)[: last + 1].mean())
-
-
-def compute_path_length(solution: Solution) -> float:
-    """Return the length of the mean path [m]."""
-    return float(np.linalg.norm(np.diff(solution.path, axis=0), axis=1).sum())
-
-
-def compute_largest_stddev(solution: Solution) -> float:
-    """Return the root of the largest sum over the axes of the position's variance on the path [m]."""
-    return float(np.sqrt(solution.covariance[:, 0, 0] + solution.covariance[:, 1, 1]).max())
-
-
-def _compute_edge_distance(scene: PaperScene, solution: Solution) -> Array:
-    """Return the distance (N + 1, n) [m] of the mean path from the mean edge of each obstacle."""
-    centre, radius = scene.obstacles.centre, scene.obstacles.radius
-    distance: Array = np.linalg.norm(solution.path[:, None] - centre[None], axis=-1) - radius
-    return distance

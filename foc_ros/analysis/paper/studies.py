@@ -6,8 +6,8 @@ classes; 7: strategy `optimal` beside both, which the paper does not have.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -92,39 +92,26 @@ class RatioCurve:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """One of studies 1 to 6: solutions by eta and name; ratios over eta, the continuous one first."""
+    """One study: solutions by eta and name; ratios over eta, the continuous one first.
+
+    efforts over eta, and roll-outs by name at some of the etas: of study 7.
+    """
 
     number: int
     title: str
     scene: PaperScene
     noise: float
-    solutions: dict[float, dict[str, Solution]]
+    solutions: dict[float, dict[str, Solution]] = field(default_factory=dict)
     ratios: tuple[RatioCurve, ...] = ()
+    efforts: tuple[EffortCurve, ...] = ()
+    rolled_out: dict[str, dict[float, MonteCarlo]] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, eq=False)
-class OptimalStudy:
-    """Study 7: efforts over eta of `optimal`, LV and HC, and roll-outs of each by name at some of the etas."""
-
-    scene: PaperScene
-    noise: float
-    efforts: tuple[EffortCurve, ...]
-    rolled_out: dict[str, dict[float, MonteCarlo]]
+Studies = dict[int, Study]
+"""All studies by number."""
 
 
-@dataclass(frozen=True, eq=False)
-class Studies:
-    """All studies; reported: solutions with the paper's own tau and lambda in the scene of study 1."""
-
-    paper: tuple[Study, ...]
-    optimal: OptimalStudy
-    reported: dict[str, Solution]
-
-    def __getitem__(self, number: int) -> Study:
-        return self.paper[number - 1]
-
-
-def compute_studies(grid: Grid = FULL) -> Iterator[Study | OptimalStudy]:
+def compute_studies(grid: Grid = FULL) -> Iterator[Study]:
     """Compute study after study."""
     yield _solve_strategies(1, (0.94,))
     yield _solve_strategies(2, (0.86, 0.95))
@@ -135,17 +122,13 @@ def compute_studies(grid: Grid = FULL) -> Iterator[Study | OptimalStudy]:
     yield _compare_optimal(grid)
 
 
-def collect_studies(computed: Iterable[Study | OptimalStudy]) -> Studies:
-    """Return all studies together."""
-    studies = list(computed)
-    paper = tuple(each for each in studies if isinstance(each, Study))
-    optimal = next(each for each in studies if isinstance(each, OptimalStudy))
+def solve_reported() -> dict[str, Solution]:
+    """Solve the scene of study 1 with the tau and lambda that the paper reports."""
     scene, path_class = STRATEGY_SCENE, STRATEGY_SCENE.ways[0]
-    reported = {
+    return {
         name: solve_class(scene, path_class, Method(NOISE, 'fixed', (('tau', tau), ('lam', lam))), 0.94)
         for name, (tau, lam) in REPORTED.items()
     }
-    return Studies(paper, optimal, reported)
 
 
 def _solve_strategies(number: int, etas: tuple[float, ...]) -> Study:
@@ -169,7 +152,7 @@ def _compare_strategies(number: int, noise: float, grid: Grid) -> Study:
         )
         for name in by_strategy['lv']
     )
-    return Study(number, f'effort of LV over that of HC, c = {noise:g}', scene, noise, {}, ratios)
+    return Study(number, f'effort of LV over that of HC, c = {noise:g}', scene, noise, ratios=ratios)
 
 
 def _compare_classes(number: int, strategy: str, grid: Grid) -> Study:
@@ -185,7 +168,7 @@ def _compare_classes(number: int, strategy: str, grid: Grid) -> Study:
     return Study(number, title, scene, NOISE, solutions, ratios)
 
 
-def _compare_optimal(grid: Grid) -> OptimalStudy:
+def _compare_optimal(grid: Grid) -> Study:
     scene, path_class = STRATEGY_SCENE, STRATEGY_SCENE.ways[0]
     efforts = tuple(
         _solve_curve(name, scene, path_class, Method(NOISE, strategy), grid.fine)
@@ -199,7 +182,8 @@ def _compare_optimal(grid: Grid) -> OptimalStudy:
         }
         for curve in efforts
     }
-    return OptimalStudy(scene, NOISE, efforts, rolled_out)
+    title = f'strategy optimal beside LV and HC, c = {NOISE:g}'
+    return Study(7, title, scene, NOISE, efforts=efforts, rolled_out=rolled_out)
 
 
 def _make_methods(strategy: str, noise: float, grid: Grid) -> dict[str, tuple[Method, tuple[float, ...]]]:
