@@ -79,21 +79,10 @@ def _end_with_parent() -> None:
 
 
 def run(function: Callable[[T], R], items: Sequence[tuple[str, T]], executor: Executor) -> Iterator[tuple[str, R | Failure]]:
-    """Apply a function to every item and yield names and results in the order of the items.
+    """Apply a function to every item; yield names and results in the order of the items.
 
-    Parameters
-    ----------
-    function
-        Importable by name where the workers are, and without a state of its own.
-    items
-        Names with arguments that can be pickled.
-    executor
-        Any executor; one of :func:`open_executor` keeps failures apart.
-
-    Raises
-    ------
-    RecordingError
-        If the executor gave up.
+    function: importable by name where the workers are, and without a state of its own; items: names with arguments that can be
+    pickled. Raises RecordingError where the executor gave up.
     """
     futures = [executor.submit(call_guarded, function, item) for _, item in items]
     try:

@@ -62,8 +62,9 @@ def register_baseline(name: str, forecast: ForecastFunction, settings: tuple[Any
         all of the observation except its ``truth``, and of the question ``answers``, ``given`` and ``obstacles``. It has to be a
         function of a module, so that worker processes can import it.
     settings
-        Values of ``setting`` that are tried. Each recording is scored with the one that is best for the other recordings. Or a
-        function that returns them: ``settings(recordings, likelihood_config)``.
+        Values of ``setting`` that are tried, each something that JSON can hold or a dataclass of such things, or a function
+        ``settings(recordings, likelihood_config)`` that returns them. Each recording is scored with the setting that is best for
+        the other recordings.
 
     Raises
     ------
@@ -75,10 +76,9 @@ def register_baseline(name: str, forecast: ForecastFunction, settings: tuple[Any
 
 def make_baselines(recordings: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[Baseline, ...]:
     """Return all registered predictors; published: the parameters that the recordings were replayed with."""
-    parts = ((name, *BASELINES.get(name)) for name in BASELINES)
     return tuple(
         Baseline(name, forecast, settings if isinstance(settings, tuple) else settings(recordings, published))
-        for name, forecast, settings in parts
+        for name, (forecast, settings) in ((name, BASELINES.get(name)) for name in BASELINES)
     )
 
 

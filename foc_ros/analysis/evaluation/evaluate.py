@@ -30,23 +30,11 @@ Table = dict[tuple[str, str], Array]
 
 
 def evaluate(recordings: Sequence[ObservedRecording], config: Config, executor: Executor) -> dict[str, Any]:
-    """Score all predictors on recordings; what is fitted is scored on recordings that it was not fitted to.
+    """Score all predictors on recordings, at least one, that were replayed with a configuration; return plain values for JSON.
 
-    Parameters
-    ----------
-    recordings
-        One at least.
-    config
-        That the recordings were replayed with.
-    executor
-        See :func:`foc_ros.analysis.parallel.open_executor`.
-
-    Returns
-    -------
-    dict
-        Plain values for JSON. ``questions``: by question and predictor, the values of `metrics.summarise`; for `gap`, tenths and
-        `right_from_half_way` count from row to row, for the others over the whole movement. ``settings``: by question and
-        predictor, the setting that is best on all recordings. ``positions``: see `position_metrics.compute_position_scores`.
+    What is fitted is scored on recordings that it was not fitted to. `questions`: values of `metrics.summarise` by question and
+    predictor; for `gap`, tenths and `right_from_half_way` count from row to row, else over the whole movement. `settings`: by
+    question and predictor, the best for all recordings. `positions`: values of `position_metrics.compute_position_scores`.
     """
     baselines = make_baselines(recordings, config.likelihood)
     items = [(recording.name, (recording, baselines)) for recording in recordings]

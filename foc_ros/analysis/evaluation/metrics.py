@@ -91,10 +91,7 @@ def compute_reliability(scores: Scores) -> list[dict[str, Any]]:
 
 
 def compute_calibration_error(scores: Scores) -> float:
-    """Return the expected calibration error: the mean distance of confidence and share correct over the bins, by their counts.
-
-    Naeini, Cooper and Hauskrecht 2015.
-    """
+    """Return the mean distance of confidence and share correct over the bins, by their counts (Naeini et al. 2015)."""
     bins = [each for each in compute_reliability(scores) if each['count']]
     return float(sum(each['count'] * abs(each['confidence'] - each['right']) for each in bins) / len(scores.confidence))
 

@@ -61,19 +61,22 @@ def compute_position_scores(recordings: Sequence[ObservedRecording]) -> dict[str
         'straight minimum jerk': np.array([_continue_minimum_jerk(each) for each in observations]),
     }
 
-    def inside(rows: Sequence[int], level: float) -> dict[str, float | None]:
-        mean = np.array([each.candidates.mean[row] for each, row in zip(observations, rows, strict=True)])
-        covariance = np.array([each.candidates.covariance[row] for each, row in zip(observations, rows, strict=True)])
-        return _average_at_horizons(is_inside_ellipse(true - mean, covariance, level))
-
     return {
         'displacement_m': {name: _compute_errors(positions, true) for name, positions in predicted.items()},
-        'inside': {f'{level:g}': inside(leading, level) for level in LEVELS},
-        'inside_taken': {f'{level:g}': inside(taken, level) for level in LEVELS},
+        'inside': _compute_coverage(observations, leading),
+        'inside_taken': _compute_coverage(observations, taken),
         'inside_all': {
             f'{level:g}': _average_at_horizons(np.where(np.isfinite(denser), denser < level, np.nan)) for level in LEVELS
         },
     }
+
+
+def _compute_coverage(observations: Sequence[Observation], rows: Sequence[int]) -> dict[str, dict[str, float | None]]:
+    """Return the shares of true positions inside the ellipses of one candidate (m,) of each observation, by level and horizon."""
+    true = np.array([each.truth.positions for each in observations])
+    mean = np.array([each.candidates.mean[row] for each, row in zip(observations, rows, strict=True)])
+    covariance = np.array([each.candidates.covariance[row] for each, row in zip(observations, rows, strict=True)])
+    return {f'{level:g}': _average_at_horizons(is_inside_ellipse(true - mean, covariance, level)) for level in LEVELS}
 
 
 def is_inside_ellipse(offset: Array, covariance: Array, level: float) -> Array:

@@ -79,14 +79,12 @@ def compute_log_densities(observation: Observation, shares: Array, config: Confi
     covariance = _widen_covariances(observation, np.array(widenings), config)[:, rows, times] + EXACT * np.eye(2)
     offset = true[known] - observation.candidates.mean[rows, times]
     entries = covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1]
-    density: Array = np.maximum(log_mixture_density(shares[counted], offset, *entries), FURTHEST).mean(axis=1)
-    return density
+    return np.asarray(np.maximum(log_mixture_density(shares[counted], offset, *entries), FURTHEST).mean(axis=1))
 
 
 def widen_covariance(observation: Observation, widening: Widening, config: Config) -> Array:
     """Return the covariance (k, h, 2, 2) [m^2] of the candidates' positions at `TIMES_S` with a widening."""
-    covariance: Array = _widen_covariances(observation, np.array([widening]), config)[0]
-    return covariance
+    return np.asarray(_widen_covariances(observation, np.array([widening]), config)[0])
 
 
 def _widen_covariances(observation: Observation, widenings: Array, config: Config) -> Array:
@@ -95,8 +93,7 @@ def _widen_covariances(observation: Observation, widenings: Array, config: Confi
     unit = np.array([_compute_unit_variances(float(time_s), config) for time_s in candidates.time_s])
     both = np.tensordot(widenings[:, :2] ** 2, unit, (1, 1))
     spread = np.multiply.outer(widenings[:, 2] ** 2, late[..., :, None] * late[..., None, :])
-    covariance: Array = candidates.covariance + both[..., None, None] * np.eye(2) + spread
-    return covariance
+    return np.asarray(candidates.covariance + both[..., None, None] * np.eye(2) + spread)
 
 
 def _compute_unit_variances(time_s: float, config: Config) -> Array:

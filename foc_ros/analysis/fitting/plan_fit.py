@@ -121,8 +121,7 @@ def interpolate_plan(solution: Solution, times: Array) -> Array:
     step = np.clip((times / solution.dt).astype(np.intp), 0, len(solution.control) - 1)
     s = np.clip(times - step * solution.dt, 0.0, solution.dt)[:, None]
     state, jerk = solution.mean[step], solution.control[step]
-    positions: Array = state[:, :2] + s * state[:, 2:4] + s**2 / 2.0 * state[:, 4:6] + s**3 / 6.0 * jerk
-    return positions
+    return np.asarray(state[:, :2] + s * state[:, 2:4] + s**2 / 2.0 * state[:, 4:6] + s**3 / 6.0 * jerk)
 
 
 def recover_tau_and_lambda(reaches: Sequence[Reach], config: Config) -> Recovered:
@@ -171,8 +170,7 @@ def _estimate_start(times: Array, positions: Array) -> Array:
     """Return where a movement from rest began, (2,) [m], by the cubic and quartic that its first samples follow."""
     early = max(int(np.searchsorted(times, EARLY * times[-1])), MIN_SAMPLES // 2)
     t = times[:early] / times[-1]
-    start: Array = np.linalg.lstsq(np.column_stack([np.ones(early), t**3, t**4]), positions[:early], rcond=None)[0][0]
-    return start
+    return np.asarray(np.linalg.lstsq(np.column_stack([np.ones(early), t**3, t**4]), positions[:early], rcond=None)[0][0])
 
 
 def _expand_log_likelihood(reaches: Sequence[Reach], residual: Array, jacobian: Array) -> tuple[Array, Array]:

@@ -31,8 +31,7 @@ class RecordedHand(Record):
     @cached_property
     def times(self) -> Array:
         """Seconds since the first sample, (m,)."""
-        seconds: Array = (self.stamps_ns - self.stamps_ns[0]) / NANOSECONDS
-        return seconds
+        return np.asarray((self.stamps_ns - self.stamps_ns[0]) / NANOSECONDS)
 
     def estimate_states(self, config: Config) -> list[HandState]:
         """Return the state that the estimator of a configuration gives at each sample."""

@@ -78,8 +78,7 @@ class Quadratic(Record):
         gradient, curvature = weights @ self.gradient, np.einsum('i,ijk->jk', weights, self.curvature)
         values, vectors = np.linalg.eigh(-curvature)
         step = vectors @ ((vectors.T @ gradient) / np.maximum(values, RIDGE))
-        maximum: Array = np.clip(self.x + np.clip(step, -FARTHEST, FARTHEST), self.low, self.high)
-        return maximum
+        return np.asarray(np.clip(self.x + np.clip(step, -FARTHEST, FARTHEST), self.low, self.high))
 
     def compute_interval(self) -> tuple[Array, Array]:
         """Return the 95 % interval of the bootstrap, low and high (p,)."""

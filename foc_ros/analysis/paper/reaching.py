@@ -110,5 +110,4 @@ def measure_solution(scene: PaperScene, solution: Solution) -> dict[str, float]:
 
 def compute_speed(solution: Solution) -> Array:
     """Return the speed of the mean, (N + 1,) [m/s]."""
-    speed: Array = np.linalg.norm(solution.mean[:, 2:4], axis=1)
-    return speed
+    return np.asarray(np.linalg.norm(solution.mean[:, 2:4], axis=1))
