@@ -18,11 +18,12 @@ from .questions import Questions
 
 def compute_log_likelihoods(questions: Questions, baseline: Baseline) -> Array:
     """Return the sum of the log-likelihoods of the true answers under each setting of a predictor, (s,)."""
-
-    def log_likelihood(setting: object) -> float:
-        return float(sum(np.log(baseline.forecast(*pair, setting).true_probability(pair[1])) for pair in questions))
-
-    return np.array([log_likelihood(setting) for setting in baseline.settings])
+    return np.array(
+        [
+            sum(np.log([baseline.forecast(*each, setting).true_probability(each[1]) for each in questions]))
+            for setting in baseline.settings
+        ]
+    )
 
 
 def choose_held_out(table: Array, groups: Sequence[Hashable]) -> NDArray[np.intp]:

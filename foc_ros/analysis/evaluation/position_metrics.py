@@ -80,10 +80,8 @@ def _compute_coverage(observations: Sequence[Observation], rows: Sequence[int]) 
 
 
 def is_inside_ellipse(offset: Array, covariance: Array, level: float) -> Array:
-    """Return 1 where the ellipse of a probability holds a point, 0 where not, nan where there is no point.
-
-    offset (..., 2) [m] from the centre, covariance (..., 2, 2), by the chi-square distribution of two degrees of freedom.
-    """
+    """Return 1 where the ellipse of a probability holds a point at offset (..., 2) [m], 0 where not, nan where there is none."""
+    # chi-square distribution of two degrees of freedom
     squared = (offset * np.linalg.solve(covariance + EXACT * np.eye(2), offset[..., None])[..., 0]).sum(axis=-1)
     return np.where(np.isfinite(squared), (squared <= -2.0 * np.log(1.0 - level)).astype(float), np.nan)
 
@@ -111,8 +109,7 @@ def find_denser_share(weight: Array, mean: Array, covariance: Array, position: A
     entries = covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1]
     level = log_mixture_density(weight, position[..., None, :, :] - mean, *entries)
     is_above = log_mixture_density(weight, points[..., None, :, :] - mean, *entries) > level
-    share: Array = (is_above.mean(axis=0) * weight[:, None]).sum(axis=0)
-    return np.where(np.isfinite(level), share, np.nan)
+    return np.where(np.isfinite(level), (is_above.mean(axis=0) * weight[:, None]).sum(axis=0), np.nan)
 
 
 def log_mixture_density(weight: Array, offset: Array, xx: Array, yy: Array, xy: Array) -> Array:

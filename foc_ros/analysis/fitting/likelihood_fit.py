@@ -61,10 +61,9 @@ def warn_of_missed_classes(recordings: Sequence[ObservedRecording]) -> list[str]
 def choose_form(table: SettingTable, groups: Sequence[Hashable]) -> list[int]:
     """Return the columns of the form of the likelihood that is better held out; the plain one if the gain is small."""
     columns = range(1, len(table.settings))
-    ahead = [column for column in columns if table.settings[column].lookahead_s > 0.0]
-    plain = [column for column in columns if table.settings[column].lookahead_s <= 0.0]
-    gain = np.nanmean(table.score_held_out(ahead, groups)) - np.nanmean(table.score_held_out(plain, groups))
-    return ahead if gain > MARGIN_NAT else plain
+    forms = [[each for each in columns if (table.settings[each].lookahead_s > 0.0) == is_ahead] for is_ahead in (False, True)]
+    plain, ahead = (np.nanmean(table.score_held_out(form, groups)) for form in forms)
+    return forms[int(ahead - plain > MARGIN_NAT)]
 
 
 def estimate_likelihood(table: SettingTable, columns: Sequence[int]) -> tuple[Estimates, list[str]]:

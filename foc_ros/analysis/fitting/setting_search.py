@@ -207,8 +207,7 @@ def _take_choice(name: str, value: str, given: str, resampled: Sequence[Config],
     """Take a value that is no number."""
     if value != given:
         fit.chosen[name] = value
-    share = float(np.mean([flatten(each)[name] == value for each in resampled]))
-    if share < CONFIDENT:
+    if (share := float(np.mean([flatten(each)[name] == value for each in resampled]))) < CONFIDENT:
         fit.warnings.append(f'{name}: {value} is the best, but only in {100 * share:.0f} % of the resamples')
 
 

@@ -27,6 +27,8 @@ GROWTHS = (10.0, 1.5)
 """Delta of algorithm 1: as printed, and one that ends near the values of tau and lambda that the paper reports."""
 REPORTED = {'LV': (0.0009, 2.28e6), 'HC': (0.0012, 0.9e6)}
 """(tau [m^2], lambda) at eta 0.94 in the paper."""
+STRATEGY_CLASS = STRATEGY_SCENE, STRATEGY_SCENE.ways[0]
+"""Scene and homotopy class in which strategies are compared."""
 
 
 def _range(first: float, last: float, step: float) -> tuple[float, ...]:
@@ -124,35 +126,30 @@ def compute_studies(grid: Grid = FULL) -> Iterator[Study]:
 
 def solve_reported() -> dict[str, Solution]:
     """Solve the scene of study 1 with the tau and lambda that the paper reports."""
-    scene, path_class = STRATEGY_SCENE, STRATEGY_SCENE.ways[0]
     return {
-        name: solve_class(scene, path_class, Method(NOISE, 'fixed', (('tau', tau), ('lam', lam))), 0.94)
+        name: solve_class(*STRATEGY_CLASS, Method(NOISE, 'fixed', (('tau', tau), ('lam', lam))), 0.94)
         for name, (tau, lam) in REPORTED.items()
     }
 
 
 def _solve_strategies(number: int, etas: tuple[float, ...]) -> Study:
-    scene, path_class = STRATEGY_SCENE, STRATEGY_SCENE.ways[0]
     solutions = {
-        eta: {
-            name: solve_class(scene, path_class, Method(NOISE, strategy), eta) for name, strategy in (('LV', 'lv'), ('HC', 'hc'))
-        }
+        eta: {name: solve_class(*STRATEGY_CLASS, Method(NOISE, strategy), eta) for name, strategy in (('LV', 'lv'), ('HC', 'hc'))}
         for eta in etas
     }
-    return Study(number, f'strategies LV and HC, c = {NOISE:g}', scene, NOISE, solutions)
+    return Study(number, f'strategies LV and HC, c = {NOISE:g}', STRATEGY_SCENE, NOISE, solutions)
 
 
 def _compare_strategies(number: int, noise: float, grid: Grid) -> Study:
-    scene, path_class = STRATEGY_SCENE, STRATEGY_SCENE.ways[0]
     by_strategy = {strategy: _make_methods(strategy, noise, grid) for strategy in ('lv', 'hc')}
     ratios = tuple(
         RatioCurve(
             name,
-            *(_solve_curve(strategy.upper(), scene, path_class, *methods[name]) for strategy, methods in by_strategy.items()),
+            *(_solve_curve(strategy.upper(), *STRATEGY_CLASS, *methods[name]) for strategy, methods in by_strategy.items()),
         )
         for name in by_strategy['lv']
     )
-    return Study(number, f'effort of LV over that of HC, c = {noise:g}', scene, noise, ratios=ratios)
+    return Study(number, f'effort of LV over that of HC, c = {noise:g}', STRATEGY_SCENE, noise, ratios=ratios)
 
 
 def _compare_classes(number: int, strategy: str, grid: Grid) -> Study:
@@ -169,21 +166,20 @@ def _compare_classes(number: int, strategy: str, grid: Grid) -> Study:
 
 
 def _compare_optimal(grid: Grid) -> Study:
-    scene, path_class = STRATEGY_SCENE, STRATEGY_SCENE.ways[0]
     efforts = tuple(
-        _solve_curve(name, scene, path_class, Method(NOISE, strategy), grid.fine)
+        _solve_curve(name, *STRATEGY_CLASS, Method(NOISE, strategy), grid.fine)
         for name, strategy in (('LV', 'lv'), ('HC', 'hc'), ('optimal', 'optimal'))
     )
     rolled_out = {
         curve.name: {
-            eta: monte_carlo(scene.make_problem(NOISE, eta), solution.control.T.ravel(), grid.samples)
+            eta: monte_carlo(STRATEGY_SCENE.make_problem(NOISE, eta), solution.control.T.ravel(), grid.samples)
             for eta, solution in zip(curve.etas, curve.solutions, strict=True)
             if eta in grid.rolled_out and solution.status is Status.SOLVED
         }
         for curve in efforts
     }
     title = f'strategy optimal beside LV and HC, c = {NOISE:g}'
-    return Study(7, title, scene, NOISE, efforts=efforts, rolled_out=rolled_out)
+    return Study(7, title, STRATEGY_SCENE, NOISE, efforts=efforts, rolled_out=rolled_out)
 
 
 def _make_methods(strategy: str, noise: float, grid: Grid) -> dict[str, tuple[Method, tuple[float, ...]]]:
