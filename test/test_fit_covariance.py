@@ -11,10 +11,9 @@ from foc_ros.analysis.fitting.covariance_fit import (
     NO_WIDENING,
     WIDENINGS,
     Widening,
-    choose_widenings,
-    compute_coverage,
     compute_log_densities,
     estimate_widening,
+    score_positions,
     tabulate_densities,
     widen_covariance,
 )
@@ -46,12 +45,11 @@ def test_the_true_values_are_found_and_ellipses_then_have_their_coverage(endpoin
     assert found['duration.spread'].value == pytest.approx(spread, abs=0.11)
     for each in found.values():
         assert each.low <= each.value <= each.high
-    by_name = choose_widenings(table, [each.name for each in recordings])
-    coverage = {name: compute_coverage(recordings, Config(), each) for name, each in by_name.items()}
-    assert coverage['motor noise alone']['inside_90'] < 0.1
+    scores = score_positions(table, Config(), recordings, cross=True)
+    assert scores['inside_90']['motor noise alone'] < 0.1
     for kind in ('inside_90', 'inside_all_90'):
-        assert coverage['fitted'][kind] == pytest.approx(0.9, abs=0.08)
-        assert coverage['without the recording'][kind] == pytest.approx(0.9, abs=0.08)
+        assert scores[kind]['fitted'] == pytest.approx(0.9, abs=0.08)
+        assert scores[kind]['without the recording'] == pytest.approx(0.9, abs=0.08)
 
 
 def test_the_density_is_that_of_the_widened_mixture() -> None:

@@ -49,6 +49,12 @@ def test_an_exception_is_the_failure_of_its_item() -> None:
     assert found['r2'].reason.startswith("KeyError: 'two' (worker_tasks.py:")
 
 
+def test_an_argument_that_cannot_be_loaded_is_the_failure_of_its_item() -> None:
+    with IsolatedProcessPool(1) as pool:
+        found = dict(run(worker_tasks.squared, [('bad', worker_tasks.Unloadable()), ('good', 2)], pool))
+    assert found['good'] == 4 and 'ValueError: invalid literal' in found['bad'].reason
+
+
 def test_workers_run_concurrently() -> None:
     with IsolatedProcessPool(2) as pool:
         assert len({pid for _, pid in run(worker_tasks.worker_pid, ITEMS[:4], pool)}) == 2

@@ -27,6 +27,13 @@ def faulty(number: int) -> int:
     return number
 
 
+class Unloadable:
+    """An argument that can be pickled but not loaded."""
+
+    def __reduce__(self) -> tuple:
+        return (int, ('no number',))
+
+
 def worker_pid(number: int) -> int:
     time.sleep(0.1)
     return os.getpid()

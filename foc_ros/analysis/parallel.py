@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import pickle
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
@@ -50,7 +51,8 @@ class IsolatedProcessPool(Executor):
 
     def submit(self, fn: Callable[..., R], /, *args: Any, **kwargs: Any) -> Future[R]:
         """Schedule a call; see :class:`concurrent.futures.Executor`."""
-        future: Future[R] = self._pool.schedule(fn, args=args, kwargs=kwargs)
+        # pickled here and loaded in the call: a worker that could not load its task would die, and its future never end
+        future: Future[R] = self._pool.schedule(_call_pickled, args=[pickle.dumps((fn, args, kwargs))])
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -64,6 +66,11 @@ class IsolatedProcessPool(Executor):
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self.shutdown(cancel_futures=kind is not None)
+
+
+def _call_pickled(pickled: bytes) -> Any:
+    function, args, kwargs = pickle.loads(pickled)  # noqa: S301 (our own)
+    return function(*args, **kwargs)
 
 
 def _end_with_parent() -> None:

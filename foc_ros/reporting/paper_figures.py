@@ -24,13 +24,8 @@ STYLES = {'LV': 0, 'HC': 1, 'optimal': 2, 'H1': 3, 'H2': 4}
 RATIO_STYLES = (('black', '-', None), ('#009E73', '', 's'), ('#CC79A7', '', 'o'))
 """Colour, dash and marker: of the continuous curve, then of the paper's stepping, which gives points."""
 PAPER_MARK = '#D55E00'
-TICKS: tuple[tuple[float, tuple[float, ...]], ...] = (
-    (0.15, (1.0, 1.05, 1.1, 9.0, 9.5)),
-    (1.2, (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)),
-    (3.5, (1.0, 2.0, 5.0)),
-    (np.inf, (1.0,)),
-)
-"""Round numbers in each decade of an axis that spans less than a number of decades."""
+NARROW_DECADES = 0.5
+"""Span below which an axis of a ratio has ticks at equal distances, not at powers of ten and their double and fivefold."""
 LEAST_SPAN = 1.12
 """Least factor from 1 to either end of the axis of a ratio."""
 
@@ -120,6 +115,8 @@ def _draw_speeds(axes: Any, solutions: Mapping[str, Solution], top: float) -> No
 
 def _draw_ratios(alone: Any, beside: Any, study: Study) -> None:
     """Draw the ratio over eta on logarithmic scales: the continuous one alone, then beside those of the paper's stepping."""
+    from matplotlib.ticker import LogLocator, MaxNLocator
+
     first = study.ratios[0]
     for axes, shown in ((alone, study.ratios[:1]), (beside, study.ratios)):
         axes.axhline(1.0, color='0.5', linewidth=1.0)
@@ -136,15 +133,8 @@ def _draw_ratios(alone: Any, beside: Any, study: Study) -> None:
         )
         low, high = axes.get_ylim()
         axes.set_ylim(min(low, 1 / LEAST_SPAN), max(high, LEAST_SPAN))
-        ticks = _choose_ticks(*axes.get_ylim())
-        axes.set_yticks(ticks, [f'{tick:g}' for tick in ticks])
+        is_narrow = np.log10(np.divide(*axes.get_ylim()[::-1])) < NARROW_DECADES
+        axes.yaxis.set_major_locator(MaxNLocator(6) if is_narrow else LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.yaxis.set_major_formatter('{x:g}')
         axes.minorticks_off()
         axes.legend(frameon=False, fontsize=8, loc='lower left', bbox_to_anchor=(0.0, 1.0), ncols=2)
-
-
-def _choose_ticks(low: float, high: float) -> list[float]:
-    """Return round numbers of a logarithmic axis: the narrower it is, the more in each decade."""
-    decades = np.log10(high / low)
-    parts = next(parts for widest, parts in TICKS if decades < widest)
-    powers = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
-    return [tick for power in powers for part in parts if low <= (tick := float(f'{part * 10.0**power:.3g}')) <= high]

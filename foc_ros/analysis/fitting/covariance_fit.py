@@ -6,13 +6,12 @@ that all of them are tried on the observations of one replay with motor noise al
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.cross_validation import choose_held_out
 from foc_ros.analysis.evaluation.forecasts import power_rule_shares
 from foc_ros.analysis.evaluation.ground_truth import TIMES_S
 from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording
@@ -131,26 +130,15 @@ def estimate_widening(table: SettingTable) -> Estimates:
     }
 
 
-def choose_widenings(table: SettingTable, groups: Sequence[Hashable] | None) -> dict[str, list[Widening]]:
-    """Return, for each recording, no widening, the one best for all, and, with groups, the one best for the other groups."""
-    n = len(table.values)
-    found = {'motor noise alone': [NO_WIDENING] * n, 'fitted': [table.settings[table.find_best(range(len(table.settings)))]] * n}
-    if groups is not None:
-        held_out = choose_held_out(np.nan_to_num(table.values), groups)
-        found['without the recording'] = [table.settings[column] for column in held_out]
-    return found
-
-
 def score_positions(table: SettingTable, config: Config, recordings: Sequence[ObservedRecording], cross: bool) -> dict[str, Any]:
     """Return mean log-densities and coverage, by score and by how the widening was chosen; cross: also held out."""
-    names, columns = [each.name for each in recordings], range(len(table.settings))
-    densities = {'motor noise alone': table.values[:, 0], 'fitted': table.values[:, table.find_best(columns)]}
+    columns, n = range(len(table.settings)), len(recordings)
+    chosen = {'motor noise alone': np.zeros(n, dtype=np.intp), 'fitted': np.full(n, table.find_best(columns))}
     if cross:
-        densities['without the recording'] = table.score_held_out(columns, names)
-    chosen = choose_widenings(table, names if cross else None)
-    coverage = {name: compute_coverage(recordings, config, each) for name, each in chosen.items()}
+        chosen['without the recording'] = table.choose_held_out(columns, [each.name for each in recordings])
+    coverage = {name: compute_coverage(recordings, config, [table.settings[each] for each in chosen[name]]) for name in chosen}
     return {
-        'positions': {name: float(np.nanmean(values)) for name, values in densities.items()},
+        'positions': {name: table.score(each) for name, each in chosen.items()},
         **{kind: {name: each[kind] for name, each in coverage.items()} for kind in ('inside_90', 'inside_all_90')},
     }
 

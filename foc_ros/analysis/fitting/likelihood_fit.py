@@ -62,7 +62,7 @@ def choose_form(table: SettingTable, groups: Sequence[Hashable]) -> list[int]:
     """Return the columns of the form of the likelihood that is better held out; the plain one if the gain is small."""
     columns = range(1, len(table.settings))
     forms = [[each for each in columns if (table.settings[each].lookahead_s > 0.0) == is_ahead] for is_ahead in (False, True)]
-    plain, ahead = (np.nanmean(table.score_held_out(form, groups)) for form in forms)
+    plain, ahead = (table.score(table.choose_held_out(form, groups)) for form in forms)
     return forms[int(ahead - plain > MARGIN_NAT)]
 
 
@@ -92,18 +92,16 @@ def score_classes(
 ) -> dict[str, Any]:
     """Return mean log-likelihoods by how the setting was chosen; cross: also held out, by recording and by class taken."""
     questions = [ask_main(each) for each in recordings]
-    uniform = [np.mean([-math.log(question.possible) for _, question in each]) if each else np.nan for each in questions]
+    uniform = [np.mean([-math.log(question.possible) for _, question in each]) for each in questions if each]
     scores = {
-        'uniform': np.array(uniform),
-        'as given': table.values[:, 0],
-        'fitted': table.values[:, table.find_best(columns)],
+        'uniform': float(np.mean(uniform)),
+        'as given': table.score(0),
+        'fitted': table.score(table.find_best(columns)),
     }
     if cross:
-        taken = [
-            each[0][1].answers[each[0][1].truth] if each else recording.name
-            for each, recording in zip(questions, recordings, strict=True)
-        ]
-        scores['without the recording'] = table.score_held_out(columns, [each.name for each in recordings])
+        names = [each.name for each in recordings]
+        taken = [each[0][1].answers[each[0][1].truth] if each else name for each, name in zip(questions, names, strict=True)]
+        scores['without the recording'] = table.score(table.choose_held_out(columns, names))
         if len(set(taken)) > 1:
-            scores['without its way'] = table.score_held_out(columns, taken)
-    return {'ways': {name: float(np.nanmean(values)) for name, values in scores.items()}}
+            scores['without its way'] = table.score(table.choose_held_out(columns, taken))
+    return {'ways': scores}

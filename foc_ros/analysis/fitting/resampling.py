@@ -51,11 +51,13 @@ class SettingTable:
         """Return the column of some that is best for all recordings."""
         return int(columns[int(np.nansum(self.values[:, columns], axis=0).argmax())])
 
-    def score_held_out(self, columns: Sequence[int], groups: Sequence[Hashable]) -> Array:
-        """Return the value of each recording (n,) under the setting of some columns that is best for the other groups."""
-        values = np.nan_to_num(self.values[:, columns])
-        scores = values[np.arange(len(values)), choose_held_out(values, groups)]
-        return np.where(np.isnan(self.values[:, 0]), np.nan, scores)
+    def choose_held_out(self, columns: Sequence[int], groups: Sequence[Hashable]) -> NDArray[np.intp]:
+        """Return the column of some, for each recording (n,), that is best for the other groups."""
+        return np.array(columns)[choose_held_out(np.nan_to_num(self.values[:, columns]), groups)]
+
+    def score(self, chosen: int | NDArray[np.intp]) -> float:
+        """Return the mean over the recordings under the column chosen for all, or for each of them (n,)."""
+        return float(np.nanmean(self.values[np.arange(len(self.values)), chosen]))
 
     def resample_best(self, columns: Sequence[int]) -> list[int]:
         """Return the best of some columns in each resample of the recordings."""
