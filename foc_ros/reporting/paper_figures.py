@@ -24,7 +24,7 @@ STYLES = {'LV': 0, 'HC': 1, 'optimal': 2, 'H1': 3, 'H2': 4}
 RATIO_STYLES = (('black', '-', None), ('#009E73', '', 's'), ('#CC79A7', '', 'o'))
 """Colour, dash and marker: of the continuous curve, then of the paper's stepping, which gives points."""
 PAPER_MARK = '#D55E00'
-NARROW_DECADES = 0.5
+NARROW_DECADES = 1.0
 """Span below which an axis of a ratio has ticks at equal distances, not at powers of ten and their double and fivefold."""
 LEAST_SPAN = 1.12
 """Least factor from 1 to either end of the axis of a ratio."""
