@@ -115,7 +115,7 @@ def _choose_circles(scene: SearchScene, named: list[int], nearest: list[int]) ->
 def _build_partial_graph(scene: SearchScene, goal: int, rows: list[int], named: list[int]) -> PartialGraph:
     """Build the graph of some obstacles for one goal; a graph without all named ones is one to grow, up to MOST."""
     graph = connect_hand(build_tangent_graph(scene.centre[rows], scene.radius[goal, rows], scene.goals), scene.hand)
-    others = np.setdiff1d(np.arange(len(scene.centre)), rows)
+    others = np.delete(np.arange(len(scene.centre)), rows)
     limit = float(scene.excess[others].min(initial=np.inf)) * math.dist(scene.goals[goal], scene.hand)
     is_enough = len(rows) >= MOST or set(rows).issuperset(named)
     return PartialGraph(graph, rows, others, named, limit, np.inf if is_enough else limit)

@@ -11,7 +11,7 @@ from foc_ros.core.kernels import Matrix, Vector
 from foc_ros.core.types import Array, as_readonly
 
 from .search_scene import SearchScene
-from .tangent_graph import TangentGraph, measure_arc
+from .tangent_graph import TangentGraph, measure_arcs
 
 SLOPE = 0.5
 """A hand in a margin leaves it by this much for each metre of its path, and enters the margin of its goal likewise."""
@@ -55,13 +55,15 @@ class TautPath(NamedTuple):
 def lay_out(graph: TangentGraph, path: Sequence[int]) -> TautPath:
     """Lay out a path that is given by its runs in a graph."""
     runs, rows = graph.runs, list(path)
-    node = runs.head[rows]
-    sense, size, bend = 2 * (node & 1) - 1, np.zeros(2 * len(rows)), np.zeros(2 * len(rows))
-    size[::2] = runs.length[rows]
-    for i in range(len(rows) - 1):
-        radius = graph.circles.radius[node[i] >> 1]
-        bend[2 * i + 1] = sense[i] / radius
-        size[2 * i + 1] = radius * max(measure_arc(runs.leave_angle[rows[i + 1]], runs.reach_angle[rows[i]], sense[i]), 0.0)
+    node = runs.head[rows[:-1]]
+    sense, radius, size, bend = (
+        2 * (node & 1) - 1,
+        graph.circles.radius[node >> 1],
+        np.zeros(2 * len(rows)),
+        np.zeros(2 * len(rows)),
+    )
+    size[::2], bend[1:-1:2] = runs.length[rows], sense / radius
+    size[1:-1:2] = radius * np.maximum(measure_arcs(runs.leave_angle[rows[1:]], runs.reach_angle[rows[:-1]], sense), 0.0)
     start = np.stack((runs.start[rows], runs.end[rows]), axis=1).reshape(-1, 2)
     return TautPath(np.cumsum(size) - size, start, np.repeat(runs.heading[rows], 2, axis=0), bend)
 
