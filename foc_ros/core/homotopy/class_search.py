@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from foc_ros.core.kernels import Indices
 from foc_ros.core.types import LEFT, RIGHT, Array
 
 from .guesses import TautPath, lay_out
@@ -67,7 +68,7 @@ class PartialGraph(NamedTuple):
 
     graph: TangentGraph
     rows: list[int]
-    others: Array
+    others: Indices
     named: list[int]
     limit: float
     max_key: float
@@ -148,7 +149,7 @@ def _find_named_paths(scene: SearchScene, partial: PartialGraph, query: ClassQue
         yield from sorted(classes, key=lambda found: found[:2])
 
 
-def _find_met(scene: SearchScene, found: PathClass, others: Array) -> list[int]:
+def _find_met(scene: SearchScene, found: PathClass, others: Indices) -> list[int]:
     """Return those of other obstacles (rows) that a path meets."""
     apart = found.path.space_points(FINENESS)[:, None] - scene.centre[others]
     is_met = np.hypot(apart[..., 0], apart[..., 1]) < scene.radius[found.goal, others] - GRAZE

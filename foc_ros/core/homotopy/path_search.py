@@ -62,8 +62,8 @@ class Arrival(NamedTuple):
 def find_shortest_paths(graph: TangentGraph, query: PathQuery, notes: Counter[str]) -> Iterator[list[Arrival]]:
     """Yield the shortest paths to a goal, one for each signature, in the order of their keys, equally long ones together.
 
-    The estimate of a path is its key plus the length of the shortest path from its end to the goal, whatever the signature. A path
-    that winds about a named circle is not followed. notes: `search_cut` is increased if states are left at the end.
+    The estimate for a path is its key plus the length of the shortest path from its end to the goal, whatever the signature. A
+    path that winds about a named circle is not followed. notes: `search_cut` is increased if states are left at the end.
     """
     rest, signatures, numbers = graph.rest[query.goal].tolist(), SignatureCounter(graph, query.named), count()
     last = set(np.flatnonzero(graph.runs.head == 2 * (len(graph.circles.radius) + query.goal) + 1).tolist())

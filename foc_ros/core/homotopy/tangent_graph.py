@@ -106,7 +106,8 @@ def connect_hand(graph: TangentGraph, hand: Array) -> TangentGraph:
     both = Runs._make(np.concatenate(pair) for pair in zip(graph.runs, runs, strict=True))
     arcs = _find_arcs(circles, both, graph.first_run, np.arange(m, len(both.head)))
     rest = np.where(runs.head == 2 * (n + np.arange(g))[:, None] + 1, 0.0, np.inf)
-    np.minimum.at(rest, (slice(None), arcs.before - m), arcs.step + graph.rest[:, arcs.after])
+    for goal in range(g):
+        np.minimum.at(rest[goal], arcs.before - m, arcs.step + graph.rest[goal, arcs.after])
     arcs = Arcs._make(np.concatenate(pair) for pair in zip(graph.arcs, arcs, strict=True))
     return graph._replace(runs=both, arcs=arcs, rest=np.concatenate((graph.rest, rest), axis=1))
 
@@ -122,17 +123,19 @@ def _build_from_bytes(centre: bytes, radius: bytes, goals: bytes) -> TangentGrap
     circles = _build_circles(np.frombuffer(centre).reshape(-1, 2), np.frombuffer(radius))
     points, n = np.frombuffer(goals).reshape(-1, 2), len(circles.radius)
     runs = _find_runs(circles, points, *_list_pairs(tuple(circles.is_outer.tolist()), len(points)))
-    m, first_run = len(runs.head), np.searchsorted(runs.tail, np.arange(2 * n + 1))
-    arcs = _find_arcs(circles, runs, first_run, np.arange(m))
-    backwards, rest = (
-        csr_matrix((np.maximum(arcs.step, 0.0), (arcs.after, arcs.before)), (m, m)),
-        np.full((len(points), m), np.inf),
-    )
-    for goal in range(len(points)):
-        last = np.flatnonzero(runs.head == 2 * (n + goal) + 1)
-        if len(last):
-            rest[goal] = dijkstra(backwards, indices=last, min_only=True)
-    return TangentGraph(circles, points, runs, arcs, first_run, rest)
+    first_run = np.searchsorted(runs.tail, np.arange(2 * n + 1))
+    arcs = _find_arcs(circles, runs, first_run, np.arange(len(runs.head)))
+    rest = [_measure_rest(arcs, runs.head == 2 * (n + goal) + 1) for goal in range(len(points))]
+    return TangentGraph(circles, points, runs, arcs, first_run, np.array(rest).reshape(len(points), len(runs.head)))
+
+
+def _measure_rest(arcs: Arcs, is_last: Flags) -> Vector:
+    """Return the least lengths (m,) [m] of the paths from the ends of the runs to a goal, at which some of the runs end."""
+    if not is_last.any():
+        return np.full(len(is_last), np.inf)
+    backwards = csr_matrix((np.maximum(arcs.step, 0.0), (arcs.after, arcs.before)), 2 * is_last.shape)
+    rest: Vector = dijkstra(backwards, indices=np.flatnonzero(is_last), min_only=True)
+    return rest
 
 
 def _find_arcs(circles: Circles, runs: Runs, first_run: Indices, rows: Indices) -> Arcs:
