@@ -1,4 +1,4 @@
-"""The account of a solution: what its numbers mean, held against finite differences and geometry."""
+"""The numbers of a solution against finite differences and geometry."""
 
 import math
 import re
@@ -15,7 +15,7 @@ WALL = make_obstacles([[0.15, 0.02], [0.15, -0.02]], [0.03, 0.03], ids=('left', 
 
 
 @pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
-def test_the_largest_reachable_eta_is_a_number_of_its_own(strategy):
+def test_the_largest_reachable_eta_is_reported(strategy):
     solution = solved(one_obstacle(0.999, (0.6, 0.6)), BOWED, strategy)
     assert solution.status is Status.ETA_UNREACHABLE
     assert 0 < solution.eta_reachable == solution.eta < 0.999
