@@ -204,11 +204,12 @@ def count_crossings(centre: Matrix, radius: Vector, holds: FlagTable, ends: Tabl
     for run in range(len(ends)):
         for k in range(n):
             for end in range(2):
-                i = ends[run, end]
-                # exact where the circle is its own: no rounding may move the point across the ray
-                seen[end] = touch[run, end] if k == i else centre[i] + touch[run, end] - centre[k]
+                i, x, y = ends[run, end], touch[run, end, 0], touch[run, end, 1]
+                if i != k:
+                    x, y = centre[i, 0] + x - centre[k, 0], centre[i, 1] + y - centre[k, 1]
+                seen[end, 0], seen[end, 1] = x, y
                 if i < n:
                     east_x, east_y = centre[i, 0] + radius[i] - centre[k, 0], centre[i, 1] - centre[k, 1]
-                    crossings[run, end, k] = count_arc_crossing(east_x, east_y, seen[end, 0], seen[end, 1], holds[i, k])
+                    crossings[run, end, k] = count_arc_crossing(east_x, east_y, x, y, holds[i, k])
             crossings[run, 0, k] += count_crossing(seen[0, 0], seen[0, 1], seen[1, 0], seen[1, 1])
     return crossings

@@ -37,7 +37,7 @@ DEVIATION: Colour = (0.85, 0.35, 0.2, 0.25)
 UNLIKELY, LIKELY = np.array([0.25, 0.45, 0.85]), np.array([0.95, 0.6, 0.05])
 
 
-def marker_array(prediction: Prediction, obstacles: Obstacles, plane: str, types: MessageTypes) -> Any:
+def encode_markers(prediction: Prediction, obstacles: Obstacles, plane: str, types: MessageTypes) -> Any:
     """Encode the MarkerArray; unsolved candidates are grey and labelled with their status; obstacles: those at the stamp."""
     encoder = _MarkerEncoder(prediction, plane, types)
     unsolved = [outcome for outcome in prediction.candidates if not outcome.is_solved]
