@@ -47,7 +47,10 @@ LONG = (
 )
 
 PROCESS = (
+    'test_cluster.py::*',
+    'test_demo_*.py::test_the_node_*',
     'test_fit.py::*',
+    'test_fit_*.py::test_a_setting_that_predicts_nothing_*',
     'test_evaluate.py::test_the_number_of_workers_does_not_matter',
     'test_paper.py::*',
 )
