@@ -1,3 +1,61 @@
-"""Predict where an operator's hand is going, among obstacles, with its uncertainty."""
+"""foc_ros predicts where an operator's hand is going among obstacles, with its uncertainty.
+
+This module is the public Python API. Lengths are in metres, times in seconds, positions in the task plane. Names are imported
+when they are first used, so that `import foc_ros` alone is fast.
+"""
+
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = '0.1.0'
+
+if TYPE_CHECKING:
+    from foc_ros.analysis.evaluation import register_baseline as register_baseline
+    from foc_ros.api import *  # noqa: F403
+    from foc_ros.core.config import Config as Config
+    from foc_ros.core.dynamics.plant_models import PlantModel as PlantModel
+    from foc_ros.core.dynamics.plants import Plant as Plant
+    from foc_ros.core.errors import FocError as FocError
+    from foc_ros.core.errors import InputError as InputError
+    from foc_ros.core.errors import MessageError as MessageError
+    from foc_ros.core.errors import ParameterError as ParameterError
+    from foc_ros.core.errors import RecordingError as RecordingError
+    from foc_ros.core.errors import SceneError as SceneError
+    from foc_ros.core.obstacles.shapes import Circle as Circle
+    from foc_ros.core.ocp.monte_carlo import MonteCarlo as MonteCarlo
+    from foc_ros.core.types import Candidate as Candidate
+    from foc_ros.core.types import HandState as HandState
+    from foc_ros.core.types import Obstacles as Obstacles
+    from foc_ros.core.types import PredictedCandidate as PredictedCandidate
+    from foc_ros.core.types import Status as Status
+
+_MODULES = {
+    'api': (
+        'Prediction Predictor Solution load_config monte_carlo plot_candidates register_likelihood_rule register_plant'
+        ' register_qp_backend register_strategy replay solve solve_classes'
+    ),
+    'analysis.evaluation': 'register_baseline',
+    'core.config': 'Config',
+    'core.dynamics.plant_models': 'PlantModel',
+    'core.dynamics.plants': 'Plant',
+    'core.errors': 'FocError InputError MessageError ParameterError RecordingError SceneError',
+    'core.obstacles.shapes': 'Circle',
+    'core.ocp.monte_carlo': 'MonteCarlo',
+    'core.types': 'Candidate HandState Obstacles PredictedCandidate Status',
+}
+_MODULE_OF = {name: f'{__name__}.{module}' for module, names in _MODULES.items() for name in names.split()}
+
+__all__ = list(_MODULE_OF)
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used (PEP 562)."""
+    if name not in _MODULE_OF:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    value = getattr(_import_module(_MODULE_OF[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return [*__all__, '__version__']

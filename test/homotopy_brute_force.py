@@ -1,4 +1,4 @@
-"""Classes by brute force: a shortest path for every pattern of sides on a visibility graph of polygons, for the tests only."""
+"""Brute-force search for homotopy classes: the shortest path for every pattern of sides on a visibility graph of polygons."""
 
 import numpy as np
 from scipy.sparse import coo_matrix

@@ -46,7 +46,7 @@ def prediction(*outcomes: PredictedCandidate, stamp_ns: int = 5_000_000_000, **c
     """Return a prediction of these outcomes, the first being the most likely."""
     solved = [each.candidate.label for each in outcomes if each.is_solved]
     values = {'frame_id': 'world', 'height': 0.2, 'most_likely': solved[0] if solved else None}
-    return Prediction(stamp_ns=stamp_ns, outcomes=outcomes, **(values | changes))
+    return Prediction(stamp_ns=stamp_ns, candidates=outcomes, **(values | changes))
 
 
 def three_ways() -> Prediction:

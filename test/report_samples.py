@@ -1,4 +1,4 @@
-"""A scene, a track and predictions to draw: made by hand, so that a test knows what has to be in the picture."""
+"""A scene, hand samples and predictions in closed form, so that a test knows the contents of a picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A time for each prediction: what does not fit in is told as out of time, with its age, and never as unlikely."""
+"""The time limit of a prediction: unsolved candidates are reported as out of time, with their age, never as unlikely."""
 
 import numpy as np
 import pytest
@@ -37,29 +37,31 @@ def test_a_budget_that_is_not_reached_changes_nothing():
             np.testing.assert_array_equal(a.solution.mean, b.solution.mean)
 
 
-def test_no_time_at_all_is_an_empty_answer_and_forgets_nothing():
+def test_without_any_time_the_prediction_is_empty_and_the_memory_stays():
     before, memory = predicted(0, Memory())
     assert len(before.solved_candidates) > 1
     late, memory = predicted(1, memory, 1e-9)
     assert set(statuses(late)) == {Status.DEADLINE}
     assert late.most_likely is None
     assert all(np.isfinite(outcome.solution.mean).all() for outcome in late.candidates)
-    told = {each.candidate.label: each.solution.message for each in late.candidates}
-    assert all('out of time' in message for message in told.values())
-    assert all('last solved 0.02 s ago' in told[each.candidate.label] for each in before.solved_candidates)
+    messages = {each.candidate.label: each.solution.message for each in late.candidates}
+    assert all('out of time' in message for message in messages.values())
+    assert all('last solved 0.02 s ago' in messages[each.candidate.label] for each in before.solved_candidates)
     after, _ = predicted(2, memory)
     assert [each.candidate.label for each in after.solved_candidates] == [
         each.candidate.label for each in before.solved_candidates
     ]
-    assert max(each.solution.qp_solves for each in after.solved_candidates) <= 3, 'warm, from before the late one'
+    assert max(each.solution.qp_solves for each in after.solved_candidates) <= 3, (
+        'warm started from the prediction before the late one'
+    )
 
 
-def test_a_way_that_never_had_time_says_so():
+def test_a_candidate_that_was_never_solved_says_so():
     assert 'never solved yet' in predicted(0, Memory(), 1e-9)[0].candidates[0].solution.message
 
 
 @pytest.mark.parametrize('turned', [False, True])
-def test_the_likeliest_of_last_time_comes_first(monkeypatch, turned):
+def test_the_most_likely_candidate_of_the_last_prediction_is_solved_first(monkeypatch, turned):
     before, memory = predicted(0, Memory())
     wanted = before.solved_candidates[-1 if turned else 0].candidate.label
     likelihoods = {each.candidate.label: float(each.candidate.label == wanted) for each in before.candidates}
@@ -68,7 +70,7 @@ def test_the_likeliest_of_last_time_comes_first(monkeypatch, turned):
     )
     asked = []
 
-    def forward_with_time_for_one(problem, start, settings, deadline):
+    def solve_with_time_for_one(problem, start, settings, deadline):
         asked.append(problem)
         if len(asked) > 1:
             monkeypatch.setattr('foc_ros.core.deadline.Deadline.check', out_of_time)
@@ -77,10 +79,10 @@ def test_the_likeliest_of_last_time_comes_first(monkeypatch, turned):
     def out_of_time(_):
         raise OutOfTimeError
 
-    from foc_ros.core import candidates as outcomes
+    from foc_ros.core import candidates as candidates
 
-    real = outcomes.solve_problem
-    monkeypatch.setattr(outcomes, 'forward', forward_with_time_for_one)
+    real = candidates.solve_problem
+    monkeypatch.setattr(candidates, 'solve_problem', solve_with_time_for_one)
     late, _ = predicted(1, memory, 60.0)
     assert [each.candidate.label for each in late.solved_candidates] == [wanted]
     assert late.solved_candidates[0].likelihood == 1.0, 'likelihoods are of what was solved; the others are unknown'

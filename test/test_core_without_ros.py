@@ -1,4 +1,4 @@
-"""The numeric core knows no ROS, and a recording is replayed where ROS is not installed."""
+"""The numeric core imports no ROS, and a recording is replayed without an installed ROS."""
 
 import json
 import subprocess
@@ -52,7 +52,7 @@ def run(program: str, *blocked: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize('package', ['rclpy', 'sensor_msgs.msg', 'rosbags'])
-def test_the_block_holds(package: str) -> None:
+def test_the_blocked_packages_cannot_be_imported(package: str) -> None:
     result = run(f'import {package}', 'rosbags')
     assert result.returncode == 1
     assert 'is blocked' in result.stderr

@@ -1,4 +1,4 @@
-"""The time to go: whole durations, time since onset, the pace of a slow hand, floor and ceiling."""
+"""The time to go: whole durations, time since onset, slow hands, lower and upper limit."""
 
 import math
 from dataclasses import replace
@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foc_ros.core.config import DurationConfig
-from foc_ros.core.estimation.duration import estimate_times_to_go, movement_time
+from foc_ros.core.estimation.duration import compute_movement_time, estimate_times_to_go
 from foc_ros.core.types import NANOSECONDS, HandState
 
 FITTS = DurationConfig(
@@ -34,35 +34,35 @@ def time_to_go(state: HandState, goal: np.ndarray, config: DurationConfig) -> fl
 def test_fitts_law_at_whole_bits() -> None:
     for bits in range(8):
         distance = 0.02 * (2.0**bits - 1.0)
-        assert movement_time(distance, FITTS) == pytest.approx(0.2 + 0.25 * bits)
+        assert compute_movement_time(distance, FITTS) == pytest.approx(0.2 + 0.25 * bits)
 
 
-def test_at_rest_the_whole_duration_from_here() -> None:
+def test_at_rest_the_time_to_go_is_the_whole_duration_from_here() -> None:
     assert time_to_go(hand(0.0), GOAL, FITTS) == pytest.approx(0.2 + 0.25 * math.log2(16.0))
     assert time_to_go(hand(0.2), GOAL, FIXED) == 1.5
 
 
-def test_in_a_movement_the_duration_from_its_onset_less_the_time_since() -> None:
+def test_during_a_movement_the_time_to_go_is_the_duration_less_the_time_since_onset() -> None:
     assert time_to_go(hand(0.1, onset=0.0, since_s=0.4), GOAL, FITTS) == pytest.approx(1.2 - 0.4)
     assert time_to_go(hand(0.1, onset=0.0, since_s=0.4), GOAL, FIXED) == pytest.approx(1.5 - 0.4)
 
 
-def test_floor_and_ceiling() -> None:
+def test_lower_and_upper_limit() -> None:
     assert time_to_go(hand(0.29, onset=0.0, since_s=5.0), GOAL, FITTS) == 0.3
     assert time_to_go(hand(0.3), GOAL, replace(FITTS, fitts_a_s=0.0)) == 0.3
     assert time_to_go(hand(0.0), GOAL, replace(FIXED, fixed_s=30.0)) == 10.0
     assert time_to_go(hand(0.1, onset=0.0, since_s=1.0, speed=0.0), GOAL, FIXED) == 10.0
 
 
-def test_a_slow_hand_takes_as_long_as_its_way_does_at_its_pace() -> None:
+def test_a_slow_hand_needs_the_time_of_the_distance_at_its_speed() -> None:
     assert time_to_go(hand(0.1, onset=0.0, since_s=1.0, speed=0.05), GOAL, FIXED) == pytest.approx(0.2 / 0.05)
     assert time_to_go(hand(0.1, onset=0.0, since_s=3.0, speed=0.05), GOAL, FIXED) == pytest.approx(0.2 / 0.05)
-    # too early for the speed to tell
+    # too early for the speed to count
     assert time_to_go(hand(0.01, onset=0.0, since_s=0.29 * 1.5, speed=0.05), GOAL, FIXED) == pytest.approx(0.71 * 1.5)
 
 
 @pytest.mark.parametrize('share', np.linspace(0.0, 0.99, 34))
-def test_a_minimum_jerk_movement_that_keeps_to_its_time_is_not_held_up(share: float) -> None:
+def test_a_minimum_jerk_movement_of_the_expected_duration_is_not_delayed(share: float) -> None:
     config = replace(FIXED, min_time_to_go_s=0.01)
     x = 0.3 * (10.0 * share**3 - 15.0 * share**4 + 6.0 * share**5)
     speed = 0.3 / 1.5 * (30.0 * share**2 - 60.0 * share**3 + 30.0 * share**4)
@@ -71,7 +71,7 @@ def test_a_minimum_jerk_movement_that_keeps_to_its_time_is_not_held_up(share: fl
 
 
 @given(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4), st.floats(0.0, 1e4), st.floats(0.0, 1e3), st.sampled_from([FITTS, FIXED]))
-def test_stays_in_bounds_and_is_continuous_at_onset(
+def test_the_time_to_go_stays_in_bounds_and_is_continuous_at_onset(
     x: float, onset: float, since_s: float, speed: float, config: DurationConfig
 ) -> None:
     assert 0.3 <= time_to_go(hand(x, onset, since_s, speed), GOAL, config) <= 10.0
@@ -80,7 +80,7 @@ def test_stays_in_bounds_and_is_continuous_at_onset(
     assert slower >= time_to_go(hand(x, onset, since_s, speed), GOAL, config)
 
 
-def test_the_frame_does_not_matter() -> None:
+def test_the_time_to_go_does_not_depend_on_the_frame() -> None:
     turn, shift = np.array([[0.6, -0.8], [0.8, 0.6]]), np.array([3.0, -2.0])
     state = hand(0.1, onset=0.0, since_s=0.5, speed=0.1)
     moved = replace(
@@ -91,8 +91,8 @@ def test_the_frame_does_not_matter() -> None:
     assert time_to_go(moved, turn @ GOAL + shift, FITTS) == pytest.approx(time_to_go(state, GOAL, FITTS), rel=1e-12)
 
 
-def test_of_several_goals_the_one_that_the_speed_fits_best_tells_how_slow_the_operator_is() -> None:
-    """Near one goal and slow, the hand gets no more time for the others than for this one."""
+def test_the_goal_that_the_speed_fits_best_gives_the_factor_for_all_goals() -> None:
+    """A hand that is slow near one goal gets no longer durations to the others."""
     goals = np.array([[0.3, 0.0], [-0.3, 0.0]])
     near = estimate_times_to_go(hand(0.28, onset=0.0, since_s=1.3, speed=0.1), goals, FIXED)
     assert near == pytest.approx([0.3, 0.3])

@@ -1,4 +1,4 @@
-"""Plants against the matrix exponential, horizons against step-by-step simulation."""
+"""Plants compared with the matrix exponential, horizons with a simulation step by step."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from foc_ros.core.dynamics.plants import (
     triple_integrator,
     triple_integrator_horizon,
 )
-from foc_ros.core.dynamics.replanning import replanned_error_map, triple_integrator_error_map
+from foc_ros.core.dynamics.replanning import compute_error_map, triple_integrator_error_map
 from foc_ros.core.errors import InputError
 
 
@@ -55,15 +55,15 @@ def test_horizon_is_what_the_plant_does_step_by_step(plant):
     np.testing.assert_allclose(predicted[-1], state, atol=1e-12)
 
 
-def test_scaled_horizon_is_the_direct_one():
+def test_the_scaled_horizon_equals_the_direct_one():
     direct, scaled = condense(triple_integrator(0.037), 30), triple_integrator_horizon(0.037, 30)
     np.testing.assert_allclose(scaled.powers, direct.powers, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(scaled.response, direct.response, rtol=1e-12, atol=1e-18)
     np.testing.assert_allclose(scaled.maps, direct.maps, rtol=1e-12, atol=1e-24)
-    np.testing.assert_allclose(triple_integrator_error_map(0.037, 30), replanned_error_map(direct), atol=1e-10)
+    np.testing.assert_allclose(triple_integrator_error_map(0.037, 30), compute_error_map(direct), atol=1e-10)
 
 
-def test_a_replanning_operator_ends_at_the_goal_and_starts_where_the_hand_is():
+def test_a_corrected_error_starts_in_full_and_vanishes_at_the_goal():
     error_map = triple_integrator_error_map(0.02, 50)
     np.testing.assert_allclose(error_map[0], np.eye(6))
     np.testing.assert_allclose(error_map[-1], 0.0, atol=1e-9)
@@ -80,7 +80,7 @@ def test_a_replanning_operator_ends_at_the_goal_and_starts_where_the_hand_is():
         (np.eye(4), np.ones((4, 2)), 0.0),
     ],
 )
-def test_a_plant_that_is_none_is_refused(A, B, dt):
+def test_a_plant_of_wrong_shape_is_refused(A, B, dt):
     with pytest.raises(InputError, match='plant'):
         Plant(A, B, dt)
 
@@ -93,7 +93,7 @@ def test_mass_and_damping_are_checked():
 
 
 @pytest.mark.parametrize('passing', [False, True])
-def test_a_control_that_leads_back_ends_at_the_goal_and_nearer_to_the_path(passing):
+def test_a_correction_ends_at_the_goal_and_nearer_to_the_path(passing):
     generator = np.random.default_rng(6)
     stacked = triple_integrator_horizon(0.02, 40)
     fixed = states_at_goal(6, passing)

@@ -1,4 +1,4 @@
-"""The effort of a movement so far: closed forms without noise, a stated factor with it, never noise taken for effort."""
+"""The effort of a movement so far: closed forms without noise, bounds with noise, and no effort from noise alone."""
 
 from collections.abc import Callable
 
@@ -65,7 +65,7 @@ def test_turning_or_shifting_the_frame_changes_nothing() -> None:
     assert fed(t + 7.0, positions @ turn.T + [3.0, -2.0]).spent == pytest.approx(fed(t, positions).spent, rel=1e-6)
 
 
-def test_two_quintics_are_two_stretches_and_their_efforts_add_up() -> None:
+def test_two_quintics_are_two_segments_and_their_efforts_add_up() -> None:
     t = np.linspace(0.0, 2.0, 401)
     aside = np.where(t < 1.0, minimum_jerk(t, 0.2, 1.0), 0.2 - minimum_jerk(t - 1.0, 0.2, 1.0))
     effort = fed(t, np.stack([0.0 * t, aside], axis=1), stddev=1e-5)
@@ -99,7 +99,7 @@ def test_noise_on_uniform_motion_is_not_taken_for_effort(rate: float) -> None:
 
 
 @pytest.mark.parametrize('rate', [50.0, 200.0])
-def test_an_outlier_belongs_to_no_stretch(rate: float) -> None:
+def test_an_outlier_belongs_to_no_segment(rate: float) -> None:
     rng = np.random.default_rng(7)
     t = np.arange(0.0, 1.0, 1.0 / rate)
     positions = reach(t) + 1e-4 * rng.standard_normal((len(t), 2))
@@ -107,9 +107,9 @@ def test_an_outlier_belongs_to_no_stretch(rate: float) -> None:
     assert fed(t, positions, stddev=1e-4).spent < 1.1 * 720.0 * 0.3**2
 
 
-def test_bunched_and_short_stretches_are_not_judged() -> None:
-    bunched = np.concatenate([1e-6 * np.arange(10.0), [LEAST_TIME_S + 0.1]])
-    assert fed(bunched, reach(bunched)).spent == 0.0
+def test_short_segments_and_clustered_samples_give_no_effort() -> None:
+    clustered = np.concatenate([1e-6 * np.arange(10.0), [LEAST_TIME_S + 0.1]])
+    assert fed(clustered, reach(clustered)).spent == 0.0
     short = np.linspace(0.0, 0.9 * LEAST_TIME_S, 100)
     assert fed(short, np.outer(short**3, [50.0, 0.0])).spent == 0.0
 

@@ -1,4 +1,4 @@
-"""The Kalman filter of the hand: against plain matrices, consistent, with onset, and with every kind of stamp."""
+"""The Kalman filter of the hand: equations, consistency, movement onset, and all kinds of stamps."""
 
 import itertools
 from dataclasses import replace
@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from foc_ros.core.config import EstimatorConfig
 from foc_ros.core.estimation.kalman_filter import FilterState, gramian, transition, update
-from foc_ros.core.sample_status import SampleStatus
-from foc_ros.core.types import NANOSECONDS, Array, HandSample
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, SampleStatus
 
 CONFIG = EstimatorConfig(position_stddev=0.001, jerk_density=5.0, onset_speed=0.05, gap_s=0.5)
 START = 100 * NANOSECONDS
@@ -50,7 +49,7 @@ def test_gramian_and_transition_compose() -> None:
     np.testing.assert_allclose(transition(b) @ gramian(a) @ transition(b).T + gramian(b), gramian(a + b), rtol=1e-12)
 
 
-def test_equals_a_plain_filter_with_six_states() -> None:
+def test_the_filter_equals_a_plain_one_with_six_states() -> None:
     rng = np.random.default_rng(1)
     times = np.cumsum(rng.uniform(0.002, 0.1, 60))
     positions = 0.2 * rng.standard_normal((60, 2))
@@ -74,14 +73,14 @@ def test_the_first_sample_gives_the_position_and_broad_velocity() -> None:
     assert (state.height, state.frame_id, state.onset_ns, state.effort_spent) == (0.4, 'world', None, 0.0)
 
 
-def test_a_uniform_motion_is_found_exactly() -> None:
+def test_a_uniform_motion_is_estimated_exactly() -> None:
     times = np.arange(0.0, 2.0, 0.02)
     last = run(times, np.outer(times, [0.3, -0.2]))[-1]
     np.testing.assert_allclose(last.mean, [*(0.3 * times[-1:]), *(-0.2 * times[-1:]), 0.3, -0.2, 0.0, 0.0], atol=2e-4)
 
 
 @pytest.mark.parametrize('rate', [15.0, 50.0, 200.0])
-def test_errors_are_as_large_as_the_covariance_says(rate: float) -> None:
+def test_the_errors_are_consistent_with_the_covariance(rate: float) -> None:
     """Normalised estimation error squared: its mean over n runs is chi-squared with 6 n degrees of freedom over n."""
     rng, runs = np.random.default_rng(4), 150
     scores = []
@@ -95,7 +94,7 @@ def test_errors_are_as_large_as_the_covariance_says(rate: float) -> None:
     assert abs(np.mean(scores) - 6.0) < 3.5 * np.sqrt(12.0 / runs)
 
 
-def test_the_frame_does_not_matter() -> None:
+def test_the_estimate_does_not_depend_on_the_frame() -> None:
     rng = np.random.default_rng(2)
     times, positions = np.arange(0.0, 1.0, 0.02), 0.3 * np.cumsum(rng.standard_normal((50, 2)), axis=0) * 0.02
     turn, shift = np.array([[0.6, -0.8], [0.8, 0.6]]), np.array([1.0, -2.0])
@@ -115,7 +114,7 @@ def test_the_frame_does_not_matter() -> None:
     steps=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=30),
     far=st.floats(0.0, 1e6),
 )
-def test_stays_finite_and_positive_for_any_configuration(
+def test_the_estimate_stays_finite_and_positive_for_any_configuration(
     stddev: float, density: float, gap: float, steps: list[float], far: float
 ) -> None:
     config = EstimatorConfig(position_stddev=stddev, jerk_density=density, gap_s=gap)
@@ -132,27 +131,27 @@ def test_stays_finite_and_positive_for_any_configuration(
 
 def test_duplicates_and_late_samples_change_nothing() -> None:
     state = run(np.arange(0.0, 1.0, 0.02), np.zeros((50, 2)))[-1]
-    for seconds, verdict in [(0.0, SampleStatus.DUPLICATE), (-1e-9, SampleStatus.LATE), (-0.5, SampleStatus.LATE)]:
-        answer = update(state, sample(0.98 + seconds, 9.0, 9.0), CONFIG)
-        assert answer.verdict is verdict
-        assert answer.state is state
+    for seconds, status in [(0.0, SampleStatus.DUPLICATE), (-1e-9, SampleStatus.LATE), (-0.5, SampleStatus.LATE)]:
+        updated = update(state, sample(0.98 + seconds, 9.0, 9.0), CONFIG)
+        assert updated.status is status
+        assert updated.state is state
 
 
-def test_jumps_back_and_gaps_start_anew() -> None:
+def test_backward_jumps_and_gaps_restart_the_filter() -> None:
     state = run(np.arange(0.0, 1.0, 0.02), np.outer(np.arange(0.0, 1.0, 0.02), [0.5, 0.0]))[-1]
     assert state.onset_ns is not None
-    for seconds, verdict in [
+    for seconds, status in [
         (-0.501, SampleStatus.RESTARTED_BACKWARD),
         (0.501, SampleStatus.RESTARTED_GAP),
         (1e9, SampleStatus.RESTARTED_GAP),
     ]:
         jump = sample(0.98 + seconds, 0.7, 0.1)
-        answer, fresh = update(state, jump, CONFIG), update(None, jump, CONFIG).state
-        assert answer.verdict is verdict
-        np.testing.assert_array_equal(answer.state.mean, fresh.mean)
-        np.testing.assert_array_equal(answer.state.covariance, fresh.covariance)
-        assert answer.state.onset_ns is None
-    assert update(state, sample(0.98 + 0.5), CONFIG).verdict is SampleStatus.ACCEPTED
+        updated, fresh = update(state, jump, CONFIG), update(None, jump, CONFIG).state
+        assert updated.status is status
+        np.testing.assert_array_equal(updated.state.mean, fresh.mean)
+        np.testing.assert_array_equal(updated.state.covariance, fresh.covariance)
+        assert updated.state.onset_ns is None
+    assert update(state, sample(0.98 + 0.5), CONFIG).status is SampleStatus.ACCEPTED
 
 
 def test_a_movement_begins_above_the_onset_speed_and_ends_below_half_of_it() -> None:

@@ -1,4 +1,4 @@
-"""Ten seconds of a noisy hand before noisy obstacles at 100 Hz: names stand still, and the most likely way does not flicker."""
+"""Ten seconds of a noisy hand and noisy obstacles at 100 Hz: labels and the most likely class stay the same."""
 
 from itertools import islice, pairwise
 
@@ -15,7 +15,7 @@ NOISE = 0.001
 
 
 def predictions(**settings):
-    """Predictions at 100 Hz for a hand at rest before a circle on its straight way, 1 mm of noise on both."""
+    """Yield predictions at 100 Hz for a hand at rest before a circle on its straight path, with 1 mm of noise on both."""
     config = updated(Config(), {'rate_hz': 100.0, 'foc.steps': 20, **settings})
     pipeline, rng = Pipeline(config), np.random.default_rng(11)
     pipeline.set_goals(np.array([[0.3, 0.0]]), 'world')
@@ -34,13 +34,13 @@ def changes(values):
 
 
 @pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
-def test_a_symmetric_obstacle_does_not_make_the_choice_flicker(strategy):
+def test_the_most_likely_class_of_a_symmetric_obstacle_does_not_flicker(strategy):
     made = list(predictions(**{'foc.strategy': strategy}))
     assert len(made) == SAMPLES
     assert all({outcome.candidate.label for outcome in one.solved_candidates} == {'goal0:+0', 'goal0:-0'} for one in made)
     assert changes([one.most_likely for one in made]) <= 1
 
 
-def test_without_a_margin_it_would():
+def test_without_a_margin_the_most_likely_class_flickers():
     made = list(islice(predictions(**{'likelihood.margin': 0.0}), 200))
     assert changes([one.most_likely for one in made]) > 10

@@ -1,4 +1,4 @@
-"""The search against brute force over all patterns of sides, on random scenes."""
+"""The candidates of random scenes agree with a brute-force search over all patterns of sides."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ K = 6
 TIE = 0.01
 
 
-def compared(seed: int):
+def compare(seed: int):
     rng = np.random.default_rng(seed)
     obstacles = random_scene(rng, int(rng.integers(1, 9)))
     expected = shortest_by_pattern(np.zeros(2), GOAL, obstacles.centre, obstacles.radius + CLEARANCE)
@@ -22,7 +22,7 @@ def compared(seed: int):
 @pytest.mark.parametrize('batch', range(20))
 def test_the_shortest_classes_are_found_and_none_is_invented(batch):
     for seed in range(25 * batch, 25 * (batch + 1)):
-        found, ours, expected = compared(seed)
+        found, ours, expected = compare(seed)
         assert len(ours) == len(found.candidates) == min(K, len(expected)), f'scene {seed}'
         assert set(ours) <= set(expected), f'scene {seed}: invented'
         last = max(ours.values())
@@ -33,13 +33,13 @@ def test_the_shortest_classes_are_found_and_none_is_invented(batch):
 @pytest.mark.parametrize('batch', range(4))
 def test_lengths_are_those_of_the_shortest_paths(batch):
     for seed in range(1000 + 25 * batch, 1000 + 25 * (batch + 1)):
-        _, ours, expected = compared(seed)
+        _, ours, expected = compare(seed)
         for pattern, length in ours.items():
             # the brute force's polygons go round the circles, so its arcs are up to 0.6 % longer
             assert expected[pattern] * (1 - 0.006) <= length <= expected[pattern] * (1 + 1e-6), f'scene {seed}'
 
 
-def test_brute_force_knows_one_circle_in_closed_form():
+def test_brute_force_agrees_with_the_closed_form_for_one_circle():
     expected = shortest_by_pattern(np.zeros(2), GOAL, np.array([[0.175, 0.0]]), np.array([0.05]))
     arc = np.pi - 2 * np.arccos(0.05 / 0.175)
     exact = 2 * np.sqrt(0.175**2 - 0.05**2) + 0.05 * arc
@@ -47,7 +47,7 @@ def test_brute_force_knows_one_circle_in_closed_form():
     assert expected[(1,)] == pytest.approx(exact, rel=0.006)
 
 
-def test_a_way_over_two_circles_and_back_down_between_them_and_a_third():
+def test_a_path_over_two_circles_and_back_between_them_and_a_third():
     centre = np.array([[0.1866, 0.0914], [0.2434, 0.0164], [0.1862, 0.0495]])
     radius = np.array([0.0355, 0.029, 0.0346])
     obstacles = make_obstacles(centre, radius - CLEARANCE)

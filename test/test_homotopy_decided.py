@@ -1,4 +1,4 @@
-"""Answers decided for hands and goals in margins, closed gaps, empty and crowded scenes."""
+"""Candidates for hands and goals in margins, closed gaps, empty scenes and crowds."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def sides(found):
     return [dict(one.sides) for one in found.candidates]
 
 
-def really(found, obstacles):
+def pass_as_named(found, obstacles):
     """Whether each guess passes the named obstacles as its name says."""
     return all(dict(one.sides).items() <= path_sides(one.guess, obstacles).items() for one in found.candidates)
 
@@ -47,7 +47,7 @@ def test_hand_inside_a_margin_finds_both_ways_out(centre):
     found = find(obstacles)
     assert found.notes == {'hand_inside': 1}
     assert {one.label for one in found.candidates} == {'goal0:+0', 'goal0:-0'}
-    assert really(found, obstacles)
+    assert pass_as_named(found, obstacles)
     depth = 0.035 - np.hypot(*centre)
     for one in found.candidates:
         out = np.hypot(*(one.guess - centre).T) - 0.035
@@ -85,7 +85,7 @@ def test_goal_inside_a_margin_only_is_reached():
     found = find(obstacles)
     assert found.notes == {'goal_near': 1}
     assert {one.label for one in found.candidates} == {'goal0:+0', 'goal0:-0'}
-    assert really(found, obstacles)
+    assert pass_as_named(found, obstacles)
     for one in found.candidates:
         np.testing.assert_allclose(one.guess[-1], GOAL, atol=1e-12)
         assert gap_to_circles(one.guess, obstacles, 0.0) > 0.0
@@ -103,7 +103,7 @@ def test_the_one_gap_in_a_ring_is_found_and_a_turn_back_is_long():
     ring = 0.1 * np.column_stack([np.cos(angle), np.sin(angle)])
     obstacles = make_obstacles(np.delete(ring, 6, axis=0), 0.03)
     found = find(obstacles, k=4)
-    assert len(found.candidates) == 2 and really(found, obstacles)
+    assert len(found.candidates) == 2 and pass_as_named(found, obstacles)
     assert all(one.length > 0.1 + 0.1 * np.pi + 0.2 for one in found.candidates)
     assert all(gap_to_circles(one.guess, obstacles) > -1e-9 for one in found.candidates)
 
@@ -119,7 +119,7 @@ def test_obstacles_on_the_same_spot_act_as_one(second):
     obstacles = make_obstacles([[0.15, 0.0], second[0]], [0.03, second[1]])
     found = find(obstacles)
     assert sides(found) == [{'0': LEFT, '1': LEFT}, {'0': RIGHT, '1': RIGHT}]
-    assert really(found, obstacles)
+    assert pass_as_named(found, obstacles)
 
 
 @pytest.mark.parametrize(('gap', 'through'), [(2 * CLEARANCE - 1e-4, False), (2 * CLEARANCE + 1e-4, True)])
@@ -185,18 +185,18 @@ def test_each_goal_comes_in_and_of_very_many_the_nearest():
     assert [one.goal for one in find(obstacles, goals=many, k=2).candidates] == list(range(64))
 
 
-def test_three_hundred_obstacles_end_within_the_bound_on_states():
+def test_three_hundred_obstacles_have_candidates_within_the_bound_on_states():
     rng = np.random.default_rng(3)
     centre = rng.uniform([-0.5, -0.5], [0.85, 0.5], (300, 2))
     radius = rng.uniform(0.002, 0.006, 300)
     keep = (np.hypot(*centre.T) > radius + 0.006) & (np.hypot(*(centre - GOAL).T) > radius + 0.006)
     obstacles = make_obstacles(centre[keep], radius[keep])
     found = find(obstacles, k=8, steps=400)
-    assert len(found.candidates) == 8 and really(found, obstacles)
+    assert len(found.candidates) == 8 and pass_as_named(found, obstacles)
     assert all(gap_to_circles(one.guess, obstacles) > -1e-9 for one in found.candidates)
 
 
-def test_a_wall_of_three_hundred_obstacles_gives_up_and_says_so():
+def test_a_wall_of_three_hundred_obstacles_is_noted():
     wall = np.column_stack([np.full(301, 0.15), np.linspace(-1.5, 1.5, 301)])
     found = find(make_obstacles(wall, 0.01))
     assert found.candidates == ()

@@ -1,4 +1,4 @@
-"""The side on which a path really passes an obstacle, by the angle it sweeps."""
+"""The side on which a path passes an obstacle, by the angle that the path sweeps about its centre."""
 
 import json
 from pathlib import Path
@@ -34,7 +34,7 @@ def test_swept_angle_of_a_quarter_circle_and_of_two_turns():
     assert compute_swept_angles(twice, np.array([[0.0, 0.0], [3.0, 0.0]])) == pytest.approx([-4 * np.pi, 0.0])
 
 
-def test_obstacles_behind_and_beyond_are_not_passed():
+def test_obstacles_behind_the_start_and_beyond_the_end_are_not_passed():
     obstacles = make_obstacles([[-0.1, 0.05], [1.2, 0.0], [0.5, 0.0]], 0.05)
     assert path_sides(bowed(0.3), obstacles) == {'2': LEFT}
 
@@ -49,7 +49,7 @@ def test_no_obstacles_no_sides_and_a_path_of_one_point_passes_nothing():
     assert path_sides(np.zeros((1, 2)), ABEAM) == {}
 
 
-def test_moving_obstacle_is_judged_where_it_is_at_the_time():
+def test_a_moving_obstacle_counts_where_it_is_at_each_step():
     path = bowed(0.0)
     crossing = np.stack([np.full(101, 0.5), np.linspace(0.4, -0.4, 101) + 0.1], axis=1)[:, None]
     # half way, when the hand passes, it has come no nearer than 0.1 m to the left

@@ -1,4 +1,4 @@
-"""Names and lists of candidates are steady under noise, and the ways through the Avoiding task are all found."""
+"""Labels and lists of candidates are steady under noise, and all classes of the Avoiding task are found."""
 
 import csv
 from collections import Counter
@@ -12,7 +12,7 @@ from foc_ros.core.types import make_obstacles
 TICKS = 400
 
 
-def changes(centre, radius, goals, hand=(0.0, 0.0), k=4, remember=True):
+def count_changes(centre, radius, goals, hand=(0.0, 0.0), k=4, remember=True):
     """How often the set of labels changes under 1 mm of noise on hand and obstacles."""
     rng = np.random.default_rng(5)
     centre = np.array(centre, dtype=float)
@@ -28,7 +28,7 @@ def changes(centre, radius, goals, hand=(0.0, 0.0), k=4, remember=True):
 
 
 def test_a_symmetric_obstacle_keeps_its_two_labels():
-    assert changes([(0.15, 0.0)], 0.03, (0.3, 0.0)) == 0
+    assert count_changes([(0.15, 0.0)], 0.03, (0.3, 0.0)) == 0
 
 
 @pytest.mark.parametrize(
@@ -39,13 +39,13 @@ def test_a_symmetric_obstacle_keeps_its_two_labels():
         pytest.param([(0.08, 0.0), (0.15, 0.0), (0.22, 0.0)], 0.02, 3, id='room for one of two equally long classes'),
     ],
 )
-def test_what_was_there_before_stays_under_noise(centre, radius, k):
-    loose = changes(centre, radius, (0.3, 0.0), k=k, remember=False)
+def test_candidates_stay_under_noise(centre, radius, k):
+    loose = count_changes(centre, radius, (0.3, 0.0), k=k, remember=False)
     assert loose > 100, 'the scene is no test'
-    assert changes(centre, radius, (0.3, 0.0), k=k) <= 8
+    assert count_changes(centre, radius, (0.3, 0.0), k=k) <= 8
 
 
-def test_a_better_class_comes_in_all_the_same():
+def test_a_clearly_better_class_replaces_one_that_was_there():
     centre, radius = np.array([[0.1, 0.0], [0.2, 0.05], [0.2, -0.05]]), 0.02
     before = find(make_obstacles(centre, radius), (0.3, 0.0), k=2)
     moved = make_obstacles(centre + np.array([0.0, 0.06]), radius)
@@ -61,24 +61,24 @@ def test_an_obstacle_added_elsewhere_leaves_the_names_as_they_are():
     assert [a.label for a in one.candidates] == [b.label for b in other.candidates]
 
 
-def gaps(path, obstacles):
+def find_gaps(path, obstacles):
     """Gap taken in each row, from low x, of a path upwards through rows at three heights."""
-    way = []
+    taken = []
     for y in np.unique(obstacles.centre[:, 1]):
         crossed = np.flatnonzero((path[:-1, 1] < y) & (path[1:, 1] >= y))
         row = np.sort(obstacles.centre[obstacles.centre[:, 1] == y, 0])
-        way.append(tuple(np.searchsorted(row, path[crossed, 0]).tolist()))
-    return tuple(way)
+        taken.append(tuple(np.searchsorted(row, path[crossed, 0]).tolist()))
+    return tuple(taken)
 
 
 @pytest.mark.skipif(not AVOIDING.is_dir(), reason='optional data ../shared/data/d3il_avoiding is not there')
 @pytest.mark.parametrize('line', ['its four goals', 'one goal beyond'])
-def test_all_24_ways_through_the_avoiding_task(line):
+def test_all_24_classes_of_the_avoiding_task_are_found(line):
     obstacles, goals = avoiding()
     found = find(obstacles, goals if line == 'its four goals' else [[0.5, 0.6]], hand=(0.525, -0.28), k=24, steps=400)
-    ways = {gaps(one.guess, obstacles) for one in found.candidates}
-    assert len(found.candidates) == 24 == len(ways)
-    assert all(len(row) == 1 for way in ways for row in way)
+    taken = {find_gaps(one.guess, obstacles) for one in found.candidates}
+    assert len(found.candidates) == 24 == len(taken)
+    assert all(len(row) == 1 for rows in taken for row in rows)
 
 
 def tracks(count):
@@ -90,13 +90,13 @@ def tracks(count):
         yield np.column_stack([x, y, np.gradient(x, t), np.gradient(y, t)])
 
 
-def named(candidates):
+def find_named(candidates):
     return {(one.goal, identity) for one in candidates for identity, _ in one.sides}
 
 
 @pytest.mark.skipif(not AVOIDING.is_dir(), reason='optional data ../shared/data/d3il_avoiding is not there')
 def test_along_the_avoiding_task_the_list_changes_only_when_it_must():
-    """Where the names are the same, what comes in is among the best for itself, what goes is not; nothing changes by itself."""
+    """While the names stay, classes that enter are among the best of a search without memory, and those that leave are not."""
     obstacles, goals = avoiding()
     count = Counter()
     for track in tracks(6):
@@ -108,8 +108,8 @@ def test_along_the_avoiding_task_the_list_changes_only_when_it_must():
             labels, before, best = ({one.label for one in each} for each in (found, previous, fresh))
             count['samples'] += 1
             if previous and labels != before:
-                count['names' if named(found) != named(previous) else 'ranking'] += 1
-                if named(found) == named(previous) == named(fresh):
+                count['names' if find_named(found) != find_named(previous) else 'ranking'] += 1
+                if find_named(found) == find_named(previous) == find_named(fresh):
                     assert labels - before <= best
                     assert not (before - labels) & best
             again = {one.label for one in find(obstacles, previous=found, **seen).candidates}

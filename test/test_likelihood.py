@@ -13,34 +13,34 @@ COSTS = st.lists(st.floats(0.0, 1.7e308), min_size=1, max_size=12)
 BETA = st.floats(0.0, 100.0)
 
 
-def plain(beta: float) -> LikelihoodConfig:
+def with_beta(beta: float) -> LikelihoodConfig:
     return LikelihoodConfig(beta=beta)
 
 
 def test_ratio_of_likelihoods_is_the_power_of_the_ratio_of_costs() -> None:
-    p = compute_likelihoods(np.array([1.0, 4.0, 9.0]), plain(0.5))
+    p = compute_likelihoods(np.array([1.0, 4.0, 9.0]), with_beta(0.5))
     np.testing.assert_allclose(p, np.array([6.0, 3.0, 2.0]) / 11.0, rtol=1e-14)
 
 
-def test_nothing_in_nothing_out() -> None:
-    assert compute_likelihoods(np.zeros(0), plain(0.5)).shape == (0,)
+def test_no_class_gives_no_likelihood() -> None:
+    assert compute_likelihoods(np.zeros(0), with_beta(0.5)).shape == (0,)
     assert select_most_likely({}, 'a', 0.1) is None
 
 
 def test_beta_zero_is_uniform_and_large_beta_picks_the_cheapest() -> None:
     costs = np.array([3.0, 2.0, 5.0])
-    np.testing.assert_allclose(compute_likelihoods(costs, plain(0.0)), 1.0 / 3.0)
-    assert compute_likelihoods(costs, plain(100.0))[1] == pytest.approx(1.0)
+    np.testing.assert_allclose(compute_likelihoods(costs, with_beta(0.0)), 1.0 / 3.0)
+    assert compute_likelihoods(costs, with_beta(100.0))[1] == pytest.approx(1.0)
 
 
 def test_costs_below_the_floor_count_as_the_floor() -> None:
-    p = compute_likelihoods(np.array([0.0, COST_FLOOR / 10.0, COST_FLOOR, 4.0 * COST_FLOOR]), plain(0.5))
+    p = compute_likelihoods(np.array([0.0, COST_FLOOR / 10.0, COST_FLOOR, 4.0 * COST_FLOOR]), with_beta(0.5))
     np.testing.assert_allclose(p, np.array([2.0, 2.0, 2.0, 1.0]) / 7.0, rtol=1e-14)
 
 
 @given(COSTS, BETA)
 def test_any_costs_give_a_distribution_in_the_order_of_the_costs(costs: list[float], beta: float) -> None:
-    p = compute_likelihoods(np.array(costs), plain(beta))
+    p = compute_likelihoods(np.array(costs), with_beta(beta))
     assert np.all((p >= 0.0) & (p <= 1.0))
     assert p.sum() == pytest.approx(1.0)
     assert np.all(np.diff(p[np.argsort(costs, kind='stable')]) <= 0.0)
@@ -49,17 +49,17 @@ def test_any_costs_give_a_distribution_in_the_order_of_the_costs(costs: list[flo
 @given(st.lists(st.floats(1e-3, 1e6), min_size=1, max_size=8), BETA, st.floats(1e-3, 1e3))
 def test_the_unit_of_effort_does_not_matter(costs: list[float], beta: float, unit: float) -> None:
     np.testing.assert_allclose(
-        compute_likelihoods(unit * np.array(costs), plain(beta)),
-        compute_likelihoods(np.array(costs), plain(beta)),
+        compute_likelihoods(unit * np.array(costs), with_beta(beta)),
+        compute_likelihoods(np.array(costs), with_beta(beta)),
         rtol=1e-9,
         atol=1e-12,
     )
 
 
 @pytest.mark.parametrize('wrong', [-1.0, np.nan, np.inf])
-def test_a_cost_that_is_none_is_refused_by_name(wrong: float) -> None:
+def test_a_negative_or_infinite_cost_is_refused_by_name(wrong: float) -> None:
     with pytest.raises(InputError, match=r'costs\[1\]: expected a finite number >= 0'):
-        compute_likelihoods(np.array([1.0, wrong]), plain(0.5))
+        compute_likelihoods(np.array([1.0, wrong]), with_beta(0.5))
 
 
 def test_most_likely_stays_until_another_leads_by_more_than_the_margin() -> None:

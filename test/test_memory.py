@@ -1,4 +1,4 @@
-"""What a prediction takes from the one before: solutions by label, by an earlier name, and from where time ran out."""
+"""The memory between predictions: solutions by label, under changed labels, and after a deadline."""
 
 import numpy as np
 import pytest
@@ -43,8 +43,8 @@ def memory() -> Memory:
         pytest.param(way({'b': LEFT}, goal=1), None, id='another goal'),
     ],
 )
-def test_a_way_is_known_by_its_name_or_the_one_it_had(memory, now, before):
-    found = memory.known([now]).solutions.get(now.label)
+def test_a_candidate_is_found_by_its_present_or_its_earlier_label(memory, now, before):
+    found = memory.find_earlier([now]).solutions.get(now.label)
     assert found is (None if before is None else memory.earlier.solutions[before.label])
 
 
@@ -58,7 +58,7 @@ def reaching(x: float, memory: Memory, budget_s: float = 0.0):
     return predict(updated(CONFIG, {'budget_s': budget_s}), state, obstacles, np.array([[0.3, 0.0]]), memory)
 
 
-def test_when_an_obstacle_is_passed_its_ways_go_on_from_where_they_were():
+def test_when_an_obstacle_is_passed_the_candidates_keep_their_solutions():
     _, memory = reaching(0.099, Memory())
     warm, _ = reaching(0.101, memory)
     cold, _ = reaching(0.101, Memory())
@@ -71,7 +71,7 @@ def test_when_an_obstacle_is_passed_its_ways_go_on_from_where_they_were():
         np.testing.assert_allclose(one.solution.path, other.solution.path, atol=1e-4)
 
 
-def test_a_way_that_was_stopped_goes_on_from_there(monkeypatch):
+def test_a_candidate_stopped_by_the_deadline_continues_from_there(monkeypatch):
     looks = []
 
     def stop_after_a_few(_):
@@ -83,15 +83,15 @@ def test_a_way_that_was_stopped_goes_on_from_there(monkeypatch):
         patch.setattr(Deadline, 'check', stop_after_a_few)
         late, memory = reaching(0.0, Memory(), 60.0)
     assert {outcome.solution.status for outcome in late.candidates} == {Status.DEADLINE}
-    assert memory.earlier.solutions, 'the first way got somewhere'
+    assert memory.earlier.solutions, 'the first candidate had some time'
     assert all(solution.lam > 0.0 for solution in memory.earlier.solutions.values())
     after, _ = reaching(0.0, memory)
     assert set(memory.earlier.solutions) <= {outcome.candidate.label for outcome in after.solved_candidates}
 
 
-def test_a_way_out_of_reach_is_followed_and_begun_anew_now_and_then(monkeypatch):
+def test_an_unreachable_candidate_is_followed_and_restarted_at_intervals(monkeypatch):
     starts = []
-    monkeypatch.setattr(outcomes, 'forward', lambda *given: starts.append(given[1].lam is None) or solve_problem(*given))
+    monkeypatch.setattr(outcomes, 'solve_problem', lambda *given: starts.append(given[1].lam is None) or solve_problem(*given))
     config = updated(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0})
     memory, begun = Memory(), []
     for tick in range(2 * RETRY_AFTER + 3):
@@ -100,4 +100,4 @@ def test_a_way_out_of_reach_is_followed_and_begun_anew_now_and_then(monkeypatch)
         prediction, memory = predict(config, state, make_obstacles([[0.15, 0.0]], 0.03, 0.003), np.array([[0.3, 0.0]]), memory)
         assert {outcome.solution.status for outcome in prediction.candidates} == {Status.ETA_UNREACHABLE}
         begun.append(any(starts))
-    assert [tick for tick, anew in enumerate(begun) if anew] == [0, RETRY_AFTER + 1, 2 * RETRY_AFTER + 2]
+    assert [tick for tick, restarted in enumerate(begun) if restarted] == [0, RETRY_AFTER + 1, 2 * RETRY_AFTER + 2]

@@ -1,4 +1,4 @@
-"""The pipeline: what is due, what is refused and why, and that nothing old is ever passed off as new."""
+"""The pipeline: when a prediction is due, what is rejected and why, and that no outdated input is used as a new one."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ CONFIG = updated(Config(), {'rate_hz': 50.0, 'scene.timeout_s': 2.0, 'foc.steps'
 
 
 class Recorder:
-    """Stands in for the predictor and keeps what it was called with."""
+    """Replaces the predictor and records its arguments."""
 
     def __init__(self) -> None:
         self.calls: list[tuple[Config, HandState, Obstacles, Array, Memory]] = []
@@ -53,14 +53,14 @@ def hand(ms: float, x: float = 0.0, frame: str = 'world') -> HandSample:
 
 
 def ready(config: Config = CONFIG) -> Pipeline:
-    """Has a scene and a goal, no hand yet."""
+    """Return a pipeline with a scene and a goal, but without a hand sample."""
     pipeline = Pipeline(config)
     pipeline.set_obstacles('cloud', make_obstacles([[0.15, 0.0]], 0.03), START, 'world')
     pipeline.set_goals(np.array([[0.3, 0.0]]), 'world')
     return pipeline
 
 
-def seen(pipeline: Pipeline) -> tuple[object, ...]:
+def observe(pipeline: Pipeline) -> tuple[object, ...]:
     return pipeline.hand_state, pipeline.scene, pipeline.due, pipeline.blocked(), pipeline.engaged, pipeline.frame_id
 
 
@@ -76,7 +76,7 @@ def test_one_prediction_for_every_sample_that_is_due(recorder: Recorder) -> None
     assert pipeline.counts == {'predict_nothing_solved': 10}
 
 
-def test_a_period_that_is_no_whole_number_of_nanoseconds(recorder: Recorder) -> None:
+def test_a_period_may_be_a_fraction_of_a_nanosecond(recorder: Recorder) -> None:
     pipeline = ready(updated(CONFIG, {'rate_hz': 30.0}))
     pipeline.hand(hand(0.0))
     pipeline.predict()
@@ -84,7 +84,7 @@ def test_a_period_that_is_no_whole_number_of_nanoseconds(recorder: Recorder) -> 
     assert pipeline.due
 
 
-def test_the_predictor_gets_the_present_scene_and_its_own_memory(recorder: Recorder) -> None:
+def test_the_predictor_gets_the_scene_at_the_stamp_and_its_memory(recorder: Recorder) -> None:
     pipeline = ready()
     pipeline.set_obstacles('markers', make_obstacles([[0.5, 0.5]], 0.1, ids=('m',), velocity=[1.0, 0.0]), START, 'world')
     pipeline.hand(hand(0.0))
@@ -103,7 +103,7 @@ def test_the_predictor_gets_the_present_scene_and_its_own_memory(recorder: Recor
     np.testing.assert_array_equal(goals, [[0.3, 0.0]])
 
 
-def test_the_same_sample_is_never_predicted_from_twice(recorder: Recorder) -> None:
+def test_no_sample_is_used_for_two_predictions(recorder: Recorder) -> None:
     pipeline = ready()
     pipeline.hand(hand(0.0))
     assert pipeline.predict() is not None
@@ -116,7 +116,7 @@ def test_the_same_sample_is_never_predicted_from_twice(recorder: Recorder) -> No
     assert pipeline.counts['predict_not_due'] == 2
 
 
-def test_why_nothing_can_be_predicted(recorder: Recorder) -> None:
+def test_every_reason_for_no_prediction_is_explained(recorder: Recorder) -> None:
     pipeline = Pipeline(CONFIG)
     assert pipeline.blocked() == 'no hand pose yet'
     pipeline.hand(hand(0.0))
@@ -139,7 +139,7 @@ def test_why_nothing_can_be_predicted(recorder: Recorder) -> None:
 
 
 @pytest.mark.parametrize('stamp', [None, 0])
-def test_unstamped_obstacles_are_not_judged_by_age(recorder: Recorder, stamp: int | None) -> None:
+def test_obstacles_without_a_stamp_never_become_stale(recorder: Recorder, stamp: int | None) -> None:
     pipeline = ready()
     pipeline.set_obstacles('cloud', make_obstacles([[0.1, 0.0]], 0.01, velocity=[1.0, 0.0]), stamp, 'world')
     pipeline.hand(hand(1e7))
@@ -147,10 +147,10 @@ def test_unstamped_obstacles_are_not_judged_by_age(recorder: Recorder, stamp: in
     np.testing.assert_array_equal(recorder.calls[0][2].centre, [[0.1, 0.0]])
 
 
-def test_a_refused_message_changes_nothing_and_is_counted_with_its_reason(recorder: Recorder) -> None:
+def test_a_rejected_message_changes_nothing_and_is_counted_with_its_reason(recorder: Recorder) -> None:
     pipeline = ready()
     pipeline.hand(hand(100.0))
-    refusals = [
+    rejections = [
         (lambda: pipeline.hand(hand(100.0)), SampleStatus.DUPLICATE, 'hand_duplicate', '0 s behind the newest one'),
         (lambda: pipeline.hand(hand(90.0)), SampleStatus.LATE, 'hand_late', '0.01 s behind the newest one'),
         (
@@ -178,18 +178,18 @@ def test_a_refused_message_changes_nothing_and_is_counted_with_its_reason(record
             "goals.header.frame_id: expected the working frame 'world', got 'camera'",
         ),
     ]
-    before = seen(pipeline)
-    for refuse, verdict, kind, words in refusals:
-        assert refuse() is verdict
-        assert not verdict.taken
-        assert seen(pipeline) == before
+    before = observe(pipeline)
+    for reject, status, kind, words in rejections:
+        assert reject() is status
+        assert not status.taken
+        assert observe(pipeline) == before
         assert pipeline.counts[kind] == 1
         assert pipeline.last_refusal is not None
         assert words in pipeline.last_refusal
-    assert sum(pipeline.counts.values()) == len(refusals)
+    assert sum(pipeline.counts.values()) == len(rejections)
 
 
-def test_a_scene_much_older_than_the_last_one_is_a_clock_that_jumped(recorder: Recorder) -> None:
+def test_a_scene_much_older_than_the_last_one_replaces_it_because_the_clock_jumped(recorder: Recorder) -> None:
     pipeline = ready()
     assert pipeline.set_obstacles('cloud', make_obstacles(), START - 501 * MS, 'world') is SampleStatus.ACCEPTED
     assert len(pipeline.scene.obstacles(START)) == 0
@@ -208,7 +208,7 @@ def test_the_first_hand_sample_fixes_an_open_frame(recorder: Recorder) -> None:
     assert pipeline.counts == {'obstacles_wrong_frame': 1, 'goals_wrong_frame': 1}
 
 
-def test_a_frame_given_as_a_parameter_holds_from_the_start(recorder: Recorder) -> None:
+def test_a_frame_from_the_parameter_holds_from_the_start(recorder: Recorder) -> None:
     pipeline = Pipeline(updated(CONFIG, {'frame_id': 'base'}))
     assert pipeline.hand(hand(0.0)) is SampleStatus.WRONG_FRAME
     assert pipeline.set_goals(np.zeros((1, 2)), 'world') is SampleStatus.WRONG_FRAME
@@ -217,22 +217,22 @@ def test_a_frame_given_as_a_parameter_holds_from_the_start(recorder: Recorder) -
 
 
 @pytest.mark.parametrize(
-    ('jump', 'verdict'),
+    ('jump', 'status'),
     [(-600.0, SampleStatus.RESTARTED_BACKWARD), (600.0, SampleStatus.RESTARTED_GAP), (-1e5, SampleStatus.RESTARTED_BACKWARD)],
 )
-def test_a_jump_of_the_hands_stamp_starts_anew(recorder: Recorder, jump: float, verdict: SampleStatus) -> None:
+def test_a_jump_of_the_hand_stamp_restarts_the_movement(recorder: Recorder, jump: float, status: SampleStatus) -> None:
     pipeline = ready(updated(CONFIG, {'scene.timeout_s': 0.0}))
     pipeline.hand(hand(0.0))
     pipeline.predict()
-    assert pipeline.hand(hand(jump)) is verdict
-    assert verdict.restarted
+    assert pipeline.hand(hand(jump)) is status
+    assert status.restarted
     assert pipeline.due
     assert pipeline.predict() is not None
     assert recorder.calls[1][4] == Memory()
-    assert pipeline.counts[f'hand_{verdict}'] == 1
+    assert pipeline.counts[f'hand_{status}'] == 1
 
 
-def test_samples_that_were_due_but_overtaken_are_counted(recorder: Recorder) -> None:
+def test_due_samples_that_a_newer_one_replaces_are_counted(recorder: Recorder) -> None:
     pipeline = ready()
     for ms in (0.0, 5.0, 10.0, 15.0):
         pipeline.hand(hand(ms))
@@ -245,7 +245,7 @@ def test_samples_that_were_due_but_overtaken_are_counted(recorder: Recorder) -> 
     assert pipeline.counts['hand_superseded'] == 3
 
 
-def test_the_clutch(recorder: Recorder) -> None:
+def test_while_disengaged_the_hand_is_followed_without_predictions(recorder: Recorder) -> None:
     pipeline = ready()
     pipeline.hand(hand(0.0))
     pipeline.predict()
@@ -280,7 +280,7 @@ def test_reset_forgets_the_movement_and_keeps_the_scene(recorder: Recorder) -> N
     assert recorder.calls[1][4] == Memory()
 
 
-def test_other_parameters_keep_movement_and_scene_where_they_can(recorder: Recorder) -> None:
+def test_other_parameters_keep_movement_and_scene(recorder: Recorder) -> None:
     pipeline = ready()
     pipeline.hand(hand(0.0))
     pipeline.predict()
@@ -297,7 +297,7 @@ def test_other_parameters_keep_movement_and_scene_where_they_can(recorder: Recor
 
 
 @pytest.mark.parametrize(('name', 'value'), [('plane', 'xz'), ('frame_id', 'base')])
-def test_another_plane_or_frame_makes_movement_and_scene_void(recorder: Recorder, name: str, value: str) -> None:
+def test_another_plane_or_frame_discards_movement_and_scene(recorder: Recorder, name: str, value: str) -> None:
     pipeline = ready()
     pipeline.hand(hand(0.0))
     pipeline.reconfigure(replace(CONFIG, **{name: value}))
@@ -306,7 +306,7 @@ def test_another_plane_or_frame_makes_movement_and_scene_void(recorder: Recorder
     assert pipeline.scene.goals is None
 
 
-def test_a_scene_that_the_predictor_refuses_is_no_crash(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scene_that_the_predictor_refuses_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*arguments: object) -> tuple[Prediction, Memory]:
         raise SceneError('goals[0]', 'a goal outside of every obstacle', '(0.15, 0)')
 
@@ -331,32 +331,32 @@ EVENTS = st.one_of(
 
 
 class Driver:
-    """Feeds events to a pipeline and checks after each what must always hold."""
+    """Feeds events to a pipeline and checks the invariants after each."""
 
     def __init__(self, pipeline: Pipeline) -> None:
         self.pipeline = pipeline
         self.now_ns = START
-        self.fresh = False
+        self.is_new = False
         self.last_ns: int | None = None
         self.predictions = 0
 
     def feed(self, kind: str, value: object, frame: str | None) -> None:
-        before, total = seen(self.pipeline), sum(self.pipeline.counts.values())
-        verdict = getattr(self, kind)(value, frame)
-        if isinstance(verdict, SampleStatus) and not verdict.taken:
-            assert seen(self.pipeline) == before
+        before, total = observe(self.pipeline), sum(self.pipeline.counts.values())
+        status = getattr(self, kind)(value, frame)
+        if isinstance(status, SampleStatus) and not status.taken:
+            assert observe(self.pipeline) == before
             assert sum(self.pipeline.counts.values()) == total + 1
         assert sum(self.pipeline.counts.values()) >= total
 
     def hand(self, ms: int, frame: str) -> SampleStatus:
         stamp_ns = self.now_ns + ms * MS
         x = 0.3 * np.sin((stamp_ns - START) / NANOSECONDS)
-        verdict = self.pipeline.hand(HandSample(stamp_ns, np.array([x, 0.02]), 0.0, frame))
-        if verdict.taken:
-            self.now_ns, self.fresh = stamp_ns, self.pipeline.engaged
-        if verdict.restarted:
+        status = self.pipeline.hand(HandSample(stamp_ns, np.array([x, 0.02]), 0.0, frame))
+        if status.taken:
+            self.now_ns, self.is_new = stamp_ns, self.pipeline.engaged
+        if status.restarted:
             self.last_ns = None
-        return verdict
+        return status
 
     def obstacles(self, ms: int | None, frame: str) -> SampleStatus:
         stamp_ns = None if ms is None else self.now_ns + ms * MS
@@ -368,12 +368,12 @@ class Driver:
 
     def engage(self, on: bool, _: None) -> None:
         if on != self.pipeline.engaged:
-            self.fresh, self.last_ns = False, None
+            self.is_new, self.last_ns = False, None
         self.pipeline.engage(on)
 
     def reset(self, _: None, __: None) -> None:
         self.pipeline.reset()
-        self.fresh, self.last_ns = False, None
+        self.is_new, self.last_ns = False, None
 
     def rate(self, rate_hz: float, _: None) -> None:
         self.pipeline.reconfigure(updated(self.pipeline.config, {'rate_hz': rate_hz}))
@@ -384,14 +384,14 @@ class Driver:
         assert (prediction is not None) == expected
         if prediction is None:
             return
-        assert self.fresh
+        assert self.is_new
         assert self.pipeline.engaged
         assert prediction.stamp_ns == self.now_ns
         assert self.last_ns is None or prediction.stamp_ns - self.last_ns >= int(1e9 / self.pipeline.config.rate_hz)
         for outcome in prediction.solved_candidates:
             assert np.all(np.isfinite(outcome.solution.mean))
             assert np.isfinite(outcome.likelihood)
-        self.fresh, self.last_ns = False, prediction.stamp_ns
+        self.is_new, self.last_ns = False, prediction.stamp_ns
         self.predictions += 1
 
 
@@ -404,7 +404,7 @@ def driven(pipeline: Pipeline, events: list[tuple[str, object, str | None]]) -> 
 
 @settings(deadline=None, max_examples=200)
 @given(st.booleans(), st.lists(EVENTS, max_size=60))
-def test_any_sequence_of_events_gives_only_fresh_predictions(
+def test_any_sequence_of_events_gives_predictions_from_new_samples_only(
     scene_given: bool, events: list[tuple[str, object, str | None]]
 ) -> None:
     with pytest.MonkeyPatch.context() as patch:
@@ -414,7 +414,7 @@ def test_any_sequence_of_events_gives_only_fresh_predictions(
 
 @settings(deadline=None, max_examples=25)
 @given(st.lists(EVENTS, max_size=30))
-def test_any_sequence_of_events_through_the_real_predictor(events: list[tuple[str, object, str | None]]) -> None:
+def test_any_sequence_of_events_passes_through_the_real_predictor(events: list[tuple[str, object, str | None]]) -> None:
     driven(ready(), events)
 
 

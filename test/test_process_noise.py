@@ -1,18 +1,18 @@
-"""Jerk that nobody planned widens what is predicted, and nothing else."""
+"""Process noise widens the predicted covariance and changes nothing else."""
 
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
 from foc_ros.core.config import Config, updated
 from foc_ros.core.dynamics.plants import condense, triple_integrator
-from foc_ros.core.dynamics.replanning import replanned_error_map, triple_integrator_process_covariance
+from foc_ros.core.dynamics.replanning import compute_error_map, triple_integrator_process_covariance
 from foc_ros.core.estimation.kalman_filter import gramian
 from foc_ros.core.memory import Memory
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import HandState, make_obstacles
 
 
-def test_it_begins_as_the_filter_expects_and_ends_near_the_goal() -> None:
+def test_the_covariance_grows_as_in_the_filter_and_is_small_at_the_goal() -> None:
     dt, steps = 0.08, 50
     covariance = triple_integrator_process_covariance(dt, steps)
     assert_array_equal(covariance[0], 0.0)
@@ -23,21 +23,21 @@ def test_it_begins_as_the_filter_expects_and_ends_near_the_goal() -> None:
     assert_allclose(covariance[:, 0, 0], covariance[:, 1, 1])
 
 
-def test_it_is_what_a_hand_that_replans_at_each_step_does() -> None:
+def test_the_covariance_agrees_with_a_hand_that_replans_at_each_step() -> None:
     steps, dt, draws = 12, 0.1, 20_000
     plant, noise = triple_integrator(dt), np.random.default_rng(3)
     root = np.linalg.cholesky(np.kron(gramian(dt), np.eye(2)))
     error = np.zeros((draws, 6))
     expected = triple_integrator_process_covariance(dt, steps)
     for step in range(steps):
-        if steps - step < 3:  # too few to bring every state to the goal
+        if steps - step < 3:  # too few steps to bring every state to the goal
             break
-        error = error @ replanned_error_map(condense(plant, steps - step))[1].T
+        error = error @ compute_error_map(condense(plant, steps - step))[1].T
         error = error + noise.standard_normal((draws, 6)) @ root.T
         assert_allclose(error.var(axis=0), np.diag(expected[step + 1]), rtol=0.05)
 
 
-def test_predictions_widen_and_means_and_likelihoods_stay() -> None:
+def test_predictions_widen_and_keep_means_and_likelihoods() -> None:
     hand = HandState(0, np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2))
     scene = make_obstacles([[0.15, 0.01]], 0.03), np.array([[0.3, 0.0]])
     narrow = predict(Config(), hand, *scene, Memory())[0]

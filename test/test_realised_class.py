@@ -1,6 +1,6 @@
-"""Every solved candidate really passes the obstacles as its label says, by a check that knows neither rows nor angles.
+"""Every solved candidate passes the obstacles as its label says, by a check that uses neither constraint rows nor angles.
 
-The suite takes a part of the 500 scenes. All of them, with a report of how the candidates ended:
+The suite solves a part of the 500 scenes. This command solves all of them and reports how the candidates ended:
 `FOC_ROS_SCENES=500 python -m pytest test/test_realised_class.py --junit-xml=classes.xml`.
 """
 
@@ -21,7 +21,7 @@ BATCHES = 4
 K = 6
 
 
-def crossings(path: np.ndarray, x: float, y: float) -> tuple[int, int]:
+def count_crossings(path: np.ndarray, x: float, y: float) -> tuple[int, int]:
     """How often, in the direction of +x less the other way, a path crosses the line through (x, y) along y: above, below."""
     before, after = path[:-1, 0] < x, path[1:, 0] < x
     direction = before.astype(int) - after
@@ -31,15 +31,15 @@ def crossings(path: np.ndarray, x: float, y: float) -> tuple[int, int]:
     return int(direction[crossed][height > y].sum()), int(direction[crossed][height <= y].sum())
 
 
-def label_of(path: np.ndarray, obstacles: Obstacles) -> str:
+def find_label(path: np.ndarray, obstacles: Obstacles) -> str:
     """Label of a path along +x that passes every obstacle."""
     signs = {}
     for identity, (x, y) in zip(obstacles.ids, obstacles.centre, strict=True):
-        signs[identity] = {(1, 0): '+', (0, 1): '-'}[crossings(path, x, y)]
+        signs[identity] = {(1, 0): '+', (0, 1): '-'}[count_crossings(path, x, y)]
     return 'goal0:' + ''.join(signs[identity] + identity for identity in sorted(signs))
 
 
-def answer(seed: int, strategy: str) -> tuple[Prediction, Obstacles]:
+def solve_scene(seed: int, strategy: str) -> tuple[Prediction, Obstacles]:
     rng = np.random.default_rng(seed)
     circles = random_scene(rng, int(rng.integers(1, 9)))
     obstacles = make_obstacles(circles.centre, circles.radius, 0.001)
@@ -52,14 +52,14 @@ def answer(seed: int, strategy: str) -> tuple[Prediction, Obstacles]:
 def test_solved_candidates_pass_as_their_labels_say(batch, strategy, record_testsuite_property):
     count = Counter()
     for seed in range(batch, SCENES, BATCHES):
-        prediction, obstacles = answer(seed, strategy)
+        prediction, obstacles = solve_scene(seed, strategy)
         count['merged'] += prediction.notes.get('merged', 0)
         labels = [outcome.candidate.label for outcome in prediction.solved_candidates]
         assert len(set(labels)) == len(labels), f'scene {seed}'
         for outcome in prediction.candidates:
             count[outcome.solution.status.value] += 1
             if outcome.is_solved:
-                assert label_of(outcome.solution.path, obstacles) == outcome.candidate.label, f'scene {seed}'
+                assert find_label(outcome.solution.path, obstacles) == outcome.candidate.label, f'scene {seed}'
     record_testsuite_property(f'{strategy} {batch}', dict(count))
     assert count['solved'] > SCENES // BATCHES
 
@@ -67,5 +67,5 @@ def test_solved_candidates_pass_as_their_labels_say(batch, strategy, record_test
 def test_the_check_tells_left_from_right():
     obstacles = make_obstacles([[0.1, 0.0], [0.2, 0.0]], 0.01)
     path = np.array([[0.0, 0.0], [0.1, 0.05], [0.2, -0.05], [0.3, 0.0]])
-    assert label_of(path, obstacles) == 'goal0:+0-1'
-    assert label_of(path * [1, -1], obstacles) == 'goal0:-0+1'
+    assert find_label(path, obstacles) == 'goal0:+0-1'
+    assert find_label(path * [1, -1], obstacles) == 'goal0:-0+1'

@@ -1,4 +1,4 @@
-"""Records hold their arrays read-only, as their own copies unless these were made for them."""
+"""Records have read-only arrays: copies, unless the array is read-only already."""
 
 from dataclasses import dataclass, fields, replace
 
@@ -25,7 +25,7 @@ def prediction() -> Prediction:
     return predict(Config(), hand, make_obstacles([[0.15, 0.0]], 0.02, 0.001), np.array([[0.3, 0.0]]), Memory())[0]
 
 
-def test_what_is_written_to_an_array_later_does_not_reach_the_record() -> None:
+def test_a_record_copies_an_array_that_can_be_written_to() -> None:
     array = np.zeros(3)
     kept = Kept(array)
     array[0] = 1.0
@@ -34,7 +34,7 @@ def test_what_is_written_to_an_array_later_does_not_reach_the_record() -> None:
         kept.array[0] = 1.0
 
 
-def test_an_array_that_was_made_for_a_record_is_taken_as_it_is() -> None:
+def test_a_read_only_array_is_not_copied() -> None:
     array = as_readonly(np.zeros(3))
     assert Kept(array).array is array
     with pytest.raises(ValueError, match='read-only'):
@@ -55,7 +55,7 @@ def test_a_solution_with_another_covariance_is_otherwise_the_same(prediction: Pr
         np.testing.assert_array_equal(vars(found)[name], value)
 
 
-def test_no_array_of_a_prediction_can_be_written_to(prediction: Prediction) -> None:
+def test_all_arrays_of_a_prediction_are_read_only(prediction: Prediction) -> None:
     for outcome in prediction.candidates:
         for record in (outcome.solution, outcome.candidate):
             arrays = [value for value in vars(record).values() if isinstance(value, np.ndarray)]

@@ -1,4 +1,4 @@
-"""The merged scene: union over sources, motion to a stamp, and why it may not be predicted from."""
+"""The merged scene: union over sources, motion to a stamp, and reasons not to predict from it."""
 
 import numpy as np
 import pytest
@@ -12,30 +12,31 @@ NOW = 50 * NANOSECONDS
 def test_the_union_of_the_sources_holds_the_latest_row_of_an_id() -> None:
     cloud = make_obstacles([[0.0, 0.0], [1.0, 0.0]], 0.1, 0.01, ids=('a', 'b'))
     markers = make_obstacles([[5.0, 0.0], [2.0, 0.0]], 0.2, 0.02, ids=('b', 'c'))
-    scene = Scene().with_part('cloud', ObstacleSource(cloud, NOW, 'w')).with_part('markers', ObstacleSource(markers, NOW, 'w'))
+    scene = Scene().with_source('cloud', ObstacleSource(cloud, NOW, 'w'))
+    scene = scene.with_source('markers', ObstacleSource(markers, NOW, 'w'))
     merged = scene.obstacles(NOW)
     assert merged.ids == ('a', 'b', 'c')
     np.testing.assert_array_equal(merged.centre[:, 0], [0.0, 5.0, 2.0])
     np.testing.assert_array_equal(merged.radius, [0.1, 0.2, 0.2])
     np.testing.assert_array_equal(merged.radius_stddev, [0.01, 0.02, 0.02])
-    again = scene.with_part('cloud', ObstacleSource(cloud, NOW, 'w')).obstacles(NOW)
+    again = scene.with_source('cloud', ObstacleSource(cloud, NOW, 'w')).obstacles(NOW)
     assert dict(zip(again.ids, again.centre[:, 0], strict=True)) == {'a': 0.0, 'b': 1.0, 'c': 2.0}
 
 
 def test_a_source_replaces_its_whole_table() -> None:
-    scene = Scene().with_part('cloud', ObstacleSource(make_obstacles([[0.0, 0.0]], 0.1, ids=('a',)), NOW, 'w'))
-    scene = scene.with_part('cloud', ObstacleSource(make_obstacles([[1.0, 0.0]], 0.1, ids=('b',)), NOW, 'w'))
+    scene = Scene().with_source('cloud', ObstacleSource(make_obstacles([[0.0, 0.0]], 0.1, ids=('a',)), NOW, 'w'))
+    scene = scene.with_source('cloud', ObstacleSource(make_obstacles([[1.0, 0.0]], 0.1, ids=('b',)), NOW, 'w'))
     assert scene.obstacles(NOW).ids == ('b',)
-    assert len(scene.with_part('cloud', ObstacleSource(make_obstacles(), NOW, 'w')).obstacles(NOW)) == 0
+    assert len(scene.with_source('cloud', ObstacleSource(make_obstacles(), NOW, 'w')).obstacles(NOW)) == 0
     assert len(Scene().obstacles(NOW)) == 0
 
 
-def test_obstacles_move_on_to_the_stamp_asked_for() -> None:
+def test_obstacles_move_on_to_the_given_stamp() -> None:
     moving = make_obstacles([[0.1, 0.2]], 0.1, velocity=[0.5, -1.0])
-    stamped = Scene().with_part('cloud', ObstacleSource(moving, NOW - NANOSECONDS // 5, 'w'))
+    stamped = Scene().with_source('cloud', ObstacleSource(moving, NOW - NANOSECONDS // 5, 'w'))
     np.testing.assert_allclose(stamped.obstacles(NOW).centre, [[0.2, 0.0]])
     np.testing.assert_allclose(stamped.obstacles(NOW - 2 * NANOSECONDS // 5).centre, [[0.0, 0.4]])
-    unstamped = Scene().with_part('cloud', ObstacleSource(moving, None, 'w'))
+    unstamped = Scene().with_source('cloud', ObstacleSource(moving, None, 'w'))
     np.testing.assert_array_equal(unstamped.obstacles(NOW).centre, [[0.1, 0.2]])
 
 
@@ -50,11 +51,11 @@ def test_obstacles_move_on_to_the_stamp_asked_for() -> None:
         ([None], 2.0, None),
     ],
 )
-def test_staleness_is_judged_by_stamps(ages: list[float | None], timeout: float, words: str | None) -> None:
+def test_stale_sources_are_found_by_their_stamps(ages: list[float | None], timeout: float, words: str | None) -> None:
     scene = Scene().with_goals(np.zeros((1, 2)), 'w')
     for i, age in enumerate(ages):
         stamp = None if age is None else NOW - round(age * 1e9)
-        scene = scene.with_part(str(i), ObstacleSource(make_obstacles(), stamp, 'w'))
+        scene = scene.with_source(str(i), ObstacleSource(make_obstacles(), stamp, 'w'))
     assert scene.not_ready_reason(NOW, timeout) == (None if words is None else ('stale', words))
 
 
@@ -64,7 +65,7 @@ def test_what_is_missing_is_named() -> None:
         'no_obstacles',
         'no obstacles received yet: publish an empty cloud for an empty scene',
     )
-    scene = scene.with_part('cloud', ObstacleSource(make_obstacles(), NOW, 'w'))
+    scene = scene.with_source('cloud', ObstacleSource(make_obstacles(), NOW, 'w'))
     assert scene.not_ready_reason(NOW, 2.0) == ('no_goal', 'no goal received')
     assert scene.with_goals(np.zeros((0, 2)), 'w').not_ready_reason(NOW, 2.0) == (
         'no_goal',
@@ -73,7 +74,7 @@ def test_what_is_missing_is_named() -> None:
     assert scene.with_goals(np.zeros((1, 2)), 'w').not_ready_reason(NOW, 2.0) is None
 
 
-def test_goals_are_the_scenes_own() -> None:
+def test_the_scene_copies_its_goals() -> None:
     given = np.zeros((1, 2))
     scene = Scene().with_goals(given, 'w')
     given[0, 0] = 7.0

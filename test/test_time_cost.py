@@ -1,13 +1,13 @@
-"""Durations where time has a price: near what is best, in agreement with themselves, and longer for a longer way."""
+"""Durations if time has a cost: near the optimum, consistent during a movement, and longer for longer paths."""
 
 import numpy as np
 import pytest
 from reach_helpers import bowed, reach
 
 from foc_ros.core.config import Config, FocConfig, updated
-from foc_ros.core.estimation.duration import candidate_durations
+from foc_ros.core.estimation.duration import choose_candidate_durations
 from foc_ros.core.estimation.kalman_filter import gramian, transition
-from foc_ros.core.estimation.time_cost import effort_along, least_cost_time
+from foc_ros.core.estimation.time_cost import compute_least_effort, find_least_cost_time
 from foc_ros.core.memory import Memory
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import cold_start
@@ -25,16 +25,16 @@ def test_effort_along_a_line_is_that_of_least_energy(length: float, speed: float
     for T in times:
         missing = np.array([length, 0.0, 0.0]) - transition(T) @ [0.0, speed, acceleration]
         expected.append(missing @ np.linalg.solve(gramian(T), missing))
-    np.testing.assert_allclose(effort_along(length, speed, acceleration, times), expected, rtol=1e-9)
+    np.testing.assert_allclose(compute_least_effort(length, speed, acceleration, times), expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize(('length', 'time_cost'), [(0.3, 100.0), (0.7, 0.2), (0.05, 1000.0)])
 def test_from_rest_the_duration_grows_with_the_cube_root_of_the_length(length: float, time_cost: float) -> None:
-    found = least_cost_time(length, 0.0, 0.0, time_cost, 0.05, 20.0)
+    found = find_least_cost_time(length, (0.0, 0.0), time_cost, (0.05, 20.0))
     assert found == pytest.approx((3600.0 * length**2 / time_cost) ** (1 / 6), rel=0.005)
 
 
-def test_in_a_movement_what_is_left_is_what_was_planned() -> None:
+def test_during_a_movement_the_remaining_duration_is_the_planned_one() -> None:
     length, time_cost = 0.3, 50.0
     whole = (3600.0 * length**2 / time_cost) ** (1 / 6)
     for share in (0.2, 0.5, 0.8):
@@ -42,23 +42,23 @@ def test_in_a_movement_what_is_left_is_what_was_planned() -> None:
         position = length * (10 * s**3 - 15 * s**4 + 6 * s**5)
         speed = length * (30 * s**2 - 60 * s**3 + 30 * s**4) / whole
         acceleration = length * (60 * s - 180 * s**2 + 120 * s**3) / whole**2
-        left = least_cost_time(length - position, speed, acceleration, time_cost, 0.05, 20.0)
+        left = find_least_cost_time(length - position, (speed, acceleration), time_cost, (0.05, 20.0))
         assert left == pytest.approx((1 - share) * whole, rel=0.02)
 
 
-def test_bounds_hold() -> None:
-    assert least_cost_time(0.3, 0.0, 0.0, 1e-9, 0.3, 10.0) == pytest.approx(10.0)
-    assert least_cost_time(0.0, 0.0, 0.0, 100.0, 0.3, 10.0) == pytest.approx(0.3)
+def test_the_duration_stays_within_its_bounds() -> None:
+    assert find_least_cost_time(0.3, (0.0, 0.0), 1e-9, (0.3, 10.0)) == pytest.approx(10.0)
+    assert find_least_cost_time(0.0, (0.0, 0.0), 100.0, (0.3, 10.0)) == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize('bow', [0.08, -0.08])
 @pytest.mark.parametrize('time_cost', [20.0, 500.0])
-def test_the_law_for_a_way_round_costs_little_more_than_its_true_optimum(bow: float, time_cost: float) -> None:
-    """Whole solves over a grid of durations: the law's total cost is within 2 % of the least."""
+def test_the_duration_of_a_curved_path_costs_little_more_than_the_true_optimum(bow: float, time_cost: float) -> None:
+    """Over a grid of durations, each solved completely, the total cost is within 2 % of the least."""
     guess = bowed([0.0, 0.0], [0.3, 0.0], 50, bow)
     length = float(np.hypot(*np.diff(guess, axis=0).T).sum())
     config = updated(Config(), {'duration.model': 'cost_of_time', 'duration.time_cost': time_cost}).duration
-    law = candidate_durations(AT_REST, [Candidate('a', 0, (), guess, length)], [1.0], config)[0]
+    law = choose_candidate_durations(AT_REST, [Candidate('a', 0, (), guess, length)], [1.0], config)[0]
 
     def total(duration_s: float) -> float:
         problem = reach(OBSTACLE, duration=duration_s, noise=(0.02, 0.02), eta=0.8)
@@ -69,7 +69,7 @@ def test_the_law_for_a_way_round_costs_little_more_than_its_true_optimum(bow: fl
     assert total(law) <= 1.02 * best
 
 
-def test_going_round_takes_longer_and_with_the_other_models_as_long() -> None:
+def test_a_longer_path_takes_longer_with_this_model_only() -> None:
     scene = make_obstacles([[0.15, 0.03]], 0.05), np.array([[0.3, 0.0]])
     for model in ('cost_of_time', 'fitts', 'fixed'):
         config = updated(Config(), {'duration.model': model, 'duration.time_cost': 100.0})
@@ -83,7 +83,7 @@ def test_going_round_takes_longer_and_with_the_other_models_as_long() -> None:
             assert lasts[long] == lasts[short]
 
 
-def test_time_is_part_of_the_cost_where_it_has_a_price() -> None:
+def test_the_price_of_time_is_part_of_the_cost_with_this_model_only() -> None:
     scene = make_obstacles([[0.15, 0.03]], 0.05), np.array([[0.3, 0.0]])
     for model, price in (('cost_of_time', 100.0), ('fitts', 0.0), ('fixed', 0.0)):
         config = updated(Config(), {'duration.model': model, 'duration.time_cost': 100.0})

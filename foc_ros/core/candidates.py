@@ -1,4 +1,4 @@
-"""From candidates to outcomes: each solved, judged by the class it is really in, told apart, and weighed."""
+"""From candidates to likelihoods: each is solved, its real class is found, duplicates are dropped, the rest is ranked."""
 
 from __future__ import annotations
 
@@ -11,16 +11,18 @@ from .config import FocConfig, LikelihoodConfig
 from .deadline import NEVER, Deadline
 from .homotopy import path_sides
 from .homotopy.branch_times import compute_branch_times
-from .likelihood import compute_likelihoods, compute_shared_cost
+from .likelihood import CostModel, compute_likelihoods
 from .ocp.problem import Problem
 from .ocp.solve import solve_problem
 from .ocp.warm_start import cold_start, warm_start
 from .types import Candidate, Obstacles, PredictedCandidate, Solution, Status
 
+EFFORT_ONLY = CostModel()
+
 
 @dataclass(frozen=True)
 class EarlierSolutions:
-    """What was found before, by label: solutions to start from, and likelihoods, by which what comes first is chosen."""
+    """Results of earlier predictions by label: solutions to start from, and likelihoods, which give the order of solving."""
 
     solutions: Mapping[str, Solution] = field(default_factory=dict)
     likelihoods: Mapping[str, float] = field(default_factory=dict)
@@ -33,70 +35,70 @@ def solve_candidates(
     candidates: Sequence[Candidate],
     problems: Sequence[Problem],
     settings: FocConfig,
-    likelihood: LikelihoodConfig,
-    effort_spent: float = 0.0,
+    costs: CostModel = EFFORT_ONLY,
     earlier: EarlierSolutions = NOTHING,
     deadline: Deadline = NEVER,
 ) -> list[PredictedCandidate]:
-    """Solve each candidate, the likeliest of last time first, until the deadline; those that had no time have that status.
+    """Solve every candidate, those that were most likely before first; return them in their own order, with likelihoods 0.
 
-    problems: one for every candidate; effort_spent: since movement onset [m^2/s^5]. Returns them in the order of the candidates.
+    problems: one for each candidate; costs: parts of the cost besides the effort to go; earlier: results of the prediction
+    before, to start from. Candidates that are not solved before the deadline get the status DEADLINE.
     """
-    shared, found = compute_shared_cost(effort_spent, likelihood), {}
+    solved = {}
     for row in sorted(range(len(candidates)), key=lambda row: -earlier.likelihoods.get(candidates[row].label, 0.0)):
         previous = earlier.solutions.get(candidates[row].label)
-        found[row] = _solved(candidates[row], problems[row], settings, shared, previous, deadline)
-    return [found[row] for row in range(len(candidates))]
+        solved[row] = _solve_candidate(candidates[row], problems[row], settings, costs, previous, deadline)
+    return [solved[row] for row in range(len(candidates))]
 
 
-def _solved(
-    candidate: Candidate, problem: Problem, settings: FocConfig, shared: float, previous: Solution | None, deadline: Deadline
+def _solve_candidate(
+    candidate: Candidate, problem: Problem, settings: FocConfig, costs: CostModel, previous: Solution | None, deadline: Deadline
 ) -> PredictedCandidate:
-    """Solve from the earlier solution; if that gets into what the earlier one was not, from the candidate's own guess.
+    """Solve from the previous solution; if the status changes, also from the candidate's own guess.
 
-    A way that was out of reach and is solved may have come from far beyond the least effort: then the cheaper of both counts.
+    A candidate that was unreachable and is solved now may have come from far beyond the least effort: the cheaper result counts.
     """
-    outcome = None
+    warm = None
     if previous is not None:
-        again = solve_problem(problem, warm_start(previous, problem), settings, deadline)
-        outcome = _judged(candidate, problem, again, shared)
-        # what ran out of time on its way goes on from there, and has left nothing out
-        stopped = previous.status is Status.DEADLINE and outcome.is_solved
-        if outcome.solution.status in (previous.status, Status.DEADLINE) or stopped:
-            return outcome
-    fresh = _judged(candidate, problem, solve_problem(problem, cold_start(candidate.guess), settings, deadline), shared)
-    return outcome if outcome is not None and outcome.is_solved and not (fresh.is_solved and fresh.cost < outcome.cost) else fresh
+        solution = solve_problem(problem, warm_start(previous, problem), settings, deadline)
+        warm = _check_class(candidate, problem, solution, costs)
+        # a solution that continues one stopped by the deadline has skipped nothing
+        is_continued = previous.status is Status.DEADLINE and warm.is_solved
+        if warm.status in (previous.status, Status.DEADLINE) or is_continued:
+            return warm
+    cold = _check_class(candidate, problem, solve_problem(problem, cold_start(candidate.guess), settings, deadline), costs)
+    return warm if warm is not None and warm.is_solved and not (cold.is_solved and cold.cost < warm.cost) else cold
 
 
-def _judged(candidate: Candidate, problem: Problem, solution: Solution, shared: float) -> PredictedCandidate:
-    """Find the class it is really in; costs are integrals of squared jerk, shared and to go, so that durations compare."""
+def _check_class(candidate: Candidate, problem: Problem, solution: Solution, costs: CostModel) -> PredictedCandidate:
+    """Find the homotopy class in which a solution really is, and its cost; the status says if it left the candidate's class."""
     sides = path_sides(solution.path, problem.obstacles, problem.courses)
     if solution.status is Status.SOLVED and any(sides.get(identity, side) != side for identity, side in candidate.sides):
-        solution = replace(solution, status=Status.LEFT_CLASS, message='the solution slid into another class')
-    return PredictedCandidate(candidate, solution, sides, shared + solution.effort * solution.dt, 0.0)
+        solution = replace(solution, status=Status.LEFT_CLASS, message='the solution moved into another homotopy class')
+    return PredictedCandidate(candidate, solution, sides, costs.compute_cost(solution), 0.0)
 
 
-def distinct(outcomes: Sequence[PredictedCandidate]) -> list[PredictedCandidate]:
-    """Drop what slid into a class that another outcome solved: the same way round is never counted twice."""
-    if all(outcome.solution.status is not Status.LEFT_CLASS for outcome in outcomes):
-        return list(outcomes)
-    held = {_class(outcome) for outcome in outcomes if outcome.is_solved}
-    return [outcome for outcome in outcomes if outcome.solution.status is not Status.LEFT_CLASS or _class(outcome) not in held]
+def drop_duplicates(candidates: Sequence[PredictedCandidate]) -> list[PredictedCandidate]:
+    """Drop candidates that moved into a class that another candidate solved, so that no class is counted twice."""
+    if all(each.status is not Status.LEFT_CLASS for each in candidates):
+        return list(candidates)
+    solved = {_identify_class(each) for each in candidates if each.is_solved}
+    return [each for each in candidates if each.status is not Status.LEFT_CLASS or _identify_class(each) not in solved]
 
 
-def _class(outcome: PredictedCandidate) -> tuple[int, frozenset[tuple[str, int]]]:
-    return outcome.candidate.goal, frozenset(outcome.sides.items())
+def _identify_class(candidate: PredictedCandidate) -> tuple[int, frozenset[tuple[str, int]]]:
+    return candidate.candidate.goal, frozenset(candidate.sides.items())
 
 
 def rank_candidates(
-    outcomes: Sequence[PredictedCandidate], likelihood: LikelihoodConfig, obstacles: Obstacles
+    candidates: Sequence[PredictedCandidate], likelihood: LikelihoodConfig, obstacles: Obstacles
 ) -> list[PredictedCandidate]:
-    """Give the solved ones, each way once, their likelihoods, the most likely first; the others follow in their order, at 0."""
-    outcomes = distinct(outcomes)
-    solved = [outcome for outcome in outcomes if outcome.is_solved]
-    parted = compute_branch_times(solved, obstacles) if likelihood.lookahead_s > 0.0 else None
-    shares = compute_likelihoods(np.array([outcome.cost for outcome in solved]), likelihood, parted).tolist()
-    pairs = zip(solved, shares, strict=True)
-    weighed = [PredictedCandidate(one.candidate, one.solution, one.sides, one.cost, share) for one, share in pairs]
-    weighed.sort(key=lambda outcome: (-outcome.likelihood, outcome.candidate.label))
-    return weighed + [outcome for outcome in outcomes if not outcome.is_solved]
+    """Return the distinct candidates with their likelihoods: solved ones, most likely first, then the others, at 0."""
+    candidates = drop_duplicates(candidates)
+    solved = [each for each in candidates if each.is_solved]
+    branch_times = compute_branch_times(solved, obstacles) if likelihood.lookahead_s > 0.0 else None
+    likelihoods = compute_likelihoods(np.array([each.cost for each in solved]), likelihood, branch_times).tolist()
+    pairs = zip(solved, likelihoods, strict=True)
+    ranked = [PredictedCandidate(each.candidate, each.solution, each.sides, each.cost, share) for each, share in pairs]
+    ranked.sort(key=lambda each: (-each.likelihood, each.label))
+    return ranked + [each for each in candidates if not each.is_solved]

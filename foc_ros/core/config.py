@@ -12,30 +12,33 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, cast
 
 from .errors import ParameterError
+from .registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
 
-STRATEGIES = ('lv', 'hc', 'optimal', 'algorithm1', 'fixed')
 PLANES = ('xy', 'xz', 'yz')
 DURATION_MODELS = ('fixed', 'fitts', 'cost_of_time')
 ARRIVALS = ('rest', 'passing')
 MOST_CANDIDATES = 64
-"""Most homotopy classes that are ever solved in one prediction."""
+"""Largest number of homotopy classes that are solved in one prediction."""
+WIDENS = 'widens the predicted covariance, not the chance constraint'
+JERK_ONLY = 'plant triple_integrator'
 REFERENCE_STEP_S = 0.02
-"""Step for which the node's noise is quoted (doc/model.md): c is scaled by sqrt(0.02 / dt)."""
+"""Step for which the noise parameters are quoted (doc/model.md): c is scaled by sqrt(0.02 / dt)."""
 
 
 @dataclass(frozen=True)
 class Bound:
-    """What a parameter may be: kind of value, closed range, choices; unit and meaning for descriptors and documents."""
+    """What values a parameter may have: closed range or choices; its unit and meaning for descriptors and documents."""
 
     low: float | None = None
     high: float | None = None
     unit: str = ''
     meaning: str = ''
-    choices: tuple[str, ...] = ()
+    choices: tuple[str, ...] | Registry = ()
     read_only: bool = False
 
 
 def _p(default: Any, meaning: str, unit: str = '', low: float | None = None, high: float | None = None, **rest: Any) -> Any:
+    """Declare a parameter."""
     return field(default=default, metadata={'bound': Bound(low, high, unit, meaning, **rest)})
 
 
@@ -45,58 +48,48 @@ class FocConfig:
 
     steps: int = _p(50, 'number of control steps N of the horizon', '', 5, 400)
     eta: float = _p(0.9, 'wanted probability of avoiding each obstacle at each step', '', 0.0, 0.999)
-    strategy: str = _p('lv', 'how clearance and precision are traded', choices=STRATEGIES)
-    noise_x: float = _p(0.05, 'noise per unit of jerk along the first axis of the plane, at a step of 0.02 s', '', 0.0, 2.0)
-    noise_y: float = _p(0.05, 'the same along the second axis', '', 0.0, 2.0)
+    strategy: str = _p('lv', 'how the solver trades clearance against precision', choices=STRATEGIES)
+    plant: str = _p('triple_integrator', 'dynamic model of the hand that the control moves', choices=PLANTS)
+    plant_mass: float = _p(1.0, 'mass of the plant damped_mass', 'kg', 1e-3, 1e3)
+    plant_damping: float = _p(2.0, 'viscous damping of the plant damped_mass', 'N s/m', 0.0, 1e4)
+    noise_x: float = _p(0.05, 'motor noise per unit of control along the first axis, at a step of 0.02 s', '', 0.0, 2.0)
+    noise_y: float = _p(0.05, 'motor noise per unit of control along the second axis, at a step of 0.02 s', '', 0.0, 2.0)
     process_noise: float = _p(
-        0.0,
-        'root of the spectral density of jerk beside any plan: widens what is predicted, no part of the chance constraint',
-        'm/s^2.5',
-        0.0,
-        1e3,
+        0.0, f'root of the spectral density of unplanned control, which {WIDENS}; N s^0.5 for damped_mass', 'm/s^2.5', 0.0, 1e3
     )
-    endpoint_stddev: float = _p(
-        0.0,
-        'standard deviation, along each axis, of where movements end about their goal: widens what is predicted alone',
-        'm',
-        0.0,
-        1.0,
-    )
+    endpoint_stddev: float = _p(0.0, f'standard deviation of end points about their goal, per axis; it {WIDENS}', 'm', 0.0, 1.0)
     lv_delta: float = _p(5e-5, 'tau per unit of s for strategy lv', 'm^2', 0.0, 1.0)
     hc_delta: float = _p(1e-4, 'tau per unit of s for strategy hc', 'm^2', 0.0, 1.0)
     growth: float = _p(2.0, 'factor on lambda per unit of s (Delta)', '', 1.0001, 1e6)
-    tau: float = _p(0.0, 'clearance term of strategy fixed', 'm^2', 0.0, 100.0)
-    lam: float = _p(1.0, 'variance weight of strategy fixed, first lambda of the others', '', 0.0, 1e15)
+    tau: float = _p(0.0, 'clearance term tau of strategy fixed', 'm^2', 0.0, 100.0)
+    lam: float = _p(1.0, 'variance weight lambda of strategy fixed, and the first lambda of lv and hc', '', 0.0, 1e15)
     algorithm1_delta: float = _p(5e-5, 'step of tau in strategy algorithm1 (delta)', 'm^2', 0.0, 1.0)
     algorithm1_growth: float = _p(10.0, 'factor on lambda per step of strategy algorithm1 (Delta)', '', 1.0, 1e6)
     algorithm1_xi: float = _p(1.0, 'change of effort at which strategy algorithm1 ends (xi)', 'm^2/s^6', 0.0, 1e12)
     goal_weight: float = _p(0.0, 'weight of the position variance at the goal, in effort per m^2', '1/s^6', 0.0, 1e15)
-    recovery_s: float = _p(0.2, 'time in which a hand inside a margin has to be out of it', 's', 0.0, 10.0)
+    recovery_s: float = _p(0.2, 'time within which a hand inside the margin of an obstacle has to leave it', 's', 0.0, 10.0)
+    qp_backend: str = _p('piqp', 'QP solver: piqp, a solver of qpsolvers by its name, or a registered one', choices=QP_BACKENDS)
 
 
 @dataclass(frozen=True)
 class DurationConfig:
-    """How long the movement takes, and how it ends."""
+    """Duration of the movement, and how it ends."""
 
     model: str = _p(
-        'fitts', 'duration of a movement: fixed, by Fitts law, or what is best where time has a cost', choices=DURATION_MODELS
+        'fitts', 'duration of a movement: fixed, by Fitts law, or optimal if time has a cost', choices=DURATION_MODELS
     )
     fixed_s: float = _p(1.0, 'duration of model fixed', 's', 0.05, 60.0)
     fitts_a_s: float = _p(0.2, 'intercept of Fitts law', 's', 0.0, 60.0)
     fitts_b_s: float = _p(0.25, 'slope of Fitts law, per bit', 's', 0.0, 60.0)
     target_width: float = _p(0.02, 'target width of Fitts law', 'm', 1e-4, 10.0)
-    time_cost: float = _p(100.0, 'cost of time of model cost_of_time: a longer way takes longer', 'm^2/s^6', 1e-9, 1e9)
-    min_time_to_go_s: float = _p(0.3, 'floor of the time to go', 's', 0.01, 60.0)
-    spread: float = _p(
-        0.0,
-        'standard deviation of the time to go, as a share of it: widens what is predicted alone',
-        '',
-        0.0,
-        2.0,
+    time_cost: float = _p(
+        100.0, f'cost of time of model cost_of_time, for {JERK_ONLY} also in the cost of a class', 'm^2/s^6', 1e-9, 1e9
     )
-    wait_s: float = _p(0.0, 'mean time that a hand at rest waits: widens what is predicted of it alone', 's', 0.0, 60.0)
-    arrival: str = _p('rest', 'how the hand comes to its goal: to rest, or passing it at any speed', choices=ARRIVALS)
-    max_time_to_go_s: float = _p(10.0, 'ceiling of the time to go', 's', 0.05, 120.0)
+    min_time_to_go_s: float = _p(0.3, 'lower limit of the time to go', 's', 0.01, 60.0)
+    spread: float = _p(0.0, f'standard deviation of the time to go, as a fraction of it; it {WIDENS}', '', 0.0, 2.0)
+    wait_s: float = _p(0.0, f'mean time until a hand at rest starts to move; it {WIDENS}', 's', 0.0, 60.0)
+    arrival: str = _p('rest', 'how the hand arrives at its goal: it comes to rest, or passes at any speed', choices=ARRIVALS)
+    max_time_to_go_s: float = _p(10.0, 'upper limit of the time to go', 's', 0.05, 120.0)
 
 
 @dataclass(frozen=True)
@@ -105,66 +98,70 @@ class EstimatorConfig:
 
     position_stddev: float = _p(0.001, 'standard deviation of a measured position', 'm', 1e-7, 1.0)
     jerk_density: float = _p(5.0, 'root of the spectral density of the jerk that the filter expects', 'm/s^2.5', 1e-6, 1e6)
-    onset_speed: float = _p(0.05, 'speed above which a movement has begun; it has ended below half of it', 'm/s', 1e-4, 10.0)
+    onset_speed: float = _p(0.05, 'speed above which a movement begins; it ends below half of this speed', 'm/s', 1e-4, 10.0)
     acceleration_time_s: float = _p(
-        0.0,
-        'time in which an acceleration fades: predictions start at the speed it leads to; 0: with the acceleration',
-        's',
-        0.0,
-        10.0,
+        0.0, 'decay time of an acceleration: predictions start at the speed that it leads to; 0: no decay', 's', 0.0, 10.0
     )
-    gap_s: float = _p(0.5, 'gap between samples beyond which the filter starts anew', 's', 0.001, 60.0)
-    hand_timeout_s: float = _p(
-        0.5, 'silence of the hand, or age of a pose, in the node beyond which nothing is predicted; 0: never', 's', 0.0, 1e6
-    )
+    gap_s: float = _p(0.5, 'gap between samples after which the filter restarts', 's', 0.001, 60.0)
+    hand_timeout_s: float = _p(0.5, 'timeout after which a missing or stale hand pose stops prediction; 0: never', 's', 0.0, 1e6)
 
 
 @dataclass(frozen=True)
 class HomotopyConfig:
-    """Which ways round are considered."""
+    """Homotopy classes that are considered."""
 
-    max_candidates: int = _p(4, 'number of homotopy classes solved, over all goals; at least one to each', '', 1, MOST_CANDIDATES)
-    clearance: float = _p(0.005, 'distance from an obstacle that the hand needs: a narrower gap is closed', 'm', 0.0, 1.0)
-    library: str = _p('', 'file of demonstrated ways that replay --learn wrote; empty: none', read_only=True)
+    max_candidates: int = _p(
+        4, 'number of homotopy classes to solve, over all goals; each goal gets at least one', '', 1, MOST_CANDIDATES
+    )
+    clearance: float = _p(0.005, 'distance that the hand needs from every obstacle: narrower gaps are closed', 'm', 0.0, 1.0)
+    library: str = _p('', 'file of demonstrated paths that replay --learn wrote; empty: none', read_only=True)
 
 
 @dataclass(frozen=True)
 class LikelihoodConfig:
-    """From costs to likelihoods."""
+    """Conversion of costs to likelihoods."""
 
+    rule: str = _p('cost_ratio', 'rule that gives the weight of a class from its cost', choices=LIKELIHOOD_RULES)
     beta: float = _p(0.5, 'exponent of the cost ratio', '', 0.0, 100.0)
-    spent_share: float = _p(1.0, 'share of the effort spent since onset that is part of every cost', '', 0.0, 1.0)
+    spent_share: float = _p(1.0, f'fraction of the effort since onset that every cost contains, for {JERK_ONLY}', '', 0.0, 1.0)
     lookahead_s: float = _p(
-        0.0,
-        'mean time that the operator looks ahead: beta fades with the time until a choice; 0: without end',
-        's',
-        0.0,
-        60.0,
+        0.0, 'mean look-ahead of the operator: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
     )
-    margin: float = _p(0.05, 'lead in likelihood at which the most likely class changes', '', 0.0, 1.0)
+    margin: float = _p(0.05, 'lead in likelihood that another class needs to become the most likely one', '', 0.0, 1.0)
 
 
 @dataclass(frozen=True)
 class SceneConfig:
-    """What is taken from the scene topics."""
+    """Use of the scene topics."""
 
     timeout_s: float = _p(
-        2.0,
-        'age of the obstacles, by stamp and in the node by silence, beyond which nothing is predicted; 0: never',
-        's',
-        0.0,
-        1e6,
+        2.0, 'age of obstacles, by stamp and in the node by arrival, after which prediction stops; 0: never', 's', 0.0, 1e6
     )
-    max_obstacles: int = _p(64, 'obstacles considered; beyond it the ones farthest from the way are left out', '', 1, 4096)
-    marker_radius_stddev: float = _p(0.0, 'standard deviation of the radius of obstacles that come as markers', 'm', 0.0, 1.0)
+    max_obstacles: int = _p(64, 'number of obstacles to consider: those farthest from the paths are left out', '', 1, 4096)
+    marker_radius_stddev: float = _p(0.0, 'standard deviation of the radius of obstacles from markers', 'm', 0.0, 1.0)
 
 
 @dataclass(frozen=True)
 class Config:
-    """All parameters of the predictor."""
+    """All parameters of the predictor.
+
+    Groups of parameters are fields of this class: ``Config().foc.eta`` is the parameter ``foc.eta``. A config is frozen;
+    `with_values` returns a changed one. The page `parameters` of the documentation lists names, bounds, units and meanings.
+
+    Examples
+    --------
+    >>> import foc_ros
+    >>> config = foc_ros.Config().with_values({'foc.eta': 0.95, 'rate_hz': 20.0})
+    >>> config
+    <Config rate_hz=20.0, foc.eta=0.95>
+    >>> config.foc.eta
+    0.95
+    """
 
     rate_hz: float = _p(50.0, 'predictions per second of message time', 'Hz', 0.1, 1000.0)
-    budget_s: float = _p(0.0, 'time of a prediction, beyond which ways are told as out of time; 0: no limit', 's', 0.0, 60.0)
+    budget_s: float = _p(
+        0.0, 'time limit of one prediction, after which unsolved classes are reported as out of time; 0: none', 's', 0.0, 60.0
+    )
     plane: str = _p('xy', 'task plane of the working frame', choices=PLANES, read_only=True)
     frame_id: str = _p('', 'working frame; empty: the frame of the first hand pose', read_only=True)
     foc: FocConfig = field(default_factory=FocConfig)
@@ -173,6 +170,29 @@ class Config:
     homotopy: HomotopyConfig = field(default_factory=HomotopyConfig)
     likelihood: LikelihoodConfig = field(default_factory=LikelihoodConfig)
     scene: SceneConfig = field(default_factory=SceneConfig)
+
+    def __repr__(self) -> str:
+        """Name the parameters that differ from their defaults."""
+        defaults = {parameter.name: parameter.default for parameter in parameters()}
+        changed = [f'{name}={value!r}' for name, value in flatten(self).items() if value != defaults[name]]
+        return f'<Config {", ".join(changed) or "of defaults"}>'
+
+    def with_values(self, values: Mapping[str, object]) -> Config:
+        """Return the config with other values, by dotted name such as ``'foc.eta'``.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown name, a wrong type or a value out of bounds; it names the parameter, the value and the bound.
+
+        Examples
+        --------
+        >>> import foc_ros
+        >>> foc_ros.Config().with_values({'foc.eta': 1.5})
+        Traceback (most recent call last):
+        foc_ros.core.errors.ParameterError: foc.eta: expected a number in [0, 0.999], got 1.5
+        """
+        return updated(self, values)
 
 
 @dataclass(frozen=True)
@@ -205,34 +225,32 @@ def flatten(config: Config) -> dict[str, float | int | str]:
 
 
 def updated(config: Config, values: Mapping[str, object]) -> Config:
-    """Return the config with some values changed, all checked together.
-
-    values: by dotted name. Raises ParameterError, naming the parameter, the value and the bound; `config` is unharmed.
-    """
+    """Return the config with some values changed, by dotted name: `Config.with_values`."""
     known = {parameter.name: parameter for parameter in parameters()}
     for name, value in values.items():
         if name not in known:
             raise ParameterError(name, 'a known parameter', repr(value))
         group, _, leaf = name.rpartition('.')
-        checked = _checked(known[name], value)
+        checked = _check_value(known[name], value)
         config = replace(config, **({group: replace(getattr(config, group), **{leaf: checked})} if group else {leaf: checked}))
     return config
 
 
-def _checked(parameter: Parameter, value: object) -> float | int | str:
+def _check_value(parameter: Parameter, value: object) -> float | int | str:
+    """Return a value in the type of its parameter; raise ParameterError for a wrong type or a value out of bounds."""
     name, bound = parameter.name, parameter.bound
     if isinstance(parameter.default, str):
         if not isinstance(value, str) or (bound.choices and value not in bound.choices):
             raise ParameterError(name, f'one of {", ".join(bound.choices)}' if bound.choices else 'a text', repr(value))
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ParameterError(name, f'a finite number{_range(bound)}', repr(value))
+        raise ParameterError(name, f'a finite number{_describe_range(bound)}', repr(value))
     if isinstance(parameter.default, int) and value != int(value):
-        raise ParameterError(name, f'a whole number{_range(bound)}', repr(value))
+        raise ParameterError(name, f'a whole number{_describe_range(bound)}', repr(value))
     if (bound.low is not None and value < bound.low) or (bound.high is not None and value > bound.high):
-        raise ParameterError(name, f'a number{_range(bound)}', repr(value))
+        raise ParameterError(name, f'a number{_describe_range(bound)}', repr(value))
     return int(value) if isinstance(parameter.default, int) else float(value)
 
 
-def _range(bound: Bound) -> str:
+def _describe_range(bound: Bound) -> str:
     return '' if bound.low is None else f' in [{bound.low:g}, {bound.high:g}] {bound.unit}'.rstrip()

@@ -1,4 +1,4 @@
-"""The one exception tree: wrong input names the field, the value and the bound.
+"""The exceptions of the package: for wrong input they name the field, the value and what was expected.
 
 An expected failure (infeasible, unreachable, out of time) is a :class:`foc_ros.core.types.Status`, not an exception.
 """
@@ -7,11 +7,14 @@ from __future__ import annotations
 
 
 class FocError(Exception):
-    """Base of everything this package raises on purpose."""
+    """Base of all exceptions that this package raises on purpose."""
 
 
 class InputError(FocError):
-    """A value that cannot be used: says which field, what it was and what was expected."""
+    """A value that cannot be used.
+
+    Attributes: field, its name; expected, in words; got, the value or its description.
+    """
 
     def __init__(self, field: str, expected: str, got: object) -> None:
         super().__init__(f'{field}: expected {expected}, got {got}')
@@ -21,11 +24,11 @@ class InputError(FocError):
 
 
 class ParameterError(InputError):
-    """A parameter outside its bounds, of the wrong type, or unknown."""
+    """A parameter that is unknown, of the wrong type or out of its bounds."""
 
 
 class SceneError(InputError):
-    """A scene (obstacles, goals, start) that describes no reaching problem."""
+    """Obstacles, goals or a start that define no reaching problem."""
 
 
 class MessageError(InputError):
@@ -33,4 +36,4 @@ class MessageError(InputError):
 
 
 class RecordingError(FocError):
-    """A bag or CSV that cannot be read or written: says which file and why."""
+    """A file that cannot be read or written; the message names the file and the reason."""

@@ -1,69 +1,98 @@
-"""From costs to likelihoods: ratios of likelihoods are powers of ratios of costs.
+"""Likelihoods of homotopy classes from their costs: ratios of likelihoods are powers of ratios of costs.
 
     p_i / p_j = (J_j / J_i)^beta,  so  p_i = J_i^-beta / sum_j J_j^-beta,
 
-which, unlike the usual exponential of cost differences, does not change with the unit of effort or the scale of the scene.
+which, unlike the usual exponential of cost differences, does not change with the unit of effort or the scale of the scene. This
+is the rule `cost_ratio`; `likelihood.rule` can name another one, which maps costs to logarithms of weights.
 
-J_i is the effort to go through class i, where time has a price what its duration costs (`duration.time_price`), and what all
-share: a part of the effort spent since onset (`likelihood.spent_share`).
+J_i is the cost that `CostModel` assembles: the effort to go through class i, the price of its duration, and a part of the effort
+since movement onset, which all classes share.
 
-People weigh what is near, and leave far choices open. Where `likelihood.lookahead_s` is set, they look ahead by a time h that is
-exponentially distributed with that mean. A way round W, with all goals to which it leads, is worth V_W = sum_{i in W} J_i^-beta.
-Ways that part from W later than h, S_W(h) = {W': tau_WW' > h}, look the same as W, and are worth their mean:
+Operators weigh what is near and leave distant choices open. Where `likelihood.lookahead_s` is set, an operator looks ahead by a
+time h that is exponentially distributed with this mean. A path class W, with all goals to which it leads, has the weight
+V_W = sum_{i in W} J_i^-beta. The path classes that branch off from W later than h, S_W(h) = {W': tau_WW' > h}, are not yet
+distinguished from W, so that each gets their mean weight:
 
     p_W = exp(u_W) / sum_W' exp(u_W'),  u_W = E_h[log mean_{W' in S_W(h)} V_W'],  and within W  p_i = p_W J_i^-beta / V_W.
 
-So a choice that lies tau ahead is made with the exponent beta exp(-tau / lookahead_s): by the ratio of costs when it is near,
-evenly when it is far. Looking ahead without end, h is infinite, and p_i is as above.
+A choice that lies tau ahead is therefore made with the exponent beta exp(-tau / lookahead_s): by the ratio of costs when it is
+near, evenly when it is far. Without `lookahead_s`, h is infinite, and p_i is as above.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
-from .config import LikelihoodConfig
+from .config import Config, LikelihoodConfig
+from .dynamics.plant_models import make_plant_model
 from .errors import InputError
+from .estimation.duration import time_price
 from .homotopy.branch_times import BranchTimes
 from .kernels import Vector, compiled
-from .types import Array
+from .registry import LIKELIHOOD_RULES
+from .types import Array, Solution
 
 COST_FLOOR = 1e-9
-"""Least cost told apart from none [m^2/s^5]: the effort of a reach of 1 um in 1 s, 720 D^2 / T^5 = 7e-10."""
+"""Smallest cost that is distinguished from zero [m^2/s^5]: the effort of a reach of 1 um in 1 s, 720 D^2 / T^5 = 7e-10."""
+
+
+class CostModel(NamedTuple):
+    """Parts of the cost of a class besides its effort: a part that all classes share [m^2/s^5], the price of time [m^2/s^6]."""
+
+    shared: float = 0.0
+    time_price: float = 0.0
+
+    def compute_cost(self, solution: Solution) -> float:
+        """Return the cost J_i [m^2/s^5] of a class: an integral of squared jerk, so that classes of other durations compare."""
+        return self.shared + solution.effort * solution.dt + self.time_price * float(solution.times[-1])
+
+
+def make_cost_model(effort_spent: float, config: Config) -> CostModel:
+    """Return the costs of a movement with an effort since onset [m^2/s^5]; both parts are 0 for a plant not driven by jerk."""
+    if not make_plant_model(config.foc).is_jerk_driven:
+        return CostModel()
+    return CostModel(compute_shared_cost(effort_spent, config.likelihood), time_price(config.duration))
 
 
 def compute_shared_cost(effort_spent: float, config: LikelihoodConfig) -> float:
-    """Return the part of the cost [m^2/s^5] that all classes share, of a movement that has taken effort_spent [m^2/s^5]."""
+    """Return the part of the cost [m^2/s^5] that all classes share, for an effort since onset [m^2/s^5]."""
     return config.spent_share * effort_spent
 
 
-def compute_likelihoods(costs: Array, config: LikelihoodConfig, partings: BranchTimes | None = None) -> Array:
-    """Return the likelihoods (k,) of classes with costs (k,) >= 0 [m^2/s^5], summing to one; none for none.
+def compute_likelihoods(costs: Array, config: LikelihoodConfig, branch_times: BranchTimes | None = None) -> Array:
+    """Return the likelihoods (k,) of classes by the rule that `likelihood.rule` names; they sum to one.
 
-    partings: of these classes, not asked for without a look-ahead. Costs below `COST_FLOOR` count as that. Computed from
-    logarithms, so nothing overflows. Raises InputError for a cost that is negative or not finite.
+    costs (k,) >= 0 [m^2/s^5], of which those below `COST_FLOOR` count as `COST_FLOOR`; branch_times: of these classes, for a
+    look-ahead only. Logarithms keep numbers in range. Raises InputError for a cost that is negative or not finite.
     """
     values = np.ascontiguousarray(costs, dtype=float)
     for row, value in enumerate(values.tolist()):
         if not 0.0 <= value < math.inf:
             raise InputError(f'costs[{row}]', 'a finite number >= 0', value)
-    logs = worths(values, config.beta)
-    if config.lookahead_s > 0.0 and partings is not None and len(logs):
-        logs = _looking_ahead(logs - logs.max(), partings, config.lookahead_s)
-    return shares(logs)
+    logs = LIKELIHOOD_RULES.get(config.rule)(values, config)
+    if config.lookahead_s > 0.0 and branch_times is not None and len(logs):
+        logs = _weigh_by_lookahead(logs - logs.max(), branch_times, config.lookahead_s)
+    return normalise_logs(np.ascontiguousarray(logs, dtype=float))
+
+
+def cost_ratio_logs(costs: Array, config: LikelihoodConfig) -> Array:
+    """Return log J_i^-beta, (k,), for costs (k,): the rule `cost_ratio`."""
+    return compute_log_weights(costs, config.beta)
 
 
 @compiled
-def worths(costs: Vector, beta: float) -> Vector:
+def compute_log_weights(costs: Vector, beta: float) -> Vector:
     """Return log J_i^-beta, (k,)."""
     return -beta * np.log(np.maximum(costs, COST_FLOOR))
 
 
 @compiled
-def shares(logs: Vector) -> Vector:
-    """Return what is proportional to exp(logs) and sums to one, (k,)."""
+def normalise_logs(logs: Vector) -> Vector:
+    """Return the weights (k,) that are proportional to exp(logs) and sum to one."""
     if not len(logs):
         return np.zeros(0)
     weights: Array = np.exp(logs - logs.max())
@@ -71,31 +100,31 @@ def shares(logs: Vector) -> Vector:
     return weights
 
 
-def _looking_ahead(logs: Array, partings: BranchTimes, lookahead_s: float) -> Array:
+def _weigh_by_lookahead(logs: Array, branch_times: BranchTimes, lookahead_s: float) -> Array:
     """Return u_W + log(J_i^-beta / V_W) of each class, (k,), from the logarithms of J_i^-beta."""
-    numbers, way = np.unique(partings.way, return_inverse=True)
-    worth = np.full(len(numbers), -np.inf)
-    np.logaddexp.at(worth, way, logs)
+    numbers, path_class = np.unique(branch_times.way, return_inverse=True)
+    weight = np.full(len(numbers), -np.inf)
+    np.logaddexp.at(weight, path_class, logs)
     after_s = np.full((len(numbers), len(numbers)), np.inf)
-    np.minimum.at(after_s, (way[:, None], way), partings.after_s)
+    np.minimum.at(after_s, (path_class[:, None], path_class), branch_times.after_s)
     order = np.argsort(after_s, axis=1, kind='stable')
-    # Column m: of those from rank m on, which are what has not parted while h lies between the partings of ranks m - 1 and m.
-    total = np.logaddexp.accumulate(worth[order][:, ::-1], axis=1)[:, ::-1]
+    # Column m: the classes from rank m on, which have not branched off while h lies between the branch times m - 1 and m.
+    total = np.logaddexp.accumulate(weight[order][:, ::-1], axis=1)[:, ::-1]
     mean = total - np.log(np.arange(len(numbers), 0, -1))
     later = np.exp(-np.take_along_axis(after_s, order, axis=1) / lookahead_s)
-    chance = -np.diff(later, axis=1, prepend=1.0)
-    weighed: Array = ((chance * mean).sum(axis=1) - worth)[way] + logs
-    return weighed
+    probability = -np.diff(later, axis=1, prepend=1.0)
+    weighted: Array = ((probability * mean).sum(axis=1) - weight)[path_class] + logs
+    return weighted
 
 
 def select_most_likely(likelihoods: Mapping[str, float], previous: str | None, margin: float) -> str | None:
-    """Return the label of the most likely class, which stays `previous` until another leads by more than `margin`.
+    """Return the label of the most likely class; the previous one stays until another leads by more than `margin`.
 
-    likelihoods: by label. Of equally likely ones the label first in the alphabet holds, whatever the order of the input. None
-    for none.
+    likelihoods: by label. Among equally likely classes the first label in the alphabet is taken, whatever the order of the input.
+    None for no class.
     """
     if not likelihoods:
         return None
-    lead, best = min((-share, label) for label, share in likelihoods.items())
-    held = likelihoods.get(previous) if previous is not None else None
-    return previous if held is not None and -lead - held <= margin else best
+    negative, best = min((-share, label) for label, share in likelihoods.items())
+    kept = likelihoods.get(previous) if previous is not None else None
+    return previous if kept is not None and -negative - kept <= margin else best

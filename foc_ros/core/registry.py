@@ -5,7 +5,8 @@ A registry knows the names of its parts before it imports them, so that a parame
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from importlib import import_module
 from typing import Any
 
@@ -15,12 +16,8 @@ from .errors import InputError
 class Registry:
     """Parts of one kind by name.
 
-    Parameters
-    ----------
-    kind
-        What the parts are, for messages: ``'strategy'``.
-    locations
-        ``'module:attribute'`` of every built-in part by name. A part is imported when it is first asked for.
+    kind: what the parts are, for messages, such as 'strategy'; locations: 'module:attribute' of every built-in part by name. A
+    part is imported when it is first used.
     """
 
     def __init__(self, kind: str, locations: dict[str, str]) -> None:
@@ -34,26 +31,44 @@ class Registry:
     def __contains__(self, name: object) -> bool:
         return name in self._locations or name in self._parts
 
-    def register(self, name: str, part: Any) -> None:
-        """Add a part under a new name.
-
-        Raises
-        ------
-        InputError
-            If the name is taken or empty.
-        """
+    def register(self, name: str, part: Callable[..., Any]) -> None:
+        """Add a part under a new name; raise InputError if the name is taken or empty, or the part cannot be called."""
         if not name or name in self:
-            raise InputError(self.kind, f'a new name beside {", ".join(self)}', repr(name))
+            raise InputError(self.kind, f'a new name besides {", ".join(self)}', repr(name))
+        if not callable(part):
+            raise InputError(f'{self.kind} {name}', 'a function', repr(part))
         self._parts[name] = part
 
     def get(self, name: str) -> Any:
-        """Return the part of a name; raise InputError, naming all that exist, for an unknown one."""
+        """Return the part of a name; raise InputError, which lists all names, for an unknown one."""
         if name not in self:
             raise InputError(self.kind, f'one of {", ".join(self)}', repr(name))
         if name not in self._parts:
             module, _, attribute = self._locations[name].partition(':')
             self._parts[name] = getattr(import_module(module), attribute)
         return self._parts[name]
+
+
+class QPBackendRegistry(Registry):
+    """QP backends by name: PIQP, those that were registered, and every solver that qpsolvers finds installed."""
+
+    def __contains__(self, name: object) -> bool:
+        return super().__contains__(name) or name in _find_qpsolvers()
+
+    def get(self, name: str) -> Any:
+        """Return the solver of a name, a function from `DenseQP` to `Answer`."""
+        if not super().__contains__(name) and name in self:
+            self._parts[name] = partial(import_module('foc_ros.core.ocp.backend').solve_named, backend=name)
+        return super().get(name)
+
+
+def _find_qpsolvers() -> list[str]:
+    """Return the names of the solvers that qpsolvers can use here; none where it is not installed."""
+    try:
+        solvers: list[str] = import_module('qpsolvers').available_solvers
+    except ImportError:
+        return []
+    return solvers
 
 
 STRATEGIES = Registry(
@@ -69,8 +84,9 @@ STRATEGIES = Registry(
 PLANTS = Registry(
     'plant',
     {
-        'triple_integrator': 'foc_ros.core.dynamics.plants:make_triple_integrator',
-        'damped_mass': 'foc_ros.core.dynamics.plants:make_damped_mass',
+        'triple_integrator': 'foc_ros.core.dynamics.plant_models:TripleIntegratorModel',
+        'damped_mass': 'foc_ros.core.dynamics.plant_models:make_damped_mass',
     },
 )
+QP_BACKENDS = QPBackendRegistry('QP backend', {'piqp': 'foc_ros.core.ocp.backend:solve_piqp'})
 LIKELIHOOD_RULES = Registry('likelihood rule', {'cost_ratio': 'foc_ros.core.likelihood:cost_ratio_logs'})

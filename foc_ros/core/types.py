@@ -1,12 +1,12 @@
-"""What flows through the house: frozen records with read-only arrays, SI units, in the task plane.
+"""The records that pass between the parts of the package: frozen, with read-only arrays, SI units, in the task plane.
 
 message -> HandSample -> HandState -> Candidates -> Solutions -> Prediction -> message.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from enum import Enum
+from dataclasses import dataclass, field, replace
+from enum import Enum, StrEnum
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,22 +16,24 @@ Array = NDArray[np.float64]
 NANOSECONDS = 1_000_000_000
 LEFT, RIGHT = 1, -1
 """Side on which a path passes an obstacle, seen in the direction of travel."""
+SHOWN_NAMES = 5
+"""Number of obstacles that the repr of a table names."""
 
 
 def as_readonly(array: Array) -> Array:
-    """Make an array that nobody else holds read-only, so that a record takes it as it is, without a copy."""
+    """Make a new array read-only, so that a record takes it without a copy; no other code may hold a reference to it."""
     array.setflags(write=False)
     return array
 
 
 class Record:
-    """Base of the records: freezes every array field after construction."""
+    """Base of the records: after construction every array field is read-only and C-contiguous."""
 
     def __post_init__(self) -> None:
-        held = vars(self)
-        for name, value in held.items():
+        values = vars(self)
+        for name, value in values.items():
             if isinstance(value, np.ndarray) and ((flags := value.flags).writeable or not flags.c_contiguous):
-                held[name] = as_readonly(value.copy())
+                values[name] = as_readonly(value.copy())
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +41,7 @@ class HandSample(Record):
     """One measured hand position.
 
     stamp_ns: message stamp [ns]; position (2,): in the task plane [m]; height: along the plane's normal [m];
-    frame_id: the frame it was measured in.
+    frame_id: frame of the measurement.
     """
 
     stamp_ns: int
@@ -48,9 +50,35 @@ class HandSample(Record):
     frame_id: str = ''
 
 
+class SampleStatus(StrEnum):
+    """What became of a message that was given to the predictor.
+
+    ACCEPTED: used. RESTARTED_BACKWARD, RESTARTED_GAP: used, and the movement restarts from it. DISENGAGED: the hand was followed,
+    but nothing is predicted from it. DUPLICATE, LATE, WRONG_FRAME: rejected, without any change.
+    """
+
+    ACCEPTED = 'accepted'
+    DUPLICATE = 'duplicate'
+    LATE = 'late'
+    RESTARTED_BACKWARD = 'restarted_backward'
+    RESTARTED_GAP = 'restarted_gap'
+    WRONG_FRAME = 'wrong_frame'
+    DISENGAGED = 'disengaged'
+
+    @property
+    def taken(self) -> bool:
+        """Whether the message was used."""
+        return self not in (SampleStatus.DUPLICATE, SampleStatus.LATE, SampleStatus.WRONG_FRAME)
+
+    @property
+    def restarted(self) -> bool:
+        """Whether the movement restarts from this message."""
+        return self in (SampleStatus.RESTARTED_BACKWARD, SampleStatus.RESTARTED_GAP)
+
+
 @dataclass(frozen=True, eq=False)
 class HandState(Record):
-    """The estimator's answer at a stamp.
+    """The estimated state of the hand at a stamp.
 
     mean (6,): x, y, vx, vy, ax, ay [m, m/s, m/s^2]; covariance (6, 6) in the same order;
     onset_ns: stamp at which the present movement began, None at rest; onset_position (2,): where it began [m];
@@ -67,11 +95,11 @@ class HandState(Record):
     effort_spent: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Obstacles(Record):
     """Circles in the task plane, as a table of n rows.
 
-    ids: identity of each, used in labels; centre (n, 2) [m]; radius (n,) mean [m]; radius_stddev (n,) [m];
+    ids: name of each, used in labels; centre (n, 2) [m]; radius (n,) mean [m]; radius_stddev (n,) [m];
     velocity (n, 2) [m/s]; centre_covariance (n, 2, 2) [m^2].
     """
 
@@ -84,6 +112,11 @@ class Obstacles(Record):
 
     def __len__(self) -> int:
         return len(self.ids)
+
+    def __repr__(self) -> str:
+        """Count the obstacles and name the first few."""
+        names = ', '.join(self.ids[:SHOWN_NAMES]) + (', ...' if len(self) > SHOWN_NAMES else '')
+        return f'<Obstacles: {len(self)} circles{names and f" ({names})"}>'
 
     def take(self, rows: NDArray[np.intp] | list[int]) -> Obstacles:
         """Return the obstacles of the given rows, in that order."""
@@ -98,17 +131,10 @@ class Obstacles(Record):
         )
 
     def after(self, seconds: float) -> Obstacles:
-        """Return the obstacles moved on at their velocity for `seconds` [s]."""
+        """Return the obstacles at a time `seconds` [s] later, each moved on at its velocity."""
         if not self.velocity.any():
             return self
-        return Obstacles(
-            self.ids,
-            self.centre + seconds * self.velocity,
-            self.radius,
-            self.radius_stddev,
-            self.velocity,
-            self.centre_covariance,
-        )
+        return replace(self, centre=self.centre + seconds * self.velocity)
 
 
 def make_obstacles(
@@ -119,7 +145,7 @@ def make_obstacles(
     velocity: ArrayLike = 0.0,
     centre_covariance: ArrayLike = 0.0,
 ) -> Obstacles:
-    """Build :class:`Obstacles` from anything numpy can read; scalars hold for every row, ids default to positions."""
+    """Build `Obstacles` from array-likes; scalars hold for every row, and ids default to the numbers of the rows."""
     centres = np.asarray(centre, dtype=float).reshape(-1, 2)
     n = len(centres)
     return Obstacles(
@@ -134,7 +160,7 @@ def make_obstacles(
 
 @dataclass(frozen=True, eq=False)
 class Candidate(Record):
-    """One way round: a homotopy class towards one goal, with a timed guess inside it.
+    """A homotopy class towards one goal that is followed, with a timed guess of a path inside it.
 
     label: stable name such as `goal0:+l1-l2` (+ passes on the left); goal: row of the goals; sides: (obstacle id, LEFT or
     RIGHT) of the obstacles in the name; guess (N + 1, 2): positions at steps 0..N [m]; length: of the path [m].
@@ -148,7 +174,12 @@ class Candidate(Record):
 
 
 class Status(Enum):
-    """How a candidate's forward optimal control ended. Only SOLVED takes part in the likelihood."""
+    """Result of the forward optimal control of a candidate. Only a solved candidate takes part in the likelihood.
+
+    SOLVED: the solution meets the wanted eta. ETA_UNREACHABLE: it meets a smaller eta only. INFEASIBLE: no path of the class
+    meets the goal and the constraints. ITERATION_LIMIT: the solver did not converge. DEADLINE: the time limit came first.
+    LEFT_CLASS: the solution lies in another homotopy class.
+    """
 
     SOLVED = 'solved'
     ETA_UNREACHABLE = 'eta_unreachable'
@@ -158,24 +189,27 @@ class Status(Enum):
     LEFT_CLASS = 'left_class'
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Solution(Record):
-    """The forward optimal control's answer for one candidate.
+    """The forward optimal control of one candidate.
 
-    status, message: how it ended, in words and numbers. dt [s]; mean (N + 1, n) and covariance (N + 1, n, n) of the state at
-    steps 0..N (positions first); control (N, 2): jerk [m/s^3]. effort: J_U = sum |U|^2 [m^2/s^6]; costs: every term of J_aug
-    by name [m^2/s^6]; tau [m^2] and lam (lambda [1/s^6]): where on the curve, or as given; 0 in `optimal`, which has one of each
-    for every row.
+    Units are those of the triple integrator, whose control is jerk [m/s^3]; with another plant m/s^3 becomes the unit of its
+    control.
 
-    eta: achieved, the smallest over obstacles and steps, for `lv` and `hc` between the steps too; eta_at: (obstacle id, step)
-    where, with fractions of a step. eta_reachable: the largest that was found, where the wanted one is out of reach, else None.
-    violation: by how much the mean comes nearer to a centre than sqrt(E[R^2] + tau) [m], 0 where it never does; violation_at:
+    status, message: result in words and numbers. dt [s]; mean (N + 1, n) and covariance (N + 1, n, n) of the state at
+    steps 0..N (positions first, then velocities); control (N, 2) [m/s^3]. effort: J_U = sum |U|^2 [m^2/s^6]; costs: every term of
+    J_aug by name [m^2/s^6]; tau [m^2] and lam (lambda [1/s^6]): the parameters of the final QP; both are 0 for `optimal`, which
+    has a pair for each constraint.
+
+    eta: achieved, the smallest over obstacles and steps, and with `lv` and `hc` also between the steps; eta_at: (obstacle id,
+    step) where, with fractions of a step. eta_reachable: the largest eta that was found if the wanted one is unreachable.
+    violation: by how much the mean comes nearer to a centre than sqrt(E[R^2] + tau) [m], 0 where it does not; violation_at:
     (obstacle id, step) where.
 
-    multipliers: (obstacle id, step, value) of the contacts that hold the mean off, in `lv` and `hc` with fractions of a step: by
-    how much J_aug would grow for each metre more of distance asked for [m/s^6]; held: what each of them asks for, tau [m^2] and
-    lambda [1/s^6]. slope: dk/ds on the curve of `lv` and `hc`, 0 where not known. qp_solves: QPs solved; iterations: of the loop
-    of `algorithm1`, None in the others; solve_s: wall time [s].
+    multipliers: (obstacle id, step, value) of the active constraints, with `lv` and `hc` at fractions of a step; the value is the
+    growth of J_aug for each metre more of required distance [m/s^6]; held: the equivalent weights tau [m^2] and lambda [1/s^6] of
+    each active constraint. slope: derivative dk/ds of the safety factor along the penalty path of `lv` and `hc`, 0 where unknown.
+    qp_solves: number of QPs solved; iterations: of `algorithm1`, None for the others; solve_s: wall time [s].
     """
 
     status: Status
@@ -200,9 +234,13 @@ class Solution(Record):
     iterations: int | None = None
     solve_s: float = 0.0
 
+    def __repr__(self) -> str:
+        """Say the status, the effort and the eta achieved."""
+        return f'<Solution {self.status.value}, effort {self.effort:.4g}, eta {self.eta:.4g}>'
+
     def with_covariance(self, covariance: Array) -> Solution:
-        """Return the solution with another covariance (N + 1, n, n), fresh: `dataclasses.replace` at a tenth of the time."""
-        other = object.__new__(Solution)
+        """Return the solution with another covariance (N + 1, n, n), a new array; ten times as fast as `dataclasses.replace`."""
+        other = object.__new__(type(self))
         vars(other).update(vars(self), covariance=as_readonly(covariance))
         return other
 
@@ -217,12 +255,13 @@ class Solution(Record):
         return self.dt * np.arange(len(self.mean), dtype=np.float64)
 
 
-@dataclass(frozen=True, eq=False)
-class PredictedCandidate:
-    """One candidate with its solution; sides: side of every obstacle its path really passes, by id.
+@dataclass(frozen=True, eq=False, repr=False)
+class PredictedCandidate(Record):
+    """One candidate with its solution and likelihood.
 
-    cost: effort to go, what its time costs, and what all classes share, as effort spent since onset [m^2/s^5]; likelihood in
-    [0, 1]: 0 unless solved.
+    candidate: the homotopy class; solution: its forward optimal control; sides: side on which the mean path passes each obstacle,
+    by id. cost: effort to go, time cost, and the share of the effort since onset that all classes have in common [m^2/s^5];
+    likelihood in [0, 1]: 0 unless solved.
     """
 
     candidate: Candidate
@@ -231,19 +270,59 @@ class PredictedCandidate:
     cost: float
     likelihood: float
 
+    def __repr__(self) -> str:
+        """Say label, status and likelihood."""
+        return f'<PredictedCandidate {self.label}, {self.status.value}, likelihood {self.likelihood:.2f}>'
+
     @property
     def is_solved(self) -> bool:
-        """Whether this outcome takes part in the likelihood."""
+        """Whether this candidate takes part in the likelihood."""
         return self.solution.status is Status.SOLVED
 
+    @property
+    def label(self) -> str:
+        """Name of the homotopy class, such as `goal0:+l1-l2`."""
+        return self.candidate.label
 
-@dataclass(frozen=True, eq=False)
-class Prediction:
-    """The whole answer to one hand sample.
+    @property
+    def status(self) -> Status:
+        """Result of the forward optimal control."""
+        return self.solution.status
 
-    outcomes: solved ones first, most likely first; then those that could not be solved, with their status.
+    @property
+    def mean(self) -> Array:
+        """Mean state at steps 0..N, (N + 1, n): position [m], velocity [m/s], and what else the plant has."""
+        return self.solution.mean
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the state at steps 0..N, (N + 1, n, n)."""
+        return self.solution.covariance
+
+    @property
+    def times(self) -> Array:
+        """Seconds from now, (N + 1,) [s]."""
+        return self.solution.times
+
+    @property
+    def eta(self) -> float:
+        """Probability of avoidance that the solution achieves."""
+        return self.solution.eta
+
+    @property
+    def effort(self) -> float:
+        """Control effort sum |U|^2 [m^2/s^6]."""
+        return self.solution.effort
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Prediction(Record):
+    """The prediction that belongs to one hand sample.
+
+    candidates: solved ones first, most likely first; then those that could not be solved, with their status.
     most_likely: label after hysteresis, None where nothing was solved. notes: facts for diagnostics (relaxed margins, merged
-    classes, culled obstacles), as counts by name. solve_s: wall time of the whole prediction [s].
+    classes, culled obstacles), as counts by name. solve_s: wall time of the whole prediction [s]. obstacles: all that were given,
+    at the stamp of the hand; goals (g, 2) [m].
     """
 
     stamp_ns: int
@@ -253,8 +332,22 @@ class Prediction:
     most_likely: str | None
     notes: dict[str, int] = field(default_factory=dict)
     solve_s: float = 0.0
+    obstacles: Obstacles = field(default_factory=make_obstacles)
+    goals: Array = field(default_factory=lambda: np.zeros((0, 2)))
+
+    def __repr__(self) -> str:
+        """Say time, number of candidates and the most likely one."""
+        likelihoods = {each.label: each.likelihood for each in self.candidates}
+        best = 'none solved' if self.most_likely is None else f'most likely {self.most_likely}'
+        share = f' ({likelihoods[self.most_likely]:.2f})' if self.most_likely in likelihoods else ''
+        return f'<Prediction t={self.t:g} s, {len(self.candidates)} candidates, {best}{share}>'
+
+    @property
+    def t(self) -> float:
+        """Time of the hand sample [s]."""
+        return self.stamp_ns / NANOSECONDS
 
     @property
     def solved_candidates(self) -> tuple[PredictedCandidate, ...]:
-        """The outcomes that meet the wanted eta, most likely first."""
-        return tuple(outcome for outcome in self.candidates if outcome.is_solved)
+        """The candidates that meet the wanted eta, most likely first."""
+        return tuple(each for each in self.candidates if each.is_solved)

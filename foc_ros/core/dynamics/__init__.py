@@ -1,4 +1,4 @@
-"""Dynamics: a plant and a number of steps enter; condensed responses, variances and predictive covariances leave.
+"""Dynamics: a plant and a number of steps enter; condensed horizons, covariances and predictive covariances leave.
 
-May import the ground modules of `foc_ros.core` and `foc_ros.core.estimation`.
+It may import the ground modules of `foc_ros.core` and `foc_ros.core.estimation`.
 """

@@ -1,7 +1,7 @@
-"""Linear plants of the hand and their maps over a horizon.
+"""Discrete linear plants of the hand, and their maps over a horizon.
 
 State X, control U of two channels: X(t+1) = A X(t) + B (U(t) + noise). The first two states are the position, the next two the
-velocity. Everything downstream works for any such (A, B).
+velocity. The optimal control works for any such (A, B); `plant_models` says what the predictor needs besides.
 """
 
 from __future__ import annotations
@@ -16,14 +16,18 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.types import Array, Record
 
 CACHED_HORIZONS = 16
-"""Horizons kept: those of one tick (one per duration) and a few ticks before it, about 30 kB each at N = 50."""
-FREEDOM = 1e-2
-"""Weight w of the control that leads back to a path, relative to what it moves: less would turn sharply to be back at once."""
+"""Size of caches: one horizon per duration, for a prediction and a few before it, about 30 kB each at N = 50."""
+CORRECTION_WEIGHT = 1e-2
+"""Relative weight w of a correcting control: with a smaller one the correction would be abrupt."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plant(Record):
-    """A discrete linear plant: A (n, n), B (n, 2), dt [s]; states 0 and 1 are the position [m], 2 and 3 the velocity [m/s]."""
+    """A discrete linear plant X(t+1) = A X(t) + B U(t).
+
+    A (n, n), n >= 4; B (n, 2); dt [s]. States 0 and 1 are the position [m], 2 and 3 the velocity [m/s]. Raises InputError for
+    other shapes, numbers that are not finite or dt <= 0.
+    """
 
     A: Array
     B: Array
@@ -67,10 +71,10 @@ def damped_mass(dt: float, mass: float, damping: float) -> Plant:
 
 @dataclass(frozen=True, eq=False)
 class Horizon(Record):
-    """What N steps of a plant do: X(t) = A^t X(0) + what the control drives it to, `driven(states, u)`.
+    """The condensed dynamics of N steps: X(t) = A^t X(0) + the convolution of u with the impulse responses.
 
-    u (2N,) is the control stacked axis after axis: first channel at steps 0..N-1, then the second. powers (N + 1, n, n):
-    A^0..A^N; states (n, 2, N + 1): the responses of the states, as in `driven`. dt [s].
+    u (2N,) is the stacked control: the first channel at steps 0..N-1, then the second. powers (N + 1, n, n): A^0..A^N; states
+    (n, 2, N + 1): impulse responses of the states, as in `apply_impulse_response`. dt [s].
     """
 
     powers: Array
@@ -84,64 +88,64 @@ class Horizon(Record):
 
     @cached_property
     def maps(self) -> Array:
-        """Responses of the position: x, y and their products xx, yy, xy, (5, 2, N + 1).
+        """Impulse responses of the position, x and y, and their products xx, yy, xy, (5, 2, N + 1).
 
-        The first two, driven by u, move it; the last three, driven by c^2 u^2, spread it.
+        Applied to u, the first two give the mean; applied to c^2 u^2, the last three give the covariance.
         """
         x, y = self.states[:2]
         return np.stack((x, y, x * x, y * y, x * y))
 
     @cached_property
     def motion(self) -> Array:
-        """Responses of position and velocity per step: x, y, vx, vy, (4, 2, N + 1)."""
+        """Impulse responses of position and velocity per step: x, y, vx, vy, (4, 2, N + 1)."""
         motion = self.states[:4].copy()
         motion[2:] *= self.dt
         return motion
 
     @cached_property
     def last(self) -> Array:
-        """What the states at step N owe to u, (n, 2N)."""
+        """Matrix (n, 2N) from u to the states at step N."""
         return np.ascontiguousarray(self.states[..., :0:-1].reshape(len(self.states), -1))
 
     @cached_property
     def response(self) -> Array:
-        """What the states at steps 1..N owe to u, written out in full, (N, n, 2N)."""
+        """Matrices (N, n, 2N) from u to the states at steps 1..N."""
         since = np.arange(1, self.steps + 1)[:, None] - np.arange(self.steps)
-        response: Array = self.states[..., np.maximum(since, 0)].transpose(2, 0, 1, 3)  # nothing is owed to what comes later
+        response: Array = self.states[..., np.maximum(since, 0)].transpose(2, 0, 1, 3)  # later controls have no effect
         return response.reshape(self.steps, len(self.states), -1)
 
     @property
     def position(self) -> Array:
-        """S: positions at steps 1..N from u, written out in full, (2, N, 2N)."""
+        """S: matrices (2, N, 2N) from u to the positions at steps 1..N."""
         return self.response[:, :2].swapaxes(0, 1)
 
     def returning(self, path: Array, state: Array, fixed: NDArray[np.bool_]) -> Array:
-        """Return the control (2N,) that makes up for what a path, and the fixed states (n,) at its end, are missing.
+        """Return the control (2N,) that corrects deviations of a path, and of the fixed states (n,) at its end.
 
-        path (N, 2): of the positions at steps 1..N; state (n,): of the states at step N. It is the u of least
-        |S u - path|^2 + w |u|^2 with E u = state, where S and E are the responses of the positions and of the fixed states.
+        path (N, 2): deviations of the positions at steps 1..N; state (n,): of the states at step N. The control minimises
+        |S u - path|^2 + w |u|^2 subject to E u = state, with S and E the matrices to the positions and to the fixed states.
         """
-        back, to_goal = _returning(self, fixed.tobytes())
-        control: Array = back @ path.T.ravel() + to_goal @ state
+        to_path, to_goal = _correction_matrices(self, fixed.tobytes())
+        control: Array = to_path @ path.T.ravel() + to_goal @ state
         return control
 
 
 @lru_cache(maxsize=CACHED_HORIZONS)
-def _returning(stacked: Horizon, fixed: bytes) -> tuple[Array, Array]:
+def _correction_matrices(horizon: Horizon, fixed: bytes) -> tuple[Array, Array]:
     is_fixed = np.frombuffer(fixed, dtype=np.bool_)
-    S, E = np.concatenate(stacked.position), stacked.last[is_fixed]
-    unit = 1.0 / np.sqrt((E**2).sum(axis=1))[:, None]  # of rows that mix metres, metres per second and their like
+    S, E = np.concatenate(horizon.position), horizon.last[is_fixed]
+    unit = 1.0 / np.sqrt((E**2).sum(axis=1))[:, None]  # the rows have different units: m, m/s, ...
     square = S.T @ S
-    weight = square + FREEDOM * np.trace(square) / len(square) * np.eye(len(square))
-    back, turned = np.linalg.solve(weight, S.T), np.linalg.solve(weight, (unit * E).T)
+    weight = square + CORRECTION_WEIGHT * np.trace(square) / len(square) * np.eye(len(square))
+    to_path, turned = np.linalg.solve(weight, S.T), np.linalg.solve(weight, (unit * E).T)
     to_goal = turned @ np.linalg.pinv(unit * E @ turned) * unit.T
     of_each_state = np.zeros((len(to_goal), len(is_fixed)))
     of_each_state[:, is_fixed] = to_goal
-    return back - to_goal @ (E @ back), of_each_state
+    return to_path - to_goal @ (E @ to_path), of_each_state
 
 
 def condense(plant: Plant, steps: int) -> Horizon:
-    """Stack a plant over `steps` >= 1 steps."""
+    """Return the condensed horizon of a plant over `steps` >= 1 steps."""
     n = len(plant.A)
     powers = np.empty((steps + 1, n, n))
     powers[0] = np.eye(n)
@@ -153,7 +157,7 @@ def condense(plant: Plant, steps: int) -> Horizon:
 
 
 STATE_ORDER = np.array([0.0, 0.0, 1.0, 1.0, 2.0, 2.0])
-"""Of the triple integrator's states as derivatives of the position."""
+"""Order of each state of the triple integrator as a derivative of the position."""
 
 
 def state_scale(dt: float) -> Array:
@@ -164,7 +168,7 @@ def state_scale(dt: float) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Scaled(Horizon):
-    """The triple integrator's horizon at a step dt [s]; unit: the one of unit step, which knows the way back to a path."""
+    """The triple integrator's horizon at a step dt [s]; unit: the one of unit step, which computes the corrections."""
 
     unit: Horizon
 
@@ -179,9 +183,9 @@ def _unit_horizon(steps: int) -> Horizon:
 
 @lru_cache(maxsize=CACHED_HORIZONS)
 def triple_integrator_horizon(dt: float, steps: int) -> Horizon:
-    """Return the triple integrator's horizon for any dt [s] by scaling the one of unit step.
+    """Return the triple integrator's horizon for any dt [s], scaled from the one of unit step.
 
-    With X = D X', D = diag(1, 1, 1/dt, 1/dt, 1/dt^2, 1/dt^2) and U = U'/dt^3 the dynamics have no unit of time left.
+    With X = D X', D = diag(1, 1, 1/dt, 1/dt, 1/dt^2, 1/dt^2) and U = U'/dt^3 the dynamics of X' do not depend on dt.
     """
     unit = _unit_horizon(steps)
     scale = state_scale(dt)
@@ -189,5 +193,5 @@ def triple_integrator_horizon(dt: float, steps: int) -> Horizon:
 
 
 def states_at_goal(n: int, passing: bool = False) -> NDArray[np.bool_]:
-    """Tell which of n states the goal fixes, (n,): all, as at rest; or, where the hand only passes it, all but the velocity."""
+    """Return which of n states the goal fixes, (n,): all if the hand comes to rest, all but the velocity if it passes."""
     return np.array([not (passing and 2 <= state < 4) for state in range(n)])

@@ -1,18 +1,19 @@
-"""What an error of the initial state becomes when the operator corrects it on the way, and what another end of the plan changes.
+"""Errors under replanning: how the operator corrects an error on the way, and what a displaced end changes in the plan.
 
-The operator sees the hand and moves from where it is: whatever the true state, its plan ends at the goal. What moves the end by d
-with least effort, u = R_N^+ d, moves the state at step t by K_t d, K_t = R_t R_N^+. So an error e of the state is taken to zero
-at step N by moving the end that it would have by -A^N e, and at step t it is (A^t - K_t A^N) e. Without this, the estimator's
-doubt about acceleration would grow with t^2 over the whole horizon, although no hand would act on it.
+The operator sees the hand and plans anew from where it is: whatever the true state, the plan ends at the goal. The control
+u = R_N^+ d moves the end by d with least effort, and moves the state at step t by K_t d, K_t = R_t R_N^+. An error e of the
+initial state would move the end by A^N e. The operator corrects this, so that the error at step t is (A^t - K_t A^N) e, and zero
+at step N. Without the correction, the uncertainty of the acceleration would grow with t^2 over the whole horizon, although the
+hand of a seeing operator does not.
 
-Nobody keeps to a plan either. Jerk that nobody planned, white of unit spectral density, adds the covariance G (`estimator`) to
-the state in every step, and is corrected from then on like any other error:
+Unplanned control noise, white and of unit spectral density, adds a covariance G to the state in every step (for jerk: the
+`gramian` of the Kalman filter), and is corrected from then on like any other error:
 
     D(t) = sum_{k < t} E_{N-k-1}(t - k - 1) G E_{N-k-1}(t - k - 1)',
 
-with E_m the map of an error m steps before the goal. At first this is the t^5 / 20 of the filter's model; at the goal it is
-small. Where the goal does not fix the velocity (`dynamics.states_at_goal`), its errors are not corrected: A^N and R_N hold the
-rows of the other states.
+with E_m the map of an error m steps before the goal. For jerk, this is t^5 / 20 at first, as in the filter's model, and small at
+the goal. Where the goal does not fix the velocity (`plants.states_at_goal`), errors of the velocity are not corrected: A^N and
+R_N have only the rows of the other states.
 """
 
 from __future__ import annotations
@@ -25,63 +26,86 @@ from foc_ros.core.estimation.kalman_filter import gramian
 from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled
 from foc_ros.core.types import Array
 
-from .plants import CACHED_HORIZONS, Horizon, condense, state_scale, states_at_goal, triple_integrator
+from .plants import CACHED_HORIZONS, Horizon, Plant, condense, state_scale, states_at_goal, triple_integrator
 
 STATES = 6
-"""Of the triple integrator: a number that the compiler knows makes `carried` twice as fast."""
+"""States of the triple integrator: with this number known at compile time, `propagate_scaled` is twice as fast."""
 
 
-def goal_map(stacked: Horizon, passing: bool = False) -> Array:
-    """Return K_t of steps 0..N, (N + 1, n, n): what another state at the goal changes in the plan of least effort to it.
+def compute_goal_map(horizon: Horizon, passing: bool = False) -> Array:
+    """Return K_t at steps 0..N, (N + 1, n, n): how a displaced state at the goal displaces the plan of least effort to it.
 
-    passing: the goal does not fix the velocity; the columns of states that it does not fix are zero.
+    passing: the goal does not fix the velocity; the columns of states that the goal does not fix are zero.
     """
-    fixed = states_at_goal(len(stacked.powers[-1]), passing)
-    last = stacked.last[fixed]
-    # rows scaled to unit length first: they mix metres, metres per second and their like
+    fixed = states_at_goal(len(horizon.powers[-1]), passing)
+    last = horizon.last[fixed]
+    # the rows have different units (m, m/s, ...), so they are scaled to unit length first
     scale = 1.0 / np.sqrt((last**2).sum(axis=1))
-    moved = np.zeros_like(stacked.powers)
-    moved[1:, :, fixed] = stacked.response @ (np.linalg.pinv(scale[:, None] * last) * scale)
-    return moved
+    goal_map = np.zeros_like(horizon.powers)
+    goal_map[1:, :, fixed] = horizon.response @ (np.linalg.pinv(scale[:, None] * last) * scale)
+    return goal_map
 
 
-def replanned_error_map(stacked: Horizon, passing: bool = False) -> Array:
-    """Return what an initial error becomes at steps 0..N, (N + 1, n, n); passing: the goal does not fix the velocity."""
-    error_map: Array = stacked.powers - goal_map(stacked, passing) @ stacked.powers[-1]
+def compute_error_map(horizon: Horizon, passing: bool = False) -> Array:
+    """Return what remains of an initial error at steps 0..N, (N + 1, n, n); passing: the goal does not fix the velocity."""
+    error_map: Array = horizon.powers - compute_goal_map(horizon, passing) @ horizon.powers[-1]
     return error_map
+
+
+def compute_process_covariance(plant: Plant, steps: int, added: Array, passing: bool) -> Array:
+    """Return D at steps 0..N, (N + 1, n, n), for a covariance `added` (n, n) that each step adds and the operator corrects."""
+    covariance = np.zeros((steps + 1, *added.shape))
+    for step in range(steps):
+        left = steps - step - 1
+        error_map = compute_error_map(condense(plant, left), passing) if left else np.eye(len(added))[None]
+        covariance[step + 1 :] += error_map @ added @ error_map.swapaxes(1, 2)
+    return covariance
 
 
 @lru_cache(maxsize=CACHED_HORIZONS)
 def _unit_goal_map(steps: int, passing: bool) -> Array:
-    return goal_map(condense(triple_integrator(1.0), steps), passing)
+    return compute_goal_map(condense(triple_integrator(1.0), steps), passing)
 
 
 @lru_cache(maxsize=CACHED_HORIZONS)
 def _unit_error_map(steps: int, passing: bool) -> Array:
-    return replanned_error_map(condense(triple_integrator(1.0), steps), passing)
+    return compute_error_map(condense(triple_integrator(1.0), steps), passing)
+
+
+@lru_cache(maxsize=CACHED_HORIZONS)
+def _unit_process_covariance(steps: int, passing: bool) -> Array:
+    added = np.kron(gramian(1.0), np.eye(2)).astype(np.float64)
+    return compute_process_covariance(triple_integrator(1.0), steps, added, passing)
 
 
 def triple_integrator_goal_map(dt: float, steps: int, passing: bool = False) -> Array:
-    """Return `goal_map` of the triple integrator at any dt [s], by scaling the map of unit step."""
+    """Return `compute_goal_map` of the triple integrator for any dt [s], scaled from the map of unit step."""
     scale = state_scale(dt)
-    moved: Array = _unit_goal_map(steps, passing) * (scale[:, None] / scale[None, :])
-    return moved
+    goal_map: Array = _unit_goal_map(steps, passing) * (scale[:, None] / scale[None, :])
+    return goal_map
 
 
 def triple_integrator_error_map(dt: float, steps: int, passing: bool = False) -> Array:
-    """Return `replanned_error_map` of the same."""
+    """Return `compute_error_map` of the triple integrator for any dt [s], scaled from the map of unit step."""
     scale = state_scale(dt)
     error_map: Array = _unit_error_map(steps, passing) * (scale[:, None] / scale[None, :])
     return error_map
 
 
 def triple_integrator_error_covariance(covariance: Array, dt: float, steps: int, passing: bool = False) -> Array:
-    """Return what becomes of the covariance (6, 6) of an initial error at steps 0..N, (N + 1, 6, 6); dt [s]."""
-    return carried(_unit_error_map(steps, passing), state_scale(dt), covariance)
+    """Return the covariance (N + 1, 6, 6) at steps 0..N that an initial error of covariance (6, 6) leads to; dt [s]."""
+    return propagate_scaled(_unit_error_map(steps, passing), state_scale(dt), covariance)
+
+
+def triple_integrator_process_covariance(dt: float, steps: int, passing: bool = False) -> Array:
+    """Return D at steps 0..N, (N + 1, 6, 6), for unplanned white jerk of unit spectral density; dt [s]."""
+    scale = dt**2.5 * state_scale(dt)
+    covariance: Array = _unit_process_covariance(steps, passing) * (scale[:, None] * scale[None, :])
+    return covariance
 
 
 @compiled
-def carried(maps: Tensor, scale: Vector, covariance: Matrix) -> Tensor:
+def propagate_scaled(maps: Tensor, scale: Vector, covariance: Matrix) -> Tensor:
     """Return E P E', (m, 6, 6), of a covariance P (6, 6) for each E = D M D^-1: maps M (m, 6, 6), scale the diagonal of D."""
     after, half, unit = np.empty_like(maps), np.empty((STATES, STATES)), np.empty((STATES, STATES))
     for i in range(STATES):
@@ -101,21 +125,3 @@ def carried(maps: Tensor, scale: Vector, covariance: Matrix) -> Tensor:
                     total += half[i, k] * maps[t, j, k]
                 after[t, i, j] = after[t, j, i] = scale[i] * scale[j] * total
     return after
-
-
-@lru_cache(maxsize=CACHED_HORIZONS)
-def _unit_process_covariance(steps: int, passing: bool) -> Array:
-    added = np.kron(gramian(1.0), np.eye(2))
-    covariance = np.zeros((steps + 1, 6, 6))
-    for step in range(steps):
-        left = steps - step - 1
-        error_map = replanned_error_map(condense(triple_integrator(1.0), left), passing) if left else np.eye(6)[None]
-        covariance[step + 1 :] += error_map @ added @ error_map.swapaxes(1, 2)
-    return covariance
-
-
-def triple_integrator_process_covariance(dt: float, steps: int, passing: bool = False) -> Array:
-    """Return D at steps 0..N, (N + 1, 6, 6): what white jerk of unit spectral density does while it is corrected; dt [s]."""
-    scale = dt**2.5 * state_scale(dt)
-    covariance: Array = _unit_process_covariance(steps, passing) * (scale[:, None] * scale[None, :])
-    return covariance

@@ -1,22 +1,22 @@
-"""Effort that a movement has taken so far: the integral of its squared jerk [m^2/s^5], from noisy positions.
+"""Effort of a movement so far: the integral of its squared jerk [m^2/s^5], estimated from noisy positions.
 
-A minimum-jerk movement between two states is the quintic that joins them, and its effort has a closed form: over a stretch of
+A minimum-jerk movement between two states is the quintic that joins them, and its effort has a closed form: over a segment of
 duration T, with positions sum_k c_k s^k (s = t / T in [0, 1], k = 0..5),
 
     J = c' H c / T^5,  H_jk = j(j-1)(j-2) k(k-1)(k-2) / (j + k - 5),  e.g. 720 D^2 / T^5 from rest to rest over a distance D.
 
-Jerk is a third derivative, so states of a filter at two nearby stamps give mostly noise. Instead the quintic is fitted to all
-samples of a stretch, and a stretch is as long as one quintic explains it: then noise does not grow with the sampling rate, nor
-with the slowness of the movement. The samples enter by sums alone, so a step costs the same however long the stretch is.
+Jerk is a third derivative, so the filter's states at two stamps close together give mostly noise. Instead, a quintic is fitted to
+all samples of a segment, and a segment is as long as one quintic explains it. The noise then grows neither with the sampling rate
+nor with the slowness of the movement. The samples enter through sums only, so that an update costs the same for any length.
 
-Only what the samples show to be jerk is counted. In coordinates y = L' c that are uncorrelated (L L': the sums of powers, so that
-y_k is what degree k adds), each degree k >= 3 is shrunk by max(0, 1 - 12 E / |y_k|^2), where E = 2 sigma^2 is what noise alone
-gives; and it waits until noise alone would add less than a tenth of the effort of a straight reach as long as the stretch. So
-the estimate starts at zero and stays low, never noise.
+Only jerk that is significant in the samples is counted. In coordinates y = L' c that are uncorrelated (L L': the sums of powers,
+so that y_k is what degree k adds), each degree k >= 3 is shrunk by max(0, 1 - 12 E / |y_k|^2), where E = 2 sigma^2 is the
+expectation under noise alone. A degree is used only once noise alone would add less than a tenth of the effort of a straight
+reach as long as the segment. The estimate therefore starts at zero and stays low, but never reports noise.
 
-Measured over 0.3 m from rest to rest in 0.6 to 4 s, at 15, 50 and 200 Hz, with 1 mm or 0.1 mm of noise: near the end 0.4 to 0.8
-of the true effort so far in the median (0.35 to 0.9 with a detour of 60 mm on the way); a third of it is lost before onset, where
-the jerk is highest. At no time more than 1.03 of the whole effort. With 1 mm of noise it is near zero up to half way.
+Measured over 0.3 m from rest to rest in 0.6 to 4 s, at 15, 50 and 200 Hz, with 1 mm or 0.1 mm of noise: near the end, the median
+is 0.4 to 0.8 of the true effort so far (0.35 to 0.9 with a detour of 60 mm); a third of it is lost before onset, where the jerk
+is highest. It never exceeds 1.03 of the whole effort. With 1 mm of noise it is near zero until half of the movement.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ from foc_ros.core.types import NANOSECONDS, Array, Record, as_readonly
 DEGREE = 5
 LEAST_SAMPLES = 8
 LEAST_TIME_S = 0.2
-"""A stretch is judged from here on. With shorter ones an outlier of 10 mm at 200 Hz made 1e5 times the true effort."""
+"""Duration from which a segment is fitted. With shorter ones, an outlier of 10 mm at 200 Hz gave 1e5 times the true effort."""
 SHRINKAGE = 12.0
-"""Noise exceeds it once in exp(12) = 2e5 times; with 8, a spike of 38 times the final effort came in one movement of 40."""
+"""Noise exceeds it once in exp(12) = 2e5 times; with 8, one movement of 40 had a peak of 38 times the final effort."""
 NOISE_SHARE = 0.1
 MISFIT = 2.0
-"""Root mean square of the residuals, in standard deviations of a position, beyond which a quintic does not explain a stretch."""
+"""Root mean square of the residuals, in standard deviations of a position, above which a quintic does not explain a segment."""
 
 ROUNDING = 1e-12
 """Share of the sum of squares that rounding leaves in the residuals; 2e-13 was seen with 20000 samples."""
 
-TOLD_APART = 1e-9
-"""Share of its own sum of squares that a degree has to add to those below it: bunched stamps do not tell them apart."""
+LEAST_PIVOT = 1e-9
+"""Share of its own sum of squares that a degree has to add to those below it: for clustered stamps the degrees are degenerate."""
 
 _K = np.arange(DEGREE + 1)
 _THIRD = _K * (_K - 1.0) * (_K - 2.0)
@@ -52,11 +52,11 @@ _H: Array = np.outer(_THIRD, _THIRD) / np.maximum(_K[:, None] + _K - 5.0, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class Effort(Record):
-    """What is known of a movement's effort.
+    """The effort of a movement and the sums over its present segment.
 
-    spent: so far [m^2/s^5]; before: of it, before the present stretch. The present stretch, as sums over its samples at times
-    t [s] since start_ns (None: no sample yet) and positions z (2,) [m] from origin: powers (11,) of t^0..t^10, products (6, 2) of
-    t^k z, square of |z|^2; last_s: time of the last sample [s].
+    spent: effort so far [m^2/s^5]; before: the part before the present segment. The sums are over samples at times t [s] since
+    start_ns (None: no sample yet) and positions z (2,) [m] from origin: powers (11,) of t^0..t^10, products (6, 2) of t^k z,
+    square of |z|^2; last_s: time of the last sample [s].
     """
 
     spent: float = 0.0
@@ -70,19 +70,19 @@ class Effort(Record):
 
 
 def add_sample(effort: Effort, stamp_ns: int, position: Array, stddev: float) -> Effort:
-    """Take the movement's next sample; stddev: of a measured position [m].
+    """Return the effort with the next sample of the movement; stddev: of a measured position [m].
 
-    A sample that the stretch's quintic does not explain ends the stretch, and belongs to none: it may be an outlier.
+    A sample that the quintic of the segment does not explain ends the segment and belongs to none, since it may be an outlier.
     """
     start_ns, origin = (stamp_ns, position) if effort.start_ns is None else (effort.start_ns, effort.origin)
     seconds, z = (stamp_ns - start_ns) / NANOSECONDS, position - origin
     powers, products = map(as_readonly, add_to_sums(effort.powers, effort.products, seconds, z))
     square, spent = effort.square + float(z @ z), effort.spent
     if powers[0] >= LEAST_SAMPLES and seconds >= LEAST_TIME_S:
-        told, added, explained = fit_quintic(powers, products, square, seconds, stddev)
-        if told and not explained:
+        is_determined, added, is_explained = fit_quintic(powers, products, square, seconds, stddev)
+        if is_determined and not is_explained:
             return Effort(spent=effort.spent, before=effort.spent)
-        spent = effort.before + added if told else spent
+        spent = effort.before + added if is_determined else spent
     return Effort(spent, effort.before, start_ns, seconds, origin, powers, products, square)
 
 
@@ -100,7 +100,10 @@ def add_to_sums(powers: Vector, products: Matrix, seconds: float, z: Vector) -> 
 
 @compiled
 def fit_quintic(powers: Vector, products: Matrix, square: float, T: float, stddev: float) -> tuple[bool, float, bool]:
-    """Return whether a stretch of T [s] tells the degrees apart, its effort [m^2/s^5], and whether its quintic explains it."""
+    """Fit the quintic of a segment of T [s].
+
+    Return whether the samples determine all degrees, the effort [m^2/s^5], and whether the quintic explains the samples.
+    """
     n, count = len(products), powers[0]
     gram, right = np.empty((n, n)), np.empty((n, 2))
     for j in range(n):
@@ -109,7 +112,7 @@ def fit_quintic(powers: Vector, products: Matrix, square: float, T: float, stdde
             gram[j, k] = powers[j + k] / T ** (j + k)
     root = factorise_cholesky(gram, 0.0)
     for k in range(n):
-        if not root[k, k] ** 2 > TOLD_APART * gram[k, k]:
+        if not root[k, k] ** 2 > LEAST_PIVOT * gram[k, k]:
             return False, 0.0, False
     y = solve_lower(root, right)
     energy = (y**2).sum(axis=1)
@@ -119,7 +122,7 @@ def fit_quintic(powers: Vector, products: Matrix, square: float, T: float, stdde
     jerk = solve_lower(root, np.ascontiguousarray(solve_lower(root, _H).T))
     length_squared = 12.0 * energy[1:].sum() / count
     for k in range(n):
-        told = k >= 3 and noise * jerk[k, k] <= NOISE_SHARE * 720.0 * length_squared
-        y[k] *= max(1.0 - SHRINKAGE * noise / max(energy[k], noise), 0.0) if told else 0.0
+        is_used = k >= 3 and noise * jerk[k, k] <= NOISE_SHARE * 720.0 * length_squared
+        y[k] *= max(1.0 - SHRINKAGE * noise / max(energy[k], noise), 0.0) if is_used else 0.0
     spent = max((y * multiply(jerk, y)).sum(), 0.0) / T**5
     return True, spent, residual <= (MISFIT * stddev) ** 2 + rounding

@@ -1,24 +1,25 @@
-"""Kalman filter of the hand: positions with stamps in, mean and covariance of position, velocity and acceleration out.
+"""Kalman filter of the hand: stamped positions enter; mean and covariance of position, velocity and acceleration leave.
 
-Per axis the state is x = (position, velocity, acceleration) driven by white jerk of spectral density q^2,
+Per axis the state is x = (position, velocity, acceleration), driven by white jerk of spectral density q^2,
 
     x(t + dt) = A(dt) x(t) + w,  A = [[1, dt, dt^2/2], [0, 1, dt], [0, 0, 1]],  w ~ N(0, q^2 G(dt)),
     G(dt) = [[dt^5/20, dt^4/8, dt^3/6], [dt^4/8, dt^3/3, dt^2/2], [dt^3/6, dt^2/2, dt]],
 
-the exact discretisation for any dt, so irregular stamps need no resampling. Both axes are measured equally well, so they share
-one 3 x 3 covariance P and one gain.
+the exact discretisation for any dt, so that irregular stamps need no resampling. Both axes are measured equally well, so they
+share one 3 x 3 covariance P and one gain.
 
-The filter works on the lower triangular root L of P = L L'. In time, the columns [A L, q C] are made triangular, C C' = G(dt).
-A measured position of deviation r sees the first row of L alone, which is (l, 0, 0): with e^2 = l^2 + r^2 the variance of the
-innovation, the gain is L_1 l / e^2 and the first column becomes L_1 r / e, the others stay. So the covariance is symmetric and
-positive whatever the deviations and intervals; an update in Joseph form was not for two samples 1 us apart.
+The filter propagates the lower triangular root L of P = L L'. The time update makes the columns [A L, q C] triangular, with C C'
+= G(dt). The measurement update, for a position of standard deviation r, involves only the first row of L, which is (l, 0, 0):
+with the variance e^2 = l^2 + r^2 of the innovation, the gain is L_1 l / e^2, the first column becomes L_1 r / e, and the others
+stay. The covariance is therefore symmetric and positive for all deviations and intervals; the Joseph form was not for two samples
+1 us apart.
 
-The first sample gives the position. Velocity and acceleration then start at zero with the covariance that a hand at rest would
-have got from the jerk in `gap_s`, the longest time for which the filter believes in an old state.
+The first sample gives the position. Velocity and acceleration start at zero, with the covariance that the jerk would give a hand
+at rest within `gap_s`, the longest time for which the filter trusts an old state.
 
-A movement begins where the speed exceeds `onset_speed` and three of its own standard deviations, and ends below half of
-`onset_speed`. Measured at rest with 1 mm of noise and the default jerk density: the second condition lowers the false onsets from
-several per second to one in 45 s or fewer, and delays a true one (0.3 m in 1 s) by 0.03 s at 200 Hz and 0.09 s at 15 Hz.
+A movement begins when the speed exceeds both `onset_speed` and three of its own standard deviations, and ends below half of
+`onset_speed`. Measured at rest with 1 mm of noise and the default jerk density, the second condition reduces the false onsets
+from several per second to at most one in 45 s, and delays a true one (0.3 m in 1 s) by 0.03 s at 200 Hz and 0.09 s at 15 Hz.
 """
 
 from __future__ import annotations
@@ -31,8 +32,7 @@ import numpy as np
 from foc_ros.core.config import EstimatorConfig
 from foc_ros.core.kernels import Matrix, Vector, compiled
 from foc_ros.core.linear_algebra import multiply, multiply_transposed
-from foc_ros.core.sample_status import SampleStatus
-from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, as_readonly
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, SampleStatus, as_readonly
 
 from .effort import Effort, add_sample
 
@@ -41,9 +41,9 @@ ONSET_STDDEVS = 3.0
 
 @dataclass(frozen=True, eq=False)
 class FilterState(HandState):
-    """A hand state, and what else the estimator remembers.
+    """A hand state with the internal state of the filter.
 
-    root (3, 3): lower triangular root of one axis' covariance; effort: the samples since onset, as far as the effort needs them.
+    root (3, 3): lower triangular root of the covariance of one axis; effort: sums over the samples since onset.
     """
 
     root: Array = field(default_factory=lambda: np.zeros((3, 3)))
@@ -52,30 +52,42 @@ class FilterState(HandState):
 
 @dataclass(frozen=True)
 class Update:
-    """The estimator's answer: the state to hand in next time, and what became of the sample."""
+    """The state after a sample, and what became of the sample."""
 
     state: FilterState
-    verdict: SampleStatus
+    status: SampleStatus
 
 
 def update(state: FilterState | None, sample: HandSample, config: EstimatorConfig) -> Update:
-    """Take one sample into the filter.
+    """Update the filter by one sample.
 
-    state: of the last update, None at the start. A sample of the same stamp, or late by no more than `gap_s`, is dropped: the
-    state is returned as it was. A stamp farther back, or farther ahead than `gap_s`, starts the filter anew.
+    Parameters
+    ----------
+    state
+        State after the last sample; None at the start.
+    sample
+        The measured position.
+    config
+        Parameters of the filter.
+
+    Returns
+    -------
+    Update
+        A sample with the last stamp, or late by at most `gap_s`, is dropped, and the state stays as it was. A sample that is
+        earlier than that, or later than the last one by more than `gap_s`, restarts the filter.
     """
     if state is None:
-        return Update(_first(sample, config), SampleStatus.ACCEPTED)
+        return Update(_start_state(sample, config), SampleStatus.ACCEPTED)
     dt = (sample.stamp_ns - state.stamp_ns) / NANOSECONDS
     if dt == 0.0:
         return Update(state, SampleStatus.DUPLICATE)
     if dt < -config.gap_s:
-        return Update(_first(sample, config), SampleStatus.RESTARTED_BACKWARD)
+        return Update(_start_state(sample, config), SampleStatus.RESTARTED_BACKWARD)
     if dt < 0.0:
         return Update(state, SampleStatus.LATE)
     if dt > config.gap_s:
-        return Update(_first(sample, config), SampleStatus.RESTARTED_GAP)
-    return Update(_followed(state, sample, dt, config), SampleStatus.ACCEPTED)
+        return Update(_start_state(sample, config), SampleStatus.RESTARTED_GAP)
+    return Update(_update_state(state, sample, dt, config), SampleStatus.ACCEPTED)
 
 
 @compiled
@@ -101,7 +113,7 @@ _UNIT_ROOT = np.linalg.cholesky(gramian(1.0))
 
 @compiled
 def triangularise(columns: Matrix) -> Matrix:
-    """Return the lower triangular L (n, n) with L L' = M M' for columns M (n, q), q >= n: M turned by plane rotations."""
+    """Return the lower triangular L (n, n) with L L' = M M' for columns M (n, q), q >= n, by plane rotations of M."""
     turned = columns.copy()
     n, q = turned.shape
     for i in range(n):
@@ -115,8 +127,8 @@ def triangularise(columns: Matrix) -> Matrix:
 
 
 @compiled
-def both_axes(covariance: Matrix) -> Matrix:
-    """Return the (6, 6) covariance of x, y, vx, vy, ax, ay from the (3, 3) one that both axes have."""
+def expand_to_both_axes(covariance: Matrix) -> Matrix:
+    """Return the covariance (6, 6) of x, y, vx, vy, ax, ay from the one (3, 3) that both axes share."""
     both = np.zeros((6, 6))
     for i in range(3):
         for j in range(3):
@@ -128,7 +140,7 @@ def both_axes(covariance: Matrix) -> Matrix:
 def filter_step(
     mean: Vector, root: Matrix, dt: float, jerk_density: float, stddev: float, position: Vector
 ) -> tuple[Vector, Matrix, Matrix]:
-    """Return mean (6,), covariance (6, 6) and root (3, 3) a time dt [s] on, corrected by a position (2,) of a deviation [m]."""
+    """Return mean (6,), covariance (6, 6) and root (3, 3) after dt [s] and a position (2,) of a standard deviation [m]."""
     step, columns = transition(dt), np.empty((3, 6))
     columns[:, :3] = multiply(step, root)
     for i in range(3):
@@ -137,35 +149,35 @@ def filter_step(
     first = corrected[0, 0]
     deviation = np.hypot(first, stddev)
     states = multiply(step, mean.reshape(3, 2))
-    missed = position - states[0]
+    innovation = position - states[0]
     for i in range(3):
-        states[i] += corrected[i, 0] * (first / deviation / deviation) * missed
+        states[i] += corrected[i, 0] * (first / deviation / deviation) * innovation
         corrected[i, 0] *= stddev / deviation
-    return states.ravel(), both_axes(multiply_transposed(corrected, corrected)), corrected
+    return states.ravel(), expand_to_both_axes(multiply_transposed(corrected, corrected)), corrected
 
 
-def _first(sample: HandSample, config: EstimatorConfig) -> FilterState:
-    """Start from one position."""
+def _start_state(sample: HandSample, config: EstimatorConfig) -> FilterState:
+    """Return the state after a first position."""
     root = np.zeros((3, 3))
     root[0, 0] = config.position_stddev
     root[1:, 1:] = config.jerk_density * np.linalg.cholesky(gramian(config.gap_s)[1:, 1:])
     mean = np.concatenate([sample.position, np.zeros(4)])
-    return FilterState(sample.stamp_ns, mean, both_axes(root @ root.T), sample.height, sample.frame_id, root=root)
+    return FilterState(sample.stamp_ns, mean, expand_to_both_axes(root @ root.T), sample.height, sample.frame_id, root=root)
 
 
-def _followed(state: FilterState, sample: HandSample, dt: float, config: EstimatorConfig) -> FilterState:
-    """Predict to the sample's stamp, correct by its position, and see what becomes of the movement."""
+def _update_state(state: FilterState, sample: HandSample, dt: float, config: EstimatorConfig) -> FilterState:
+    """Propagate a state to the stamp of the sample, correct it by the position, and update the movement."""
     settings = config.jerk_density, config.position_stddev
     mean, covariance, root = map(as_readonly, filter_step(state.mean, state.root, dt, *settings, sample.position))
-    onset_ns, onset_position, effort = _movement(state, sample, mean, covariance, config)
+    onset_ns, onset_position, effort = _update_movement(state, sample, mean, covariance, config)
     hand = sample.stamp_ns, mean, covariance, sample.height, sample.frame_id
     return FilterState(*hand, onset_ns, onset_position, effort.spent, root, effort)
 
 
-def _movement(
+def _update_movement(
     state: FilterState, sample: HandSample, mean: Array, covariance: Array, config: EstimatorConfig
 ) -> tuple[int | None, Array | None, Effort]:
-    """Begin, go on with, or end a movement: return its onset and where that was, None at rest, and its effort."""
+    """Begin, continue or end a movement; return stamp and position (2,) of its onset, None at rest, and its effort."""
     onset_ns, onset_position, speed = state.onset_ns, state.onset_position, math.hypot(mean[2], mean[3])
     if onset_ns is None:
         if speed <= max(config.onset_speed, ONSET_STDDEVS * math.sqrt(covariance[2, 2])):

@@ -1,22 +1,22 @@
-"""How long a movement should take where time has a price: least effort plus rho times the duration.
+"""Optimal duration of a movement if time has a cost: least effort plus rho times the duration.
 
 Along a path of length L, from speed v and acceleration a along it to rest at its end, the least integral of squared jerk in a
 time T is
 
     J(T) = e' G(T)^-1 e,  e = (L - v T - a T^2 / 2, -v - a T, -a),
 
-with G the Gramian of the triple integrator; from rest J = 720 L^2 / T^5. So the duration that minimises J + rho T is
-(3600 L^2 / rho)^(1/6) from rest: a way round that is longer takes longer, by the cube root. In a movement the minimum over the
-time that is left agrees with itself from one moment to the next, without a clock: what is optimal from here is the rest of what
-was optimal before.
+with G the Gramian of the triple integrator; from rest J = 720 L^2 / T^5. From rest, the duration that minimises J + rho T is
+therefore (3600 L^2 / rho)^(1/6): a longer path takes longer, by the cube root of its length. During a movement, the optimal time
+to go is consistent from one moment to the next without a clock, since the optimum from here is the remainder of the previous
+optimum.
 
-Where the goal is passed at any velocity, the one in e is free: for e = (x, ., y), G without its row and column gives
+If the goal is passed at any velocity, the velocity in e is free: for e = (x, ., y), G without its row and column gives
 
     J(T) = 45 x^2 / T^5 - 15 x y / T^3 + 9 y^2 / (4 T),
 
-which is nothing for a hand that keeps its speed.
+which is zero for a hand that keeps its speed.
 
-The path is taken for straight. Bending costs effort, too: C times as much makes the best duration C^(1/6) times as long.
+The path is taken as straight. Bends increase the effort; C times the effort makes the optimal duration C^(1/6) times as long.
 """
 
 from __future__ import annotations
@@ -28,18 +28,19 @@ import numpy as np
 from foc_ros.core.types import Array
 
 GRID = 64
-"""Durations among which the best is sought, evenly in the logarithm; between them by a parabola."""
+"""Number of durations that are compared, evenly in the logarithm; the optimum between them is interpolated by a parabola."""
 
 
-def least_cost_time(
-    length: float, speed: float, acceleration: float, time_cost: float, low: float, high: float, passing: bool = False
+def find_least_cost_time(
+    length: float, state: tuple[float, float], time_cost: float, bounds: tuple[float, float], passing: bool = False
 ) -> float:
-    """Return the duration [s] in [low, high] of least effort plus time_cost [m^2/s^6] times duration.
+    """Return the duration [s] within bounds of least effort plus time_cost [m^2/s^6] times the duration.
 
-    length [m] of the path left; speed [m/s] and acceleration [m/s^2] along it now; passing: it need not end at rest.
+    length [m] of the remaining path; state: speed [m/s] and acceleration [m/s^2] along it now; passing: it need not end at rest.
     """
+    low, high = bounds
     times = np.geomspace(low, high, GRID)
-    costs = effort_along(length, speed, acceleration, times, passing) + time_cost * times
+    costs = compute_least_effort(length, *state, times, passing) + time_cost * times
     best = int(costs.argmin())
     if not 0 < best < GRID - 1:
         return float(times[best])
@@ -49,8 +50,8 @@ def least_cost_time(
     return float(times[best] * math.exp(shift * math.log(high / low) / (GRID - 1)))
 
 
-def effort_along(length: float, speed: float, acceleration: float, times: Array, passing: bool = False) -> Array:
-    """Return the least integral of squared jerk [m^2/s^5] that ends a path in given times (m,) [s]."""
+def compute_least_effort(length: float, speed: float, acceleration: float, times: Array, passing: bool = False) -> Array:
+    """Return the least integral of squared jerk [m^2/s^5] that completes a path in each of the times (m,) [s]."""
     x = length - speed * times - acceleration * times**2 / 2.0
     v = -speed - acceleration * times
     a = -acceleration

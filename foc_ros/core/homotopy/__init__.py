@@ -1,7 +1,12 @@
-"""Ways round: homotopy classes found, named and seeded, and the side on which a path really passes an obstacle."""
+"""Homotopy classes of the paths from the hand to the goals: which classes exist, their names, and an initial guess in each.
 
+Enters: the hand, the goals and the obstacles. Leaves: candidates, and the side on which a given path passes an obstacle.
+May import `foc_ros.core.dynamics`, `obstacles`, `estimation` and the ground modules.
+"""
+
+from .guesses import timed
 from .search import Search, search
-from .shown import named_obstacles, timed
+from .search_scene import named_obstacles
 from .sides import compute_swept_angles, is_same_class, path_sides, sweep_angles
 
 __all__ = ['Search', 'compute_swept_angles', 'is_same_class', 'named_obstacles', 'path_sides', 'search', 'sweep_angles', 'timed']

@@ -1,4 +1,4 @@
-"""When predicted ways part: the choices that are still open, and how far ahead they lie."""
+"""Branch times: when predicted paths separate at an obstacle, which says how far ahead a choice lies."""
 
 from __future__ import annotations
 
@@ -11,43 +11,39 @@ from numpy.typing import NDArray
 from foc_ros.core.obstacles.chance_constraint import centre_trajectories
 from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Record
 
-from . import compute_swept_angles
+from .sides import compute_swept_angles
 
 
 @dataclass(frozen=True, eq=False)
 class BranchTimes(Record):
-    """How k ways part.
+    """When k paths separate.
 
-    after_s (k, k): seconds from now until two of them part, infinite where they never do, as on the diagonal; way (k,): those
-    with the same number pass all obstacles on the same sides, though they may lead to different goals.
+    after_s (k, k): time until two of them separate [s], infinite if they never do, as on the diagonal. way (k,): paths with equal
+    numbers pass all obstacles on the same sides, though they may lead to different goals.
     """
 
     after_s: Array
     way: NDArray[np.intp]
 
     def take(self, rows: NDArray[np.intp]) -> BranchTimes:
-        """Return how some of the ways part."""
+        """Return the branch times of some of the paths."""
         return BranchTimes(self.after_s[np.ix_(rows, rows)], self.way[rows])
 
 
 def compute_branch_times(outcomes: Sequence[PredictedCandidate], obstacles: Obstacles) -> BranchTimes:
-    """Return how the mean paths of outcomes part; obstacles: where they are now.
+    """Compute when the mean paths of candidates separate; obstacles: where they are now.
 
-    Two paths from one hand pass an obstacle on different sides where the angles that they sweep about it differ by more than half
-    a turn. They part at the first obstacle of which that is true, when the first of them is nearest to it.
+    Two paths from one hand pass an obstacle on different sides if the angles that they sweep about it differ by more than half a
+    turn. They separate at the first such obstacle, when the first of the two is nearest to it.
     """
     if not outcomes:
         return BranchTimes(np.zeros((0, 0)), np.zeros(0, dtype=np.intp))
-    seen = [_seen(outcome, obstacles) for outcome in outcomes]
-    swept, passing = np.array([each[0] for each in seen]), np.array([each[1] for each in seen])
-    aside = np.abs(swept[:, None] - swept) > np.pi
-    after_s = np.where(aside, np.minimum(passing[:, None], passing), np.inf).min(axis=2, initial=np.inf)
+    angles, times = [], []
+    for solution in [outcome.solution for outcome in outcomes]:
+        centre = centre_trajectories(obstacles.centre, solution.dt * obstacles.velocity, len(solution.mean) - 1)
+        angles.append(compute_swept_angles(solution.path, centre))
+        times.append(solution.times[((solution.path[:, None] - centre) ** 2).sum(axis=2).argmin(axis=0)])
+    swept, passing_s = np.array(angles), np.array(times)
+    is_opposite = np.abs(swept[:, None] - swept) > np.pi
+    after_s = np.where(is_opposite, np.minimum(passing_s[:, None], passing_s), np.inf).min(axis=2, initial=np.inf)
     return BranchTimes(after_s, np.isinf(after_s).argmax(axis=1))
-
-
-def _seen(outcome: PredictedCandidate, obstacles: Obstacles) -> tuple[Array, Array]:
-    """Return the angle (n,) [rad] that the mean path sweeps about each obstacle, and when (n,) [s] it is nearest to it."""
-    solution = outcome.solution
-    where = centre_trajectories(obstacles.centre, solution.dt * obstacles.velocity, len(solution.mean) - 1)
-    apart = solution.path[:, None] - where
-    return compute_swept_angles(solution.path, where), solution.times[(apart**2).sum(axis=2).argmin(axis=0)]

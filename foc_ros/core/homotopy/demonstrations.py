@@ -1,36 +1,40 @@
-"""Remembered ways: demonstrated paths that come back as candidates where the scene is the one they were shown in.
+"""Demonstrated paths, which come back as candidates if the scene is the one in which they were recorded.
 
-The search proposes short ways; a demonstrated one may be longer, and still be what this operator does (the paper stores the
-initial guesses of each class for its scene).
+The search proposes short classes. A demonstrated class may be longer and still be the one that the operator takes (the paper
+stores the initial guesses of each class for its scene).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from foc_ros.core.config import HomotopyConfig
-from foc_ros.core.types import LEFT, Array, Candidate, HandState, Obstacles, Record
+from foc_ros.core.types import Array, Candidate, HandState, Obstacles, Record
 
-from . import named_obstacles, path_sides, timed
+from .class_search import name_course
+from .guesses import compute_path_lengths, timed
+from .search_scene import named_obstacles
+from .sides import path_sides
 
 NEAR = 0.02
-"""So far may each obstacle and the goal be from where they were in the demonstration [m]."""
+"""Largest distance of an obstacle or a goal from its place in the demonstration [m]."""
 ASIDE = 0.1
-"""So far may the hand be from the demonstrated path [m]."""
+"""Largest distance of the hand from the demonstrated path [m]."""
 POINTS = 65
-"""Points of a remembered path."""
+"""Number of points of a demonstrated path."""
 DIGITS = 6
-"""A micrometre is exact enough, and keeps the file small."""
+"""Decimals of the coordinates: a micrometre is exact enough and keeps the file small."""
 MOST = 2
-"""Recalled ways are solved beside the `max_candidates` found ones, at most so many."""
+"""Number of recalled candidates that are solved at most, besides the `max_candidates` that the search finds."""
 
 
 @dataclass(frozen=True, eq=False)
 class Demonstration(Record):
-    """A demonstration: frame; ids, centre (n, 2) [m] of the obstacles that the path (m, 2) [m] passed, and on which sides."""
+    """A demonstrated path (m, 2) [m] in a frame, and the obstacles that it passed: ids, sides and centre (n, 2) [m]."""
 
     frame_id: str
     ids: tuple[str, ...]
@@ -39,31 +43,36 @@ class Demonstration(Record):
     path: Array
 
     def matches(self, frame_id: str, obstacles: Obstacles) -> bool:
-        """Tell whether all obstacles that it passed are there, by id, within NEAR of where they were."""
+        """Tell whether all obstacles that the path passed are present, by id, within NEAR of where they were."""
         rows = {identity: row for row, identity in enumerate(obstacles.ids)}
         if frame_id != self.frame_id or not rows.keys() >= set(self.ids):
             return False
-        apart = obstacles.centre[[rows[identity] for identity in self.ids]] - self.centre if self.ids else np.zeros((0, 2))
-        return bool((np.hypot(*apart.T) <= NEAR).all())
+        return _is_near(obstacles.centre[[rows[identity] for identity in self.ids]], self.centre)
+
+
+class GuessTiming(NamedTuple):
+    """The time to go to each goal (g,) [s], and the number N of time steps."""
+
+    durations_s: Sequence[float]
+    steps: int
 
 
 def record_demonstration(frame_id: str, path: Array, obstacles: Obstacles) -> Demonstration:
-    """Remember a path (m, 2) [m], m >= 2, by POINTS points at equal distances, with the sides that it really took."""
-    length = _lengths(path)
+    """Record a path (m, 2) [m], m >= 2, as POINTS points at equal distances, with the sides on which it passes the obstacles."""
+    length = compute_path_lengths(path)
     at = np.linspace(0.0, length[-1], POINTS)
     evenly = np.column_stack([np.interp(at, length, axis) for axis in path.T]).round(DIGITS)
     sides = path_sides(evenly, obstacles)
-    rows = sorted((row for row, identity in enumerate(obstacles.ids) if identity in sides), key=obstacles.ids.__getitem__)
-    ids = tuple(obstacles.ids[row] for row in rows)
-    return Demonstration(frame_id, ids, tuple(sides[identity] for identity in ids), obstacles.centre[rows].round(DIGITS), evenly)
+    ids = tuple(sorted(sides))
+    centre = obstacles.centre[[obstacles.ids.index(identity) for identity in ids]]
+    return Demonstration(frame_id, ids, tuple([sides[identity] for identity in ids]), centre.round(DIGITS), evenly)
 
 
 def is_same_demonstration(one: Demonstration, other: Demonstration) -> bool:
-    """Tell whether two demonstrations say the same: obstacles, sides and end."""
+    """Tell whether two demonstrations agree in frame, obstacles, sides and end."""
     if (one.frame_id, one.ids, one.sides) != (other.frame_id, other.ids, other.sides):
         return False
-    ends = np.vstack([one.centre - other.centre, one.path[-1:] - other.path[-1:]])
-    return bool((np.hypot(*ends.T) <= NEAR).all())
+    return _is_near(one.centre, other.centre) and _is_near(one.path[-1:], other.path[-1:])
 
 
 def recall_demonstrations(
@@ -72,76 +81,68 @@ def recall_demonstrations(
     goals: Array,
     obstacles: Obstacles,
     config: HomotopyConfig,
-    durations_s: Sequence[float],
-    steps: int,
+    timing: GuessTiming,
     found: Sequence[Candidate],
     previous: Sequence[Candidate],
 ) -> tuple[Candidate, ...]:
-    """Return the found candidates and, among them in the order of their length, at most MOST recalled ones of other classes.
+    """Return the found candidates and at most MOST demonstrated ones of other classes, in the order of their length.
 
-    goals (g, 2) [m]; durations_s: to each goal [s]; steps: N; previous: the candidates of the tick before. A recalled path
-    is deformed to the present hand and goal; it is kept only if it still passes every obstacle as it was shown, and runs
-    through none.
+    goals (g, 2) [m]; previous: the candidates of the previous prediction. A demonstrated path is moved to the present hand and
+    goal. It is kept only if it still passes every obstacle on the side on which it did, and runs through none.
     """
     if not library:
         return tuple(found)
-    names = named_obstacles(hand.mean[:2], goals, obstacles, config.clearance, previous)
+    names = [sorted(ids) for ids in named_obstacles(hand.mean[:2], goals, obstacles, config.clearance, previous)]
     labels, recalled = {one.label for one in found}, []
-    for way in library:
-        if not way.matches(hand.frame_id, obstacles):
+    for demonstration in library:
+        if not demonstration.matches(hand.frame_id, obstacles):
             continue
-        for goal in np.flatnonzero(np.hypot(*(goals - way.path[-1]).T) <= NEAR).tolist():
-            for one in _deformed(way, hand, goals, goal, obstacles, sorted(names[goal]), durations_s[goal], steps):
-                if one.label not in labels:
-                    labels.add(one.label)
-                    recalled.append(one)
+        for goal in np.flatnonzero(np.hypot(*(goals - demonstration.path[-1]).T) <= NEAR).tolist():
+            rest = _deform(demonstration.path, hand.mean[:2], goals[goal])
+            if rest is None or not _is_free(rest, obstacles):
+                continue
+            guess = timed(rest, hand.mean[2:4], timing.durations_s[goal], timing.steps)
+            sides, shown = path_sides(guess, obstacles), dict(zip(demonstration.ids, demonstration.sides, strict=True))
+            if not sides.keys() >= set(names[goal]) or any(shown.get(name, side) != side for name, side in sides.items()):
+                continue
+            named = tuple([(name, sides[name]) for name in names[goal]])
+            label = f'goal{goal}:{name_course(named)}'
+            if label not in labels:
+                labels.add(label)
+                recalled.append(Candidate(label, goal, named, guess, float(compute_path_lengths(rest)[-1])))
     recalled.sort(key=_rank)
     return tuple(sorted([*found, *recalled[:MOST]], key=_rank)) if recalled else tuple(found)
 
 
-def _deformed(
-    way: Demonstration,
-    hand: HandState,
-    goals: Array,
-    goal: int,
-    obstacles: Obstacles,
-    names: Sequence[str],
-    duration_s: float,
-    steps: int,
-) -> Iterator[Candidate]:
-    """Yield the rest of a way, from where it is nearest to the hand, moved to hand and goal; names: who is named."""
-    apart = np.hypot(*(way.path - hand.mean[:2]).T)
+def _deform(path: Array, hand: Array, goal: Array) -> Array | None:
+    """Return the rest of a path from where it is nearest to the hand, with its ends moved to hand and goal (2,) [m].
+
+    The result is None if the hand is farther than ASIDE from the path, or at its end.
+    """
+    apart = np.hypot(*(path - hand).T)
     nearest = int(apart.argmin())
-    if apart[nearest] > ASIDE or nearest == len(way.path) - 1:
-        return
-    rest = way.path[nearest:]
+    if apart[nearest] > ASIDE or nearest == len(path) - 1:
+        return None
+    rest = path[nearest:]
     share = np.linspace(0.0, 1.0, len(rest))[:, None]
-    rest = rest + (1.0 - share) * (hand.mean[:2] - rest[0]) + share * (goals[goal] - rest[-1])
-    length = float(_lengths(rest)[-1])
-    guess = timed(rest, hand.mean[2:4], duration_s, steps)
-    sides, shown = path_sides(guess, obstacles), dict(zip(way.ids, way.sides, strict=True))
-    if any(name not in sides for name in names) or any(shown.get(name, side) != side for name, side in sides.items()):
-        return
-    if not _clear(rest, obstacles):
-        return
-    label = f'goal{goal}:' + ''.join(('+' if sides[name] == LEFT else '-') + name for name in names)
-    yield Candidate(label, goal, tuple((name, sides[name]) for name in names), guess, length)
+    moved: Array = rest + (1.0 - share) * (hand - rest[0]) + share * (goal - rest[-1])
+    return moved
 
 
-def _clear(path: Array, obstacles: Obstacles) -> bool:
-    """Tell whether no piece of a path runs through an obstacle that does not hold its first point."""
+def _is_free(path: Array, obstacles: Obstacles) -> bool:
+    """Tell whether no segment of a path runs through an obstacle, other than those that hold its first point."""
     step = np.diff(path, axis=0)[:, None]
     start = obstacles.centre - path[:-1, None]
     squared = np.maximum((step**2).sum(2), np.finfo(float).tiny)
     share = np.clip((start * step).sum(2) / squared, 0.0, 1.0)
     distance = np.hypot(*(start - share[..., None] * step).transpose(2, 0, 1))
-    outside = np.hypot(*(obstacles.centre - path[0]).T) > obstacles.radius
-    return not bool(((distance < obstacles.radius) & outside).any())
+    is_outside = np.hypot(*(obstacles.centre - path[0]).T) > obstacles.radius
+    return not bool(((distance < obstacles.radius) & is_outside).any())
 
 
-def _lengths(path: Array) -> Array:
-    lengths: Array = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-    return lengths
+def _is_near(points: Array, others: Array) -> bool:
+    """Tell whether all points (n, 2) lie within NEAR of others (n, 2) [m]."""
+    return bool((np.hypot(*(points - others).T) <= NEAR).all())
 
 
 def _rank(one: Candidate) -> tuple[float, str]:

@@ -1,87 +1,111 @@
-"""The timed guesses of classes that were chosen."""
+"""Initial guesses: a taut path, laid out as straight runs and arcs, and the positions of a hand that moves along it in time."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.core.kernels import Flags, FlagTable, Indices, Matrix, Points, PointTable, Vector, compiled_exactly
+from foc_ros.core.kernels import Matrix, Vector
 from foc_ros.core.types import Array, as_readonly
 
-from .classes import Found
-from .scene import SearchScene
-from .taut import AT, HEADING_X, HEADING_Y, points_at, progress
+from .search_scene import SearchScene
+from .tangent_graph import TangentGraph, measure_arc
 
 SLOPE = 0.5
-"""A hand in a margin leaves it by this much for each metre on its way, and enters the margin of its goal likewise."""
+"""A hand in a margin leaves it by this much for each metre of its path, and enters the margin of its goal likewise."""
+MAX_SPEED_RATIO = 2.5
+"""Largest ratio of v T to L for which the timing does not overshoot."""
 
 
-def guesses(scene: SearchScene, velocity: complex, chosen: Sequence[Found], duration_s: Sequence[float], steps: int) -> Array:
-    """Return positions of each class at steps 0..N, (w, N + 1, 2) [m], read-only.
+class TautPath(NamedTuple):
+    """A path of p pieces, a run, an arc, a run, ..., and its end.
 
-    duration_s: to each goal [s]. Along the taut path, clear of all circles; a path that begins or ends in a margin gets out of
-    it and into it gradually, straight away from the obstacle, as far as other obstacles are not in the way.
+    begin (p,): length of the path before each piece [m]; start, heading (p, 2): point [m] and direction where the piece begins;
+    bend (p,): curvature [1/m], anticlockwise positive.
     """
-    if not chosen:
-        return np.zeros((0, steps + 1, 2))
-    pieces, goal = [one.pieces for one in chosen], [one.goal for one in chosen]
-    points = followed(
-        np.concatenate(pieces),
-        np.array([len(each) for each in pieces]),
-        np.array(goal),
-        np.array(duration_s, dtype=float),
-        velocity,
-        steps,
-        scene.centre,
-        scene.wanted,
-        scene.held,
-        scene.near,
-    )
-    return as_readonly(points.view(float).reshape(len(chosen), steps + 1, 2))
+
+    begin: Vector
+    start: Matrix
+    heading: Matrix
+    bend: Vector
+
+    @property
+    def length(self) -> float:
+        """Length [m]."""
+        return float(self.begin[-1])
+
+    def evaluate(self, along: Array) -> Array:
+        """Return the points (m, 2) at lengths `along` (m,) from the beginning [m]."""
+        piece = np.maximum(np.searchsorted(self.begin, along, side='right') - 1, 0)
+        step, bend = along - self.begin[piece], self.bend[piece]
+        angle, safe_bend = bend * step, np.where(bend == 0.0, 1.0, bend)
+        ahead = np.where(bend == 0.0, step, np.sin(angle) / safe_bend)
+        aside = (1.0 - np.cos(angle)) / safe_bend
+        x, y = self.heading[piece].T
+        points: Array = self.start[piece] + np.stack((ahead * x - aside * y, ahead * y + aside * x), axis=1)
+        return points
+
+    def space_points(self, count: int) -> Array:
+        """Return points (count, 2) at equal distances from the beginning to the end."""
+        return self.evaluate(self.length * np.linspace(0.0, 1.0, count))
 
 
-@compiled_exactly
-def out_of_margin(points: Points, along: Vector, centre: complex, wanted: float, held: bool, near: bool) -> Points:
-    """Push points of a path out of a circle that was shrunk to let the hand out (held), the goal in (near), or both."""
-    distance, pushed = np.abs(points - centre), points.copy()
-    for i in range(len(points)):
-        allowed = wanted
-        if held:
-            allowed = min(allowed, distance[0] + SLOPE * along[i])
-        if near:
-            allowed = min(allowed, distance[-1] + SLOPE * (along[-1] - along[i]))
-        if 0.0 < distance[i] < allowed:
-            pushed[i] = centre + (points[i] - centre) * (allowed / distance[i])
-    return pushed
+def lay_out(graph: TangentGraph, path: Sequence[int]) -> TautPath:
+    """Lay out a path that is given by its runs in a graph."""
+    runs, rows = graph.runs, list(path)
+    node = runs.head[rows]
+    sense, size, bend = 2 * (node & 1) - 1, np.zeros(2 * len(rows)), np.zeros(2 * len(rows))
+    size[::2] = runs.length[rows]
+    for i in range(len(rows) - 1):
+        radius = graph.circles.radius[node[i] >> 1]
+        bend[2 * i + 1] = sense[i] / radius
+        size[2 * i + 1] = radius * max(measure_arc(runs.leave_angle[rows[i + 1]], runs.reach_angle[rows[i]], sense[i]), 0.0)
+    start = np.stack((runs.start[rows], runs.end[rows]), axis=1).reshape(-1, 2)
+    return TautPath(np.cumsum(size) - size, start, np.repeat(runs.heading[rows], 2, axis=0), bend)
 
 
-@compiled_exactly
-def followed(
-    pieces: Matrix,
-    sizes: Indices,
-    goal: Indices,
-    duration_s: Vector,
-    velocity: complex,
-    steps: int,
-    centre: Points,
-    wanted: Vector,
-    held: Flags,
-    near: FlagTable,
-) -> PointTable:
-    """Return where a hand that follows each of w ways is at steps 0..N, (w, N + 1), complex [m].
+def timed(path: Array, velocity: Array, duration_s: float, steps: int) -> Array:
+    """Return the positions (N + 1, 2) [m] at steps 0..N along a path (m, 2) [m], m >= 2, with the timing of the guesses."""
+    along, step = compute_path_lengths(path), path[1] - path[0]
+    heading = step / max(float(np.hypot(*step)), np.finfo(float).tiny)
+    at = compute_progress(float(along[-1]), float(heading @ velocity), duration_s, steps)
+    return np.column_stack([np.interp(at, along, axis) for axis in path.T])
 
-    pieces: of the ways one after the other; sizes (w,): how many of each; goal (w,): numbers; duration_s (g,): to each goal [s];
-    velocity: of the hand now [m/s]; centre, ..., near: of `Scene`.
+
+def compute_path_lengths(path: Array) -> Array:
+    """Compute the lengths (m,) [m] of a path (m, 2) [m] from its beginning to each of its points."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+
+
+def compute_progress(length: float, speed: float, duration_s: float, steps: int) -> Array:
+    """Compute the path length at steps 0..N (N + 1,) [m]: minimum jerk from a speed along the path to rest at its end.
+
+    s = L (10 t^3 - 15 t^4 + 6 t^5) + v T (t - 6 t^3 + 8 t^4 - 3 t^5) with t in [0, 1]. The path would overshoot with v T > 2.5 L
+    and begin backwards with v < 0, so v is kept between these bounds. length [m], speed [m/s], duration_s [s].
     """
-    points, begin = np.empty((len(goal), steps + 1), np.complex128), 0
-    for way in range(len(goal)):
-        laid = pieces[begin : begin + sizes[way]]
-        begin += sizes[way]
-        speed = laid[0, HEADING_X] * velocity.real + laid[0, HEADING_Y] * velocity.imag
-        along = progress(laid[-1, AT], speed, duration_s[goal[way]], steps)
-        points[way] = points_at(laid, along)
-        for k in range(len(centre)):
-            if held[k] or near[goal[way], k]:
-                points[way] = out_of_margin(points[way], along, centre[k], wanted[k], held[k], near[goal[way], k])
-    return points
+    carried, t = min(max(speed * duration_s, 0.0), MAX_SPEED_RATIO * length), np.arange(steps + 1) / steps
+    rest = t**3 * (10.0 + t * (6.0 * t - 15.0))
+    return np.clip(length * rest + carried * t * (1.0 + t**2 * (t * (8.0 - 3.0 * t) - 6.0)), 0.0, length)
+
+
+def build_guess(scene: SearchScene, path: TautPath, goal: int, velocity: Array, duration_s: float, steps: int) -> Array:
+    """Return the positions (N + 1, 2) [m] at steps 0..N of a hand with a velocity (2,) [m/s] that follows a path, read-only.
+
+    The taut path touches no circle. If hand or goal lies in the margin of an obstacle, the guess leaves or enters the margin
+    gradually, straight away from the obstacle, as far as other obstacles are not in the way.
+    """
+    along = compute_progress(path.length, float(path.heading[0] @ velocity), duration_s, steps)
+    points = path.evaluate(along)
+    for k in np.flatnonzero(scene.holds_hand | scene.holds_goal[goal]):
+        apart = points - scene.centre[k]
+        distance = np.hypot(*apart.T)
+        wanted = np.full(len(points), scene.wanted_radius[k])
+        if scene.holds_hand[k]:
+            wanted = np.minimum(wanted, distance[0] + SLOPE * along)
+        if scene.holds_goal[goal, k]:
+            wanted = np.minimum(wanted, distance[-1] + SLOPE * (along[-1] - along))
+        is_pushed = (distance > 0.0) & (distance < wanted)
+        points[is_pushed] = scene.centre[k] + apart[is_pushed] * (wanted / np.maximum(distance, 1e-300))[is_pushed, None]
+    return as_readonly(points)

@@ -1,9 +1,13 @@
-"""The search for ways round: hand, goals and obstacles in; named candidates, each with a timed guess, out."""
+"""The search for homotopy classes: hand, goals and obstacles in; named candidates, each with a timed initial guess, out."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from bisect import insort
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
+from heapq import merge
+from itertools import islice
 
 import numpy as np
 
@@ -11,28 +15,31 @@ from foc_ros.core.config import MOST_CANDIDATES, HomotopyConfig
 from foc_ros.core.errors import SceneError
 from foc_ros.core.types import Array, Candidate, Obstacles
 
-from .classes import NOTES, Classes, Quest
-from .guesses import guesses
-from .levels import IncrementalRoadmap
-from .names import names_of
-from .scene import scene
-from .selection import select
-from .taut import AT
+from .class_search import ClassQuery, PathClass, find_classes
+from .guesses import build_guess
+from .search_scene import build_search_scene
 
 STATES, STATES_PER_CANDIDATE = 1000, 300
-"""States that the search for one goal may look at: a few dozen are enough for four candidates."""
-SPARE_WAYS = 2
-"""Ways to one goal that are looked for at first, beside those that there is room for after the first to each: that first one, and
-one that tells that no more are short enough."""
+"""Number of states that the search for one goal may look at; a few dozen are enough for four candidates."""
+REPEAT = 1.5
+"""A class that passes all obstacles as a class to another goal does ranks as if it were this times as long: it adds little."""
+STAY = 0.95
+"""A class of the previous prediction ranks as if it were this times as long: noise does not swap classes of equal length."""
 
 
 @dataclass(frozen=True)
 class Search:
-    """candidates: shortest first; notes: what was decided on the way, as counts by name, none that is 0.
+    """What a search has found.
 
-    hand_inside: obstacles whose margin holds the hand; goal_near: goals in an obstacle's margin; goal_inside: goals inside an
-    obstacle, which get no candidates; no_way: other goals without any; left_out: classes that circles beyond the last roadmap
-    were in the way of; search_cut: goals whose search ended at its bound.
+    Attributes
+    ----------
+    candidates : tuple[Candidate, ...]
+        The candidates, shortest first.
+    notes : dict[str, int]
+        Counts by name, none of them 0. hand_inside: obstacles whose margin holds the hand. goal_near: goals in the margin of an
+        obstacle. goal_inside: goals inside an obstacle, which get no candidates. no_way: other goals without candidates.
+        left_out: classes whose path meets circles that the largest graph does not contain. search_cut: goals whose search ended
+        at the largest number of states.
     """
 
     candidates: tuple[Candidate, ...]
@@ -48,35 +55,80 @@ def search(
     steps: int,
     previous: Sequence[Candidate] = (),
 ) -> Search:
-    """Find the best config.max_candidates classes between the hand and the goals.
+    """Find the best `config.max_candidates` homotopy classes between the hand and the goals.
 
-    Of more goals it is one to each, up to `MOST_CANDIDATES`.
+    If there are more goals than that, the search finds one class to each goal, up to `MOST_CANDIDATES`. Obstacles are circles of
+    their radius plus `config.clearance`. The uncertainty of the radius is left to the chance constraint, which weighs it by eta.
 
-    hand_mean (6,): state mean, SI units; goals (g, 2) [m]; duration_s: time to go to each goal [s]; steps: N of the guesses;
-    previous: the candidates of the tick before, which stay where others are not clearly better. Obstacles are circles of radius
-    + config.clearance: what their size is uncertain by is left to the chance constraint, which weighs it by eta. Raises
-    SceneError where the arguments do not fit each other.
+    Parameters
+    ----------
+    hand_mean : Array
+        State mean (6,), SI units.
+    goals : Array
+        Positions (g, 2) [m].
+    obstacles : Obstacles
+        The obstacles.
+    config : HomotopyConfig
+        Number of candidates and clearance.
+    duration_s : Sequence[float]
+        Time to go to each goal [s].
+    steps : int
+        Number N of time steps of the guesses.
+    previous : Sequence[Candidate], optional
+        Candidates of the previous prediction. They stay unless others are clearly better.
+
+    Returns
+    -------
+    Search
+        Candidates and notes.
+
+    Raises
+    ------
+    SceneError
+        If the arguments do not fit each other.
     """
     if hand_mean.shape != (6,) or goals.ndim != 2 or goals.shape[1] != 2:
         raise SceneError('hand_mean, goals', 'arrays (6,) and (g, 2)', f'{hand_mean.shape} and {goals.shape}')
     if len(duration_s) != len(goals):
         raise SceneError('duration_s', f'one for each of the {len(goals)} goals', len(duration_s))
-    x, y, v_x, v_y = hand_mean[:4].tolist()
-    hand, velocity, names = complex(x, y), complex(v_x, v_y), names_of(obstacles.ids)
-    view = scene(hand, np.ascontiguousarray(goals, dtype=float).view(complex)[:, 0], obstacles, config.clearance, previous)
-    sizes = [radius.tobytes() for radius in view.radius]
-    levels = {size: IncrementalRoadmap(view, radius) for size, radius in zip(sizes, view.radius, strict=True)}
-    reachable = [goal for goal, inside in enumerate(view.inside.tolist()) if not inside]
-    # a goal without a candidate could never be foretold
+    velocity, scene = hand_mean[2:4], build_search_scene(hand_mean[:2], goals, obstacles, config.clearance, previous)
+    reachable = np.flatnonzero(~scene.is_goal_inside).tolist()
+    # a prediction cannot name a goal without a candidate
     count = max(config.max_candidates, min(len(reachable), MOST_CANDIDATES))
-    states, usual = STATES + STATES_PER_CANDIDATE * config.max_candidates, max(count - len(reachable), 0) + SPARE_WAYS
-    quest, notes = Quest(view, velocity, names, states, usual), dict.fromkeys(NOTES, 0)
-    classes = [Classes(quest, levels[sizes[goal]], goal, notes) for goal in reachable]
-    chosen = select(classes, count, {candidate.label for candidate in previous})
-    notes |= {'hand_inside': int(np.count_nonzero(view.held)), 'goal_inside': len(goals) - len(reachable)}
-    notes['goal_near'], notes['no_way'] = view.close, sum(to_goal.none for to_goal in classes)
-    candidates = tuple(
-        Candidate(one.label, one.goal, tuple(zip(one.ids, one.sides, strict=True)), path, float(one.pieces[-1, AT]))
-        for one, path in zip(chosen, guesses(view, velocity, chosen, duration_s, steps), strict=True)
+    max_states = STATES + STATES_PER_CANDIDATE * config.max_candidates
+    notes = Counter(
+        hand_inside=int(scene.holds_hand.sum()),
+        goal_near=int((scene.holds_goal.any(axis=1) & ~scene.is_goal_inside).sum()),
+        goal_inside=len(goals) - len(reachable),
     )
-    return Search(candidates, {name: count for name, count in notes.items() if count})
+    classes = [find_classes(scene, ClassQuery(goal, obstacles.ids, velocity, max_states), notes) for goal in reachable]
+    chosen = _select_classes(classes, count, {candidate.label for candidate in previous}, notes)
+    candidates = []
+    for one in chosen:
+        guess = build_guess(scene, one.path, one.goal, velocity, duration_s[one.goal], steps)
+        candidates.append(Candidate(one.label, one.goal, one.sides, guess, one.path.length))
+    return Search(tuple(candidates), {name: number for name, number in notes.items() if number})
+
+
+def _select_classes(
+    streams: Sequence[Iterator[PathClass]], count: int, previous: Collection[str], notes: Counter[str]
+) -> list[PathClass]:
+    """Choose `count` classes from those to each goal, which come in the order of their rank.
+
+    The best class to each goal is chosen first, the shortest of these if there is no room for all. The rest is chosen by
+    length, multiplied by REPEAT or STAY where they apply. previous: labels of the previous prediction.
+    """
+    firsts = sorted([found for stream in streams for found in islice(stream, 1)])
+    notes['no_way'] = len(streams) - len(firsts)
+    firsts = firsts[:count]
+    room = count - len(firsts)
+    goal_of_course = {found.course: found.goal for found in firsts}
+    awaited = {*previous} - {found.label for found in firsts}
+    others: list[tuple[float, str, PathClass]] = []
+    for found in merge(*streams) if room else ():
+        if len(others) >= room and (STAY if awaited else 1.0) * found.key > others[room - 1][0]:
+            break
+        factor = REPEAT if goal_of_course.setdefault(found.course, found.goal) != found.goal else 1.0
+        insort(others, (found.key * factor * (STAY if found.label in awaited else 1.0), found.label, found))
+        awaited.discard(found.label)
+    return sorted([*firsts, *[found for _, _, found in others[:room]]])

@@ -1,80 +1,100 @@
-"""The side on which a path really passes an obstacle: independent of how the path was found."""
+"""On which side a path passes an obstacle, computed from the path alone, whatever method found the path.
+
+A path crosses the ray that leaves an obstacle's centre along -x. The number of these crossings (anticlockwise ones positive) and
+the directions of the two ends, as seen from the centre, give the angle that the path sweeps about the centre.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from foc_ros.core.errors import SceneError
-from foc_ros.core.kernels import Flags, Matrix, Tensor, Vector, compiled_exactly
+from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled_exactly
 from foc_ros.core.types import LEFT, RIGHT, Array, Obstacles
 
-from .crossing import TURN, direction, straight
+TURN = 2.0 * np.pi
 
 
 def compute_swept_angles(path: Array, centres: Array) -> Array:
-    """Angle that a path sweeps about each centre, anticlockwise positive.
+    """Compute the angle (n,) [rad] that a path (m, 2) [m] sweeps about each centre, anticlockwise positive.
 
-    path (m, 2) [m], m >= 1; centres (n, 2), or (m, n, 2) where they move: the centre at each point of the path. Returns (n,)
-    [rad]: exact where no step turns by pi or more about a centre.
+    centres (n, 2) [m], or (m, n, 2) if they move: the centres at each point of the path. The angle is exact if no step of the
+    path turns by pi or more about a centre. Raises SceneError if the shapes do not fit each other.
     """
-    return sweep_angles(*_checked(path, centres))
+    return sweep_angles(*_check_shapes(path, centres))
 
 
 def path_sides(path: Array, obstacles: Obstacles, centres: Array | None = None) -> dict[str, int]:
-    """Side on which a path passes each obstacle, by id.
+    """Find the side on which a path passes each obstacle.
 
-    path (m, 2) [m]; centres (m, n, 2): where the obstacles are at each point of the path, if they move. A path that sweeps
-    clockwise about a centre has it on its right, so it passes on the left: LEFT; else RIGHT. An obstacle is passed when the
-    foot of its centre on the chord from the first to the last point lies strictly between the two (seen from the obstacle,
-    where it moves), or when the path winds about it by more than half a turn; obstacles behind the hand or beyond the end are
-    not.
+    A path that sweeps clockwise about a centre passes the obstacle on the left. A path passes an obstacle if the foot of the
+    centre on the chord from the first to the last point lies strictly between the two, or if the path winds about the centre by
+    more than half a turn. If the obstacle moves, points are relative to it.
+
+    Parameters
+    ----------
+    path : Array
+        Points (m, 2) [m], m >= 1.
+    obstacles : Obstacles
+        The n obstacles.
+    centres : Array, optional
+        Centres (m, n, 2) [m] of the obstacles at each point of the path, if they move.
+
+    Returns
+    -------
+    dict[str, int]
+        LEFT or RIGHT by the id of each obstacle that is passed.
+
+    Raises
+    ------
+    SceneError
+        If the shapes do not fit each other.
     """
-    path, centres = _checked(path, obstacles.centre if centres is None else centres)
-    angles = sweep_angles(path, centres)
-    sides = zip(obstacles.ids, angles.tolist(), passed(path, centres, angles).tolist(), strict=True)
-    return {identity: LEFT if angle < 0.0 else RIGHT for identity, angle, is_passed in sides if is_passed}
+    path, centres = _check_shapes(path, obstacles.centre if centres is None else centres)
+    angles, ends = sweep_angles(path, centres), path[[0, -1], None] - centres[[0, -1]]
+    chord = ends[1] - ends[0]
+    foot, end = -(ends[0] * chord).sum(axis=1), (chord * chord).sum(axis=1)
+    is_passed = ((foot > 0.0) & (foot < end)) | (np.abs(angles) > np.pi)
+    return {obstacles.ids[k]: LEFT if angles[k] < 0.0 else RIGHT for k in np.flatnonzero(is_passed)}
+
+
+@compiled_exactly
+def count_crossing(a_x: float, a_y: float, b_x: float, b_y: float) -> int:
+    """Count how often the straight line from a to b, relative to a centre, crosses the ray of the centre: -1, 0 or 1."""
+    left = a_x * b_y - a_y * b_x
+    if a_y >= 0.0:
+        return 1 if b_y < 0.0 and left > 0.0 else 0
+    return -1 if b_y >= 0.0 and left < 0.0 else 0
 
 
 @compiled_exactly
 def sweep_angles(path: Matrix, centres: Tensor) -> Vector:
-    """Return the angle (n,) [rad] that a path (m, 2) sweeps about centres (m, n, 2), or (1, n, 2) where they stand still.
+    """Compute the angles (n,) [rad] that a path (m, 2) sweeps about centres (m, n, 2), or (1, n, 2) if they stand still.
 
-    It is the difference of the directions at the ends, and a turn for each crossing of the ray from the centre along -x.
+    The angle is the difference between the directions of the two ends, and one turn for each crossing of the ray.
     """
     m, n = len(path), centres.shape[1]
     angles = np.empty(n)
     for k in range(n):
         x, y = path[0, 0] - centres[0, k, 0], path[0, 1] - centres[0, k, 1]
-        begins, before, turns = direction(complex(x, y)), complex(x, y), 0
+        # a negative zero counts as zero here, as it does in `count_crossing`
+        first, crossings = np.arctan2(y + 0.0, x + 0.0), 0
         for t in range(1, m):
-            at = min(t, len(centres) - 1)
+            at, x_before, y_before = min(t, len(centres) - 1), x, y
             x, y = path[t, 0] - centres[at, k, 0], path[t, 1] - centres[at, k, 1]
-            turns += straight(before, complex(x, y))
-            before = complex(x, y)
-        angles[k] = direction(before) - begins + TURN * turns
+            crossings += count_crossing(x_before, y_before, x, y)
+        angles[k] = np.arctan2(y + 0.0, x + 0.0) - first + TURN * crossings
     return angles
 
 
 @compiled_exactly
 def is_same_class(angles: Vector, others: Vector) -> bool:
-    """Tell whether two paths with the same ends, which sweep angles (n,) each, pass all centres on the same sides."""
+    """Tell whether two paths with the same ends, which sweep the angles (n,) [rad], pass all n centres on the same sides."""
     return bool((np.abs(angles - others) < np.pi).all())
 
 
-@compiled_exactly
-def passed(path: Matrix, centres: Tensor, angles: Vector) -> Flags:
-    """Tell which centres (m, n, 2) or (1, n, 2) a path (m, 2) that sweeps angles (n,) about them passes."""
-    flags = np.zeros(len(angles), np.bool_)
-    for k in range(len(angles)):
-        x, y = path[0, 0] - centres[0, k, 0], path[0, 1] - centres[0, k, 1]
-        along_x, along_y = path[-1, 0] - centres[-1, k, 0] - x, path[-1, 1] - centres[-1, k, 1] - y
-        foot = -(x * along_x + y * along_y)
-        flags[k] = 0.0 < foot < along_x * along_x + along_y * along_y or abs(angles[k]) > np.pi
-    return flags
-
-
-def _checked(path: Array, centres: Array) -> tuple[Array, Array]:
-    """Return a path (m, 2), and centres as (m, n, 2) or (1, n, 2), as the kernels take them."""
+def _check_shapes(path: Array, centres: Array) -> tuple[Array, Array]:
+    """Return a path (m, 2), and centres as (m, n, 2) or (1, n, 2), in the form that the kernels take."""
     if path.ndim != 2 or path.shape[1] != 2 or not len(path):
         raise SceneError('path', 'points (m, 2), m >= 1', f'an array {path.shape}')
     if centres.ndim == 3 and len(centres) != len(path):

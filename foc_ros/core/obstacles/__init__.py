@@ -1,4 +1,4 @@
-"""Obstacles: sources and shapes enter; the scene at a stamp and the moments of its chance constraint leave.
+"""Obstacles: shapes and tables of several sources enter; obstacles at a stamp and the moments of their constraint leave.
 
-May import the ground modules of `foc_ros.core`.
+It may import the ground modules of `foc_ros.core`.
 """

@@ -1,4 +1,4 @@
-"""Of many obstacles, those that can be in the way: what a prediction costs stays bounded, whatever a scene holds."""
+"""Culling of obstacles that are far from every path, so that the cost of a prediction is bounded for any scene."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from foc_ros.core.types import Array, Obstacles
 
 
 def cull_obstacles(obstacles: Obstacles, hand: Array, goals: Array, duration_s: float, most: int) -> Obstacles:
-    """Return at most `most` obstacles, in their order: those that the shortest way to a goal touches with the least detour.
+    """Return the `most` obstacles at most, in their order, that a path to a goal can touch with the smallest detour.
 
     hand (2,), goals (g, 2) [m], g >= 1. The detour over a circle is |hand - o| + |o - goal| - 2 r - |hand - goal|, for the goal
-    where that is least; a circle that moves may come nearer by its speed times duration_s [s], at both ends. Of equal ones the
-    first rows are kept.
+    where it is smallest. A moving circle may come nearer by its speed times duration_s [s], at both ends. Of equal ones the first
+    rows are kept.
     """
     if len(obstacles) <= most:
         return obstacles

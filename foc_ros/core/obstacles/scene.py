@@ -1,4 +1,4 @@
-"""The scene: obstacles from several sources, each the whole table of its source, merged and moved on to a stamp."""
+"""The scene: goals, and obstacles from several sources, merged and moved on to a stamp."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from foc_ros.core.types import NANOSECONDS, Array, Obstacles, Record, make_obsta
 
 @dataclass(frozen=True)
 class ObstacleSource:
-    """What one source said last: its obstacles, each id once, the stamp they hold for (None: always), the frame they are in."""
+    """The last table of one source: its obstacles with unique ids, the stamp for which they hold (None: always), their frame."""
 
     obstacles: Obstacles
     stamp_ns: int | None
     frame_id: str
 
     def at(self, stamp_ns: int) -> Obstacles:
-        """Return the obstacles moved on at their velocity to a stamp [ns]; unstamped ones stay where they are."""
+        """Return the obstacles at a stamp [ns], moved on at their velocity; those without a stamp stay where they are."""
         return self.obstacles if self.stamp_ns is None else self.obstacles.after((stamp_ns - self.stamp_ns) / NANOSECONDS)
 
 
@@ -30,29 +30,29 @@ class Scene(Record):
     goals: Array | None = None
     goals_frame: str = ''
 
-    def with_part(self, source: str, part: ObstacleSource) -> Scene:
-        """Return the scene with one source's obstacles replaced; that source is now the latest."""
-        parts = {name: held for name, held in self.parts.items() if name != source}
-        return replace(self, parts=parts | {source: part})
+    def with_source(self, name: str, source: ObstacleSource) -> Scene:
+        """Return the scene with the obstacles of one source replaced; this source is now the latest."""
+        parts = {other: part for other, part in self.parts.items() if other != name}
+        return replace(self, parts=parts | {name: source})
 
     def with_goals(self, goals: Array, frame_id: str) -> Scene:
         """Return the scene with all goals replaced."""
         return replace(self, goals=np.array(goals, dtype=float).reshape(-1, 2), goals_frame=frame_id)
 
     def obstacles(self, stamp_ns: int) -> Obstacles:
-        """Return all obstacles at a stamp [ns]: the union over the sources, where the latest source's row of an id holds."""
+        """Return all obstacles at a stamp [ns]: the union over the sources, in which the latest source of an id counts."""
         tables = [part.at(stamp_ns) for part in self.parts.values()]
         if len(tables) < 2:
             return tables[0] if tables else make_obstacles()
         ids = [name for table in tables for name in table.ids]
         latest = {name: row for row, name in enumerate(ids)}
-        return _stacked(tables, ids).take(sorted(latest.values()))
+        return _concatenate(tables, ids).take(sorted(latest.values()))
 
     def not_ready_reason(self, stamp_ns: int, timeout_s: float) -> tuple[str, str] | None:
-        """Return why nothing can be predicted at a hand's stamp [ns], as (kind, words with numbers); None where it can.
+        """Return why nothing can be predicted for a hand pose at a stamp [ns], as (kind, message); None if it can.
 
-        A source is stale where its stamp is more than timeout_s [s] from the hand's, either way; 0: never. One stale source is
-        enough: its silence does not mean that its obstacles have gone.
+        A source is stale if its stamp differs from that of the hand by more than timeout_s [s], in either direction; 0: never.
+        One stale source suffices, since a missing message does not mean that its obstacles are gone.
         """
         if not self.parts:
             return 'no_obstacles', 'no obstacles received yet: publish an empty cloud for an empty scene'
@@ -68,7 +68,7 @@ class Scene(Record):
         return None
 
 
-def _stacked(tables: list[Obstacles], ids: list[str]) -> Obstacles:
+def _concatenate(tables: list[Obstacles], ids: list[str]) -> Obstacles:
     return Obstacles(
         tuple(ids),
         np.concatenate([table.centre for table in tables]),

@@ -1,0 +1,516 @@
+"""The public Python API as far as it is more than a re-export; `foc_ros` exports all of it. No other module imports this one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from foc_ros.core import types
+from foc_ros.core.checks import check_array, check_number, check_vector
+from foc_ros.core.config import Config
+from foc_ros.core.errors import InputError, SceneError
+from foc_ros.core.estimation.kalman_filter import FilterState, update
+from foc_ros.core.homotopy.demonstrations import Demonstration
+from foc_ros.core.memory import Memory
+from foc_ros.core.obstacles.scene import ObstacleSource
+from foc_ros.core.obstacles.shapes import Circle, collect_obstacles
+from foc_ros.core.ocp import monte_carlo as sampling
+from foc_ros.core.ocp.problem import Problem
+from foc_ros.core.predictor import predict
+from foc_ros.core.reaching_scene import ReachingScene, build_scene_problems, check_outside, solve_scene
+from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
+from foc_ros.core.types import (
+    NANOSECONDS,
+    Candidate,
+    HandSample,
+    HandState,
+    Obstacles,
+    PredictedCandidate,
+    SampleStatus,
+    make_obstacles,
+)
+
+LATEST_S = 9e9
+"""Bound on a time [s]: stamps are 64-bit numbers of nanoseconds."""
+MOST_SAMPLES = 10_000_000
+
+
+class Prediction(types.Prediction):
+    """The prediction for one hand sample.
+
+    Attributes
+    ----------
+    t, solve_s : float
+        Time of the hand sample, and wall time of the prediction [s].
+    candidates : tuple of PredictedCandidate
+        Solved ones first, the most likely first; then those that could not be solved, with their status.
+    most_likely : str or None
+        Label of the most likely class, which changes only when another one leads by `likelihood.margin`; None if none was solved.
+    obstacles, goals : Obstacles, ndarray of shape (g, 2)
+        The scene at time `t`.
+    notes : dict
+        Counts of events such as merged classes and culled obstacles.
+    """
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw the solved candidates, coloured by likelihood, in their scene.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes, optional
+            Axes to draw on; new ones by default.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes that hold the drawing.
+        """
+        from foc_ros.reporting.plots import plot_prediction
+
+        return plot_prediction(self, axes)
+
+
+class Predictor:
+    """Predict where a moving hand is going.
+
+    A predictor follows one hand: it filters its positions, detects where movements begin, and starts every prediction from the
+    previous one.
+
+    Parameters
+    ----------
+    config : Config, optional
+        Parameters; the defaults if not given. `rate_hz` and the timeouts have no effect here: every update predicts.
+    library : path or sequence of demonstrations, optional
+        Demonstrated paths that `foc_ros replay --learn` wrote; by default the file that `homotopy.library` names.
+
+    Examples
+    --------
+    >>> import foc_ros
+    >>> predictor = foc_ros.Predictor()
+    >>> predictor.set_goals([(0.3, 0.0)])
+    >>> predictor.set_obstacles([foc_ros.Circle((0.15, 0.01), radius=0.03, name='cup')])
+    >>> prediction = predictor.update(t=0.0, position=(0.0, 0.0))
+    >>> prediction
+    <Prediction t=0 s, 2 candidates, most likely goal0:-cup (0.55)>
+    >>> [candidate.label for candidate in prediction.candidates]
+    ['goal0:-cup', 'goal0:+cup']
+    """
+
+    def __init__(self, config: Config | None = None, library: str | Path | Sequence[Demonstration] | None = None) -> None:
+        self.config = _check_config(config)
+        source = self.config.homotopy.library if library is None else library
+        if isinstance(source, (str, Path)):
+            from foc_ros.io.class_library import load_library
+
+            source = load_library(str(source))
+        self._library = tuple(source)
+        self._goals: types.Array | None = None
+        self._obstacles = ObstacleSource(make_obstacles(), None, '')
+        self._hand: FilterState | None = None
+        self._memory = Memory()
+
+    def __repr__(self) -> str:
+        """Count goals and obstacles."""
+        goals = 0 if self._goals is None else len(self._goals)
+        return f'<Predictor with {goals} goals, {len(self._obstacles.obstacles)} obstacles>'
+
+    def set_goals(self, goals: ArrayLike) -> None:
+        """Replace the goals.
+
+        Parameters
+        ----------
+        goals : array_like of shape (g, 2)
+            Positions [m], at least one. Labels number them in this order. `SceneError` is raised for anything else.
+        """
+        points = check_array('goals', goals, (None, 2))
+        if not len(points):
+            raise SceneError('goals', 'at least one position', 'none')
+        self._goals = points
+
+    def set_obstacles(self, obstacles: Iterable[Circle] | Obstacles) -> None:
+        """Replace the obstacles. Their positions hold at the next update; from then on each moves on at its velocity.
+
+        Parameters
+        ----------
+        obstacles : iterable of Circle, or Obstacles
+            The obstacles, none for a free scene. `SceneError` is raised if a name occurs twice.
+        """
+        self._obstacles = ObstacleSource(collect_obstacles(obstacles), None, '')
+
+    def update(self, t: float, position: ArrayLike) -> Prediction:
+        """Take the next hand position and predict from it.
+
+        A gap of more than `estimator.gap_s` since the last update restarts the movement: the hand is then taken to be at rest.
+
+        Parameters
+        ----------
+        t : float
+            Time of the measurement [s].
+        position : array_like of shape (2,)
+            Position of the hand [m].
+
+        Returns
+        -------
+        Prediction
+            The prediction for this time.
+
+        Raises
+        ------
+        SceneError
+            If no goals were set.
+        InputError
+            For a time that is not after the last one, a number that is not finite or a wrong shape. Nothing is changed then.
+        """
+        stamp_ns = round(check_number('t', t, -LATEST_S, LATEST_S) * NANOSECONDS)
+        sample = HandSample(stamp_ns, check_vector('position', position, 2), frame_id=self.config.frame_id)
+        if self._goals is None:
+            raise SceneError('goals', 'at least one, by set_goals', 'none')
+        updated = update(self._hand, sample, self.config.estimator)
+        if updated.status is SampleStatus.RESTARTED_BACKWARD or not updated.status.taken:
+            last = '' if self._hand is None else f', {self._hand.stamp_ns / NANOSECONDS:.9g} s'
+            raise InputError('t', f'a time after the last one{last}', t)
+        if updated.status.restarted:
+            self._memory = Memory()
+        self._hand = updated.state
+        if self._obstacles.stamp_ns is None:
+            self._obstacles = replace(self._obstacles, stamp_ns=stamp_ns)
+        obstacles = self._obstacles.at(stamp_ns)
+        prediction, self._memory = predict(self.config, self._hand, obstacles, self._goals, self._memory, self._library)
+        return Prediction(**vars(prediction))
+
+    def reset(self) -> None:
+        """Forget the movement; keep goals and obstacles. The next update may have any time."""
+        self._hand, self._memory = None, Memory()
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(types.Solution):
+    """The forward optimal control of one homotopy class, with the problem that it solves.
+
+    Attributes
+    ----------
+    status, message : Status, str
+        Result in words and numbers. Only `Status.SOLVED` meets the wanted eta.
+    label : str
+        Name of the homotopy class, such as ``goal0:+0-1``: + passes an obstacle on the left.
+    times, path, mean, covariance : ndarray of shape (N + 1,), (N + 1, 2), (N + 1, n), (N + 1, n, n)
+        Times [s], mean positions [m], and mean and covariance of the state: position, velocity and what else the plant has.
+    control, effort : ndarray of shape (N, 2), float
+        Jerk [m/s^3] for the triple integrator, force [N] for the damped mass; the sum of its squares.
+    eta : float
+        Probability of avoidance that the solution achieves for each obstacle and step.
+    """
+
+    label: str = ''
+    problem: Problem | None = None
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw the solution, if it is solved, in its scene; see `Prediction.plot`."""
+        candidate = Candidate(self.label, 0, (), self.path, 0.0)
+        return plot_candidates([PredictedCandidate(candidate, self, {}, 0.0, 1.0)], axes)
+
+
+def solve(
+    start: ArrayLike,
+    goal: ArrayLike,
+    obstacles: Iterable[Circle] | Obstacles = (),
+    eta: float | None = None,
+    strategy: str | None = None,
+    duration_s: float = 1.0,
+    config: Config | None = None,
+    guess: ArrayLike | None = None,
+) -> Solution:
+    """Solve one reaching scene and return its most likely homotopy class.
+
+    Parameters
+    ----------
+    start : array_like of shape (2,) or (6,)
+        Position of a hand at rest [m], or its state x, y, vx, vy, ax, ay [m, m/s, m/s^2].
+    goal : array_like of shape (2,)
+        Position at which the hand comes to rest [m].
+    obstacles : iterable of Circle, or Obstacles
+        The obstacles.
+    eta : float, optional
+        Wanted probability of avoiding each obstacle at each step; by default `foc.eta` of the config.
+    strategy : str, optional
+        Strategy of the solver; by default `foc.strategy` of the config.
+    duration_s : float
+        Duration of the movement [s].
+    config : Config, optional
+        All other parameters; the defaults if not given.
+    guess : array_like of shape (m, 2), optional
+        Via points of a path [m], or its positions at all N + 1 steps. Only its homotopy class is solved then.
+
+    Returns
+    -------
+    Solution
+        The solution of the most likely class. Its status says if the problem could not be solved.
+
+    Raises
+    ------
+    InputError
+        For input that cannot be used: `SceneError` for the scene, or if no path leads to the goal, `ParameterError` for eta,
+        strategy and duration.
+
+    Examples
+    --------
+    >>> import foc_ros
+    >>> solution = foc_ros.solve((0, 0), (0.3, 0), [foc_ros.Circle((0.15, 0.01), radius=0.03)], eta=0.95)
+    >>> solution.status, solution.label
+    (<Status.SOLVED: 'solved'>, 'goal0:-0')
+    >>> solution.path.shape
+    (51, 2)
+    """
+    target, config = check_vector('goal', goal, 2), _fix_parameters(config, eta, strategy, duration_s)
+    scene = _build_scene(start, target[None], obstacles, config)
+    if guess is not None:
+        from foc_ros.io.guess import guess_path
+
+        points = check_array('guess', guess, (None, 2))
+        scene = replace(scene, guess=guess_path(scene.hand.mean[:2], target, config.foc.steps, via=points))
+    candidates = _solve(scene)
+    if not candidates:
+        raise SceneError('scene', 'a path between the obstacles from the start to the goal', 'none')
+    solution = candidates[0].solution
+    assert isinstance(solution, Solution)
+    return solution
+
+
+def solve_classes(
+    start: ArrayLike,
+    goal: ArrayLike,
+    obstacles: Iterable[Circle] | Obstacles = (),
+    eta: float | None = None,
+    strategy: str | None = None,
+    duration_s: float = 1.0,
+    config: Config | None = None,
+) -> tuple[PredictedCandidate, ...]:
+    """Solve one reaching scene in every homotopy class that is found, at most `homotopy.max_candidates`.
+
+    Parameters
+    ----------
+    start, obstacles, eta, strategy, duration_s, config
+        As for `solve`, which also lists the errors.
+    goal : array_like of shape (2,) or (g, 2)
+        One goal or several [m].
+
+    Returns
+    -------
+    tuple of PredictedCandidate
+        Solved ones first, the most likely first; then those that could not be solved. The solution of each is a `Solution`.
+        Empty if no path leads to a goal.
+
+    Examples
+    --------
+    >>> import foc_ros
+    >>> for candidate in foc_ros.solve_classes((0, 0), (0.3, 0), [foc_ros.Circle((0.15, 0.01), radius=0.03)]):
+    ...     print(candidate)
+    <PredictedCandidate goal0:-0, solved, likelihood 0.55>
+    <PredictedCandidate goal0:+0, solved, likelihood 0.45>
+    """
+    goals = check_array('goal', np.atleast_2d(np.asarray(goal, dtype=object)).tolist(), (None, 2))
+    return _solve(_build_scene(start, goals, obstacles, _fix_parameters(config, eta, strategy, duration_s)))
+
+
+def _build_scene(start: ArrayLike, goals: types.Array, obstacles: Iterable[Circle] | Obstacles, config: Config) -> ReachingScene:
+    expected = 'a position (2,) or a state (6,) x, y, vx, vy, ax, ay'
+    size = np.shape(np.asarray(start, dtype=object))
+    if size not in ((2,), (6,)):
+        raise SceneError('start', expected, f'{start!r} of shape {size}')
+    state, table = np.zeros(6), collect_obstacles(obstacles)
+    state[: size[0]] = check_vector('start', start, size[0])
+    for name, point in (('start', state[:2]), *(('goal', goal) for goal in goals)):
+        check_outside(name, point, table)
+    return ReachingScene(HandState(0, state, np.zeros((6, 6))), goals, table, None, None, config)
+
+
+def _fix_parameters(config: Config | None, eta: float | None, strategy: str | None, duration_s: float) -> Config:
+    given = {'foc.eta': eta, 'foc.strategy': strategy, 'duration.fixed_s': duration_s, 'duration.model': 'fixed'}
+    return _check_config(config).with_values({name: value for name, value in given.items() if value is not None})
+
+
+def _check_config(config: Config | None) -> Config:
+    if not isinstance(config, (Config, type(None))):
+        raise InputError('config', 'a Config', repr(config))
+    return Config() if config is None else config
+
+
+def _solve(scene: ReachingScene) -> tuple[PredictedCandidate, ...]:
+    problems = build_scene_problems(scene)
+    return tuple(
+        replace(each, solution=Solution(**vars(each.solution), label=each.label, problem=problems[each.candidate.goal]))
+        for each in solve_scene(scene, problems)
+    )
+
+
+def monte_carlo(solution: Solution, samples: int = 10_000, seed: int = 0) -> sampling.MonteCarlo:
+    """Estimate from noisy movements how often a solution avoids the obstacles.
+
+    Parameters
+    ----------
+    solution : Solution
+        Result of `solve`, or the solution of a candidate of `solve_classes`.
+    samples : int
+        Number of movements, up to 10,000,000.
+    seed : int
+        Seed of the random generator: equal seeds give equal results.
+
+    Returns
+    -------
+    MonteCarlo
+        Fractions of movements that avoid the obstacles, each with its 95 % interval: `step` for the worst obstacle and step, and
+        `path` for all obstacles and steps together.
+
+    Raises
+    ------
+    InputError
+        For a solution without its problem, or a number of samples out of bounds.
+
+    Examples
+    --------
+    >>> import foc_ros
+    >>> solution = foc_ros.solve((0, 0), (0.3, 0), [foc_ros.Circle((0.15, 0.01), radius=0.03)])
+    >>> fraction, low, high = foc_ros.monte_carlo(solution, samples=1000).step
+    >>> fraction >= 0.9
+    True
+    """
+    problem = getattr(solution, 'problem', None)
+    if problem is None:
+        raise InputError('solution', 'a result of foc_ros.solve or solve_classes', repr(solution))
+    if not check_number('samples', samples, 1, MOST_SAMPLES).is_integer():
+        raise InputError('samples', 'a whole number', samples)
+    return sampling.monte_carlo(problem, solution.control.T.ravel(), int(samples), seed)
+
+
+def plot_candidates(candidates: Sequence[PredictedCandidate], axes: Any = None) -> Any:
+    """Draw the solved candidates of `solve_classes`, coloured by likelihood, in their scene.
+
+    Parameters
+    ----------
+    candidates : sequence of PredictedCandidate
+        Result of `solve_classes`, not empty.
+    axes : matplotlib.axes.Axes, optional
+        Axes to draw on; new ones by default. They are returned.
+    """
+    problems = [each.solution.problem for each in candidates if isinstance(each.solution, Solution) and each.solution.problem]
+    if not problems:
+        raise InputError('candidates', 'results of foc_ros.solve_classes', repr(candidates))
+    goals = np.unique([problem.goal[:2] for problem in problems], axis=0)
+    shown = Prediction(0, '', 0.0, tuple(candidates), candidates[0].label, obstacles=problems[0].obstacles, goals=goals)
+    return shown.plot(axes)
+
+
+def replay(recording: str | Path, config: Config | None = None, topics: Mapping[str, str] | None = None) -> Iterator[Prediction]:
+    """Predict through a recording, in its own time.
+
+    Parameters
+    ----------
+    recording : path
+        A bag: MCAP or SQLite file, or its folder. `RecordingError` is raised if it cannot be read.
+    config : Config, optional
+        Parameters; the defaults if not given.
+    topics : mapping, optional
+        Topic of each input by its name, where the recording uses others than the usual ones.
+
+    Yields
+    ------
+    Prediction
+        One for every hand pose that is due, in their order.
+    """
+    from foc_ros.analysis.replay import replay as replay_bag
+
+    for prediction in replay_bag(recording, _check_config(config), topics):
+        yield Prediction(**vars(prediction))
+
+
+def load_config(file: str | Path) -> Config:
+    """Return the configuration of a ROS 2 parameter file such as `foc.yaml`; parameters that it does not set keep their defaults.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown parameter or a value out of bounds; it names the parameter, the value and the bound.
+    RecordingError
+        If the file cannot be read.
+    """
+    from foc_ros.ros.parameters import load_parameter_file
+
+    return load_parameter_file(file)
+
+
+def register_strategy(name: str, function: Callable[..., Any]) -> None:
+    """Add a strategy, a new value of `foc.strategy`.
+
+    Parameters
+    ----------
+    name : str
+        A new name; `InputError` is raised if it is taken.
+    function : callable
+        ``function(problem, start, settings, deadline)``, which returns the result that `foc_ros.core.ocp.strategies` describes.
+    """
+    STRATEGIES.register(name, function)
+
+
+def register_plant(name: str, factory: Callable[..., Any]) -> None:
+    """Add a plant, a new value of `foc.plant`.
+
+    Parameters
+    ----------
+    name : str
+        A new name; `InputError` is raised if it is taken.
+    factory : callable
+        ``factory(settings)``, which returns a `PlantModel`; `settings` are the parameters of the group `foc`.
+
+    Examples
+    --------
+    A hand whose control is its acceleration [m/s^2]:
+
+    >>> import numpy as np
+    >>> import foc_ros
+    >>> def discretise(dt):
+    ...     position, velocity = np.eye(2) * dt**2 / 2, np.eye(2) * dt
+    ...     A = np.block([[np.eye(2), np.eye(2) * dt], [np.zeros((2, 2)), np.eye(2)]])
+    ...     return foc_ros.Plant(A, np.vstack([position, velocity]), dt)
+    >>> foc_ros.register_plant('double_integrator', lambda settings: foc_ros.PlantModel(discretise))
+    >>> config = foc_ros.Config().with_values({'foc.plant': 'double_integrator'})
+    >>> foc_ros.solve((0, 0), (0.3, 0), config=config).mean.shape
+    (51, 4)
+    """
+    PLANTS.register(name, factory)
+
+
+def register_qp_backend(name: str, solver: Callable[..., Any]) -> None:
+    """Add a QP solver, a new value of `foc.qp_backend`; the solvers of qpsolvers need no registration.
+
+    Parameters
+    ----------
+    name : str
+        A new name; `InputError` is raised if it is taken.
+    solver : callable
+        ``solver(qp)``, from a `foc_ros.core.ocp.backend.DenseQP` to an `Answer`.
+    """
+    QP_BACKENDS.register(name, solver)
+
+
+def register_likelihood_rule(name: str, function: Callable[..., Any]) -> None:
+    """Add a likelihood rule, a new value of `likelihood.rule`.
+
+    Parameters
+    ----------
+    name : str
+        A new name; `InputError` is raised if it is taken.
+    function : callable
+        ``function(costs, config)``: from the costs (k,) of k classes and the parameters of the group `likelihood` to the
+        logarithms (k,) of their weights, which need no normalisation.
+
+    Examples
+    --------
+    >>> import foc_ros
+    >>> foc_ros.register_likelihood_rule('exponential', lambda costs, config: -config.beta * costs)
+    """
+    LIKELIHOOD_RULES.register(name, function)

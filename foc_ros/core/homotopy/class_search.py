@@ -1,0 +1,156 @@
+"""The homotopy classes of the paths to one goal, in the order of their rank, with their names.
+
+A graph of all obstacles would be slow in a crowd. There the graph begins with the obstacles that are likely to matter, and grows
+until no obstacle outside can change the answer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from foc_ros.core.types import LEFT, RIGHT, Array
+
+from .guesses import TautPath, lay_out
+from .path_search import PathQuery, find_shortest_paths
+from .search_scene import SearchScene
+from .sides import compute_swept_angles
+from .tangent_graph import GRAZE, TangentGraph, build_tangent_graph, connect_hand
+
+FEW, MOST = 16, 64
+"""So many circles are always in the graph together; a graph grows up to the larger number."""
+CLOSE = 1.02
+"""Excess of the circles that the graph of a crowd begins with: the best paths through a crowd are nearly straight."""
+FINENESS = 257
+"""Number of points at which a path is compared with circles that are not in its graph."""
+NANO = 1e9
+
+
+class PathClass(NamedTuple):
+    """A homotopy class, represented by its shortest path.
+
+    key, length plus what coasting adds, to the nanometre [m], and label: by these, classes rank. goal: row; course: the label
+    without the goal; sides: LEFT or RIGHT by id, in the order of the label.
+    """
+
+    key: float
+    label: str
+    goal: int
+    course: str
+    sides: tuple[tuple[str, int], ...]
+    path: TautPath
+
+
+class ClassQuery(NamedTuple):
+    """Which classes to find.
+
+    goal: row; ids (n,) of the obstacles; velocity (2,): of the hand [m/s]; max_states: number that a path search may look at.
+    """
+
+    goal: int
+    ids: tuple[str, ...]
+    velocity: Array
+    max_states: int
+
+
+class PartialGraph(NamedTuple):
+    """The tangent graph of some of the obstacles.
+
+    rows: obstacles in the graph; others: those that are not; named: rows of the obstacles that the names to the goal contain, in
+    their order; limit: length of a path that may touch one of the others [m]; max_key: bound on the paths to find [m], finite if
+    there will be a larger graph beyond.
+    """
+
+    graph: TangentGraph
+    rows: list[int]
+    others: Array
+    named: list[int]
+    limit: float
+    max_key: float
+
+
+def name_course(sides: Sequence[tuple[str, int]]) -> str:
+    """Return the part of a label that says on which side each obstacle is passed."""
+    return ''.join([('+' if side == LEFT else '-') + identity for identity, side in sides])
+
+
+def find_classes(scene: SearchScene, query: ClassQuery, notes: Counter[str]) -> Iterator[PathClass]:
+    """Yield each class to a goal once, in the order of their rank; notes: counts of what is decided, see `search.Search`."""
+    named = sorted(np.flatnonzero(scene.is_named[query.goal]).tolist(), key=query.ids.__getitem__)
+    nearest: list[int] = np.argsort(scene.excess, kind='stable').tolist()
+    rows, given = _choose_circles(scene, named, nearest), set[str]()
+    while True:
+        partial = _build_partial_graph(scene, query.goal, sorted(rows), named)
+        most = _count_classes(partial)
+        for found in _find_named_paths(scene, partial, query, notes):
+            if found.course in given:
+                continue
+            met = _find_met(scene, found, partial.others) if found.key >= partial.limit else []
+            if met and len(rows) < MOST:
+                rows = [*rows, *met]
+                break
+            given.add(found.course)
+            if met:
+                notes['left_out'] += 1
+            else:
+                yield found
+            if len(given) == most:
+                return
+        else:
+            if math.isinf(partial.max_key):
+                return
+            rows = nearest[: min(2 * len(rows), MOST)]
+
+
+def _choose_circles(scene: SearchScene, named: list[int], nearest: list[int]) -> list[int]:
+    """Return the rows to begin with: all of a few obstacles, the named ones of many if they are few, or the close ones."""
+    rows, close = {*named, *nearest[: FEW // 2]}, int((scene.excess < CLOSE).sum())
+    return list(rows) if len(rows) <= FEW < len(nearest) else nearest[: min(max(close, FEW), MOST)]
+
+
+def _build_partial_graph(scene: SearchScene, goal: int, rows: list[int], named: list[int]) -> PartialGraph:
+    """Build the graph of some obstacles for one goal; a graph without all named ones is one to grow, up to MOST."""
+    graph = connect_hand(build_tangent_graph(scene.centre[rows], scene.radius[goal, rows], scene.goals), scene.hand)
+    others = np.setdiff1d(np.arange(len(scene.centre)), rows)
+    limit = float(scene.excess[others].min(initial=np.inf)) * math.dist(scene.goals[goal], scene.hand)
+    is_enough = len(rows) >= MOST or set(rows).issuperset(named)
+    return PartialGraph(graph, rows, others, named, limit, np.inf if is_enough else limit)
+
+
+def _count_classes(partial: PartialGraph) -> int:
+    """Return the largest number of classes: two for each cluster of named circles that overlap."""
+    clusters = {cluster for row, cluster in zip(partial.rows, partial.graph.circles.cluster, strict=True) if row in partial.named}
+    return 1 << len(clusters) + len(set(partial.named).difference(partial.rows))
+
+
+def _find_named_paths(scene: SearchScene, partial: PartialGraph, query: ClassQuery, notes: Counter[str]) -> Iterator[PathClass]:
+    """Yield the classes of the paths over a graph, by their rank. A class may come again if the graph lacks named circles."""
+    place = {row: place for place, row in enumerate(partial.rows)}
+    held = [row for row in partial.named if row in place]
+    bearing_change, is_complete = scene.bearing_change[query.goal, held], len(held) == len(partial.named)
+    paths = PathQuery(
+        query.goal, query.velocity, [place[row] for row in held], bearing_change, is_complete, partial.max_key, query.max_states
+    )
+    for tied in find_shortest_paths(partial.graph, paths, notes):
+        classes = []
+        for key, runs, swept in tied:
+            path, angles = lay_out(partial.graph, runs), dict(zip(held, swept, strict=True))
+            if not is_complete:
+                by_points = compute_swept_angles(path.space_points(FINENESS), scene.centre[partial.named]).tolist()
+                angles = dict(zip(partial.named, by_points, strict=True)) | angles
+            sides = tuple([(query.ids[row], LEFT if angles[row] < 0.0 else RIGHT) for row in partial.named])
+            course, rank = name_course(sides), round(key * NANO) / NANO
+            classes.append(PathClass(rank, f'goal{query.goal}:{course}', query.goal, course, sides, path))
+        yield from sorted(classes, key=lambda found: found[:2])
+
+
+def _find_met(scene: SearchScene, found: PathClass, others: Array) -> list[int]:
+    """Return those of other obstacles (rows) that a path meets."""
+    apart = found.path.space_points(FINENESS)[:, None] - scene.centre[others]
+    is_met = np.hypot(apart[..., 0], apart[..., 1]) < scene.radius[found.goal, others] - GRAZE
+    met: list[int] = others[is_met.any(axis=0)].tolist()
+    return met

@@ -1,0 +1,251 @@
+"""The public API: its doctests, what it accepts and refuses, and its extension points."""
+
+import doctest
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import foc_ros
+import foc_ros.api
+import foc_ros.core.config
+import foc_ros.core.obstacles.shapes
+from foc_ros.core.registry import LIKELIHOOD_RULES
+
+CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003, name='cup')
+FAST = foc_ros.Config().with_values({'foc.steps': 20})
+
+
+@pytest.mark.parametrize(
+    'module', [foc_ros.api, foc_ros.core.config, foc_ros.core.obstacles.shapes], ids=lambda module: module.__name__
+)
+def test_the_examples_of_the_docstrings_hold(module):
+    results = doctest.testmod(module)
+    assert results.attempted
+    assert not results.failed
+
+
+@pytest.mark.parametrize('name', [name for name in foc_ros.__all__ if name != 'register_baseline'])
+def test_every_public_name_exists_and_is_documented(name):
+    assert getattr(foc_ros, name).__doc__
+
+
+def test_the_import_is_lazy_and_fast():
+    program = "import sys, foc_ros; print('numpy' in sys.modules, 'Predictor' in dir(foc_ros))"
+    shown = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True, check=True).stdout
+    assert shown.split() == ['False', 'True']
+    with pytest.raises(AttributeError, match='no attribute'):
+        _ = foc_ros.unknown
+
+
+def predictor_of_one_cup():
+    predictor = foc_ros.Predictor(FAST)
+    predictor.set_goals([(0.3, 0.0)])
+    predictor.set_obstacles([CUP])
+    return predictor
+
+
+def test_a_prediction_knows_its_scene_and_its_candidates():
+    prediction = predictor_of_one_cup().update(t=1.5, position=[0.0, 0.0])
+    assert prediction.t == 1.5
+    assert prediction.obstacles.ids == ('cup',)
+    np.testing.assert_array_equal(prediction.goals, [[0.3, 0.0]])
+    assert {each.label for each in prediction.candidates} == {'goal0:+cup', 'goal0:-cup'}
+    best = prediction.candidates[0]
+    assert best.likelihood == max(each.likelihood for each in prediction.candidates)
+    assert best.status is foc_ros.Status.SOLVED
+    assert best.eta >= 0.9 - 1e-5
+    assert best.mean.shape == (21, 6)
+    assert best.covariance.shape == (21, 6, 6)
+    assert len(best.times) == 21
+    assert best.effort > 0.0
+
+
+def test_a_predictor_follows_a_movement_and_forgets_it():
+    predictor = predictor_of_one_cup()
+    for step in range(40):
+        prediction = predictor.update(0.02 * step, (0.004 * step, -0.002 * step))
+    assert prediction.most_likely == 'goal0:-cup'
+    moving = prediction.candidates[0].mean[0, 2]
+    assert moving > 0.1
+    restarted = predictor.update(0.8 + FAST.estimator.gap_s, (0.16, -0.08))
+    assert restarted.candidates[0].mean[0, 2] == 0.0
+    predictor.reset()
+    assert predictor.update(0.0, (0.0, 0.0)).t == 0.0
+
+
+def test_moving_obstacles_move_on_from_the_update_that_first_sees_them():
+    predictor = predictor_of_one_cup()
+    predictor.update(5.0, (0.0, 0.0))
+    predictor.set_obstacles([foc_ros.Circle((0.15, 0.1), 0.02, velocity=(0.0, -0.5))])
+    np.testing.assert_allclose(predictor.update(5.1, (0.0, 0.0)).obstacles.centre, [[0.15, 0.1]])
+    np.testing.assert_allclose(predictor.update(5.2, (0.0, 0.0)).obstacles.centre, [[0.15, 0.05]])
+
+
+@pytest.mark.parametrize(
+    ('t', 'position', 'field'),
+    [
+        (1.0, (0.0, 0.0), 't'),
+        (0.5, (0.0, 0.0), 't'),
+        (-9.0, (0.0, 0.0), 't'),
+        (float('nan'), (0.0, 0.0), 't'),
+        ('2', (0.0, 0.0), 't'),
+        (2.0, (0.0, float('nan')), 'position'),
+        (2.0, (0.0, 0.0, 0.0), 'position'),
+        (2.0, 'here', 'position'),
+    ],
+)
+def test_a_sample_that_cannot_be_used_is_refused_and_changes_nothing(t, position, field):
+    predictor = predictor_of_one_cup()
+    predictor.update(1.0, (0.0, 0.0))
+    with pytest.raises(foc_ros.InputError, match=f'^{field}: expected') as caught:
+        predictor.update(t, position)
+    assert caught.value.field == field
+    assert predictor.update(1.02, (0.0, 0.0)).t == 1.02
+
+
+def test_without_goals_there_is_no_prediction():
+    with pytest.raises(foc_ros.SceneError, match='goals'):
+        foc_ros.Predictor(FAST).update(0.0, (0.0, 0.0))
+
+
+@pytest.mark.parametrize('goals', [[], [(0.3, 0.0, 0.1)], [(0.3, float('inf'))], 0.3])
+def test_goals_that_cannot_be_used_are_refused(goals):
+    with pytest.raises(foc_ros.SceneError, match='goals'):
+        foc_ros.Predictor().set_goals(goals)
+
+
+@pytest.mark.parametrize(
+    ('field', 'values'),
+    [
+        ('centre', {'centre': (0.1, 0.2, 0.3)}),
+        ('radius', {'radius': 0.0}),
+        ('radius', {'radius': '3 cm'}),
+        ('radius_stddev', {'radius_stddev': -0.001}),
+        ('velocity', {'velocity': (float('nan'), 0.0)}),
+        ('name', {'name': 3}),
+    ],
+)
+def test_a_circle_is_checked_field_by_field(field, values):
+    with pytest.raises(foc_ros.SceneError, match=f'obstacle.{field}'):
+        foc_ros.Circle(**({'centre': (0.1, 0.0), 'radius': 0.02} | values))
+
+
+@pytest.mark.parametrize('obstacles', [[(0.1, 0.0, 0.02)], [CUP, CUP]])
+def test_obstacles_are_circles_with_different_names(obstacles):
+    with pytest.raises(foc_ros.SceneError, match='obstacles'):
+        foc_ros.solve((0, 0), (0.3, 0), obstacles)
+
+
+@pytest.mark.parametrize(
+    ('changed', 'field'),
+    [
+        ({'start': [0.0, 0.0, 0.0, 0.0]}, 'start'),
+        ({'start': (0.0, float('nan'))}, 'start'),
+        ({'start': (0.15, 0.0)}, 'start'),
+        ({'goal': (0.15, 0.02)}, 'goal'),
+        ({'goal': (0.3,)}, 'goal'),
+        ({'strategy': 'fastest'}, 'foc.strategy'),
+        ({'eta': 1.0}, 'foc.eta'),
+        ({'duration_s': 0.0}, 'duration.fixed_s'),
+        ({'config': {'eta': 0.9}}, 'config'),
+        ({'guess': [(0.1, 0.1, 0.1)]}, 'guess'),
+    ],
+)
+def test_a_scene_that_cannot_be_solved_is_refused_by_field(changed, field):
+    with pytest.raises(foc_ros.InputError, match=f'^{field}: expected .*, got'):
+        foc_ros.solve(**({'start': (0, 0), 'goal': (0.3, 0), 'obstacles': [CUP]} | changed))
+
+
+def test_lists_states_and_tables_are_accepted():
+    by_position = foc_ros.solve([0, 0], [0.3, 0], [CUP], config=FAST)
+    by_state = foc_ros.solve(
+        np.zeros(6), np.array([0.3, 0.0]), foc_ros.core.obstacles.shapes.collect_obstacles([CUP]), config=FAST
+    )
+    np.testing.assert_array_equal(by_position.mean, by_state.mean)
+    moving = foc_ros.solve((0, 0, 0.3, 0, 0, 0), (0.3, 0), config=FAST)
+    np.testing.assert_allclose(moving.mean[0, 2], 0.3)
+
+
+def test_a_guess_chooses_the_class():
+    labels = {foc_ros.solve((0, 0), (0.3, 0), [CUP], config=FAST, guess=[(0.15, y)]).label for y in (0.08, -0.06)}
+    assert labels == {'goal0:+cup', 'goal0:-cup'}
+
+
+def test_the_solution_of_solve_is_the_most_likely_of_all_classes():
+    candidates = foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], config=FAST)
+    solution = foc_ros.solve((0, 0), (0.3, 0), [CUP], config=FAST)
+    assert solution.label == candidates[0].label
+    np.testing.assert_array_equal(solution.mean, candidates[0].mean)
+    assert sum(each.likelihood for each in candidates) == pytest.approx(1.0)
+    goals = foc_ros.solve_classes((0, 0), [(0.3, 0.0), (0.3, 0.1)], config=FAST)
+    assert {each.candidate.goal for each in goals} == {0, 1}
+
+
+def test_monte_carlo_confirms_eta():
+    solution = foc_ros.solve((0, 0), (0.3, 0), [CUP], config=FAST)
+    assert foc_ros.monte_carlo(solution, 2000, seed=1).step[2] >= 0.9
+    with pytest.raises(foc_ros.InputError, match='samples'):
+        foc_ros.monte_carlo(solution, 0)
+    with pytest.raises(foc_ros.InputError, match='solution'):
+        foc_ros.monte_carlo(predictor_of_one_cup().update(0.0, (0.0, 0.0)).candidates[0].solution)
+
+
+def test_predictions_and_solutions_are_drawn():
+    pytest.importorskip('matplotlib', reason='matplotlib is not installed')
+    from matplotlib import pyplot as plt
+    from matplotlib.figure import Figure
+
+    given = Figure().subplots()
+    prediction = predictor_of_one_cup().update(0.0, (0.0, 0.0))
+    assert prediction.plot(given) is given
+    assert len(given.lines) >= 2
+    for drawn in (foc_ros.solve((0, 0), (0.3, 0), [CUP], config=FAST), prediction):
+        assert drawn.plot().get_xlabel() == 'x [m]'
+    foc_ros.plot_candidates(foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], config=FAST))
+    with pytest.raises(foc_ros.InputError, match='candidates'):
+        foc_ros.plot_candidates(prediction.candidates)
+    plt.close('all')
+
+
+def test_a_replay_yields_predictions_that_can_be_drawn():
+    prediction = next(foc_ros.replay('foc_ros/recordings/reaching.mcap', FAST))
+    assert isinstance(prediction, foc_ros.Prediction)
+    assert len(prediction.goals)
+
+
+def test_a_config_file_is_read_and_checked(tmp_path):
+    file = tmp_path / 'foc.yaml'
+    file.write_text('foc:\n  ros__parameters:\n    foc.eta: 0.95\n')
+    assert foc_ros.load_config(file).foc.eta == 0.95
+    file.write_text('foc:\n  ros__parameters:\n    foc.zeta: 0.95\n')
+    with pytest.raises(foc_ros.ParameterError, match=r'foc\.zeta'):
+        foc_ros.load_config(file)
+
+
+@pytest.mark.parametrize(
+    ('part', 'text'),
+    [
+        (lambda: predictor_of_one_cup(), '<Predictor with 1 goals, 1 obstacles>'),
+        (lambda: predictor_of_one_cup().update(1.0, (0, 0)).obstacles, '<Obstacles: 1 circles (cup)>'),
+        (lambda: FAST, '<Config foc.steps=20>'),
+        (lambda: foc_ros.solve((0, 0), (0.3, 0), config=FAST), '<Solution solved, effort 1312, eta 1>'),
+    ],
+)
+def test_representations_are_short(part, text):
+    assert repr(part()).startswith(text)
+
+
+def test_a_likelihood_rule_from_outside_is_used():
+    foc_ros.register_likelihood_rule('even', lambda costs, config: np.zeros(len(costs)))
+    even = FAST.with_values({'likelihood.rule': 'even'})
+    candidates = foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], config=even)
+    np.testing.assert_allclose([each.likelihood for each in candidates], 0.5)
+    with pytest.raises(foc_ros.InputError, match='a new name besides cost_ratio'):
+        foc_ros.register_likelihood_rule('even', lambda costs, config: costs)
+    with pytest.raises(foc_ros.InputError, match='a function'):
+        foc_ros.register_likelihood_rule('odd', 3)
+    with pytest.raises(foc_ros.ParameterError, match=r'likelihood\.rule: expected one of cost_ratio, .*even'):
+        FAST.with_values({'likelihood.rule': 'odd'})
+    assert 'odd' not in LIKELIHOOD_RULES

@@ -1,0 +1,166 @@
+"""Plants that `foc.plant` chooses: the damped mass, and plants from outside the package, in solve, predict and replay."""
+
+from itertools import islice
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import foc_ros
+from foc_ros.core.config import Config
+from foc_ros.core.dynamics.plant_models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
+from foc_ros.core.dynamics.plants import Plant, condense, damped_mass, triple_integrator
+from foc_ros.core.dynamics.predictive_covariance import duration_sensitivity
+from foc_ros.core.memory import Memory
+from foc_ros.core.obstacles.chance_constraint import k_of_eta
+from foc_ros.core.predictor import build_problem, predict
+from foc_ros.core.registry import PLANTS
+from foc_ros.core.types import HandState, make_obstacles
+
+STEPS, MASS, DAMPING = 50, 1.5, 4.0
+MASS_CONFIG = Config().with_values({'foc.plant': 'damped_mass', 'foc.plant_mass': MASS, 'foc.plant_damping': DAMPING})
+MOVING = HandState(
+    0, np.array([0.0, 0.0, 0.1, -0.05, 1.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2), effort_spent=5.0
+)
+GOAL = np.array([[0.3, 0.0]])
+CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003)
+
+
+@pytest.fixture
+def register():
+    """Register plants for one test."""
+    names = []
+
+    def add(name, factory):
+        foc_ros.register_plant(name, factory)
+        names.append(name)
+        return Config().with_values({'foc.plant': name})
+
+    yield add
+    for name in names:
+        del PLANTS._parts[name]
+    make_plant_model.cache_clear()
+
+
+def test_without_obstacles_the_effort_of_a_damped_mass_is_that_of_the_kkt_system():
+    (found,) = predict(MASS_CONFIG, MOVING, make_obstacles(), GOAL, Memory())[0].solved_candidates
+    solution = found.solution
+    horizon = condense(damped_mass(solution.dt, MASS, DAMPING), STEPS)
+    target = np.array([0.3, 0.0, 0.0, 0.0]) - horizon.powers[-1] @ MOVING.mean[:4]
+    n = 2 * STEPS
+    kkt = np.block([[2.0 * np.eye(n), horizon.last.T], [horizon.last, np.zeros((4, 4))]])
+    control = np.linalg.solve(kkt, np.concatenate([np.zeros(n), target]))[:n]
+    assert solution.effort == pytest.approx(control @ control, rel=1e-9)
+    assert_allclose(solution.mean[-1], [0.3, 0.0, 0.0, 0.0], atol=1e-9)
+    assert solution.mean.shape == (STEPS + 1, 4)
+    assert solution.covariance.shape == (STEPS + 1, 4, 4)
+
+
+@pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
+def test_a_damped_mass_avoids_obstacles_as_surely_as_wanted(strategy):
+    candidates = foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], strategy=strategy, config=MASS_CONFIG)
+    assert len(candidates) == 2
+    for each in candidates:
+        assert each.status is foc_ros.Status.SOLVED
+        assert each.eta >= 0.9 - 1e-5
+        assert foc_ros.monte_carlo(each.solution, 2000).step[2] >= 0.9
+        offset = each.mean[1:, :2] - np.array([0.15, 0.01])
+        distance = np.hypot(*offset.T)
+        normal = offset / distance[:, None]
+        variance = np.einsum('ti,tij,tj->t', normal, each.covariance[1:, :2, :2], normal)
+        expected = 0.03**2 + 0.003**2 - distance**2
+        total = 4 * 0.03**2 * 0.003**2 + 2 * 0.003**4 + 4 * distance**2 * variance
+        assert (expected + k_of_eta(0.9) * np.sqrt(total)).max() <= 1e-6
+
+
+def test_predictions_of_a_damped_mass_have_all_parts_of_the_covariance():
+    config = MASS_CONFIG.with_values({'foc.process_noise': 0.5, 'foc.endpoint_stddev': 0.005, 'duration.spread': 0.2})
+    scene = make_obstacles([[0.15, 0.01]], 0.03), GOAL
+    narrow, wide = (predict(each, MOVING, *scene, Memory())[0] for each in (MASS_CONFIG, config))
+    assert len(narrow.solved_candidates) == 2
+    for before, after in zip(narrow.candidates, wide.candidates, strict=True):
+        np.testing.assert_array_equal(before.mean, after.mean)
+        added = after.covariance - before.covariance
+        assert np.linalg.eigvalsh(added).min() > -1e-12
+        assert added[-1, 0, 0] >= 0.005**2
+        assert added[STEPS // 2, 0, 0] > added[-1, 0, 0]
+
+
+def test_the_duration_shifts_the_end_of_a_damped_mass_as_a_longer_plan_does():
+    plans = []
+    for factor in (0.99, 1.0, 1.01):
+        config = MASS_CONFIG.with_values({'duration.model': 'fixed', 'duration.fixed_s': factor})
+        plans.append(predict(config, MOVING, make_obstacles(), GOAL, Memory())[0].candidates[0].solution)
+    plan = plans[1]
+    early, late = (np.interp(plan.times, each.times, each.path[:, 0]) for each in plans[::2])
+    found = duration_sensitivity(plan, False, make_plant_model(MASS_CONFIG.foc))[:, 0]
+    middle = slice(0, int(0.95 * STEPS))
+    assert_allclose(found[middle], ((early - late) / 0.02)[middle], atol=0.03 * np.abs(found).max())
+
+
+def test_only_effort_of_jerk_is_added_to_effort_of_jerk():
+    """The effort since onset and the price of time have the units of jerk: a force-driven class costs its own effort alone."""
+    values = {'duration.model': 'cost_of_time', 'duration.time_cost': 50.0}
+    scene = make_obstacles([[0.15, 0.01]], 0.03), GOAL
+    for config, shared, price in ((Config(), 5.0, 50.0), (MASS_CONFIG, 0.0, 0.0)):
+        for each in predict(config.with_values(values), MOVING, *scene, Memory())[0].solved_candidates:
+            assert each.cost == pytest.approx(shared + each.effort * each.solution.dt + price * each.times[-1])
+
+
+def test_the_durations_do_not_depend_on_the_plant():
+    durations = []
+    for config in (Config(), MASS_CONFIG):
+        values = config.with_values({'duration.model': 'cost_of_time'})
+        solved = predict(values, MOVING, make_obstacles([[0.15, 0.01]], 0.03), GOAL, Memory())[0].solved_candidates
+        durations.append({each.label: each.times[-1] for each in solved})
+    assert durations[0] == durations[1]
+
+
+def test_a_triple_integrator_from_outside_predicts_what_the_built_in_one_does(register):
+    class Outside(PlantModel):
+        is_jerk_driven = True
+
+    config = register('outside', lambda settings: Outside(triple_integrator))
+    values = {'foc.endpoint_stddev': 0.005, 'duration.spread': 0.2, 'duration.wait_s': 0.1}
+    scene = make_obstacles([[0.15, 0.01]], 0.03), GOAL
+    ours, theirs = (predict(each.with_values(values), MOVING, *scene, Memory())[0] for each in (Config(), config))
+    assert [each.label for each in ours.candidates] == [each.label for each in theirs.candidates]
+    for one, other in zip(ours.candidates, theirs.candidates, strict=True):
+        assert_allclose(other.mean, one.mean, atol=1e-6 * np.abs(one.mean).max())
+        assert_allclose(
+            other.covariance[:, :2, :2], one.covariance[:, :2, :2], atol=0.03 * np.abs(one.covariance[:, :2, :2]).max()
+        )
+        assert other.likelihood == pytest.approx(one.likelihood, rel=1e-6)
+    noise = make_plant_model(config.foc).compute_process_covariance(0.02, STEPS, False)[:, 0, 0]
+    exact = TRIPLE_INTEGRATOR.compute_process_covariance(0.02, STEPS, False)[:, 0, 0]
+    assert_allclose(noise, exact, atol=0.02 * exact.max())
+
+
+def test_a_plant_with_other_states_from_outside_is_solved_and_predicted(register):
+    """A double integrator, whose control is the acceleration: the least effort from rest to rest is 12 D^2 / T^3."""
+
+    def discretise(dt):
+        A = np.block([[np.eye(2), dt * np.eye(2)], [np.zeros((2, 2)), np.eye(2)]])
+        return Plant(A, np.vstack([dt**2 / 2 * np.eye(2), dt * np.eye(2)]), dt)
+
+    config = register('double', lambda settings: PlantModel(discretise))
+    solution = foc_ros.solve((0, 0), (0.3, 0), duration_s=1.0, config=config)
+    assert solution.effort * solution.dt == pytest.approx(12 * 0.3**2, rel=1e-3)
+    for prediction in islice(foc_ros.replay('foc_ros/recordings/reaching.mcap', config), 3):
+        assert prediction.solved_candidates
+        assert prediction.candidates[0].mean.shape[1] == 4
+
+
+def test_a_recording_is_replayed_with_a_damped_mass():
+    for prediction in islice(foc_ros.replay('foc_ros/recordings/reaching.mcap', MASS_CONFIG), 3):
+        assert prediction.solved_candidates
+
+
+def test_what_is_no_plant_model_is_refused(register):
+    config = register('wrong', lambda settings: triple_integrator(0.02))
+    with pytest.raises(foc_ros.InputError, match='plant wrong: expected a factory that returns a PlantModel'):
+        build_problem(config, MOVING, make_obstacles(), GOAL[0], 1.0)
+    with pytest.raises(foc_ros.InputError, match='4 to 6 states'):
+        PlantModel(lambda dt: Plant(np.eye(8), np.ones((8, 2)), dt))
+    with pytest.raises(foc_ros.ParameterError, match=r'foc\.plant: expected one of triple_integrator, damped_mass'):
+        Config().with_values({'foc.plant': 'unicycle'})
