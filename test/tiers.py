@@ -23,7 +23,7 @@ LONG = (
     # studies of the solver over many scenes
     'test_effort_over_eta.py::test_effort_is_continuous*',
     'test_effort_over_eta.py::test_no_strategy_needs_less_effort_than_optimal_in_the_same_class',
-    'test_flicker.py::test_a_symmetric_obstacle_does_not_make_the_choice_flicker',
+    'test_flicker.py::test_*symmetric_obstacle*',
     'test_guarantee.py::*',
     'test_slow_path.py::*',
     # all steps of a fit, of the paper's studies and of long reports
