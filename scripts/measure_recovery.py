@@ -14,7 +14,7 @@ from foc_ros.analysis.fitting.plan_fit import Recovered, interpolate_plan, make_
 from foc_ros.analysis.fitting.recorded_hand import RecordedHand
 from foc_ros.core.config import Config, FocConfig
 from foc_ros.core.types import NANOSECONDS, Array, Obstacles, make_obstacles
-from foc_ros.io.guess import guess_path
+from foc_ros.io.scene_file import guess_path
 
 TRIALS = 20
 SENSOR_STDDEV_M, RATE_HZ, DURATION_S = 1e-3, 100.0, 1.0

@@ -18,7 +18,7 @@ from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config, updated
 from foc_ros.core.types import LEFT
 from foc_ros.io.bags import TYPESTORE, BagReader, Item
-from foc_ros.ros.messages.input_messages import goal_poses
+from foc_ros.ros.messages.encode_inputs import goal_poses
 from foc_ros.ros.messages.types import RosbagsTypes
 
 FAST = {'rate_hz': 4.0, 'foc.steps': 20, 'foc.strategy': 'fixed', 'foc.tau': 1e-4, 'foc.lam': 0.0, 'homotopy.max_candidates': 6}

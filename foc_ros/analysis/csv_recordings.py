@@ -13,7 +13,7 @@ from foc_ros.core.errors import RecordingError
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.bags import TYPESTORE, BagWriter
 from foc_ros.io.csv_tables import Row, rows
-from foc_ros.ros.messages.input_messages import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.ros.messages.encode_inputs import goal_poses, hand_pose, obstacle_cloud
 from foc_ros.ros.messages.types import RosbagsTypes
 
 FRAME = 'world'

@@ -14,7 +14,7 @@ from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import cold_start
 from foc_ros.core.types import Array, Obstacles, Solution, Status, make_obstacles
-from foc_ros.io.guess import guess_path
+from foc_ros.io.scene_file import guess_path
 
 STEPS, DURATION_S = 50, 1.0
 EQUAL_M = 1e-6
