@@ -171,10 +171,10 @@ class Predictor:
         if self._goals is None:
             raise SceneError('goals', 'at least one, by set_goals', 'none')
         updated = update(self._hand, sample, self.config.estimator)
-        if updated.status is SampleStatus.RESTARTED_BACKWARD or not updated.status.taken:
+        if updated.status is SampleStatus.RESTARTED_BACKWARD or not updated.status.is_taken:
             last = '' if self._hand is None else f', {self._hand.stamp_ns / NANOSECONDS:.9g} s'
             raise InputError('t', f'a time after the last one{last}', t)
-        if updated.status.restarted:
+        if updated.status.is_restart:
             self._memory = Memory()
         self._hand = updated.state
         if self._obstacles.stamp_ns is None:

@@ -15,7 +15,7 @@ from foc_ros.analysis.recordings import find_recordings
 from foc_ros.core.config import Config, flatten
 from foc_ros.core.errors import InputError
 from foc_ros.io.terminal import show_table
-from foc_ros.ros.parameters import dump_parameter_file, given_config
+from foc_ros.ros.parameters import dump_parameter_file, load_optional_config
 
 SCORES = {
     'ways': 'log-likelihood of the class taken [nat]',
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fit, write and show; return 2 where a recording could not be used, and the others were."""
-    config, output = given_config(arguments.params), arguments.output
+    config, output = load_optional_config(arguments.params), arguments.output
     # before the work, not after it
     if output.is_dir() or not output.resolve().parent.is_dir():
         raise InputError('--output', 'a file in a directory that exists', output)

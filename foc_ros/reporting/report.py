@@ -16,7 +16,7 @@ from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.types import NANOSECONDS, HandSample
 
 from .page import render
-from .plots import make_recording_figure, make_snapshot_figure, save
+from .plots import make_recording_figure, make_snapshot_figure, save_figure
 from .report_data import PageData, bounds_of_recording, round_number
 from .snapshots import HandTrajectory, Snapshot, build_hand_trajectory, build_snapshot
 from .track_association import CandidateTracks, build_candidate_tracks
@@ -98,7 +98,7 @@ def _write_pictures(directory: Path, hand: HandTrajectory, tracks: CandidateTrac
     for count, (row, span) in enumerate(_select_rows(tracks.snapshots, spans).items()):
         figures[f'moment_{count + 1:02d}.png'] = make_snapshot_figure(hand, tracks, row, span, bounds)
     for name, figure in figures.items():
-        save(figure, directory / name)
+        save_figure(figure, directory / name)
     return [directory / name for name in figures]
 
 

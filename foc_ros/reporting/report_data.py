@@ -14,8 +14,8 @@ import numpy as np
 
 from foc_ros.core.types import NANOSECONDS, Array, make_obstacles
 
-from .drawing import CLASS_COLOURS, ELLIPSES_PER_WAY, NAMED_OBSTACLES, STDDEVS, Bounds, ellipse_axes
-from .plots import bounds_of
+from .drawing import CLASS_COLOURS, ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, STDDEVS, Bounds, ellipse_axes
+from .plots import compute_bounds
 from .snapshots import CandidateView, HandTrajectory, Snapshot
 from .track_association import CandidateTracks
 
@@ -103,7 +103,7 @@ def bounds_of_recording(hand: HandTrajectory, snapshots: Sequence[Snapshot]) -> 
         points += [each.goals, each.obstacles.centre - reach, each.obstacles.centre + reach]
     paths = [candidate.path for each in snapshots for candidate in each.candidates]
     points += [np.percentile(np.concatenate(paths), DRAWN_PERCENTILES, axis=0)] if paths else []
-    return bounds_of(make_obstacles(), np.zeros((0, 2)), (), *points, margin=0.06)
+    return compute_bounds(make_obstacles(), np.zeros((0, 2)), (), *points, margin=0.06)
 
 
 def round_number(value: float) -> float | None:
@@ -119,7 +119,7 @@ def spread_rows(count: int, most: int) -> np.ndarray[tuple[int], np.dtype[np.int
 def _encode_candidate(candidate: CandidateView) -> dict[str, Any]:
     """Return one candidate; ellipses: x, y, greater and smaller standard deviation, angle of the greater [degrees]."""
     points = spread_rows(len(candidate.path), PATH_POINTS)
-    marks = spread_rows(len(candidate.path), ELLIPSES_PER_WAY + 1)[1:]
+    marks = spread_rows(len(candidate.path), ELLIPSES_PER_CANDIDATE + 1)[1:]
     greater, smaller, angle = ellipse_axes(candidate.covariance[marks])
     lengths = np.column_stack([candidate.path[marks], STDDEVS * greater, STDDEVS * smaller])
     return {

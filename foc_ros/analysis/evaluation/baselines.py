@@ -71,15 +71,22 @@ def register_baseline(name: str, forecast: ForecastFunction, settings: tuple[Any
     InputError
         If the name is taken or empty.
     """
-    BASELINES.register(name, (forecast, settings))
+    BASELINES.register(name, partial(_make_baseline, name, forecast, settings))
 
 
 def make_baselines(recordings: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[Baseline, ...]:
     """Return all registered predictors; published: the parameters that the recordings were replayed with."""
-    return tuple(
-        Baseline(name, forecast, settings if isinstance(settings, tuple) else settings(recordings, published))
-        for name, (forecast, settings) in ((name, BASELINES.get(name)) for name in BASELINES)
-    )
+    return tuple(BASELINES.get(name)(recordings, published) for name in BASELINES)
+
+
+def _make_baseline(
+    name: str,
+    forecast: ForecastFunction,
+    settings: tuple[Any, ...] | SettingsFunction,
+    recordings: Sequence[ObservedRecording],
+    published: LikelihoodConfig,
+) -> Baseline:
+    return Baseline(name, forecast, settings if isinstance(settings, tuple) else settings(recordings, published))
 
 
 def make_plain_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[LikelihoodConfig, ...]:

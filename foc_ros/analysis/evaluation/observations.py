@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay, Step
 from foc_ros.core.config import Config, DurationConfig
-from foc_ros.core.dynamics.predictive_covariance import duration_sensitivity
+from foc_ros.core.dynamics.predictive_covariance import compute_duration_sensitivity
 from foc_ros.core.errors import RecordingError
-from foc_ros.core.estimation.duration import is_passing, time_price
+from foc_ros.core.estimation.duration import get_time_price, is_passing
 from foc_ros.core.homotopy.branch_times import BranchTimes, compute_branch_times
 from foc_ros.core.obstacles.chance_constraint import centre_trajectories
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Obstacles, PredictedCandidate, Prediction, Record
@@ -115,7 +115,7 @@ def observe(recording: Recording, config: Config) -> ObservedRecording:
             assert replayed.pipeline.hand_state is not None
             made.append((step, replayed.pipeline.hand_state))
     if not made:
-        reason = replayed.pipeline.blocked() or replayed.intake.last_refusal or 'no candidate could be solved'
+        reason = replayed.pipeline.not_ready_reason() or replayed.intake.last_refusal or 'no candidate could be solved'
         raise RecordingError(f'{recording.name}: nothing could be predicted: {reason}')
     goals = made[-1][0].scene.goals
     assert goals is not None
@@ -150,7 +150,7 @@ def _make_observation(step: Step, hand: HandState, path: RecordedPath, duration:
 def _tabulate_candidates(
     prediction: Prediction, obstacles: Obstacles, effort_spent: float, duration: DurationConfig
 ) -> CandidateTable:
-    predicted, price, passing = prediction.candidates, time_price(duration), is_passing(duration)
+    predicted, price, passing = prediction.candidates, get_time_price(duration), is_passing(duration)
     solutions = [each.solution for each in predicted]
     steps = [np.minimum(np.rint(np.array(TIMES_S) / each.dt).astype(int), len(each.mean) - 1) for each in solutions]
     named = [[identity in dict(each.candidate.sides) for identity in obstacles.ids] for each in predicted]
@@ -169,7 +169,7 @@ def _tabulate_candidates(
         mean=np.array([each.mean[at, :2] for each, at in zip(solutions, steps, strict=True)]),
         covariance=np.array([each.covariance[at, :2, :2] for each, at in zip(solutions, steps, strict=True)]),
         duration_sensitivity=np.array(
-            [duration_sensitivity(each, passing)[at, :2] for each, at in zip(solutions, steps, strict=True)]
+            [compute_duration_sensitivity(each, passing)[at, :2] for each, at in zip(solutions, steps, strict=True)]
         ),
         branch_times=compute_branch_times(predicted, obstacles),
     )

@@ -18,7 +18,7 @@ from scipy.optimize import minimize
 
 from foc_ros.analysis.evaluation.ground_truth import RecordedPath
 from foc_ros.analysis.goal_reached import has_covered_distance
-from foc_ros.core.config import Config, DurationConfig, updated
+from foc_ros.core.config import Config, DurationConfig, replace_values
 from foc_ros.core.estimation.duration import estimate_times_to_go
 from foc_ros.core.types import NANOSECONDS, Array, HandState
 
@@ -113,7 +113,7 @@ def fit_duration(hands: Sequence[RecordedHand], config: Config) -> tuple[Estimat
 
 def fit_other_models(hands: Sequence[RecordedHand], config: Config) -> list[Config]:
     """Return the configuration with each other model of duration that depends on distance, its constants fitted."""
-    others = [updated(config, {'duration.model': model}) for model in DISTANCE_MODELS if model != config.duration.model]
+    others = [replace_values(config, {'duration.model': model}) for model in DISTANCE_MODELS if model != config.duration.model]
     return [apply_estimates(each, fit_duration(hands, each)[0]) for each in others]
 
 

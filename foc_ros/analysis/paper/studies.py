@@ -27,7 +27,7 @@ GROWTHS = (10.0, 1.5)
 """Delta of algorithm 1: as printed, and one that ends near the values of tau and lambda that the paper reports."""
 REPORTED = {'LV': (0.0009, 2.28e6), 'HC': (0.0012, 0.9e6)}
 """(tau [m^2], lambda) at eta 0.94 in the paper."""
-STRATEGY_CLASS = STRATEGY_SCENE, STRATEGY_SCENE.ways[0]
+STRATEGY_CLASS = STRATEGY_SCENE, STRATEGY_SCENE.path_classes[0]
 """Scene and homotopy class in which strategies are compared."""
 
 
@@ -155,10 +155,11 @@ def _compare_strategies(number: int, noise: float, grid: Grid) -> Study:
 def _compare_classes(number: int, strategy: str, grid: Grid) -> Study:
     scene = CLASSES_SCENE
     solutions = {
-        eta: {each.name: solve_class(scene, each, Method(NOISE, strategy), eta) for each in scene.ways} for eta in (0.9, 0.965)
+        eta: {each.name: solve_class(scene, each, Method(NOISE, strategy), eta) for each in scene.path_classes}
+        for eta in (0.9, 0.965)
     }
     ratios = tuple(
-        RatioCurve(name, *(_solve_curve(each.name, scene, each, method, etas) for each in scene.ways))
+        RatioCurve(name, *(_solve_curve(each.name, scene, each, method, etas) for each in scene.path_classes))
         for name, (method, etas) in _make_methods(strategy, NOISE, grid).items()
     )
     title = f'two homotopy classes, strategy {strategy.upper()}, c = {NOISE:g}'

@@ -24,7 +24,7 @@ def compute_swept_angles(path: Array, centres: Array) -> Array:
     return sweep_angles(*_check_shapes(path, centres))
 
 
-def path_sides(path: Array, obstacles: Obstacles, centres: Array | None = None) -> dict[str, int]:
+def find_path_sides(path: Array, obstacles: Obstacles, centres: Array | None = None) -> dict[str, int]:
     """Find the side on which a path passes each obstacle.
 
     A path that sweeps clockwise about a centre passes the obstacle on the left. A path passes an obstacle if the foot of the

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from foc_ros.core.dynamics.condensed import PositionNoise, position_variances, variance_weights
 from foc_ros.core.dynamics.noise import stack_noise
-from foc_ros.core.dynamics.plants import Horizon, states_at_goal
+from foc_ros.core.dynamics.plants import Horizon, find_states_at_goal
 from foc_ros.core.errors import SceneError
 from foc_ros.core.kernels import freeze
 from foc_ros.core.obstacles.chance_constraint import UncertainCircles, centre_trajectories, k_of_eta, size_moments
@@ -288,7 +288,7 @@ def rest_to_goal(
         noise=np.asarray(noise, dtype=float),
         obstacles=obstacles,
         eta=eta,
-        at_goal=states_at_goal(n, options.get('passing', False)),
+        at_goal=find_states_at_goal(n, options.get('passing', False)),
         terminal_weights=np.where(np.arange(n) < 2, options.get('goal_weight', 0.0), 0.0),
         stage_weights=np.zeros(n),
         recovery_s=options.get('recovery_s', 0.0),

@@ -45,21 +45,21 @@ def render(template: str, **values: Any) -> str:
     return _TEMPLATES.get_template(template).render(values)
 
 
-def page_of(title: str, body: str, warnings: Sequence[str] = ()) -> str:
+def render_page(title: str, body: str, warnings: Sequence[str] = ()) -> str:
     """Return a page with a title, warnings on top, and a body of HTML."""
     return render('frame.html', title=title, body=body, warnings=warnings)
 
 
-def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def render_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a table as HTML; the first cell of a row is its heading; columns may be empty."""
     return str(_PARTS.table(columns, rows))
 
 
-def picture(file: Path, caption: str) -> str:
+def render_picture(file: Path, caption: str) -> str:
     """Return a figure as HTML that contains a PNG file."""
     return str(_PARTS.picture(base64.b64encode(file.read_bytes()).decode('ascii'), caption))
 
 
-def pictures(figures: Iterable[str]) -> str:
+def render_pictures(figures: Iterable[str]) -> str:
     """Return figures as HTML, as many side by side as the screen has room for."""
     return str(_PARTS.pictures(figures))
