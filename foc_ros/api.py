@@ -203,8 +203,8 @@ class Solution(types.Solution):
         Times [s], mean positions [m], and mean and covariance of the state: position, velocity and what else the plant has.
     control, effort : ndarray of shape (N, 2), float
         Jerk [m/s^3] for the triple integrator, force [N] for the damped mass; the sum of its squares.
-    eta : float
-        Probability of avoidance that the solution achieves for each obstacle and step.
+    eta, problem : float, Problem
+        Probability of avoidance that the solution achieves for each obstacle and step, and the problem that was solved.
     """
 
     label: str = ''
