@@ -1,12 +1,25 @@
-# make setup [PYTHON=python3.12] [ROS=wheels|system]   a .venv with everything; re-run only when needed
-# make demo | test | lint | doc | bench | pages | clean
-# make colcon | fuzz | soak | stops   the long checks: colcon build and test, many messages, ten minutes of faults, 200 signals
+# make setup [PYTHON=python3.12] [ROS=wheels|system]   create .venv with everything; repeated only if something has changed
+# make check       lint, and the tests that run within one process: less than a minute on two cores
+# make test        all tests but the long ones: less than three minutes
+# make test-long   the long studies, tests under load and the commands of the documentation
+#                  test/tiers.py lists the long tests (mark `long`) and finds those that start another process, a ROS graph or a
+#                  browser (mark `process`); make check is pytest -m 'not long and not process'
+# make lint        ruff, mypy and the import contracts
+# make demo        the demo: the node and the packaged recording
+# make doc         the documentation as HTML, in build/doc/index.html
+# make bench       the benchmark; OPTIONS=--quick for a first look, --json, --markdown, '--only NAME'
+# make pages       files that are derived from the parameters in foc_ros/core/config.py
+# make colcon      build, start, lint and test with colcon, as in a ROS workspace
+# make fuzz        100,000 random messages
+# make soak        ten minutes of a node among faulty publishers
+# make stops       a node that is stopped 200 times
+# make clean       remove everything that these targets have made
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# wheels: rclpy from the package index into .venv; system: the rclpy of the ROS installation that is sourced.
-# What setup chose holds for the other targets.
+# wheels: install rclpy from the package index into .venv; system: use rclpy of the ROS installation that is sourced.
+# The other targets use what setup has chosen.
 ROS ?= $(if $(wildcard $(VENV)/.setup-system),system,wheels)
 STAMP := $(VENV)/.setup-$(ROS)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --retries 10 --timeout 120
@@ -14,7 +27,7 @@ WORKERS ?= auto
 
 export ROS_LOG_DIR := $(CURDIR)/build/ros_log
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
-# A ROS in the surrounding shell must not mix with the one in .venv; the wheels' own loader sets these anew for every process.
+# A ROS installation of the surrounding shell must not mix with the one in .venv. The loader of the wheels sets these variables itself.
 ifeq ($(ROS),wheels)
 EXTRAS := ros,report,test
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV)
@@ -23,31 +36,46 @@ else ifeq ($(ROS),system)
 EXTRAS := report,test
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 VENV_OPTIONS := --system-site-packages
-# the pytest plugins of a ROS installation are for launch tests, and older than our pytest
+# the pytest plugins of a ROS installation are for launch tests and do not fit this pytest
 export PYTEST_DISABLE_PLUGIN_AUTOLOAD := 1
 export PYTEST_ADDOPTS := -p xdist.plugin -p pytest_timeout
 else
 $(error ROS is wheels or system, got '$(ROS)')
 endif
 
-.PHONY: setup demo test lint doc bench pages colcon fuzz soak stops clean
+TEST = ROS_PYTHON_CHECK_FIELDS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
+
+.PHONY: setup help check test test-long lint demo doc bench pages colcon fuzz soak stops clean
 
 setup: $(STAMP)
 ifneq ($(origin PYTHON),file)
 	@test "$$($(BIN)/python -V)" = "$$($(PYTHON) -V)" || { echo "make: .venv is $$($(BIN)/python -V), not $$($(PYTHON) -V): make clean first" >&2; exit 1; }
 endif
+	@echo 'setup: ready'
 
 $(STAMP): setup.py setup.cfg pyproject.toml
+	@echo 'setup: creating .venv'
 	@test -e $@ || $(PYTHON) -m venv --clear $(VENV_OPTIONS) $(VENV) || { echo 'make: no venv in $(PYTHON); on Debian and Ubuntu: apt install python3-venv' >&2; exit 1; }
-	$(PIP) install --quiet --editable '.[$(EXTRAS)]'
-	$(BIN)/python -c 'import foc_ros.core.pipeline'  # compiles the solver's kernels, which takes some seconds once
-	touch $@
+	@echo 'setup: installing foc_ros[$(EXTRAS)], one to three minutes'
+	@$(PIP) install --quiet --editable '.[$(EXTRAS)]'
+	@echo "setup: compiling the solver's kernels, one to three minutes once"
+	@$(BIN)/python -c 'import foc_ros.core.pipeline'
+	@touch $@
+
+help:
+	@sed -n 's/^# //p; /^$$/q' Makefile
+
+check: lint
+	$(TEST) -m 'not long and not process'
+
+test: $(STAMP)
+	$(TEST) -m 'not long'
+
+test-long: $(STAMP)
+	$(TEST) -m long
 
 demo: $(STAMP)
 	$(BIN)/python -m foc_ros demo
-
-test: $(STAMP)
-	ROS_PYTHON_CHECK_FIELDS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
 
 lint: $(STAMP)
 	$(BIN)/ruff check
@@ -59,7 +87,7 @@ colcon:
 	PYTHON=$(PYTHON) scripts/colcon_check
 
 fuzz: $(STAMP)
-	FOC_ROS_FUZZ=100000 ROS_PYTHON_CHECK_FIELDS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4 --timeout 3600 test/test_fuzz.py
+	FOC_ROS_FUZZ=100000 $(TEST) --timeout 3600 test/test_fuzz.py
 
 soak: $(STAMP)
 	$(BIN)/python scripts/soak.py --minutes 10
@@ -67,27 +95,29 @@ soak: $(STAMP)
 stops: $(STAMP)
 	$(BIN)/python scripts/stops.py --count 100
 
-# build/doc/index.html; what Sphinx warns of, such as a link that leads nowhere, fails
+# a warning of Sphinx, such as a link to a page that does not exist, is a failure
 doc: $(VENV)/.doc
 	$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --quiet --fresh-env doc build/doc
 
 $(VENV)/.doc: $(STAMP)
-	$(PIP) install --quiet --editable '.[doc]'
+	@echo 'doc: installing Sphinx'
+	@$(PIP) install --quiet --editable '.[doc]'
 	touch $@
 
-# What it compares with is large, and installed only for this. OPTIONS=--quick for a look, --json, --markdown, '--only NAME'
+# the peers are large and are installed only for this
 bench: $(VENV)/.bench
 	$(BIN)/python benchmarks/run.py $(OPTIONS)
 
 $(VENV)/.bench: $(STAMP)
-	$(PIP) install --quiet --editable '.[bench]'
+	@echo 'bench: installing the peers'
+	@$(PIP) install --quiet --editable '.[bench]'
 	touch $@
 
-# What is derived from foc_ros/foc/config.py
 pages: $(STAMP)
 	$(BIN)/python -m foc_ros.ros.parameters > config/foc.yaml
 	$(BIN)/python scripts/make_parameter_page.py
 
 clean:
+	rm -rf doc/auto_examples doc/sg_execution_times.rst
 	rm -rf $(VENV) build dist install log demo_output paper_output *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,4 +1,4 @@
-"""The scenes that are timed: drawn from seeds, one metre-scale reach of 0.3 to 0.4 m in 1 s."""
+"""The scenes that are timed. They are drawn from seeds; each is a reach of 0.36 m in 1 s."""
 
 from __future__ import annotations
 
@@ -22,87 +22,86 @@ RATE_HZ = 100.0
 GOAL = np.array([0.36, 0.0])
 START_NS = 1_000_000_000
 DRIFT = np.array([0.01, 0.004])
-"""Velocity of the hand that makes its mind up [m/s]."""
+"""Velocity of a hand whose movement has not begun [m/s]."""
 TRACKER_STDDEV = 0.0001
-"""Noise of the measured positions [m]."""
+"""Standard deviation of the measured positions [m]."""
 
 
-def three_obstacles() -> Obstacles:
-    """Three circles with a way past the left of all. IPOPT ends in the same minimum here; not in every scene."""
+def build_obstacles() -> Obstacles:
+    """Return three circles that can all be passed on the left. IPOPT ends in the same minimum here, but not in every scene."""
     return make_obstacles([[0.12, -0.01], [0.16, -0.02], [0.2, -0.05]], [0.03, 0.025, 0.025], [0.003, 0.002, 0.002])
 
 
-def guess_left(steps: int = 50, amplitude: float = 0.09) -> Array:
-    """Minimum-jerk straight line bowed to the left, (N + 1, 2) [m]."""
+def build_guess(steps: int = 50, amplitude: float = 0.09) -> Array:
+    """Return a minimum-jerk straight line bowed to the left, (N + 1, 2) [m]."""
     s = np.arange(steps + 1) / steps
     along = 10 * s**3 - 15 * s**4 + 6 * s**5
     return np.stack((GOAL[0] * along, amplitude * np.sin(np.pi * s)), axis=1)
 
 
-def one_class(steps: int = 50, obstacles: Obstacles | None = None, initial_mean: Array | None = None) -> Problem:
-    """Return the rest-to-rest problem of one class."""
-    scene = three_obstacles() if obstacles is None else obstacles
+def build_problem(steps: int = 50, initial_mean: Array | None = None) -> Problem:
+    """Return the reaching problem of one class, by default from rest at the origin."""
     horizon = triple_integrator_horizon(DURATION_S / steps, steps)
     initial = np.zeros(6) if initial_mean is None else initial_mean
-    return rest_to_goal(horizon, initial, GOAL, scene, np.array([NOISE, NOISE]), ETA)
+    return rest_to_goal(horizon, initial, GOAL, build_obstacles(), np.array([NOISE, NOISE]), ETA)
 
 
-def clusters(sizes: tuple[int, ...], seed: int = 0, radius: float = 0.008) -> Obstacles:
-    """Return rows of circles along the way with gaps of about 7 cm between them: one class more than there are rows.
+def build_rows(sizes: tuple[int, ...], seed: int = 0, radius: float = 0.008) -> Obstacles:
+    """Return rows of circles along the reach, one row for each size, with gaps of about 7 cm between them.
 
-    The circles of a row are too close together for the hand. All are near the start, where the spread of a movement with so much
-    noise still leaves room for it.
+    The circles of a row are too close together for the hand, so that there is one class more than there are rows. All rows are
+    near the start, where the variance of a movement with so much noise still fits into the gaps.
     """
     generator = np.random.default_rng(seed)
     heights = 0.07 * (np.arange(len(sizes)) - (len(sizes) - 1) / 2)
-    places = [(0.12 + 2.2 * radius * i, height) for height, size in zip(heights, sizes, strict=True) for i in range(size)]
-    centre = np.array(places) + generator.uniform(-0.002, 0.002, (len(places), 2))
-    return make_obstacles(centre, generator.uniform(0.7 * radius, radius, len(places)), 0.0005)
-
-
-def with_far(near: Obstacles, count: int, seed: int, nearest: float = 1.0) -> Obstacles:
-    """Return the obstacles and `count` more, `nearest` to 3 m from the middle of the way."""
-    generator = np.random.default_rng(seed)
-    angle, distance = generator.uniform(0, 2 * np.pi, count), generator.uniform(nearest, 3.0, count)
-    far = GOAL / 2 + distance[:, None] * np.stack((np.cos(angle), np.sin(angle)), axis=1)
-    radius = np.concatenate((near.radius, generator.uniform(0.01, 0.03, count)))
-    radius_stddev = np.concatenate((near.radius_stddev, np.full(count, 0.001)))
-    return make_obstacles(np.concatenate((near.centre, far)), radius, radius_stddev)
+    centres = [(0.12 + 2.2 * radius * i, height) for height, size in zip(heights, sizes, strict=True) for i in range(size)]
+    shifted = np.array(centres) + generator.uniform(-0.002, 0.002, (len(centres), 2))
+    return make_obstacles(shifted, generator.uniform(0.7 * radius, radius, len(centres)), 0.0005)
 
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """A hand among obstacles: parameters, goals (g, 2) [m], and the estimator's state at each tick."""
+    """A hand among obstacles: parameters, obstacles, goals (g, 2) [m], and the estimated hand state of each tick."""
 
     config: Config
     obstacles: Obstacles
     goals: Array
     hands: tuple[FilterState, ...]
 
-    def changed(self, values: dict[str, object]) -> Reach:
+    def change_config(self, values: dict[str, object]) -> Reach:
         """Return the reach with other parameters, by dotted name."""
         return replace(self, config=updated(self.config, values))
 
 
-def drifting(obstacles: Obstacles, candidates: int, goals: Array = GOAL[None], ticks: int = 40, seed: int = 3) -> Reach:
-    """Return ticks at 100 Hz of a hand that drifts too slowly for a movement to have begun, so that T stays what it is."""
+def add_far_obstacles(reach: Reach, count: int, seed: int, nearest: float = 1.0) -> Reach:
+    """Return the reach with `count` more obstacles at `nearest` to 3 m from the middle of the reach."""
+    generator, near = np.random.default_rng(seed), reach.obstacles
+    angle, distance = generator.uniform(0, 2 * np.pi, count), generator.uniform(nearest, 3.0, count)
+    far = GOAL / 2 + distance[:, None] * np.stack((np.cos(angle), np.sin(angle)), axis=1)
+    radius = np.concatenate((near.radius, generator.uniform(0.01, 0.03, count)))
+    radius_stddev = np.concatenate((near.radius_stddev, np.full(count, 0.001)))
+    return replace(reach, obstacles=make_obstacles(np.concatenate((near.centre, far)), radius, radius_stddev))
+
+
+def build_reach(obstacles: Obstacles, candidates: int, goals: Array = GOAL[None], ticks: int = 40, seed: int = 3) -> Reach:
+    """Return ticks at 100 Hz of a hand that drifts too slowly for a movement to have begun, so that T does not change."""
     values = {'foc.noise_x': NOISE, 'foc.noise_y': NOISE, 'foc.eta': ETA, 'homotopy.max_candidates': candidates}
     config = updated(Config(), values | {'duration.model': 'fixed', 'duration.fixed_s': DURATION_S, 'rate_hz': RATE_HZ})
     generator = np.random.default_rng(seed)
     state: FilterState | None = None
     hands = []
     for tick in range(ticks):
-        place = DRIFT * tick / RATE_HZ + generator.normal(0, TRACKER_STDDEV, 2)
-        state = update(state, HandSample(START_NS + round(tick * 1e9 / RATE_HZ), place), config.estimator).state
+        position = DRIFT * tick / RATE_HZ + generator.normal(0, TRACKER_STDDEV, 2)
+        state = update(state, HandSample(START_NS + round(tick * 1e9 / RATE_HZ), position), config.estimator).state
         hands.append(state)
     return Reach(config, obstacles, goals, tuple(hands[ticks // 4 :]))
 
 
-def tick_4x8() -> Reach:
-    """4 classes among 8 obstacles."""
-    return drifting(clusters((3, 2, 3)), 4)
+def build_4x8() -> Reach:
+    """Return a reach with 4 classes among 8 obstacles."""
+    return build_reach(build_rows((3, 2, 3)), 4)
 
 
-def tick_8x16() -> Reach:
-    """Up to 8 classes among 16 obstacles, towards two goals."""
-    return drifting(clusters((5, 6, 5), radius=0.005), 8, np.array([[0.36, 0.04], [0.36, -0.04]]))
+def build_8x16() -> Reach:
+    """Return a reach to two goals with up to 8 classes among 16 obstacles."""
+    return build_reach(build_rows((5, 6, 5), radius=0.005), 8, np.array([[0.36, 0.04], [0.36, -0.04]]))

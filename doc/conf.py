@@ -1,15 +1,62 @@
-"""The documentation as a web site: `make doc`. The pages read as well where they are, on the screen of a repository."""
+"""Settings of the documentation web site, which `make doc` builds with Sphinx. The pages can also be read in the repository."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 project = 'foc_ros'
 author = 'the foc_ros developers'
 copyright = f'{author}, Apache-2.0'  # noqa: A001 (the name that Sphinx wants)
 
-extensions = ['myst_parser']
-# links to headings, as repositories make them
+extensions = [
+    'myst_parser',
+    'numpydoc',
+    'sphinx.ext.autodoc',
+    'sphinx.ext.mathjax',
+    'sphinx_gallery.gen_gallery',
+]
+exclude_patterns = ['examples', 'sg_execution_times.rst']
+
+# links to headings, as repositories make them; formulas between dollar signs
 myst_heading_anchors = 4
-exclude_patterns = ['examples']
-# every link between pages and to files has to lead somewhere; those of the web are not asked for
+myst_enable_extensions = ['dollarmath', 'amsmath']
+# every link between pages and to files has to lead somewhere; links to the web are not checked
 nitpicky = True
+# types in docstrings are words such as array_like, and not links
+nitpick_ignore_regex = [('py:.*', '.*')]
+
+autodoc_default_options = {'member-order': 'bysource'}
+autodoc_typehints = 'none'
+add_module_names = False
+numpydoc_show_class_members = False
+numpydoc_attributes_as_param_list = True
+# single backticks in docstrings are code
+default_role = 'code'
+
+sphinx_gallery_conf = {
+    'examples_dirs': '../examples',
+    'gallery_dirs': 'auto_examples',
+    'filename_pattern': r'plot_',
+    'within_subsection_order': 'FileNameSortKey',
+    'abort_on_example_error': True,
+    'download_all_examples': False,
+    'show_memory': False,
+    'min_reported_time': 1e9,
+    'matplotlib_animations': False,
+    'remove_config_comments': True,
+}
 
 html_theme = 'furo'
 html_title = 'foc_ros'
+
+
+def escape_bars(*arguments: object) -> None:
+    """Let |U| in a docstring be the size of U, and not a substitution of reStructuredText."""
+    lines: list[str] = arguments[-1]  # type: ignore[assignment]
+    lines[:] = [line if '``' in line else line.replace('|', '\\|') for line in lines]
+
+
+def setup(app: object) -> None:
+    """Connect the function to Sphinx."""
+    app.connect('autodoc-process-docstring', escape_bars)  # type: ignore[attr-defined]

@@ -1,12 +1,12 @@
-"""Whether a change leaves predictions as they were: `record` the answers of replays before it, `compare` them after it.
+"""Check that a change leaves the predictions as they were: `record` replays before and after the change, and `compare` them.
 
-    python scripts/compare_predictions.py record BEFORE BAG...
-    python scripts/compare_predictions.py record AFTER BAG...
+    python scripts/compare_predictions.py record BEFORE BAG... [OPTIONS]
+    python scripts/compare_predictions.py record AFTER BAG... [OPTIONS]
     python scripts/compare_predictions.py compare BEFORE AFTER [--tolerance 1e-9]
 
-Each recording is replayed by `foc_ros replay BAG --json` in a process of its own; BAG may also be a folder of bags. Numbers are
-compared relative to the largest one of their kind in a candidate, or to 1 if that is less. Labels, statuses and the most likely
-class have to agree.
+Each recording is replayed by `foc_ros replay BAG --json OPTIONS` in a process of its own. BAG may also be a folder of bags.
+The difference of two numbers is relative to the largest number of their kind in a candidate, or to 1 if that is larger. Labels,
+statuses and the most likely class have to be equal.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from typing import Any
 import numpy as np
 
 NUMBERS = ('mean', 'stddev', 'effort', 'cost', 'eta', 'likelihood')
-MOST_SHOWN = 20
+MAX_PRINTED = 20
 
 
 def record(folder: Path, bags: list[Path], options: list[str]) -> None:
-    """Replay every bag and keep its answer in the folder, compressed."""
+    """Replay every bag and write the compressed answer into the folder."""
     folder.mkdir(parents=True, exist_ok=True)
     found = [bag for path in bags for bag in ([path] if _is_bag(path) else sorted(filter(_is_bag, path.iterdir())))]
     for bag in found:
@@ -43,52 +43,68 @@ def _is_bag(path: Path) -> bool:
     return path.suffix in ('.mcap', '.db3') or (path / 'metadata.yaml').exists()
 
 
+class Comparison:
+    """Differences between recorded predictions: counts, the largest relative difference of each number, and texts."""
+
+    def __init__(self, tolerance: float) -> None:
+        self.tolerance = tolerance
+        self.counts = Counter[str]()
+        self.largest = dict.fromkeys(NUMBERS, 0.0)
+        self.differences: list[str] = []
+
+    def compare_recordings(self, name: str, before: list[dict[str, Any]], after: list[dict[str, Any]]) -> None:
+        """Compare the predictions of one recording."""
+        if [each['stamp_ns'] for each in before] != [each['stamp_ns'] for each in after]:
+            self.differences.append(f'{name}: other stamps')
+        for one, other in zip(before, after, strict=False):
+            self.counts['predictions'] += 1
+            where = f'{name} at {one["stamp_ns"]} ns'
+            self.differences += [f'{where}: {text}' for text in self._compare_predictions(one, other)]
+
+    def _compare_predictions(self, one: dict[str, Any], other: dict[str, Any]) -> list[str]:
+        """Return the differences between two predictions."""
+        texts = []
+        if one['most_likely'] != other['most_likely']:
+            texts.append(f'most likely {one["most_likely"]} and {other["most_likely"]}')
+        first, second = ({each['label']: each for each in prediction['candidates']} for prediction in (one, other))
+        if first.keys() != second.keys():
+            texts.append(f'labels {sorted(first)} and {sorted(second)}')
+        for label in first.keys() & second.keys():
+            self.counts['candidates'] += 1
+            texts += [f'{label}: {text}' for text in self._compare_candidates(first[label], second[label])]
+        return texts
+
+    def _compare_candidates(self, one: dict[str, Any], other: dict[str, Any]) -> list[str]:
+        """Return the differences between two candidates."""
+        if one['status'] != other['status']:
+            return [f'{one["status"]} and {other["status"]}']
+        texts = []
+        for name in NUMBERS:
+            a, b = np.array(one[name], dtype=float), np.array(other[name], dtype=float)
+            difference = float(np.abs(a - b).max() / max(1.0, np.abs(a).max()))
+            self.largest[name] = max(self.largest[name], difference)
+            if not difference <= self.tolerance:
+                texts.append(f'{name} by {difference:.2g}')
+        return texts
+
+
 def compare(before: Path, after: Path, tolerance: float) -> int:
-    """Print how far the answers in two folders differ; return 1 if more than the tolerance, or in any word."""
+    """Print the differences between the answers in two folders; return 1 if there are any above the tolerance."""
+    comparison = Comparison(tolerance)
     names = sorted({file.name for folder in (before, after) for file in folder.glob('*.json.gz')})
-    counts, largest, differences = Counter[str](), dict.fromkeys(NUMBERS, 0.0), list[str]()
     for name in names:
         if not (before / name).exists() or not (after / name).exists():
-            differences.append(f'{name}: in one folder only')
+            comparison.differences.append(f'{name}: in one folder only')
             continue
         one, other = (json.loads(gzip.decompress((folder / name).read_bytes()))['predictions'] for folder in (before, after))
-        if [each['stamp_ns'] for each in one] != [each['stamp_ns'] for each in other]:
-            differences.append(f'{name}: other stamps')
-        for first, second in zip(one, other, strict=False):
-            counts['predictions'] += 1
-            where = f'{name} at {first["stamp_ns"]} ns'
-            differences += [f'{where}: {words}' for words in _differences(first, second, tolerance, largest, counts)]
+        comparison.compare_recordings(name, one, other)
+    counts, differences = comparison.counts, comparison.differences
     print(f'{len(names)} recordings, {counts["predictions"]} predictions, {counts["candidates"]} candidates')
-    print('largest relative differences: ' + ', '.join(f'{name} {value:.2g}' for name, value in largest.items()))
+    print('largest relative differences: ' + ', '.join(f'{name} {value:.2g}' for name, value in comparison.largest.items()))
     print(f'{len(differences)} differences above {tolerance:g} or in words')
-    for words in differences[:MOST_SHOWN]:
-        print(f'  {words}')
+    for text in differences[:MAX_PRINTED]:
+        print(f'  {text}')
     return 1 if differences else 0
-
-
-def _differences(
-    one: dict[str, Any], other: dict[str, Any], tolerance: float, largest: dict[str, float], counts: Counter[str]
-) -> list[str]:
-    """Return in words what differs between two predictions, and keep the largest differences of numbers."""
-    candidates = [{each['label']: each for each in prediction['candidates']} for prediction in (one, other)]
-    words = []
-    if one['most_likely'] != other['most_likely']:
-        words.append(f'most likely {one["most_likely"]} and {other["most_likely"]}')
-    if candidates[0].keys() != candidates[1].keys():
-        words.append(f'labels {sorted(candidates[0])} and {sorted(candidates[1])}')
-    for label in candidates[0].keys() & candidates[1].keys():
-        counts['candidates'] += 1
-        first, second = candidates[0][label], candidates[1][label]
-        if first['status'] != second['status']:
-            words.append(f'{label}: {first["status"]} and {second["status"]}')
-            continue
-        for name in NUMBERS:
-            a, b = np.array(first[name], dtype=float), np.array(second[name], dtype=float)
-            difference = float(np.abs(a - b).max() / max(1.0, np.abs(a).max()))
-            largest[name] = max(largest[name], difference)
-            if not difference <= tolerance:
-                words.append(f'{label}: {name} by {difference:.2g}')
-    return words
 
 
 def main() -> int:

@@ -1,38 +1,34 @@
 #!/usr/bin/env python3
-"""Measure what doc/accuracy.md tells, and renew its pictures and the blocks of numbers in it: a few minutes.
+"""Measure everything that doc/accuracy.md reports, and renew its figures and its blocks of numbers. It takes a few minutes.
 
 python scripts/make_accuracy_figures.py
-
-The ten reference cases are measured where the optional folder `shared` lies beside the checkout; else their block stays as it is.
 """
 
 from __future__ import annotations
 
-from accuracy import guarantee, literal, over_eta, page, reference
+from accuracy import algorithm1, effort_over_eta, guarantee, page, reference
 
 from foc_ros.reporting.plots import save
 
 
 def main() -> None:
-    """Measure everything, one part after the other."""
-    kept, curves, stepped, agreement = guarantee.measure(), over_eta.measure(), literal.measure(), reference.text()
-    for name, figure in {
-        'guarantee': guarantee.figure(kept),
-        'effort_over_eta': over_eta.figure(),
-        'algorithm1': literal.figure(stepped),
-    }.items():
+    """Measure one thing after the other, then write the figures and the blocks."""
+    outcomes, curves, ends = guarantee.measure(), effort_over_eta.measure(), algorithm1.measure()
+    figures = {
+        'guarantee': guarantee.draw(outcomes),
+        'effort_over_eta': effort_over_eta.draw(),
+        'algorithm1': algorithm1.draw(ends),
+    }
+    for name, figure in figures.items():
         save(figure, page.IMAGES / f'{name}.png')
     texts = {
-        'guarantee': guarantee.text(kept),
-        'outcomes': guarantee.outcomes(kept),
-        'curves': over_eta.text(curves),
-        'algorithm1': literal.text(stepped),
+        'guarantee': guarantee.format_excess(outcomes),
+        'outcomes': guarantee.format_statuses(outcomes),
+        'curves': effort_over_eta.format_curves(curves),
+        'algorithm1': algorithm1.format_ends(ends),
+        'reference': reference.format_agreement(),
     }
-    if agreement is None:
-        print('the reference cases are absent: their block stays as it is')
-    else:
-        texts['reference'] = agreement
-    page.write(texts)
+    page.write_blocks(texts)
     for name, text in texts.items():
         print(f'{name}\n{text}\n')
 

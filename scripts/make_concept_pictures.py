@@ -17,7 +17,6 @@ from matplotlib.figure import Figure
 from foc_ros.analysis.paper.reaching import Method, solve_class
 from foc_ros.analysis.paper.scenes import NOISE as PAPER_NOISE
 from foc_ros.analysis.paper.scenes import STRATEGY_SCENE
-from foc_ros.cli.solve import scene_problems, solve_scene
 from foc_ros.core.config import FocConfig, LikelihoodConfig
 from foc_ros.core.dynamics.noise import scale_noise, stack_noise
 from foc_ros.core.dynamics.plants import triple_integrator_horizon
@@ -26,22 +25,22 @@ from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import cold_start
+from foc_ros.core.reaching_scene import build_scene_problems, solve_scene
 from foc_ros.core.types import Array, Obstacles, Solution, make_obstacles
-from foc_ros.io.guess import guess_path
-from foc_ros.io.scene_file import load_scene
-from foc_ros.reporting.drawing import class_style, draw_legend, draw_scene, draw_ways, new_figure, stddev_ellipse, tag
-from foc_ros.reporting.plots import bounds_of, save
-from foc_ros.reporting.snapshots import candidate_views
+from foc_ros.io.scene_file import guess_path, load_scene
+from foc_ros.reporting.drawing import class_style, draw_candidates, draw_scene, draw_tag, new_figure, stddev_ellipse
+from foc_ros.reporting.plots import bounds_of, number_labels, save
+from foc_ros.reporting.snapshots import build_candidate_views
 
 PICTURES = Path(__file__).resolve().parents[1] / 'doc' / 'images'
 SCENE = Path(__file__).resolve().parents[1] / 'doc' / 'examples' / 'scene.yaml'
 STEPS, GOAL = 50, np.array([0.3, 0.0])
 NOISE, REFERENCE_S = 0.1, 0.02
-"""c for a step of so long [s]."""
+"""Noise coefficient c, and the step [s] that it holds for."""
 NOTHING = make_obstacles()
 CIRCLE = make_obstacles([[0.15, -0.01]], 0.03, 0.003)
 SLANTED = np.array([0.3, 0.12])
-"""A goal that takes effort on both axes."""
+"""A goal that needs effort on both axes."""
 SAMPLES = 20_000
 
 
@@ -65,7 +64,7 @@ def rolled(problem: Problem, solution: Solution, count: int) -> Array:
 
 
 def noise() -> Figure:
-    """Return two reaches, quick and slow: noise grows with effort."""
+    """Return the picture of a quick and a slow reach: noise grows with effort."""
     with new_figure(8.6, 3.4) as figure:
         paths, spread = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
         for number, (seconds, shift) in enumerate(((0.5, 0.05), (1.2, -0.05))):
@@ -127,21 +126,19 @@ def strategies() -> Figure:
 
 
 def classes() -> Figure:
-    """Return the ways that the search finds through the scene of the examples, solved."""
+    """Return the solved candidates of the scene of the examples."""
     scene = load_scene(SCENE)
-    ways = candidate_views(solve_scene(scene, scene_problems(scene)))
-    letters = {way.label: number for number, way in enumerate(ways)}
+    candidates = build_candidate_views(solve_scene(scene, build_scene_problems(scene)))
     with new_figure(7.4, 5.6) as figure:
-        axes, legend = figure.subplots(2, 1, height_ratios=(5.0, 0.2 * len(ways)))
-        draw_scene(axes, scene.obstacles, scene.goals, bounds_of(scene.obstacles, scene.goals, ways))
-        draw_ways(axes, ways, letters)
+        axes = figure.subplots()
+        draw_scene(axes, scene.obstacles, scene.goals, bounds_of(scene.obstacles, scene.goals, candidates))
+        draw_candidates(axes, candidates, number_labels(candidates))
         axes.plot(*scene.hand.mean[:2], marker='o', color='black')
-        draw_legend(legend, ways, letters)
     return figure
 
 
 def likelihood() -> Figure:
-    """Return what cost ratios mean for likelihoods, by beta."""
+    """Return the picture of likelihoods over cost ratios for three values of beta."""
     costs = np.array([1.0, 1.3, 2.0, 4.0])
     with new_figure(8.6, 3.2) as figure:
         shares, pair = figure.subplots(1, 2)
@@ -153,11 +150,11 @@ def likelihood() -> Figure:
             ratios = np.geomspace(1.0, 10.0, 60)
             first = [compute_likelihoods(np.array([1.0, ratio]), config)[0] for ratio in ratios]
             pair.plot(ratios, first, color=colour, linestyle=dash, linewidth=2.0)
-            tag(pair, (ratios[40], first[40]), f'{beta:g}', colour)
+            draw_tag(pair, (ratios[40], first[40]), f'{beta:g}', colour)
         shares.set_xticks(range(len(costs)), [f'{cost:g}' for cost in costs])
-        shares.set(xlabel='cost of a way, as a multiple of the best one', ylabel='likelihood')
+        shares.set(xlabel='cost of a candidate relative to the cheapest', ylabel='likelihood')
         shares.legend(frameon=False)
-        pair.set(xscale='log', xlabel='cost of the other way, of two', ylabel='likelihood of the cheaper one', ylim=(0.48, 1.02))
+        pair.set(xscale='log', xlabel='cost ratio of two candidates', ylabel='likelihood of the cheaper one', ylim=(0.48, 1.02))
         pair.set_xticks([1, 2, 5, 10], ['1', '2', '5', '10'])
         pair.minorticks_off()
     return figure

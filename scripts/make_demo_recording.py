@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Make the packaged recording: a simulated operator carries things to and fro among obstacles, each time another way round.
+"""Make the packaged recording: a simulated operator carries objects to and fro among obstacles, on a different path each time.
 
     python scripts/make_demo_recording.py [FILE]
 
-The movements owe nothing to the predictor they are shown to. Each reach is the minimum-jerk movement through hand-picked via
-points (a quintic spline, continuous up to the fourth derivative, with the passing times that make its squared jerk least; Flash
-and Hogan 1985). Its jerk, with noise in proportion, drives a triple integrator; a weak feedback brings the hand to the target all
-the same. What is recorded has the noise of a tracker on top. Everything is drawn from one seed.
+The movements are independent of the predictor. Each reach is the minimum-jerk movement through hand-picked via points: a quintic
+spline, continuous up to the fourth derivative, with the passing times that minimise its squared jerk (Flash and Hogan 1985). Its
+jerk with proportional noise drives a triple integrator, and a weak feedback brings the hand to the target. The recorded positions
+have the noise of a tracker in addition. All random numbers come from one seed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 from scipy.optimize import minimize
 
 from foc_ros.io.bags import TYPESTORE, BagWriter
-from foc_ros.ros.messages.input_messages import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.ros.messages.encode_inputs import goal_poses, hand_pose, obstacle_cloud
 from foc_ros.ros.messages.types import RosbagsTypes
 
 Array = NDArray[np.float64]
@@ -40,7 +40,7 @@ MOTOR_NOISE = 0.25
 """Standard deviation of the jerk's noise per unit of jerk, drawn once per step."""
 SENSOR_NOISE_M = 0.0007
 FEEDBACK_RATE = 3.5
-"""All three poles of the feedback [1/s]: slow beside a reach, so that the noise shows, and done within a rest."""
+"""The three poles of the feedback [1/s]: slow compared with a reach, so that the noise is visible, but faster than a rest."""
 
 NEAR = np.array([[0.0, -0.06], [0.0, 0.07]])
 FAR = np.array([[0.36, -0.065], [0.35, 0.08]])
@@ -54,7 +54,7 @@ OBSTACLES = [  # x, y, z, radius, radius_stddev, id
 
 @dataclass(frozen=True)
 class Reach:
-    """From one of the sites to one of the opposite ones: `via` (m, 2) points [m], duration [s], rest before it [s]."""
+    """A reach to one of the opposite sites: `via` (m, 2) points [m], duration [s], rest before it [s]."""
 
     outward: bool
     target: int
@@ -75,11 +75,11 @@ REACHES = (
 )
 REST_AT_END_S = 1.0
 SWITCH_S = 0.4
-"""Seconds after an arrival at which the goals change: what was carried is put down."""
+"""Time after an arrival at which the goals change: the object is put down."""
 
 
 def minimum_jerk(points: Array, duration_s: float) -> BSpline:
-    """Return the movement through `points` (m, 2), at rest at both ends, whose integral of squared jerk is least."""
+    """Return the movement through `points` (m, 2), at rest at both ends, with the smallest integral of squared jerk."""
 
     def through(inner: Array) -> BSpline:
         times = np.concatenate([[0.0], inner, [duration_s]])
@@ -99,9 +99,9 @@ def minimum_jerk(points: Array, duration_s: float) -> BSpline:
 
 
 def reference() -> tuple[Array, list[tuple[float, bool]]]:
-    """Return what the operator means to do, (n, 3, 2): position, velocity, acceleration at every step.
+    """Return the intended movement (n, 3, 2): position, velocity, acceleration at every step; and the changes of the goals.
 
-    With it, from which second on which sites are the goals: True for the far ones.
+    A change is the time [s] from which on the goals are the far sites (True) or the near ones (False).
     """
     parts: list[Array] = []
     goals = [(0.0, True)]
@@ -124,7 +124,7 @@ def _resting(at: Array, seconds: float) -> Array:
 
 
 def moved(intended: Array, random: np.random.Generator) -> Array:
-    """Return where the hand really goes, (n, 2): the intended jerk plus feedback plus noise, through the triple integrator."""
+    """Return the positions of the hand (n, 2): the triple integrator driven by intended jerk, feedback and noise."""
     dt, rate = STEP_S, FEEDBACK_RATE
     a = np.array([[1.0, dt, dt**2 / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
     b = np.array([dt**3 / 6, dt**2 / 2, dt])
@@ -140,7 +140,7 @@ def moved(intended: Array, random: np.random.Generator) -> Array:
 
 
 def messages() -> list[tuple[int, str, Any]]:
-    """Return every message of the recording in order: stamp [ns], topic, message."""
+    """Return all messages of the recording in order: stamp [ns], topic, message."""
     types, random = RosbagsTypes(TYPESTORE), np.random.default_rng(SEED)
     intended, switches = reference()
     truth = moved(intended, random)
@@ -165,7 +165,7 @@ def _stamp(seconds: float) -> int:
 
 
 def write(file: Path) -> None:
-    """Write the recording as one MCAP file, replacing what is there."""
+    """Write the recording as one MCAP file, replacing an existing file."""
     with tempfile.TemporaryDirectory() as directory:
         bag = Path(directory) / 'reaching'
         with BagWriter(bag) as writer:

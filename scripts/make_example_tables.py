@@ -15,29 +15,29 @@ from foc_ros.core.config import Config
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Obstacles
 from foc_ros.io.bags import BagReader
-from foc_ros.reporting.snapshots import Track, movements, track_of
+from foc_ros.reporting.snapshots import HandTrajectory, build_hand_trajectory
 from foc_ros.ros.intake import Intake
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORDING, EXAMPLES = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap', ROOT / 'doc' / 'examples'
 MOVEMENTS = (4, 6)
-"""Which movements of the recording, counted from 0."""
+"""Rows of the movements of the recording that are written."""
 LEAD_NS, EVERY = 200_000_000, 2
-"""How long before a movement its table begins, and of how many samples one is kept: 50 a second."""
+"""Time by which a table begins before its movement, and the number of samples of which one is kept: 50 per second."""
 
 
 def main() -> None:
-    """Write recordings.csv, obstacles.csv and goals.csv into the directory of the command line."""
+    """Write recordings.csv, obstacles.csv and goals.csv into the directory given on the command line."""
     parser = argparse.ArgumentParser(description='Make the tables of doc/examples.')
     parser.add_argument('directory', nargs='?', type=Path, default=EXAMPLES)
     directory = parser.parse_args().directory
-    track, obstacles, goals = read()
-    spans = movements(track, Config().estimator.onset_speed)
+    hand, obstacles, goals = read()
+    spans = hand.find_movements(Config().estimator.onset_speed)
     samples = []
     for name, number in zip('ab', MOVEMENTS, strict=True):
         begin_ns, end_ns = spans[number][0] - LEAD_NS, spans[number][1]
-        rows = track.between(begin_ns, end_ns)
-        for stamp, (x, y) in list(zip(track.stamps_ns[rows], track.positions[rows], strict=True))[::EVERY]:
+        rows = hand.between(begin_ns, end_ns)
+        for stamp, (x, y) in list(zip(hand.stamps_ns[rows], hand.positions[rows], strict=True))[::EVERY]:
             samples.append((name, f'{(stamp - begin_ns) / NANOSECONDS:.3f}', f'{x:.4f}', f'{y:.4f}'))
     discs = zip(obstacles.ids, obstacles.centre, obstacles.radius, obstacles.radius_stddev, strict=True)
     circles = [(name, *(f'{value:.4f}' for value in (*centre, radius, stddev))) for name, centre, radius, stddev in discs]
@@ -46,8 +46,8 @@ def main() -> None:
     _write(directory / 'goals.csv', ('x_m', 'y_m'), [tuple(f'{value:.4f}' for value in goal) for goal in goals])
 
 
-def read() -> tuple[Track, Obstacles, Array]:
-    """Return the hand, the obstacles and the goals of the recording, as the node takes its messages."""
+def read() -> tuple[HandTrajectory, Obstacles, Array]:
+    """Return the hand, the obstacles and the goals of the recording, decoded as in the node."""
     intake = Intake(Pipeline(Config()))
     samples: list[HandSample] = []
     with BagReader(RECORDING) as reader:
@@ -57,7 +57,7 @@ def read() -> tuple[Track, Obstacles, Array]:
                 samples.append(intake.sample)
     scene = intake.pipeline.scene
     assert scene.goals is not None
-    return track_of(samples), scene.obstacles(samples[-1].stamp_ns), scene.goals
+    return build_hand_trajectory(samples), scene.obstacles(samples[-1].stamp_ns), scene.goals
 
 
 def _write(file: Path, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

@@ -11,9 +11,9 @@ PAGE = Path(__file__).parents[1] / 'doc' / 'parameters.md'
 HEAD = """# Parameters
 
 Every parameter of the node, of `replay` and of the configuration in Python. This page is made from
-`foc_ros/foc/config.py` by `scripts/make_parameter_page.py`; `config/foc.yaml` holds the same defaults as a ROS 2 parameter file.
+`foc_ros/core/config.py` by `scripts/make_parameter_page.py`; `config/foc.yaml` holds the same defaults as a ROS 2 parameter file.
 
-A value outside its range, of the wrong type, or of an unknown name is refused, by name, value and bound, and nothing is changed.
+A value outside its range, of the wrong type, or of an unknown name is refused with name, value and bound, and nothing is changed.
 Read-only parameters are set at the start. The node alone also has `autostart` (true or false, default true, read-only).
 In Python, `likelihood.beta` is `Config().likelihood.beta`.
 """
@@ -30,22 +30,23 @@ def page() -> str:
     for parameter in parameters():
         name = parameter.name.rpartition('.')[0]
         if name != group:
-            text += f'\n## {name or "General"}\n\n{_meaning(name)}\n{TABLE}'
+            text += f'\n## {name or "General"}\n\n{_describe_group(name)}\n{TABLE}'
             group = name
-        text += _row(parameter)
+        text += _build_row(parameter)
     return text
 
 
-def _meaning(group: str) -> str:
+def _describe_group(group: str) -> str:
     """Return the first sentence of the docstring of a group's class."""
     document = type(getattr(Config(), group) if group else Config()).__doc__ or ''
     return document.strip().splitlines()[0]
 
 
-def _row(parameter: Parameter) -> str:
+def _build_row(parameter: Parameter) -> str:
     bound = parameter.bound
-    if bound.choices:
-        span = ', '.join(f'`{choice}`' for choice in bound.choices)
+    choices = tuple(bound.choices)
+    if choices:
+        span = ', '.join(f'`{choice}`' for choice in choices)
     else:
         span = '' if bound.low is None else f'{bound.low:g} .. {bound.high:g}'
     default = f'`{parameter.default}`' if parameter.default != '' else 'empty'

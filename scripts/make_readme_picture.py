@@ -13,48 +13,40 @@ from matplotlib.figure import Figure
 
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config
-from foc_ros.core.types import NANOSECONDS, HandSample
+from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import BagReader
-from foc_ros.reporting.drawing import draw_colour_bar, draw_hand, draw_legend, draw_scene, draw_ways, new_figure
-from foc_ros.reporting.plots import bounds_of, save
-from foc_ros.reporting.snapshots import Snapshot, Track, movements, snapshot_of_prediction, track_of
+from foc_ros.reporting.drawing import draw_candidates, draw_hand, draw_scene, new_figure
+from foc_ros.reporting.plots import bounds_of, number_labels, save
+from foc_ros.reporting.report import ReportCollector
+from foc_ros.reporting.snapshots import HandTrajectory, Snapshot, build_hand_trajectory
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORDING = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'
 PICTURE = ROOT / 'doc' / 'images' / 'scene.png'
 MOVEMENT, AFTER_S = 5, 0.02
-"""Which movement, counted from 1, and how long after its beginning [s]: when most is still open."""
+"""The movement, counted from 1, and the time after its beginning [s] of the prediction shown: early, with several candidates."""
 
 
-def replayed() -> tuple[Track, list[Snapshot]]:
-    """Return the hand's track and all predictions of the recording up to the wanted one and the end of its movement."""
-    samples: list[HandSample] = []
-    moments: list[Snapshot] = []
+def replayed() -> tuple[HandTrajectory, list[Snapshot]]:
+    """Return the hand's trajectory and all predictions of the recording."""
+    collected = ReportCollector()
     with BagReader(RECORDING) as reader:
         for step in Replay(Config()).steps(reader):
-            if step.sample is not None:
-                samples.append(step.sample)
-            if step.prediction is not None and step.scene.goals is not None:
-                obstacles = step.scene.obstacles(step.prediction.stamp_ns)
-                moments.append(snapshot_of_prediction(step.prediction, obstacles, step.scene.goals))
-    return track_of(samples), moments
+            collected.add(step)
+    return build_hand_trajectory(collected.samples), collected.snapshots
 
 
-def picture(track: Track, moments: list[Snapshot]) -> Figure:
-    """Return the picture of the wanted moment."""
-    span = movements(track, Config().estimator.onset_speed)[MOVEMENT - 1]
+def picture(hand: HandTrajectory, snapshots: list[Snapshot]) -> Figure:
+    """Return the picture of the chosen prediction."""
+    span = hand.find_movements(Config().estimator.onset_speed)[MOVEMENT - 1]
     wanted_ns = span[0] + int(AFTER_S * NANOSECONDS)
-    moment = min(moments, key=lambda each: abs(each.stamp_ns - wanted_ns))
-    numbers = {way.label: number for number, way in enumerate(moment.ways)}
-    positions = track.positions[track.between(*span)]
-    bounds = bounds_of(moment.obstacles, moment.goals, moment.ways, positions)
+    snapshot = min(snapshots, key=lambda each: abs(each.stamp_ns - wanted_ns))
+    bounds = bounds_of(snapshot.obstacles, snapshot.goals, snapshot.candidates, hand.positions[hand.between(*span)])
     with new_figure(7.6, 6.6) as figure:
-        scene, legend = figure.subplots(2, 1, height_ratios=[5.6, 0.8])
-        draw_scene(scene, moment.obstacles, moment.goals, bounds)
-        draw_ways(scene, moment.ways, numbers)
-        draw_hand(scene, track, moment.stamp_ns, span)
-        draw_colour_bar(figure, scene)
-        draw_legend(legend, moment.ways, numbers)
+        scene = figure.subplots()
+        draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
+        draw_candidates(scene, snapshot.candidates, number_labels(snapshot.candidates))
+        draw_hand(scene, hand, snapshot.stamp_ns, span)
     return figure
 
 

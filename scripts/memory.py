@@ -1,7 +1,7 @@
-"""Predictions one after the other in one process, memory watched: `python scripts/memory.py --ticks 100000`.
+"""Memory of a process that makes many predictions: `python scripts/memory.py --ticks 100000`.
 
-A hand goes to and fro among obstacles, so that ways and durations change all the time. Exit code 0 where the resident memory
-never grew by more than a twentieth after the first tenth of the ticks.
+A hand moves to and fro among obstacles, so that homotopy classes and durations keep changing. The exit code is 0 if the resident
+memory never grows by more than a twentieth after the first tenth of the ticks.
 """
 
 from __future__ import annotations
@@ -25,30 +25,30 @@ GOALS = np.array([[0.3, 0.0], [0.28, 0.1]])
 
 
 def resident_mb() -> float:
-    """Return the memory of this process that is resident [MB]."""
+    """Return the resident memory of this process [MB]."""
     pages = int(Path('/proc/self/statm').read_text().split()[1])
     return pages * os.sysconf('SC_PAGE_SIZE') / 1e6
 
 
 def main() -> int:
-    """Predict and watch."""
+    """Predict, and measure the memory."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--ticks', type=int, default=100_000, metavar='N', help='predictions (default: 100000)')
     ticks = parser.parse_args().ticks
     pipeline = Pipeline(CONFIG)
     pipeline.set_obstacles('cloud', OBSTACLES, None, 'world')
     pipeline.set_goals(GOALS, 'world')
-    generator, seen, predictions = np.random.default_rng(1), [], 0
+    generator, measured_mb, predictions = np.random.default_rng(1), [], 0
     for tick in track(range(ticks), description='ticks'):
         phase = 2 * np.pi * tick / 700
-        place = np.array([0.14 - 0.14 * np.cos(phase), 0.02 * np.sin(3.1 * phase)]) + generator.normal(0, 2e-4, 2)
-        pipeline.hand(HandSample(1_000_000_000 + 10_000_000 * tick, place, 0.0, 'world'))
+        position = np.array([0.14 - 0.14 * np.cos(phase), 0.02 * np.sin(3.1 * phase)]) + generator.normal(0, 2e-4, 2)
+        pipeline.hand(HandSample(1_000_000_000 + 10_000_000 * tick, position, 0.0, 'world'))
         predictions += pipeline.due and pipeline.predict() is not None
         if tick >= WARM_UP * ticks and tick % max(ticks // 50, 1) == 0:
-            seen.append(resident_mb())
-    growth = max(seen) / seen[0]
+            measured_mb.append(resident_mb())
+    growth = max(measured_mb) / measured_mb[0]
     print(f'{predictions} predictions of {ticks} ticks')
-    print(f'{seen[0]:.0f} MB after the first tenth, {max(seen):.0f} MB at most: x {growth:.3f}')
+    print(f'{measured_mb[0]:.0f} MB after the first tenth, {max(measured_mb):.0f} MB at most: x {growth:.3f}')
     return int(growth > GROWTH or predictions < 0.9 * ticks)
 
 

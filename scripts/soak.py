@@ -1,13 +1,13 @@
-"""A node in a process of its own, fed at 100 Hz with faults mixed in: `python scripts/soak.py --minutes 10`.
+"""Long run of a node in its own process, with inputs at 100 Hz and random faults: `python scripts/soak.py --minutes 10`.
 
-Exit code 0 where memory stayed flat after the warm-up, no thread or file was left, no good pose was lost, the 99th percentile of
-the cycle did not grow, nothing failed inside, and the node stopped without an error.
+The exit code is 0 if the memory does not grow after the warm-up, no thread or file remains open, no valid pose is lost, the 99th
+percentile of the cycle time does not grow, the node has no internal error, and it stops without an error.
 
-A good pose is lost where the node never heard it, or refused it. What it heard it follows; it predicts from the newest that is
-due, and counts the due ones that it passed over as dropped cycles: those are shown, and not lost.
+A valid pose is lost if the node never receives it or refuses it. The node predicts from the newest pose that is due, and counts
+the due poses before it as dropped cycles; these are printed and are not lost.
 
-Other programs of the machine make cycles longer too. So a fixed piece of work is timed all along, and the 99th percentile of the
-cycle is judged by what it grew more than that of the work.
+Other programs of the machine lengthen the cycles too. The script therefore times a fixed computation all along, and judges only
+the growth of the cycle's 99th percentile beyond that of the computation.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from foc_ros.cli.demo.environment import free_domain, private_environment
-from foc_ros.ros.messages.input_messages import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.ros.messages.encode_inputs import goal_poses, hand_pose, obstacle_cloud
 from foc_ros.ros.messages.types import RclpyTypes
 
 PERIOD_S = 0.01
@@ -37,15 +37,15 @@ REPORT_S = 5.0
 FRAME = 'world'
 GOALS = np.array([[0.3, 0.0, 0.0], [0.3, 0.1, 0.0]])
 ROWS = [(0.15, 0.02, 0.0, 0.03, 0.002, 7), (0.2, 0.08, 0.0, 0.02, 0.002, 8)]
-BAD_POSES = {'nowhere': 'hand_pose_invalid', 'camera': 'hand_wrong_frame', 'again': 'hand_duplicate', 'late': 'hand_late'}
-"""What the node counts a bad pose as; one that comes late just after a reset is a beginning, and none of them."""
-FAULTS = (*BAD_POSES, 'burst', 'cut', 'negative', 'flip', 'parameter', 'wrong parameter', 'crowd', 'clutch', 'reset')
+BAD_POSES = {'nan': 'hand_pose_invalid', 'camera': 'hand_wrong_frame', 'again': 'hand_duplicate', 'late': 'hand_late'}
+"""The node's count of each kind of bad pose; a late pose right after a reset starts a movement, and is not counted."""
+FAULTS = (*BAD_POSES, 'burst', 'truncated', 'negative', 'flip', 'parameter', 'wrong parameter', 'crowd', 'clutch', 'reset')
 BURST, BURST_NS = 20, 100_000
-"""Poses that come at once, as after a stall of the network, and what their stamps differ by at least [ns]."""
+"""Number of poses sent at once, as after a stall of the network, and the least difference of their stamps [ns]."""
 WARM_UP, GROWTH, SLOWER = 0.2, 1.05, 1.5
-"""Part of the time that is not judged; growth of memory, and of the 99th percentile, that still passes."""
+"""Share of the time that is not judged; largest accepted growth of the memory, and of the 99th percentile."""
 PROBE_TURNS, PROBE_ROUNDS = 25, 400_000
-"""Periods between two pieces of the fixed work, and how long one is: some milliseconds."""
+"""Number of periods between two fixed computations, and the length of one: some milliseconds."""
 
 
 def graph_environment(logs: Path) -> dict[str, str]:
@@ -54,9 +54,9 @@ def graph_environment(logs: Path) -> dict[str, str]:
 
 
 class Player:
-    """Plays hand, scene and faults into whatever node is there.
+    """Publishes hand poses, the scene and faults to a running node.
 
-    Attributes: sent, poses by kind; health, the newest figures; probes_s, how long the fixed work took each time [s].
+    Attributes: sent: number of poses by kind; health: the newest diagnostics; probes_s: times of the fixed computation [s].
     """
 
     def __init__(self) -> None:
@@ -70,8 +70,8 @@ class Player:
         from sensor_msgs.msg import PointCloud2
         from std_srvs.srv import SetBool, Trigger
 
-        # A tracker is a program of its own. In one with the scene, large clouds would fill the memory that DDS shares with the
-        # node, and poses, which are sent with best effort, would be lost before they left.
+        # The tracker has its own context: in one with the scene, large clouds would fill the memory that DDS shares with the
+        # node, and the poses, which are published as best effort, would be lost before they are sent.
         self._contexts = [rclpy.Context(), rclpy.Context()]
         for context in self._contexts:
             rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
@@ -82,17 +82,17 @@ class Player:
         kinds = {'obstacles': PointCloud2, 'goals': PoseArray}
         self._publishers = {name: self._node.create_publisher(kind, name, 10) for name, kind in kinds.items()}
         self._publishers['hand_pose'] = self._tracker.create_publisher(PoseStamped, 'hand_pose', qos_profile_sensor_data)
-        self._node.create_subscription(PointCloud2, 'foc/prediction', self._predicted, 10)
-        self._node.create_subscription(DiagnosticArray, '/diagnostics', self._judged, 10)
+        self._node.create_subscription(PointCloud2, 'foc/prediction', self._receive_prediction, 10)
+        self._node.create_subscription(DiagnosticArray, '/diagnostics', self._receive_health, 10)
         self._parameters = self._node.create_client(SetParametersAtomically, 'foc/set_parameters_atomically')
         self._engage = self._node.create_client(SetBool, 'foc/engage')
         self._reset = self._node.create_client(Trigger, 'foc/reset')
-        self._types, self._dice = RclpyTypes(), random.Random(1)
-        self._began = self._next = time.monotonic()
+        self._types, self._random = RclpyTypes(), random.Random(1)
+        self._start = self._next = time.monotonic()
         self._turn, self._stamp_ns = 0, 0
         self.probes_s: list[float] = []
         self.sent = dict.fromkeys(('good', *BAD_POSES), 0)
-        self.predictions, self.unfit = 0, 0
+        self.predictions, self.not_finite = 0, 0
         self.health: Mapping[str, str] = {}
 
     def __enter__(self) -> Player:
@@ -105,68 +105,68 @@ class Player:
             context.try_shutdown()
 
     @property
-    def connected(self) -> bool:
-        """Whether the node hears every input."""
+    def is_connected(self) -> bool:
+        """Whether the node subscribes to every input."""
         return all(publisher.get_subscription_count() for publisher in self._publishers.values())
 
     def spin(self, seconds: float) -> None:
-        """Listen for a while."""
+        """Process messages for a while [s]."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             self._executor.spin_once(timeout_sec=max(end - time.monotonic(), 0.0))
 
     def tick(self, *, faulty: bool = False) -> None:
-        """Send what is due in one period, and listen for the rest of it."""
+        """Publish the messages of one period, and process messages for the rest of it."""
         stamp_ns = max(self._node.get_clock().now().nanoseconds, self._stamp_ns + BURST_NS)
         if self._turn % 10 == 0:
             self._publishers['obstacles'].publish(obstacle_cloud(self._types, stamp_ns, FRAME, ROWS))
         if self._turn % 50 == 0:
             self._publishers['goals'].publish(goal_poses(self._types, stamp_ns, FRAME, GOALS))
-        self._pose(stamp_ns)
+        self._publish_pose(stamp_ns)
         if faulty and self._turn % 20 == 7:
-            self._fault(self._dice.choice(FAULTS), stamp_ns)
+            self._publish_fault(self._random.choice(FAULTS), stamp_ns)
         if self._turn % PROBE_TURNS == 3:
-            self._probe()
+            self._time_fixed_work()
         self._turn += 1
         self._next = max(self._next + PERIOD_S, time.monotonic() - PERIOD_S)
         self.spin(max(self._next - time.monotonic(), 0.0))
 
-    def _pose(self, stamp_ns: int, kind: str = 'good', frame: str = FRAME, x: float | None = None) -> None:
-        phase = (time.monotonic() - self._began) % 1.5 / 1.5
-        share = 0.5 - 0.5 * np.cos(2.0 * np.pi * phase)
-        position = np.array([0.28 * share if x is None else x, 0.05 * share, 0.1])
+    def _publish_pose(self, stamp_ns: int, kind: str = 'good', frame: str = FRAME, x: float | None = None) -> None:
+        phase = (time.monotonic() - self._start) % 1.5 / 1.5
+        progress = 0.5 - 0.5 * np.cos(2.0 * np.pi * phase)
+        position = np.array([0.28 * progress if x is None else x, 0.05 * progress, 0.1])
         self._publishers['hand_pose'].publish(hand_pose(self._types, stamp_ns, frame, position))
         self.sent[kind] += 1
         self._stamp_ns = max(self._stamp_ns, stamp_ns)
 
-    def _probe(self) -> None:
+    def _time_fixed_work(self) -> None:
         began = time.perf_counter()
         sum(range(PROBE_ROUNDS))
         self.probes_s.append(time.perf_counter() - began)
 
-    def _fault(self, name: str, stamp_ns: int) -> None:
+    def _publish_fault(self, name: str, stamp_ns: int) -> None:
         from rcl_interfaces.srv import SetParametersAtomically
         from rclpy.parameter import Parameter
         from std_srvs.srv import SetBool, Trigger
 
         if name in BAD_POSES:
             ns = stamp_ns - (50_000_000 if name == 'late' else 0)
-            x = np.nan if name == 'nowhere' else None
-            self._pose(ns, name, 'camera' if name == 'camera' else FRAME, x)
+            x = np.nan if name == 'nan' else None
+            self._publish_pose(ns, name, 'camera' if name == 'camera' else FRAME, x)
         elif name == 'burst':
             for i in range(1, BURST + 1):
-                self._pose(stamp_ns + i * BURST_NS)
-        elif name in ('cut', 'negative', 'crowd'):
+                self._publish_pose(stamp_ns + i * BURST_NS)
+        elif name in ('truncated', 'negative', 'crowd'):
             rows = [(0.0, 1.0 + 0.001 * i, 0.0, 0.001, 0.0, i) for i in range(10_000)] if name == 'crowd' else ROWS
             rows = [(0.0, 0.0, 0.0, -1.0, 0.0, 1)] if name == 'negative' else rows
             message = obstacle_cloud(self._types, stamp_ns, FRAME, rows)
-            if name == 'cut':
+            if name == 'truncated':
                 message.data = message.data[:-3]
             self._publishers['obstacles'].publish(message)
         elif name == 'flip':
             self._publishers['goals'].publish(goal_poses(self._types, stamp_ns, FRAME, GOALS[::-1]))
         elif name in ('parameter', 'wrong parameter') and self._parameters.service_is_ready():
-            eta = 5.0 if name == 'wrong parameter' else self._dice.uniform(0.5, 0.9)
+            eta = 5.0 if name == 'wrong parameter' else self._random.uniform(0.5, 0.9)
             request = SetParametersAtomically.Request(parameters=[Parameter('foc.eta', value=eta).to_parameter_msg()])
             self._parameters.call_async(request)
         elif name == 'clutch' and self._engage.service_is_ready():
@@ -175,17 +175,17 @@ class Player:
         elif name == 'reset' and self._reset.service_is_ready():
             self._reset.call_async(Trigger.Request())
 
-    def _predicted(self, cloud: Any) -> None:
+    def _receive_prediction(self, cloud: Any) -> None:
         self.predictions += 1
         rows = np.frombuffer(cloud.data, dtype=np.uint8).reshape(-1, cloud.point_step)
         numbers = np.ascontiguousarray(rows[:, :52]).view('<f4')
-        self.unfit += not np.isfinite(numbers).all()
+        self.not_finite += not np.isfinite(numbers).all()
 
-    def _judged(self, array: Any) -> None:
+    def _receive_health(self, array: Any) -> None:
         self.health = {entry.key: entry.value for entry in array.status[0].values}
 
 
-def measured(pid: int) -> dict[str, float]:
+def measure_process(pid: int) -> dict[str, float]:
     """Return resident memory [MB], threads and open files of a process."""
     lines = Path(f'/proc/{pid}/status').read_text('ascii').splitlines()
     status = dict(line.split(':', 1) for line in lines)
@@ -193,9 +193,9 @@ def measured(pid: int) -> dict[str, float]:
     return {'memory': int(status['VmRSS'].split()[0]) / 1024.0, 'threads': float(status['Threads']), 'files': float(files)}
 
 
-def begun(player: Player) -> None:
-    """Play until the node has heard of us: poses of before may never arrive, and are not counted."""
-    while not player.connected:
+def wait_for_node(player: Player) -> None:
+    """Publish until the node receives poses: earlier ones may be lost, and are not counted."""
+    while not player.is_connected:
         player.spin(0.1)
     while 'hand_pose refused' not in player.health:
         player.tick()
@@ -203,8 +203,8 @@ def begun(player: Player) -> None:
     player.sent['good'] = int(player.health['hand_pose refused'].split(' of ')[1])
 
 
-def soaked(process: subprocess.Popen[str], player: Player, seconds: float) -> list[dict[str, float]]:
-    """Play for a while; return what was measured each REPORT_S."""
+def soak(process: subprocess.Popen[str], player: Player, seconds: float) -> list[dict[str, float]]:
+    """Publish for a while, with faults; return one row of measurements for every REPORT_S."""
     table, began = [], time.monotonic()
     due = began + REPORT_S
     while (now := time.monotonic()) - began < seconds:
@@ -212,7 +212,7 @@ def soaked(process: subprocess.Popen[str], player: Player, seconds: float) -> li
         if now >= due:
             due += REPORT_S
             p50, _, p99 = player.health.get('cycle time p50, p99 [ms]', '').partition(', ')
-            row = {'time': now - began, **measured(process.pid), 'p50': float(p50 or 'nan'), 'p99': float(p99 or 'nan')}
+            row = {'time': now - began, **measure_process(process.pid), 'p50': float(p50 or 'nan'), 'p99': float(p99 or 'nan')}
             row['probe'] = 1e3 * statistics.fmean(player.probes_s)
             player.probes_s.clear()
             table.append(row)
@@ -220,8 +220,8 @@ def soaked(process: subprocess.Popen[str], player: Player, seconds: float) -> li
     return table
 
 
-def heard(player: Player) -> tuple[int, int]:
-    """Return how many poses never arrived, and how many good ones were refused, when the node has told of all that was sent."""
+def count_lost(player: Player) -> tuple[int, int]:
+    """Return how many poses were never received, and how many valid ones were refused, after the last diagnostics."""
     total, received = sum(player.sent.values()), 0
     for _ in range(50):
         player.spin(0.2)
@@ -232,8 +232,8 @@ def heard(player: Player) -> tuple[int, int]:
     return total - received, sum(max(count - player.sent[name], 0) for name, count in counted.items())
 
 
-def verdicts(table: list[dict[str, float]], player: Player, lost: int, refused: int) -> dict[str, bool]:
-    """Return what had to hold, in words, and whether it did."""
+def judge(table: list[dict[str, float]], player: Player, lost: int, refused: int) -> dict[str, bool]:
+    """Return every requirement as a text, and whether it is met."""
     after = [row for row in table if row['time'] >= WARM_UP * table[-1]['time']]
     third = max(len(after) // 3, 1)
     start, end = _medians(after[:third]), _medians(after[-third:])
@@ -242,12 +242,12 @@ def verdicts(table: list[dict[str, float]], player: Player, lost: int, refused: 
         f'memory {start["memory"]:.1f} to {end["memory"]:.1f} MB': end['memory'] <= GROWTH * start['memory'],
         f'threads {start["threads"]:.0f} to {end["threads"]:.0f}': end['threads'] <= start['threads'],
         f'files {start["files"]:.0f} to {end["files"]:.0f}': end['files'] <= start['files'],
-        f'p99 {start["p99"]:.1f} to {end["p99"]:.1f} ms, of the fixed work {start["probe"]:.1f} to {end["probe"]:.1f} ms': (
+        f'p99 {start["p99"]:.1f} to {end["p99"]:.1f} ms, of the computation {start["probe"]:.1f} to {end["probe"]:.1f} ms': (
             end['p99'] <= SLOWER * others * start['p99']
         ),
-        f'{lost} of {sum(player.sent.values())} poses lost, {refused} good ones refused': lost == refused == 0,
-        f'{player.predictions} predictions, {player.health["dropped cycles"]} passed over, {player.unfit} not finite': (
-            player.predictions > 0 and not player.unfit
+        f'{lost} of {sum(player.sent.values())} poses lost, {refused} valid ones refused': lost == refused == 0,
+        f'{player.predictions} predictions, {player.health["dropped cycles"]} dropped cycles, {player.not_finite} not finite': (
+            player.predictions > 0 and not player.not_finite
         ),
         f'internal error: {player.health["last internal error"]}': player.health['last internal error'] == 'none',
     }
@@ -258,22 +258,22 @@ def _medians(rows: list[dict[str, float]]) -> dict[str, float]:
 
 
 def main() -> int:
-    """Soak a node and say how it went."""
+    """Run a node for a long time and judge it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument('--minutes', type=float, default=10.0, help='how long (default: %(default)s)')
+    parser.add_argument('--minutes', type=float, default=10.0, help='duration (default: %(default)s)')
     seconds = 60.0 * parser.parse_args().minutes
     with tempfile.TemporaryDirectory(prefix='foc_ros_soak_') as logs:
         os.environ.update(graph_environment(Path(logs)))
         command = [sys.executable, '-m', 'foc_ros.ros.main', '--ros-args', '-p', 'homotopy.max_candidates:=2']
         with Player() as player, subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
-            begun(player)
-            table = soaked(process, player, seconds)
-            found = verdicts(table, player, *heard(player))
+            wait_for_node(player)
+            table = soak(process, player, seconds)
+            found = judge(table, player, *count_lost(player))
             process.send_signal(signal.SIGTERM)
             _, errors = process.communicate(timeout=30)
     found[f'exit code {process.returncode}'] = process.returncode == 0 and 'Traceback' not in errors
-    for words, right in found.items():
-        print(f'{"holds" if right else "FAILS"}: {words}')
+    for requirement, is_met in found.items():
+        print(f'{"holds" if is_met else "FAILS"}: {requirement}')
     return 0 if all(found.values()) else 1
 
 

@@ -1,7 +1,7 @@
-"""Stop a working node at random moments, by SIGTERM and SIGINT: `python scripts/stops.py --count 100`.
+"""Stops of a working node at random times, by SIGTERM and SIGINT: `python scripts/stops.py --count 100`.
 
-Each time a node process is fed, and told to stop at a moment up to SPREAD_S after it first could be. Exit code 0 where all ended
-with exit code 0 and without a traceback.
+Every node receives inputs and a signal at a time up to SPREAD_S after it installed its handlers. The exit code is 0 if all nodes
+ended with exit code 0 and without a traceback.
 """
 
 from __future__ import annotations
@@ -22,25 +22,25 @@ SPREAD_S = 2.0
 LIMIT_S = 30.0
 
 
-def catches(process: subprocess.Popen[str], number: int) -> bool:
-    """Return whether a process has a handler for a signal: before, the interpreter itself is not up yet."""
+def has_handler(process: subprocess.Popen[str], number: int) -> bool:
+    """Return whether a process has a handler for a signal; before that, the interpreter is still starting."""
     lines = Path(f'/proc/{process.pid}/status').read_text('ascii').splitlines()
     mask = next(int(line.split()[1], 16) for line in lines if line.startswith('SigCgt'))
     return bool(mask >> (number - 1) & 1)
 
 
-def stopped_once(player: Player, number: signal.Signals, after_s: float) -> str | None:
-    """Start a node, stop it; return what was wrong, None where nothing was."""
+def stop_one_node(player: Player, number: signal.Signals, after_s: float) -> str | None:
+    """Start a node and stop it; return what went wrong, None if nothing did."""
     command = [sys.executable, '-m', 'foc_ros.ros.main', '--ros-args', '-p', 'foc.steps:=20', '-p', 'homotopy.max_candidates:=2']
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
-        began = time.monotonic()
-        while not catches(process, signal.SIGTERM):
+        start_s = time.monotonic()
+        while not has_handler(process, signal.SIGTERM):
             time.sleep(0.005)
-            if time.monotonic() - began > LIMIT_S:
+            if time.monotonic() - start_s > LIMIT_S:
                 process.kill()
                 return 'did not start'
-        moment = time.monotonic() + after_s
-        while time.monotonic() < moment:
+        stop_s = time.monotonic() + after_s
+        while time.monotonic() < stop_s:
             player.tick()
         process.send_signal(number)
         try:
@@ -48,24 +48,24 @@ def stopped_once(player: Player, number: signal.Signals, after_s: float) -> str 
         except subprocess.TimeoutExpired:
             process.kill()
             return f'{number.name} after {after_s:.2f} s: did not end'
-    wrong = process.returncode != 0 or 'Traceback' in errors
-    return f'{number.name} after {after_s:.2f} s: exit code {process.returncode}, {errors.strip()[-400:]}' if wrong else None
+    has_failed = process.returncode != 0 or 'Traceback' in errors
+    return f'{number.name} after {after_s:.2f} s: exit code {process.returncode}, {errors.strip()[-400:]}' if has_failed else None
 
 
 def main() -> int:
-    """Stop count nodes by each signal and say how they ended."""
+    """Stop `count` nodes by each signal and print how they ended."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument('--count', type=int, default=100, help='stops by each signal (default: %(default)s)')
-    count, dice, failures = parser.parse_args().count, random.Random(0), 0
+    count, generator, failures = parser.parse_args().count, random.Random(0), 0
     with tempfile.TemporaryDirectory(prefix='foc_ros_stops_') as logs:
         os.environ.update(graph_environment(Path(logs)))
         with Player() as player:
             for turn in range(count):
                 for number in (signal.SIGTERM, signal.SIGINT):
-                    wrong = stopped_once(player, number, dice.uniform(0.0, SPREAD_S))
-                    failures += wrong is not None
-                    if wrong is not None or (turn + 1) % 10 == 0:
-                        print(f'{number.name} {turn + 1} of {count}: {wrong or "all right"}', flush=True)
+                    error = stop_one_node(player, number, generator.uniform(0.0, SPREAD_S))
+                    failures += error is not None
+                    if error is not None or (turn + 1) % 10 == 0:
+                        print(f'{number.name} {turn + 1} of {count}: {error or "no error"}', flush=True)
     print(f'{2 * count - failures} of {2 * count} stops with exit code 0 and no traceback')
     return min(failures, 1)
 

@@ -10,13 +10,13 @@ import numpy as np
 
 from foc_ros.core.config import Config, updated
 from foc_ros.io.bags import TYPESTORE, BagWriter
-from foc_ros.ros.messages.input_messages import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.ros.messages.encode_inputs import goal_poses, hand_pose, obstacle_cloud
 from foc_ros.ros.messages.types import RosbagsTypes
 from foc_ros.ros.parameters import dump_parameter_file
 
 TYPES = RosbagsTypes(TYPESTORE)
 CONFIG = updated(Config(), {'foc.strategy': 'fixed', 'foc.tau': 5e-4, 'foc.steps': 30})
-"""Every class of these recordings is solved with it, whatever eta the hand's uncertainty allows."""
+"""With it, every class of these recordings is solved, whatever eta is reachable."""
 FRAME = 'world'
 START_NS = 5_000_000_000
 SCENE = [(0.15, 0.0, 0.0, 0.03, 0.002, 7)]
@@ -28,7 +28,7 @@ def ns(seconds: float) -> int:
 
 
 def reach(seconds: float = 0.6, rate_hz: float = 50.0) -> list[tuple[float, np.ndarray]]:
-    """Times and positions of a minimum-jerk reach of 0.3 m in 1 s, bulging 5 cm to the left, as far as it goes in `seconds`."""
+    """Times and positions of a minimum-jerk reach of 0.3 m in 1 s, with a bulge of 5 cm to the left, for `seconds`."""
     times = np.arange(0.0, seconds, 1 / rate_hz)
     s = 10 * times**3 - 15 * times**4 + 6 * times**5
     return [(time, np.array([0.3 * part, 0.05 * np.sin(np.pi * part), 0.1])) for time, part in zip(times, s, strict=True)]
@@ -45,7 +45,7 @@ def messages(seconds: float = 0.6, rate_hz: float = 50.0, scene_hz: float = 5.0)
 
 
 def write_bag(path: Path, items: Iterable[tuple[str, int, Any]] | None = None, rename: dict[str, str] | None = None) -> Path:
-    """Write a bag; rename: other topic names, '' leaves a topic out."""
+    """Write a bag; rename: other topic names, '' omits a topic."""
     names = rename or {}
     with BagWriter(path) as writer:
         for topic, stamp_ns, message in messages() if items is None else items:

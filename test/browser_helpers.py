@@ -1,4 +1,4 @@
-"""A page in a headless Chromium, and the check that a report's page shows what its numbers say."""
+"""Pages in a headless Chromium, and the check that a report page shows the numbers of its report."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SWITCHES = (
 
 
 def programs() -> tuple[str, str]:
-    """Return Chromium and its driver, both of the system; skip where they are not, or fail where they are demanded."""
+    """Return the system's Chromium and its driver; skip the test if they are missing, or fail it if they are required."""
     browser = shutil.which('chromium') or shutil.which('chromium-browser') or shutil.which('google-chrome')
     driver = shutil.which('chromedriver')
     if browser is None or driver is None:
@@ -36,7 +36,7 @@ def programs() -> tuple[str, str]:
 
 @contextmanager
 def chromium(profile: Path) -> Iterator[Any]:
-    """Yield a browser with a fresh profile. It downloads nothing: neither itself nor its driver."""
+    """Yield a browser with a new profile. Nothing is downloaded."""
     webdriver = pytest.importorskip('selenium.webdriver', reason='selenium is not installed')
     browser, driver = programs()
     options = webdriver.ChromeOptions()
@@ -52,7 +52,7 @@ def chromium(profile: Path) -> Iterator[Any]:
 
 
 def show(browser: Any, page: Path, width: int = 1280, height: int = 900, dark: bool = False) -> list[str]:
-    """Open a page on a screen of a size; return what the browser complains of."""
+    """Open a page on a screen of the given size; return the messages of the browser's log."""
     browser.get_log('browser')
     screen = {'width': width, 'height': height, 'deviceScaleFactor': 1, 'mobile': width < 500}
     browser.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', screen)
@@ -75,15 +75,15 @@ DRAWN = """
 const box = document.getElementById('likelihoods');
 const [xaxis, yaxis] = [box._fullLayout.xaxis, box._fullLayout.yaxis];
 const traces = [...box.querySelectorAll('.scatterlayer .trace')];
-return box.data.map((trace, row) => !trace.meta || trace.meta.line === undefined ? null : {
-  line: trace.meta.line,
+return box.data.map((trace, row) => !trace.meta || trace.meta.track === undefined ? null : {
+  track: trace.meta.track,
   points: [...traces[row].querySelectorAll('.points path')].map((mark) => {
     const place = mark.transform.baseVal.consolidate().matrix;
     return [xaxis.p2d(place.e), yaxis.p2d(place.f)];
   }),
 }).filter((each) => each !== null);
 """
-"""The likelihoods as they stand on the screen: the places of the marks, from pixels back to seconds and shares."""
+"""The likelihoods as drawn: positions of the marks, converted from pixels to seconds and likelihoods."""
 MOVE = """
 const slider = document.getElementById('time');
 slider.value = arguments[0];
@@ -91,12 +91,12 @@ slider.dispatchEvent(new Event('input'));
 return Number(slider.value);
 """
 TABLE = """
-return [...document.querySelectorAll('#ways tr[data-line]')].map(
+return [...document.querySelectorAll('#candidates tr[data-track]')].map(
   (row) => [row.cells[3].textContent, Number(row.dataset.share), row.cells[1].textContent]);
 """
 PATHS = """
 const box = document.getElementById('scene');
-return [box.data.filter((trace) => trace.meta && trace.meta.way !== undefined).length,
+return [box.data.filter((trace) => trace.meta && trace.meta.candidate !== undefined).length,
         [...box.querySelectorAll('.scatterlayer .trace .js-line')].filter((line) => line.getAttribute('d')).length];
 """
 
@@ -104,8 +104,8 @@ return [box.data.filter((trace) => trace.meta && trace.meta.way !== undefined).l
 def check_report(browser: Any, directory: Path) -> None:
     """Assert that the page of a report works and shows the numbers of predictions.json.
 
-    No complaint and no request; every likelihood on the chart stands where it should; wherever the slider is, the table has the
-    candidates of that prediction and the scene their paths.
+    The browser logs no message and sends no request. The chart shows every likelihood at its position. At every position of the
+    slider, the table lists the candidates of that prediction and the scene shows their paths.
     """
     numbers = json.loads((directory / 'predictions.json').read_text(encoding='utf-8'))['predictions']
     assert show(browser, directory / 'index.html') == []
@@ -124,9 +124,9 @@ def _whole_recording(browser: Any) -> None:
 
 def _check_drawn(drawn: list[dict[str, Any]], numbers: list[dict[str, Any]]) -> None:
     marks = np.array(sorted(point for line in drawn for point in line['points']))
-    wanted = np.array(sorted([each['t_s'], way['likelihood']] for each in numbers for way in each['candidates']))
+    wanted = np.array(sorted([each['t_s'], candidate['likelihood']] for each in numbers for candidate in each['candidates']))
     assert marks.shape == wanted.shape
-    # a pixel is some milliseconds wide and less than a hundredth high; marks of one time are sorted among themselves
+    # A pixel is some milliseconds wide and less than a hundredth high; marks of equal time are sorted by likelihood.
     assert np.abs(np.sort(marks[:, 0]) - np.sort(wanted[:, 0])).max() < 2e-3
     marks[:, 0] = np.sort(wanted[:, 0])
     order = np.lexsort((marks[:, 1], marks[:, 0]))
@@ -139,12 +139,12 @@ def _check_slider(browser: Any, numbers: list[dict[str, Any]]) -> None:
         assert browser.execute_script(MOVE, int(stop)) == stop
         wanted = numbers[shown[stop]]
         assert browser.find_element('id', 'clock').text == f'{wanted["t_s"]:.2f} s'
-        told = browser.execute_script(TABLE)
-        assert [(label, share) for label, share, _ in told] == [
+        rows = browser.execute_script(TABLE)
+        assert [(label, share) for label, share, _ in rows] == [
             (each['label'], each['likelihood']) for each in wanted['candidates']
         ]
-        for _, share, text in told:
+        for _, share, text in rows:
             assert abs(float(text.removesuffix(' %')) - 100 * share) <= 0.5
-        ways, lines = browser.execute_script(PATHS)
-        assert ways == len(wanted['candidates'])
-        assert lines >= ways
+        candidates, lines = browser.execute_script(PATHS)
+        assert candidates == len(wanted['candidates'])
+        assert lines >= candidates

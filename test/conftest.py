@@ -1,4 +1,4 @@
-"""What all tests share: a private ROS graph, and that where ROS is required, a test that skips for want of it fails."""
+"""What all tests share: their marks, a private ROS graph, and failure instead of a skip where ROS is required."""
 
 import os
 from collections.abc import Iterator
@@ -7,18 +7,25 @@ import pytest
 from hypothesis import settings
 from message_helpers import message_types
 from ros_helpers import Graph, graph, prepare_environment
+from tiers import add_marks
 
 from foc_ros.ros.messages.types import MessageTypes
 
 prepare_environment()
 
-# The same examples in every run, and no time limit: a busy machine is no failure.
+# Every run uses the same examples, without a time limit, because a test must not fail on a busy machine.
 settings.register_profile('seeded', derandomize=True, deadline=None)
 settings.load_profile('seeded')
 
 REQUIRE_ROS = os.environ.get('FOC_ROS_REQUIRE_ROS') == '1'
-# Skips that remain skips: they want data that does not come with the sources, or a browser where none is demanded.
+# Tests that may be skipped even then: they need data that is not part of the sources, or a browser that is not required.
 ALLOWED = ('Skipped: optional data', 'Skipped: optional browser')
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests before pytest selects them by `-m`."""
+    add_marks(items)
 
 
 def _fail_if_skipped(report: pytest.TestReport | pytest.CollectReport) -> None:
@@ -46,12 +53,12 @@ def pytest_make_collect_report():
 
 @pytest.fixture
 def ros() -> Iterator[Graph]:
-    """A private ROS graph: own context, domain and executor."""
-    with graph() as made:
-        yield made
+    """Yield a ROS graph with a context, a domain and an executor of its own."""
+    with graph() as created:
+        yield created
 
 
 @pytest.fixture
 def types(request: pytest.FixtureRequest) -> MessageTypes:
-    """Message classes of the kind that the test is parametrised with (`message_helpers.both_kinds`)."""
+    """Return the message classes of the kind that the test is parametrised with (`message_helpers.both_kinds`)."""
     return message_types(request.param)

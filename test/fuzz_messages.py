@@ -1,4 +1,4 @@
-"""Messages of every input as hypothesis makes them: mostly plausible, often wrong, sometimes nonsense."""
+"""Hypothesis strategies for input messages: mostly plausible, often wrong, sometimes nonsense."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def markers(draw: st.DrawFn, types: MessageTypes) -> Any:
 
 
 def inputs(types: MessageTypes) -> st.SearchStrategy[tuple[str, Any]]:
-    """Return the strategy of (topic, message); the hand moves most."""
+    """Return the strategy of (topic, message); most messages are hand poses."""
     hands = st.builds(lambda *given: (topics.HAND, pose_stamped(types, *given)), POINTS, STAMPS, FRAMES)
     steady = st.builds(lambda at, stamp: (topics.HAND, pose_stamped(types, at, stamp)), st.tuples(*[PLACES] * 3), STAMPS)
     return st.one_of(

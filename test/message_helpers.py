@@ -1,4 +1,4 @@
-"""Input messages for tests, made for either kind of message class."""
+"""Input messages for tests, of rclpy and of rosbags."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SECOND = 1_000_000_000
 
 
 def message_types(kind: str) -> MessageTypes:
-    """Return the classes of 'rclpy' (skipping where it is missing) or 'rosbags'."""
+    """Return the message classes of 'rosbags' or of 'rclpy'; skip the test if rclpy is missing."""
     if kind == 'rosbags':
         return RosbagsTypes(STORE)
     ros_helpers.require_ros()
@@ -26,7 +26,7 @@ def message_types(kind: str) -> MessageTypes:
 
 
 both_kinds = pytest.mark.parametrize('types', ['rclpy', 'rosbags'], indirect=True)
-"""For tests with the fixture `types` of conftest: once with each kind of message."""
+"""Runs a test with the fixture `types` of conftest once for each library."""
 
 
 def pose(types: MessageTypes, position: Sequence[float]) -> Any:
@@ -48,7 +48,7 @@ def pose_array(types: MessageTypes, positions: Iterable[Sequence[float]], frame_
 
 
 def cloud(types: MessageTypes, table: np.ndarray, stamp_ns: int = SECOND, frame_id: str = 'world', **changes: Any) -> Any:
-    """Return the PointCloud2 of a structured array; changes: fields set differently afterwards."""
+    """Return the PointCloud2 of a structured array; changes: fields with other values."""
     fields = [
         types.make('sensor_msgs/msg/PointField', name=name, offset=offset, datatype=DATATYPES[kind.str[1:]], count=1)
         for name, (kind, offset, *_) in (table.dtype.fields or {}).items()

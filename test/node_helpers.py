@@ -1,4 +1,4 @@
-"""A FocNode and the operator's side of it, in one private graph."""
+"""A FocNode and publishers of its inputs, in one private graph."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ ROWS = [(0.15, 0.02, 0.0, 0.03)]
 CROWD = [(0.01 * (i % 100) - 0.35, 0.05 + 0.01 * (i // 100), 0.0, 0.004) for i in range(10_000)]
 GOALS = [(0.3, 0.0, 0.0)]
 QUICK = {'foc.steps': 20, 'homotopy.max_candidates': 2, 'scene.timeout_s': 0.0, 'estimator.hand_timeout_s': 0.0}
-"""Parameters with which a prediction takes little time, and a slow machine is no silent source."""
+"""Parameters for quick predictions, without timeouts that a slow machine would exceed."""
 RELIABLE_HAND = {'qos_overrides./hand_pose.subscription.reliability': 'reliable'}
-"""So that a test can tell when all it published has arrived."""
+"""Reliable hand poses, so that a test can wait until all of them are received."""
 
 
 def hand_path(count: int, rate_hz: float = 100.0, start_s: float = 10.0) -> list[Any]:
@@ -39,7 +39,8 @@ class Bench:
         from sensor_msgs.msg import PointCloud2
         from visualization_msgs.msg import MarkerArray
 
-        from foc_ros.ros.endpoints import OUTPUTS
+        from foc_ros.ros.messages.encode_prediction import OUTPUTS
+        from foc_ros.ros.messages.types import find_message_class
         from foc_ros.ros.node import FocNode
 
         parameters = QUICK | RELIABLE_HAND | options.pop('parameters', {})
@@ -60,13 +61,13 @@ class Bench:
             'goal_pose': PoseStamped,
         }
         self.publishers = {name: self.player.create_publisher(kind, name, 1000) for name, kind in inputs.items()}
-        self.received = {name: ros.collect(self.player, OUTPUTS[name], f'foc/{name}') for name in outputs}
+        self.received = {name: ros.collect(self.player, find_message_class(OUTPUTS[name][0]), f'foc/{name}') for name in outputs}
         self.diagnostics = ros.collect(self.player, DiagnosticArray, '/diagnostics')
         if connected:
             self.connect()
 
     def connect(self) -> None:
-        """Spin until publishers and subscriptions have found each other."""
+        """Spin until all publishers and subscriptions are matched."""
         self.ros.spin_until(self._connected, 'publishers and subscriptions')
 
     def _connected(self) -> bool:
@@ -76,37 +77,37 @@ class Bench:
         return heard and all(self.node._outputs[name].get_subscription_count() for name in self.received)
 
     def send(self, name: str, *messages: Any) -> None:
-        """Publish, and return when the node has every message in its queue: none was looked at yet."""
+        """Publish, and return when the node has every message in its queue, before it takes any."""
         from rclpy.duration import Duration
 
         for message in messages:
             self.publishers[name].publish(message)
         assert self.publishers[name].wait_for_all_acked(Duration(seconds=20)), f'{name} was not received'
 
-    def hear(self, name: str, *messages: Any) -> None:
-        """Publish, and spin until the node has looked at every message."""
+    def deliver(self, name: str, *messages: Any) -> None:
+        """Publish, and spin until the node has taken every message."""
         monitored = self.node._monitor._inputs
         before = monitored[name].received if name in monitored else 0
         self.send(name, *messages)
         self.ros.spin_until(lambda: name in monitored and monitored[name].received >= before + len(messages), f'{name} is taken')
 
-    def show_scene(
+    def publish_scene(
         self, rows: Sequence[tuple[float, ...]] = ROWS, goals: Sequence[Sequence[float]] = GOALS, stamp_s: float = 10.0
     ) -> None:
-        self.hear('obstacles', cloud(TYPES, obstacle_table(rows), round(stamp_s * SECOND)))
-        self.hear('goals', pose_array(TYPES, goals))
+        self.deliver('obstacles', cloud(TYPES, obstacle_table(rows), round(stamp_s * SECOND)))
+        self.deliver('goals', pose_array(TYPES, goals))
 
     def move(self, poses: Iterable[Any]) -> None:
-        """Send hand poses one by one, each when the one before was taken: the node keeps up."""
+        """Publish hand poses one by one, each after the node has taken the one before."""
         for pose in poses:
-            self.hear('hand_pose', pose)
+            self.deliver('hand_pose', pose)
 
     def wait_for(self, name: str, count: int) -> list[Any]:
         self.ros.spin_until(lambda: len(self.received[name]) >= count, f'{count} messages of {name}')
         return self.received[name]
 
     def health(self) -> Any:
-        """Return the status of what happened since the last one; the node's own timer is stopped, or it might tell it before."""
+        """Return the status since the last one; the node's own timer is stopped, because it would publish in between."""
         before = len(self._statuses())
         self.node._publish_health()
         self.ros.spin_until(lambda: len(self._statuses()) > before, 'diagnostics')

@@ -23,13 +23,13 @@ DOMAINS = range(1, 102)
 """Domains whose ports lie below the ephemeral ones of Linux."""
 
 ASK_AGAIN_S = 3.0
-"""How long a service's response may take before it counts as dropped, and the request is sent again."""
+"""Time after which a service's response counts as dropped, and the request is sent again [s]."""
 
 _turn = itertools.count(os.getpid() * 37)
 
 
 def prepare_environment() -> None:
-    """Checked message fields and a graph that stays on this host; to be called before a message class is imported."""
+    """Turn on field checks and restrict graphs to this host; to be called before a message class is imported."""
     os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ.setdefault('ROS_LOG_DIR', str(Path(tempfile.gettempdir()) / 'foc_ros_test_log'))
@@ -39,7 +39,7 @@ def prepare_environment() -> None:
 
 
 def require_ros() -> None:
-    """Skip where rclpy is missing; fail instead where FOC_ROS_REQUIRE_ROS=1."""
+    """Skip the test if rclpy is missing; fail if FOC_ROS_REQUIRE_ROS=1."""
     try:
         import rclpy  # noqa: F401
     except ImportError as error:
@@ -51,7 +51,7 @@ def require_ros() -> None:
 
 @contextmanager
 def free_domain() -> Iterator[int]:
-    """Hold a domain that no other test process on this host holds, by a lock that dies with the process."""
+    """Reserve a domain for this test process, by a lock that the end of the process releases."""
     for turn in itertools.islice(_turn, 10 * len(DOMAINS)):
         domain = DOMAINS[turn % len(DOMAINS)]
         with (Path(tempfile.gettempdir()) / f'foc_ros_test_domain_{os.getuid()}_{domain}.lock').open('w') as lock:
@@ -96,20 +96,20 @@ class Graph:
         return self.add(Node(name, context=self.context, **options))
 
     def collect(self, node: Any, message_type: Any, topic: str, qos: Any = 100) -> list[Any]:
-        """Subscribe, and return the list that the messages will be appended to."""
+        """Subscribe, and return the list to which the messages are appended."""
         received: list[Any] = []
         node.create_subscription(message_type, topic, received.append, qos)
         return received
 
     def spin_until(self, condition: Callable[[], bool], what: str, seconds: float = 20.0) -> None:
-        """Spin until the condition holds; fail, saying `what` was waited for, after a deadline."""
+        """Spin until the condition holds; fail after a deadline with `what` was awaited."""
         deadline = time.monotonic() + seconds
         while not condition():
             assert time.monotonic() < deadline, f'waited {seconds} s for: {what}'
             self.executor.spin_once(timeout_sec=0.02)
 
     def spin_for(self, seconds: float) -> None:
-        """Spin for a while: only to see that something does not happen."""
+        """Spin for a while, to check that something does not happen."""
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
             self.executor.spin_once(timeout_sec=0.02)
@@ -117,8 +117,8 @@ class Graph:
     def call(self, node: Any, service_type: Any, name: str, request: Any, seconds: float = 20.0) -> Any:
         """Call a service and return its response.
 
-        Asks again where none comes: a server that has not yet discovered its client's reader drops the response (rmw says
-        "client will not receive response"), so what is called must bear to be called twice.
+        The request is sent again if there is no response: a server that has not yet discovered its client's reader drops the
+        response (rmw logs "client will not receive response"). The service must therefore allow a second call.
         """
         client = node.create_client(service_type, name)
         self.spin_until(client.service_is_ready, f'service {name}', seconds)

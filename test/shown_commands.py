@@ -1,8 +1,7 @@
-"""The command lines that the documentation shows, and the ones of them that a test cannot run, each with its reason.
+"""The command lines that the documentation shows, and those of them that a test cannot run, each with its reason.
 
-The rule: every line of a block marked `console`, in README, CONTRIBUTING and doc/, is run as it stands, page by page and in
-order, unless it is listed in NOT_RUN. Lines of ENDLESS run until they are interrupted. A line that is listed and no longer shown
-is an error, too.
+Every line of a block marked `console`, in README, CONTRIBUTING and doc/, runs as it stands, page by page and in order, unless
+NOT_RUN lists it. Lines of ENDLESS run until they are interrupted. A line that is listed and no longer shown is an error, too.
 """
 
 from __future__ import annotations
@@ -14,22 +13,22 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *(ROOT / 'doc').glob('*.md')])
 
-SUDO, ROOT_OR_NETWORK = 'wants root', 'wants root or the network'
-ROS = 'wants the commands of a ROS installation'
-BY_CI = '.ci/run runs it'
+SUDO, ROOT_OR_NETWORK = 'needs root', 'needs root or the network'
+ROS = 'needs the commands of a ROS installation'
+BY_CI = '.ci/run runs this line'
 LONG = 'takes minutes'
-FIT = 'takes minutes; test_fit.py and test_evaluate.py do it with few predictions'
-SHELL = 'the test has the program on its path already'
+FIT = 'takes minutes; test_fit.py and test_evaluate.py run it with few predictions'
+SHELL = 'the program is on the path of the test already'
 NOT_RUN = {
     # README
     'make setup': BY_CI,
-    'make demo': 'test_demo.py plays the recording, and this would take another half a minute',
+    'make demo': 'takes half a minute; test_demo.py plays the recording',
     'echo "yaml file://$PWD/src/foc_ros/rosdep/foc_ros.yaml" | sudo tee /etc/ros/rosdep/sources.list.d/10-foc_ros.list': SUDO,
     'rosdep update && rosdep install --from-paths src --ignore-src': ROOT_OR_NETWORK,
-    'colcon build --packages-select foc_ros': 'scripts/colcon_check runs it',
-    'source install/setup.bash': 'scripts/colcon_check runs it',
+    'colcon build --packages-select foc_ros': 'scripts/colcon_check runs this line',
+    'source install/setup.bash': 'scripts/colcon_check runs this line',
     'ros2 run foc_ros foc_node --ros-args -r hand_pose:=/MTMR/measured_cp -r obstacles:=/perception/obstacles '
-    '--params-file install/foc_ros/share/foc_ros/config/foc.yaml': 'scripts/colcon_check starts what this starts',
+    '--params-file install/foc_ros/share/foc_ros/config/foc.yaml': 'scripts/colcon_check starts the same program',
     'python3 -m venv venv && . venv/bin/activate': ROOT_OR_NETWORK,
     "pip install '.[ros,report]'": ROOT_OR_NETWORK,
     'export AMENT_PREFIX_PATH=$VIRTUAL_ENV': SHELL,
@@ -38,7 +37,7 @@ NOT_RUN = {
     # calibration
     'foc_ros fit recordings --params foc.yaml --output operator.yaml': FIT,
     'foc_ros evaluate recordings --params operator.yaml --report report': FIT,
-    'foc_ros node --ros-args --params-file operator.yaml': 'test_fit.py starts the node with what was fitted',
+    'foc_ros node --ros-args --params-file operator.yaml': 'test_fit.py starts the node with the fitted parameters',
     # start
     '. .venv/bin/activate': SHELL,
     # beside_a_stack
@@ -53,10 +52,12 @@ NOT_RUN = {
     'export ROS_SECURITY_KEYSTORE=$PWD/keystore ROS_SECURITY_ENABLE=true ROS_SECURITY_STRATEGY=Enforce': ROS,
     'ros2 run foc_ros foc_node --ros-args --enclave /foc': ROS,
     # measuring
-    '.venv/bin/python scripts/make_accuracy_figures.py': f'{LONG}; test_accuracy_page.py runs its parts',
-    'foc_ros paper --output paper_output': 'takes half a minute; test_paper.py does the same on a coarser grid',
+    '.venv/bin/python scripts/make_accuracy_figures.py': f'{LONG}; test_accuracy_page.py checks the page',
+    'foc_ros paper --output paper_output': 'takes half a minute; test_paper.py runs the studies on a coarser grid',
     # CONTRIBUTING
+    'make check': BY_CI,
     'make test': BY_CI,
+    'make test-long': BY_CI,
     'make lint': BY_CI,
     'make doc': BY_CI,
     'make bench': LONG,
@@ -64,17 +65,18 @@ NOT_RUN = {
     'make fuzz': LONG,
     'make soak': LONG,
     'make stops': LONG,
-    '.ci/run': 'runs this test',
+    '.ci/run': 'it runs this test',
 }
 ENDLESS = (
     'foc_ros node --ros-args -r hand_pose:=/MTMR/measured_cp',
     'foc_ros node --ros-args -r hand_pose:=/MTMR/measured_cp -r obstacles:=/perception/obstacles -p plane:=xz',
     'python doc/examples/teleoperation_loop.py',
 )
+KNOWN_BLOCKS = ('console', 'python', 'yaml', 'text', '{toctree}', '{eval-rst}')
 
 
-def commands(page: Path) -> Iterator[str]:
-    """Yield the command lines of a page: continued ones as one, comments left out."""
+def find_commands(page: Path) -> Iterator[str]:
+    """Yield the command lines of a page; continued lines are joined, comments are removed."""
     for block in re.findall(r'^```console\n(.*?)^```', page.read_text('utf-8'), re.MULTILINE | re.DOTALL):
         for line in re.sub(r'\s*\\\n\s*', ' ', block).splitlines():
             command = re.sub(r'(^|\s+)#.*$', '', line).strip()
@@ -82,7 +84,7 @@ def commands(page: Path) -> Iterator[str]:
                 yield command
 
 
-def other_shell_blocks(page: Path) -> list[str]:
-    """Return the kinds of blocks of a page that might hold commands and escape the rule."""
+def find_unknown_blocks(page: Path) -> list[str]:
+    """Return the kinds of blocks of a page that are unknown, and might contain commands that are not run."""
     kinds = re.findall(r'^```([^\n`]*)\n(?:.*?)^```', page.read_text('utf-8'), re.MULTILINE | re.DOTALL)
-    return [kind for kind in kinds if kind not in ('console', 'yaml', 'text', '{toctree}')]
+    return [kind for kind in kinds if kind not in KNOWN_BLOCKS]

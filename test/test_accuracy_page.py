@@ -1,4 +1,4 @@
-"""doc/accuracy.md has a place for everything that its script measures, and nothing in it is left empty."""
+"""doc/accuracy.md has a block for everything that its script measures, and no block is empty."""
 
 import importlib
 import sys
@@ -13,25 +13,25 @@ page = importlib.import_module('accuracy.page')
 MEASURED = {'guarantee', 'outcomes', 'curves', 'algorithm1', 'reference'}
 
 
-def test_every_measurement_is_on_the_page_with_its_numbers_and_pictures():
+def test_the_page_shows_every_measurement_with_its_picture():
     text = page.PAGE.read_text(encoding='utf-8')
-    blocks = page.blocks(text)
+    blocks = page.find_blocks(text)
     assert set(blocks) == MEASURED
     for name, block in blocks.items():
         rows = block.strip().splitlines()
         assert len(rows) >= 7, name
-        assert len({row.count('|') for row in rows}) == 1, f'{name}: a row of another length'
+        assert len({row.count('|') for row in rows}) == 1, f'{name}: the rows differ in length'
     for picture in ('guarantee', 'effort_over_eta', 'algorithm1'):
         assert f'(images/{picture}.png)' in text
         assert (page.IMAGES / f'{picture}.png').is_file()
 
 
-def test_filling_a_block_leaves_the_rest_as_it_is():
+def test_replacing_a_block_leaves_the_rest_of_the_page_unchanged():
     text = page.PAGE.read_text(encoding='utf-8')
-    table = page.table(['a', 'b'], [['1', '2']])
+    table = page.format_table(['a', 'b'], [['1', '2']])
     assert table == '| a | b |\n| --- | --- |\n| 1 | 2 |'
-    once = page.filled(text, {'curves': table})
-    assert page.blocks(once) == page.blocks(text) | {'curves': f'\n{table}\n\n'}
-    assert page.filled(once, {'curves': page.blocks(text)['curves'].strip()}) == text
+    once = page.replace_blocks(text, {'curves': table})
+    assert page.find_blocks(once) == page.find_blocks(text) | {'curves': f'\n{table}\n\n'}
+    assert page.replace_blocks(once, {'curves': page.find_blocks(text)['curves'].strip()}) == text
     with pytest.raises(KeyError, match='no block speed'):
-        page.filled(text, {'speed': table})
+        page.replace_blocks(text, {'speed': table})

@@ -1,4 +1,4 @@
-"""Recordings in and out: nothing lost, nothing overwritten, every damage named."""
+"""Bags: no message is lost, no file is overwritten, and every damage is reported."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from foc_ros.core.errors import RecordingError
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
-from foc_ros.ros.messages.input_messages import hand_pose
+from foc_ros.ros.messages.encode_inputs import hand_pose
 
 
 def read(path: Path, chosen: dict[str, str] | None = None) -> list[Any]:
@@ -34,7 +34,7 @@ def mcap(bag: Path) -> Path:
     return bag / f'{bag.name}.mcap'
 
 
-def test_a_bag_comes_back_as_it_was_written(tmp_path: Path) -> None:
+def test_a_bag_is_read_as_it_was_written(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'one')
     assert sorted(each.name for each in bag.iterdir()) == ['metadata.yaml', 'one.mcap']
     with BagReader(bag) as reader:
@@ -45,12 +45,12 @@ def test_a_bag_comes_back_as_it_was_written(tmp_path: Path) -> None:
     assert_same(items, messages())
 
 
-def test_a_single_mcap_file_reads_alike(tmp_path: Path) -> None:
+def test_a_single_mcap_file_is_read_like_a_bag(tmp_path: Path) -> None:
     assert_same(read(mcap(write_bag(tmp_path / 'one'))), messages())
 
 
 @pytest.mark.parametrize('whole', [True, False])
-def test_sqlite_bags_read_alike(tmp_path: Path, whole: bool) -> None:
+def test_sqlite_bags_are_read_like_mcap_bags(tmp_path: Path, whole: bool) -> None:
     bag = tmp_path / 'old'
     with Writer(bag, version=8, storage_plugin=StoragePlugin.SQLITE3) as writer:
         connections: dict[str, Any] = {}
@@ -64,7 +64,7 @@ def test_sqlite_bags_read_alike(tmp_path: Path, whole: bool) -> None:
     assert_same([item for item in items if item.topic == '/hand_pose'], [each for each in messages() if each[0] == '/hand_pose'])
 
 
-def test_other_topics_are_left_out_but_counted(tmp_path: Path) -> None:
+def test_other_topics_are_skipped_and_counted(tmp_path: Path) -> None:
     extra = TYPES.make('std_msgs/msg/String', data='hello')
     bag = write_bag(tmp_path / 'more', [*messages(), ('/log', START_NS + 10**9, extra)])
     with BagReader(bag) as reader:
@@ -93,7 +93,7 @@ def test_an_existing_path_is_not_overwritten(tmp_path: Path) -> None:
     assert mcap(bag).read_bytes() == before
 
 
-def test_an_unfinished_bag_is_taken_away(tmp_path: Path) -> None:
+def test_an_unfinished_bag_is_removed(tmp_path: Path) -> None:
     def interrupted() -> Iterator[tuple[str, int, Any]]:
         yield from messages()
         raise KeyboardInterrupt
@@ -103,7 +103,7 @@ def test_an_unfinished_bag_is_taken_away(tmp_path: Path) -> None:
     assert not (tmp_path / 'half').exists()
 
 
-def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+def test_a_path_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / 'file').write_text('not a directory')
     with pytest.raises(RecordingError, match=re.escape(str(tmp_path / 'file' / 'bag'))):
         write_bag(tmp_path / 'file' / 'bag')
@@ -116,7 +116,7 @@ def test_a_missing_topic_is_named(tmp_path: Path, topic: str) -> None:
         read(bag)
 
 
-def test_an_empty_hand_topic_is_said(tmp_path: Path) -> None:
+def test_an_empty_hand_topic_is_refused(tmp_path: Path) -> None:
     with BagWriter(tmp_path / 'none') as writer:
         writer._writer.add_connection('/hand_pose', 'geometry_msgs/msg/PoseStamped', typestore=TYPESTORE)
         for topic, stamp_ns, message in messages():
@@ -126,14 +126,14 @@ def test_an_empty_hand_topic_is_said(tmp_path: Path) -> None:
         read(tmp_path / 'none')
 
 
-def test_a_bag_without_messages_is_said(tmp_path: Path) -> None:
+def test_a_bag_without_messages_is_refused(tmp_path: Path) -> None:
     with BagWriter(tmp_path / 'none'):
         pass
     with pytest.raises(RecordingError, match='holds no messages'):
         read(tmp_path / 'none')
 
 
-def test_two_types_on_one_topic_are_said(tmp_path: Path) -> None:
+def test_two_types_on_one_topic_are_refused(tmp_path: Path) -> None:
     bag = tmp_path / 'two'
     with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         for kind in ('geometry_msgs/msg/PoseArray', 'geometry_msgs/msg/PoseStamped'):
@@ -156,14 +156,14 @@ def test_two_types_on_one_topic_are_said(tmp_path: Path) -> None:
         (lambda path: path.write_bytes(b'\x89MCAP0\r\n'), 'cannot be read'),
     ],
 )
-def test_what_is_no_bag_is_said(tmp_path: Path, make: Any, reason: str) -> None:
+def test_a_path_that_is_no_bag_is_refused(tmp_path: Path, make: Any, reason: str) -> None:
     path = tmp_path / 'it.mcap'
     make(path)
     with pytest.raises(RecordingError, match=f'^{re.escape(str(path))}: {reason}'):
         read(path)
 
 
-def test_a_file_of_another_kind_is_said(tmp_path: Path) -> None:
+def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
     (tmp_path / 'notes.txt').write_text('hello')
     with pytest.raises(RecordingError, match=re.escape('expected a bag directory, a .mcap or a .db3 file')):
         read(tmp_path / 'notes.txt')
@@ -171,7 +171,7 @@ def test_a_file_of_another_kind_is_said(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('share', [0.02, 0.3, 0.6, 0.9, 0.999])
 @pytest.mark.parametrize('single', [True, False])
-def test_a_cut_bag_is_never_read_in_part(tmp_path: Path, share: float, single: bool) -> None:
+def test_a_truncated_bag_is_never_read_in_part(tmp_path: Path, share: float, single: bool) -> None:
     bag = write_bag(tmp_path / 'cut')
     whole = mcap(bag).read_bytes()
     mcap(bag).write_bytes(whole[: int(share * len(whole))])
@@ -179,7 +179,7 @@ def test_a_cut_bag_is_never_read_in_part(tmp_path: Path, share: float, single: b
         read(mcap(bag) if single else bag)
 
 
-def test_a_cut_sqlite_bag_is_said(tmp_path: Path) -> None:
+def test_a_truncated_sqlite_bag_is_refused(tmp_path: Path) -> None:
     bag = tmp_path / 'old'
     with Writer(bag, version=8, storage_plugin=StoragePlugin.SQLITE3) as writer:
         for topic, stamp_ns, message in messages(seconds=2.0):
@@ -193,7 +193,7 @@ def test_a_cut_sqlite_bag_is_said(tmp_path: Path) -> None:
         read(bag)
 
 
-def test_fewer_messages_than_the_bag_says_is_an_error(tmp_path: Path) -> None:
+def test_fewer_messages_than_the_bag_states_is_an_error(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'less')
     metadata = bag / 'metadata.yaml'
     count = len(messages())
@@ -204,7 +204,7 @@ def test_fewer_messages_than_the_bag_says_is_an_error(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('seed', range(40))
 def test_a_damaged_file_gives_all_messages_or_one_error(tmp_path: Path, seed: int) -> None:
-    """Whatever bytes are wrong, the answer is a RecordingError or a stream of full length."""
+    """Whatever bytes are wrong, reading raises RecordingError or gives all messages."""
     source = random.Random(seed)
     bag = write_bag(tmp_path / 'bad')
     data = bytearray(mcap(bag).read_bytes())

@@ -1,4 +1,4 @@
-"""The node beside a stand-in for a teleoperation stack, in two processes: engaged, handed over, stale, recovered."""
+"""The node and a substitute for a teleoperation stack, in two processes: engagement, handover, stale input, recovery."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The program as it is started: exit codes, one line for what is wrong, and no import that is not needed."""
+"""The program as a process: exit codes, errors in one line, and no unnecessary imports."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_help_names_every_command_and_imports_nothing_heavy() -> None:
 
 
 class Fake:
-    """A command that does as told."""
+    """A command with a given outcome."""
 
     def __init__(self, outcome: int | BaseException) -> None:
         self.outcome = outcome
@@ -80,7 +80,7 @@ def test_exit_codes(
     assert capsys.readouterr() == ('', line)
 
 
-def test_what_follows_node_is_left_to_ros(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_arguments_of_node_are_passed_to_ros(monkeypatch: pytest.MonkeyPatch) -> None:
     taken = []
 
     class Node(Fake):
@@ -94,7 +94,7 @@ def test_what_follows_node_is_left_to_ros(monkeypatch: pytest.MonkeyPatch) -> No
     assert taken == [ros]
 
 
-def test_a_reader_that_went_away_is_no_traceback() -> None:
+def test_a_closed_standard_output_gives_no_traceback() -> None:
     program = (
         'import sys\nfrom foc_ros.cli import main as command_line\n'
         'class Loud:\n'

@@ -1,4 +1,4 @@
-"""The demo end to end: the real node in its own process, fed over DDS, on the beginning of the packaged recording."""
+"""The demo end to end: the real node in its own process receives the first seconds of the packaged recording over DDS."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ def test_end_to_end(domain: int, tmp_path: Path, capsys: pytest.CaptureFixture[s
     before = dict(os.environ)
     assert perform(tmp_path / 'out', last_s=LAST_S, domain=domain) == 0
     assert dict(os.environ) == before
-    told = capsys.readouterr().out
-    assert 'report/index.html' in told
-    assert ' of 2.0 s   hand ' in told
+    printed = capsys.readouterr().out
+    assert 'report/index.html' in printed
+    assert ' of 2.0 s   hand samples ' in printed
     found = counted(tmp_path / 'out' / 'bag')
     assert (found['/hand_pose'], found['/obstacles'], found['/goals']) == (201, 11, 3)
     assert found['/foc/prediction'] > 0
@@ -64,7 +64,7 @@ def test_end_to_end(domain: int, tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 
 def test_the_live_predictions_are_those_of_the_recording(domain: int, tmp_path: Path) -> None:
-    """Every prediction carries the stamp of a hand pose that was sent, each stamp once, in order."""
+    """Every prediction has the stamp of a hand pose that was sent; the stamps increase."""
     from foc_ros.cli.demo.command import perform
 
     perform(tmp_path / 'out', last_s=1.0, domain=domain)
@@ -80,17 +80,17 @@ def test_the_live_predictions_are_those_of_the_recording(domain: int, tmp_path: 
 
 
 def start(domain: int, output: Path) -> tuple[subprocess.Popen[str], int]:
-    """Start a demo of its own and return it with the process id of its node, once the recording plays."""
+    """Start a demo as a process and return it with the process id of its node once the recording plays."""
     program = f"""
 import sys
 from pathlib import Path
-from foc_ros.cli.demo import command, node_process
-entered = node_process.NodeProcess.__enter__
+from foc_ros.cli.demo import command, environment
+entered = environment.NodeProcess.__enter__
 def enter(self):
     node = entered(self)
     print({STARTED!r} + str(node.pid), flush=True)
     return node
-node_process.NodeProcess.__enter__ = enter
+environment.NodeProcess.__enter__ = enter
 sys.exit(command.perform(Path({str(output)!r}), domain={domain}))
 """
     demo = subprocess.Popen(
@@ -122,9 +122,9 @@ def gone(pid: int) -> bool:
 def test_an_interrupt_ends_it_cleanly(domain: int, tmp_path: Path, number: int) -> None:
     demo, node = start(domain, tmp_path / 'out')
     demo.send_signal(number)
-    told, complaints = demo.communicate(timeout=60)
-    assert (demo.returncode, complaints) == (130, '')
-    assert told.splitlines()[-1].startswith('interrupted')
+    printed, errors = demo.communicate(timeout=60)
+    assert (demo.returncode, errors) == (130, '')
+    assert printed.splitlines()[-1].startswith('interrupted')
     assert gone(node)
     assert counted(tmp_path / 'out' / 'bag')['/hand_pose'] > 0
     assert not (tmp_path / 'out' / 'report').exists()
@@ -133,6 +133,6 @@ def test_an_interrupt_ends_it_cleanly(domain: int, tmp_path: Path, number: int) 
 def test_a_node_that_dies_is_told(domain: int, tmp_path: Path) -> None:
     demo, node = start(domain, tmp_path / 'out')
     os.kill(node, signal.SIGKILL)
-    _, complaints = demo.communicate(timeout=60)
+    _, errors = demo.communicate(timeout=60)
     assert demo.returncode == 1
-    assert complaints.splitlines() == ['foc_ros demo: the node ended with exit code -9: it printed nothing']
+    assert errors.splitlines() == ['foc_ros demo: the node ended with exit code -9: it printed nothing']

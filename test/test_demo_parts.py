@@ -1,4 +1,4 @@
-"""The parts of the demo that need no ROS: bookkeeping, display, the node's process, the output directory."""
+"""The parts of the demo that need no ROS: recorder, display, the node's process, the output directory."""
 
 from __future__ import annotations
 
@@ -16,105 +16,106 @@ import pytest
 from report_samples import START_NS, prediction
 from rich.console import Console
 
-from foc_ros.cli.demo import command, environment, node_process
-from foc_ros.cli.demo.display import Display
-from foc_ros.cli.demo.recorder import Recorder
+from foc_ros.cli.demo import command, environment
+from foc_ros.cli.demo.recorder import Recorder, show_live
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
 from foc_ros.core.types import Prediction
 from foc_ros.io.bags import TYPESTORE, Item
-from foc_ros.reporting.snapshots import snapshot_of_prediction
-from foc_ros.ros.messages.input_messages import goal_poses, hand_pose, obstacle_cloud
-from foc_ros.ros.messages.outputs import likelihood_array, prediction_cloud
+from foc_ros.reporting.snapshots import build_snapshot
+from foc_ros.ros.messages.encode_inputs import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.ros.messages.encode_prediction import likelihood_array, prediction_cloud
 from foc_ros.ros.messages.types import RosbagsTypes
 
 TYPES = RosbagsTypes(TYPESTORE)
 STEP_NS = 20_000_000
 
 
-def send_scene(ledger: Recorder) -> None:
+def send_scene(recorder: Recorder) -> None:
     goals = goal_poses(TYPES, START_NS, 'world', np.array([[0.3, 0.0, 0.1], [0.3, 0.12, 0.1]]))
     cloud = obstacle_cloud(TYPES, START_NS, 'world', [(0.15, 0.0, 0.1, 0.03, 0.003, 7)])
     for role, message in (('goals', goals), ('obstacles', cloud)):
-        ledger.sent(Item(role, f'/{role}', START_NS, message, b''), 0.0)
+        recorder.add_sent(Item(role, f'/{role}', START_NS, message, b''), 0.0)
 
 
-def send_hand(ledger: Recorder, number: int, now: float) -> None:
+def send_hand(recorder: Recorder, number: int, now: float) -> None:
     stamp_ns = START_NS + number * STEP_NS
-    ledger.sent(Item('hand_pose', '/hand_pose', stamp_ns, hand_pose(TYPES, stamp_ns, 'world', (0.0, 0.0, 0.1)), b''), now)
+    recorder.add_sent(Item('hand_pose', '/hand_pose', stamp_ns, hand_pose(TYPES, stamp_ns, 'world', (0.0, 0.0, 0.1)), b''), now)
 
 
-def answer(number: int) -> tuple[object, object, Prediction]:
+def messages(number: int) -> tuple[object, object, Prediction]:
     made = prediction(START_NS + number * STEP_NS, np.zeros(2), 0.3 + 0.01 * number)
     return prediction_cloud(made, 'xy', TYPES), likelihood_array(made, TYPES), made
 
 
 def filled(count: int = 5) -> Recorder:
-    ledger = Recorder(Config())
-    send_scene(ledger)
+    recorder = Recorder(Config())
+    send_scene(recorder)
     for number in range(count):
-        send_hand(ledger, number, now=0.02 * number)
-        cloud, table, _ = answer(number)
-        ledger.received('prediction', cloud, 0.02 * number + 0.005)
-        ledger.received('likelihoods', table, 0.02 * number + 0.006)
-    return ledger
+        send_hand(recorder, number, now=0.02 * number)
+        cloud, table, _ = messages(number)
+        recorder.add_received('prediction', cloud, 0.02 * number + 0.005)
+        recorder.add_received('likelihoods', table, 0.02 * number + 0.006)
+    return recorder
 
 
-def test_ledger_keeps_every_answer_with_its_scene() -> None:
-    ledger = filled()
-    assert [sample.stamp_ns for sample in ledger.samples] == [START_NS + n * STEP_NS for n in range(5)]
-    assert [moment.stamp_ns for moment in ledger.moments] == [START_NS + n * STEP_NS for n in range(5)]
-    moment = ledger.moments[3]
-    expected = snapshot_of_prediction(answer(3)[2], moment.obstacles, moment.goals)
-    assert [(way.label, way.likelihood) for way in moment.ways] == [(way.label, way.likelihood) for way in expected.ways]
-    assert moment.obstacles.ids == ('7',)
-    np.testing.assert_allclose(moment.goals, [[0.3, 0.0], [0.3, 0.12]])
-    np.testing.assert_allclose(ledger.delays, 0.005)
+def test_recorder_keeps_every_prediction_with_its_scene() -> None:
+    recorder = filled()
+    assert [sample.stamp_ns for sample in recorder.samples] == [START_NS + n * STEP_NS for n in range(5)]
+    assert [snapshot.stamp_ns for snapshot in recorder.snapshots] == [START_NS + n * STEP_NS for n in range(5)]
+    snapshot = recorder.snapshots[3]
+    expected = build_snapshot(messages(3)[2])
+    assert [(each.label, each.likelihood) for each in snapshot.candidates] == [
+        (each.label, each.likelihood) for each in expected.candidates
+    ]
+    assert snapshot.obstacles.ids == ('7',)
+    np.testing.assert_allclose(snapshot.goals, [[0.3, 0.0], [0.3, 0.12]])
+    np.testing.assert_allclose(recorder.delays, 0.005)
 
 
 @pytest.mark.parametrize('lost', ['prediction', 'likelihoods'])
-def test_ledger_pairs_on_after_a_loss(lost: str) -> None:
-    ledger = Recorder(Config())
-    send_scene(ledger)
+def test_recorder_pairs_messages_after_a_loss(lost: str) -> None:
+    recorder = Recorder(Config())
+    send_scene(recorder)
     for number in range(6):
-        send_hand(ledger, number, now=0.02 * number)
-        cloud, table, _ = answer(number)
-        # the table first: topics come in any order
+        send_hand(recorder, number, now=0.02 * number)
+        cloud, table, _ = messages(number)
+        # The two topics arrive in any order.
         for name, message in (('likelihoods', table), ('prediction', cloud)):
             if not (number == 2 and name == lost):
-                ledger.received(name, message, 0.02 * number)
-    assert [(moment.stamp_ns - START_NS) // STEP_NS for moment in ledger.moments] == [0, 1, 3, 4, 5]
+                recorder.add_received(name, message, 0.02 * number)
+    assert [(snapshot.stamp_ns - START_NS) // STEP_NS for snapshot in recorder.snapshots] == [0, 1, 3, 4, 5]
 
 
-def test_ledger_counts_the_last_second() -> None:
-    ledger = Recorder(Config())
-    send_scene(ledger)
+def test_recorder_counts_messages_of_the_last_second() -> None:
+    recorder = Recorder(Config())
+    send_scene(recorder)
     for number in range(100):
-        send_hand(ledger, number, now=0.025 * number)
-    assert ledger.hand_rate(0.025 * 99) == 40
-    assert ledger.hand_rate(0.025 * 99 + 2.0) == 0
+        send_hand(recorder, number, now=0.025 * number)
+    assert recorder.rates(0.025 * 99) == (40, 0)
+    assert recorder.rates(0.025 * 99 + 2.0) == (0, 0)
 
 
-def shown(ledger: Recorder, terminal: bool, times: np.ndarray) -> str:
+def shown(recorder: Recorder, terminal: bool, times: np.ndarray) -> str:
     screen = io.StringIO()
     console = Console(file=screen, force_terminal=terminal, width=110)
-    with Display(ledger, START_NS, 5.0, console) as display:
+    with show_live(recorder, START_NS, 5.0, console) as show:
         for now in times:
-            display.update(float(now))
+            show(float(now))
     return screen.getvalue()
 
 
-def test_without_a_terminal_one_plain_line_a_second() -> None:
+def test_without_a_terminal_a_line_is_printed_each_second() -> None:
     lines = shown(filled(), False, np.arange(0.0, 3.0, 0.01)).splitlines()
     assert len(lines) == 3
-    assert lines[0].startswith(' 0.1 of 5.0 s   hand 5/s, predictions 5/s, after 5 ms')
+    assert lines[0].startswith(' 0.1 of 5.0 s   hand samples 5/s, predictions 5/s, delay 5 ms')
     assert '56 % goal0:-1' in lines[0]
     assert '34 % goal0:+1' in lines[0]
     assert '\x1b' not in ''.join(lines)
 
 
-def test_on_a_terminal_a_table() -> None:
+def test_on_a_terminal_a_table_is_shown() -> None:
     text = shown(filled(), True, np.array([0.2]))
     for part in ('likelihood', 'effort', 'eta', 'goal0:-1', '56 %', 'goal1:+1-post', '0.90', 'x 1.15'):
         assert part in text
@@ -123,20 +124,20 @@ def test_on_a_terminal_a_table() -> None:
 
 @pytest.mark.parametrize('terminal', [False, True])
 def test_nothing_solved_is_shown(terminal: bool) -> None:
-    ledger = Recorder(Config())
-    send_scene(ledger)
-    send_hand(ledger, 0, 0.0)
+    recorder = Recorder(Config())
+    send_scene(recorder)
+    send_hand(recorder, 0, 0.0)
     made = Prediction(START_NS, 'world', 0.1, (), None)
-    ledger.received('prediction', prediction_cloud(made, 'xy', TYPES), 0.0)
-    ledger.received('likelihoods', likelihood_array(made, TYPES), 0.0)
-    assert 'no way solved' in shown(ledger, terminal, np.array([1.0]))
+    recorder.add_received('prediction', prediction_cloud(made, 'xy', TYPES), 0.0)
+    recorder.add_received('likelihoods', likelihood_array(made, TYPES), 0.0)
+    assert 'no solved candidate' in shown(recorder, terminal, np.array([1.0]))
 
 
-def test_display_waits_for_the_first_answer() -> None:
+def test_display_waits_for_the_first_prediction() -> None:
     assert shown(Recorder(Config()), False, np.array([0.0, 2.0])) == ''
 
 
-def test_output_directory_is_made_and_what_a_demo_left_is_replaced(tmp_path: Path) -> None:
+def test_output_directory_is_made_and_an_earlier_demo_is_replaced(tmp_path: Path) -> None:
     output = tmp_path / 'new' / 'demo_output'
     command.prepare(output)
     for name in ('bag', 'report'):
@@ -148,7 +149,7 @@ def test_output_directory_is_made_and_what_a_demo_left_is_replaced(tmp_path: Pat
 
 
 @pytest.mark.parametrize('what', ['directory', 'file'])
-def test_output_directory_with_other_things_is_refused(tmp_path: Path, what: str) -> None:
+def test_output_directory_with_other_contents_is_refused(tmp_path: Path, what: str) -> None:
     output = tmp_path / 'other'
     if what == 'directory':
         (output / 'bag').mkdir(parents=True)
@@ -159,7 +160,7 @@ def test_output_directory_with_other_things_is_refused(tmp_path: Path, what: str
     assert (output / 'bag').exists() or output.read_text() == 'mine'
 
 
-def test_without_rclpy_one_line_tells_how_to_get_it(
+def test_without_rclpy_one_line_says_how_to_install_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(command, 'find_spec', lambda name: None)
@@ -187,14 +188,14 @@ def test_environment_is_private(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
     assert 'ROS_DISCOVERY_SERVER' not in made
 
 
-def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: str) -> node_process.NodeProcess:
-    """Return a process of another program under the node's name."""
+def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: str) -> environment.NodeProcess:
+    """Return a process that runs another program in place of the node."""
     package = tmp_path / 'foc_ros'
     package.mkdir()
     (package / '__init__.py').touch()
     (package / '__main__.py').write_text(program)
     monkeypatch.chdir(tmp_path)
-    return node_process.NodeProcess(os.environ | {'PYTHONPATH': str(tmp_path)}, tmp_path / 'log.txt')
+    return environment.NodeProcess(os.environ | {'PYTHONPATH': str(tmp_path)}, tmp_path / 'log.txt')
 
 
 def until(condition: object, seconds: float = 20.0) -> None:
@@ -212,10 +213,10 @@ def alive(pid: int) -> bool:
     return state != 'Z'
 
 
-def test_a_node_that_dies_is_reported_with_its_words(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_node_that_dies_is_reported_with_its_output(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     with stand_in(monkeypatch, tmp_path, 'import sys; print("out of"); sys.exit("luck")') as node:
         until(lambda: not alive(node.pid))
-        with pytest.raises(node_process.NodeDiedError, match=r'exit code 1: out of \| luck|exit code 1: luck \| out of'):
+        with pytest.raises(environment.NodeDiedError, match=r'exit code 1: out of \| luck|exit code 1: luck \| out of'):
             until(lambda: node.check() is not None)
 
 
@@ -226,8 +227,8 @@ def test_a_node_that_dies_is_reported_with_its_words(monkeypatch: pytest.MonkeyP
         'import signal, time; signal.signal(15, lambda *_: None); [time.sleep(1) for _ in range(60)]',
     ],
 )
-def test_the_node_never_survives(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: str) -> None:
-    monkeypatch.setattr(node_process, 'STOP_S', 0.3)
+def test_the_node_ends_with_its_context(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: str) -> None:
+    monkeypatch.setattr(environment, 'STOP_S', 0.3)
     with pytest.raises(KeyboardInterrupt), stand_in(monkeypatch, tmp_path, 'print("up", flush=True);' + program) as node:  # noqa: PT012
         until(lambda: 'up' in (tmp_path / 'log.txt').read_text())
         node.check()
@@ -246,7 +247,7 @@ def test_the_node_does_not_outlive_a_killed_demo(tmp_path: Path) -> None:
 import os, sys, time
 sys.path.insert(0, {str(root)!r})
 from pathlib import Path
-from foc_ros.cli.demo.node_process import NodeProcess
+from foc_ros.cli.demo.environment import NodeProcess
 os.chdir({str(package.parent)!r})
 with NodeProcess(os.environ | {{'PYTHONPATH': {str(package.parent)!r}}}, Path({str(tmp_path / 'log.txt')!r})) as node:
     print(node.pid, flush=True)

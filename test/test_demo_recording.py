@@ -1,4 +1,4 @@
-"""The packaged recording is what its script makes, small, readable by other tools, and a recording of what it says."""
+"""The packaged recording equals the output of its script, is small, and can be read by other tools."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_rates_length_and_frame(recorded: list[tuple[str, int, Any]]) -> None:
     assert [topic for topic, _, _ in recorded[:3]] == ['/goals', '/obstacles', '/hand_pose']
 
 
-def test_movements_are_reaches_that_touch_nothing(script: ModuleType, recorded: list[tuple[str, int, Any]]) -> None:
+def test_movements_are_reaches_without_collision(script: ModuleType, recorded: list[tuple[str, int, Any]]) -> None:
     track, OBSTACLES = hand(recorded), np.array(script.OBSTACLES)
     clearance = np.linalg.norm(track[:, None, 1:3] - OBSTACLES[None, :, :2], axis=2) - OBSTACLES[:, 3]
     assert clearance.min() > 0.008
@@ -98,7 +98,7 @@ def test_movements_are_reaches_that_touch_nothing(script: ModuleType, recorded: 
         assert 0.9 <= reach.duration_s <= 1.4
 
 
-def test_noise_is_there_and_in_bounds(script: ModuleType, recorded: list[tuple[str, int, Any]]) -> None:
+def test_noise_has_the_given_size(script: ModuleType, recorded: list[tuple[str, int, Any]]) -> None:
     intended, _ = script.reference()
     truth = script.moved(intended, np.random.default_rng(script.SEED))
     sensor = hand(recorded)[:, 1:3] - truth
@@ -114,8 +114,8 @@ def test_minimum_jerk_without_via_points_is_the_known_quintic(script: ModuleType
     np.testing.assert_allclose(movement(1.2 * s), expected, atol=1e-12)
 
 
-def test_passing_times_are_the_best(script: ModuleType) -> None:
-    """Flash and Hogan: at the best passing time of a via point the derivative of the cost by it vanishes."""
+def test_passing_times_are_optimal(script: ModuleType) -> None:
+    """The cost is minimal at the passing time of a via point (Flash and Hogan 1985)."""
     from scipy.interpolate import make_interp_spline
 
     points = np.array([[0.0, 0.0], [0.12, 0.1], [0.35, 0.0]])

@@ -1,4 +1,4 @@
-"""The documentation names only what exists: files, parameters, commands, tests."""
+"""The documentation names only files, parameters, commands and tests that exist, and the start page leads to every page."""
 
 import ast
 import re
@@ -19,8 +19,8 @@ TESTS = {
 }
 
 
-def anchors(page: Path) -> set[str]:
-    """Anchors that GitHub gives the headings of a page."""
+def find_anchors(page: Path) -> set[str]:
+    """Return the anchors that repositories give to the headings of a page."""
     headings = re.findall(r'^#+ (.+)$', page.read_text('utf-8'), re.MULTILINE)
     return {re.sub(r'[^\w -]', '', heading.lower()).replace(' ', '-') for heading in headings}
 
@@ -33,20 +33,37 @@ def test_links_lead_somewhere(page: Path) -> None:
             continue
         linked = page.parent / path if path else page
         assert linked.exists(), f'{page.name}: {target} does not exist'
-        assert not anchor or anchor in anchors(linked), f'{page.name}: {target} has no such heading'
+        assert not anchor or anchor in find_anchors(linked), f'{page.name}: {target} has no such heading'
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
+def test_paths_named_exist(page: Path) -> None:
+    """Module paths, scripts and tests in code font are those of this tree."""
+    text = page.read_text('utf-8')
+    for path in re.findall(r'`((?:foc_ros|scripts|test|examples|benchmarks|config|rosdep)/[\w/.]*)`', text):
+        assert (ROOT / path).exists(), f'{page.name}: there is no {path}'
+
+
+def test_every_page_is_in_the_table_of_contents() -> None:
+    contents = (ROOT / 'doc' / 'index.md').read_text('utf-8')
+    listed = set(re.findall(r'^(\w+)$', contents, re.MULTILINE))
+    pages = {page.stem for page in (ROOT / 'doc').glob('*.md')} - {'index'}
+    assert pages <= listed, f'doc/index.md does not list {pages - listed}'
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
 def test_parameters_named_exist(page: Path) -> None:
     known = {parameter.name for parameter in parameters()}
     groups = '|'.join(sorted({name.partition('.')[0] for name in known if '.' in name}))
-    for name in re.findall(rf'`((?:{groups})\.\w+)`', page.read_text('utf-8')):
+    for name in re.findall(rf'`((?:{groups})\.(?!py`)\w+)`', page.read_text('utf-8')):
         assert name in known, f'{page.name}: there is no parameter {name}'
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
 def test_commands_named_exist(page: Path) -> None:
-    for command in re.findall(r'(?:^|[`/ ])foc_ros ([a-z]\w*)', page.read_text('utf-8'), re.MULTILINE):
+    text = page.read_text('utf-8')
+    shown = '\n'.join([*re.findall(r'^```console\n(.*?)^```', text, re.MULTILINE | re.DOTALL), *re.findall(r'`([^`\n]+)`', text)])
+    for command in re.findall(r'(?:^|[/ ])foc_ros ([a-z]\w*)', shown, re.MULTILINE):
         assert command in {*COMMANDS, 'foc_node'}, f'{page.name}: there is no command {command}'
 
 
@@ -61,16 +78,16 @@ def test_failures_are_tested_as_they_say() -> None:
     rows = [line for line in (ROOT / 'doc' / 'failures.md').read_text('utf-8').splitlines() if re.match(r'\| (?!when|-)', line)]
     assert len(rows) >= 14
     for row in rows:
-        named = re.findall(r'`(test_\w+\.py::test_\w+)`', row)
-        assert named, f'no test is named in: {row}'
-        assert not set(named) - TESTS, f'no such test: {set(named) - TESTS}'
+        named_tests = re.findall(r'`(test_\w+\.py::test_\w+)`', row)
+        assert named_tests, f'no test is named in: {row}'
+        assert not set(named_tests) - TESTS, f'no such test: {set(named_tests) - TESTS}'
 
 
 def test_failures_of_the_node_name_the_level_of_its_diagnostics() -> None:
     sections = (ROOT / 'doc' / 'failures.md').read_text('utf-8').split('\n## ')[1:]
-    of_the_node = [section for section in sections if not section.startswith('Files')]
-    assert len(of_the_node) == 4
-    for section in of_the_node:
+    node_sections = [section for section in sections if not section.startswith('Files')]
+    assert len(node_sections) == 4
+    for section in node_sections:
         header, _, *rows = [line for line in section.splitlines() if line.startswith('|')]
         assert header == '| when | what happens | level | where you see it | test |'
         for row in rows:

@@ -1,4 +1,4 @@
-"""What the node's clocks add: a silent source and an old pose are said, in words with numbers."""
+"""Readiness by the node's clocks: a silent source and an old pose are reported with numbers."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ import pytest
 from foc_ros.core.config import Config, updated
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.topics import CLOUD, HAND, MARKERS
-from foc_ros.ros.freshness import Freshness
+from foc_ros.ros.health import Freshness
 
 CONFIG = updated(Config(), {'estimator.hand_timeout_s': 0.5, 'scene.timeout_s': 2.0})
 NEVER = updated(Config(), {'estimator.hand_timeout_s': 0.0, 'scene.timeout_s': 0.0})
 BOTH = ('cloud', 'markers')
 
 
-def heard(**times: float) -> Freshness:
+def build_freshness(**times: float) -> Freshness:
     made = Freshness()
     for role, time_s in times.items():
-        made.heard(role, time_s)
+        made.note_received(role, time_s)
     return made
 
 
-def test_what_never_came_is_not_silent() -> None:
-    assert Freshness().not_ready_reason(1e6, CONFIG, ()) is None
+def test_an_input_that_was_never_received_is_not_silent() -> None:
+    assert Freshness().find_not_ready_reason(1e6, CONFIG, ()) is None
 
 
 @pytest.mark.parametrize(
@@ -34,47 +34,47 @@ def test_what_never_came_is_not_silent() -> None:
         ({HAND: 9.6, CLOUD: 8.1, MARKERS: 8.1}, None),
     ],
 )
-def test_one_silent_input_is_enough(times: dict[str, float], words: str | None) -> None:
-    found = heard(**times).not_ready_reason(10.0, CONFIG, BOTH)
+def test_one_silent_input_stops_predictions(times: dict[str, float], words: str | None) -> None:
+    found = build_freshness(**times).find_not_ready_reason(10.0, CONFIG, BOTH)
     assert (found and found[1]) == words
-    assert heard(**times).not_ready_reason(10.0, NEVER, BOTH) is None
+    assert build_freshness(**times).find_not_ready_reason(10.0, NEVER, BOTH) is None
 
 
-def test_a_source_that_is_heard_again_is_silent_no_more() -> None:
-    freshness = heard(hand_pose=10.0, obstacles=1.0)
-    assert freshness.not_ready_reason(10.0, CONFIG, ['cloud']) is not None
-    freshness.heard(CLOUD, 10.0)
-    assert freshness.not_ready_reason(10.0, CONFIG, ['cloud']) is None
+def test_a_source_that_is_received_again_is_not_silent() -> None:
+    freshness = build_freshness(hand_pose=10.0, obstacles=1.0)
+    assert freshness.find_not_ready_reason(10.0, CONFIG, ['cloud']) is not None
+    freshness.note_received(CLOUD, 10.0)
+    assert freshness.find_not_ready_reason(10.0, CONFIG, ['cloud']) is None
 
 
 def pose(freshness: Freshness, stamp_s: float, clock_s: float, *, restarted: bool = False) -> str | None:
-    freshness.pose(round(stamp_s * NANOSECONDS), round(clock_s * NANOSECONDS), 0.5, restarted=restarted)
-    found = freshness.not_ready_reason(0.0, CONFIG, ())
+    freshness.note_pose(round(stamp_s * NANOSECONDS), round(clock_s * NANOSECONDS), 0.5, restarted=restarted)
+    found = freshness.find_not_ready_reason(0.0, CONFIG, ())
     return found and found[1]
 
 
-def test_poses_of_the_nodes_own_time_are_judged_by_it() -> None:
+def test_poses_stamped_by_ros_time_are_judged_by_it() -> None:
     freshness = Freshness()
     assert pose(freshness, 100.0, 100.1) is None
     words = 'the hand pose is 0.6 s older than the time of the node (estimator.hand_timeout_s is 0.5)'
     assert pose(freshness, 100.1, 100.7) == words
     assert 'newer' in (pose(freshness, 101.3, 100.7) or '')
     assert pose(freshness, 101.4, 101.4) is None
-    assert freshness.not_ready_reason(0.0, NEVER, ()) is None
+    assert freshness.find_not_ready_reason(0.0, NEVER, ()) is None
 
 
-def test_a_recordings_own_stamps_are_not_judged_until_a_movement_begins_in_the_present() -> None:
+def test_the_stamps_of_a_recording_are_not_judged_until_a_movement_begins_at_ros_time() -> None:
     freshness = Freshness()
     assert pose(freshness, 10.0, 1e9) is None
     assert pose(freshness, 1e9, 1e9) is None
     assert pose(freshness, 10.0, 1e9) is None
     assert pose(freshness, 1e9, 1e9, restarted=True) is None
     assert pose(freshness, 10.0, 1e9, restarted=True) is not None
-    freshness.forget()
+    freshness.forget_clock()
     assert pose(freshness, 10.0, 1e9) is None
 
 
-def test_a_clock_that_does_not_run_yet_decides_nothing() -> None:
+def test_a_clock_at_zero_is_not_used() -> None:
     freshness = Freshness()
     assert pose(freshness, 10.0, 0.0) is None
     assert pose(freshness, 10.1, 10.1) is None

@@ -1,6 +1,6 @@
-"""Any messages in any order: no exception escapes, nothing leaves that is not finite, or without a fresh pose.
+"""Any messages in any order: no exception, no number that is not finite, and no prediction without a new pose.
 
-FOC_ROS_FUZZ: how many messages, 2,000 by default and 100,000 in `make fuzz`; a twentieth of them go through a live node.
+FOC_ROS_FUZZ: the number of messages, 2,000 by default and 100,000 in `make fuzz`; a running node gets a twentieth of them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from foc_ros.core.config import Config, updated
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.io import topics
 from foc_ros.ros.intake import Intake
-from foc_ros.ros.messages.outputs import output_messages
+from foc_ros.ros.messages.encode_prediction import output_messages
 
 COUNT = int(os.environ.get('FOC_ROS_FUZZ', '2000'))
 LENGTH = 20
@@ -34,7 +34,7 @@ LIVE = settings(THOROUGH, max_examples=max(COUNT // LENGTH // 20, 1))
 
 
 def intake_of(known: bool) -> Intake:
-    """Return a beginning: nothing is known, or a scene and a goal are, so that poses lead to predictions."""
+    """Return a new intake, without a scene or with a scene and a goal, so that poses lead to predictions."""
     intake = Intake(Pipeline(CONFIG))
     if known:
         intake.take(topics.CLOUD, cloud(TYPES, obstacle_table([(0.1, 0.05, 0.0, 0.02)]), 11 * SECOND))
@@ -43,7 +43,7 @@ def intake_of(known: bool) -> Intake:
 
 
 def numbers(message: Any) -> Iterator[float]:
-    """Yield every number of a message that is an output; of a cloud, those of its rows."""
+    """Yield every number of an output message; of a cloud, those of its rows."""
     if hasattr(message, 'point_step'):
         kinds = {7: '<f4', 6: '<u4'}
         rows = np.frombuffer(bytes(message.data), dtype=[(field.name, kinds[field.datatype]) for field in message.fields])
@@ -82,7 +82,7 @@ def test_any_messages_in_any_order(known: bool, messages: list[tuple[str, Any]])
 
 
 def test_the_messages_lead_to_predictions_and_to_refusals() -> None:
-    """Or the test above would see nothing."""
+    """Otherwise the test above would test nothing."""
     seen: dict[str, int] = {'predicted': 0, 'refused': 0}
 
     @settings(THOROUGH, max_examples=100)
@@ -116,14 +116,14 @@ def test_any_messages_through_a_live_node(bench: Any) -> None:
     @given(st.lists(inputs(LIVE_TYPES), min_size=LENGTH, max_size=LENGTH))
     def play(messages: list[tuple[str, Any]]) -> None:
         for role, message in messages:
-            before = int(bench.node._monitor._own['predictions'])
-            bench.hear(role, message)
-            made = int(bench.node._monitor._own['predictions']) - before
+            before = int(bench.node._monitor._counts['predictions'])
+            bench.deliver(role, message)
+            made = int(bench.node._monitor._counts['predictions']) - before
             assert made <= (role == topics.HAND), f'{made} predictions from {role}'
         for received in bench.received.values():
             assert all(np.isfinite(number) for each in received for number in numbers(each))
             received.clear()
-        assert not bench.node._monitor._own['internal_errors'], bench.node._monitor._error
+        assert not bench.node._monitor._counts['internal_errors'], bench.node._monitor._error
 
     play()
     assert bench.health().level in (b'\x00', b'\x01')

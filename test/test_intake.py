@@ -1,4 +1,4 @@
-"""Messages on their way into the pipeline: markers live by the hand's time, what is wrong is counted and changes nothing."""
+"""Messages on their way into the pipeline: markers expire by the hand's stamps, and refused messages are counted."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_every_input_reaches_the_pipeline(intake: Intake) -> None:
     assert intake.counts == {} and intake.last_refusal is None
 
 
-def test_a_marker_is_gone_when_its_life_is_over_by_the_hands_stamp(intake: Intake) -> None:
+def test_a_marker_expires_by_the_stamp_of_the_hand(intake: Intake) -> None:
     move(intake, 1.0)
     show(intake, marker(TYPES, id=1, lifetime=0.5), marker(TYPES, id=2))
     for seconds, expected in ((1.1, ('a/1', 'a/2')), (1.4, ('a/1', 'a/2')), (1.6, ('a/2',))):
@@ -55,7 +55,7 @@ def test_a_marker_is_gone_when_its_life_is_over_by_the_hands_stamp(intake: Intak
         assert seen(intake) == expected
 
 
-def test_markers_of_two_publishers_with_different_delays_all_count(intake: Intake) -> None:
+def test_markers_of_publishers_with_different_delays_are_all_used(intake: Intake) -> None:
     move(intake, 1.0)
     for name, seconds in (('a', 1.0), ('b', 0.9), ('c', 0.8)):
         assert show(intake, marker(TYPES, ns=name, stamp_ns=round(seconds * SECOND))) is SampleStatus.ACCEPTED
@@ -69,8 +69,8 @@ def test_deleting_all_markers_is_an_empty_scene(intake: Intake) -> None:
     assert seen(intake) == () and 'markers' in intake.pipeline.scene.parts
 
 
-def test_markers_in_another_frame_do_not_stay_in_the_way(intake: Intake) -> None:
-    """They come first, when any frame may be the working one; the hand then settles on another."""
+def test_markers_in_another_frame_are_discarded(intake: Intake) -> None:
+    """They are received before the hand pose that fixes another working frame."""
     show(intake, marker(TYPES, id=1, frame_id='camera'))
     move(intake, 1.0)
     assert intake.counts == {'obstacles_wrong_frame': 1}
@@ -110,7 +110,7 @@ def test_markers_in_another_frame_do_not_stay_in_the_way(intake: Intake) -> None
         ),
     ],
 )
-def test_what_cannot_be_converted_changes_nothing_and_is_counted(
+def test_a_message_that_cannot_be_decoded_changes_nothing_and_is_counted(
     intake: Intake, role: str, message: Any, kind: str, words: str
 ) -> None:
     move(intake, 1.0)
@@ -122,7 +122,7 @@ def test_what_cannot_be_converted_changes_nothing_and_is_counted(
     assert intake.counts == {kind: 1} and words in intake.last_refusal
 
 
-def test_rows_that_are_dropped_are_counted(intake: Intake) -> None:
+def test_dropped_rows_are_counted(intake: Intake) -> None:
     rows = obstacle_table([(0.1, 0.2, 0.0, 0.03), (float('nan'), 0, 0, 0.1)])
     assert intake.take('obstacles', cloud(TYPES, rows)) is SampleStatus.ACCEPTED
     show(intake, marker(TYPES, type=1), marker(TYPES, (float('inf'), 0, 0), id=3))
@@ -133,7 +133,7 @@ def test_rows_that_are_dropped_are_counted(intake: Intake) -> None:
     }
 
 
-def test_what_the_pipeline_refuses_is_told_too(intake: Intake) -> None:
+def test_a_refusal_of_the_pipeline_is_reported(intake: Intake) -> None:
     move(intake, 1.0)
     assert move(intake, 1.0) is SampleStatus.DUPLICATE
     assert move(intake, 1.1, 'camera') is SampleStatus.WRONG_FRAME
@@ -141,7 +141,7 @@ def test_what_the_pipeline_refuses_is_told_too(intake: Intake) -> None:
     assert intake.last_refusal == intake.pipeline.last_refusal and 'camera' in intake.last_refusal
 
 
-def test_a_restart_is_no_refusal_and_leaves_the_last_one_told(intake: Intake) -> None:
+def test_a_restart_does_not_replace_the_last_refusal(intake: Intake) -> None:
     move(intake, 1.0)
     move(intake, 1.1, 'camera')
     assert intake.take('goals', pose_array(TYPES, [(float('nan'), 0.0, 0.0)])) is None

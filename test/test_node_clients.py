@@ -1,4 +1,4 @@
-"""What the `ros2` tools do, done by plain clients in another process than the node's: parameters, states, topics."""
+"""Services and topics as the `ros2` tools use them: plain clients, and the node in another process."""
 
 from __future__ import annotations
 
@@ -45,16 +45,17 @@ def test_every_parameter_is_listed_described_read_and_set(ros: Graph) -> None:
             assert not read_only or 'read-only' in result.reason
 
 
-def test_the_state_is_changed_and_every_topic_is_heard(ros: Graph) -> None:
+def test_the_state_is_changed_and_every_topic_is_received(ros: Graph) -> None:
     from diagnostic_msgs.msg import DiagnosticArray
     from geometry_msgs.msg import PoseArray, PoseStamped
     from lifecycle_msgs.msg import TransitionEvent
     from sensor_msgs.msg import PointCloud2
 
-    from foc_ros.ros.endpoints import OUTPUTS
+    from foc_ros.ros.messages.encode_prediction import OUTPUTS
+    from foc_ros.ros.messages.types import find_message_class
 
     client = ros.node('client')
-    kinds = {f'foc/{name}': kind for name, kind in OUTPUTS.items()}
+    kinds = {f'foc/{name}': find_message_class(kind) for name, (kind, _) in OUTPUTS.items()}
     kinds |= {'/diagnostics': DiagnosticArray, 'foc/transition_event': TransitionEvent}
     received: dict[str, list[Any]] = {name: ros.collect(client, kind, name) for name, kind in kinds.items()}
     inputs = {'obstacles': PointCloud2, 'goals': PoseArray, 'hand_pose': PoseStamped}

@@ -1,4 +1,4 @@
-"""Bad input, wrong parameters and errors inside: the node says so, publishes nothing wrong, and goes on."""
+"""Bad input, wrong parameters and internal errors: the node reports them, publishes nothing wrong, and goes on."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ BAD_INPUTS = {
 
 
 class Log:
-    """Stands in for a logger and keeps the lines."""
+    """A logger that stores its lines."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -86,16 +86,16 @@ class Log:
 
 
 @pytest.mark.parametrize('case', BAD_INPUTS)
-def test_bad_input_is_refused_in_words_and_changes_nothing(ros: Graph, case: str) -> None:
+def test_bad_input_is_refused_with_its_reason_and_changes_nothing(ros: Graph, case: str) -> None:
     role, message, words = BAD_INPUTS[case]
     bench, poses = Bench(ros), hand_path(4)
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(poses[:2])
     bench.wait_for('prediction', 1)
     log = bench.node._loggers[role] = Log()
     scene, state = bench.node.pipeline.scene, bench.node.pipeline.hand_state
     bench.health()
-    bench.hear(role, message)
+    bench.deliver(role, message)
     status = bench.health()
     assert words in figures(status)['last refusal']
     assert status.level == b'\x01'
@@ -107,20 +107,20 @@ def test_bad_input_is_refused_in_words_and_changes_nothing(ros: Graph, case: str
     bench.wait_for('prediction', 2)
 
 
-def test_rows_left_out_are_told(ros: Graph) -> None:
+def test_dropped_rows_are_reported(ros: Graph) -> None:
     bench = Bench(ros)
-    bench.hear('obstacles', cloud(TYPES, obstacle_table([*ROWS, (NAN, 0, 0, 1)]), 10 * SECOND))
+    bench.deliver('obstacles', cloud(TYPES, obstacle_table([*ROWS, (NAN, 0, 0, 1)]), 10 * SECOND))
     status = bench.health()
     assert status.level == b'\x01'
     assert 'obstacles_dropped_not_finite 1' in status.message
-    bench.hear('goals', pose_array(TYPES, GOALS))
+    bench.deliver('goals', pose_array(TYPES, GOALS))
     bench.move(hand_path(2))
     (table,) = bench.wait_for('likelihoods', 1)
     assert '0' in table.layout.dim[0].label
     assert bench.health().level == b'\x00'
 
 
-def test_of_several_scenes_waiting_the_newest_good_one_holds(ros: Graph) -> None:
+def test_the_newest_valid_scene_of_the_queue_is_used(ros: Graph) -> None:
     bench = Bench(ros)
     good = [cloud(TYPES, obstacle_table([(x, 0, 0, 0.01)]), 10 * SECOND) for x in (1, 2, 3)]
     bench.send('obstacles', *good, cloud(TYPES, obstacle_table(ROWS), data=b'abc'))
@@ -131,7 +131,7 @@ def test_of_several_scenes_waiting_the_newest_good_one_holds(ros: Graph) -> None
 
 def test_a_scene_that_is_not_renewed_stops_predictions(ros: Graph) -> None:
     bench = Bench(ros, parameters={'scene.timeout_s': 500.0, 'estimator.gap_s': 60.0, 'rate_hz': 0.1})
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(pose_stamped(TYPES, (0, 0, 0), (10 + 100 * i) * SECOND) for i in range(9))
     status = bench.health()
     assert len(bench.received['prediction']) == 6
@@ -139,9 +139,9 @@ def test_a_scene_that_is_not_renewed_stops_predictions(ros: Graph) -> None:
     assert re.search(r'no prediction: obstacles are 800 s older than the hand pose', status.message)
 
 
-def test_a_silent_hand_is_told(ros: Graph) -> None:
+def test_a_silent_hand_is_reported(ros: Graph) -> None:
     bench = Bench(ros, parameters={'estimator.hand_timeout_s': 0.05})
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(hand_path(2))
     ros.spin_for(0.1)
     status = bench.health()
@@ -150,7 +150,7 @@ def test_a_silent_hand_is_told(ros: Graph) -> None:
 
 
 @pytest.mark.parametrize('where', ['predict', 'output_messages'])
-def test_an_error_inside_is_counted_and_told_and_the_node_goes_on(
+def test_an_internal_error_is_counted_and_reported_and_the_node_goes_on(
     ros: Graph, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:
     from foc_ros.ros import node as module
@@ -161,7 +161,7 @@ def test_an_error_inside_is_counted_and_told_and_the_node_goes_on(
     bench, poses = Bench(ros), hand_path(6)
     log = Log()
     monkeypatch.setattr(bench.node, 'get_logger', lambda: log)
-    bench.show_scene()
+    bench.publish_scene()
     with monkeypatch.context() as patch:
         patch.setattr(*((bench.node.pipeline, where) if where == 'predict' else (module, where)), broken)
         bench.move(poses[:3])
@@ -227,7 +227,7 @@ def test_quality_of_service_is_overridden_topic_by_topic(ros: Graph) -> None:
 
 def test_parameters_change_together_and_without_a_missed_prediction(ros: Graph) -> None:
     bench, poses = Bench(ros), hand_path(20)
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(poses[:10])
     assert set_on(bench, foc__eta=0.7, likelihood__beta=1, homotopy__max_candidates=1).successful
     bench.move(poses[10:])
@@ -251,7 +251,7 @@ def test_parameters_change_together_and_without_a_missed_prediction(ros: Graph) 
         ({'foc__strategy': None}, 'cannot be undeclared'),
     ],
 )
-def test_a_refused_value_changes_nothing_and_says_why(ros: Graph, values: dict[str, Any], words: str) -> None:
+def test_a_refused_value_changes_nothing_and_names_the_reason(ros: Graph, values: dict[str, Any], words: str) -> None:
     bench = Bench(ros, outputs=[])
     before = bench.node.pipeline.config
     result = set_on(bench, rate_hz=25.0, **values)
@@ -261,9 +261,9 @@ def test_a_refused_value_changes_nothing_and_says_why(ros: Graph, values: dict[s
     assert {name: bench.node.get_parameter(name).value for name in flatten(before)} == flatten(before)
 
 
-def test_a_storm_of_parameters_leaves_the_node_predicting(ros: Graph) -> None:
+def test_the_node_predicts_while_parameters_change_with_every_pose(ros: Graph) -> None:
     bench, poses = Bench(ros), hand_path(40)
-    bench.show_scene()
+    bench.publish_scene()
     client = bench.player.create_client(SetParametersAtomically, 'foc/set_parameters_atomically')
     ros.spin_until(client.service_is_ready, 'parameter service')
     futures = []

@@ -1,4 +1,4 @@
-"""What a robot cell can do to a node: for each fault, what comes out and the level of its diagnostics."""
+"""Faults of a robot cell: the outputs of the node and the level of its diagnostics for each of them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def stamps(messages: list[Any]) -> list[int]:
 
 
 def goes_on(bench: Bench, poses: list[Any], level: bytes = OK) -> None:
-    """The node answers the last of these poses, and says so."""
+    """Wait until the node has predicted from the last pose and reports OK."""
     before = len(bench.received['prediction'])
     bench.health()
     bench.move(poses)
@@ -36,9 +36,9 @@ def goes_on(bench: Bench, poses: list[Any], level: bytes = OK) -> None:
     assert status.level == level, status.message
 
 
-def test_a_publisher_that_dies_in_mid_movement(ros: Graph) -> None:
+def test_a_publisher_that_dies_during_a_movement(ros: Graph) -> None:
     bench, poses = Bench(ros, parameters={'estimator.hand_timeout_s': 0.3}), hand_path(8)
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(poses[:4])
     sent = len(bench.wait_for('prediction', 2))
     ros.spin_for(0.4)
@@ -51,19 +51,19 @@ def test_a_publisher_that_dies_in_mid_movement(ros: Graph) -> None:
 
 
 @pytest.mark.parametrize('topic', ['obstacles', 'obstacle_markers'])
-def test_a_flood_of_obstacles_does_not_starve_the_hand(ros: Graph, topic: str) -> None:
-    """Three messages of thousands of obstacles for each pose: every pose is heard, and predictions go on."""
+def test_hand_poses_are_taken_during_a_flood_of_obstacles(ros: Graph, topic: str) -> None:
+    """Three messages of thousands of obstacles for each pose: every pose is received, and predictions continue."""
     if topic == 'obstacles':
         flood = cloud(TYPES, obstacle_table(CROWD), 10 * SECOND)
     else:
         kept = enumerate(CROWD[:2000])
         flood = marker_array(TYPES, *[marker(TYPES, row[:3], (0.008,) * 3, id=i, stamp_ns=10 * SECOND) for i, row in kept])
     bench, poses = Bench(ros), hand_path(10)
-    bench.show_scene()
+    bench.publish_scene()
     for pose in poses:
         for _ in range(3):
             bench.publishers[topic].publish(flood)
-        bench.hear('hand_pose', pose)
+        bench.deliver('hand_pose', pose)
     assert len(bench.wait_for('prediction', 5)) == 5
     status = bench.health()
     values = figures(status)
@@ -73,7 +73,7 @@ def test_a_flood_of_obstacles_does_not_starve_the_hand(ros: Graph, topic: str) -
 
 def test_poses_at_a_kilohertz(ros: Graph) -> None:
     bench = Bench(ros)
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(hand_path(200, rate_hz=1000.0))
     clouds = bench.wait_for('prediction', 10)
     assert stamps(clouds) == [10 * SECOND + 20_000_000 * i for i in range(10)]
@@ -90,10 +90,10 @@ def test_poses_at_a_kilohertz(ros: Graph) -> None:
         (900 * SECOND, 'obstacles are 890 s older than the hand pose'),
     ],
 )
-def test_a_stamp_from_elsewhere(ros: Graph, stamp_ns: int, words: str) -> None:
-    """Zero, late, backward or from the future: told at WARN, and the movement goes on with the next good poses."""
+def test_a_stamp_far_from_the_others(ros: Graph, stamp_ns: int, words: str) -> None:
+    """A stamp of zero, late, backward or in the future is reported at WARN, and valid poses continue the movement."""
     bench, poses = Bench(ros, parameters={'scene.timeout_s': 60.0}), hand_path(8)
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(poses[:3])
     bench.wait_for('prediction', 2)
     bench.health()
@@ -106,9 +106,9 @@ def test_a_stamp_from_elsewhere(ros: Graph, stamp_ns: int, words: str) -> None:
     assert set(stamps(bench.received['prediction'])) <= {*stamps(poses), 4 * SECOND}
 
 
-def test_frames_that_flip(ros: Graph) -> None:
+def test_a_frame_that_changes_from_pose_to_pose(ros: Graph) -> None:
     bench, poses = Bench(ros), hand_path(8)
-    bench.show_scene()
+    bench.publish_scene()
     for i, pose in enumerate(poses):
         pose.header.frame_id = 'camera' if i % 2 else 'world'
     bench.move(poses)
@@ -119,15 +119,15 @@ def test_frames_that_flip(ros: Graph) -> None:
     assert {each.header.frame_id for each in bench.received['prediction']} == {'world'}
 
 
-def test_goals_that_change_each_tick(ros: Graph) -> None:
+def test_goals_that_change_with_every_pose(ros: Graph) -> None:
     bench, poses = Bench(ros), hand_path(20)
-    bench.show_scene()
+    bench.publish_scene()
     for i, pose in enumerate(poses):
-        bench.hear('goals', pose_array(TYPES, [(0.3, 0.02 * (j - i % 3), 0.0) for j in range(1 + i % 3)]))
+        bench.deliver('goals', pose_array(TYPES, [(0.3, 0.02 * (j - i % 3), 0.0) for j in range(1 + i % 3)]))
         bench.move([pose])
     assert stamps(bench.wait_for('prediction', 10)) == stamps(poses)[::2]
     assert bench.health().level == OK
-    bench.hear('goals', pose_array(TYPES, []))
+    bench.deliver('goals', pose_array(TYPES, []))
     bench.move([pose_stamped(TYPES, (0.0, 0.0, 0.1), round(10.5 * SECOND))])
     status = bench.health()
     assert (status.level, status.message) == (WARN, 'no prediction: no goal: the last goals message was empty')
@@ -135,11 +135,11 @@ def test_goals_that_change_each_tick(ros: Graph) -> None:
 
 
 def test_a_clock_that_jumps_forward_and_back(ros: Graph) -> None:
-    """A simulation that is started anew, twice: poses of its time are predicted from, those of another are not."""
+    """A simulation is restarted twice: predictions are made from poses stamped with its time only."""
     from rosgraph_msgs.msg import Clock
 
     bench = Bench(ros, outputs=['prediction'], parameters={'use_sim_time': True, 'estimator.hand_timeout_s': 60.0})
-    bench.show_scene()
+    bench.publish_scene()
     clock = bench.player.create_publisher(Clock, '/clock', 10)
 
     def now(seconds: float) -> None:
@@ -189,7 +189,7 @@ def test_a_disk_that_is_full_ends_the_output_bag_in_one_line(tmp_path: Path) -> 
         text=True,
         timeout=100,
         check=False,
-        # writes beyond it fail as they do on a full disk
+        # writes beyond this limit fail like those to a full disk
         preexec_fn=lambda: (
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN),
             resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
@@ -201,13 +201,13 @@ def test_a_disk_that_is_full_ends_the_output_bag_in_one_line(tmp_path: Path) -> 
     assert not (tmp_path / 'out').exists()
 
 
-def test_several_nodes_of_one_process_keep_to_themselves(ros: Graph) -> None:
+def test_several_nodes_of_one_process_are_independent(ros: Graph) -> None:
     benches = [Bench(ros, namespace=name, outputs=['prediction']) for name in ('left', 'right', 'third')]
     for i, bench in enumerate(benches):
-        bench.show_scene(rows=ROWS[:1] * (i > 0))
+        bench.publish_scene(rows=ROWS[:1] * (i > 0))
     for pose in hand_path(4):
         for bench in benches:
-            bench.hear('hand_pose', pose)
+            bench.deliver('hand_pose', pose)
     for i, bench in enumerate(benches):
         assert len(bench.wait_for('prediction', 2)) == 2
         status = bench.health()

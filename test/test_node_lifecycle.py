@@ -1,4 +1,4 @@
-"""The managed node: it predicts only while it is active, and any client can ask and change its state."""
+"""The managed node: it predicts only while it is active, and every client can read and change its state."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_a_node_starts_active(ros: Graph) -> None:
     assert figures(bench.health())['state'] == 'active'
 
 
-def test_a_managed_node_waits_to_be_configured_and_activated(ros: Graph) -> None:
+def test_a_managed_node_waits_for_configuration_and_activation(ros: Graph) -> None:
     bench = Bench(ros, outputs=[], connected=False, parameters={'autostart': False})
     assert state_of(bench) == 'unconfigured'
     assert not bench.player.get_subscriptions_info_by_topic('hand_pose')
@@ -46,7 +46,7 @@ def test_a_managed_node_waits_to_be_configured_and_activated(ros: Graph) -> None
     assert (status.level, status.message) == (b'\x00', 'unconfigured: nothing is predicted')
     assert change(bench, 'configure')
     bench.connect()
-    bench.show_scene()
+    bench.publish_scene()
     assert predicted(bench, hand_path(4)) == 0
     status = bench.health()
     assert (status.level, status.message) == (b'\x00', 'inactive: nothing is predicted')
@@ -55,9 +55,9 @@ def test_a_managed_node_waits_to_be_configured_and_activated(ros: Graph) -> None
     assert predicted(bench, hand_path(6)[4:]) == 1
 
 
-def test_a_node_that_is_deactivated_keeps_the_scene_and_takes_up_again(ros: Graph) -> None:
+def test_a_deactivated_node_keeps_the_scene_and_can_be_activated_again(ros: Graph) -> None:
     bench, poses = Bench(ros, outputs=[]), hand_path(12)
-    bench.show_scene()
+    bench.publish_scene()
     assert predicted(bench, poses[:4]) == 2
     assert change(bench, 'deactivate')
     assert predicted(bench, poses[4:8]) == 0
@@ -70,7 +70,7 @@ def test_a_node_that_is_deactivated_keeps_the_scene_and_takes_up_again(ros: Grap
 
 def test_the_clutch_is_kept_through_a_deactivation(ros: Graph) -> None:
     bench, poses = Bench(ros, outputs=[]), hand_path(8)
-    bench.show_scene()
+    bench.publish_scene()
     ros.call(bench.player, SetBool, 'foc/engage', SetBool.Request(data=False))
     assert change(bench, 'deactivate')
     assert change(bench, 'activate')
@@ -80,7 +80,7 @@ def test_the_clutch_is_kept_through_a_deactivation(ros: Graph) -> None:
 
 def test_cleaning_up_forgets_all_but_the_parameters(ros: Graph) -> None:
     bench = Bench(ros, outputs=[], parameters={'foc.eta': 0.7})
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(hand_path(2))
     assert change(bench, 'deactivate')
     assert change(bench, 'cleanup')
@@ -91,20 +91,20 @@ def test_cleaning_up_forgets_all_but_the_parameters(ros: Graph) -> None:
     bench.connect()
     assert bench.node.pipeline.config.foc.eta == 0.7
     assert change(bench, 'activate')
-    bench.show_scene()
+    bench.publish_scene()
     assert predicted(bench, hand_path(2)) == 1
 
 
 @pytest.mark.parametrize('label', ['activate', 'cleanup', 'no such transition'])
-def test_a_transition_that_cannot_be_is_refused_by_an_answer(ros: Graph, label: str) -> None:
+def test_an_impossible_transition_is_refused_by_an_answer(ros: Graph, label: str) -> None:
     bench = Bench(ros, outputs=[])
     assert not change(bench, label)
     assert state_of(bench) == 'active'
-    bench.show_scene()
+    bench.publish_scene()
     assert predicted(bench, hand_path(2)) == 1
 
 
-def test_a_node_that_is_shut_down_stays_so(ros: Graph) -> None:
+def test_a_node_that_is_shut_down_stays_finalized(ros: Graph) -> None:
     bench = Bench(ros, outputs=[])
     transitions = ros.call(
         bench.player, GetAvailableTransitions, 'foc/get_available_transitions', GetAvailableTransitions.Request()
@@ -116,24 +116,24 @@ def test_a_node_that_is_shut_down_stays_so(ros: Graph) -> None:
     assert bench.health().message == 'finalized: nothing is predicted'
 
 
-def test_a_node_that_cannot_be_configured_says_why_and_can_be_later(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_configuration_is_logged_and_can_be_repeated(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
     from foc_ros.ros import node
 
     bench = Bench(ros, outputs=[], connected=False, parameters={'autostart': False})
     with monkeypatch.context() as patch:
-        patch.setattr(node, 'subscribe', lambda *_: 1 / 0)
+        patch.setattr(node, 'create_subscriptions', lambda *_: 1 / 0)
         assert not change(bench, 'configure')
     assert state_of(bench) == 'unconfigured'
     assert change(bench, 'configure')
     assert state_of(bench) == 'inactive'
 
 
-def test_a_silent_scene_by_the_steady_clock_stops_predictions_until_it_is_heard_again(ros: Graph) -> None:
-    """Unstamped obstacles have no age: that their source has died shows by its silence alone."""
+def test_a_silent_scene_stops_predictions_until_it_is_received_again(ros: Graph) -> None:
+    """Unstamped obstacles have no age, so only the silence of their source shows that it has stopped."""
     bench, poses = Bench(ros, parameters={'scene.timeout_s': 1.0}), hand_path(12)
     scene = cloud(TYPES, obstacle_table(ROWS), 0)
-    bench.hear('goals', pose_array(TYPES, GOALS))
-    bench.hear('obstacles', scene)
+    bench.deliver('goals', pose_array(TYPES, GOALS))
+    bench.deliver('obstacles', scene)
     bench.move(poses[:2])
     bench.wait_for('prediction', 1)
     ros.spin_for(1.1)
@@ -143,14 +143,14 @@ def test_a_silent_scene_by_the_steady_clock_stops_predictions_until_it_is_heard_
     assert 'no prediction: obstacles silent for' in status.message
     assert int(figures(status)['count predict_obstacles_silent']) == len(poses[2:6])
     assert len(bench.received['prediction']) == 1
-    bench.hear('obstacles', scene)
+    bench.deliver('obstacles', scene)
     bench.move(poses[6:8])
     bench.wait_for('prediction', 2)
 
 
-def test_a_pose_that_comes_late_is_not_predicted_from(ros: Graph) -> None:
+def test_no_prediction_is_made_from_a_late_pose(ros: Graph) -> None:
     bench = Bench(ros, parameters={'estimator.hand_timeout_s': 5.0})
-    bench.show_scene()
+    bench.publish_scene()
     now_s = bench.node.get_clock().now().nanoseconds / SECOND
     bench.move(hand_path(1, start_s=now_s))
     bench.wait_for('prediction', 1)

@@ -1,4 +1,4 @@
-"""The node in a process of its own, fed with a bag's raw messages over DDS, publishes what a replay of the bag computes."""
+"""The node in its own process publishes the predictions of a replay when a bag's raw messages are sent over DDS."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ros_helpers import Graph
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config, updated
 from foc_ros.io.bags import BagReader, Item
-from foc_ros.ros.messages.outputs import output_messages
+from foc_ros.ros.messages.encode_prediction import output_messages
 
 ROOT = Path(__file__).parents[1]
 SECONDS = 0.3
@@ -27,7 +27,7 @@ CONFIGS = {'fixed': CONFIG, 'lv': updated(Config(), {'foc.eta': 0.3, 'foc.steps'
 
 @contextmanager
 def node_process(ros: Graph, parameters: str) -> Iterator[subprocess.Popen[str]]:
-    """Run the node until the block ends; it must have lived until then, and stop without an error."""
+    """Run the node until the end of the block; it must still run then, and stop without an error."""
     reliable = 'qos_overrides./hand_pose.subscription.reliability:=reliable'
     command = [
         sys.executable,
@@ -55,9 +55,9 @@ def node_process(ros: Graph, parameters: str) -> Iterator[subprocess.Popen[str]]
 
 
 def play(ros: Graph, items: list[Item], parameters: str) -> tuple[list[Any], list[Any]]:
-    """Publish the raw messages, the scene first; return the clouds and likelihoods that the node answers with.
+    """Publish the raw messages, the scene first; return the clouds and likelihoods that the node publishes.
 
-    Each hand pose waits for the answer to the one before, so that a slow machine plays slower and drops nothing.
+    Each hand pose is sent after the prediction of the one before, so that a slow machine is slower and drops nothing.
     """
     from diagnostic_msgs.msg import DiagnosticArray
     from geometry_msgs.msg import PoseArray, PoseStamped
@@ -67,7 +67,7 @@ def play(ros: Graph, items: list[Item], parameters: str) -> tuple[list[Any], lis
     player = ros.node('player')
     clouds = ros.collect(player, PointCloud2, '/foc/prediction')
     likelihoods = ros.collect(player, Float64MultiArray, '/foc/likelihoods')
-    # Subscriptions are announced in their order: a node that is heard here has heard of the two above.
+    # subscriptions are announced in order: a node whose diagnostics are received knows the two subscriptions above
     health = ros.collect(player, DiagnosticArray, '/diagnostics')
     types = {'hand_pose': PoseStamped, 'obstacles': PointCloud2, 'goals': PoseArray}
     publishers = {role: player.create_publisher(kind, role, 100) for role, kind in types.items()}
@@ -98,7 +98,7 @@ def play(ros: Graph, items: list[Item], parameters: str) -> tuple[list[Any], lis
 
 
 def replayed(bag: Path, config: Config) -> list[dict[str, Any]]:
-    """Return what a node would publish for each prediction of a replay."""
+    """Return the messages of each prediction of a replay."""
     replay = Replay(config)
     with BagReader(bag) as reader:
         return [

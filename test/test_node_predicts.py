@@ -1,4 +1,4 @@
-"""The node in its graph: what it publishes, when, and that it is what the pipeline computes."""
+"""Outputs of the node: their content, their time, and their agreement with the pipeline."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ros_helpers import Graph  # noqa: E402
 from foc_ros.core.config import Config, updated  # noqa: E402
 from foc_ros.core.pipeline import Pipeline  # noqa: E402
 from foc_ros.ros.intake import Intake  # noqa: E402
-from foc_ros.ros.messages.outputs import output_messages  # noqa: E402
+from foc_ros.ros.messages.encode_prediction import output_messages  # noqa: E402
 
 
 def stamps(messages: list[Any]) -> list[int]:
@@ -26,13 +26,13 @@ def stamps(messages: list[Any]) -> list[int]:
 
 
 def sent(message: Any) -> Any:
-    """Return the message as it arrives, with its float32 fields rounded."""
+    """Return the message after serialisation, with its float32 fields rounded."""
     return deserialize_message(serialize_message(message), type(message))
 
 
-def test_every_due_hand_pose_is_answered_as_the_pipeline_answers_it(ros: Graph) -> None:
+def test_every_due_hand_pose_gets_the_prediction_of_the_pipeline(ros: Graph) -> None:
     bench, poses = Bench(ros), hand_path(20)
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(poses)
     clouds = bench.wait_for('prediction', 10)
     assert stamps(clouds) == stamps(poses)[::2]
@@ -54,9 +54,9 @@ def test_every_due_hand_pose_is_answered_as_the_pipeline_answers_it(ros: Graph) 
 
 def test_every_output_carries_the_stamp_and_frame_of_the_hand(ros: Graph) -> None:
     bench = Bench(ros)
-    bench.hear('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'base'))
-    bench.hear('goals', pose_array(TYPES, GOALS, 'base'))
-    bench.hear('hand_pose', pose_stamped(TYPES, (0.0, 0.0, 0.25), 10 * SECOND + 7, 'base'))
+    bench.deliver('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'base'))
+    bench.deliver('goals', pose_array(TYPES, GOALS, 'base'))
+    bench.deliver('hand_pose', pose_stamped(TYPES, (0.0, 0.0, 0.25), 10 * SECOND + 7, 'base'))
     for name in ('prediction', 'path'):
         head = bench.wait_for(name, 1)[0].header
         assert (head.stamp.sec, head.stamp.nanosec, head.frame_id) == (10, 7, 'base')
@@ -66,35 +66,35 @@ def test_every_output_carries_the_stamp_and_frame_of_the_hand(ros: Graph) -> Non
     assert {pose.pose.position.z for pose in path} == {0.25}
 
 
-def test_markers_and_a_single_goal_are_a_scene_too(ros: Graph) -> None:
+def test_markers_and_a_single_goal_make_a_scene(ros: Graph) -> None:
     bench = Bench(ros)
-    bench.hear(
+    bench.deliver(
         'obstacle_markers', marker_array(TYPES, marker(TYPES, (0.15, 0.02, 0.0), (0.06, 0.06, 0.06), stamp_ns=10 * SECOND))
     )
-    bench.hear('goal_pose', pose_stamped(TYPES, GOALS[0]))
+    bench.deliver('goal_pose', pose_stamped(TYPES, GOALS[0]))
     bench.move(hand_path(2))
     table = bench.wait_for('likelihoods', 1)[0]
     assert 'a/0' in table.layout.dim[0].label
 
 
-def test_nothing_is_predicted_before_all_inputs_are_there_and_diagnostics_say_so(ros: Graph) -> None:
+def test_nothing_is_predicted_before_all_inputs_are_received_and_diagnostics_report_it(ros: Graph) -> None:
     bench = Bench(ros)
     assert 'no hand pose yet' in bench.health().message
     bench.move(hand_path(1))
     status = bench.health()
     assert status.level == b'\x01'
     assert 'no obstacles received yet' in status.message
-    bench.hear('obstacles', cloud(TYPES, obstacle_table([]), 10 * SECOND))
+    bench.deliver('obstacles', cloud(TYPES, obstacle_table([]), 10 * SECOND))
     assert 'no goal received' in bench.health().message
     assert not bench.received['prediction']
-    bench.hear('goals', pose_array(TYPES, GOALS))
+    bench.deliver('goals', pose_array(TYPES, GOALS))
     bench.move(hand_path(3)[1:])
     bench.wait_for('prediction', 1)
 
 
-def test_a_node_that_cannot_keep_up_predicts_from_the_newest_pose_and_counts_the_rest(ros: Graph) -> None:
+def test_an_overloaded_node_predicts_from_the_newest_pose_and_counts_the_others(ros: Graph) -> None:
     bench, poses = Bench(ros), hand_path(41)
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(poses[:1])
     bench.wait_for('prediction', 1)
     bench.send('hand_pose', *poses[1:])
@@ -107,19 +107,19 @@ def test_a_node_that_cannot_keep_up_predicts_from_the_newest_pose_and_counts_the
     assert int(values['count predictions']) == 2
 
 
-def test_a_pose_that_is_refused_triggers_nothing(ros: Graph) -> None:
+def test_a_refused_pose_triggers_no_prediction(ros: Graph) -> None:
     bench, pose = Bench(ros), hand_path(1)[0]
-    bench.hear('hand_pose', pose)
-    bench.show_scene()
+    bench.deliver('hand_pose', pose)
+    bench.publish_scene()
     assert bench.node.pipeline.due
-    bench.hear('hand_pose', pose)
+    bench.deliver('hand_pose', pose)
     assert figures(bench.health())['count hand_duplicate'] == '1'
     assert not bench.received['prediction']
 
 
-def test_a_bag_that_loops_starts_anew(ros: Graph) -> None:
+def test_a_looping_bag_restarts_the_movement(ros: Graph) -> None:
     bench, poses = Bench(ros), hand_path(8, rate_hz=10.0)
-    bench.show_scene()
+    bench.publish_scene()
     for turn in range(2):
         bench.move(poses)
         status = bench.health()
@@ -131,23 +131,23 @@ def test_a_bag_that_loops_starts_anew(ros: Graph) -> None:
     assert status.level == b'\x00', status.message
 
 
-def test_only_what_is_listened_to_is_made(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_subscribed_outputs_are_encoded(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
     from foc_ros.ros import node
 
     asked: list[list[str]] = []
     monkeypatch.setattr(node, 'output_messages', lambda *args: asked.append(list(args[-1])) or output_messages(*args))
     bench = Bench(ros, outputs=['likelihoods'])
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(hand_path(1))
     bench.wait_for('likelihoods', 1)
     assert asked == [['likelihoods']]
 
 
-def test_engage_is_a_clutch(ros: Graph) -> None:
+def test_nothing_is_predicted_while_disengaged(ros: Graph) -> None:
     from std_srvs.srv import SetBool
 
     bench, poses = Bench(ros), hand_path(12)
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(poses[:3])
     assert len(bench.wait_for('prediction', 2)) == 2
     answer = ros.call(bench.player, SetBool, 'foc/engage', SetBool.Request(data=False))
@@ -165,7 +165,7 @@ def test_reset_forgets_the_movement_and_keeps_the_scene(ros: Graph) -> None:
     from std_srvs.srv import Trigger
 
     bench = Bench(ros)
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(hand_path(4))
     bench.wait_for('prediction', 2)
     assert ros.call(bench.player, Trigger, 'foc/reset', Trigger.Request()).success
@@ -174,10 +174,10 @@ def test_reset_forgets_the_movement_and_keeps_the_scene(ros: Graph) -> None:
     assert stamps(bench.wait_for('prediction', 3))[-1] == round(9.9 * SECOND)
 
 
-def test_two_arms_in_two_namespaces_do_not_hear_each_other(ros: Graph) -> None:
+def test_two_arms_in_two_namespaces_are_independent(ros: Graph) -> None:
     left, right = Bench(ros, namespace='left', parameters={}), Bench(ros, namespace='right', parameters={})
-    left.show_scene()
-    right.show_scene()
+    left.publish_scene()
+    right.publish_scene()
     left.publishers['hand_pose'].publish(hand_path(1)[0])
     left.wait_for('prediction', 1)
     ros.spin_for(0.2)
@@ -185,7 +185,7 @@ def test_two_arms_in_two_namespaces_do_not_hear_each_other(ros: Graph) -> None:
     assert (left.health().name, right.health().name) == ('left/foc: prediction', 'right/foc: prediction')
 
 
-def test_a_scene_published_once_is_heard_later_where_durability_says_so(ros: Graph) -> None:
+def test_a_scene_published_once_is_received_later_with_transient_local_durability(ros: Graph) -> None:
     from rclpy.qos import QoSDurabilityPolicy, QoSProfile
     from sensor_msgs.msg import PointCloud2
 
@@ -205,9 +205,9 @@ def test_a_scene_published_once_is_heard_later_where_durability_says_so(ros: Gra
     assert len(node.pipeline.scene.obstacles(0)) == len(ROWS)
 
 
-def test_diagnostics_tell_rates_ages_times_and_candidates(ros: Graph) -> None:
+def test_diagnostics_contain_rates_ages_times_and_candidates(ros: Graph) -> None:
     bench = Bench(ros)
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(hand_path(10))
     bench.wait_for('prediction', 5)
     status = bench.health()
@@ -225,14 +225,14 @@ def test_diagnostics_tell_rates_ages_times_and_candidates(ros: Graph) -> None:
     assert likelihoods.sum() == pytest.approx(1.0)
 
 
-def test_diagnostics_come_once_a_second_by_themselves(ros: Graph) -> None:
+def test_diagnostics_are_published_once_a_second(ros: Graph) -> None:
     bench = Bench(ros, outputs=[], ticking=True)
     ros.spin_until(lambda: len(bench.diagnostics) >= 3, 'three diagnostics')
     stamps_s = [array.header.stamp.sec + 1e-9 * array.header.stamp.nanosec for array in bench.diagnostics[:3]]
     assert stamps_s[2] - stamps_s[0] == pytest.approx(2.0, abs=0.9)
 
 
-def test_diagnostics_come_though_simulated_time_stands_still(ros: Graph) -> None:
+def test_diagnostics_are_published_while_simulated_time_stands_still(ros: Graph) -> None:
     bench = Bench(ros, outputs=[], ticking=True, parameters={'use_sim_time': True})
     ros.spin_until(lambda: len(bench.diagnostics) >= 2, 'two diagnostics')
     assert bench.node.get_clock().now().nanoseconds == 0

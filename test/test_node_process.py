@@ -1,4 +1,4 @@
-"""The node as a process: it starts with what it is given or says why not, and ends without an error when it is told to."""
+"""The node as a process: it starts or prints the reason why not, and stops without an error on a signal."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def entry_point(name: str) -> str:
-    """Return what `ros2 run` starts where colcon has installed the package, and what pip has installed elsewhere."""
+    """Return the program that colcon has installed for `ros2 run`, or else the one that pip has installed."""
     from ament_index_python import get_package_prefix
 
     try:
@@ -53,14 +53,14 @@ def running(ros: Graph, launch: str, *arguments: str) -> Iterator[subprocess.Pop
 
 
 def ended(process: subprocess.Popen[str], number: signal.Signals) -> tuple[int, str]:
-    """Send a signal; return exit code and what was written to standard error."""
+    """Send a signal; return the exit code and the text on standard error."""
     process.send_signal(number)
     _, errors = process.communicate(timeout=30)
     return process.returncode, errors
 
 
 def feed(ros: Graph, count: int) -> list[Any]:
-    """Play a scene and hand poses at 100 Hz to the node, wait until it has predicted, and return its diagnostics to come."""
+    """Publish a scene and hand poses at 100 Hz, wait for a prediction, and return the list of later diagnostics."""
     from diagnostic_msgs.msg import DiagnosticArray
     from geometry_msgs.msg import PoseArray, PoseStamped
     from sensor_msgs.msg import PointCloud2
@@ -84,13 +84,13 @@ def feed(ros: Graph, count: int) -> list[Any]:
 
 
 def figure(statuses: list[Any], name: str) -> str | None:
-    """Return a figure of the newest diagnostics."""
+    """Return a value of the newest diagnostics."""
     return figures(statuses[-1].status[0]).get(name) if statuses else None
 
 
 @pytest.mark.parametrize('launch', LAUNCHES)
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_a_node_at_work_ends_without_an_error(ros: Graph, launch: str, number: signal.Signals) -> None:
+def test_a_working_node_stops_without_an_error(ros: Graph, launch: str, number: signal.Signals) -> None:
     with running(ros, launch) as process:
         feed(ros, 60)
         code, errors = ended(process, number)
@@ -99,7 +99,7 @@ def test_a_node_at_work_ends_without_an_error(ros: Graph, launch: str, number: s
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_a_node_ends_without_an_error_at_any_moment_of_its_start(ros: Graph, number: signal.Signals) -> None:
+def test_a_starting_node_stops_without_an_error_at_any_moment(ros: Graph, number: signal.Signals) -> None:
     watcher = ros.node('watcher')
     with running(ros, 'module') as process:
         ros.spin_until(lambda: 'foc' in watcher.get_node_names(), 'the node', 30.0)
@@ -107,7 +107,7 @@ def test_a_node_ends_without_an_error_at_any_moment_of_its_start(ros: Graph, num
     assert (code, errors) == (0, '')
 
 
-def test_two_signals_are_one(ros: Graph) -> None:
+def test_a_second_signal_has_no_effect(ros: Graph) -> None:
     watcher = ros.node('watcher')
     with running(ros, 'module') as process:
         ros.spin_until(lambda: 'foc' in watcher.get_node_names(), 'the node', 30.0)
@@ -129,7 +129,7 @@ def test_two_signals_are_one(ros: Graph) -> None:
         (['--fast'], 'foc_node: unrecognized arguments: --fast (those of ROS follow --ros-args)\n'),
     ],
 )
-def test_a_node_that_cannot_start_says_why_in_one_line(ros: Graph, arguments: list[str], words: str) -> None:
+def test_a_node_that_cannot_start_prints_the_reason_in_one_line(ros: Graph, arguments: list[str], words: str) -> None:
     with running(ros, 'module', *arguments) as process:
         _, errors = process.communicate(timeout=30)
     assert process.returncode == 2
@@ -139,7 +139,7 @@ def test_a_node_that_cannot_start_says_why_in_one_line(ros: Graph, arguments: li
     assert 'Traceback' not in errors
 
 
-def test_a_request_that_rclpy_cannot_digest_does_not_end_the_node(ros: Graph) -> None:
+def test_a_request_that_rclpy_cannot_handle_does_not_end_the_node(ros: Graph) -> None:
     from rcl_interfaces.msg import Parameter, ParameterValue
     from rcl_interfaces.srv import GetParameters, SetParameters
 
@@ -156,7 +156,7 @@ def test_a_request_that_rclpy_cannot_digest_does_not_end_the_node(ros: Graph) ->
     assert code == 0
 
 
-def test_nothing_is_left_behind(ros: Graph, tmp_path: Path) -> None:
+def test_a_stopped_node_leaves_no_files_and_no_trace_in_the_graph(ros: Graph, tmp_path: Path) -> None:
     watcher = ros.node('watcher')
     command = [sys.executable, '-m', 'foc_ros.ros.main']
     environment = ros.environment | {'ROS_LOG_DIR': str(tmp_path / 'log'), 'PYTHONPATH': str(ROOT)}
@@ -171,7 +171,7 @@ def test_nothing_is_left_behind(ros: Graph, tmp_path: Path) -> None:
     assert [each.name for each in tmp_path.iterdir()] == ['log']
 
 
-def test_a_node_hears_every_pose_of_a_tracker(ros: Graph) -> None:
+def test_a_node_receives_every_pose_of_a_tracker(ros: Graph) -> None:
     count = 200
     with running(ros, 'module', '--ros-args', '-p', 'foc.steps:=20') as process:
         statuses = feed(ros, count)

@@ -1,4 +1,4 @@
-"""Inputs at rates that a node has to bear, in real time and to a node in a process of its own: what comes out, and the level."""
+"""Inputs at high rates, in real time, to a node in its own process: its outputs and the level of its diagnostics."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ RELIABLE = 'qos_overrides./hand_pose.subscription.reliability:=reliable'
 
 
 class Feeder:
-    """Plays hand poses and clouds to a node at given rates. Attributes: clouds, health: what came back; sent: poses."""
+    """Publishes hand poses and clouds at given rates. Attributes: clouds, health: messages received; sent: number of poses."""
 
     def __init__(self, ros: Graph) -> None:
         self.ros, player = ros, ros.node('player')
@@ -46,7 +46,7 @@ class Feeder:
         return figures(self.health[-1].status[0]).get(name) if self.health else None
 
     def play(self, seconds: float, pose_hz: float, tick: Callable[[int], Any] = lambda _: None) -> None:
-        """Send what is due every 10 ms, poses as many as that takes; `tick(i)` in each."""
+        """Publish every 10 ms the poses that are due, and call `tick(i)`."""
         began, ticks = time.monotonic(), round(100 * seconds)
         for i in range(ticks):
             tick(i)
@@ -57,7 +57,7 @@ class Feeder:
             self.ros.spin_for(max(began + 0.01 * (i + 1) - time.monotonic(), 0.001))
 
     def complaints(self) -> list[str]:
-        """Return what diagnostics said since the first prediction, but for OK and the poses that a slow machine passes over."""
+        """Return the summaries since the first prediction, except OK and dropped cycles of a slow machine."""
         told = [each.status[0] for each in self.health if 'count predictions' in figures(each.status[0])]
         assert told
         return [
@@ -80,7 +80,7 @@ def parameters(*given: str) -> list[str]:
 
 
 def test_ten_thousand_obstacles_at_50_hz(ros: Graph) -> None:
-    """Each of the poses is heard, predictions go on being made from the newest, and nothing is wrong with that."""
+    """Every pose is received, predictions are made from the newest, and the level is OK."""
     feeder, flood = Feeder(ros), cloud(TYPES, obstacle_table(CROWD), 10 * SECOND)
     with running(ros, 'module', *parameters(*LIGHT, RELIABLE)) as process:
         feeder.connect()
@@ -110,7 +110,7 @@ def test_poses_at_1_khz(ros: Graph) -> None:
     assert feeder.complaints() == []
 
 
-def test_bad_poses_at_1_khz_are_few_lines_in_the_log(ros: Graph) -> None:
+def test_bad_poses_at_1_khz_write_few_lines_to_the_log(ros: Graph) -> None:
     feeder, nowhere = Feeder(ros), pose_stamped(TYPES, (float('nan'), 0.0, 0.0), 10 * SECOND)
     with running(ros, 'module', *parameters(*LIGHT, RELIABLE)) as process:
         feeder.connect()

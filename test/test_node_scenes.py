@@ -1,4 +1,4 @@
-"""Scenes at the edge of what can be predicted, through the live node: what comes out, and the level of the diagnostics."""
+"""Extreme scenes in a running node: its outputs and the level of its diagnostics."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ RING = [(0.1 * np.cos(angle), 0.1 * np.sin(angle), 0.0, 0.02) for angle in np.li
 
 @dataclass
 class Case:
-    """A scene; how many candidates come out, at least and at most; level and words of the diagnostics."""
+    """A scene; the least and largest number of candidates; level and text of the diagnostics."""
 
     rows: list[tuple[float, ...]]
     candidates: tuple[int, int]
@@ -49,11 +49,11 @@ CASES = {
 
 
 @pytest.mark.parametrize('name', CASES)
-def test_what_comes_out_of_a_scene_at_the_edge_and_the_level(ros: Graph, name: str) -> None:
+def test_the_outputs_and_the_level_of_an_extreme_scene(ros: Graph, name: str) -> None:
     case = CASES[name]
     bench = Bench(ros, parameters=case.parameters)
-    bench.hear('obstacles', cloud(TYPES, obstacle_table(case.rows), 10 * SECOND))
-    bench.hear('goals', pose_array(TYPES, case.goals))
+    bench.deliver('obstacles', cloud(TYPES, obstacle_table(case.rows), 10 * SECOND))
+    bench.deliver('goals', pose_array(TYPES, case.goals))
     bench.health()
     (pose,) = hand_path(1)
     bench.move([pose])
@@ -74,12 +74,12 @@ def test_what_comes_out_of_a_scene_at_the_edge_and_the_level(ros: Graph, name: s
     assert len([value for value in told if value.startswith('solved')]) == count
 
 
-def test_what_is_wrong_is_told_as_long_as_it_lasts_and_no_longer(ros: Graph) -> None:
+def test_a_fault_is_reported_as_long_as_it_lasts(ros: Graph) -> None:
     bench, poses = Bench(ros), hand_path(8)
-    bench.show_scene(rows=[(0.01, 0.0, 0.0, 0.03)])
+    bench.publish_scene(rows=[(0.01, 0.0, 0.0, 0.03)])
     bench.move(poses[:4])
     assert bench.health().level == WARN
-    bench.show_scene()
+    bench.publish_scene()
     bench.move(poses[4:])
     bench.health()
     bench.move(hand_path(2, start_s=10.08))

@@ -1,4 +1,4 @@
-"""The output bag, read with the mcap library and its ROS 2 decoder: nothing of ours, and nothing of what wrote it."""
+"""The output bag, read with the mcap library and its ROS 2 decoder, which share no code with the writer."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DTYPES = {1: 'i1', 2: 'u1', 3: 'i2', 4: 'u2', 5: 'i4', 6: 'u4', 7: 'f4', 8: 'f8'
 
 @pytest.fixture(scope='module')
 def decoded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[object]]:
-    """Messages by topic, as the independent reader sees them, and the bag they are from."""
+    """Messages by topic as the independent reader decodes them."""
     folder = tmp_path_factory.mktemp('independent')
     bag = write_bag(folder / 'reach', messages(seconds=SECONDS))
     assert main(['replay', str(bag), '--output', str(folder / 'out'), '--params', write_parameters(folder)]) == 0
@@ -55,7 +55,7 @@ def test_topics_and_counts(decoded: dict[str, list[object]]) -> None:
     }
 
 
-def test_metadata_agrees(decoded: dict[str, list[object]]) -> None:
+def test_metadata_agrees_with_the_messages(decoded: dict[str, list[object]]) -> None:
     information = yaml.safe_load((decoded['out'][0] / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
     assert information['version'] == 9 and information['storage_identifier'] == 'mcap'
     assert information['message_count'] == sum(len(found) for topic, found in decoded.items() if topic.startswith('/'))

@@ -1,7 +1,8 @@
-"""What pip and colcon install: metadata that agrees, and every file that the program needs."""
+"""What pip and colcon install: consistent metadata, and every file that the program needs."""
 
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -23,7 +24,7 @@ SOURCES = ('.py', '.mcap', '.css', '.html', '.js')
 
 @pytest.fixture(scope='module')
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
-    """Build a wheel of a copy of the sources, without the network."""
+    """Build a wheel from a copy of the sources, without network access."""
     setuptools = pytest.importorskip('setuptools', '70.1', reason='setuptools 70.1 is needed to build a wheel')
     source, target = tmp_path_factory.mktemp('source') / 'foc_ros', tmp_path_factory.mktemp('wheel')
     shutil.copytree(ROOT, source, ignore=SKIPPED)
@@ -68,14 +69,14 @@ def test_package_xml_names_every_message_package(package_xml: ET.Element) -> Non
     assert used - {'builtin_interfaces'} <= keys
 
 
-def test_rosdep_rule_resolves_what_rosdep_does_not_know(package_xml: ET.Element) -> None:
+def test_own_rosdep_rules_are_used(package_xml: ET.Element) -> None:
     rules = yaml.safe_load((ROOT / 'rosdep' / 'foc_ros.yaml').read_text('utf-8'))
     keys = {node.text for node in package_xml if node.tag.endswith('depend')}
     assert set(rules) <= keys
     assert rules['python3-piqp-pip']['ubuntu'] == {'pip': {'packages': ['piqp']}}
 
 
-def test_wheel_holds_what_the_program_needs(wheel: zipfile.ZipFile) -> None:
+def test_wheel_contains_all_files_of_the_program(wheel: zipfile.ZipFile) -> None:
     names = set(wheel.namelist())
     data = 'foc_ros-0.1.0.data/data/'.replace('0.1.0', foc_ros.__version__)
     assert f'{data}share/ament_index/resource_index/packages/foc_ros' in names
@@ -88,8 +89,8 @@ def test_wheel_holds_what_the_program_needs(wheel: zipfile.ZipFile) -> None:
     assert not [name for name in names if name.startswith(('test', 'scripts', 'benchmarks'))]
 
 
-def test_ros2_run_knows_every_command(wheel: zipfile.ZipFile) -> None:
-    """`ros2 run` starts files of lib/foc_ros: one per command, executable, and none of them on everybody's PATH."""
+def test_ros2_run_finds_every_command(wheel: zipfile.ZipFile) -> None:
+    """`ros2 run` starts files of lib/foc_ros: one executable per command, which is not on PATH."""
     scripts = {Path(info.filename).name: info for info in wheel.infolist() if '.data/data/lib/foc_ros/' in info.filename}
     assert set(scripts) == set(COMMANDS)
     assert all(info.external_attr >> 16 & 0o111 == 0o111 for info in scripts.values())
@@ -97,24 +98,26 @@ def test_ros2_run_knows_every_command(wheel: zipfile.ZipFile) -> None:
     assert re.findall(r'^(\w+) =', entry_points, re.MULTILINE) == ['foc_node', 'foc_ros']
 
 
-@pytest.mark.parametrize('command', sorted(path.name for path in (ROOT / 'scripts' / 'ros2_run').iterdir()))
-def test_ros2_run_starts_the_command(command: str) -> None:
-    script = ROOT / 'scripts' / 'ros2_run' / command
-    under_test = str(Path(foc_ros.__file__).parents[1])
-    paths = os.pathsep.join([under_test, *filter(None, [os.environ.get('PYTHONPATH')])])
-    result = subprocess.run(
-        [sys.executable, script, '--help'],
-        capture_output=True,
-        text=True,
-        timeout=100,
-        check=False,
-        env=os.environ | {'PYTHONPATH': paths},
-    )
+@pytest.mark.parametrize('script', sorted((ROOT / 'scripts' / 'ros2_run').iterdir()), ids=lambda script: script.name)
+def test_ros2_run_starts_the_command(script: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(sys, 'argv', [str(script), '--help'])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(script), run_name='__main__')
+    assert not ended.value.code
+    assert f' {script.name} ' in capsys.readouterr().out
+
+
+def test_ros2_run_starts_a_script_without_the_working_directory(tmp_path: Path) -> None:
+    """Run one of the scripts as `ros2 run` does: in a process of its own, from any directory."""
+    paths = os.pathsep.join([str(Path(foc_ros.__file__).parents[1]), *filter(None, [os.environ.get('PYTHONPATH')])])
+    command = [sys.executable, ROOT / 'scripts' / 'ros2_run' / 'solve', '--help']
+    environment = os.environ | {'PYTHONPATH': paths}
+    result = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=100, check=False)
     assert result.returncode == 0, result.stderr
-    assert f' {command} ' in result.stdout
+    assert ' solve ' in result.stdout
 
 
-def test_no_file_names_a_path_of_somebodys_machine() -> None:
+def test_no_file_contains_a_path_of_one_machine() -> None:
     listed = subprocess.run(['git', 'ls-files', '-z'], cwd=ROOT, capture_output=True, check=False)
     if listed.returncode:
         pytest.skip('not a git checkout: the list of files is unknown')
@@ -122,4 +125,4 @@ def test_no_file_names_a_path_of_somebodys_machine() -> None:
     for name in filter(None, listed.stdout.decode().split('\0')):
         file = ROOT / name
         if file.is_file() and file.suffix not in ('.png', '.mcap') and file != Path(__file__):
-            assert not wrong.search(file.read_bytes()), f'{name} names a path of a machine'
+            assert not wrong.search(file.read_bytes()), f'{name} contains a path of one machine'

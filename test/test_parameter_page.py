@@ -1,4 +1,4 @@
-"""doc/parameters.md says what the configuration says."""
+"""doc/parameters.md agrees with the configuration."""
 
 import importlib.util
 import re
@@ -19,7 +19,7 @@ def test_the_page_is_current() -> None:
 
 
 def test_every_parameter_is_read_somewhere() -> None:
-    """A setting that nothing reads would be accepted and ignored."""
+    """A parameter that no code reads would be accepted and ignored."""
     code = ' '.join(file.read_text('utf-8') for file in (ROOT / 'foc_ros').rglob('*.py') if file.name != 'config.py')
     unread = [parameter.name for parameter in parameters() if not re.search(rf'\.{parameter.name.split(".")[-1]}\b', code)]
     assert unread == []

@@ -1,4 +1,4 @@
-"""Parameters from the config classes: the file, and those of the node."""
+"""Parameters of the config classes in the parameter file and on the node."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ros_helpers import Graph
 from foc_ros.core.config import Config, flatten, parameters, updated
 from foc_ros.core.errors import FocError, ParameterError, RecordingError
 from foc_ros.ros import parameters as module
-from foc_ros.ros.parameters import config_of, declare_all, dump_parameter_file, load_parameter_file
+from foc_ros.ros.parameters import dump_parameter_file, load_parameter_file
 
 ROOT = Path(__file__).parents[1]
 NAMES = [parameter.name for parameter in parameters()]
@@ -41,7 +41,7 @@ def test_the_shipped_file_holds_the_defaults() -> None:
     assert load_parameter_file(ROOT / 'config' / 'foc.yaml') == Config()
 
 
-def test_the_file_explains_every_parameter() -> None:
+def test_the_file_describes_every_parameter() -> None:
     lines = dump_parameter_file(Config()).splitlines()
     for name in NAMES:
         leaf = name.rpartition('.')[2]
@@ -53,7 +53,7 @@ def test_the_file_explains_every_parameter() -> None:
 def values_of(parameter: Any) -> st.SearchStrategy[Any]:
     bound = parameter.bound
     if bound.choices:
-        return st.sampled_from(bound.choices)
+        return st.sampled_from(tuple(bound.choices))
     if isinstance(parameter.default, str):
         return st.text(st.characters(codec='ascii', exclude_categories=['Cc']), max_size=12)
     if isinstance(parameter.default, int):
@@ -62,7 +62,7 @@ def values_of(parameter: Any) -> st.SearchStrategy[Any]:
 
 
 @given(st.fixed_dictionaries({}, optional={parameter.name: values_of(parameter) for parameter in parameters()}))
-def test_every_configuration_comes_back_from_its_file(tmp_path_factory: pytest.TempPathFactory, values: dict[str, Any]) -> None:
+def test_every_configuration_is_read_as_it_was_written(tmp_path_factory: pytest.TempPathFactory, values: dict[str, Any]) -> None:
     config = updated(Config(), values)
     assert load(tmp_path_factory.getbasetemp(), dump_parameter_file(config)) == config
 
@@ -77,7 +77,7 @@ def test_names_are_nested_or_dotted(tmp_path: Path, key: str, body: str) -> None
     assert dataclasses.replace(config, foc=Config().foc) == Config()
 
 
-def test_what_others_put_into_the_file_is_skipped(tmp_path: Path) -> None:
+def test_parameters_of_others_in_the_file_are_skipped(tmp_path: Path) -> None:
     text = """
 /other_node: {ros__parameters: {gain: 3}}
 /**:
@@ -119,7 +119,7 @@ foc: {ros__parameters: {rate_hz: 25}}
         ('', 'expected a section /** or foc or /foc, got NoneType'),
     ],
 )
-def test_a_wrong_file_is_refused_in_words(tmp_path: Path, text: str, words: str) -> None:
+def test_a_wrong_file_is_refused_with_its_reason(tmp_path: Path, text: str, words: str) -> None:
     with pytest.raises(ParameterError, match=re.escape(words)):
         load(tmp_path, text)
 
@@ -127,17 +127,17 @@ def test_a_wrong_file_is_refused_in_words(tmp_path: Path, text: str, words: str)
 @pytest.mark.parametrize(
     'text', ['/**: {ros__parameters: {rate_hz: 5', '!!python/object/apply:os.system ["true"]', '/**: {a: 1, a: 2}', '\x00']
 )
-def test_a_file_that_is_no_plain_yaml_is_refused(tmp_path: Path, text: str) -> None:
+def test_a_file_that_is_not_plain_yaml_is_refused(tmp_path: Path, text: str) -> None:
     with pytest.raises(RecordingError, match=r'params\.yaml: not a YAML file'):
         load(tmp_path, text)
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(FocError, match=r'absent\.yaml: cannot be read'):
         load_parameter_file(tmp_path / 'absent.yaml')
 
 
-def test_aliases_do_not_multiply_without_bound(tmp_path: Path) -> None:
+def test_nested_yaml_aliases_are_not_expanded(tmp_path: Path) -> None:
     levels = ['a0: &a0 {x: 1}', *[f'a{i}: &a{i} {{b: *a{i - 1}, c: *a{i - 1}}}' for i in range(1, 60)]]
     text = 'other:\n' + '\n'.join(f'  {line}' for line in levels) + '\n/**: {ros__parameters: {foc: {d: {e: 1}}}}'
     with pytest.raises(ParameterError, match=r'foc\.d: expected a known parameter'):
@@ -151,9 +151,11 @@ def node_with(ros: Graph, **overrides: object) -> Any:
     return ros.node('foc', parameter_overrides=given_values, automatically_declare_parameters_from_overrides=True)
 
 
-def test_a_node_declares_every_parameter_with_its_meaning_and_range(ros: Graph) -> None:
+def test_a_node_declares_every_parameter_with_description_and_range(ros: Graph) -> None:
+    from foc_ros.ros.node_parameters import declare_parameters, read_config
+
     node = node_with(ros)
-    assert declare_all(node, Config()) == Config() == config_of(node)
+    assert declare_parameters(node, Config()) == Config() == read_config(node)
     for parameter in parameters():
         descriptor = node.describe_parameter(parameter.name)
         assert node.get_parameter(parameter.name).value == parameter.default
@@ -166,29 +168,37 @@ def test_a_node_declares_every_parameter_with_its_meaning_and_range(ros: Graph) 
         assert all(choice in descriptor.additional_constraints for choice in parameter.bound.choices)
 
 
-def test_a_node_starts_with_what_it_was_given(ros: Graph) -> None:
+def test_a_node_starts_with_its_parameter_overrides(ros: Graph) -> None:
+    from foc_ros.ros.node_parameters import declare_parameters, read_config
+
     node = node_with(ros, rate_hz=20, foc__eta=0.7, use_sim_time=False)
-    config = declare_all(node, Config())
-    assert config == updated(Config(), {'rate_hz': 20.0, 'foc.eta': 0.7}) == config_of(node)
+    config = declare_parameters(node, Config())
+    assert config == updated(Config(), {'rate_hz': 20.0, 'foc.eta': 0.7}) == read_config(node)
     assert isinstance(node.get_parameter('rate_hz').value, float)
 
 
 def test_a_node_does_not_start_with_a_value_out_of_bounds(ros: Graph) -> None:
+    from foc_ros.ros.node_parameters import declare_parameters
+
     with pytest.raises(ParameterError, match=re.escape('foc.eta: expected a number in [0, 0.999], got 2.0')):
-        declare_all(node_with(ros, foc__eta=2.0), Config())
+        declare_parameters(node_with(ros, foc__eta=2.0), Config())
 
 
 def test_a_node_reads_the_file_that_replay_reads(tmp_path: Path) -> None:
     from ros_helpers import graph
 
+    from foc_ros.ros.node_parameters import declare_parameters
+
     config = updated(Config(), {'foc.lv_delta': 5e-5, 'foc.lam': 1e15, 'frame_id': 'base', 'foc.steps': 33})
     file = tmp_path / 'params.yaml'
     file.write_text(dump_parameter_file(config), 'utf-8')
     with graph(['--ros-args', '--params-file', str(file)]) as ros:
-        assert declare_all(node_with(ros), Config()) == config == load_parameter_file(file)
+        assert declare_parameters(node_with(ros), Config()) == config == load_parameter_file(file)
 
 
-def test_an_unknown_parameter_of_a_node_is_warned_of(ros: Graph) -> None:
+def test_an_unknown_parameter_of_a_node_is_logged_as_a_warning(ros: Graph) -> None:
+    from foc_ros.ros.node_parameters import declare_parameters
+
     class Log:
         def __init__(self) -> None:
             self.lines: list[str] = []
@@ -198,15 +208,15 @@ def test_an_unknown_parameter_of_a_node_is_warned_of(ros: Graph) -> None:
 
     node, log = node_with(ros, foc__etta=0.5), Log()
     node.get_logger = lambda: log
-    declare_all(node, Config())
+    declare_parameters(node, Config())
     assert log.lines == ['parameter foc.etta is unknown and has no effect']
 
 
 def test_names_in_the_file_are_the_names_of_the_node() -> None:
     tree = yaml.safe_load(dump_parameter_file(Config()))['/**']['ros__parameters']
-    assert dict(module._leaves(tree)) == flatten(Config())
+    assert dict(module._flatten_group(tree)) == flatten(Config())
 
 
-def test_what_is_the_nodes_alone_may_stand_in_the_file(tmp_path: Path) -> None:
+def test_parameters_of_the_node_alone_may_stand_in_the_file(tmp_path: Path) -> None:
     text = '/**: {ros__parameters: {autostart: false, use_sim_time: true, foc: {eta: 0.7}}}'
     assert load(tmp_path, text) == updated(Config(), {'foc.eta': 0.7})

@@ -1,4 +1,4 @@
-"""Pictures: what is drawn is what was computed, in colours that everybody can tell apart."""
+"""Pictures: the drawn values are the computed ones, in colours that can be told apart with any colour vision."""
 
 from __future__ import annotations
 
@@ -19,10 +19,18 @@ from report_samples import START_NS, prediction, predictions, samples, scene
 
 from foc_ros.core.errors import InputError
 from foc_ros.core.types import make_obstacles
-from foc_ros.reporting.drawing import CLASS_COLOURS, CLASSES, ELLIPSES_PER_WAY, LIKELIHOOD_COLOURS, stddev_ellipse
-from foc_ros.reporting.plots import Around, bounds_of, moment_figure, plot_outcomes, plot_prediction, save, scene_figure
-from foc_ros.reporting.snapshots import candidate_views, movements, snapshot_of_prediction, track_of
-from foc_ros.reporting.track_association import associate_tracks, slots
+from foc_ros.reporting.drawing import (
+    CLASS_COLOURS,
+    CLASSES,
+    ELLIPSES_PER_WAY,
+    NO_CLASS_COLOUR,
+    candidate_style,
+    class_style,
+    stddev_ellipse,
+)
+from foc_ros.reporting.plots import bounds_of, make_scene_figure, make_snapshot_figure, plot_outcomes, plot_prediction, save
+from foc_ros.reporting.snapshots import build_candidate_views, build_hand_trajectory, build_snapshot
+from foc_ros.reporting.track_association import build_candidate_tracks
 
 ROOT = Path(__file__).resolve().parents[1]
 PNG = b'\x89PNG\r\n\x1a\n'
@@ -47,14 +55,16 @@ def luminance(colour: tuple[float, float, float]) -> float:
     return float(np.dot([0.2126, 0.7152, 0.0722], linear))
 
 
-def test_likelihood_darkens_steadily_and_shows_on_white() -> None:
-    values = [luminance(LIKELIHOOD_COLOURS(step)[:3]) for step in np.linspace(0.0, 1.0, 50)]
-    assert np.all(np.diff(values) < 0.0)
-    assert 1.05 / (values[0] + 0.05) > 1.5
+def test_colours_show_on_white_and_the_likely_candidate_is_the_thickest() -> None:
+    assert all(1.05 / (luminance(colour) + 0.05) > 1.5 for colour in (*CLASS_COLOURS, NO_CLASS_COLOUR))
+    widths = [candidate_style(0, likelihood)['linewidth'] for likelihood in np.linspace(0.0, 1.0, 20)]
+    assert np.all(np.diff(widths) > 0.0)
+    styles = [class_style(slot) for slot in range(CLASSES)]
+    assert len(set(styles)) == CLASSES
 
 
 def test_class_colours_differ_for_the_colour_blind() -> None:
-    """Seen by a deuteranope and a protanope (Vienot, Brettel, Mollon 1999, linear RGB), no two fall together."""
+    """The colours differ as seen by a deuteranope and a protanope (Vienot, Brettel, Mollon 1999, linear RGB)."""
     deuteranope = np.array([[0.29275, 0.70725, 0.0], [0.29275, 0.70725, 0.0], [-0.02234, 0.02234, 1.0]])
     protanope = np.array([[0.11238, 0.88762, 0.0], [0.11238, 0.88762, 0.0], [0.00401, -0.00401, 1.0]])
     linear = np.array([to_rgb(colour) for colour in CLASS_COLOURS]) ** 2.2
@@ -63,52 +73,54 @@ def test_class_colours_differ_for_the_colour_blind() -> None:
         assert gaps.min() > 0.1
 
 
-def test_scene_holds_every_obstacle_goal_and_way() -> None:
+def test_scene_holds_every_obstacle_goal_and_candidate() -> None:
     obstacles, goals = scene()
-    ways = candidate_views(prediction(START_NS, np.zeros(2)).candidates)
-    axes = scene_figure(obstacles, goals, ways, bounds_of(obstacles, goals, ways)).axes[0]
+    candidates = build_candidate_views(prediction(START_NS, np.zeros(2)).candidates)
+    axes = make_scene_figure(obstacles, goals, candidates).axes[0]
     radii = sorted(patch.radius for patch in axes.patches if isinstance(patch, Circle))
     np.testing.assert_allclose(radii, [0.02, 0.02, 0.03, 0.033])
     drawn = [line.get_xydata() for line in axes.lines]
-    for way in ways:
-        assert any(np.array_equal(line, way.path) for line in drawn)
+    for each in candidates:
+        assert any(np.array_equal(line, each.path) for line in drawn)
     for goal in goals:
         assert any(np.array_equal(line, [goal]) for line in drawn)
-    assert sum(type(patch) is Ellipse for patch in axes.patches) == ELLIPSES_PER_WAY * len(ways)
+    assert sum(type(patch) is Ellipse for patch in axes.patches) == ELLIPSES_PER_WAY * len(candidates)
 
 
 def test_unsolved_outcomes_are_not_drawn() -> None:
     outcomes = prediction(START_NS, np.zeros(2)).candidates
-    assert [way.label for way in candidate_views(outcomes)] == [each.candidate.label for each in outcomes if each.is_solved]
+    assert [view.label for view in build_candidate_views(outcomes)] == [
+        each.candidate.label for each in outcomes if each.is_solved
+    ]
     assert any(not each.is_solved for each in outcomes)
 
 
 def test_bounds_hold_the_ellipses() -> None:
     obstacles, goals = scene()
-    ways = candidate_views(prediction(START_NS, np.zeros(2)).candidates)
-    left, right, bottom, top = bounds_of(obstacles, goals, ways)
+    candidates = build_candidate_views(prediction(START_NS, np.zeros(2)).candidates)
+    left, right, bottom, top = bounds_of(obstacles, goals, candidates)
     assert right > 0.3 + 2 * 0.011
     assert left < 0.0
     assert bottom < -0.06
     assert top > 0.12
 
 
-def test_moment_shows_past_and_future_of_the_hand() -> None:
+def test_a_snapshot_figure_shows_past_and_future_of_the_hand() -> None:
     made = samples()
-    track = track_of(made)
-    (span,) = movements(track, 0.05)
-    around = [snapshot_of_prediction(each, *scene()) for each in predictions(made) if span[0] <= each.stamp_ns <= span[1]]
-    moment = around[len(around) // 3]
-    lines = associate_tracks(around)
-    told = Around(tuple(around), tuple(lines), slots(around, lines, CLASSES, len(CLASS_COLOURS)))
-    figure = moment_figure(track, moment, told, span, bounds_of(*scene(), moment.ways))
-    hand = [line for line in figure.axes[0].lines if line.get_color() == 'black' and len(line.get_xdata()) > 1]
-    assert [line.get_linestyle() for line in hand] == ['-', ':']
-    now = track.positions[track.stamps_ns == moment.stamp_ns][0]
-    np.testing.assert_array_equal(hand[0].get_xydata()[-1], now)
-    drawn = [line.get_ydata() for line in figure.axes[2].lines if len(line.get_ydata()) == len(around)]
-    now = sorted(values[around.index(moment)] for values in drawn)
-    np.testing.assert_array_equal(now, sorted(way.likelihood for way in moment.ways))
+    hand = build_hand_trajectory(made)
+    (span,) = hand.find_movements(0.05)
+    during = [build_snapshot(each) for each in predictions(made) if span[0] <= each.stamp_ns <= span[1]]
+    row = len(during) // 3
+    snapshot = during[row]
+    bounds = bounds_of(*scene(), snapshot.candidates)
+    figure = make_snapshot_figure(hand, build_candidate_tracks(during), row, span, bounds)
+    drawn = [line for line in figure.axes[0].lines if line.get_color() == 'black' and len(line.get_xdata()) > 1]
+    assert [line.get_linestyle() for line in drawn] == ['-', ':']
+    now = hand.positions[hand.stamps_ns == snapshot.stamp_ns][0]
+    np.testing.assert_array_equal(drawn[0].get_xydata()[-1], now)
+    likelihoods = [line.get_ydata() for line in figure.axes[1].lines if len(line.get_ydata()) == len(during)]
+    expected = sorted(each.likelihood for each in snapshot.candidates)
+    np.testing.assert_array_equal(sorted(values[row] for values in likelihoods), expected)
 
 
 @pytest.mark.parametrize('suffix', ['png', 'pdf', 'svg'])
@@ -136,14 +148,16 @@ def test_a_file_that_cannot_be_written(tmp_path: Path, name: str, expected: str)
 
 def test_equal_input_gives_equal_pictures(tmp_path: Path) -> None:
     obstacles, goals = scene()
-    ways = candidate_views(prediction(START_NS, np.zeros(2)).candidates)
+    candidates = build_candidate_views(prediction(START_NS, np.zeros(2)).candidates)
     for name in ('one.png', 'two.png'):
-        save(scene_figure(obstacles, goals, ways, bounds_of(obstacles, goals, ways)), tmp_path / name)
+        save(make_scene_figure(obstacles, goals, candidates), tmp_path / name)
     assert (tmp_path / 'one.png').read_bytes() == (tmp_path / 'two.png').read_bytes()
 
 
-@pytest.mark.parametrize(('missing', 'module'), [('matplotlib', 'plots'), ('matplotlib', 'report'), ('plotly', 'report')])
-def test_a_missing_library_is_told_in_one_line_with_how_to_get_it(missing: str, module: str) -> None:
+@pytest.mark.parametrize(
+    ('missing', 'module'), [('matplotlib', 'plots'), ('matplotlib', 'report'), ('plotly', 'report'), ('jinja2', 'report')]
+)
+def test_a_missing_library_is_reported_in_one_line_with_how_to_install_it(missing: str, module: str) -> None:
     program = f"""
 import importlib.util, sys
 sys.modules['{missing}'] = None
@@ -155,9 +169,9 @@ try:
 except FocError as error:
     print(error)
 """
-    told = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True, check=True, cwd=ROOT).stdout
-    assert 'pip install' in told
-    assert told.count('\n') == 1
+    printed = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True, check=True, cwd=ROOT).stdout
+    assert 'pip install' in printed
+    assert printed.count('\n') == 1
 
 
 def test_a_prediction_is_drawn_on_given_or_new_axes() -> None:

@@ -1,4 +1,4 @@
-"""The pictures of README and concepts are there, and their scripts draw what they say; so are the tables of the examples."""
+"""The pictures of README and concepts exist, their scripts draw them, and the tables of the examples are current."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
-from report_samples import predictions, samples, scene
+from report_samples import predictions, samples
 
-from foc_ros.reporting.snapshots import movements, snapshot_of_prediction, track_of
+from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
 def script(name: str) -> ModuleType:
-    """Import a file of scripts/, which is no package."""
+    """Import a file of scripts/, which is not a package."""
     sys.path.insert(0, str(ROOT / 'scripts'))
     try:
         return importlib.import_module(name)
@@ -36,10 +36,10 @@ def test_the_pictures_are_in_the_readme(name: str, start: bytes) -> None:
     assert len(picture) < 2_000_000
 
 
-def test_the_moving_picture_goes_through_a_movement(tmp_path: Path) -> None:
+def test_the_animation_covers_a_movement(tmp_path: Path) -> None:
     moving = script('make_demo_animation')
     made = samples(1)
-    drawn = list(moving.pictures(track_of(made), [snapshot_of_prediction(each, *scene()) for each in predictions(made)], (0,)))
+    drawn = list(moving.pictures(build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made)], (0,)))
     assert 10 < len(drawn) <= moving.PICTURES
     lengths = [len(figure.axes[1].lines[0].get_xdata()) for figure, _ in drawn]
     assert all(np.diff(lengths) > 0)
@@ -47,17 +47,17 @@ def test_the_moving_picture_goes_through_a_movement(tmp_path: Path) -> None:
     assert (tmp_path / 'demo.gif').read_bytes().startswith(b'GIF89a')
 
 
-def test_the_script_draws_the_beginning_of_its_movement() -> None:
+def test_the_readme_picture_shows_the_beginning_of_its_movement() -> None:
     still = script('make_readme_picture')
     made = samples(still.MOVEMENT)
-    track, moments = track_of(made), [snapshot_of_prediction(each, *scene()) for each in predictions(made, every=2)]
-    start_ns = movements(track, 0.05)[still.MOVEMENT - 1][0]
-    shown = min(moments, key=lambda each: abs(each.stamp_ns - start_ns - still.AFTER_S * 1e9))
-    drawn = [line.get_xydata() for line in still.picture(track, moments).axes[0].lines]
-    for way in shown.ways:
-        assert any(np.array_equal(line, way.path) for line in drawn)
+    hand, snapshots = build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made, every=2)]
+    start_ns = hand.find_movements(0.05)[still.MOVEMENT - 1][0]
+    shown = min(snapshots, key=lambda each: abs(each.stamp_ns - start_ns - still.AFTER_S * 1e9))
+    drawn = [line.get_xydata() for line in still.picture(hand, snapshots).axes[0].lines]
+    for each in shown.candidates:
+        assert any(np.array_equal(line, each.path) for line in drawn)
     # the hand's past, its future, and where it is
-    assert sum(np.isin(line[:, 0], track.positions[:, 0]).all() for line in drawn) >= 3
+    assert sum(np.isin(line[:, 0], hand.positions[:, 0]).all() for line in drawn) >= 3
 
 
 @pytest.mark.parametrize('name', ['noise', 'surrogate', 'strategies', 'classes', 'likelihood'])
@@ -70,7 +70,7 @@ def test_concepts_have_their_pictures(name: str, monkeypatch: pytest.MonkeyPatch
     assert (ROOT / 'doc' / 'images' / f'concept_{name}.png').exists()
 
 
-def test_example_tables_are_those_of_the_script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_example_tables_equal_those_of_the_script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tables = script('make_example_tables')
     monkeypatch.setattr(sys, 'argv', ['make_example_tables.py', str(tmp_path)])
     tables.main()

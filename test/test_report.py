@@ -1,4 +1,4 @@
-"""The report: one page that needs nothing else, and numbers that agree with the predictions."""
+"""The report: a page that needs no other file, and numbers that agree with the predictions."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ import pytest
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 pytest.importorskip('plotly', reason='plotly is not installed')
 
-from report_samples import OBSTACLES, START_NS, prediction, predictions, samples, scene
+from report_samples import OBSTACLES, START_NS, prediction, predictions, samples
 
 from foc_ros.core.errors import InputError
 from foc_ros.core.types import HandSample, Prediction
-from foc_ros.reporting.page import plotly_script
+from foc_ros.reporting.page import load_plotly
 from foc_ros.reporting.report import write_report
-from foc_ros.reporting.report_data import MOST_SHOWN
-from foc_ros.reporting.snapshots import snapshot_of_prediction, track_of
+from foc_ros.reporting.report_data import MOST_FRAMES
+from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
 
 
 class Page(HTMLParser):
-    """What a browser would find: tags with attributes, and text."""
+    """Parser of a page: its tags with attributes, and its text."""
 
     def __init__(self, file: Path) -> None:
         super().__init__()
@@ -49,11 +49,11 @@ class Page(HTMLParser):
 
 def report(directory: Path, reaches: int = 1, title: str = 'A title') -> list[Path]:
     made = samples(reaches)
-    moments = [snapshot_of_prediction(each, *scene()) for each in predictions(made)]
-    return write_report(directory, title, track_of(made), moments, {'recording': 'some <bag> & more'})
+    snapshots = [build_snapshot(each) for each in predictions(made)]
+    return write_report(directory, title, build_hand_trajectory(made), snapshots, {'recording': 'some <bag> & more'})
 
 
-def test_files_are_there(tmp_path: Path) -> None:
+def test_all_files_are_written(tmp_path: Path) -> None:
     files = report(tmp_path / 'new' / 'report')
     assert {file.name for file in files} == {
         'index.html',
@@ -64,7 +64,7 @@ def test_files_are_there(tmp_path: Path) -> None:
     assert set((tmp_path / 'new' / 'report').iterdir()) == set(files)
 
 
-def test_page_needs_nothing_else(tmp_path: Path) -> None:
+def test_the_page_refers_to_no_other_file(tmp_path: Path) -> None:
     report(tmp_path)
     page = Page(tmp_path / 'index.html')
     for _, attributes in page.tags:
@@ -81,7 +81,7 @@ def test_text_is_escaped_and_facts_are_shown(tmp_path: Path) -> None:
     assert 'img' not in [tag for tag, _ in page.tags]
     assert 'some <bag> & more' in page.text
     assert '4.0 ms (median)' in page.text
-    assert '38 candidates ended as eta_unreachable' in page.text
+    assert '38 candidates ended with status eta_unreachable' in page.text
 
 
 def test_page_holds_the_likelihoods_of_all_predictions(tmp_path: Path) -> None:
@@ -92,37 +92,37 @@ def test_page_holds_the_likelihoods_of_all_predictions(tmp_path: Path) -> None:
     for row, frame in enumerate(data['frames']):
         assert frame['at'] == row
         shares = {}
-        for way in frame['ways']:
-            line = data['lines'][way['line']]
-            shares[data['labels'][way['label']]] = line['share'][row - line['first']]
+        for candidate in frame['candidates']:
+            track = data['tracks'][candidate['track']]
+            shares[data['labels'][candidate['label']]] = track['share'][row - track['first']]
         assert shares == {each['label']: each['likelihood'] for each in numbers[row]['candidates']}
 
 
 def test_paths_on_the_page_are_those_predicted(tmp_path: Path) -> None:
     made = samples()
     expected = predictions(made)
-    write_report(tmp_path, 'x', track_of(made), [snapshot_of_prediction(each, *scene()) for each in expected], {})
+    write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in expected], {})
     data = page_data_of(tmp_path)
     for frame, known in zip(data['frames'], expected, strict=True):
-        for way, outcome in zip(frame['ways'], known.solved_candidates, strict=True):
-            drawn = np.cumsum([way['x'], way['y']], axis=1).T * data['unit']['length']
+        for candidate, outcome in zip(frame['candidates'], known.solved_candidates, strict=True):
+            drawn = np.cumsum([candidate['x'], candidate['y']], axis=1).T * data['unit']['length']
             np.testing.assert_allclose(drawn, outcome.solution.path, atol=0.51e-4)
-            spread = np.array(way['ellipses'])[-1, 2:4] * data['unit']['length']
+            spread = np.array(candidate['ellipses'])[-1, 2:4] * data['unit']['length']
             wanted = np.sqrt(np.linalg.eigvalsh(outcome.solution.covariance[-1, :2, :2]))[::-1]
             np.testing.assert_allclose(spread, wanted, atol=0.51e-4)
 
 
-def test_a_long_recording_is_thinned_out_and_says_so(tmp_path: Path) -> None:
+def test_a_long_recording_is_thinned_out(tmp_path: Path) -> None:
     made = samples(5)
-    moments = [snapshot_of_prediction(each, *scene()) for each in predictions(made, every=1)]
-    write_report(tmp_path, 'x', track_of(made), moments, {})
+    snapshots = [build_snapshot(each) for each in predictions(made, every=1)]
+    write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {})
     data = page_data_of(tmp_path)
-    assert len(data['times']) == len(moments) == 750 > len(data['frames']) == MOST_SHOWN
+    assert len(data['times']) == len(snapshots) == 750 > len(data['frames']) == MOST_FRAMES
     assert data['frames'][0]['at'] == 0 and data['frames'][-1]['at'] == 749
-    # what does not change is there once
+    # Obstacles and goals that do not change are stored once.
     assert len(data['scenes']) == len(data['goals']) == 1
     size = (tmp_path / 'index.html').stat().st_size
-    assert size - len(plotly_script()) < 700 * len(data['frames']) * 3
+    assert size - len(load_plotly()) < 700 * len(data['frames']) * 3
 
 
 def page_data_of(directory: Path) -> dict[str, Any]:
@@ -133,20 +133,20 @@ def page_data_of(directory: Path) -> dict[str, Any]:
 def test_numbers_agree_with_the_predictions(tmp_path: Path) -> None:
     made = samples()
     expected = predictions(made)
-    write_report(tmp_path, 'x', track_of(made), [snapshot_of_prediction(each, *scene()) for each in expected], {})
+    write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in expected], {})
     numbers = json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))
     assert numbers['hand_samples'] == len(made)
     assert len(numbers['predictions']) == len(expected)
-    for told, known in zip(numbers['predictions'], expected, strict=True):
-        assert told['stamp_ns'] == known.stamp_ns
-        assert told['t_s'] == pytest.approx((known.stamp_ns - START_NS) * 1e-9)
-        assert told['most_likely'] == known.most_likely
-        assert [each['label'] for each in told['candidates']] == [each.candidate.label for each in known.solved_candidates]
-        assert [each['likelihood'] for each in told['candidates']] == pytest.approx(
+    for written, known in zip(numbers['predictions'], expected, strict=True):
+        assert written['stamp_ns'] == known.stamp_ns
+        assert written['t_s'] == pytest.approx((known.stamp_ns - START_NS) * 1e-9)
+        assert written['most_likely'] == known.most_likely
+        assert [each['label'] for each in written['candidates']] == [each.candidate.label for each in known.solved_candidates]
+        assert [each['likelihood'] for each in written['candidates']] == pytest.approx(
             [each.likelihood for each in known.solved_candidates], rel=1e-5
         )
-        assert told['candidates'][0]['end'] == pytest.approx(known.solved_candidates[0].solution.path[-1], abs=1e-6)
-        assert told['unsolved'] == {'goal1:+1+post': 'eta_unreachable'}
+        assert written['candidates'][0]['end'] == pytest.approx(known.solved_candidates[0].solution.path[-1], abs=1e-6)
+        assert written['unsolved'] == {'goal1:+1+post': 'eta_unreachable'}
 
 
 @pytest.mark.parametrize(('reaches', 'pictures'), [(1, 4), (3, 3), (10, 8)])
@@ -155,31 +155,29 @@ def test_every_movement_is_shown_up_to_a_number(tmp_path: Path, reaches: int, pi
     assert len(list(tmp_path.glob('moment_*.png'))) == pictures
 
 
-def test_nothing_predicted_is_said(tmp_path: Path) -> None:
-    files = write_report(tmp_path, 'x', track_of(samples()), [], {})
+def test_a_report_without_predictions_says_so(tmp_path: Path) -> None:
+    files = write_report(tmp_path, 'x', build_hand_trajectory(samples()), [], {})
     assert [file.name for file in files] == ['index.html', 'predictions.json']
     assert 'There is no prediction.' in Page(tmp_path / 'index.html').text
 
 
-def test_nothing_solved_is_said(tmp_path: Path) -> None:
+def test_a_report_without_solved_candidates_says_so(tmp_path: Path) -> None:
     lost = [each for each in prediction(START_NS, np.zeros(2)).candidates if not each.is_solved]
-    moments = [snapshot_of_prediction(Prediction(START_NS + n, 'world', 0.0, tuple(lost), None), *scene()) for n in range(3)]
-    write_report(tmp_path, 'x', track_of(samples()), moments, {})
+    snapshots = [build_snapshot(Prediction(START_NS + n, 'world', 0.0, tuple(lost), None)) for n in range(3)]
+    write_report(tmp_path, 'x', build_hand_trajectory(samples()), snapshots, {})
     assert 'In 3 of 3 predictions no candidate could be solved.' in Page(tmp_path / 'index.html').text
 
 
 def test_a_hand_that_never_moves(tmp_path: Path) -> None:
     still = [HandSample(START_NS + n * 10_000_000, np.zeros(2)) for n in range(50)]
-    write_report(
-        tmp_path, 'x', track_of(still), [snapshot_of_prediction(prediction(still[20].stamp_ns, np.zeros(2)), *scene())], {}
-    )
+    write_report(tmp_path, 'x', build_hand_trajectory(still), [build_snapshot(prediction(still[20].stamp_ns, np.zeros(2)))], {})
     assert (tmp_path / 'moment_01.png').exists()
 
 
-def test_numbers_that_json_has_not_become_null(tmp_path: Path) -> None:
-    made = snapshot_of_prediction(prediction(START_NS, np.zeros(2)), *scene())
-    lost = replace(made, ways=(replace(made.ways[0], eta=float('nan')), *made.ways[1:]))
-    write_report(tmp_path, 'x', track_of(samples()), [lost], {})
+def test_numbers_that_are_not_finite_become_null(tmp_path: Path) -> None:
+    made = build_snapshot(prediction(START_NS, np.zeros(2)))
+    lost = replace(made, candidates=(replace(made.candidates[0], eta=float('nan')), *made.candidates[1:]))
+    write_report(tmp_path, 'x', build_hand_trajectory(samples()), [lost], {})
     text = (tmp_path / 'predictions.json').read_text(encoding='utf-8')
     assert 'NaN' not in text
     assert json.loads(text)['predictions'][0]['candidates'][0]['eta'] is None
@@ -187,7 +185,7 @@ def test_numbers_that_json_has_not_become_null(tmp_path: Path) -> None:
 
 def test_no_hand_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match='hand pose'):
-        write_report(tmp_path / 'report', 'x', track_of([]), [], {})
+        write_report(tmp_path / 'report', 'x', build_hand_trajectory([]), [], {})
     assert not (tmp_path / 'report').exists()
 
 

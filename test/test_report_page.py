@@ -1,4 +1,4 @@
-"""The report's page in a browser: it moves, and what it draws is what the numbers say; broken on purpose, the check fails."""
+"""The report page in a browser: it plays, it draws the numbers of predictions.json, and the check finds a broken page."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 pytest.importorskip('plotly', reason='plotly is not installed')
 
 from browser_helpers import check_report, chromium, screenshot, show
-from report_samples import predictions, samples, scene
+from report_samples import predictions, samples
 
 from foc_ros.reporting.report import write_report
-from foc_ros.reporting.report_data import MOST_SHOWN
-from foc_ros.reporting.snapshots import snapshot_of_prediction, track_of
+from foc_ros.reporting.report_data import MOST_FRAMES
+from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
 
 HOSTILE = '</script><img src=x onerror=alert(1)><b>&amp;'
 
@@ -34,8 +34,8 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_report(
         directory,
         HOSTILE,
-        track_of(made),
-        [snapshot_of_prediction(each, *scene()) for each in predictions(made)],
+        build_hand_trajectory(made),
+        [build_snapshot(each) for each in predictions(made)],
         {HOSTILE: HOSTILE},
     )
     return directory
@@ -45,7 +45,7 @@ def test_the_page_shows_the_numbers(browser: Any, report: Path) -> None:
     check_report(browser, report)
 
 
-def test_text_stays_text(browser: Any, report: Path) -> None:
+def test_hostile_text_is_escaped(browser: Any, report: Path) -> None:
     show(browser, report / 'index.html')
     assert browser.title == HOSTILE
     assert browser.find_elements('tag name', 'img') == []
@@ -53,8 +53,8 @@ def test_text_stays_text(browser: Any, report: Path) -> None:
 
 
 @pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
-def test_a_phone_shows_all_of_it(browser: Any, report: Path, tmp_path: Path, dark: bool) -> None:
-    """Nothing is wider than a screen of 390 px; dark and light come from the system and can be changed."""
+def test_the_page_fits_on_a_phone(browser: Any, report: Path, tmp_path: Path, dark: bool) -> None:
+    """The page fits into a width of 390 px; it follows the dark or light mode of the system, and a button changes it."""
     assert show(browser, report / 'index.html', 390, 844, dark) == []
     assert browser.execute_script('return document.documentElement.scrollWidth') == 390
     pages = [browser.execute_script('return getComputedStyle(document.body).backgroundColor')]
@@ -65,7 +65,7 @@ def test_a_phone_shows_all_of_it(browser: Any, report: Path, tmp_path: Path, dar
     assert pages == (['rgb(20, 24, 28)', 'rgb(255, 255, 255)'] if dark else ['rgb(255, 255, 255)', 'rgb(20, 24, 28)'])
 
 
-def test_it_plays_to_the_end_of_a_movement(browser: Any, report: Path) -> None:
+def test_playing_stops_at_the_end_of_a_movement(browser: Any, report: Path) -> None:
     from selenium.webdriver.support.ui import WebDriverWait
 
     show(browser, report / 'index.html')
@@ -77,22 +77,20 @@ def test_it_plays_to_the_end_of_a_movement(browser: Any, report: Path) -> None:
 
 def test_a_long_recording_says_where_the_slider_stops(browser: Any, tmp_path: Path) -> None:
     made = samples(5)
-    write_report(
-        tmp_path, 'x', track_of(made), [snapshot_of_prediction(each, *scene()) for each in predictions(made, every=1)], {}
-    )
+    write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made, every=1)], {})
     check_report(browser, tmp_path)
-    assert f'{MOST_SHOWN} of the 750 predictions' in browser.find_element('id', 'decimated').text
+    assert f'{MOST_FRAMES} of the 750 predictions' in browser.find_element('id', 'decimated').text
 
 
-def test_a_way_can_be_seen_alone(browser: Any, report: Path) -> None:
+def test_a_candidate_can_be_highlighted(browser: Any, report: Path) -> None:
     show(browser, report / 'index.html')
-    row = browser.find_element('css selector', '#ways tr[data-line]')
+    row = browser.find_element('css selector', '#candidates tr[data-track]')
     browser.execute_script('arguments[0].click()', row)
-    assert len(browser.find_elements('css selector', '#ways tr.faded')) == 2
+    assert len(browser.find_elements('css selector', '#candidates tr.faded')) == 2
 
 
 def changed(report: Path, copy: Path, old: str, new: str) -> Path:
-    """Return a copy of a report with one thing in its page another."""
+    """Return a copy of a report with one text of its page replaced."""
     page = (report / 'index.html').read_text(encoding='utf-8')
     assert old in page
     (copy / 'index.html').write_text(page.replace(old, new, 1), encoding='utf-8')
@@ -107,20 +105,20 @@ def changed(report: Path, copy: Path, old: str, new: str) -> Path:
         ('y: share, type', 'y: share.map((value) => value * 0.99), type'),
         ('times: data.times.slice(begin, end)', 'times: data.times.slice(begin + 1, end + 1)'),
         ("cell(row, percent(share), 'number')", "cell(row, percent(share / 2), 'number')"),
-        ('cell(row, data.labels[way.label])', 'cell(row, data.labels[0])'),
+        ('cell(row, data.labels[candidate.label])', 'cell(row, data.labels[0])'),
         ('const hand = { t:', 'const hand = {{ t:'),
         ('drawn.map((each) => each.path)', 'drawn.map(() => nothing)'),
         ('</body>', '<script src="https://foc-ros.invalid/x.js"></script></body>'),
     ],
     ids=['slider', 'likelihoods', 'times', 'percent', 'labels', 'syntax', 'paths', 'network'],
 )
-def test_a_broken_page_is_found_out(browser: Any, report: Path, tmp_path: Path, old: str, new: str) -> None:
+def test_the_check_finds_a_broken_page(browser: Any, report: Path, tmp_path: Path, old: str, new: str) -> None:
     broken = changed(report, tmp_path, old, new)
     with pytest.raises(AssertionError):
         check_report(browser, broken)
 
 
-def test_numbers_of_another_recording_are_found_out(browser: Any, report: Path, tmp_path: Path) -> None:
+def test_the_check_finds_numbers_of_another_recording(browser: Any, report: Path, tmp_path: Path) -> None:
     copy = changed(report, tmp_path, '</body>', '</body>')
     numbers = json.loads((copy / 'predictions.json').read_text(encoding='utf-8'))
     numbers['predictions'][20]['candidates'][1]['likelihood'] += 0.01

@@ -1,4 +1,4 @@
-"""Scene files: every field arrives, and every wrong one is named with its value and bound."""
+"""Scene files: every field is read, and errors name field, value and bound."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ import pytest
 
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, RecordingError, SceneError
-from foc_ros.io.guess import guess_path
-from foc_ros.io.scene_file import load_scene, parse_scene
+from foc_ros.io.scene_file import guess_path, load_scene, parse_scene
 
 SCENE: dict[str, Any] = {
     'start': [0.0, 0.1],
@@ -36,7 +35,7 @@ SCENE: dict[str, Any] = {
 }
 
 
-def test_every_field_arrives() -> None:
+def test_every_field_is_read() -> None:
     scene = parse_scene(SCENE)
     assert scene.hand.mean.tolist() == [0.0, 0.1, 0.2, 0.0, 0.0, -1.0]
     assert np.allclose(np.diag(scene.hand.covariance), [4e-6, 4e-6, 0, 0, 0, 0])
@@ -50,7 +49,7 @@ def test_every_field_arrives() -> None:
     assert scene.guess is None
 
 
-def test_what_is_not_given_is_the_parameters_default() -> None:
+def test_a_missing_field_has_the_default_of_its_parameter() -> None:
     scene = parse_scene({'start': [0, 0], 'goals': [[0.3, 0], [0.3, 0.1]]})
     assert scene.config.foc == Config().foc and scene.config.homotopy == Config().homotopy
     assert scene.duration_s == Config().duration.fixed_s
@@ -59,7 +58,7 @@ def test_what_is_not_given_is_the_parameters_default() -> None:
 
 
 @pytest.mark.parametrize('name', ['scene.yaml', 'scene.yml', 'scene.json', 'scene'])
-def test_yaml_and_json_read_alike(tmp_path: Path, name: str) -> None:
+def test_yaml_and_json_give_the_same_scene(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text(json.dumps(SCENE, indent='\t' if name.endswith('json') else None), 'utf-8')
     scene = load_scene(tmp_path / name)
     assert scene.config.foc.lam == 1e6 and scene.obstacles.ids == ('cup', '1')
@@ -129,7 +128,7 @@ def obstacle(count: int = 1, **fields: Any) -> dict[str, Any]:
         ({'start': [0, 0], 'goal': [0, 0], 'guess': {'amplitude': 0.1}}, 'guess: expected a goal away from the start, got both'),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_named(scene: object, message: str) -> None:
+def test_a_wrong_field_is_named(scene: object, message: str) -> None:
     with pytest.raises(SceneError, match=f'^{message}'):
         parse_scene(scene)
 
@@ -146,13 +145,13 @@ def test_what_is_wrong_is_named(scene: object, message: str) -> None:
         ('s.yaml', '\x00', 'not a YAML file'),
     ],
 )
-def test_files_that_cannot_be_read(tmp_path: Path, name: str, text: str, message: str) -> None:
+def test_a_file_that_cannot_be_parsed_is_refused(tmp_path: Path, name: str, text: str, message: str) -> None:
     (tmp_path / name).write_text(text, 'utf-8')
     with pytest.raises(RecordingError, match=f'^{re.escape(str(tmp_path / name))}: .*{re.escape(message)}|{re.escape(message)}'):
         load_scene(tmp_path / name)
 
 
-def test_a_missing_file_and_bytes_that_are_no_text(tmp_path: Path) -> None:
+def test_a_missing_file_and_a_binary_file_are_refused(tmp_path: Path) -> None:
     with pytest.raises(FocError, match=r'none\.yaml: cannot be read: No such file'):
         load_scene(tmp_path / 'none.yaml')
     (tmp_path / 'b.yaml').write_bytes(b'\xff\xfe\xfa')
@@ -170,10 +169,17 @@ def test_a_guess_is_a_minimum_jerk_line_with_a_bulge_to_its_left() -> None:
     assert np.allclose(turned[20], [-0.05, 0.15])
 
 
-def test_a_guess_through_points() -> None:
+def test_a_guess_leads_through_points() -> None:
     start, goal = np.zeros(2), np.array([2.0, 0.0])
     path = guess_path(start, goal, 100, via=np.array([[1.0, 1.0]]))
     assert path[0].tolist() == [0, 0] and np.allclose(path[50], [1, 1]) and np.allclose(path[-1], [2, 0])
     assert np.allclose(np.abs(path[:, 1]), np.minimum(path[:, 0], 2 - path[:, 0]))
     timed = np.random.default_rng(1).standard_normal((11, 2))
     assert np.array_equal(guess_path(start, goal, 10, via=timed), timed)
+
+
+def test_the_plant_is_a_field() -> None:
+    foc = parse_scene({'start': [0, 0], 'goal': [0.3, 0], 'plant': 'damped_mass', 'plant_mass': 2, 'plant_damping': 3e0}).config.foc
+    assert (foc.plant, foc.plant_mass, foc.plant_damping) == ('damped_mass', 2.0, 3.0)
+    with pytest.raises(SceneError, match='^plant: expected one of triple_integrator, damped_mass'):
+        parse_scene({'start': [0, 0], 'goal': [0.3, 0], 'plant': 'spring'})

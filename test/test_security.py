@@ -1,4 +1,4 @@
-"""What comes from outside is bounded and never run; what is promised of a secured graph is what the node has."""
+"""Input from outside is bounded and never executed; the permissions of a secured graph are those of the node."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_a_table_larger_than_any_recording_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('text', ['!!python/object/apply:os.mkdir [made]', '!!python/name:os.system', '!include other.yaml'])
-def test_a_document_is_data_and_never_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+def test_a_document_is_never_executed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'it.yaml').write_text(text, 'utf-8')
     with pytest.raises(RecordingError, match='not a YAML file'):
@@ -48,8 +48,8 @@ def allowed(kind: str, action: str) -> set[str]:
     return {each.text.strip() for group in groups for each in group}
 
 
-def test_the_permissions_are_what_the_node_has(ros: ros_helpers.Graph) -> None:
-    """Neither less, or it does not run, nor more."""
+def test_the_permissions_are_those_that_the_node_needs(ros: ros_helpers.Graph) -> None:
+    """The node needs all of them, and no others."""
     from foc_ros.ros.node import FocNode
 
     node = ros.add(FocNode(context=ros.context))
@@ -62,7 +62,7 @@ def test_the_permissions_are_what_the_node_has(ros: ros_helpers.Graph) -> None:
     services = names(node.get_service_names_and_types_by_node('foc', '/'))
     absolute = {'rosout', 'parameter_events', 'diagnostics', 'clock'}
     assert allowed('topics', 'publish') == {f'/{name}' if name in absolute else name for name in published}
-    # the clock is heard where use_sim_time is set
+    # the node subscribes to the clock if use_sim_time is set
     assert allowed('topics', 'subscribe') - {'/clock'} == {f'/{name}' if name in absolute else name for name in subscribed}
     assert allowed('services', 'reply') == services
     assert allowed('services', 'request') == set()

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from foc_ros.cli.main import main
+from foc_ros.core.types import Candidate, PredictedCandidate, Solution, Status
+from foc_ros.io.json_output import encode_candidate, encode_solution
 
 CASES = Path(__file__).parents[2] / 'shared' / 'reference' / 'cases.json'
 SCENE: dict[str, Any] = {
@@ -75,15 +77,15 @@ def test_a_free_reach_is_minimum_jerk(tmp_path: Path, capsys: pytest.CaptureFixt
     assert found['eta'] == pytest.approx(1) and found['sides'] == {}
 
 
-def test_noise_is_per_step_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """One random jerk per step: halving the step halves the variance at the goal."""
+def test_noise_is_per_step(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The random jerk is drawn once per step: half the step gives half the variance at the goal."""
     coarse, fine = (
         candidates(tmp_path, capsys, {**SCENE, 'obstacles': [], 'steps': steps})[0]['stddev'][-1][0] for steps in (100, 200)
     )
     assert coarse / fine == pytest.approx(np.sqrt(2), rel=1e-2)
 
 
-def test_an_uncertain_start_shows_and_costs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_uncertain_start_increases_stddev_and_effort(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = {**SCENE, 'guess': {'amplitude': 0.08}, 'noise': [0.02, 0.02]}
     (sure,), (unsure,) = (candidates(tmp_path, capsys, {**scene, 'start_stddev': value}) for value in (0.0, 0.01))
     assert sure['stddev'][0] == [0.0, 0.0]
@@ -145,8 +147,8 @@ def test_wrong_input_is_exit_2_with_one_line(
     assert capsys.readouterr() == ('', f'{line}\n')
 
 
-def test_json_gives_the_full_account(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Every term of the cost, the whole state and its covariance, where eta is attained, and what holds the path."""
+def test_json_describes_the_whole_solution(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The JSON holds every cost term, the whole state with its covariance, the place of the smallest eta, and the contacts."""
     for each in candidates(tmp_path, capsys, {**SCENE, 'start_stddev': 0.001}):
         assert each['costs']['effort'] == pytest.approx(each['effort']) and each['costs']['lambda_variance'] > 0
         covariance = np.array(each['covariance'])
@@ -161,7 +163,7 @@ def test_json_gives_the_full_account(tmp_path: Path, capsys: pytest.CaptureFixtu
         assert min(abs(each['eta_at']['step'] - row['step']) for row in each['rows']) < 0.5
 
 
-def test_json_of_what_could_not_be_solved_says_how_far_it_got(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_of_an_unsolved_candidate_holds_what_was_reached(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     far = candidates(tmp_path, capsys, {**SCENE, 'eta': 0.999, 'noise': [0.6, 0.6]}, code=3)
     assert {each['status'] for each in far} == {'eta_unreachable'}
     assert all(0 < each['eta_reachable'] == each['eta'] < 0.999 for each in far)
@@ -169,3 +171,19 @@ def test_json_of_what_could_not_be_solved_says_how_far_it_got(tmp_path: Path, ca
     (shut,) = candidates(tmp_path, capsys, {**SCENE, 'obstacles': walls, 'guess': {'amplitude': 0.0}}, code=3)
     assert shut['status'] == 'infeasible' and shut['violation'] > 0.005
     assert shut['violation_at']['obstacle'] in ('0', '1')
+
+
+def test_a_damped_mass_has_no_acceleration(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for each in candidates(tmp_path, capsys, {**SCENE, 'plant': 'damped_mass'}):
+        assert each['acceleration'] is None
+        assert np.shape(each['velocity']) == (51, 2) and np.shape(each['covariance']) == (51, 4, 4)
+
+
+def test_a_state_without_acceleration_is_encoded_with_null() -> None:
+    mean, covariance = np.zeros((3, 4)), np.zeros((3, 4, 4))
+    solution = Solution(Status.SOLVED, '', 0.1, mean, covariance, np.ones((2, 2)), 1.0, {}, 0.0, 1.0, 0.9)
+    encoded = encode_solution(solution)
+    assert encoded['acceleration'] is None
+    assert np.shape(encoded['velocity']) == (3, 2) and np.shape(encoded['covariance']) == (3, 4, 4)
+    candidate = PredictedCandidate(Candidate('goal0:', 0, (), mean[:, :2], 0.0), solution, {}, 1.0, 1.0)
+    assert np.shape(encode_candidate(candidate)['stddev']) == (3, 2)

@@ -1,4 +1,4 @@
-"""Which topic plays which part, from names and types alone."""
+"""Assignment of topics to inputs, by names and types."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 import pytest
 
 from foc_ros.core.errors import RecordingError
-from foc_ros.io.topics import assign
+from foc_ros.io.topics import assign_topics
 
 POSE, CLOUD, MARKERS, POSES = (
     'geometry_msgs/msg/PoseStamped',
@@ -40,23 +40,27 @@ PLAIN = {'/hand_pose': POSE, '/obstacles': CLOUD, '/goals': POSES}
     ],
 )
 def test_topics_are_found(topics: dict[str, str], expected: dict[str, str]) -> None:
-    roles = assign(topics)
+    roles = assign_topics(topics)
     assert {role: roles[role] for role in expected} == expected
     assert len(set(roles.values())) == len(roles)
 
 
-def test_a_choice_overrules_names() -> None:
+def test_a_choice_overrides_names() -> None:
     topics = {**PLAIN, '/left/measured_cp': POSE, '/right/measured_cp': POSE}
-    assert assign(topics, {'hand_pose': '/right/measured_cp'})['hand_pose'] == '/right/measured_cp'
+    assert assign_topics(topics, {'hand_pose': '/right/measured_cp'})['hand_pose'] == '/right/measured_cp'
 
 
 @pytest.mark.parametrize(
     ('topics', 'chosen', 'message'),
     [
-        ({'/obstacles': CLOUD, '/goals': POSES}, None, 'no topic for hand_pose (geometry_msgs/msg/PoseStamped); it has /goals'),
+        (
+            {'/obstacles': CLOUD, '/goals': POSES},
+            None,
+            'no topic for hand_pose (geometry_msgs/msg/PoseStamped); the recording has /goals',
+        ),
         ({'/hand_pose': POSE, '/goals': POSES}, None, 'no topic for obstacles (sensor_msgs/msg/PointCloud2) or obstacle_markers'),
         ({'/hand_pose': POSE, '/obstacles': CLOUD}, None, 'no topic for goals (geometry_msgs/msg/PoseArray) or goal_pose'),
-        ({}, None, 'it has no topics'),
+        ({}, None, 'the recording has no topics'),
         (
             {'/r/measured_cp': POSE, '/l/measured_cp': POSE, '/obstacles': CLOUD, '/goals': POSES},
             None,
@@ -64,10 +68,10 @@ def test_a_choice_overrules_names() -> None:
         ),
         ({'/hand_pose': POSE, '/a': CLOUD, '/b': MARKERS, '/goals': POSES}, None, 'several topics could be obstacles: /a, /b'),
         (PLAIN, {'hand': '/hand_pose'}, "no input is named 'hand': expected one of hand_pose, obstacles"),
-        (PLAIN, {'hand_pose': '/other'}, 'topic /other chosen for hand_pose is not in it'),
+        (PLAIN, {'hand_pose': '/other'}, 'topic /other chosen for hand_pose is not in the recording, which has'),
         (PLAIN, {'goals': '/obstacles'}, f'topic /obstacles chosen for goals: expected type {POSES}, got {CLOUD}'),
     ],
 )
-def test_what_does_not_fit_is_said(topics: dict[str, str], chosen: dict[str, str] | None, message: str) -> None:
+def test_a_wrong_choice_of_topics_is_refused(topics: dict[str, str], chosen: dict[str, str] | None, message: str) -> None:
     with pytest.raises(RecordingError, match=re.escape(message)):
-        assign(topics, chosen)
+        assign_topics(topics, chosen)

@@ -1,1 +1,1 @@
-"""What users would take otherwise, one way to a file, each on the identical problem."""
+"""The programs that a user could take instead, one per file, each on the identical problem."""

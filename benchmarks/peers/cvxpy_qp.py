@@ -1,4 +1,4 @@
-"""One QP of the reformulated problem, written in CVXPY with parameters, so that only its data change between solves."""
+"""One QP of the reformulated problem in CVXPY. It has parameters, so that only the data change between solves."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .dense import Array
 
 
 class CvxpyQP:
-    """The program of one size of problem: m obstacle rows, r goal rows, 2N controls scaled to unit Hessian."""
+    """The program for QPs of one size: m obstacle rows, r goal rows, 2N controls scaled to a unit Hessian."""
 
     def __init__(self, qp: ReachingQP, solver: str = 'CLARABEL') -> None:
         rows, columns, goals = qp.limits.size, len(qp.cost.hessian), len(qp.cost.goal_targets)

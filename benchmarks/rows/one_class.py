@@ -1,13 +1,13 @@
-"""One class with three obstacles, from the guess."""
+"""One homotopy class with three obstacles, solved from the initial guess or from the solution of the previous tick."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from measure import interleaved, median_ms
-from results import Result, Target, at_least
-from scenes import guess_left, one_class
+from measurement import GAIN, Agreement, Result, Target, Timing, at_least, compute_median_ms, time_in_turn
+from scenes import build_guess, build_problem
 
 from foc_ros.core.config import FocConfig
 from foc_ros.core.ocp.problem import Problem
@@ -17,160 +17,147 @@ from foc_ros.core.ocp.warm_start import cold_start, warm_start
 from foc_ros.core.ocp.working_set import WorkingSet, solve
 from foc_ros.core.types import Solution, Status
 
-GUESS = guess_left()
+GUESS = build_guess()
 DELTA, GROWTH, XI = 5e-5, 1.5, 1.0
 LV = FocConfig(strategy='lv', lv_delta=DELTA, growth=GROWTH)
 OPTIMAL = FocConfig(strategy='optimal')
-GAIN = 'peer / ours'
 
 
-def _solved(settings: FocConfig, problem: Problem | None = None) -> Solution:
-    """Solve from the guess, the problem built anew: what it caches counts."""
-    return solve_problem(one_class() if problem is None else problem, cold_start(GUESS), settings)
+def _solve_cold(settings: FocConfig, problem: Problem | None = None) -> Solution:
+    """Solve from the guess. The problem is built anew by default, so that the time includes what it caches."""
+    return solve_problem(build_problem() if problem is None else problem, cold_start(GUESS), settings)
 
 
-def cold_vs_naive_piqp(quick: bool) -> Result:
-    """Compare with the literal stepping loop on full dense PIQP."""
-    return _against_naive('cold_vs_naive_piqp', 'piqp', at_least(40.0), quick)
+def _time(
+    ours: tuple[str, Callable[[], object]], peer: tuple[str, Callable[[], object]], repetitions: int
+) -> tuple[Timing, Timing]:
+    """Time both sides, each given by its description and its task, in turn."""
+    times = time_in_turn({'ours': ours[1], 'peer': peer[1]}, repetitions)
+    return Timing(ours[0], compute_median_ms(times['ours'])), Timing(peer[0], compute_median_ms(times['peer']))
 
 
-def naive_daqp(quick: bool) -> Result:
-    """Compare with the same loop on DAQP, for the record."""
-    return _against_naive('cold_vs_naive_daqp', 'daqp', None, quick)
+def measure_against_piqp(is_quick: bool) -> Result:
+    """Compare with algorithm 1 as printed, each QP dense and solved by PIQP."""
+    return _measure_against_naive('piqp', at_least(40.0), is_quick)
 
 
-def _against_naive(name: str, solver: str, target: Target | None, quick: bool) -> Result:
-    from peers.naive import stepping
+def measure_against_daqp(is_quick: bool) -> Result:
+    """Compare with algorithm 1 as printed, each QP dense and solved by DAQP."""
+    return _measure_against_naive('daqp', None, is_quick)
 
-    repetitions = 3 if quick else 25
-    problem = one_class()
-    tasks = {
-        'ours': lambda: _solved(LV),
-        'peer': lambda: stepping(one_class(), GUESS[1:], solver, DELTA, GROWTH, XI),
-    }
-    times = interleaved(tasks, repetitions)
-    stepped, ours = stepping(problem, GUESS[1:], solver, DELTA, GROWTH, XI), _solved(LV)
-    if stepped is None:
-        raise RuntimeError(f'{solver} has no answer')
-    same = _solved(replace(LV, strategy='fixed', tau=stepped.tau, lam=stepped.lam))
-    apart = float(np.abs(same.path[1:] - stepped.positions).max())
-    close = ours.status is Status.SOLVED and apart < 1e-4 and ours.effort <= stepped.effort * (1 + 1e-4)
-    return Result(
-        name,
-        'lv, Delta 1.5, from the guess',
-        f'algorithm 1 stepping by Delta 1.5, each QP full and dense by {solver}',
-        *_medians(times),
-        GAIN,
-        close,
-        f'at the tau and lambda where the loop ends: paths {apart:.1e} m apart (1e-4 allowed); effort {ours.effort:.0f}, '
-        f'of the loop, which overshoots, {stepped.effort:.0f}',
+
+def _measure_against_naive(solver: str, target: Target | None, is_quick: bool) -> Result:
+    from peers.naive import NaiveSolution, run_algorithm1
+
+    def solve_naive() -> NaiveSolution | None:
+        return run_algorithm1(build_problem(), GUESS[1:], solver, (DELTA, GROWTH, XI))
+
+    repetitions = 3 if is_quick else 25
+    timings = _time(
+        ('lv, Delta 1.5, from the guess', lambda: _solve_cold(LV)),
+        (f'algorithm 1 with Delta 1.5, each QP full and dense by {solver}', solve_naive),
         repetitions,
-        target,
-        {'qps_ours': ours.qp_solves, 'qps_peer': stepped.qps},
     )
+    naive, ours = solve_naive(), _solve_cold(LV)
+    if naive is None:
+        raise RuntimeError(f'{solver} found no solution')
+    same = _solve_cold(replace(LV, strategy='fixed', tau=naive.tau, lam=naive.lam))
+    distance = float(np.abs(same.path[1:] - naive.positions).max())
+    agreement = Agreement(
+        ours.status is Status.SOLVED and distance < 1e-4 and ours.effort <= naive.effort * (1 + 1e-4),
+        f'at the tau and lambda where the peer ends, paths differ by {distance:.1e} m (1e-4 allowed); effort {ours.effort:.0f}, '
+        f'and {naive.effort:.0f} of the peer, which overshoots',
+    )
+    return Result(*timings, GAIN, agreement, repetitions, target, {'qps_ours': ours.qp_solves, 'qps_peer': naive.qps})
 
 
-def cold_vs_ipopt(quick: bool) -> Result:
-    """Compare strategy optimal with IPOPT on the problem as it is."""
-    from peers.ipopt import best_ipopt
+def measure_against_ipopt(is_quick: bool) -> Result:
+    """Compare strategy `optimal` with IPOPT on the un-linearised problem."""
+    from peers.ipopt import build_fastest_ipopt
 
-    repetitions = 2 if quick else 15
-    peer = best_ipopt(one_class(), GUESS[1:])
-    start = peer.start(GUESS[1:])
-    times = interleaved({'ours': lambda: _solved(OPTIMAL), 'peer': lambda: peer.solve(start)}, repetitions)
+    repetitions = 2 if is_quick else 15
+    peer = build_fastest_ipopt(build_problem(), GUESS[1:])
+    start = peer.build_start(GUESS[1:])
+    timings = _time(
+        ('optimal, from the guess', lambda: _solve_cold(OPTIMAL)),
+        ('IPOPT on the un-linearised problem, built beforehand', lambda: peer.solve(start)),
+        repetitions,
+    )
     converged, effort, _ = peer.solve(start)
-    ours = _solved(OPTIMAL)
+    ours = _solve_cold(OPTIMAL)
     excess = ours.effort / effort - 1
-    return Result(
-        'cold_vs_ipopt',
-        'optimal, from the guess',
-        'IPOPT on the un-linearised problem, built beforehand',
-        *_medians(times),
-        GAIN,
+    agreement = Agreement(
         converged and ours.status is Status.SOLVED and abs(excess) < 0.02,
-        f"effort {100 * excess:+.4f} % of IPOPT's (2 % allowed)",
-        repetitions,
-        at_least(60.0),
-        {'qps_ours': ours.qp_solves, 'ipopt_iterations': peer.iterations},
+        f'effort differs by {100 * excess:+.4f} % from that of IPOPT (2 % allowed)',
     )
+    details = {'qps_ours': ours.qp_solves, 'ipopt_iterations': peer.iterations}
+    return Result(*timings, GAIN, agreement, repetitions, at_least(60.0), details)
 
 
-def warm_vs_cold(quick: bool) -> Result:
-    """Measure the next tick at 100 Hz of the same class against the same one from the guess."""
-    repetitions = 4 if quick else 40
-    before = _solved(LV)
-    moved = one_class(initial_mean=np.concatenate((before.mean[0, :2] + 1e-4, [0.01, 0.004], np.zeros(2))))
+def measure_warm_start(is_quick: bool) -> Result:
+    """Compare the next tick at 100 Hz, warm-started, with the same tick from the guess."""
+    repetitions = 4 if is_quick else 40
+    before = _solve_cold(LV)
+    moved = build_problem(initial_mean=np.concatenate((before.mean[0, :2] + 1e-4, [0.01, 0.004], np.zeros(2))))
 
-    def next_tick() -> Solution:
+    def solve_warm() -> Solution:
         problem = replace(moved)
         return solve_problem(problem, warm_start(before, problem), LV)
 
-    times = interleaved({'ours': next_tick, 'peer': lambda: _solved(LV, replace(moved))}, repetitions)
-    warmed, fresh = next_tick(), _solved(LV, moved)
-    apart = float(np.abs(warmed.path - fresh.path).max())
-    return Result(
-        'warm_vs_cold',
-        'lv, from the solution of 10 ms ago',
-        'lv, from the guess',
-        *_medians(times),
-        GAIN,
-        apart < 1e-5,
-        f'paths {apart:.1e} m apart (1e-5 allowed: k is found to 1e-5), efforts {warmed.effort:.0f} and {fresh.effort:.0f}',
+    timings = _time(
+        ('lv, from the solution of 10 ms ago', solve_warm),
+        ('lv, from the guess', lambda: _solve_cold(LV, replace(moved))),
         repetitions,
-        at_least(4.0),
-        {'qps_warm': warmed.qp_solves, 'qps_cold': fresh.qp_solves},
     )
+    warm, cold = solve_warm(), _solve_cold(LV, moved)
+    distance = float(np.abs(warm.path - cold.path).max())
+    agreement = Agreement(
+        distance < 1e-5,
+        f'paths differ by {distance:.1e} m (1e-5 allowed, as k is found to 1e-5), efforts are {warm.effort:.0f} '
+        f'and {cold.effort:.0f}',
+    )
+    details = {'qps_warm': warm.qp_solves, 'qps_cold': cold.qp_solves}
+    return Result(*timings, GAIN, agreement, repetitions, at_least(4.0), details)
 
 
-def cvxpy_qp(quick: bool) -> Result:
-    """Compare one QP, at the guess, with CVXPY, for the record."""
+def measure_against_cvxpy(is_quick: bool) -> Result:
+    """Compare one QP at the guess with the same QP in CVXPY."""
     from peers.cvxpy_qp import CvxpyQP
 
-    repetitions, problem = (3 if quick else 25), one_class()
+    repetitions, problem = (3 if is_quick else 25), build_problem()
 
-    def qp() -> ReachingQP:
+    def build_qp() -> ReachingQP:
         return clearance_qp(problem, effort_cost(problem, 1e3), GUESS[1:], 1e-4)
 
-    peer = CvxpyQP(qp())
-    times = interleaved({'ours': lambda: solve(qp(), WorkingSet()), 'peer': lambda: peer.solve(qp())}, repetitions)
-    answer = solve(qp(), WorkingSet())
+    peer = CvxpyQP(build_qp())
+    timings = _time(
+        ('one QP at the guess, built and solved', lambda: solve(build_qp(), WorkingSet())),
+        ('CVXPY with parameters and Clarabel, compiled beforehand', lambda: peer.solve(build_qp())),
+        repetitions,
+    )
+    answer = solve(build_qp(), WorkingSet())
     if answer is None:
         raise RuntimeError('the QP at the guess is infeasible')
-    apart = float(np.abs(problem.positions(answer.control) - problem.positions(peer.solve(qp()))).max())
-    return Result(
-        'one_qp_vs_cvxpy',
-        'one QP at the guess, built and solved',
-        'CVXPY with parameters and Clarabel, compiled beforehand',
-        *_medians(times),
-        GAIN,
-        apart < 1e-6,
-        f'positions {apart:.1e} m apart (1e-6 allowed)',
-        repetitions,
-    )
+    distance = float(np.abs(problem.positions(answer.control) - problem.positions(peer.solve(build_qp()))).max())
+    agreement = Agreement(distance < 1e-6, f'positions differ by {distance:.1e} m (1e-6 allowed)')
+    return Result(*timings, GAIN, agreement, repetitions)
 
 
-def annealing(quick: bool) -> Result:
-    """Compare with simulated annealing over via points, for the record."""
+def measure_against_annealing(is_quick: bool) -> Result:
+    """Compare with simulated annealing over via points."""
     from peers.annealing import Annealing
 
-    repetitions, iterations = (1, 100) if quick else (3, 1000)
-    peer = Annealing(one_class(), GUESS[1:])
-    times = interleaved({'ours': lambda: _solved(OPTIMAL), 'peer': lambda: peer.solve(iterations, 1)}, repetitions)
-    effort, share, _ = peer.solve(iterations, 1)
-    ours = _solved(OPTIMAL)
-    return Result(
-        'cold_vs_annealing',
-        'optimal, from the guess',
-        f'dual_annealing over two via points, {iterations} iterations',
-        *_medians(times),
-        GAIN,
-        ours.status is Status.SOLVED and (share < 1 - 1e-6 or effort > 0.999 * ours.effort),
-        f'it found {effort / ours.effort:.2f} times our effort at {share:.3f} of the wanted k (nothing better than ours allowed)',
+    repetitions, iterations = (1, 100) if is_quick else (3, 1000)
+    peer = Annealing(build_problem(), GUESS[1:])
+    timings = _time(
+        ('optimal, from the guess', lambda: _solve_cold(OPTIMAL)),
+        (f'dual_annealing over two via points, {iterations} iterations', lambda: peer.solve(iterations, 1)),
         repetitions,
     )
-
-
-def _medians(times: dict[str, list[float]]) -> tuple[float, float, float]:
-    """Return ours, the peer's [ms], and their ratio."""
-    ours, peer = median_ms(times['ours']), median_ms(times['peer'])
-    return ours, peer, peer / ours
+    effort, share, _ = peer.solve(iterations, 1)
+    ours = _solve_cold(OPTIMAL)
+    agreement = Agreement(
+        ours.status is Status.SOLVED and (share < 1 - 1e-6 or effort > 0.999 * ours.effort),
+        f'annealing found {effort / ours.effort:.2f} times our effort at {share:.3f} of the wanted k (it may not be better)',
+    )
+    return Result(*timings, GAIN, agreement, repetitions)

@@ -1,4 +1,4 @@
-"""Whole predictions of several classes, warm, against one IPOPT solve or against each other."""
+"""Whole predictions of several classes, warm, compared with one IPOPT solve or with each other."""
 
 from __future__ import annotations
 
@@ -7,11 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from measure import median_ms, replaced
-from results import Result, Target, at_least, at_most
-from scenes import Reach, with_far
-from scenes import tick_4x8 as four_classes
-from scenes import tick_8x16 as eight_classes
+from measurement import COST, GAIN, Agreement, Result, Target, Timing, at_least, at_most, compute_median_ms, replace_attribute
+from scenes import Reach, add_far_obstacles, build_4x8, build_8x16
 
 from foc_ros.core import predictor
 from foc_ros.core.candidates import solve_candidates
@@ -23,120 +20,114 @@ from foc_ros.core.ocp.warm_start import cold_start
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import Candidate, PredictedCandidate
 
-from .ticking import Ticking, alternating
+from .tick_sequence import TickSequence, time_ticks_in_turn
 
 WARM_TOLERANCE = 1e-4
-"""Largest distance between warm and cold paths [m]: k is found to 1e-5, and where effort is high a path moves more than that."""
+"""Largest distance between warm and cold paths [m]. k is found to 1e-5, but at a high effort a path moves by more."""
 
 
-def tick_4x8(quick: bool) -> Result:
-    """Measure 4 classes among 8 obstacles."""
-    return _against_ipopt('tick_4x8', four_classes(), '4 classes, 8 obstacles', at_least(50.0), quick)
+def measure_4_classes(is_quick: bool) -> Result:
+    """Compare a tick of 4 classes among 8 obstacles with IPOPT."""
+    return _measure_against_ipopt(build_4x8(), '4 classes, 8 obstacles', at_least(50.0), is_quick)
 
 
-def tick_8x16(quick: bool) -> Result:
-    """Measure 8 classes among 16 obstacles."""
-    return _against_ipopt('tick_8x16', eight_classes(), '8 classes, 16 obstacles', at_least(40.0), quick)
+def measure_8_classes(is_quick: bool) -> Result:
+    """Compare a tick of 8 classes among 16 obstacles with IPOPT."""
+    return _measure_against_ipopt(build_8x16(), '8 classes, 16 obstacles', at_least(40.0), is_quick)
 
 
-def _against_ipopt(name: str, reach: Reach, what: str, target: Target, quick: bool) -> Result:
-    from peers.ipopt import best_ipopt
+def _measure_against_ipopt(reach: Reach, scene: str, target: Target, is_quick: bool) -> Result:
+    from peers.ipopt import build_fastest_ipopt
 
-    repetitions, ticking = (2 if quick else 8), Ticking(reach)
-    candidate, problem = _asked(reach)
-    peer = best_ipopt(problem, candidate.guess[1:])
-    start = peer.start(candidate.guess[1:])
+    repetitions, sequence = (2 if is_quick else 8), TickSequence(reach)
+    candidate, problem = _find_most_likely(reach)
+    peer = build_fastest_ipopt(problem, candidate.guess[1:])
+    start = peer.build_start(candidate.guess[1:])
     converged, effort, _ = peer.solve(start)
     ticks, solves = [], []
     for _ in range(repetitions):
-        ticks += [ticking.tick() for _ in range(4)]
+        ticks += [sequence.tick() for _ in range(4)]
         began = time.perf_counter()
         peer.solve(start)
         solves.append(time.perf_counter() - began)
-    least = solve_problem(problem, cold_start(candidate.guess), FocConfig(strategy='optimal')).effort
-    apart = ticking.far_from_cold()
-    ours_ms, peer_ms = median_ms(ticks), median_ms(solves)
+    excess = solve_problem(problem, cold_start(candidate.guess), FocConfig(strategy='optimal')).effort / effort - 1
+    distance = sequence.compute_distance_to_cold()
+    agreement = Agreement(
+        converged and abs(excess) < 0.02 and distance < WARM_TOLERANCE,
+        f'effort of strategy optimal in that class differs by {100 * excess:+.4f} % from that of IPOPT (2 % allowed); '
+        f'warm and cold paths differ by {distance:.1e} m ({WARM_TOLERANCE:g} allowed)',
+    )
+    details = {
+        'classes_solved': sequence.describe_classes(),
+        'slowest_ms': 1e3 * max(ticks),
+        'ipopt_iterations': peer.iterations,
+    }
     return Result(
-        name,
-        f'a warm tick, {what}',
-        'one IPOPT solve of the most likely class, un-linearised, built beforehand',
-        ours_ms,
-        peer_ms,
-        peer_ms / ours_ms,
-        'peer / ours',
-        converged and abs(least / effort - 1) < 0.02 and apart < WARM_TOLERANCE,
-        f"strategy optimal in that class: effort {100 * (least / effort - 1):+.4f} % of IPOPT's (2 % allowed); "
-        f'warm and cold paths {apart:.1e} m apart ({WARM_TOLERANCE:g} allowed)',
+        Timing(f'a warm tick, {scene}', compute_median_ms(ticks)),
+        Timing('one IPOPT solve of the most likely class, un-linearised, built beforehand', compute_median_ms(solves)),
+        GAIN,
+        agreement,
         repetitions,
         target,
-        {'classes_solved': ticking.classes(), 'slowest_ms': 1e3 * max(ticks), 'ipopt_iterations': peer.iterations},
+        details,
     )
 
 
-def _asked(reach: Reach) -> tuple[Candidate, Problem]:
-    """Return the most likely class of the first tick and the problem that the predictor solves for it."""
-    asked: dict[str, Problem] = {}
+def _find_most_likely(reach: Reach) -> tuple[Candidate, Problem]:
+    """Return the most likely candidate of the first tick and the problem that the predictor solves for it."""
+    solved: dict[str, Problem] = {}
 
-    def listening(candidates: Sequence[Candidate], problems: Sequence[Problem], *rest: Any) -> list[PredictedCandidate]:
-        asked.update({each.label: problem for each, problem in zip(candidates, problems, strict=True)})
+    def solve_and_record(candidates: Sequence[Candidate], problems: Sequence[Problem], *rest: Any) -> list[PredictedCandidate]:
+        solved.update({each.label: problem for each, problem in zip(candidates, problems, strict=True)})
         return solve_candidates(candidates, problems, *rest)
 
-    with replaced(predictor, 'solve_candidates', listening):
+    with replace_attribute(predictor, 'solve_candidates', solve_and_record):
         prediction, _ = predict(reach.config, reach.hands[0], reach.obstacles, reach.goals, Memory())
     candidate = prediction.solved_candidates[0].candidate
-    return candidate, asked[candidate.label]
+    return candidate, solved[candidate.label]
 
 
-def far_obstacles(quick: bool) -> Result:
-    """Measure what 248 obstacles far from every way cost."""
-    near = four_classes()
-    far = Reach(near.config, with_far(near.obstacles, 248, 5), near.goals, near.hands)
-    uncut = far.changed({'scene.max_obstacles': 4096})
-    tickings = {'near': Ticking(near), 'far': Ticking(far), 'uncut': Ticking(uncut)}
-    times = alternating(tickings, 5 if quick else 60)
-    near_ms, far_ms, uncut_ms = (median_ms(times[name]) for name in tickings)
-    apart = _apart(tickings['near'], tickings['far'])
+def measure_far_obstacles(is_quick: bool) -> Result:
+    """Measure the cost of 248 obstacles that are far from every class."""
+    near = build_4x8()
+    far = add_far_obstacles(near, 248, 5)
+    sequences = {
+        'near': TickSequence(near),
+        'far': TickSequence(far),
+        'unlimited': TickSequence(far.change_config({'scene.max_obstacles': 4096})),
+    }
+    times = time_ticks_in_turn(sequences, 5 if is_quick else 60)
+    near_ms, far_ms, unlimited_ms = (compute_median_ms(times[name]) for name in sequences)
+    pairs = zip(*(sequences[name].predictions[-1].solved_candidates for name in ('near', 'far')), strict=True)
+    distance = max(float(np.abs(one.solution.path - other.solution.path).max()) for one, other in pairs)
     return Result(
-        'far_obstacles',
-        'a warm tick, 8 near and 248 far obstacles',
-        'the same with the 8 near ones alone',
-        far_ms,
-        near_ms,
-        far_ms / near_ms,
-        'ours / peer',
-        apart < WARM_TOLERANCE,
-        f'paths {apart:.1e} m apart ({WARM_TOLERANCE:g} allowed)',
+        Timing('a warm tick, 8 near and 248 far obstacles', far_ms),
+        Timing('the same with the 8 near ones alone', near_ms),
+        COST,
+        Agreement(distance < WARM_TOLERANCE, f'paths differ by {distance:.1e} m ({WARM_TOLERANCE:g} allowed)'),
         len(times['near']),
         at_most(1.5),
-        {'ratio_without_scene.max_obstacles': uncut_ms / near_ms},
+        {'ratio_without_scene.max_obstacles': unlimited_ms / near_ms},
     )
 
 
-def steps_200(quick: bool) -> Result:
-    """Measure what four times as many steps cost."""
-    coarse = four_classes()
-    tickings = {'coarse': Ticking(coarse), 'fine': Ticking(coarse.changed({'foc.steps': 200}))}
-    times = alternating(tickings, 2 if quick else 30)
-    coarse_ms, fine_ms = median_ms(times['coarse']), median_ms(times['fine'])
-    best = [tickings[name].predictions[-1].solved_candidates[0].solution.path for name in tickings]
-    apart = float(np.abs(best[0] - best[1][::4]).max())
+def measure_200_steps(is_quick: bool) -> Result:
+    """Measure the cost of four times as many steps."""
+    coarse = build_4x8()
+    sequences = {'coarse': TickSequence(coarse), 'fine': TickSequence(coarse.change_config({'foc.steps': 200}))}
+    times = time_ticks_in_turn(sequences, 2 if is_quick else 30)
+    paths = [sequence.predictions[-1].solved_candidates[0].solution.path for sequence in sequences.values()]
+    distance = float(np.abs(paths[0] - paths[1][::4]).max())
+    agreement = Agreement(
+        distance < 5e-3,
+        f'the most likely paths differ by {1e3 * distance:.2g} mm (5 mm allowed, as obstacles are checked four times as often)',
+    )
     return Result(
-        'steps_200',
-        'a warm tick, N = 200',
-        'the same, N = 50',
-        fine_ms,
-        coarse_ms,
-        fine_ms / coarse_ms,
-        'ours / peer',
-        apart < 5e-3,
-        f'most likely paths {1e3 * apart:.2g} mm apart (5 mm allowed: the obstacles are looked at four times as often)',
+        Timing('a warm tick, N = 200', compute_median_ms(times['fine'])),
+        Timing('the same, N = 50', compute_median_ms(times['coarse'])),
+        COST,
+        agreement,
         len(times['fine']),
         at_most(5.0),
-        {'classes_solved': tickings['fine'].classes()},
+        {'classes_solved': sequences['fine'].describe_classes()},
     )
-
-
-def _apart(one: Ticking, other: Ticking) -> float:
-    """Return how far the paths of two last predictions are apart [m], class by class in the order of their likelihoods."""
-    pairs = zip(one.predictions[-1].solved_candidates, other.predictions[-1].solved_candidates, strict=True)
-    return max(float(np.abs(a.solution.path - b.solution.path).max()) for a, b in pairs)

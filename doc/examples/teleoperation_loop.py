@@ -1,8 +1,9 @@
-"""A stand-in for a teleoperation stack: a hand that reaches to and fro, a scene, and a consumer that leans on the prediction.
+"""A small stand-in for a teleoperation stack: a hand that reaches to and fro, a scene, and a consumer of the prediction.
 
-Run it beside the node: `foc_ros node --ros-args -r hand_pose:=MTMR/measured_cp`; with `--seconds 20` it ends by itself. The set
-point it publishes is the hand's own position, moved towards the predicted path by a share of at most MOST. The share grows while
-predictions are fresh and falls to zero as soon as they are not, whatever the reason: the consumer trusts stamps, not the node.
+Run it beside the node, `foc_ros node --ros-args -r hand_pose:=MTMR/measured_cp`. With `--seconds 20` it ends by itself. It
+publishes a set point: the position of the hand, moved towards the predicted path by a share of at most LARGEST_SHARE. The share
+grows while predictions are fresh, and falls to zero as soon as they are not, whatever the reason is. The consumer judges a
+prediction by its stamp alone.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ GOALS = np.array([[0.0, 0.0, 0.1], [0.3, 0.0, 0.1]])
 REACH_S, PAUSE_S = 1.2, 0.3
 OBSTACLES = np.array([(0.15, 0.01, 0.1, 0.03)], dtype=[(name, '<f4') for name in ('x', 'y', 'z', 'radius')])
 FRESH_S = 0.3
-"""A prediction from an older hand pose counts for nothing."""
-MOST, RISE_PER_S = 0.4, 1.0
+"""Age of the hand pose beyond which a prediction is not used."""
+LARGEST_SHARE, RISE_PER_S = 0.4, 1.0
 LOOKAHEAD_S = 0.05
 
 
-def hand_at(seconds: float) -> np.ndarray:
-    """Return where the hand is (3,) [m]: minimum-jerk reaches between the goals, in a bow around the obstacle."""
+def compute_hand_position(seconds: float) -> np.ndarray:
+    """Return the position of the hand (3,) [m]: minimum-jerk reaches between the goals, on an arc around the obstacle."""
     turn, rest = divmod(seconds, REACH_S + PAUSE_S)
     s = min(rest / REACH_S, 1.0)
     share = 10 * s**3 - 15 * s**4 + 6 * s**5
@@ -44,7 +45,7 @@ def hand_at(seconds: float) -> np.ndarray:
 
 
 class TeleoperationLoop(Node):
-    """Publishes MTMR/measured_cp, obstacles and goals; reads foc/prediction; publishes the set point and the share."""
+    """Publishes MTMR/measured_cp, obstacles and goals, reads foc/prediction, and publishes the set point and the share."""
 
     def __init__(self, context: rclpy.Context) -> None:
         super().__init__('teleoperation', context=context)
@@ -55,44 +56,44 @@ class TeleoperationLoop(Node):
         self._goals = self.create_publisher(PoseArray, 'goals', 10)
         self._set_point = self.create_publisher(PoseStamped, 'PSM1/servo_cp', 10)
         self._shares = self.create_publisher(Float64, '~/share', 10)
-        self.create_subscription(PointCloud2, 'foc/prediction', self._predicted, 10)
-        self.create_timer(0.01, self._move)
-        self.create_timer(0.1, self._show)
-        self.create_timer(1.0, self._tell)
+        self.create_subscription(PointCloud2, 'foc/prediction', self._keep_prediction, 10)
+        self.create_timer(0.01, self._move_hand)
+        self.create_timer(0.1, self._publish_scene)
+        self.create_timer(1.0, self._print_share)
 
-    def _predicted(self, cloud: PointCloud2) -> None:
+    def _keep_prediction(self, cloud: PointCloud2) -> None:
         self._prediction = cloud
 
-    def _move(self) -> None:
-        now, position = self.get_clock().now(), hand_at(time.monotonic() - self._began)
-        self._hand.publish(self._pose(now, position))
-        target = self._target(now)
+    def _move_hand(self) -> None:
+        now, position = self.get_clock().now(), compute_hand_position(time.monotonic() - self._began)
+        self._hand.publish(self._make_pose(now, position))
+        target = self._find_target(now)
         step = 0.01 * RISE_PER_S
-        self._share = min(self._share + step, MOST) if target is not None else 0.0
+        self._share = min(self._share + step, LARGEST_SHARE) if target is not None else 0.0
         self._shares.publish(Float64(data=self._share))
         blended = position if target is None else position + self._share * (target - position)
-        self._set_point.publish(self._pose(now, blended))
+        self._set_point.publish(self._make_pose(now, blended))
 
-    def _target(self, now: Time) -> np.ndarray | None:
-        """Return where the most likely way is in LOOKAHEAD_S (3,) [m], None without a fresh prediction."""
+    def _find_target(self, now: Time) -> np.ndarray | None:
+        """Return the position (3,) [m] on the most likely path in LOOKAHEAD_S, or None without a fresh prediction."""
         if self._prediction is None:
             return None
         age_s = (now - Time.from_msg(self._prediction.header.stamp)).nanoseconds * 1e-9
-        rows = table(self._prediction)
+        rows = read_table(self._prediction)
         rows = rows[rows['candidate'] == 0]
         if not len(rows) or age_s > FRESH_S:
             return None
         row = rows[min(np.searchsorted(rows['t'], age_s + LOOKAHEAD_S), len(rows) - 1)]
         return np.array([row['x'], row['y'], row['z']], dtype=float)
 
-    def _tell(self) -> None:
-        print(f'{time.monotonic() - self._began:4.0f} s: leaning on the prediction by {self._share:.0%}', flush=True)
+    def _print_share(self) -> None:
+        print(f'{time.monotonic() - self._began:4.0f} s: following the prediction by {self._share:.0%}', flush=True)
 
-    def _show(self) -> None:
+    def _publish_scene(self) -> None:
         stamp = self.get_clock().now().to_msg()
         goals = PoseArray()
         goals.header.stamp, goals.header.frame_id = stamp, FRAME
-        goals.poses = [self._pose(self.get_clock().now(), goal).pose for goal in GOALS]
+        goals.poses = [self._make_pose(self.get_clock().now(), goal).pose for goal in GOALS]
         self._goals.publish(goals)
         if self.get_parameter('obstacles').value:
             cloud = PointCloud2(height=1, width=len(OBSTACLES), point_step=OBSTACLES.itemsize, row_step=OBSTACLES.nbytes)
@@ -104,7 +105,7 @@ class TeleoperationLoop(Node):
             cloud.data = OBSTACLES.tobytes()
             self._obstacles.publish(cloud)
 
-    def _pose(self, now: Time, position: np.ndarray) -> PoseStamped:
+    def _make_pose(self, now: Time, position: np.ndarray) -> PoseStamped:
         message = PoseStamped(pose=Pose())
         message.header.stamp, message.header.frame_id = now.to_msg(), FRAME
         point = message.pose.position
@@ -112,15 +113,15 @@ class TeleoperationLoop(Node):
         return message
 
 
-def table(cloud: PointCloud2) -> np.ndarray:
+def read_table(cloud: PointCloud2) -> np.ndarray:
     """Return the rows of a prediction as a structured array."""
     kinds = {PointField.FLOAT32: '<f4', PointField.UINT32: '<u4'}
     return np.frombuffer(cloud.data, dtype=[(field.name, kinds[field.datatype]) for field in cloud.fields])
 
 
 def main() -> int:
-    """Run until SIGINT or SIGTERM, or for so many seconds."""
-    parser = argparse.ArgumentParser(description='A teleoperation stack in small.')
+    """Run until SIGINT or SIGTERM, or for the given number of seconds."""
+    parser = argparse.ArgumentParser(description='A small stand-in for a teleoperation stack.')
     parser.add_argument('--seconds', type=float, default=float('inf'))
     until = time.monotonic() + parser.parse_args(remove_ros_args(sys.argv)[1:]).seconds
     stopped: list[int] = []

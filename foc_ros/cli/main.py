@@ -1,7 +1,7 @@
-"""One program, several commands: each in a module of its own, imported only when it is asked for.
+"""The program `foc_ros` and its commands. A command's module is imported only when the command is run.
 
-Exit codes: 0 done; 2 the input is wrong, and one line on standard error says what and where; 3 nothing could be solved; as in a
-shell 130 for an interrupt and 141 for a reader of our output that went away.
+Exit codes: 0 done; 2 the input is wrong, and one line on standard error names field, value and bound; 3 no candidate could be
+solved; 130 after an interrupt and 141 if the reader of standard output has closed it, both as in a shell.
 """
 
 from __future__ import annotations
@@ -16,29 +16,29 @@ from typing import NoReturn
 from foc_ros.core.errors import FocError
 
 COMMANDS = {
-    'demo': 'play the packaged recording into the node and show what it predicts',
-    'node': 'run the node; what follows goes to ROS: --ros-args -r hand_pose:=/PSM1/measured_cp',
-    'paper': "redo the paper's studies: figures, numbers, a table",
+    'demo': 'play the packaged recording to the node and show its predictions',
+    'node': 'run the node; further arguments are passed to ROS, as in --ros-args -r hand_pose:=/PSM1/measured_cp',
+    'paper': "repeat the paper's studies: figures, numbers, a table",
     'solve': 'solve one scene from a YAML or JSON file',
-    'replay': 'predict from a recording, without ROS and without waiting',
+    'replay': 'compute predictions from a recording, without ROS and faster than real time',
     'fit': 'find the parameters that explain recordings best',
-    'evaluate': 'judge predictions by recordings of people, beside simple baselines',
-    'convert': 'turn motion capture in CSV tables into bags',
+    'evaluate': 'compare predictions with recordings of people, beside simple baselines',
+    'convert': 'convert motion capture in CSV tables to bags',
 }
-"""Purpose of each command. Its module has the same name and defines `add_arguments(parser)` and `run(arguments) -> exit code`."""
+"""Purpose of each command. The module of that name defines `add_arguments(parser)` and `run(arguments) -> exit code`."""
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
+    """A parser that reports an error in one line."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f'{self.prog}: {" ".join(message.split())}\n')
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return the exit code; arguments: without the program's name, those of the process by default."""
+    """Run one command and return the exit code; arguments: those of the process by default, without its name."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    parser = _Parser(prog='foc_ros', description='Predict where an operator is reaching among obstacles.')
+    parser = _Parser(prog='foc_ros', description='Predict where the hand of an operator is going among obstacles.')
     commands = parser.add_subparsers(dest='command', required=True)
     for name, purpose in COMMANDS.items():
         command = commands.add_parser(name, help=purpose, description=f'{purpose[0].upper()}{purpose[1:]}.')
@@ -61,7 +61,7 @@ def _run(parsed: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:
-        # Or the interpreter meets the same pipe again when it flushes at exit, and complains.
+        # Otherwise the interpreter flushes into the closed pipe at exit and prints an error.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
     return code

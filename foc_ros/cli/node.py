@@ -1,4 +1,4 @@
-"""`node`: the node as a command; all arguments are ROS's."""
+"""`node`: runs the node; all arguments are passed on to ROS."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from foc_ros.core.errors import FocError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare nothing: what rclpy takes is rclpy's affair."""
+    """Declare no arguments: rclpy parses them."""
     parser.usage = '%(prog)s [-h] [--ros-args ...]'
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the node until it is told to stop."""
+    """Run the node until it is stopped."""
     if find_spec('rclpy') is None:
         raise FocError('rclpy is not installed: source a ROS 2 installation, or install the extra `ros`')
     from foc_ros.ros.main import main

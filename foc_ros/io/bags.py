@@ -1,7 +1,7 @@
-"""Recordings: ROS 2 bags read and written without ROS.
+"""ROS 2 bags, read and written without ROS.
 
-Nothing is lost on the way in: the messages read are counted against what the bag says it holds, and every fault of the file
-becomes one :class:`RecordingError` with its name and the reason.
+The messages read are counted against the number that the bag states, so that none is lost unnoticed, and every fault of the file
+is raised as one :class:`RecordingError` with its name and the reason.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from foc_ros.core.errors import RecordingError
 from . import topics
 
 TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
-"""Message definitions for what we write, and for bags that carry none (sqlite3 before ROS 2 Iron)."""
+"""Message definitions for written bags, and for bags without definitions (sqlite3 before ROS 2 Iron)."""
 
 
 @dataclass(frozen=True)
 class Item:
-    """One recorded message: the input it is for, its topic, log time [ns], the decoded message, and its bytes."""
+    """One recorded message: the name of its input, its topic, log time [ns], the decoded message, and its bytes."""
 
     role: str
     topic: str
@@ -40,11 +40,11 @@ class Item:
 
 
 class BagReader:
-    """The inputs of the predictor in a recording, as a stream in order of log time.
+    """The predictor's inputs in a recording, as an iterator in order of log time, within a context manager.
 
-    path: bag directory, or one .mcap or .db3 file; chosen: topic by input name, overruling names and types.
-    roles: the topic of every input found; message_count: of the whole bag; duration_s: from first to last message.
-    Use as a context manager; raises RecordingError on opening and on iteration.
+    path: bag directory, or one .mcap or .db3 file; chosen: topic by name of the input, overriding names and types. Attributes:
+    roles: the topic of every input found; message_count: of the whole bag; duration_s: from the first to the last message.
+    Raises RecordingError on opening and on iteration.
     """
 
     def __init__(self, path: Path | str, chosen: Mapping[str, str] | None = None) -> None:
@@ -52,59 +52,58 @@ class BagReader:
         self._chosen = chosen
 
     def __enter__(self) -> BagReader:
-        with _reasons(self.path):
+        with _named_errors(self.path):
             _refuse_unreadable(self.path)
             self._reader = AnyReader([self.path], default_typestore=TYPESTORE)
             self._reader.open()
-        try:
-            with _reasons(self.path):
+            try:
                 self.message_count = self._reader.message_count
                 if not self.message_count:
                     raise RecordingError('holds no messages')
                 self.duration_s = self._reader.duration * 1e-9
-                self.roles = self._assigned()
-        except RecordingError:
-            self._reader.close()
-            raise
+                self.roles = self._assign_topics()
+            except BaseException:
+                self._reader.close()
+                raise
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._reader.close()
 
     def __iter__(self) -> Iterator[Item]:
-        """Yield every message of an input; all others are read too, to be counted."""
+        """Yield every message of an input; all other messages are read too, and counted."""
         roles = {topic: role for role, topic in self.roles.items()}
-        seen: Counter[str] = Counter()
-        with _reasons(self.path):
+        counts: Counter[str] = Counter()
+        with _named_errors(self.path):
             for connection, log_ns, raw in self._reader.messages():
                 role = roles.get(connection.topic)
-                seen[role or ''] += 1
+                counts[role or ''] += 1
                 if role is not None:
                     yield Item(role, connection.topic, log_ns, self._reader.deserialize(raw, connection.msgtype), raw)
-            if seen.total() != self.message_count:
-                raise RecordingError(f'damaged or cut short: {seen.total()} of its {self.message_count} messages can be read')
-            if not seen[topics.HAND]:
+            if counts.total() != self.message_count:
+                raise RecordingError(f'damaged or cut short: {counts.total()} of its {self.message_count} messages can be read')
+            if not counts[topics.HAND]:
                 raise RecordingError(f'topic {self.roles[topics.HAND]} holds no message')
 
-    def _assigned(self) -> dict[str, str]:
+    def _assign_topics(self) -> dict[str, str]:
         kinds = {each.topic: each.msgtype for each in self._reader.connections}
-        roles = topics.assign(kinds, self._chosen)
+        roles = topics.assign_topics(kinds, self._chosen)
         for each in self._reader.connections:
             if each.topic in roles.values() and each.msgtype != kinds[each.topic]:
                 raise RecordingError(f'topic {each.topic}: expected one message type, got {each.msgtype} and {kinds[each.topic]}')
         return roles
 
     def connection_of(self, topic: str) -> dict[str, Any]:
-        """Return what a writer needs to know of a topic: type, definitions, quality of service offered."""
+        """Return a topic's type, definitions and offered quality of service, as a writer needs them."""
         connection = next(each for each in self._reader.connections if each.topic == topic)
         offered = connection.ext.offered_qos_profiles if isinstance(connection.ext, ConnectionExtRosbag2) else []
         return {'msgtype': connection.msgtype, 'typestore': self._reader.typestore, 'offered_qos_profiles': offered}
 
 
 class BagWriter:
-    """A new bag: a directory with metadata.yaml and one .mcap file, rosbag2 version 9.
+    """A new bag, within a context manager: a directory with metadata.yaml and one .mcap file, rosbag2 version 9.
 
-    An existing path is refused, and a bag that could not be finished is taken away again. Use as a context manager.
+    An existing path is refused, and an unfinished bag is removed. Raises RecordingError.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -112,7 +111,7 @@ class BagWriter:
         self._connections: dict[str, Connection] = {}
 
     def __enter__(self) -> BagWriter:
-        with self._problems():
+        with self._named_errors():
             if self.path.exists():
                 raise RecordingError(f'{self.path}: exists already and is not overwritten; choose another name')
             self._writer = Writer(self.path, version=9, storage_plugin=StoragePlugin.MCAP)
@@ -120,36 +119,37 @@ class BagWriter:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        finished = False
+        is_finished = False
         try:
-            with self._problems():
+            with self._named_errors():
                 self._writer.__exit__(kind, error, trace)
-                finished = kind is None
+                is_finished = kind is None
         finally:
-            if not finished:
+            if not is_finished:
                 shutil.rmtree(self.path, ignore_errors=True)
 
     def write(self, topic: str, message: Any, log_ns: int) -> None:
         """Write a message made with :data:`TYPESTORE`."""
         kind = message.__msgtype__
-        self._put(topic, log_ns, TYPESTORE.serialize_cdr(message, kind), {'msgtype': kind, 'typestore': TYPESTORE})
+        self.write_raw(topic, kind, TYPESTORE.serialize_cdr(message, kind), log_ns)
 
-    def write_raw(self, topic: str, kind: str, raw: bytes, log_ns: int) -> None:
-        """Write the bytes of a message of a type that :data:`TYPESTORE` knows."""
-        self._put(topic, log_ns, raw, {'msgtype': kind, 'typestore': TYPESTORE})
+    def write_raw(self, topic: str, kind: str, raw: bytes | memoryview, log_ns: int) -> None:
+        """Write the bytes of a message whose type :data:`TYPESTORE` knows."""
+        self._write(topic, log_ns, raw, {'msgtype': kind, 'typestore': TYPESTORE})
 
     def copy(self, item: Item, reader: BagReader) -> None:
         """Write a message as it was read, with its topic's definitions and offered quality of service."""
-        self._put(item.topic, item.log_ns, item.raw, {} if item.topic in self._connections else reader.connection_of(item.topic))
+        connection = {} if item.topic in self._connections else reader.connection_of(item.topic)
+        self._write(item.topic, item.log_ns, item.raw, connection)
 
-    def _put(self, topic: str, log_ns: int, raw: bytes | memoryview, connection: Mapping[str, Any]) -> None:
+    def _write(self, topic: str, log_ns: int, raw: bytes | memoryview, connection: Mapping[str, Any]) -> None:
         if topic not in self._connections:
             self._connections[topic] = self._writer.add_connection(topic, **connection)
-        with self._problems():
+        with self._named_errors():
             self._writer.write(self._connections[topic], log_ns, raw)
 
     @contextmanager
-    def _problems(self) -> Iterator[None]:
+    def _named_errors(self) -> Iterator[None]:
         try:
             yield
         except (OSError, WriterError) as error:
@@ -157,7 +157,7 @@ class BagWriter:
 
 
 def _refuse_unreadable(path: Path) -> None:
-    """Give the usual mistakes a reason of their own; what is wrong deeper inside comes from the reader."""
+    """Raise RecordingError for the usual mistakes; the reader finds the others."""
     if not path.exists():
         raise RecordingError('no such file or directory')
     if path.is_dir() and not (path / 'metadata.yaml').exists():
@@ -169,11 +169,11 @@ def _refuse_unreadable(path: Path) -> None:
 
 
 @contextmanager
-def _reasons(path: Path) -> Iterator[None]:
-    """Turn whatever a reader throws at a damaged file into one RecordingError with the file's name.
+def _named_errors(path: Path) -> Iterator[None]:
+    """Turn every error of a reader into one RecordingError with the name of the file.
 
-    The readers fail in many ways (their own errors, struct, seek, decompression, Unicode, SQLite), so all are caught: nothing but
-    reading happens inside.
+    A damaged file makes the readers fail in many ways (their own errors, struct, seek, decompression, Unicode, SQLite), so all
+    exceptions are caught; nothing but reading happens inside.
     """
     try:
         yield

@@ -1,4 +1,4 @@
-"""The class library as a JSON file: demonstrated ways, read with all bounds checked, written whole or not at all."""
+"""The class library as a JSON file of demonstrated homotopy classes; a file is written completely or not at all."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .documents import read_document
 SIDES = {'left': LEFT, 'right': RIGHT}
 MOST_WAYS, MOST_OBSTACLES = 500, 4096
 FARTHEST = 1e6
-"""Greatest coordinate [m]."""
+"""Largest coordinate [m]."""
 
 
 def load_library(name: str) -> tuple[Demonstration, ...]:
-    """Return the ways of a library file, none for an empty name.
+    """Return the demonstrations of a library file, none for an empty name.
 
-    Raises RecordingError where it cannot be read, InputError naming field, value and bound where it is no library.
+    Raises RecordingError if the file cannot be read, InputError, naming field, value and bound, if it is no library.
     """
     if not name:
         return ()
@@ -33,17 +33,17 @@ def load_library(name: str) -> tuple[Demonstration, ...]:
     if not isinstance(ways, list) or len(ways) > MOST_WAYS:
         got = f'{len(ways)} of them' if isinstance(ways, list) else type(ways).__name__
         raise InputError(f'{name}: ways', f'a list of at most {MOST_WAYS} ways', got)
-    return tuple(_way(f'{name}: ways[{k}]', way) for k, way in enumerate(ways))
+    return tuple(_read_demonstration(f'{name}: ways[{k}]', way) for k, way in enumerate(ways))
 
 
 def save_library(file: Path, ways: Sequence[Demonstration]) -> None:
-    """Write a library in place of what the file held.
+    """Write a library, replacing the file.
 
-    Raises RecordingError where it cannot be written, InputError for too many ways.
+    Raises RecordingError if the file cannot be written, InputError for too many demonstrations.
     """
     if len(ways) > MOST_WAYS:
         raise InputError(f'{file}: ways', f'at most {MOST_WAYS}', f'{len(ways)} with the new ones')
-    document = {'ways': [_plain(way) for way in ways]}
+    document = {'ways': [_dump_demonstration(way) for way in ways]}
     unfinished = file.with_name(file.name + '.unfinished')
     try:
         unfinished.write_text(json.dumps(document, allow_nan=False) + '\n', encoding='utf-8')
@@ -53,7 +53,7 @@ def save_library(file: Path, ways: Sequence[Demonstration]) -> None:
         raise RecordingError(f'{file}: cannot be written: {error.strerror}') from error
 
 
-def _plain(way: Demonstration) -> dict[str, Any]:
+def _dump_demonstration(way: Demonstration) -> dict[str, Any]:
     sides = {side: word for word, side in SIDES.items()}
     passed = [
         {'id': identity, 'x': x, 'y': y, 'side': sides[side]}
@@ -62,42 +62,42 @@ def _plain(way: Demonstration) -> dict[str, Any]:
     return {'frame_id': way.frame_id, 'passed': passed, 'path': way.path.tolist()}
 
 
-def _way(field: str, way: object) -> Demonstration:
+def _read_demonstration(field: str, way: object) -> Demonstration:
     if not isinstance(way, Mapping) or set(way) != {'frame_id', 'passed', 'path'}:
-        raise InputError(field, 'frame_id, passed and path', _short(way))
+        raise InputError(field, 'frame_id, passed and path', _shorten(way))
     frame_id, passed, path = way['frame_id'], way['passed'], way['path']
     if not isinstance(frame_id, str):
-        raise InputError(f'{field}.frame_id', 'a text', _short(frame_id))
+        raise InputError(f'{field}.frame_id', 'a text', _shorten(frame_id))
     if not isinstance(passed, list) or len(passed) > MOST_OBSTACLES:
-        raise InputError(f'{field}.passed', f'a list of at most {MOST_OBSTACLES} obstacles', _short(passed))
+        raise InputError(f'{field}.passed', f'a list of at most {MOST_OBSTACLES} obstacles', _shorten(passed))
     if not isinstance(path, list) or len(path) != POINTS:
-        raise InputError(f'{field}.path', f'{POINTS} points', _short(path))
-    rows = [_passed(f'{field}.passed[{k}]', row) for k, row in enumerate(passed)]
+        raise InputError(f'{field}.path', f'{POINTS} points', _shorten(path))
+    rows = [_read_passed(f'{field}.passed[{k}]', row) for k, row in enumerate(passed)]
     ids = tuple(identity for identity, _, _ in rows)
     if len(set(ids)) != len(ids):
-        raise InputError(f'{field}.passed', 'each obstacle once', _short(ids))
-    points = np.array([_point(f'{field}.path[{k}]', point) for k, point in enumerate(path)])
+        raise InputError(f'{field}.passed', 'each obstacle once', _shorten(ids))
+    points = np.array([_read_point(f'{field}.path[{k}]', point) for k, point in enumerate(path)])
     centre: Array = np.array([point for _, point, _ in rows], dtype=float).reshape(-1, 2)
     return Demonstration(frame_id, ids, tuple(side for _, _, side in rows), centre, points)
 
 
-def _passed(field: str, row: object) -> tuple[str, tuple[float, float], int]:
+def _read_passed(field: str, row: object) -> tuple[str, tuple[float, float], int]:
     if not isinstance(row, Mapping) or set(row) != {'id', 'x', 'y', 'side'} or not isinstance(row['id'], str):
-        raise InputError(field, 'id (a text), x, y and side', _short(row))
+        raise InputError(field, 'id (a text), x, y and side', _shorten(row))
     if row['side'] not in ('left', 'right'):
-        raise InputError(f'{field}.side', 'left or right', _short(row['side']))
-    return row['id'], _point(field, [row['x'], row['y']]), SIDES[row['side']]
+        raise InputError(f'{field}.side', 'left or right', _shorten(row['side']))
+    return row['id'], _read_point(field, [row['x'], row['y']]), SIDES[row['side']]
 
 
-def _point(field: str, point: object) -> tuple[float, float]:
+def _read_point(field: str, point: object) -> tuple[float, float]:
     if isinstance(point, list) and len(point) == 2 and all(_is_coordinate(value) for value in point):
         return float(point[0]), float(point[1])
-    raise InputError(field, f'two numbers within {FARTHEST:g} m', _short(point))
+    raise InputError(field, f'two numbers within {FARTHEST:g} m', _shorten(point))
 
 
 def _is_coordinate(value: object) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and -FARTHEST <= value <= FARTHEST
 
 
-def _short(value: object) -> str:
+def _shorten(value: object) -> str:
     return repr(value)[:100]

@@ -1,92 +1,85 @@
-"""CSV tables of measured numbers, checked cell by cell: every fault names file, row, column, value and bound."""
+"""CSV tables of measured numbers, checked cell by cell: every error names file, row, column, value and bound."""
 
 from __future__ import annotations
 
 import csv
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from foc_ros.core.errors import RecordingError
 
 FARTHEST_M = 1e4
-"""Bound on coordinates and radii [m]: what is beyond is no workspace, but a unit or a column mixed up."""
+"""Bound of coordinates and radii [m]; a larger one has a wrong unit or is in the wrong column."""
 MAX_BYTES = 1_000_000_000
-"""A day of motion capture at 200 Hz."""
+"""Size of a day of motion capture at 200 Hz."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One line of a table: where it stands, and its cells by column name."""
+    """One line of a table, and its cells by column name."""
 
     file: Path
     line: int
     cells: dict[str, str]
 
     def number(self, column: str, low: float = -FARTHEST_M, high: float = FARTHEST_M, default: float | None = None) -> float:
-        """Return a cell as a number in [low, high]; default: for a column that the table does not have."""
+        """Return a cell as a number in [low, high]; default: if the table does not have the column."""
         if column not in self.cells and default is not None:
             return default
-        value = _parsed(self.cells[column])
+        try:
+            value = float(self.cells[column])
+        except ValueError:
+            value = math.nan
         if not low <= value <= high:
             raise self.fault(column, f'a number in [{low:.12g}, {high:.12g}]')
         return value
 
     def whole(self, column: str, low: int, high: int, default: int) -> int:
-        """Return a cell as a whole number in [low, high]; default: for a column that the table does not have."""
-        if column not in self.cells:
-            return default
-        value = _parsed(self.cells[column])
-        if not low <= value <= high or value != int(value):
+        """Return a cell as a whole number in [low, high]; default: if the table does not have the column."""
+        value = self.number(column, low, high, default)
+        if value != int(value):
             raise self.fault(column, f'a whole number in [{low}, {high}]')
         return int(value)
 
     def fault(self, column: str, expected: str) -> RecordingError:
-        """Return the error for a cell."""
+        """Return the error of a cell."""
         return RecordingError(f'{self.file}: row {self.line}, column {column}: expected {expected}, got {self.cells[column]!r}')
 
 
 def rows(file: Path, needed: tuple[str, ...]) -> Iterator[Row]:
-    """Yield the rows of a CSV file with a header; empty lines are passed over, other columns than the needed ones may be there.
+    """Yield the rows of a CSV file with a header; empty lines are skipped, and columns beside the needed ones are allowed.
 
     Raises RecordingError for a file that cannot be read, lacks a needed column or names one twice, and for a row with more or
     fewer cells than the header.
     """
-    with _faults(file), file.open(newline='', encoding='utf-8-sig') as stream:
-        if file.stat().st_size > MAX_BYTES:
-            raise RecordingError(f'{file}: expected at most {MAX_BYTES:,} bytes, got {file.stat().st_size:,}')
-        reader = csv.reader(stream, strict=True)
-        header = [name.strip() for name in next(reader, [])]
-        if not header:
-            raise RecordingError(f'{file}: the file is empty: expected columns {", ".join(needed)}')
-        missing = [name for name in needed if name not in header]
-        if missing:
-            raise RecordingError(f'{file}: row 1: no column {", ".join(missing)}; it has {", ".join(header)}')
-        if len(set(header)) < len(header):
-            raise RecordingError(f'{file}: row 1: a column is named twice: {", ".join(header)}')
-        for cells in reader:
-            if any(cell.strip() for cell in cells):
-                if len(cells) != len(header):
-                    raise RecordingError(f'{file}: row {reader.line_num}: expected {len(header)} cells, got {len(cells)}')
-                yield Row(file, reader.line_num, {name: cell.strip() for name, cell in zip(header, cells, strict=True)})
-
-
-def _parsed(text: str) -> float:
     try:
-        return float(text)
-    except ValueError:
-        return math.nan
-
-
-@contextmanager
-def _faults(file: Path) -> Iterator[None]:
-    try:
-        yield
+        with file.open(newline='', encoding='utf-8-sig') as stream:
+            if file.stat().st_size > MAX_BYTES:
+                raise RecordingError(f'{file}: expected at most {MAX_BYTES:,} bytes, got {file.stat().st_size:,}')
+            reader = csv.reader(stream, strict=True)
+            header = _read_header(file, next(reader, []), needed)
+            for cells in reader:
+                if any(cell.strip() for cell in cells):
+                    if len(cells) != len(header):
+                        raise RecordingError(f'{file}: row {reader.line_num}: expected {len(header)} cells, got {len(cells)}')
+                    yield Row(file, reader.line_num, {name: cell.strip() for name, cell in zip(header, cells, strict=True)})
     except OSError as error:
         raise RecordingError(f'{file}: cannot be read: {error.strerror}') from error
     except UnicodeDecodeError as error:
         raise RecordingError(f'{file}: expected UTF-8 text, got byte {error.object[error.start]:#04x}') from error
     except csv.Error as error:
         raise RecordingError(f'{file}: not a CSV table: {error}') from error
+
+
+def _read_header(file: Path, cells: list[str], needed: tuple[str, ...]) -> list[str]:
+    header = [name.strip() for name in cells]
+    if not header:
+        raise RecordingError(f'{file}: the file is empty: expected columns {", ".join(needed)}')
+    missing = [name for name in needed if name not in header]
+    if missing:
+        raise RecordingError(f'{file}: row 1: no column {", ".join(missing)}; it has {", ".join(header)}')
+    if len(set(header)) < len(header):
+        raise RecordingError(f'{file}: row 1: a column is named twice: {", ".join(header)}')
+    return header

@@ -1,4 +1,4 @@
-"""Outcomes as plain values for JSON: the same names wherever the program prints them."""
+"""Candidates and predictions as plain values for JSON, under the same names in all commands."""
 
 from __future__ import annotations
 
@@ -10,77 +10,84 @@ import numpy as np
 from foc_ros.core.types import LEFT, Array, PredictedCandidate, Prediction, Solution
 
 
-def candidate_answer(outcome: PredictedCandidate) -> dict[str, Any]:
-    """Return one candidate: which way round, how it ended, its costs, and mean and standard deviation of the path.
-
-    goal: position of its goal in the list of goals; effort [m^2/s^6], cost [m^2/s^5], tau [m^2]; mean (N + 1, 2) and stddev
-    (N + 1, 2) [m] at steps 0..N. A number that is not finite is null.
-    """
-    solution = outcome.solution
-    numbers = {
-        'effort': solution.effort,
-        'cost': outcome.cost,
-        'eta': solution.eta,
-        'tau': solution.tau,
-        'lambda': solution.lam,
-        'likelihood': outcome.likelihood,
-    }
-    variances = np.diagonal(solution.covariance[:, :2, :2], axis1=1, axis2=2)
-    return {
-        'label': outcome.candidate.label,
-        'goal': outcome.candidate.goal,
-        'sides': {identity: 'left' if side == LEFT else 'right' for identity, side in outcome.sides.items()},
-        'status': solution.status.value,
-        **{name: number(value) for name, value in numbers.items()},
-        'qp_solves': solution.qp_solves,
-        'mean': table(solution.path),
-        'stddev': table(np.sqrt(np.maximum(variances, 0.0))),
-    }
-
-
-def solution_account(solution: Solution) -> dict[str, Any]:
-    """Return all the rest of a solution: words, every term of the cost, where eta is attained, what holds it, the whole state.
-
-    Units: those of :class:`Solution`. rows: the contacts that hold it; covariance (N + 1, n, n) at steps 0..N; control (N, 2).
-    """
-    held = zip(solution.multipliers, solution.held, strict=True)
-    return {
-        'message': solution.message,
-        'costs': {name: number(value) for name, value in solution.costs.items()},
-        'eta_at': _place(solution.eta_at),
-        'eta_reachable': solution.eta_reachable,
-        'violation': number(solution.violation),
-        'violation_at': _place(solution.violation_at),
-        'rows': [
-            {'obstacle': identity, 'step': step, 'multiplier': number(value), 'tau': number(tau), 'lambda': number(lam)}
-            for (identity, step, value), (tau, lam) in held
-        ],
-        'iterations': solution.iterations,
-        'acceleration': table(solution.mean[:, 4:6]),
-        'control': table(solution.control),
-        'covariance': [table(each) for each in solution.covariance],
-    }
-
-
-def _place(place: tuple[str, float] | None) -> dict[str, Any] | None:
-    return None if place is None else {'obstacle': place[0], 'step': place[1]}
-
-
-def prediction_answer(prediction: Prediction) -> dict[str, Any]:
-    """Return one prediction with all its candidates: the most likely first, as in the messages; those not solved last."""
-    outcomes = sorted(prediction.candidates, key=lambda outcome: outcome.candidate.label != prediction.most_likely)
+def encode_prediction(prediction: Prediction) -> dict[str, Any]:
+    """Return a prediction with all its candidates: the most likely first, as in the messages; unsolved ones last."""
+    candidates = sorted(prediction.candidates, key=lambda each: each.candidate.label != prediction.most_likely)
     return {
         'stamp_ns': prediction.stamp_ns,
         'most_likely': prediction.most_likely,
-        'candidates': [candidate_answer(outcome) for outcome in outcomes],
+        'candidates': [encode_candidate(each) for each in candidates],
     }
 
 
-def number(value: float) -> float | None:
-    """Return a number as JSON can hold it: null where it is not finite."""
+def encode_candidate(candidate: PredictedCandidate) -> dict[str, Any]:
+    """Return the class, status, costs and path of a candidate.
+
+    goal: row of its goal; effort [m^2/s^6], cost [m^2/s^5], tau [m^2], lambda [1/s^6]; mean and stddev (N + 1, 2) of the position
+    [m] at steps 0..N. Numbers that are not finite become null.
+    """
+    solution = candidate.solution
+    variances = np.diagonal(solution.covariance[:, :2, :2], axis1=1, axis2=2)
+    return {
+        'label': candidate.candidate.label,
+        'goal': candidate.candidate.goal,
+        'sides': {name: 'left' if side == LEFT else 'right' for name, side in candidate.sides.items()},
+        'status': solution.status.value,
+        'effort': encode_number(solution.effort),
+        'cost': encode_number(candidate.cost),
+        'eta': encode_number(solution.eta),
+        'tau': encode_number(solution.tau),
+        'lambda': encode_number(solution.lam),
+        'likelihood': encode_number(candidate.likelihood),
+        'qp_solves': solution.qp_solves,
+        'mean': encode_table(solution.path),
+        'stddev': encode_table(np.sqrt(np.maximum(variances, 0.0))),
+    }
+
+
+def encode_solution(solution: Solution) -> dict[str, Any]:
+    """Return what `encode_candidate` leaves out of a solution; units are those of :class:`Solution`.
+
+    rows: the active contacts; velocity and acceleration (N + 1, 2), where acceleration is null if the state of the plant holds
+    only position and velocity; covariance (N + 1, n, n) of the state; control (N, 2).
+    """
+    contacts = zip(solution.multipliers, solution.held, strict=True)
+    has_acceleration = solution.mean.shape[1] >= 6
+    return {
+        'solve_ms': 1e3 * solution.solve_s,
+        'velocity': encode_table(solution.mean[:, 2:4]),
+        'message': solution.message,
+        'costs': {name: encode_number(value) for name, value in solution.costs.items()},
+        'eta_at': _encode_place(solution.eta_at),
+        'eta_reachable': solution.eta_reachable,
+        'violation': encode_number(solution.violation),
+        'violation_at': _encode_place(solution.violation_at),
+        'rows': [
+            {
+                'obstacle': name,
+                'step': step,
+                'multiplier': encode_number(multiplier),
+                'tau': encode_number(tau),
+                'lambda': encode_number(lam),
+            }
+            for (name, step, multiplier), (tau, lam) in contacts
+        ],
+        'iterations': solution.iterations,
+        'acceleration': encode_table(solution.mean[:, 4:6]) if has_acceleration else None,
+        'control': encode_table(solution.control),
+        'covariance': [encode_table(each) for each in solution.covariance],
+    }
+
+
+def encode_number(value: float) -> float | None:
+    """Return a number, None if it is not finite: JSON has no such numbers."""
     return float(value) if math.isfinite(value) else None
 
 
-def table(rows: Array) -> list[list[float | None]]:
+def encode_table(rows: Array) -> list[list[float | None]]:
     """Return an array (m, k) as lists of numbers."""
-    return [[number(value) for value in row] for row in rows.tolist()]
+    return [[encode_number(value) for value in row] for row in rows.tolist()]
+
+
+def _encode_place(place: tuple[str, float] | None) -> dict[str, Any] | None:
+    return None if place is None else {'obstacle': place[0], 'step': place[1]}

@@ -1,4 +1,4 @@
-"""Which topic of a recording plays which part: by name, by explicit choice, else by type where only one fits."""
+"""The topic of a recording for every input of the predictor: by choice, by name, or by type if only one topic fits."""
 
 from __future__ import annotations
 
@@ -14,70 +14,70 @@ TYPES = {
     GOALS: 'geometry_msgs/msg/PoseArray',
     GOAL: 'geometry_msgs/msg/PoseStamped',
 }
-"""Message type of every input, by the name of the node's subscription."""
+"""Message type of every input, by the name of the node's subscription, which is called its role."""
 
 NAMES = {role: (role,) for role in TYPES} | {HAND: ('hand_pose', 'measured_cp')}
-"""Last parts of a topic's name that speak for a role, the better first (`measured_cp`: CRTK's measured Cartesian pose)."""
+"""Last parts of the topic names of a role, the preferred one first (`measured_cp`: CRTK's measured Cartesian pose)."""
 
-NEEDS = ((HAND,), (CLOUD, MARKERS), (GOALS, GOAL))
-"""What a recording must hold to be predicted from: one of each row."""
+REQUIRED = ((HAND,), (CLOUD, MARKERS), (GOALS, GOAL))
+"""Roles that a recording must contain for a prediction: one of each row."""
 
 OUTPUTS = ('prediction', 'likelihoods', 'path', 'markers')
-"""Last parts of the node's own outputs, never taken for an input by their type."""
+"""Last parts of the node's own outputs, which are never used as an input because of their type."""
 
 
-def assign(topics: Mapping[str, str], chosen: Mapping[str, str] | None = None) -> dict[str, str]:
-    """Return the topic of every role that the recording has.
+def assign_topics(topics: Mapping[str, str], chosen: Mapping[str, str] | None = None) -> dict[str, str]:
+    """Return the topic of every role that the recording contains.
 
-    topics: message type by topic name; chosen: topic by role, which overrules names and types. Raises RecordingError where a
-    choice cannot be met, where several topics fit alike, or where a recording lacks the hand, obstacles or goals.
+    topics: message type by topic; chosen: topic by role, overriding names and types. Raises RecordingError for an impossible
+    choice, for several topics that fit equally, and for a recording without a hand, obstacles or goals.
     """
-    roles = {role: _checked(topics, role, topic) for role, topic in (chosen or {}).items()}
+    roles = {role: _check_choice(topics, role, topic) for role, topic in (chosen or {}).items()}
     for role in TYPES:
-        if role not in roles:
-            found = _by_name(topics, role)
-            roles.update({role: found} if found and found not in roles.values() else {})
-    for need in NEEDS:
-        if not any(role in roles for role in need):
-            role, topic = _by_type(topics, need, roles)
+        found = None if role in roles else _find_by_name(topics, role)
+        if found is not None and found not in roles.values():
+            roles[role] = found
+    for alternatives in REQUIRED:
+        if not any(role in roles for role in alternatives):
+            role, topic = _find_by_type(topics, alternatives, roles)
             roles[role] = topic
     return roles
 
 
-def _checked(topics: Mapping[str, str], role: str, topic: str) -> str:
+def _check_choice(topics: Mapping[str, str], role: str, topic: str) -> str:
     if role not in TYPES:
         raise RecordingError(f'no input is named {role!r}: expected one of {", ".join(TYPES)}')
     if topic not in topics:
-        raise RecordingError(f'topic {topic} chosen for {role} is not in it; it has {_listed(topics)}')
+        raise RecordingError(f'topic {topic} chosen for {role} is not in the recording, which has {_list_topics(topics)}')
     if topics[topic] != TYPES[role]:
         raise RecordingError(f'topic {topic} chosen for {role}: expected type {TYPES[role]}, got {topics[topic]}')
     return topic
 
 
-def _by_name(topics: Mapping[str, str], role: str) -> str | None:
+def _find_by_name(topics: Mapping[str, str], role: str) -> str | None:
     for name in NAMES[role]:
         fitting = [topic for topic, kind in topics.items() if kind == TYPES[role] and topic.rpartition('/')[2] == name]
         if fitting:
-            return _only(role, fitting)
+            return _check_is_unique(role, fitting)
     return None
 
 
-def _by_type(topics: Mapping[str, str], need: tuple[str, ...], roles: Mapping[str, str]) -> tuple[str, str]:
-    """Return the role and topic for a need that no name meets. A goal is never guessed: its type is the hand's too."""
-    open_topics = [topic for topic in topics if topic not in roles.values() and topic.rpartition('/')[2] not in OUTPUTS]
-    fitting = [(role, topic) for role in need if role != GOAL for topic in open_topics if topics[topic] == TYPES[role]]
+def _find_by_type(topics: Mapping[str, str], alternatives: tuple[str, ...], roles: Mapping[str, str]) -> tuple[str, str]:
+    """Return the role and topic of a requirement that no name meets; never a single goal, whose type is the hand's too."""
+    unused = [topic for topic in topics if topic not in roles.values() and topic.rpartition('/')[2] not in OUTPUTS]
+    fitting = [(role, topic) for role in alternatives if role != GOAL for topic in unused if topics[topic] == TYPES[role]]
     if not fitting:
-        wanted = ' or '.join(f'{role} ({TYPES[role]})' for role in need)
-        raise RecordingError(f'no topic for {wanted}; it has {_listed(topics)}')
-    _only(fitting[0][0], [topic for _, topic in fitting])
+        wanted = ' or '.join(f'{role} ({TYPES[role]})' for role in alternatives)
+        raise RecordingError(f'no topic for {wanted}; the recording has {_list_topics(topics)}')
+    _check_is_unique(fitting[0][0], [topic for _, topic in fitting])
     return fitting[0]
 
 
-def _only(role: str, fitting: list[str]) -> str:
+def _check_is_unique(role: str, fitting: list[str]) -> str:
     if len(fitting) > 1:
         raise RecordingError(f'several topics could be {role}: {", ".join(sorted(fitting))}; choose with --remap {role}:=TOPIC')
     return fitting[0]
 
 
-def _listed(topics: Mapping[str, str]) -> str:
+def _list_topics(topics: Mapping[str, str]) -> str:
     return ', '.join(f'{topic} ({kind})' for topic, kind in sorted(topics.items())) or 'no topics'

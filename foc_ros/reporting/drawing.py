@@ -1,6 +1,7 @@
-"""What goes on the axes of a picture: scenes, ways through them, the real hand, likelihoods, speeds.
+"""Elements of the pictures, drawn on matplotlib axes: scenes, candidates, the measured hand, likelihoods, speeds.
 
-Colours tell apart without hue: likelihood is viridis from pale to dark, classes are Okabe and Ito's colours with a letter each.
+Colours, dashes, letters and ellipses are defined here once: the report page receives them with its data. The colours of Okabe and
+Ito can be told apart without perception of hue, and a letter stands beside each.
 """
 
 from __future__ import annotations
@@ -8,19 +9,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from string import ascii_uppercase
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from foc_ros.core.errors import FocError
 from foc_ros.core.types import NANOSECONDS, Array, Obstacles
 
-from .snapshots import CandidateView, Snapshot, Track
+from .snapshots import CandidateView, HandTrajectory, Snapshot
+
+if TYPE_CHECKING:
+    from .track_association import CandidateTracks
 
 try:
     import matplotlib as mpl
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import ListedColormap, Normalize
+    from matplotlib.colors import to_rgba
     from matplotlib.figure import Figure
     from matplotlib.patches import Circle, Ellipse
     from matplotlib.rcsetup import cycler
@@ -28,16 +31,18 @@ except ImportError as error:
     raise FocError("pictures need matplotlib: install python3-matplotlib, or pip install 'foc_ros[report]'") from error
 
 CLASS_COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')
-"""Okabe and Ito's, without the yellow that vanishes on white and the black that is the real hand's."""
-LIKELIHOOD_COLOURS = ListedColormap(mpl.colormaps['viridis'](np.linspace(0.88, 0.0, 256)), name='likelihood')
-LIKELIHOOD_SCALE = Normalize(0.0, 1.0)
-STDDEVS = 1.0
-"""Standard deviations that ellipses and rings stand for."""
+"""Colours of Okabe and Ito, without yellow (invisible on white) and black (used for the measured hand)."""
+NO_CLASS_COLOUR = '#777777'
+"""Colour of a candidate without a slot."""
+LIKELIHOOD_COLOURS = mpl.colormaps['viridis_r']
+"""Colours of a share from 0 (pale) to 1 (dark)."""
 CLASSES = 2 * len(CLASS_COLOURS)
-"""Classes told apart by colour and dash; there are no letters and colours for more."""
+"""Number of slots: pairs of a colour and a dash, each with its letter."""
+STDDEVS = 1.0
+"""Size of ellipses and rings in standard deviations."""
 ELLIPSES_PER_WAY = 8
 NAMED_OBSTACLES = 30
-"""Above this many, the obstacles' names would hide the scene."""
+"""The obstacles of larger scenes are drawn without their ids."""
 
 STYLE = {
     'font.size': 10,
@@ -56,15 +61,45 @@ Bounds = tuple[float, float, float, float]
 
 @contextmanager
 def new_figure(width_in: float, height_in: float) -> Iterator[Figure]:
-    """Yield an empty figure of a size [in], to be filled in our style."""
+    """Yield an empty figure of the given size [in]; what is drawn within the context has the common style."""
     with mpl.rc_context(STYLE):
         yield Figure(figsize=(width_in, height_in), layout='constrained')
 
 
-def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, named: bool = True) -> None:
-    """Draw obstacles (disc: mean radius; pale ring: a standard deviation of the radius more) and goals.
+def class_style(number: int) -> tuple[str, str]:
+    """Return colour and dash of a slot, or of anything else that is numbered."""
+    return CLASS_COLOURS[number % len(CLASS_COLOURS)], ('-', '--')[number // len(CLASS_COLOURS) % 2]
 
-    named: whether goals are numbered, as labels of ways do.
+
+def get_letter(slot: int | None) -> str:
+    """Return the letter of a slot, a blank if there is no slot."""
+    return ' ' if slot is None else ascii_uppercase[slot]
+
+
+def candidate_style(slot: int | None, likelihood: float) -> dict[str, Any]:
+    """Return the line style of a candidate: colour and dash of its slot, the thicker the more likely."""
+    colour, dash = (NO_CLASS_COLOUR, '-') if slot is None else class_style(slot)
+    return {'color': colour, 'linestyle': dash, 'linewidth': 1.2 + 3.0 * likelihood}
+
+
+def ellipse_axes(covariance: Array) -> tuple[Array, Array, Array]:
+    """Return greater and smaller standard deviation and the angle of the greater [degrees]; covariance (..., 2, 2)."""
+    variances, vectors = np.linalg.eigh(covariance)
+    stddevs = np.sqrt(np.maximum(variances, 0.0))
+    return stddevs[..., 1], stddevs[..., 0], np.degrees(np.arctan2(vectors[..., 1, 1], vectors[..., 0, 1]))
+
+
+def stddev_ellipse(centre: Array, covariance: Array, stddevs: float = STDDEVS) -> Ellipse:
+    """Return the ellipse of the given number of standard deviations; centre (2,) [m], covariance (2, 2) [m^2]."""
+    greater, smaller, angle = ellipse_axes(covariance)
+    return Ellipse(tuple(centre), 2.0 * stddevs * float(greater), 2.0 * stddevs * float(smaller), angle=float(angle))
+
+
+def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, named: bool = True) -> None:
+    """Draw obstacles and goals.
+
+    An obstacle is a disc of its mean radius in a pale ring as wide as the standard deviation of the radius. named: whether the
+    goals (g, 2) are numbered, as in the labels of candidates.
     """
     rows = zip(obstacles.ids, obstacles.centre, obstacles.radius, obstacles.radius_stddev, strict=True)
     for name, centre, radius, stddev in rows:
@@ -80,102 +115,76 @@ def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, na
     axes.set_aspect('equal')
 
 
+def draw_candidates(axes: Any, candidates: Sequence[CandidateView], slots: Mapping[str, int]) -> None:
+    """Draw candidates, the most likely on top, with ellipses of the position's standard deviation, and a legend below the axes.
+
+    slots: by label; a candidate without a slot has no letter.
+    """
+    for rank, each in reversed(list(enumerate(candidates))):
+        style, letter = candidate_style(slots.get(each.label), each.likelihood), get_letter(slots.get(each.label))
+        for row in np.unique(np.linspace(0, len(each.path) - 1, ELLIPSES_PER_WAY).astype(int)):
+            ellipse = stddev_ellipse(each.path[row], each.covariance[row])
+            ellipse.set(facecolor=to_rgba(style['color'], 0.1), edgecolor=to_rgba(style['color'], 0.5), linewidth=0.6, zorder=2)
+            axes.add_patch(ellipse)
+        axes.plot(*each.path.T, zorder=3, label=f'{letter}  {100 * each.likelihood:3.0f} %  {each.label}', **style)
+        row = int((0.45 + 0.12 * (rank % 3)) * (len(each.path) - 1))
+        draw_tag(axes, each.path[row], letter, style['color'])
+    lines, labels = axes.get_legend_handles_labels()
+    look = {'loc': 'upper left', 'frameon': False, 'borderaxespad': 4.5, 'prop': {'family': 'monospace', 'size': 8}}
+    title = None if candidates else 'no candidate could be solved'
+    axes.legend(lines[::-1], labels[::-1], title=title, bbox_to_anchor=(0.0, 0.0), **look)
+
+
+def draw_hand(axes: Any, hand: HandTrajectory, now_ns: int, span: tuple[int, int]) -> None:
+    """Draw the measured hand within a span [ns]: solid before now, dotted after it, a dot at its position now."""
+    past, future = hand.between(span[0], now_ns), hand.between(now_ns, span[1])
+    axes.plot(*hand.positions[past].T, color='black', linewidth=2.0, zorder=4)
+    axes.plot(*hand.positions[future].T, color='black', linewidth=1.4, linestyle=':', zorder=4)
+    axes.plot(*hand.positions[past][-1:].T, marker='o', markersize=6, color='black', zorder=6)
+
+
 def draw_movement(axes: Any, positions: Array, number: int) -> None:
-    """Draw a movement (m, 2) with an arrow on its way, and its number, counted from 1, near its beginning."""
+    """Draw a movement (m, 2) with an arrow and its number, counted from 1."""
     colour, dash = class_style(number)
     axes.plot(*positions.T, color=colour, linestyle=dash, linewidth=1.8)
     tail, head = positions[len(positions) * 2 // 3], positions[len(positions) * 3 // 4]
     axes.annotate('', head, tail, arrowprops={'arrowstyle': '-|>', 'color': colour, 'linewidth': 0.0, 'mutation_scale': 16})
-    tag(axes, positions[len(positions) * (2 + number % 2) // 6], str(number + 1), colour)
+    draw_tag(axes, positions[len(positions) * (2 + number % 2) // 6], str(number + 1), colour)
 
 
-def draw_ways(axes: Any, ways: Sequence[CandidateView], numbers: Mapping[str, int]) -> None:
-    """Draw ways, the most likely on top, coloured by likelihood, with ellipses of one standard deviation of the position."""
-    for rank, way in reversed(list(enumerate(ways))):
-        colour = LIKELIHOOD_COLOURS(LIKELIHOOD_SCALE(way.likelihood))
-        for row in np.unique(np.linspace(0, len(way.path) - 1, ELLIPSES_PER_WAY).astype(int)):
-            ellipse = stddev_ellipse(way.path[row], way.covariance[row])
-            ellipse.set(facecolor=(*colour[:3], 0.1), edgecolor=(*colour[:3], 0.5), linewidth=0.6, zorder=2)
-            axes.add_patch(ellipse)
-        axes.plot(*way.path.T, color=colour, linewidth=2.2, zorder=3)
-        if way.label in numbers:
-            place = way.path[int((0.45 + 0.12 * (rank % 3)) * (len(way.path) - 1))]
-            tag(axes, place, ascii_uppercase[numbers[way.label]], class_style(numbers[way.label])[0])
-
-
-def draw_hand(axes: Any, track: Track, now_ns: int, span: tuple[int, int]) -> None:
-    """Draw where the hand came from (solid), where it is, and where it really went (dotted)."""
-    before, after = track.between(span[0], now_ns), track.between(now_ns, span[1])
-    axes.plot(*track.positions[before].T, color='black', linewidth=2.0, zorder=4)
-    axes.plot(*track.positions[after].T, color='black', linewidth=1.4, linestyle=':', zorder=4)
-    axes.plot(*track.positions[before][-1:].T, marker='o', markersize=6, color='black', zorder=6)
-
-
-def draw_likelihoods(
-    axes: Any, moments: Sequence[Snapshot], lines: Sequence[Mapping[str, int]], letters: Mapping[int, int], origin_ns: int
-) -> None:
-    """Draw the likelihood of ways over time; one that is no candidate for a while leaves a gap.
-
-    lines: for every moment, the line of each way by label; letters: number of the letter and colour by line, for those drawn.
-    """
-    times = [(moment.stamp_ns - origin_ns) / NANOSECONDS for moment in moments]
-    tables = [{numbers[way.label]: way.likelihood for way in moment.ways} for moment, numbers in zip(moments, lines, strict=True)]
-    shown = sorted({line for table in tables for line in table} & set(letters))
-    for rank, line in enumerate(shown):
-        values = np.array([table.get(line, np.nan) for table in tables])
-        colour, dash = class_style(letters[line])
-        axes.plot(times, values, color=colour, linestyle=dash, linewidth=1.8, marker='.', markersize=2.5, label=f'line {line}')
+def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None:
+    """Draw the likelihoods of the tracks that have a slot over time [s]; a track has a gap where it has no candidate."""
+    times = (np.array([each.stamp_ns for each in tracks.snapshots]) - origin_ns) / NANOSECONDS
+    drawn = {track: values for track, values in tracks.likelihoods().items() if track in tracks.slots}
+    for rank, (track, (first, values)) in enumerate(drawn.items()):
+        colour, dash = class_style(tracks.slots[track])
+        axes.plot(
+            times[first : first + len(values)], values, color=colour, linestyle=dash, linewidth=1.8, marker='.', markersize=2.5
+        )
         known = np.flatnonzero(np.isfinite(values))
-        place = known[(2 * rank + 1) * len(known) // (2 * len(shown))]
-        tag(axes, (times[place], values[place]), ascii_uppercase[letters[line]], colour)
+        row = known[(2 * rank + 1) * len(known) // (2 * len(drawn))]
+        draw_tag(axes, (times[first + row], values[row]), get_letter(tracks.slots[track]), colour)
     axes.set(ylim=(-0.03, 1.03), ylabel='likelihood')
     axes.tick_params(labelbottom=False)
 
 
-def draw_speeds(axes: Any, track: Track, moment: Snapshot, span: tuple[int, int], origin_ns: int) -> None:
-    """Draw the measured speed over a movement and, from the moment on, the predicted ones, coloured by likelihood."""
-    rows = track.between(*span)
-    times = (track.stamps_ns[rows] - origin_ns) / NANOSECONDS
-    now = (moment.stamp_ns - origin_ns) / NANOSECONDS
-    for way in reversed(moment.ways):
-        axes.plot(now + way.times, way.speed, color=LIKELIHOOD_COLOURS(LIKELIHOOD_SCALE(way.likelihood)), linewidth=1.6)
-    axes.plot(times, np.linalg.norm(track.velocity[rows], axis=1), color='black', linewidth=1.6, linestyle=':')
-    past = times <= now
-    axes.plot(times[past], np.linalg.norm(track.velocity[rows][past], axis=1), color='black', linewidth=2.0)
+def draw_speeds(
+    axes: Any, hand: HandTrajectory, snapshot: Snapshot, slots: Mapping[str, int], span: tuple[int, int], origin_ns: int
+) -> None:
+    """Draw predicted speeds and the measured speed within a span [ns], which is dotted after the stamp of the snapshot."""
+    now_s = (snapshot.stamp_ns - origin_ns) / NANOSECONDS
+    for each in reversed(snapshot.candidates):
+        axes.plot(now_s + each.times, each.speed, **candidate_style(slots.get(each.label), each.likelihood))
+    times = hand.seconds_after(origin_ns)
+    for rows, dash, width in ((hand.between(*span), ':', 1.6), (hand.between(span[0], snapshot.stamp_ns), '-', 2.0)):
+        axes.plot(times[rows], hand.speed[rows], color='black', linewidth=width, linestyle=dash)
     axes.set(ylabel='speed [m/s]', xlabel='time [s]')
     axes.set_ylim(bottom=0.0)
 
 
-def draw_legend(axes: Any, ways: Sequence[CandidateView], numbers: Mapping[str, int]) -> None:
-    """Write the letter, likelihood and label of every way."""
-    axes.axis('off')
-    if not ways:
-        axes.text(0.0, 0.5, 'no candidate could be solved', transform=axes.transAxes, va='center')
-    for row, way in enumerate(ways):
-        height = 1.0 - (row + 0.5) / len(ways)
-        letter = ascii_uppercase[numbers[way.label]] if way.label in numbers else ' '
-        text = f'{letter}  {100 * way.likelihood:3.0f} %  {way.label}'
-        axes.text(0.0, height, text, transform=axes.transAxes, va='center', family='monospace', fontsize=8)
-
-
-def stddev_ellipse(centre: Array, covariance: Array, stddevs: float = STDDEVS) -> Ellipse:
-    """Return the ellipse of so many standard deviations; covariance (2, 2) [m^2]."""
-    variances, vectors = np.linalg.eigh(covariance)
-    minor, major = 2.0 * stddevs * np.sqrt(np.maximum(variances, 0.0))
-    return Ellipse(tuple(centre), major, minor, angle=float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))))
-
-
-def class_style(number: int) -> tuple[str, str]:
-    """Return the colour and dash of a class, or of a numbered movement."""
-    return CLASS_COLOURS[number % len(CLASS_COLOURS)], ('-', '--')[number // len(CLASS_COLOURS) % 2]
-
-
-def tag(axes: Any, place: Any, text: str, colour: str) -> None:
-    """Write a letter or number in a small circle at a place (2,)."""
+def draw_tag(axes: Any, position: Any, text: str, colour: str) -> None:
+    """Write a letter or a number, unless it is empty, in a small circle at a position (2,)."""
+    if not text.strip():
+        return
     box = {'boxstyle': 'circle,pad=0.18', 'facecolor': 'white', 'edgecolor': colour, 'linewidth': 1.4}
-    axes.text(*place, text, fontsize=7.5, ha='center', va='center', zorder=7, bbox=box, clip_on=True)
-
-
-def draw_colour_bar(figure: Figure, axes: Any) -> None:
-    """Draw the scale of the likelihood beside a scene."""
-    figure.colorbar(ScalarMappable(LIKELIHOOD_SCALE, LIKELIHOOD_COLOURS), ax=axes, label='likelihood', shrink=0.8, pad=0.02)
+    axes.text(*position, text, fontsize=7.5, ha='center', va='center', zorder=7, bbox=box, clip_on=True)

@@ -1,136 +1,153 @@
-"""A directory that tells of a recording: one interactive page, pictures for print, and the numbers."""
+"""The report of a recording: a directory with one interactive page, pictures for print, and the numbers."""
 
 from __future__ import annotations
 
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from foc_ros.core.errors import InputError
-from foc_ros.core.types import NANOSECONDS
+from foc_ros.analysis.replay import Step
+from foc_ros.core.errors import FocError, InputError
+from foc_ros.core.types import NANOSECONDS, HandSample
 
-from . import plots
-from .drawing import CLASS_COLOURS, CLASSES
-from .report_data import page_data, rounded
-from .report_page import report_page
-from .snapshots import Snapshot, Track, movements
-from .track_association import associate_tracks, slots
+from .page import render
+from .plots import make_recording_figure, make_snapshot_figure, save
+from .report_data import PageData, bounds_of_recording, round_number
+from .snapshots import HandTrajectory, Snapshot, build_hand_trajectory, build_snapshot
+from .track_association import CandidateTracks, build_candidate_tracks
+
+if find_spec('plotly') is None:
+    raise FocError("reports need plotly: pip install plotly, or pip install 'foc_ros[report]'")
 
 MOST_PICTURES = 8
-FRACTIONS_OF_ONE = (0.1, 0.3, 0.5, 0.7)
-"""Where in its time a movement is shown when it is the only one; of several, each is shown once, at FRACTION."""
+SINGLE_MOVEMENT_FRACTIONS = (0.1, 0.3, 0.5, 0.7)
+"""Fractions of its duration at which a movement is pictured if it is the only one."""
 FRACTION = 0.3
+"""Fraction of its duration at which each of several movements is pictured."""
 ONSET_SPEED = 0.05
-"""Speed [m/s] above which the pictures take the hand to be moving."""
+"""Speed [m/s] above which the hand counts as moving."""
+Span = tuple[int, int]
+"""Start and end of a movement [ns]."""
+
+
+class ReportCollector:
+    """Collects the steps of a replay for their report."""
+
+    def __init__(self) -> None:
+        self.samples: list[HandSample] = []
+        self.snapshots: list[Snapshot] = []
+
+    def add(self, step: Step) -> None:
+        """Keep the hand sample and the prediction of a step."""
+        if step.sample is not None:
+            self.samples.append(step.sample)
+        if step.prediction is not None:
+            self.snapshots.append(build_snapshot(step.prediction))
+
+    def write(self, directory: Path, title: str, summary: Mapping[str, str]) -> None:
+        """Write the report; see :func:`write_report`."""
+        write_report(directory, title, build_hand_trajectory(self.samples), self.snapshots, summary)
 
 
 def write_report(
-    directory: Path, title: str, track: Track, moments: Sequence[Snapshot], summary: Mapping[str, str]
+    directory: Path, title: str, hand: HandTrajectory, snapshots: Sequence[Snapshot], summary: Mapping[str, str]
 ) -> list[Path]:
-    """Write index.html (which needs nothing else), predictions.json and pictures; return the files.
+    """Write index.html, predictions.json and pictures into a directory, replacing files of those names; return the files.
 
-    track: the measured hand; moments: the predictions in order; summary: facts to put on top, in words. Files of those names are
-    replaced. Raises InputError where the directory cannot be written or the hand has no sample.
+    hand: the measured movement; snapshots: the predictions in order of their stamps; summary: facts for a table of the page.
+    Raises InputError if the directory cannot be written or the hand has no sample.
     """
-    if not len(track.stamps_ns):
+    if not len(hand.stamps_ns):
         raise InputError('report', 'a recording with a hand pose', 'none')
-    spans = movements(track, ONSET_SPEED) or [(int(track.stamps_ns[0]), int(track.stamps_ns[-1]))]
-    html = report_page(title, page_data(track, moments, spans), {**_facts(moments), **summary}, _warnings(moments))
+    spans = hand.find_movements(ONSET_SPEED) or [(int(hand.stamps_ns[0]), int(hand.stamps_ns[-1]))]
+    tracks = build_candidate_tracks(snapshots)
+    facts, warnings = {**_collect_facts(snapshots), **summary}, _collect_warnings(snapshots)
+    data = PageData(hand, tracks).build(spans, bounds_of_recording(hand, snapshots))
+    html = render('report.html', title=title, warnings=warnings, facts=facts, data=data)
+    numbers = {
+        'title': title,
+        'summary': facts,
+        'warnings': warnings,
+        'hand_samples': len(hand.stamps_ns),
+        'predictions': [_encode_snapshot(each, int(hand.stamps_ns[0])) for each in snapshots],
+    }
+    page_file, numbers_file = directory / 'index.html', directory / 'predictions.json'
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        pictures = _write_pictures(directory, track, moments, spans)
-        page, numbers = directory / 'index.html', directory / 'predictions.json'
-        page.write_text(html, encoding='utf-8')
-        numbers.write_text(json.dumps(_numbers(title, track, moments, summary), indent=1, allow_nan=False), encoding='utf-8')
+        pictures = _write_pictures(directory, hand, tracks, spans)
+        page_file.write_text(html, encoding='utf-8')
+        numbers_file.write_text(json.dumps(numbers, indent=1, allow_nan=False), encoding='utf-8')
     except OSError as error:
         raise InputError('report directory', 'a directory that can be written', f'{directory}: {error.strerror}') from error
-    return [page, numbers, *pictures]
+    return [page_file, numbers_file, *pictures]
 
 
-def _write_pictures(directory: Path, track: Track, moments: Sequence[Snapshot], spans: Sequence[tuple[int, int]]) -> list[Path]:
-    """Return the files, the overview first."""
-    shown = [moment for moment in moments if moment.ways]
-    if not shown:
+def _write_pictures(directory: Path, hand: HandTrajectory, tracks: CandidateTracks, spans: Sequence[Span]) -> list[Path]:
+    """Write the overview and the pictures of single predictions; return the files."""
+    solved = [each for each in tracks.snapshots if each.candidates]
+    if not solved:
         return []
-    lines = associate_tracks(moments)
-    letters = slots(moments, lines, CLASSES, len(CLASS_COLOURS))
-    chosen = _chosen(shown, spans)
-    ways = [way for _, moment in chosen for way in moment.ways]
-    goals = np.unique(np.concatenate([moment.goals for moment in shown]), axis=0)
-    bounds = plots.bounds_of(shown[0].obstacles, goals, ways, track.positions)
-    files = [directory / 'overview.png']
-    plots.save(plots.track_figure(track, shown[0].obstacles, goals, spans, bounds), files[0])
-    for count, (number, moment) in enumerate(chosen):
-        start_ns, end_ns = spans[number]
-        rows = [row for row, each in enumerate(moments) if start_ns <= each.stamp_ns <= end_ns]
-        around = plots.Around(tuple(moments[row] for row in rows), tuple(lines[row] for row in rows), letters)
-        files.append(directory / f'moment_{count + 1:02d}.png')
-        plots.save(plots.moment_figure(track, moment, around, spans[number], bounds), files[-1])
-    return files
+    bounds = bounds_of_recording(hand, solved)
+    goals = np.unique(np.concatenate([each.goals for each in solved]), axis=0)
+    figures = {'overview.png': make_recording_figure(hand, solved[0].obstacles, goals, spans, bounds)}
+    for count, (row, span) in enumerate(_select_rows(tracks.snapshots, spans).items()):
+        figures[f'moment_{count + 1:02d}.png'] = make_snapshot_figure(hand, tracks, row, span, bounds)
+    for name, figure in figures.items():
+        save(figure, directory / name)
+    return [directory / name for name in figures]
 
 
-def _chosen(shown: Sequence[Snapshot], spans: Sequence[tuple[int, int]]) -> list[tuple[int, Snapshot]]:
-    """Return the moments that get a picture, each with the number of its movement."""
-    numbers = np.unique(np.linspace(0, len(spans) - 1, min(len(spans), MOST_PICTURES)).round().astype(int))
-    wanted = [
-        (int(number), fraction) for number in numbers for fraction in (FRACTIONS_OF_ONE if len(spans) == 1 else (FRACTION,))
-    ]
-    stamps = np.array([moment.stamp_ns for moment in shown])
-    chosen: dict[int, int] = {}
-    for number, fraction in wanted:
-        start_ns, end_ns = spans[number]
-        inside = np.flatnonzero((stamps >= start_ns) & (stamps <= end_ns))
-        if len(inside):
-            chosen[int(inside[np.argmin(np.abs(stamps[inside] - (start_ns + fraction * (end_ns - start_ns))))])] = number
-    return [(number, shown[row]) for row, number in chosen.items()]
+def _select_rows(snapshots: Sequence[Snapshot], spans: Sequence[Span]) -> dict[int, Span]:
+    """Return the rows of the snapshots to be pictured, each with its movement."""
+    shown = np.unique(np.linspace(0, len(spans) - 1, min(len(spans), MOST_PICTURES)).round().astype(int))
+    fractions = SINGLE_MOVEMENT_FRACTIONS if len(spans) == 1 else (FRACTION,)
+    stamps = np.array([each.stamp_ns for each in snapshots])
+    is_solved = np.array([bool(each.candidates) for each in snapshots])
+    selected: dict[int, Span] = {}
+    for start_ns, end_ns in (spans[number] for number in shown):
+        inside = np.flatnonzero(is_solved & (stamps >= start_ns) & (stamps <= end_ns))
+        for fraction in fractions if len(inside) else ():
+            wanted_ns = start_ns + fraction * (end_ns - start_ns)
+            selected[int(inside[np.argmin(np.abs(stamps[inside] - wanted_ns))])] = (start_ns, end_ns)
+    return selected
 
 
-def _facts(moments: Sequence[Snapshot]) -> dict[str, str]:
-    solve_ms = [1e3 * moment.solve_s for moment in moments if moment.solve_s is not None]
-    facts = {'predictions': str(len(moments)), 'candidates solved': str(sum(len(moment.ways) for moment in moments))}
+def _collect_facts(snapshots: Sequence[Snapshot]) -> dict[str, str]:
+    solve_ms = [1e3 * each.solve_s for each in snapshots if each.solve_s is not None]
+    facts = {'predictions': str(len(snapshots)), 'candidates solved': str(sum(len(each.candidates) for each in snapshots))}
     if solve_ms:
         median, late = np.percentile(solve_ms, [50, 99])
-        facts['time per prediction'] = f'{median:.1f} ms (median), {late:.1f} ms (99 of 100)'
+        facts['time per prediction'] = f'{median:.1f} ms (median), {late:.1f} ms (99th percentile)'
     return facts
 
 
-def _warnings(moments: Sequence[Snapshot]) -> list[str]:
-    empty = sum(not moment.ways for moment in moments)
-    statuses = Counter(status for moment in moments for _, status in moment.unsolved)
-    warnings = [] if moments else ['There is no prediction.']
-    warnings += [f'In {empty} of {len(moments)} predictions no candidate could be solved.'] if empty else []
-    warnings += [f'{count} candidate{"s" if count > 1 else ""} ended as {status}.' for status, count in sorted(statuses.items())]
-    return warnings
+def _collect_warnings(snapshots: Sequence[Snapshot]) -> list[str]:
+    empty = sum(not each.candidates for each in snapshots)
+    statuses = Counter(status for each in snapshots for _, status in each.unsolved)
+    warnings = [] if snapshots else ['There is no prediction.']
+    warnings += [f'In {empty} of {len(snapshots)} predictions no candidate could be solved.'] if empty else []
+    return warnings + [
+        f'{count} candidate{"s" if count > 1 else ""} ended with status {status}.' for status, count in sorted(statuses.items())
+    ]
 
 
-def _numbers(title: str, track: Track, moments: Sequence[Snapshot], summary: Mapping[str, str]) -> dict[str, Any]:
+def _encode_snapshot(snapshot: Snapshot, origin_ns: int) -> dict[str, Any]:
     return {
-        'title': title,
-        'summary': {**_facts(moments), **summary},
-        'warnings': _warnings(moments),
-        'hand_samples': len(track.stamps_ns),
-        'predictions': [
+        'stamp_ns': snapshot.stamp_ns,
+        't_s': round((snapshot.stamp_ns - origin_ns) / NANOSECONDS, 6),
+        'most_likely': snapshot.most_likely,
+        'candidates': [
             {
-                'stamp_ns': moment.stamp_ns,
-                't_s': round((moment.stamp_ns - int(track.stamps_ns[0])) / NANOSECONDS, 6),
-                'most_likely': moment.most_likely,
-                'candidates': [
-                    {
-                        'label': way.label,
-                        'likelihood': rounded(way.likelihood),
-                        'effort': rounded(way.effort),
-                        'cost_ratio': rounded(way.cost_ratio),
-                        'eta': rounded(way.eta),
-                        'end': [rounded(value) for value in way.path[-1]],
-                    }
-                    for way in moment.ways
-                ],
-                'unsolved': dict(moment.unsolved),
+                'label': each.label,
+                **{name: round_number(getattr(each, name)) for name in ('likelihood', 'effort', 'cost_ratio', 'eta')},
+                'end': [round_number(value) for value in each.path[-1]],
             }
-            for moment in moments
+            for each in snapshot.candidates
         ],
+        'unsolved': dict(snapshot.unsolved),
     }

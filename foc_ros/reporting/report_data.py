@@ -1,170 +1,147 @@
-"""What the page of a report draws, as plain values: small, for it is read by a phone.
+"""Data of the report page as plain values, small enough for a phone.
 
-Lengths are whole tenths of a millimetre, speeds whole millimetres per second; of a list of them the first is given, then the
-differences. What does not change from one prediction to the next (obstacles, goals, labels) is given once and named by its row.
+Lengths are whole tenths of a millimetre, speeds whole millimetres per second. A list of them holds the first value and then the
+differences. Obstacles, goals and labels are stored once and referred to by their row.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Hashable, Mapping, Sequence
-from typing import Any, Generic, TypeVar
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from foc_ros.core.types import NANOSECONDS, Array
+from foc_ros.core.types import NANOSECONDS, Array, make_obstacles
 
-from .drawing import CLASS_COLOURS, CLASSES
-from .snapshots import CandidateView, Snapshot, Track
-from .track_association import associate_tracks, slots
+from .drawing import CLASS_COLOURS, ELLIPSES_PER_WAY, NAMED_OBSTACLES, STDDEVS, Bounds, ellipse_axes
+from .plots import bounds_of
+from .snapshots import CandidateView, HandTrajectory, Snapshot
+from .track_association import CandidateTracks
 
-LENGTH, SPEED = 1e-4, 1e-3
-"""Units [m], [m/s]."""
-MOST_SHOWN = 500
-"""Predictions that the slider stops at; of more, these many evenly spread. Likelihoods are drawn of all."""
-MOST_HAND = 4000
-"""Hand samples that are drawn."""
-PATH_POINTS, ELLIPSES = 26, 8
-MARGIN = 0.06
-RARE = (0.5, 99.5)
-"""Percentiles of the paths' coordinates that the scene is drawn to: one wild prediction shall not make all others small."""
-Kept = TypeVar('Kept', bound=Hashable)
-
-
-class Rows(Generic[Kept]):
-    """Values that are kept once and named by their row."""
-
-    def __init__(self) -> None:
-        self._rows: dict[Kept, int] = {}
-
-    def row(self, value: Kept) -> int:
-        """Return the row of a value, a new one where it is new."""
-        return self._rows.setdefault(value, len(self._rows))
-
-    @property
-    def values(self) -> list[Kept]:
-        """All values, by row."""
-        return list(self._rows)
+LENGTH, SPEED, TIME = 1e-4, 1e-3, 1e-3
+"""Units [m], [m/s], [s]."""
+MOST_FRAMES = 500
+"""The slider stops at no more than this many predictions, evenly spread; likelihoods are drawn for all."""
+MOST_HAND_SAMPLES = 4000
+PATH_POINTS = 26
+DRAWN_PERCENTILES = (0.5, 99.5)
+"""Percentiles of the paths' coordinates that fit into the scene: a single outlying prediction does not change its scale."""
+Rows = dict[str, int]
+"""Rows of values that are stored once."""
 
 
-def page_data(track: Track, moments: Sequence[Snapshot], spans: Sequence[tuple[int, int]]) -> dict[str, Any]:
-    """Return what the page draws; spans: start and end [ns] of the movements.
+class PageData:
+    """Builder of the data of a report page from the hand's trajectory and the associated candidates."""
 
-    times [s] from the first hand sample on, of every prediction, with its solve_ms and the likelihoods of every line: a way as
-    it goes on from one prediction to the next, `first` and `share` of it, and the `slot` that gives letter and colour.
-    """
-    origin_ns = int(track.stamps_ns[0])
-    lines = associate_tracks(moments)
-    scenes, goals, labels = Rows[str](), Rows[str](), Rows[str]()
-    shown = evenly(len(moments), MOST_SHOWN)
-    frames = [_frame(row, moments[row], lines[row], scenes, goals, labels) for row in shown.tolist()]
-    return {
-        'unit': {'length': LENGTH, 'speed': SPEED},
-        'colours': CLASS_COLOURS,
-        'bounds': _bounds(track, moments),
-        'times': [_seconds(moment.stamp_ns, origin_ns) for moment in moments],
-        'solve_ms': [None if moment.solve_s is None else round(1e3 * moment.solve_s, 2) for moment in moments],
-        'lines': _lines(moments, lines, slots(moments, lines, CLASSES, len(CLASS_COLOURS))),
-        'movements': [[_seconds(stamp, origin_ns) for stamp in span] for span in spans],
-        'hand': _hand(track, origin_ns),
-        'scenes': [json.loads(scene) for scene in scenes.values],
-        'goals': [json.loads(places) for places in goals.values],
-        'labels': labels.values,
-        'frames': frames,
-    }
+    def __init__(self, hand: HandTrajectory, tracks: CandidateTracks) -> None:
+        self._hand, self._tracks = hand, tracks
+        self._origin_ns = int(hand.stamps_ns[0])
+        self._scenes, self._goals, self._labels = Rows(), Rows(), Rows()
+
+    def build(self, spans: list[tuple[int, int]], bounds: Bounds) -> dict[str, Any]:
+        """Return everything that the page draws; spans: start and end [ns] of the movements.
+
+        times [s] after the first hand sample and solve_ms of every prediction; tracks: for each its slot, the row of its
+        first prediction and its likelihoods from there on; frames: the predictions at which the slider stops.
+        """
+        snapshots = self._tracks.snapshots
+        frames = [self._encode_frame(row) for row in spread_rows(len(snapshots), MOST_FRAMES).tolist()]
+        return {
+            'unit': {'length': LENGTH, 'speed': SPEED, 'time': TIME},
+            'colours': CLASS_COLOURS,
+            'named_obstacles': NAMED_OBSTACLES,
+            'bounds': [round(each, 4) for each in bounds],
+            'times': [self._seconds(each.stamp_ns) for each in snapshots],
+            'solve_ms': [None if each.solve_s is None else round(1e3 * each.solve_s, 2) for each in snapshots],
+            'tracks': [
+                {'slot': self._tracks.slots.get(track), 'first': first, 'share': [round_number(value) for value in values]}
+                for track, (first, values) in self._tracks.likelihoods().items()
+            ],
+            'movements': [[self._seconds(stamp) for stamp in span] for span in spans],
+            'hand': self._encode_hand(),
+            'scenes': [json.loads(scene) for scene in self._scenes],
+            'goals': [json.loads(goals) for goals in self._goals],
+            'labels': list(self._labels),
+            'frames': frames,
+        }
+
+    def _encode_frame(self, row: int) -> dict[str, Any]:
+        snapshot, tracks = self._tracks.snapshots[row], self._tracks.tracks[row]
+        obstacles = snapshot.obstacles
+        discs = np.column_stack([obstacles.centre, obstacles.radius, STDDEVS * obstacles.radius_stddev])
+        scene = [[name, *_quantise(disc, LENGTH)] for name, disc in zip(obstacles.ids, discs, strict=True)]
+        return {
+            'at': row,
+            'scene': _row_of(json.dumps(scene), self._scenes),
+            'goals': _row_of(json.dumps([_quantise(goal, LENGTH) for goal in snapshot.goals]), self._goals),
+            'candidates': [
+                {'track': tracks[each.label], 'label': _row_of(each.label, self._labels), **_encode_candidate(each)}
+                for each in snapshot.candidates
+            ],
+            'unsolved': [[_row_of(text, self._labels) for text in pair] for pair in snapshot.unsolved],
+        }
+
+    def _encode_hand(self) -> dict[str, Any]:
+        rows = spread_rows(len(self._hand.stamps_ns), MOST_HAND_SAMPLES)
+        return {
+            't': _quantise_differences(self._hand.seconds_after(self._origin_ns)[rows], TIME),
+            'x': _quantise_differences(self._hand.positions[rows, 0], LENGTH),
+            'y': _quantise_differences(self._hand.positions[rows, 1], LENGTH),
+            'v': _quantise_differences(self._hand.speed[rows], SPEED),
+        }
+
+    def _seconds(self, stamp_ns: int) -> float:
+        return round((stamp_ns - self._origin_ns) / NANOSECONDS, 4)
 
 
-def rounded(value: float) -> float | None:
-    """Return six significant digits; None for what JSON has no number for."""
+def bounds_of_recording(hand: HandTrajectory, snapshots: Sequence[Snapshot]) -> Bounds:
+    """Return limits of x and y [m] around the hand, all obstacles and goals, and all but outlying paths."""
+    points = [hand.positions]
+    for each in snapshots:
+        reach = (each.obstacles.radius + STDDEVS * each.obstacles.radius_stddev)[:, None]
+        points += [each.goals, each.obstacles.centre - reach, each.obstacles.centre + reach]
+    paths = [candidate.path for each in snapshots for candidate in each.candidates]
+    points += [np.percentile(np.concatenate(paths), DRAWN_PERCENTILES, axis=0)] if paths else []
+    return bounds_of(make_obstacles(), np.zeros((0, 2)), (), *points, margin=0.06)
+
+
+def round_number(value: float) -> float | None:
+    """Return a number with six significant digits, None if it is not finite: JSON has no such numbers."""
     return float(f'{value:.6g}') if np.isfinite(value) else None
 
 
-def evenly(count: int, most: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+def spread_rows(count: int, most: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
     """Return at most so many rows of `count`, evenly spread, the first and the last among them."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.intp))
 
 
-def _frame(
-    row: int, moment: Snapshot, numbers: Mapping[str, int], scenes: Rows[str], goals: Rows[str], labels: Rows[str]
-) -> dict[str, Any]:
-    obstacles = moment.obstacles
-    discs = np.column_stack([obstacles.centre, obstacles.radius, obstacles.radius_stddev])
-    scene = [[name, *_whole(disc, LENGTH)] for name, disc in zip(obstacles.ids, discs, strict=True)]
+def _encode_candidate(candidate: CandidateView) -> dict[str, Any]:
+    """Return one candidate; ellipses: x, y, greater and smaller standard deviation, angle of the greater [degrees]."""
+    points = spread_rows(len(candidate.path), PATH_POINTS)
+    marks = spread_rows(len(candidate.path), ELLIPSES_PER_WAY + 1)[1:]
+    greater, smaller, angle = ellipse_axes(candidate.covariance[marks])
+    lengths = np.column_stack([candidate.path[marks], STDDEVS * greater, STDDEVS * smaller])
     return {
-        'at': row,
-        'scene': scenes.row(json.dumps(scene)),
-        'goals': goals.row(json.dumps([_whole(goal, LENGTH) for goal in moment.goals])),
-        'ways': [{'line': numbers[way.label], 'label': labels.row(way.label), **_way(way)} for way in moment.ways],
-        'lost': [[labels.row(label), labels.row(status)] for label, status in moment.unsolved],
+        'ratio': round_number(candidate.cost_ratio),
+        'eta': round_number(candidate.eta),
+        'x': _quantise_differences(candidate.path[points, 0], LENGTH),
+        'y': _quantise_differences(candidate.path[points, 1], LENGTH),
+        't': _quantise_differences(candidate.times[points], TIME),
+        'v': _quantise_differences(candidate.speed[points], SPEED),
+        'ellipses': [[*_quantise(each, LENGTH), round(degrees)] for each, degrees in zip(lengths, angle.tolist(), strict=True)],
     }
 
 
-def _way(way: CandidateView) -> dict[str, Any]:
-    """Return one way; ellipses: x, y, greater and smaller standard deviation, angle of the greater [degrees] of each."""
-    points, marks = evenly(len(way.path), PATH_POINTS), evenly(len(way.path), ELLIPSES + 1)[1:]
-    variances, vectors = np.linalg.eigh(way.covariance[marks])
-    axes = np.sqrt(np.maximum(variances, 0.0))[:, ::-1]
-    angles = np.degrees(np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1]))
-    return {
-        'ratio': rounded(way.cost_ratio),
-        'eta': rounded(way.eta),
-        'x': _steps(way.path[points, 0], LENGTH),
-        'y': _steps(way.path[points, 1], LENGTH),
-        't': _steps(way.times[points], 1e-3),
-        'v': _steps(way.speed[points], SPEED),
-        'ellipses': [
-            [*_whole(way.path[mark], LENGTH), *_whole(pair, LENGTH), round(angle)]
-            for mark, pair, angle in zip(marks, axes, angles, strict=True)
-        ],
-    }
+def _row_of(text: str, rows: Rows) -> int:
+    """Return the row of a text, a new row if the text is new."""
+    return rows.setdefault(text, len(rows))
 
 
-def _lines(moments: Sequence[Snapshot], lines: Sequence[Mapping[str, int]], slot: Mapping[int, int]) -> list[dict[str, Any]]:
-    """Return every line with its likelihoods from its first prediction to its last, None where it was no candidate."""
-    found: dict[int, dict[int, float | None]] = {}
-    for row, (moment, numbers) in enumerate(zip(moments, lines, strict=True)):
-        for way in moment.ways:
-            found.setdefault(numbers[way.label], {})[row] = rounded(way.likelihood)
-    return [
-        {'slot': slot.get(line), 'first': min(known), 'share': [known.get(row) for row in range(min(known), max(known) + 1)]}
-        for line, known in sorted(found.items())
-    ]
+def _quantise(values: Array, unit: float) -> list[int]:
+    return [int(value) for value in np.rint(values / unit)]
 
 
-def _hand(track: Track, origin_ns: int) -> dict[str, Any]:
-    rows = evenly(len(track.stamps_ns), MOST_HAND)
-    return {
-        't': _steps((track.stamps_ns[rows] - origin_ns) / NANOSECONDS, 1e-3),
-        'x': _steps(track.positions[rows, 0], LENGTH),
-        'y': _steps(track.positions[rows, 1], LENGTH),
-        'v': _steps(np.linalg.norm(track.velocity[rows], axis=1), SPEED),
-    }
-
-
-def _bounds(track: Track, moments: Sequence[Snapshot]) -> list[float]:
-    """Return limits of x, then of y [m], that hold hand, goals, obstacles and nearly all of the paths."""
-    points = [track.positions]
-    for moment in moments:
-        reach = (moment.obstacles.radius + moment.obstacles.radius_stddev)[:, None]
-        points += [moment.goals, moment.obstacles.centre - reach, moment.obstacles.centre + reach]
-    paths = [way.path for moment in moments for way in moment.ways]
-    if paths:
-        points.append(np.percentile(np.concatenate(paths), RARE, axis=0))
-    everything = np.concatenate(points)
-    low, high = everything.min(axis=0), everything.max(axis=0)
-    margin = MARGIN * max(*(high - low), 0.05)
-    return [round(float(each), 4) for pair in zip(low - margin, high + margin, strict=True) for each in pair]
-
-
-def _seconds(stamp_ns: int, origin_ns: int) -> float:
-    return round((stamp_ns - origin_ns) / NANOSECONDS, 4)
-
-
-def _whole(values: Array, unit: float) -> list[int]:
-    return [int(value) for value in np.rint(np.asarray(values) / unit)]
-
-
-def _steps(values: Array, unit: float) -> list[int]:
+def _quantise_differences(values: Array, unit: float) -> list[int]:
     """Return the first value and then the differences, in whole units."""
-    whole = np.rint(np.asarray(values) / unit).astype(np.int64)
-    return [int(value) for value in np.diff(whole, prepend=0)]
+    return [int(value) for value in np.diff(np.rint(values / unit).astype(np.int64), prepend=0)]

@@ -1,98 +1,135 @@
-"""Which way of one prediction goes on in the next.
+"""Association of candidates over time: which candidate of one prediction continues which candidate of the prediction before.
 
-A label names the obstacles that matter, so it changes when one is left behind or comes near: `goal0:+1-2` goes on as `goal0:-2`.
-A line over time follows the way, not the label.
+A label names only the obstacles that matter. It changes when an obstacle is left behind or comes near: the candidate
+`goal0:+1-2` continues as `goal0:-2`. A track follows the candidate through such changes.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from .snapshots import CandidateView, Snapshot
+from foc_ros.core.types import Array
 
-PAUSE_NS = 300_000_000
-"""For so long a way may be missing, because it was not solved, say, and go on all the same."""
+from .drawing import CLASS_COLOURS, CLASSES
+from .snapshots import Snapshot
+
+LONGEST_GAP_NS = 300_000_000
+"""A track continues after a gap of up to this length, in which its candidate was not solved."""
 Sides = dict[str, str]
-"""Side ('+' left, '-' right) by obstacle."""
+"""Side ('+' left, '-' right) of each obstacle by its id."""
 
 
-def sides_of(label: str, ids: Collection[str]) -> tuple[str, Sides]:
-    """Split a label into its goal and the sides it names; ids: those of the scene, which may hold signs themselves."""
+@dataclass(frozen=True)
+class CandidateTracks:
+    """Snapshots with their candidates associated over time.
+
+    tracks: for each snapshot, the number of the track of each candidate, by label; slots: of each track, the slot that gives its
+    letter and colour. Tracks without a slot are missing there.
+    """
+
+    snapshots: Sequence[Snapshot]
+    tracks: Sequence[Mapping[str, int]]
+    slots: Mapping[int, int]
+
+    def between(self, start_ns: int, end_ns: int) -> CandidateTracks:
+        """Return the part with start_ns <= stamp <= end_ns."""
+        rows = [row for row, each in enumerate(self.snapshots) if start_ns <= each.stamp_ns <= end_ns]
+        return CandidateTracks([self.snapshots[row] for row in rows], [self.tracks[row] for row in rows], self.slots)
+
+    def slots_at(self, row: int) -> dict[str, int]:
+        """Return the slots of the candidates of one snapshot, by label."""
+        return {label: self.slots[track] for label, track in self.tracks[row].items() if track in self.slots}
+
+    def likelihoods(self) -> dict[int, tuple[int, Array]]:
+        """Return, for each track, its first row and its likelihoods from there on, NaN where it has no candidate."""
+        known: dict[int, dict[int, float]] = {}
+        for row, (snapshot, tracks) in enumerate(zip(self.snapshots, self.tracks, strict=True)):
+            for each in snapshot.candidates:
+                known.setdefault(tracks[each.label], {})[row] = each.likelihood
+        return {
+            track: (min(rows), np.array([rows.get(row, np.nan) for row in range(min(rows), max(rows) + 1)]))
+            for track, rows in sorted(known.items())
+        }
+
+
+def build_candidate_tracks(snapshots: Sequence[Snapshot]) -> CandidateTracks:
+    """Associate the candidates of successive snapshots and give the tracks their letters and colours."""
+    tracks = associate_tracks(snapshots)
+    return CandidateTracks(snapshots, tracks, assign_slots(snapshots, tracks))
+
+
+def parse_label(label: str, ids: Collection[str]) -> tuple[str, Sides]:
+    """Split a label into its goal and the sides it names; ids: of the obstacles of the scene, which may contain signs."""
     goal, _, rest = label.partition(':')
     names = '|'.join(re.escape(name) for name in sorted(ids, key=len, reverse=True))
     found = re.findall(rf'([+-])({names})(?=[+-]|$)', rest) if names else []
     return goal, {name: side for side, name in found}
 
 
-def associate_tracks(moments: Sequence[Snapshot]) -> list[dict[str, int]]:
-    """Return, for every moment, the number of the line that each of its ways belongs to, by label.
+def associate_tracks(snapshots: Sequence[Snapshot]) -> list[dict[str, int]]:
+    """Return the number of the track of each candidate, by label, for each snapshot.
 
-    A way goes on in one with the same goals and the same label, else in one with the same goal that passes no obstacle on another
-    side; of several, the one that shares most sides, then the latest, then the most likely.
+    A candidate continues a track of the same goal that passes no common obstacle on the other side: preferably the one with the
+    same label, then the one that shares most sides, then the latest, then the most likely. All tracks end when the goals change.
     """
-    numbered: list[dict[str, int]] = []
-    lines = 0
-    open_lines: dict[int, tuple[int, str]] = {}
-    before: Snapshot | None = None
-    for moment in moments:
-        if before is None or not np.array_equal(before.goals, moment.goals):
-            open_lines = {}
-        fresh = {line: kept for line, kept in open_lines.items() if moment.stamp_ns - kept[0] <= PAUSE_NS}
-        numbers = _continued(moment, {line: label for line, (_, label) in fresh.items()})
-        for way in moment.ways:
-            if way.label not in numbers:
-                numbers[way.label], lines = lines, lines + 1
-        now = {numbers[way.label]: (moment.stamp_ns, way.label) for way in moment.ways}
-        open_lines = now | {line: kept for line, kept in fresh.items() if line not in now}
-        numbered.append(numbers)
-        before = moment
-    return numbered
+    associated: list[dict[str, int]] = []
+    count = 0
+    last_seen: dict[int, tuple[int, str]] = {}
+    goals: Array | None = None
+    for snapshot in snapshots:
+        if goals is None or not np.array_equal(goals, snapshot.goals):
+            last_seen = {}
+        goals = snapshot.goals
+        alive = {track: seen for track, seen in last_seen.items() if snapshot.stamp_ns - seen[0] <= LONGEST_GAP_NS}
+        tracks = _continue_tracks(snapshot, {track: label for track, (_, label) in alive.items()})
+        for each in snapshot.candidates:
+            if each.label not in tracks:
+                tracks[each.label], count = count, count + 1
+        current = {tracks[each.label]: (snapshot.stamp_ns, each.label) for each in snapshot.candidates}
+        last_seen = current | {track: seen for track, seen in alive.items() if track not in current}
+        associated.append(tracks)
+    return associated
 
 
-def slots(moments: Sequence[Snapshot], lines: Sequence[Mapping[str, int]], count: int, colours: int) -> dict[int, int]:
-    """Return a slot in [0, count), which gives letter and colour, of each line: no two lines of one time share one.
+def assign_slots(
+    snapshots: Sequence[Snapshot], tracks: Sequence[Mapping[str, int]], count: int = CLASSES, colours: int = len(CLASS_COLOURS)
+) -> dict[int, int]:
+    """Return the slot in [0, count) of each track; simultaneous tracks have different slots.
 
-    Lines that begin together take theirs in order of likelihood. First come slots of a colour (slot modulo colours) that no line
-    of that time has, then those that have been free for longest. A line that finds none free has none. lines: as of `lineages`.
+    Tracks that begin together receive their slots in order of likelihood. A slot whose colour (slot modulo colours) is unused at
+    that time is preferred, then the one that has been free for longest. A track that finds no free slot has none.
     """
-    last = {line: row for row, numbers in enumerate(lines) for line in numbers.values()}
-    given: dict[int, int] = {}
-    seen: set[int] = set()
+    last_row = {track: row for row, numbers in enumerate(tracks) for track in numbers.values()}
+    slots: dict[int, int] = {}
+    begun: set[int] = set()
     taken_until = dict.fromkeys(range(count), -1)
-    for row, (moment, numbers) in enumerate(zip(moments, lines, strict=True)):
-        for line in (numbers[way.label] for way in moment.ways):
+    for row, (snapshot, numbers) in enumerate(zip(snapshots, tracks, strict=True)):
+        for track in (numbers[each.label] for each in snapshot.candidates):
             free = [slot for slot, until in taken_until.items() if until < row]
-            if line not in seen and free:
+            if track not in begun and free:
                 used = {slot % colours for slot, until in taken_until.items() if until >= row}
-                given[line] = min(free, key=lambda slot: (slot % colours in used, taken_until[slot], slot))
-                taken_until[given[line]] = last[line]
-            seen.add(line)
-    return given
+                slots[track] = min(free, key=lambda slot: (slot % colours in used, taken_until[slot], slot))
+                taken_until[slots[track]] = last_row[track]
+            begun.add(track)
+    return slots
 
 
-def _continued(moment: Snapshot, earlier: dict[int, str]) -> dict[str, int]:
-    """Return the line of every way that goes on, by label; no line goes on twice."""
-    went_on: dict[str, int] = {}
-    for way in moment.ways:
-        same = [line for line, label in earlier.items() if label == way.label and line not in went_on.values()]
-        went_on.update({way.label: same[0]} if same else {})
-    for way in moment.ways:
-        if way.label not in went_on:
-            left = {line: label for line, label in earlier.items() if line not in went_on.values()}
-            best = _best(way, left, moment.obstacles.ids)
-            went_on.update({} if best is None else {way.label: best})
-    return went_on
-
-
-def _best(way: CandidateView, earlier: dict[int, str], ids: Collection[str]) -> int | None:
-    """Return the first of the earlier lines that agree most with a way; None where none agrees."""
-    goal, sides = sides_of(way.label, ids)
-    agreeing: dict[int, int] = {}
-    for line, label in earlier.items():
-        other_goal, others = sides_of(label, ids)
-        if other_goal == goal and all(sides.get(name, side) == side for name, side in others.items()):
-            agreeing[line] = len(sides.items() & others.items())
-    return max(agreeing, key=lambda line: agreeing[line]) if agreeing else None
+def _continue_tracks(snapshot: Snapshot, labels: Mapping[int, str]) -> dict[str, int]:
+    """Return the track of each candidate that continues one, by label; labels: of the earlier tracks. No track is split."""
+    ids = snapshot.obstacles.ids
+    parsed = {track: parse_label(label, ids) for track, label in labels.items()}
+    pairs = []
+    for each in snapshot.candidates:
+        goal, sides = parse_label(each.label, ids)
+        for track, (other_goal, others) in parsed.items():
+            if other_goal == goal and all(sides.get(name, side) == side for name, side in others.items()):
+                pairs.append((each.label == labels[track], len(sides.items() & others.items()), each.label, track))
+    continued: dict[str, int] = {}
+    for *_, label, track in sorted(pairs, key=lambda pair: pair[:2], reverse=True):
+        if label not in continued and track not in continued.values():
+            continued[label] = track
+    return continued

@@ -1,4 +1,5 @@
-"""The ROS 2 node: messages enter, messages leave.
+"""The ROS 2 node: input messages enter; predictions, markers and diagnostics leave.
 
-May import `foc_ros.io` and `foc_ros.core`; only this folder imports rclpy.
+May import `foc_ros.io` and `foc_ros.core`. No other folder imports rclpy, except the player of `foc_ros.cli.demo`; `messages`,
+`intake` and `parameters` do not import it either, because replays without ROS use them.
 """

@@ -1,64 +1,62 @@
-"""The node's topics: types, quality of service, and how a subscription's queue is emptied."""
+"""Topics of the node: message types and quality of service, and the emptying of a subscription's queue."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from copy import copy
 from functools import partial
 from typing import Any
 
-from geometry_msgs.msg import PoseArray, PoseStamped
-from nav_msgs.msg import Path
 from rclpy.node import Node
 from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSPolicyKind, QoSProfile, QoSReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from sensor_msgs.msg import PointCloud2
-from std_msgs.msg import Float64MultiArray
-from visualization_msgs.msg import MarkerArray
 
-from foc_ros.io.topics import CLOUD, GOAL, GOALS, HAND, MARKERS
+from foc_ros.io.topics import CLOUD, GOAL, GOALS, HAND, MARKERS, TYPES
 
-INPUTS: dict[str, Any] = {GOALS: PoseArray, GOAL: PoseStamped, CLOUD: PointCloud2, MARKERS: MarkerArray, HAND: PoseStamped}
-"""Message class by topic, in the order in which the executor looks at them: the scene before the hand."""
-OUTPUTS: dict[str, Any] = {'prediction': PointCloud2, 'likelihoods': Float64MultiArray, 'path': Path, 'markers': MarkerArray}
-"""Message class by topic below the node's name."""
+from .messages.encode_prediction import OUTPUTS
+from .messages.types import find_message_class
 
+INPUTS = (GOALS, GOAL, CLOUD, MARKERS, HAND)
+"""Input topics in the order in which the executor takes their messages: the scene before the hand."""
 HAND_DEPTH = 200
-"""Hand poses kept while a prediction is computed: 0.2 s of them at 1 kHz."""
+"""Length of the queue of hand poses: 0.2 s at 1 kHz, during which a prediction may be computed."""
 SCENE_DEPTH, OUTPUT_DEPTH = 10, 10
 OVERRIDABLE = QoSOverridingOptions(
     (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
 )
 
 
-def subscribe(node: Node, receive: Callable[[str, Any], None]) -> dict[str, Any]:
-    """Return the subscriptions by topic; each calls `receive(topic, message)`.
+def create_subscriptions(node: Node, receive: Callable[[str, Any], None]) -> dict[str, Any]:
+    """Create the subscriptions, by topic; each calls `receive(topic, message)`.
 
-    The hand comes as sensor data does, the scene reliably. A scene that is published once, before the node is there, is heard
-    with `qos_overrides./obstacles.subscription.durability: transient_local`, which would not hear a volatile publisher.
+    Hand poses are received as best-effort sensor data, the scene reliably. A scene that was published once, before the start of
+    the node, is received with `qos_overrides./obstacles.subscription.durability: transient_local`, but then not from volatile
+    publishers.
     """
-    # Overrides are written into the profile that is handed over, so each subscription has its own.
-    hand, scene = _qos(QoSReliabilityPolicy.BEST_EFFORT, HAND_DEPTH), _qos(QoSReliabilityPolicy.RELIABLE, SCENE_DEPTH)
     subscriptions = {}
-    for role, kind in INPUTS.items():
-        qos = copy(hand if role == HAND else scene)
+    for role in INPUTS:
+        reliability = QoSReliabilityPolicy.BEST_EFFORT if role == HAND else QoSReliabilityPolicy.RELIABLE
+        qos = _build_qos(reliability, HAND_DEPTH if role == HAND else SCENE_DEPTH)
         subscriptions[role] = node.create_subscription(
-            kind, role, partial(receive, role), qos, qos_overriding_options=OVERRIDABLE
+            find_message_class(TYPES[role]), role, partial(receive, role), qos, qos_overriding_options=OVERRIDABLE
         )
     return subscriptions
 
 
-def advertise(node: Node) -> dict[str, Any]:
-    """Return the publishers of the outputs by topic."""
-    qos = _qos(QoSReliabilityPolicy.RELIABLE, OUTPUT_DEPTH)
+def create_publishers(node: Node) -> dict[str, Any]:
+    """Create the publishers of the outputs, by the name of the topic below the node's name."""
     return {
-        name: node.create_publisher(kind, f'~/{name}', copy(qos), qos_overriding_options=OVERRIDABLE)
-        for name, kind in OUTPUTS.items()
+        name: node.create_publisher(
+            find_message_class(kind),
+            f'~/{name}',
+            _build_qos(QoSReliabilityPolicy.RELIABLE, OUTPUT_DEPTH),
+            qos_overriding_options=OVERRIDABLE,
+        )
+        for name, (kind, _) in OUTPUTS.items()
     }
 
 
-def waiting(subscription: Any) -> list[Any]:
-    """Take the messages that wait in a subscription's queue, no more than fit into it while it keeps being filled."""
+def take_queued(subscription: Any) -> list[Any]:
+    """Take the messages from a subscription's queue, at most as many as it holds, because it may be filled meanwhile."""
     messages: list[Any] = []
     with subscription.handle:
         while len(messages) < HAND_DEPTH:
@@ -69,6 +67,7 @@ def waiting(subscription: Any) -> list[Any]:
     return messages
 
 
-def _qos(reliability: QoSReliabilityPolicy, depth: int) -> QoSProfile:
+def _build_qos(reliability: QoSReliabilityPolicy, depth: int) -> QoSProfile:
+    """Return a new profile, because rclpy writes the overrides of a topic into its profile."""
     volatile, keep_last = QoSDurabilityPolicy.VOLATILE, QoSHistoryPolicy.KEEP_LAST
     return QoSProfile(reliability=reliability, durability=volatile, history=keep_last, depth=depth)

@@ -1,26 +1,95 @@
-"""What the node knows of its own health: rates, ages and times by a steady clock, counts, and the judgement from them."""
+"""Health of the node: freshness of the inputs by the clocks, counts, rates and times, and the diagnostics made from them.
+
+Times named `now_s` are of the steady clock [s].
+"""
 
 from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from foc_ros.core.config import Config
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import PredictedCandidate, Prediction
+from foc_ros.core.types import NANOSECONDS, PredictedCandidate, Prediction
+from foc_ros.io.topics import CLOUD, HAND, MARKERS
 
 from .intake import Intake
-from .messages.diagnostics import ERROR, OK, WARN, Health
+from .messages.types import MessageTypes, header
 
+SOURCE_TOPICS = {'cloud': CLOUD, 'markers': MARKERS}
+"""Topic of every source of obstacles in the scene."""
 WINDOW = 1000
-"""Predictions over which the percentiles are taken."""
+"""Number of predictions over which the percentiles are computed."""
+OK, WARN, ERROR = 0, 1, 2
+"""Levels of diagnostic_msgs/DiagnosticStatus."""
 HARMLESS = ('candidate_', 'hand_disengaged', 'hand_duplicate', 'predict_', 'predictions')
-"""Beginnings of the counts that are no fault by themselves: what keeps predictions from being made is told in words."""
+"""Prefixes of the counts that are no fault by themselves; the reason why no prediction is made is reported as text."""
 FAULTS = ('predict_failed', 'predict_nothing_solved')
-TOLD = ('goal_inside', 'hand_inside', 'no_way')
-"""Notes of a prediction that answers less than was asked for: it is counted as `scene_` and their name."""
+REPORTED_NOTES = ('goal_inside', 'hand_inside', 'no_way')
+"""Notes of an incomplete prediction, each counted as `scene_` and its name."""
+
+
+class Freshness:
+    """Ages of the inputs by the node's clocks; the pipeline knows message stamps only, so that a replay needs no clock.
+
+    The steady clock gives the time since a topic was received last, and ROS time the age of a hand pose, if it is stamped so.
+    """
+
+    def __init__(self) -> None:
+        self._received_s: dict[str, float] = {}
+        self._age_s = 0.0
+        self._has_ros_time = False
+        self._is_moving = False
+
+    def note_received(self, role: str, now_s: float) -> None:
+        """Store the time at which a message was accepted."""
+        self._received_s[role] = now_s
+
+    def note_pose(self, stamp_ns: int, clock_ns: int, timeout_s: float, *, restarted: bool) -> None:
+        """Store the age of a hand pose by ROS time.
+
+        Ages count once a movement has begun with a pose that is not older or newer than the timeout: a recording that is played
+        with its own stamps, without `use_sim_time`, has none of this age.
+        """
+        self._age_s = (clock_ns - stamp_ns) / NANOSECONDS
+        if clock_ns and (restarted or not self._is_moving):
+            self._has_ros_time = self._has_ros_time or abs(self._age_s) <= timeout_s
+            self._is_moving = True
+
+    def forget_clock(self) -> None:
+        """Forget whether the poses are stamped by ROS time."""
+        self._has_ros_time = self._is_moving = False
+
+    def find_not_ready_reason(self, now_s: float, config: Config, sources: Iterable[str]) -> tuple[str, str] | None:
+        """Return why the clocks allow no prediction, as (kind, text); None if they allow it.
+
+        sources: of obstacles; one that is silent is enough, because its silence does not mean that its obstacles have gone.
+        """
+        limit_s = config.estimator.hand_timeout_s
+        silence_s = now_s - self._received_s.get(HAND, now_s)
+        if 0.0 < limit_s < silence_s:
+            return 'hand_silent', f'hand_pose silent for {silence_s:.1f} s (estimator.hand_timeout_s is {limit_s:g})'
+        if self._has_ros_time and 0.0 < limit_s < abs(self._age_s):
+            age = f'{abs(self._age_s):.3g} s {"older" if self._age_s > 0.0 else "newer"}'
+            return 'hand_stale', f'the hand pose is {age} than the time of the node (estimator.hand_timeout_s is {limit_s:g})'
+        limit_s = config.scene.timeout_s
+        for role in (SOURCE_TOPICS[source] for source in sources):
+            silence_s = now_s - self._received_s.get(role, now_s)
+            if 0.0 < limit_s < silence_s:
+                return 'obstacles_silent', f'{role} silent for {silence_s:.1f} s (scene.timeout_s is {limit_s:g})'
+        return None
+
+
+class Health(NamedTuple):
+    """Level, summary and all values of the diagnostics."""
+
+    level: int
+    message: str
+    values: dict[str, str]
 
 
 @dataclass
@@ -32,73 +101,70 @@ class _Input:
 
 
 class Monitor:
-    """Takes note of what happens; :meth:`health` judges what happened since it was last asked. Times: steady clock [s]."""
+    """Counts and times of what the node did; :meth:`report` judges what happened since its last call."""
 
     def __init__(self, now_s: float) -> None:
         self._inputs: dict[str, _Input] = {}
         self._prediction: Prediction | None = None
         self._predicted_s: float | None = None
-        self._own: Counter[str] = Counter()
+        self._counts: Counter[str] = Counter()
         self._error = ''
         self._solve_ms: deque[float] = deque(maxlen=WINDOW)
         self._cycle_ms: deque[float] = deque(maxlen=WINDOW)
-        self._before: Counter[str] = Counter()
-        self._asked_s = now_s
+        self._counts_before: Counter[str] = Counter()
+        self._reported_s = now_s
 
-    def received(self, role: str, now_s: float, *, taken: bool) -> tuple[int, int]:
-        """Note a message of an input, taken or refused; return how many were refused, of how many."""
+    def note_message(self, role: str, now_s: float, *, taken: bool) -> tuple[int, int]:
+        """Count an input message; return how many of this input were refused, and how many were received."""
         entry = self._inputs.setdefault(role, _Input())
         entry.received, entry.refused, entry.last_s = entry.received + 1, entry.refused + (not taken), now_s
         return entry.refused, entry.received
 
-    def predicted(self, prediction: Prediction, began_s: float, now_s: float) -> None:
-        """Note a prediction, computed and published between two times."""
+    def note_prediction(self, prediction: Prediction, start_s: float, now_s: float) -> None:
+        """Count a prediction that was computed and published between two times."""
         self._prediction, self._predicted_s = prediction, now_s
-        self._own['predictions'] += 1
-        self._own.update(f'scene_{name}' for name in TOLD if prediction.notes.get(name))
+        self._counts['predictions'] += 1
+        self._counts.update(f'scene_{name}' for name in REPORTED_NOTES if prediction.notes.get(name))
         self._solve_ms.append(1e3 * prediction.solve_s)
-        self._cycle_ms.append(1e3 * (now_s - began_s))
+        self._cycle_ms.append(1e3 * (now_s - start_s))
 
-    def withheld(self, kind: str) -> None:
-        """Note that nothing was predicted from a pose that was due."""
-        self._own[f'predict_{kind}'] += 1
+    def note_withheld(self, kind: str) -> None:
+        """Count a prediction that was due and not made."""
+        self._counts[f'predict_{kind}'] += 1
 
-    def failed(self, error: BaseException) -> None:
-        """Note an error that should not happen."""
-        self._own['internal_errors'] += 1
+    def note_error(self, error: BaseException) -> None:
+        """Count an internal error."""
+        self._counts['internal_errors'] += 1
         self._error = f'{type(error).__name__}: {error}'
 
-    def health(self, now_s: float, intake: Intake, state: str, not_ready_reason: str | None) -> Health:
-        """Return level, message and figures, with everything that the intake and its pipeline counted.
-
-        state: of the managed node; not_ready_reason: why nothing is to be predicted by the clocks.
-        """
-        pipeline, seconds = intake.pipeline, max(now_s - self._asked_s, 1e-3)
-        totals = Counter(intake.counts) + self._own
-        recent = totals - self._before
-        level, message = self._judged(pipeline, recent, state, not_ready_reason)
+    def report(self, now_s: float, intake: Intake, state: str, not_ready_reason: str | None) -> Health:
+        """Return the health since the last call; state: of the managed node; not_ready_reason: text, None if ready."""
+        pipeline, seconds = intake.pipeline, max(now_s - self._reported_s, 1e-3)
+        totals = Counter(intake.counts) + self._counts
+        recent = totals - self._counts_before
         values = {
             'state': state,
             'engaged': str(pipeline.engaged),
             'working frame': pipeline.frame_id if pipeline.frame_id is not None else 'not known yet',
-            **_scene_values(pipeline),
-            **self._input_values(now_s, seconds),
+            **{f'obstacles of {source}': str(len(part.obstacles)) for source, part in pipeline.scene.parts.items()},
+            'goals': 'none yet' if pipeline.scene.goals is None else str(len(pipeline.scene.goals)),
+            **self._describe_inputs(now_s, seconds),
             'prediction rate [Hz]': f'{recent["predictions"] / seconds:.1f}',
             'prediction age [s]': 'none yet' if self._predicted_s is None else f'{now_s - self._predicted_s:.3f}',
-            'solve time p50, p99 [ms]': _percentiles(self._solve_ms),
-            'cycle time p50, p99 [ms]': _percentiles(self._cycle_ms),
+            'solve time p50, p99 [ms]': _describe_percentiles(self._solve_ms),
+            'cycle time p50, p99 [ms]': _describe_percentiles(self._cycle_ms),
             'dropped cycles': str(totals['hand_superseded']),
-            **_candidate_values(self._prediction),
+            **_describe_prediction(self._prediction),
             **{f'count {name}': str(count) for name, count in sorted(totals.items())},
             'last refusal': intake.last_refusal or 'none',
             'last internal error': self._error or 'none',
         }
-        self._before, self._asked_s = totals, now_s
+        self._counts_before, self._reported_s = totals, now_s
         for entry in self._inputs.values():
             entry.received_before = entry.received
-        return Health(level, message, values)
+        return Health(*self._judge(pipeline, recent, state, not_ready_reason), values)
 
-    def _judged(self, pipeline: Pipeline, recent: Counter[str], state: str, not_ready_reason: str | None) -> tuple[int, str]:
+    def _judge(self, pipeline: Pipeline, recent: Counter[str], state: str, not_ready_reason: str | None) -> tuple[int, str]:
         if recent['internal_errors']:
             return ERROR, f'{recent["internal_errors"]} internal errors, the last: {self._error}'
         if state != 'active':
@@ -106,13 +172,11 @@ class Monitor:
         if not pipeline.engaged:
             return OK, 'disengaged'
         faults = {name: count for name, count in recent.items() if name in FAULTS or not name.startswith(HARMLESS)}
-        words = [f'{name} {count}' for name, count in sorted(faults.items())]
-        blocked = pipeline.blocked() or not_ready_reason
-        if blocked is not None:
-            words.insert(0, f'no prediction: {blocked}')
-        return (WARN, '; '.join(words)) if words else (OK, 'predicting')
+        parts = [] if not_ready_reason is None else [f'no prediction: {not_ready_reason}']
+        parts += [f'{name} {count}' for name, count in sorted(faults.items())]
+        return (WARN, '; '.join(parts)) if parts else (OK, 'predicting')
 
-    def _input_values(self, now_s: float, seconds: float) -> dict[str, str]:
+    def _describe_inputs(self, now_s: float, seconds: float) -> dict[str, str]:
         values = {}
         for role, entry in self._inputs.items():
             values[f'{role} age [s]'] = f'{now_s - entry.last_s:.3f}'
@@ -121,27 +185,34 @@ class Monitor:
         return values
 
 
-def _scene_values(pipeline: Pipeline) -> dict[str, str]:
-    scene = pipeline.scene
-    values = {f'obstacles of {source}': str(len(part.obstacles)) for source, part in scene.parts.items()}
-    return {**values, 'goals': 'none yet' if scene.goals is None else str(len(scene.goals))}
-
-
-def _candidate_values(prediction: Prediction | None) -> dict[str, str]:
+def _describe_prediction(prediction: Prediction | None) -> dict[str, str]:
     if prediction is None:
         return {}
-    values = {f'candidate {outcome.candidate.label}': _described(outcome) for outcome in prediction.candidates}
+    candidates = {f'candidate {outcome.candidate.label}': _describe_candidate(outcome) for outcome in prediction.candidates}
     notes = {f'note {name}': str(count) for name, count in sorted(prediction.notes.items())}
-    return {'most likely': prediction.most_likely or 'none', **values, **notes}
+    return {'most likely': prediction.most_likely or 'none', **candidates, **notes}
 
 
-def _described(outcome: PredictedCandidate) -> str:
+def _describe_candidate(outcome: PredictedCandidate) -> str:
     solution = outcome.solution
     if not outcome.is_solved:
         return f'{solution.status.value}: {solution.message}'
     return f'{solution.status.value}, likelihood {outcome.likelihood:.3f}, eta {solution.eta:.3f}, effort {solution.effort:.4g}'
 
 
-def _percentiles(milliseconds: Iterable[float]) -> str:
+def _describe_percentiles(milliseconds: Iterable[float]) -> str:
     values = list(milliseconds)
     return 'none yet' if not values else ', '.join(f'{value:.2f}' for value in np.percentile(values, [50, 99]))
+
+
+def encode_diagnostics(health: Health, node_name: str, stamp_ns: int, types: MessageTypes) -> Any:
+    """Encode a diagnostic_msgs/DiagnosticArray with one status, named after the node's full name, such as '/foc'."""
+    status = types.make(
+        'diagnostic_msgs/msg/DiagnosticStatus',
+        level=health.level,
+        name=f'{node_name[1:]}: prediction',
+        message=health.message,
+        hardware_id=node_name,
+        values=[types.make('diagnostic_msgs/msg/KeyValue', key=key, value=value) for key, value in health.values.items()],
+    )
+    return types.make('diagnostic_msgs/msg/DiagnosticArray', header=header(types, stamp_ns, ''), status=[status])

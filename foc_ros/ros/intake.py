@@ -1,10 +1,10 @@
-"""Messages of the inputs, converted and handed to the pipeline: the same way in for the node and for a recording."""
+"""From input messages to the pipeline: decoding, counting of refusals, and lifetimes of markers; for node and replay alike."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from foc_ros.core.errors import MessageError
@@ -12,32 +12,32 @@ from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
 
-from .messages.inputs import goal_of_pose, goals_of_pose_array, hand_sample
-from .messages.marker_scene import MarkerScene
-from .messages.obstacle_cloud import cloud_obstacles
+from .messages.decode_markers import MarkerTable
+from .messages.decode_point_cloud import decode_point_cloud
+from .messages.decode_poses import decode_goal, decode_goals, decode_hand_sample
 
 
 class Intake:
-    """Takes messages by the name of their input; one that cannot be converted changes nothing and is counted.
+    """Takes messages by the name of their input; one that cannot be decoded changes nothing and is counted.
 
-    Time is the hand's: markers whose lifetime ends before a hand sample's stamp are gone for it. Attributes: pipeline; sample,
-    the last hand sample that could be read; last_refusal, what was wrong with the last message refused.
+    A marker whose lifetime ends before the stamp of the last hand sample does not exist for it. Attributes: pipeline; sample: the
+    last decoded hand sample; last_refusal: why the last refused message was refused.
     """
 
     def __init__(self, pipeline: Pipeline) -> None:
         self.pipeline = pipeline
         self.sample: HandSample | None = None
         self.last_refusal: str | None = None
-        self._markers = MarkerScene()
+        self._markers = MarkerTable()
         self._markers_ns = 0
-        self._markers_hold = (-math.inf, math.inf)
+        self._markers_unchanged = (-math.inf, math.inf)
         self._counts: Counter[str] = Counter()
-        self._takers: dict[str, Callable[[Any], SampleStatus]] = {
-            topics.HAND: self._hand,
-            topics.CLOUD: self._cloud,
-            topics.MARKERS: self._marker_array,
-            topics.GOALS: self._goals,
-            topics.GOAL: self._goal,
+        self._handlers: dict[str, Callable[[Any], SampleStatus]] = {
+            topics.HAND: self._take_hand,
+            topics.CLOUD: self._take_cloud,
+            topics.MARKERS: self._take_markers,
+            topics.GOALS: lambda message: pipeline.set_goals(*decode_goals(message, pipeline.config.plane)),
+            topics.GOAL: lambda message: pipeline.set_goals(*decode_goal(message, pipeline.config.plane)),
         }
 
     @property
@@ -46,66 +46,58 @@ class Intake:
         return {**self.pipeline.counts, **self._counts}
 
     def take(self, role: str, message: Any) -> SampleStatus | None:
-        """Take one message; None where it cannot be converted."""
-        before = self.pipeline.refused
+        """Take one message; None if it cannot be decoded."""
+        refused_before = self.pipeline.refused
         try:
-            verdict = self._takers[role](message)
+            status = self._handlers[role](message)
         except MessageError as error:
             self._counts[f'{role}_invalid'] += 1
             self.last_refusal = f'{role}: {error}'
             return None
-        if self.pipeline.refused > before:
+        if self.pipeline.refused > refused_before:
             self.last_refusal = self.pipeline.last_refusal
-        return verdict
+        return status
 
-    def _hand(self, message: Any) -> SampleStatus:
-        sample = hand_sample(message, self.pipeline.config.plane)
-        self.sample = sample
-        verdict = self.pipeline.hand(sample)
-        since_ns, until_ns = self._markers_hold
-        if verdict.taken and not since_ns <= sample.stamp_ns < until_ns:
-            self._show(self._markers)
-        return verdict
+    def _take_hand(self, message: Any) -> SampleStatus:
+        self.sample = decode_hand_sample(message, self.pipeline.config.plane)
+        status = self.pipeline.hand(self.sample)
+        start_ns, end_ns = self._markers_unchanged
+        if status.taken and not start_ns <= self.sample.stamp_ns < end_ns:
+            self._set_markers(self._markers)
+        return status
 
-    def _cloud(self, message: Any) -> SampleStatus:
-        scene = cloud_obstacles(message, self.pipeline.config.plane)
-        verdict = self.pipeline.set_obstacles('cloud', scene.obstacles, scene.stamp_ns, scene.frame_id)
-        self._count_dropped(topics.CLOUD, scene.dropped if verdict.taken else {})
-        return verdict
+    def _take_cloud(self, message: Any) -> SampleStatus:
+        cloud = decode_point_cloud(message, self.pipeline.config.plane)
+        status = self.pipeline.set_obstacles('cloud', cloud.obstacles, cloud.stamp_ns, cloud.frame_id)
+        return self._count_dropped(topics.CLOUD, cloud.dropped, status)
 
-    def _marker_array(self, message: Any) -> SampleStatus:
+    def _take_markers(self, message: Any) -> SampleStatus:
         config = self.pipeline.config
-        # markers that came before the working frame was known, and turned out to be in another one, are none of the scene's
-        held = self._markers if self.pipeline.frame_id in (None, self._markers.frame_id) else MarkerScene()
-        updated = held.updated(message, self._now_ns(), config.plane, config.scene.marker_radius_stddev)
-        verdict = self._show(updated)
-        self._count_dropped(topics.MARKERS, dict(updated.dropped) if verdict.taken else {})
-        return verdict
+        # markers received before the working frame was known are discarded if they are in another frame
+        before = self._markers if self.pipeline.frame_id in (None, self._markers.frame_id) else MarkerTable()
+        markers = before.with_message(message, self._now_ns(), config.plane, config.scene.marker_radius_stddev)
+        return self._count_dropped(topics.MARKERS, markers.dropped, self._set_markers(markers))
 
-    def _show(self, markers: MarkerScene) -> SampleStatus:
-        """Hand over the markers that live now.
+    def _set_markers(self, markers: MarkerTable) -> SampleStatus:
+        """Pass the existing markers to the pipeline.
 
-        Several publishers may add to the table, each with its own delay: a stamp a little behind the newest does not make the
-        table late. A table without markers is in every frame.
+        Several publishers with different delays may add to the table, so a stamp a little behind the newest one does not make the
+        table late. A table without markers is valid in every frame.
         """
         behind_ns = self._markers_ns - markers.stamp_ns
-        within = markers.stamp_ns and 0 < behind_ns <= self.pipeline.config.estimator.gap_s * NANOSECONDS
-        stamp_ns = self._markers_ns if within else markers.stamp_ns
+        is_slightly_behind = markers.stamp_ns and 0 < behind_ns <= self.pipeline.config.estimator.gap_s * NANOSECONDS
+        stamp_ns = self._markers_ns if is_slightly_behind else markers.stamp_ns
         frame_id = markers.frame_id if markers.markers else self.pipeline.frame_id or markers.frame_id
-        verdict = self.pipeline.set_obstacles('markers', markers.obstacles(self._now_ns()), stamp_ns, frame_id)
-        if verdict.taken:
-            self._markers, self._markers_ns, self._markers_hold = markers, stamp_ns, markers.unchanged(self._now_ns())
-        return verdict
-
-    def _goals(self, message: Any) -> SampleStatus:
-        return self.pipeline.set_goals(*goals_of_pose_array(message, self.pipeline.config.plane))
-
-    def _goal(self, message: Any) -> SampleStatus:
-        return self.pipeline.set_goals(*goal_of_pose(message, self.pipeline.config.plane))
+        now_ns = self._now_ns()
+        status = self.pipeline.set_obstacles('markers', markers.obstacles(now_ns), stamp_ns, frame_id)
+        if status.taken:
+            self._markers, self._markers_ns, self._markers_unchanged = markers, stamp_ns, markers.find_unchanged_interval(now_ns)
+        return status
 
     def _now_ns(self) -> int:
         return self.pipeline.hand_state.stamp_ns if self.pipeline.hand_state is not None else 0
 
-    def _count_dropped(self, role: str, dropped: dict[str, int]) -> None:
-        for reason, count in dropped.items():
-            self._counts[f'{role}_dropped_{reason}'] += count
+    def _count_dropped(self, role: str, dropped: Mapping[str, int], status: SampleStatus) -> SampleStatus:
+        if status.taken:
+            self._counts.update({f'{role}_dropped_{reason}': count for reason, count in dropped.items()})
+        return status

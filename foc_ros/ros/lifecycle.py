@@ -1,6 +1,6 @@
-"""Transitions that cannot be made now, refused by an answer.
+"""Refusal of impossible lifecycle transitions by an answer.
 
-rclpy raises inside the service where a transition does not start in the present state, and whoever asked waits for ever.
+rclpy raises an exception in the service instead, and the caller waits without end.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from rclpy.lifecycle import LifecycleNode
 
 
 def answer_refused_transitions(node: LifecycleNode) -> None:
-    """Make `~/change_state` of a node answer `success: false` to what it cannot do in its state."""
-    service = node._service_change_state  # noqa: SLF001 (there is no other way to it)
+    """Make `~/change_state` answer `success: false` to a transition that does not start in the present state."""
+    service = node._service_change_state  # noqa: SLF001 (rclpy has no public way to it)
     change = service.callback
 
-    def answered(request: Any, response: Any) -> Any:
+    def change_or_refuse(request: Any, response: Any) -> Any:
         try:
             return change(request, response)
         except Exception as error:
@@ -24,4 +24,4 @@ def answer_refused_transitions(node: LifecycleNode) -> None:
             response.success = False
             return response
 
-    service.callback = answered
+    service.callback = change_or_refuse

@@ -1,23 +1,39 @@
-"""The node as a program: one executor, one thread, an end without an error whenever it is asked to stop."""
+"""The node's program: one executor, one thread, and an end without an error at any time."""
 
 from __future__ import annotations
 
 import gc
+import signal
 import sys
 from collections.abc import Sequence
+from types import FrameType
 
 from foc_ros.core.errors import FocError
 
-from .stop_signals import StopSignals
-
 SPIN_S = 0.1
-"""Longest wait before the stop flag is looked at again [s]."""
+"""Longest time between two checks of the stop flag [s]."""
+
+
+class StopSignals:
+    """Sets :attr:`is_requested` on SIGINT and SIGTERM, until the end of the process.
+
+    rclpy's own handlers shut the context down during a callback, and some of the stops then end with an error. This flag ends
+    the loop between two callbacks.
+    """
+
+    def __init__(self) -> None:
+        self.is_requested = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._request)
+
+    def _request(self, _number: int, _frame: FrameType | None) -> None:
+        self.is_requested = True
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the node until SIGINT, SIGTERM or the end of its context; return the exit code, 2 where it cannot start.
+    """Run the node until SIGINT, SIGTERM or the end of its context; return the exit code, 2 if it cannot start.
 
-    arguments: those of the process by default, without the program's name; all are ROS's (`--ros-args ...`).
+    arguments: ROS arguments (`--ros-args ...`) without the program's name; by default those of the process.
     """
     stop = StopSignals()
     import rclpy
@@ -40,10 +56,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'foc_node: {" ".join(str(error).split())}', file=sys.stderr)
         return 2
     gc.collect()
-    gc.freeze()  # what is there by now stays: a full collection of it would hold a prediction up by 80 ms
+    gc.freeze()  # these objects stay alive: a full collection over them would delay a prediction by 80 ms
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
-    while not stop.requested and context.ok():
+    while not stop.is_requested and context.ok():
         try:
             executor.spin_once(timeout_sec=SPIN_S)
         except ExternalShutdownException:

@@ -1,1 +1,1 @@
-"""The measurements behind doc/accuracy.md: each module takes one, tells it as a Markdown table and draws it."""
+"""The measurements behind doc/accuracy.md. Each module measures one thing, and returns it as a Markdown table and as a figure."""

@@ -1,4 +1,4 @@
-"""doc/accuracy.md: what is written by hand, with blocks of what was measured between marks."""
+"""doc/accuracy.md: text written by hand, with blocks of measured numbers between HTML comments."""
 
 from __future__ import annotations
 
@@ -11,20 +11,26 @@ PAGE = ROOT / 'doc' / 'accuracy.md'
 IMAGES = ROOT / 'doc' / 'images'
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def format_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a Markdown table."""
     lines = [head, ['---'] * len(head), *rows]
     return '\n'.join('| ' + ' | '.join(cells) + ' |' for cells in lines)
 
 
-def blocks(page: str) -> dict[str, str]:
-    """Return what stands between the marks of a page, by name."""
+def find_blocks(page: str) -> dict[str, str]:
+    """Return the text of the measured blocks of a page, by name."""
     return dict(re.findall(r'<!-- measured: (\w+) -->\n(.*?)<!-- end -->', page, re.DOTALL))
 
 
-def filled(page: str, texts: Mapping[str, str]) -> str:
-    """Return the page with new texts in some of its blocks; KeyError where it has no such block."""
-    unknown = set(texts) - set(blocks(page))
+def replace_blocks(page: str, texts: Mapping[str, str]) -> str:
+    """Return the page with new texts in some of its blocks.
+
+    Raises
+    ------
+    KeyError
+        If the page has no block of a given name.
+    """
+    unknown = set(texts) - set(find_blocks(page))
     if unknown:
         raise KeyError(f'doc/accuracy.md has no block {", ".join(sorted(unknown))}')
     for name, text in texts.items():
@@ -34,6 +40,6 @@ def filled(page: str, texts: Mapping[str, str]) -> str:
     return page
 
 
-def write(texts: Mapping[str, str], page: Path = PAGE) -> None:
-    """Fill the page's blocks."""
-    page.write_text(filled(page.read_text(encoding='utf-8'), texts), encoding='utf-8')
+def write_blocks(texts: Mapping[str, str], page: Path = PAGE) -> None:
+    """Write new texts into the blocks of a page."""
+    page.write_text(replace_blocks(page.read_text(encoding='utf-8'), texts), encoding='utf-8')

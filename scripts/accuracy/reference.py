@@ -1,41 +1,28 @@
-"""The ten reference cases, beside independent solvers."""
+"""The ten reference cases, compared with the independent solvers of `scripts/make_reference_cases.py`."""
 
 from __future__ import annotations
 
-from .page import table
-from .scenes import reference_cases, solved
+from .page import format_table
+from .scenes import load_reference_cases, solve
 
 
-def text() -> str | None:
-    """Return the table of agreement; None where the reference cases are absent."""
-    cases = reference_cases()
-    if not cases:
-        return None
-    head = [
-        'case',
-        'obstacles',
-        'c',
-        'η',
-        '`fixed` / quadprog − 1',
-        '`optimal` / cone solver − 1',
-        '`optimal` / IPOPT − 1',
-        'η achieved',
-    ]
+def format_agreement() -> str:
+    """Return the table of relative differences of effort."""
+    head = ['case', 'obstacles', 'c', 'η', '`fixed` / quadprog − 1', '`optimal` / IPOPT − 1', 'η achieved']
     rows = []
-    for number, (case, problem, guess) in enumerate(cases):
-        single, best = case['converged_qp'], case['min_effort_at_eta']
-        fixed = solved(problem, guess, 'fixed', tau=single['tau'], lam=single['lam'])
-        optimal = solved(problem, guess, 'optimal')
+    for number, (case, problem, guess) in enumerate(load_reference_cases()):
+        qp, least = case['converged_qp'], case['min_effort_at_eta']
+        fixed = solve(problem, guess, 'fixed', tau=qp['tau'], lam=qp['lam'])
+        optimal = solve(problem, guess, 'optimal')
         rows.append(
             [
                 str(number),
                 str(len(problem.obstacles)),
                 f'{problem.noise[0]:g}',
-                f'{best["eta"]:g}',
-                f'{fixed.effort / single["effort"] - 1:.0e}',
-                f'{optimal.effort / best["socp_ccp_effort"] - 1:.1e}',
-                f'{optimal.effort / best["ipopt_effort"] - 1:.1e}',
+                f'{least["eta"]:g}',
+                f'{fixed.effort / qp["effort"] - 1:.0e}',
+                f'{optimal.effort / least["ipopt_effort"] - 1:.1e}',
                 f'{optimal.eta:.5f}',
             ]
         )
-    return table(head, rows)
+    return format_table(head, rows)

@@ -1,4 +1,4 @@
-"""`demo`: the packaged recording played in real time, over DDS, to the real node in a process of its own."""
+"""`demo`: plays the packaged recording over DDS in real time to the real node, which runs in a process of its own."""
 
 from .command import add_arguments, run
 

@@ -1,4 +1,4 @@
-"""The command: from nothing to an output bag and a report in less than a minute."""
+"""The command: plays the recording, shows the predictions, and leaves a bag and a report."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,91 +20,65 @@ from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import BagReader, BagWriter, Item
-from foc_ros.reporting.snapshots import track_of
+from foc_ros.io.terminal import show_table
+from foc_ros.reporting.snapshots import build_hand_trajectory
 
-from .environment import free_domain, held, private_environment
-from .node_process import NodeDiedError, NodeProcess
-from .recorder import Recorder
+from .environment import NodeDiedError, NodeProcess, free_domain, private_environment, set_environment
+from .recorder import Recorder, show_live
 
 RECORDING = Path(__file__).resolve().parents[2] / 'recordings' / 'reaching.mcap'
 MARK = '.foc_ros_demo'
-"""File that says that a directory's bag and report are a demo's, and may be replaced by the next one's."""
+"""File that marks the output directory of a demo: the next demo may replace its bag and report."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what the command takes."""
-    words = 'where bag and report are left (default: %(default)s); those of an earlier demo are replaced, nothing else is'
+    """Declare the arguments of the command."""
+    words = "directory for bag and report (default: %(default)s); an earlier demo's are replaced, other files are kept"
     parser.add_argument('--output', type=Path, default=Path('demo_output'), metavar='DIR', help=words)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Play, show, report; 1 where the node fails, 130 where it was interrupted."""
+    """Run the demo; return 1 if the node fails, 130 after an interrupt."""
     if find_spec('rclpy') is None:
         raise FocError('rclpy is not installed: run `make setup`, or source a ROS 2 installation, or install the extra `ros`')
-    from foc_ros.reporting import report  # noqa: F401 (missing matplotlib is told before the demo, not after it)
-
     return perform(arguments.output)
 
 
 def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf, domain: int | None = None) -> int:
     """Run the demo and return the exit code.
 
-    last_s: seconds of the recording that are played; domain: of the ROS graph, a free one by default.
+    last_s: seconds of the recording to play; domain: of the ROS graph, a free one by default.
     """
-    items = _items(recording, last_s)
-    ledger = Recorder(Config())
+    from foc_ros.reporting.report import write_report  # reports a missing library before the demo, not after it
+
+    with BagReader(recording) as reader:
+        items = list(reader)
+    items = [item for item in items if item.log_ns - items[0].log_ns <= last_s * NANOSECONDS]
+    recorder = Recorder(Config())
     prepare(output)
     try:
-        with _interruption() as stopped, BagWriter(output / 'bag') as bag:
-            _play(items, bag, ledger, free_domain() if domain is None else domain, stopped)
+        with _catch_interrupts() as stopped, BagWriter(output / 'bag') as bag:
+            _play(items, bag, recorder, free_domain() if domain is None else domain, stopped)
+        if not recorder.snapshots and not stopped.is_set():
+            raise NodeDiedError('the node sent no prediction')
     except NodeDiedError as error:
-        return _failed(str(error))
+        print(f'foc_ros demo: {error}', file=sys.stderr)
+        return 1
     if stopped.is_set():
-        print(f'interrupted; what was recorded until then is in {output / "bag"}')
+        print(f'interrupted; the messages recorded so far are in {output / "bag"}')
         return 130
-    if not ledger.moments:
-        return _failed('the node sent no prediction')
-    summary = _summary(ledger, (items[-1].log_ns - items[0].log_ns) / NANOSECONDS)
-    from foc_ros.reporting.report import write_report
-
-    write_report(output / 'report', 'Reaching among obstacles, live', track_of(ledger.samples), ledger.moments, summary)
-    _tell(output, ledger, summary)
+    facts = _collect_facts(recorder, items)
+    title, hand = 'Reaching among obstacles, live', build_hand_trajectory(recorder.samples)
+    write_report(output / 'report', title, hand, recorder.snapshots, facts)
+    show_table(('', str(output)), [('predictions', str(len(recorder.snapshots))), *facts.items()])
+    print(f'written to {output}: bag (inputs and outputs, MCAP), report/index.html')
     return 0
 
 
-def _play(items: list[Item], bag: BagWriter, ledger: Recorder, domain: int, stopped: threading.Event) -> None:
-    from .display import Display
-    from .player import Player
-
-    duration_s = (items[-1].log_ns - items[0].log_ns) / NANOSECONDS
-    with tempfile.TemporaryDirectory(prefix='foc_ros_demo_') as logs:
-        environment = private_environment(domain, Path(logs))
-        with (
-            held(environment),
-            NodeProcess(environment, Path(logs) / 'node.txt') as node,
-            Player(items, bag, ledger, domain) as player,
-            Display(ledger, items[0].log_ns, duration_s) as display,
-        ):
-
-            def tick() -> bool:
-                node.check()
-                display.update(time.monotonic())
-                return not stopped.is_set()
-
-            if player.connect(tick):
-                player.play(tick)
-
-
-def _items(recording: Path, last_s: float) -> list[Item]:
-    with BagReader(recording) as reader:
-        items = list(reader)
-    return [item for item in items if item.log_ns - items[0].log_ns <= last_s * NANOSECONDS]
-
-
 def prepare(output: Path) -> None:
-    """Make room for bag and report: take away those of an earlier demo, refuse a directory that is not a demo's."""
+    """Make the output directory and remove bag and report of an earlier demo; refuse a directory with other contents."""
     if output.exists() and not (output / MARK).exists() and (not output.is_dir() or any(output.iterdir())):
-        raise InputError('--output', "a new or empty directory, or an earlier demo's", f'{output}, which holds other things')
+        raise InputError('--output', 'a new or empty directory, or one of an earlier demo', f'{output}, which has other contents')
     try:
         output.mkdir(parents=True, exist_ok=True)
         (output / MARK).write_text('The next demo replaces bag and report beside this file.\n', encoding='utf-8')
@@ -115,13 +89,31 @@ def prepare(output: Path) -> None:
         raise InputError('--output', 'a directory that can be written', f'{output}: {error.strerror}') from error
 
 
+def _play(items: list[Item], bag: BagWriter, recorder: Recorder, domain: int, stopped: threading.Event) -> None:
+    from .player import Player
+
+    with tempfile.TemporaryDirectory(prefix='foc_ros_demo_') as logs:
+        environment = private_environment(domain, Path(logs))
+        with (
+            set_environment(environment),
+            NodeProcess(environment, Path(logs) / 'node.txt') as node,
+            Player(items, bag, recorder, domain) as player,
+            show_live(recorder, items[0].log_ns, _duration_s(items)) as show,
+        ):
+
+            def tick() -> bool:
+                node.check()
+                show(time.monotonic())
+                return not stopped.is_set()
+
+            if player.connect(tick):
+                player.play(tick)
+
+
 @contextmanager
-def _interruption() -> Iterator[threading.Event]:
-    """Yield what SIGINT and SIGTERM set from now on, instead of breaking off somewhere."""
+def _catch_interrupts() -> Iterator[threading.Event]:
+    """Yield an event that SIGINT and SIGTERM set within the context, in place of their usual effect."""
     stopped = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield stopped
-        return
     before = {number: signal.signal(number, lambda *_: stopped.set()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield stopped
@@ -130,23 +122,16 @@ def _interruption() -> Iterator[threading.Event]:
             signal.signal(number, handler)
 
 
-def _summary(ledger: Recorder, duration_s: float) -> dict[str, str]:
-    median, late = 1e3 * np.percentile(ledger.delays, [50, 99])
-    counts = [f'{name.removeprefix("count ")} {value}' for name, value in ledger.health.items() if name.startswith('count ')]
+def _collect_facts(recorder: Recorder, items: list[Item]) -> dict[str, str]:
+    median, late = 1e3 * np.percentile(recorder.delays, [50, 99])
+    counts = [f'{name.removeprefix("count ")} {value}' for name, value in recorder.health.items() if name.startswith('count ')]
     return {
-        'recording': f'{duration_s:.1f} s, played over DDS to the node in real time',
-        'hand samples': str(len(ledger.samples)),
-        'from hand sample to prediction': f'{median:.1f} ms (median), {late:.1f} ms (99 of 100)',
-        'the node counted': ', '.join(counts),
+        'recording': f'{_duration_s(items):.1f} s, played over DDS to the node in real time',
+        'hand samples': str(len(recorder.samples)),
+        'delay from hand sample to prediction': f'{median:.1f} ms (median), {late:.1f} ms (99th percentile)',
+        'counters of the node': ', '.join(counts),
     }
 
 
-def _tell(output: Path, ledger: Recorder, summary: Mapping[str, str]) -> None:
-    print(f'{len(ledger.moments)} predictions from {summary["hand samples"]} hand samples in {summary["recording"]};')
-    print(f'from hand sample to prediction {summary["from hand sample to prediction"]}')
-    print(f'left in {output}: bag (inputs and outputs, MCAP), report/index.html')
-
-
-def _failed(reason: str) -> int:
-    print(f'foc_ros demo: {reason}', file=sys.stderr)
-    return 1
+def _duration_s(items: list[Item]) -> float:
+    return (items[-1].log_ns - items[0].log_ns) / NANOSECONDS

@@ -1,26 +1,37 @@
-"""A ROS graph of our own, that stays on this host and meets nobody else's."""
+"""An isolated ROS graph on this host, and the node as a process in it."""
 
 from __future__ import annotations
 
+import ctypes
 import os
+import signal
 import socket
+import subprocess
+import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
+from types import TracebackType
 
 import foc_ros
+from foc_ros.core.errors import FocError
 
 DOMAINS = range(1, 102)
-"""Domains whose ports lie below the ephemeral ones of Linux."""
+"""Domains whose ports are below the ephemeral ports of Linux."""
+STOP_S = 5.0
+"""Seconds after SIGTERM at which a node that is still running is killed."""
+_PR_SET_PDEATHSIG = 1
+
+
+class NodeDiedError(FocError):
+    """The node ended unexpectedly or did not connect."""
 
 
 def private_environment(domain: int, log_directory: Path) -> dict[str, str]:
-    """Return the environment of a ROS graph that stays on this host, in a domain of its own, and logs into a directory."""
-    inherited = {
-        name: value
-        for name, value in os.environ.items()
-        if name not in ('ROS_LOCALHOST_ONLY', 'ROS_STATIC_PEERS', 'ROS_DISCOVERY_SERVER')
-    }
+    """Return environment variables of a ROS graph in a domain on this host only, with its logs in a directory."""
+    removed = ('ROS_LOCALHOST_ONLY', 'ROS_STATIC_PEERS', 'ROS_DISCOVERY_SERVER')
+    inherited = {name: value for name, value in os.environ.items() if name not in removed}
     package = str(Path(foc_ros.__file__).parents[1])
     return inherited | {
         'ROS_DOMAIN_ID': str(domain),
@@ -32,13 +43,13 @@ def private_environment(domain: int, log_directory: Path) -> dict[str, str]:
 
 
 def free_domain() -> int:
-    """Return a domain that nobody on this host is in, told by the ports that DDS gives to its first participant."""
+    """Return a domain without participants on this host: one in which the first ports that DDS uses are free."""
     start = os.getpid()
     candidates = [DOMAINS[(start + turn) % len(DOMAINS)] for turn in range(len(DOMAINS))]
-    return next((domain for domain in candidates if _unused(domain)), candidates[0])
+    return next((domain for domain in candidates if _is_free(domain)), candidates[0])
 
 
-def _unused(domain: int) -> bool:
+def _is_free(domain: int) -> bool:
     base = 7400 + 250 * domain
     for port in (base, base + 10):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
@@ -50,8 +61,8 @@ def _unused(domain: int) -> bool:
 
 
 @contextmanager
-def held(values: Mapping[str, str]) -> Iterator[None]:
-    """Hold environment variables for as long as our own ROS context lives."""
+def set_environment(values: Mapping[str, str]) -> Iterator[None]:
+    """Set environment variables within a context."""
     before = dict(os.environ)
     os.environ.update(values)
     try:
@@ -59,3 +70,54 @@ def held(values: Mapping[str, str]) -> Iterator[None]:
     finally:
         os.environ.clear()
         os.environ.update(before)
+
+
+class NodeProcess:
+    """The node as a process that starts on entering the context and has ended on leaving it.
+
+    environment: variables of the process; log: file for its output.
+    """
+
+    def __init__(self, environment: dict[str, str], log: Path) -> None:
+        self._environment = environment
+        self._log = log
+
+    def __enter__(self) -> NodeProcess:
+        import_module('foc_ros.core.pipeline')  # compiles the kernels before a node has to answer in time
+        with self._log.open('wb') as log:
+            self._process = subprocess.Popen(
+                [sys.executable, '-m', 'foc_ros', 'node'],
+                env=self._environment,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,  # Ctrl-C does not reach the node: __exit__ ends it
+                preexec_fn=_end_with_parent,  # noqa: PLW1509 (no other thread runs yet)
+            )
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._process.terminate()
+        try:
+            self._process.wait(STOP_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    @property
+    def pid(self) -> int:
+        """The process id."""
+        return self._process.pid
+
+    def check(self) -> None:
+        """Raise NodeDiedError with the last lines of output if the node has ended."""
+        code = self._process.poll()
+        if code is not None:
+            lines = self._log.read_text(encoding='utf-8', errors='replace').strip().splitlines()[-5:]
+            raise NodeDiedError(f'the node ended with exit code {code}: {" | ".join(lines) or "it printed nothing"}')
+
+
+def _end_with_parent() -> None:
+    """Let Linux end the node if this process is killed and cannot do so."""
+    if sys.platform == 'linux':
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)

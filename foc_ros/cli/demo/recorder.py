@@ -1,99 +1,146 @@
-"""What went to the node and what came back: rates, delays, and the moments that the display and the report show."""
+"""The messages of a demo: what was sent and received, and a live display of it."""
 
 from __future__ import annotations
 
-from collections import deque
+from bisect import bisect_right
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from typing import Any
+
+import numpy as np
+from rich.bar import Bar
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
 
 from foc_ros.core.config import Config
 from foc_ros.core.obstacles.scene import Scene
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import HandSample
+from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
 from foc_ros.io.bags import Item
-from foc_ros.reporting.readback import belong_together, snapshot_of_messages
-from foc_ros.reporting.snapshots import Snapshot
+from foc_ros.reporting.snapshots import Snapshot, is_same_prediction, read_snapshot
 from foc_ros.ros.intake import Intake
-from foc_ros.ros.messages.inputs import stamp_of
+from foc_ros.ros.messages.decode_poses import stamp_of
 
 WINDOW_S = 1.0
 """Seconds over which rates are counted."""
-KEPT = 20
-"""Messages kept to be paired: a table of likelihoods has no stamp, and may come before or after its prediction."""
+REDRAW_S, LINE_S = 0.125, 1.0
+"""Seconds between two updates of the table on a terminal, and between two lines of text elsewhere."""
+ROWS = 4
+"""Rows of the table: the default number of candidates, so that its height stays the same."""
 
 
 class Recorder:
-    """Told of every message by the player.
+    """Keeps all messages of a demo.
 
-    Attributes: samples, the hand samples sent; moments, the predictions received; delays [s], from sending a hand sample to
-    receiving the prediction made from it; health, the figures of the node's diagnostics, by name.
+    Attributes: samples, the hand samples sent; snapshots, the predictions received; delays [s], from sending a hand sample to
+    receiving its prediction; health, the values of the node's diagnostics by name.
     """
 
     def __init__(self, config: Config) -> None:
         self.samples: list[HandSample] = []
-        self.moments: list[Snapshot] = []
+        self.snapshots: list[Snapshot] = []
         self.delays: list[float] = []
         self.health: dict[str, str] = {}
-        # never asked to predict: it reads the messages and knows which scene held at each of them
+        # This pipeline never predicts. It decodes the inputs and holds the scene at each of them.
         self._intake = Intake(Pipeline(config))
         self._sent: dict[int, tuple[float, Scene]] = {}
-        self._clouds: deque[Any] = deque(maxlen=KEPT)
-        self._tables: deque[Any] = deque(maxlen=KEPT)
-        self._hand_times: deque[float] = deque()
-        self._prediction_times: deque[float] = deque()
+        self._sent_times: list[float] = []
+        self._received_times: list[float] = []
+        self._unpaired: dict[str, list[Any]] = {'prediction': [], 'likelihoods': []}
 
-    def sent(self, item: Item, now: float) -> None:
-        """Note a message to the node; now [s]: of a clock that never jumps."""
+    def add_sent(self, item: Item, now: float) -> None:
+        """Record a message to the node; now [s]: of a monotonic clock."""
         self._intake.take(item.role, item.message)
         if item.role == topics.HAND and self._intake.sample is not None:
             self.samples.append(self._intake.sample)
             self._sent[self._intake.sample.stamp_ns] = (now, self._intake.pipeline.scene)
-            self._hand_times.append(now)
+            self._sent_times.append(now)
 
-    def received(self, name: str, message: Any, now: float) -> None:
-        """Note an output of the node by its name."""
-        if name == 'prediction':
-            self._prediction_times.append(now)
-            began, _ = self._sent.get(stamp_of(message.header), (now, None))
-            self.delays.append(now - began)
-            self._clouds.append(message)
-        elif name == 'likelihoods':
-            self._tables.append(message)
-        elif name == 'diagnostics':
+    def add_received(self, name: str, message: Any, now: float) -> None:
+        """Record an output of the node, by its name."""
+        if name == 'diagnostics':
             self.health = {each.key: each.value for status in message.status for each in status.values}
-        self._pair()
+            return
+        if name == 'prediction':
+            self._received_times.append(now)
+            sent, _ = self._sent.get(stamp_of(message.header), (now, None))
+            self.delays.append(now - sent)
+        self._pair(name, message)
 
     @property
-    def scene_known(self) -> bool:
-        """Whether the node's diagnostics count obstacles (none is a count, too) and goals."""
+    def is_scene_known(self) -> bool:
+        """Whether the node's diagnostics count goals and obstacles, where zero obstacles are a count, too."""
         return self.health.get('goals', 'none yet') != 'none yet' and any(name.startswith('obstacles of') for name in self.health)
 
-    def hand_rate(self, now: float) -> int:
-        """Return how many hand samples were sent within the last second."""
-        return _within(self._hand_times, now)
+    def rates(self, now: float) -> tuple[int, int]:
+        """Return how many hand samples were sent and how many predictions were received within the last second."""
+        sent, received = (len(times) - bisect_right(times, now - WINDOW_S) for times in (self._sent_times, self._received_times))
+        return sent, received
 
-    def prediction_rate(self, now: float) -> int:
-        """Return how many predictions came back within the last second."""
-        return _within(self._prediction_times, now)
+    def _pair(self, name: str, message: Any) -> None:
+        """Pair the two messages of a prediction; both topics keep their order, but a message of either may be lost."""
+        others = self._unpaired['likelihoods' if name == 'prediction' else 'prediction']
+        for row, other in enumerate(others):
+            cloud, likelihoods = (message, other) if name == 'prediction' else (other, message)
+            if is_same_prediction(cloud, likelihoods):
+                del others[: row + 1]
+                self._unpaired[name].clear()
+                self._add_snapshot(cloud, likelihoods)
+                return
+        self._unpaired[name].append(message)
 
-    def _pair(self) -> None:
-        # by place, for messages with arrays in them cannot be asked whether they are equal
-        for place in range(len(self._clouds) - 1, -1, -1):
-            cloud = self._clouds[place]
-            partner = next((i for i, table in enumerate(self._tables) if belong_together(cloud, table)), None)
-            if partner is not None:
-                self._enter(cloud, self._tables[partner])
-                del self._clouds[place], self._tables[partner]
-
-    def _enter(self, cloud: Any, table: Any) -> None:
-        stamp_ns = stamp_of(cloud.header)
-        _, scene = self._sent.get(stamp_ns, (0.0, self._intake.pipeline.scene))
+    def _add_snapshot(self, cloud: Any, likelihoods: Any) -> None:
+        pipeline, stamp_ns = self._intake.pipeline, stamp_of(cloud.header)
+        _, scene = self._sent.get(stamp_ns, (0.0, pipeline.scene))
         if scene.goals is not None:
-            plane = self._intake.pipeline.config.plane
-            self.moments.append(snapshot_of_messages(cloud, table, plane, scene.obstacles(stamp_ns), scene.goals))
+            obstacles = scene.obstacles(stamp_ns)
+            self.snapshots.append(read_snapshot(cloud, likelihoods, pipeline.config.plane, obstacles, scene.goals))
 
 
-def _within(times: deque[float], now: float) -> int:
-    while times and times[0] <= now - WINDOW_S:
-        times.popleft()
-    return len(times)
+@contextmanager
+def show_live(
+    recorder: Recorder, first_ns: int, duration_s: float, console: Console | None = None
+) -> Iterator[Callable[[float], None]]:
+    """Yield a function that shows the newest snapshot: as a live table on a terminal, else as a line of text each second.
+
+    The function takes the time [s] of the recorder's clock and may be called often; first_ns and duration_s: of the recording.
+    """
+    console = console or Console()
+    live = Live(console=console, auto_refresh=False) if console.is_terminal else None
+    next_update = -np.inf
+
+    def update(now: float) -> None:
+        nonlocal next_update
+        if now < next_update or not recorder.snapshots:
+            return
+        next_update = now + (LINE_S if live is None else REDRAW_S)
+        snapshot, rates = recorder.snapshots[-1], 'hand samples {}/s, predictions {}/s'.format(*recorder.rates(now))
+        delay_ms = 1e3 * float(np.median(recorder.delays[-50:]))
+        progress = f'{(snapshot.stamp_ns - first_ns) / NANOSECONDS:4.1f} of {duration_s:.1f} s'
+        heading = f'{progress}   {rates}, delay {delay_ms:.0f} ms'
+        if live is not None:
+            live.update(_make_table(snapshot, heading), refresh=True)
+            return
+        shares = '   '.join(f'{100 * each.likelihood:.0f} % {each.label}' for each in snapshot.candidates)
+        console.print(f'{heading}   {shares or "no solved candidate"}', highlight=False, soft_wrap=True, markup=False)
+
+    with live or nullcontext():
+        yield update
+
+
+def _make_table(snapshot: Snapshot, title: str) -> Table:
+    table = Table(title=title, title_justify='left', caption_justify='left', expand=False)
+    table.caption = '+ passes the obstacle on the left, - on the right'
+    table.add_column('candidate', width=24, no_wrap=True)
+    table.add_column('likelihood', width=30)
+    for name, width in (('', 5), ('effort', 8), ('cost', 7), ('eta', 5)):
+        table.add_column(name, justify='right', width=width)
+    for each in snapshot.candidates[:ROWS]:
+        bar = Bar(1.0, 0.0, each.likelihood, color='bright_blue')
+        share, ratio = f'{100 * each.likelihood:.0f} %', f'x {each.cost_ratio:.3g}'
+        table.add_row(each.label, bar, share, f'{each.effort:.3g}', ratio, f'{each.eta:.2f}')
+    for row in range(len(snapshot.candidates), ROWS):
+        table.add_row('' if row else 'no solved candidate')
+    return table

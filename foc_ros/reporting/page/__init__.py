@@ -1,5 +1,65 @@
-"""Pages that people read: one frame for every report; each page is one HTML file that needs no network."""
+"""HTML pages from the Jinja templates of this folder. Each page is one file that needs no network.
 
-from .frame import data_script, own_part, own_scripts, page_of, picture, pictures, plotly_script, table
+Text is escaped by the templates. HTML that a function below returns may be joined and passed to `page_of` as a body.
+"""
 
-__all__ = ['data_script', 'own_part', 'own_scripts', 'page_of', 'picture', 'pictures', 'plotly_script', 'table']
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from foc_ros.core.errors import FocError
+
+try:
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+except ImportError as error:
+    raise FocError("pages need Jinja2: install python3-jinja2, or pip install 'foc_ros[report]'") from error
+
+FOLDER = Path(__file__).parent
+POLICY = "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+"""Content security policy of every page: a browser shows what the page holds and fetches nothing."""
+
+
+def own_part(name: str) -> str:
+    """Return the text of a file of this folder."""
+    return (FOLDER / name).read_text(encoding='utf-8')
+
+
+def load_plotly() -> str:
+    """Return the source of plotly.js with its licence header."""
+    from plotly.offline import get_plotlyjs
+
+    return str(get_plotlyjs())
+
+
+_TEMPLATES = Environment(autoescape=True, undefined=StrictUndefined, loader=FileSystemLoader(FOLDER), trim_blocks=True)
+_TEMPLATES.globals.update(policy=POLICY, source=own_part, plotly=load_plotly)
+_TEMPLATES.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
+_PARTS: Any = _TEMPLATES.get_template('parts.html').module
+
+
+def render(template: str, **values: Any) -> str:
+    """Return the page of a template of this folder."""
+    return _TEMPLATES.get_template(template).render(values)
+
+
+def page_of(title: str, body: str, warnings: Sequence[str] = ()) -> str:
+    """Return a page with a title, warnings on top, and a body of HTML."""
+    return render('frame.html', title=title, body=body, warnings=warnings)
+
+
+def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table as HTML; the first cell of a row is its heading; columns may be empty."""
+    return str(_PARTS.table(columns, rows))
+
+
+def picture(file: Path, caption: str) -> str:
+    """Return a figure as HTML that contains a PNG file."""
+    return str(_PARTS.picture(base64.b64encode(file.read_bytes()).decode('ascii'), caption))
+
+
+def pictures(figures: Iterable[str]) -> str:
+    """Return figures as HTML, as many side by side as the screen has room for."""
+    return str(_PARTS.pictures(figures))

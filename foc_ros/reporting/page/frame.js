@@ -1,7 +1,7 @@
 'use strict';
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const held = (name) => JSON.parse(document.getElementById(name).textContent);
-// what is drawn again when dark and light change
+const readData = (name) => JSON.parse(document.getElementById(name).textContent);
+// Functions that draw the charts again after a switch between dark and light.
 const redraws = [];
 const root = document.documentElement;
 const systemDark = matchMedia('(prefers-color-scheme: dark)');

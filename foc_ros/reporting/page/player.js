@@ -2,22 +2,24 @@ const byId = (name) => document.getElementById(name);
 const sums = (steps, unit) => { let sum = 0; return steps.map((step) => unit * (sum += step)); };
 const LENGTH = data.unit.length;
 const SPEED = data.unit.speed;
-const hand = { t: sums(data.hand.t, 1e-3), x: sums(data.hand.x, LENGTH), y: sums(data.hand.y, LENGTH), v: sums(data.hand.v, SPEED) };
+const TIME = data.unit.time;
+const hand = { t: sums(data.hand.t, TIME), x: sums(data.hand.x, LENGTH), y: sums(data.hand.y, LENGTH), v: sums(data.hand.v, SPEED) };
 const goals = data.goals.map((places) => places.map(([x, y]) => [LENGTH * x, LENGTH * y]));
 const scenes = data.scenes.map((rows) => rows.map(([name, ...disc]) => [name, ...disc.map((value) => LENGTH * value)]));
 const frameTimes = data.frames.map((frame) => data.times[frame.at]);
-const most = Math.max(...data.frames.map((frame) => frame.ways.length));
-const slotOf = (line) => data.lines[line].slot;
-const letterOf = (line) => (slotOf(line) === null ? '' : String.fromCharCode(65 + slotOf(line)));
-const NAMED_OBSTACLES = 30;
+const mostCandidates = Math.max(...data.frames.map((frame) => frame.candidates.length));
+const slotOf = (track) => data.tracks[track].slot;
+const letterOf = (track) => (slotOf(track) === null ? '' : String.fromCharCode(65 + slotOf(track)));
+// Above this number of points, the likelihoods are drawn without marks.
 const MOST_MARKS = 3000;
 const state = { frame: 0, from: 0, to: 0, playing: false, focus: null };
 
+// The row of the first value that is not below a bound.
 const first = (values, least) => { const row = values.findIndex((value) => value >= least); return row < 0 ? values.length : row; };
 const span = () => [frameTimes[state.from], frameTimes[state.to]];
-const shareOf = (line, row) => { const value = data.lines[line].share[row - data.lines[line].first]; return value === undefined ? null : value; };
+const shareOf = (track, row) => { const value = data.tracks[track].share[row - data.tracks[track].first]; return value === undefined ? null : value; };
 
-// The outlines of ellipses [x, y, half axes, angle] as one closed line each, with gaps between them.
+// Returns the outlines of ellipses [x, y, half axes, angle] as one trace: a closed line for each, with gaps between them.
 function outlines(ellipses, points = 36) {
   const x = [];
   const y = [];
@@ -35,33 +37,33 @@ function outlines(ellipses, points = 36) {
 }
 
 const alpha = (colour, share) => colour + Math.round(255 * share).toString(16).padStart(2, '0');
-const faded = (line) => state.focus !== null && state.focus !== line;
+const faded = (track) => state.focus !== null && state.focus !== track;
 
-function wayTraces(frame, way) {
-  const colour = colourOf(slotOf(way.line));
-  const share = shareOf(way.line, frame.at);
-  const weight = faded(way.line) ? 0.15 : 1;
-  const [x, y] = [sums(way.x, LENGTH), sums(way.y, LENGTH)];
-  const discs = way.ellipses.map(([cx, cy, a, b, angle]) => [LENGTH * cx, LENGTH * cy, LENGTH * a, LENGTH * b, (Math.PI * angle) / 180]);
+function candidateTraces(frame, candidate) {
+  const colour = colourOf(slotOf(candidate.track));
+  const share = shareOf(candidate.track, frame.at);
+  const weight = faded(candidate.track) ? 0.15 : 1;
+  const [x, y] = [sums(candidate.x, LENGTH), sums(candidate.y, LENGTH)];
+  const discs = candidate.ellipses.map(([cx, cy, a, b, angle]) => [LENGTH * cx, LENGTH * cy, LENGTH * a, LENGTH * b, (Math.PI * angle) / 180]);
   const solid = colour.startsWith('#') && colour.length === 7;
   const spread = {
     ...outlines(discs), fill: 'toself', fillcolor: solid ? alpha(colour, weight * (0.02 + 0.1 * share)) : 'rgba(0,0,0,0)',
-    line: { color: colour, width: 1 }, opacity: weight * (0.25 + 0.6 * share), meta: { spread: way.line },
+    line: { color: colour, width: 1 }, opacity: weight * (0.25 + 0.6 * share), meta: { spread: candidate.track },
   };
-  const middle = Math.floor(x.length * (0.45 + 0.12 * (way.line % 3)));
+  const middle = Math.floor(x.length * (0.45 + 0.12 * (candidate.track % 3)));
   const path = {
-    x, y, type: 'scatter', mode: 'lines', line: { color: colour, dash: dashOf(slotOf(way.line)), width: 1.5 + 4 * share },
-    opacity: weight, hoverinfo: 'text', text: plain(`${letterOf(way.line)} ${percent(share)} ${data.labels[way.label]}`), meta: { way: way.line },
+    x, y, type: 'scatter', mode: 'lines', line: { color: colour, dash: dashOf(slotOf(candidate.track)), width: 1.5 + 4 * share },
+    opacity: weight, hoverinfo: 'text', text: plain(`${letterOf(candidate.track)} ${percent(share)} ${data.labels[candidate.label]}`), meta: { candidate: candidate.track },
   };
   const tag = {
-    x: [x[middle]], y: [y[middle]], type: 'scatter', mode: 'markers+text', text: letterOf(way.line), textfont: { size: 11, color: ink('--ink') },
+    x: [x[middle]], y: [y[middle]], type: 'scatter', mode: 'markers+text', text: letterOf(candidate.track), textfont: { size: 11, color: ink('--ink') },
     marker: { size: 17, color: ink('--page'), line: { color: colour, width: 2 } }, opacity: weight, hoverinfo: 'skip',
   };
   return { spread, path, tag };
 }
 
 const nothing = { x: [], y: [], type: 'scatter', mode: 'lines', hoverinfo: 'skip' };
-const filled = (list) => [...list, ...Array(most - list.length).fill(nothing)];
+const filled = (list) => [...list, ...Array(mostCandidates - list.length).fill(nothing)];
 
 function sceneTraces(frame) {
   const scene = scenes[frame.scene];
@@ -72,7 +74,7 @@ function sceneTraces(frame) {
   const part = (low, high, line) => ({
     x: hand.x.slice(low, high), y: hand.y.slice(low, high), type: 'scatter', mode: 'lines', hoverinfo: 'skip', line: { color: ink('--ink'), ...line },
   });
-  const drawn = [...frame.ways].reverse().map((way) => wayTraces(frame, way));
+  const drawn = [...frame.candidates].reverse().map((candidate) => candidateTraces(frame, candidate));
   const places = goals[frame.goals];
   return [
     { ...outlines(disc(1)), fill: 'toself', fillcolor: ink('--ring'), line: { color: ink('--disc'), width: 1 } },
@@ -83,7 +85,7 @@ function sceneTraces(frame) {
     part(Math.max(begin, middle - 1), end, { width: 2, dash: 'dot' }),
     {
       x: scene.map(([, x]) => x), y: scene.map(([, , y]) => y), type: 'scatter', mode: 'text', hoverinfo: 'skip', textfont: { size: 11 },
-      text: scene.length > NAMED_OBSTACLES ? [] : scene.map(([name]) => plain(name)),
+      text: scene.length > data.named_obstacles ? [] : scene.map(([name]) => plain(name)),
     },
     {
       x: places.map(([x]) => x), y: places.map(([, y]) => y), type: 'scatter', mode: 'markers+text', hoverinfo: 'skip',
@@ -102,25 +104,25 @@ function drawScene() {
   const [left, right, bottom, top] = data.bounds;
   const box = byId('scene');
   const height = Math.min(Math.max((box.clientWidth * (top - bottom)) / (right - left), 240), 0.75 * innerHeight + 80) + 44;
-  Plotly.react(box, sceneTraces(data.frames[state.frame]), looks({
+  Plotly.react(box, sceneTraces(data.frames[state.frame]), layoutOf({
     height, xaxis: { range: [left, right], title: { text: 'x [m]', standoff: 4 } },
     yaxis: { range: [bottom, top], title: { text: 'y [m]', standoff: 4 }, scaleanchor: 'x' }, uirevision: 'scene',
   }), { ...CONFIG, displayModeBar: !TOUCH, modeBarButtons: [['toImage', 'zoom2d', 'pan2d', 'resetScale2d']] });
 }
 
-// The parts of all lines that are in the span shown: what is beyond would cost time to draw and not be seen.
-function shownLines() {
+// Returns the parts of all tracks within the visible time span. Drawing the rest would take time and not be visible.
+function visibleTracks() {
   const [from, to] = [first(data.times, span()[0]), first(data.times, span()[1] + 1e-9)];
-  return data.lines.flatMap((line, number) => {
-    const [begin, end] = [Math.max(from, line.first), Math.min(to, line.first + line.share.length)];
-    const share = line.share.slice(begin - line.first, end - line.first);
+  return data.tracks.flatMap((track, number) => {
+    const [begin, end] = [Math.max(from, track.first), Math.min(to, track.first + track.share.length)];
+    const share = track.share.slice(begin - track.first, end - track.first);
     return begin < end && share.some((value) => value !== null) ? [{ number, times: data.times.slice(begin, end), share }] : [];
   });
 }
 
-// A letter on every line that is long enough for one.
-function letters(lines) {
-  const places = lines.flatMap(({ number, times, share }) => {
+// Returns a trace with a letter on each track that has at least three points.
+function letters(tracks) {
+  const places = tracks.flatMap(({ number, times, share }) => {
     const known = share.flatMap((value, row) => (value === null ? [] : [row]));
     const row = known[Math.floor((((number % 4) + 0.5) * known.length) / 4)];
     return known.length < 3 || slotOf(number) === null ? [] : [[times[row], share[row], number]];
@@ -133,14 +135,14 @@ function letters(lines) {
 }
 
 function drawLikelihoods() {
-  const lines = shownLines();
-  const marks = lines.reduce((sum, { share }) => sum + share.length, 0) <= MOST_MARKS;
-  const traces = lines.map(({ number, times, share }) => ({
+  const tracks = visibleTracks();
+  const marks = tracks.reduce((sum, { share }) => sum + share.length, 0) <= MOST_MARKS;
+  const traces = tracks.map(({ number, times, share }) => ({
     x: times, y: share, type: 'scatter', mode: marks ? 'lines+markers' : 'lines', marker: { size: 3 }, connectgaps: false, hoverinfo: 'text',
     line: { color: colourOf(slotOf(number)), dash: dashOf(slotOf(number)), width: 2 }, opacity: faded(number) ? 0.15 : 1,
-    text: share.map((value) => `${letterOf(number)} ${percent(value)}`), meta: { line: number },
+    text: share.map((value) => `${letterOf(number)} ${percent(value)}`), meta: { track: number },
   }));
-  Plotly.react(byId('likelihoods'), [...traces, letters(lines)], looks({
+  Plotly.react(byId('likelihoods'), [...traces, letters(tracks)], layoutOf({
     height: 210, xaxis: timeAxis(''), yaxis: { range: [-0.03, 1.03], title: { text: 'likelihood', standoff: 4 } }, shapes: [now()], hovermode: 'closest',
   }), CONFIG);
 }
@@ -149,16 +151,16 @@ function drawSpeeds() {
   const frame = data.frames[state.frame];
   const [from, past, to] = [span()[0], data.times[frame.at], span()[1]].map((time, row) => first(hand.t, time + (row ? 1e-6 : 0)));
   const measured = { type: 'scatter', mode: 'lines', hoverinfo: 'skip' };
-  const predicted = filled([...frame.ways].reverse().map((way) => ({
-    x: sums(way.t, 1e-3).map((t) => t + data.times[frame.at]), y: sums(way.v, SPEED), type: 'scatter', mode: 'lines', hoverinfo: 'text',
-    text: plain(`${letterOf(way.line)} ${data.labels[way.label]}`), opacity: faded(way.line) ? 0.15 : 1,
-    line: { color: colourOf(slotOf(way.line)), dash: dashOf(slotOf(way.line)), width: 1.2 + 2.5 * shareOf(way.line, frame.at) },
+  const predicted = filled([...frame.candidates].reverse().map((candidate) => ({
+    x: sums(candidate.t, TIME).map((t) => t + data.times[frame.at]), y: sums(candidate.v, SPEED), type: 'scatter', mode: 'lines', hoverinfo: 'text',
+    text: plain(`${letterOf(candidate.track)} ${data.labels[candidate.label]}`), opacity: faded(candidate.track) ? 0.15 : 1,
+    line: { color: colourOf(slotOf(candidate.track)), dash: dashOf(slotOf(candidate.track)), width: 1.2 + 2.5 * shareOf(candidate.track, frame.at) },
   })));
   Plotly.react(byId('speeds'), [
     ...predicted,
     { ...measured, x: hand.t.slice(from, to), y: hand.v.slice(from, to), line: { color: ink('--ink'), width: 1.5, dash: 'dot' } },
     { ...measured, x: hand.t.slice(from, past), y: hand.v.slice(from, past), line: { color: ink('--ink'), width: 2.5 } },
-  ], looks({ height: 190, xaxis: timeAxis(''), yaxis: { title: { text: 'speed [m/s]', standoff: 4 }, range: [0, topSpeed] }, shapes: [now()] }), CONFIG);
+  ], layoutOf({ height: 190, xaxis: timeAxis(''), yaxis: { title: { text: 'speed [m/s]', standoff: 4 }, range: [0, topSpeed] }, shapes: [now()] }), CONFIG);
 }
 
 function drawTimes() {
@@ -168,7 +170,7 @@ function drawTimes() {
     return;
   }
   const most99 = known[Math.min(known.length - 1, Math.floor(0.99 * known.length))];
-  Plotly.react(byId('times'), [{ x: data.times, y: data.solve_ms, type: 'scatter', mode: 'markers', marker: { size: 4, color: ink('--soft') }, hoverinfo: 'x+y' }], looks({
+  Plotly.react(byId('times'), [{ x: data.times, y: data.solve_ms, type: 'scatter', mode: 'markers', marker: { size: 4, color: ink('--soft') }, hoverinfo: 'x+y' }], layoutOf({
     height: 160, xaxis: timeAxis('time [s]'), yaxis: { title: { text: 'solve [ms]', standoff: 4 }, range: [0, 1.25 * most99] }, shapes: [now()],
   }), CONFIG);
 }
@@ -184,36 +186,36 @@ function cell(row, text, kind = '') {
 
 function fillTable() {
   const frame = data.frames[state.frame];
-  const body = byId('ways').tBodies[0];
+  const body = byId('candidates').tBodies[0];
   body.replaceChildren();
-  for (const way of frame.ways) {
-    const share = shareOf(way.line, frame.at);
+  for (const candidate of frame.candidates) {
+    const share = shareOf(candidate.track, frame.at);
     const row = body.insertRow();
-    row.dataset.line = way.line;
+    row.dataset.track = candidate.track;
     row.dataset.share = share;
-    row.classList.toggle('faded', faded(way.line));
-    row.addEventListener('click', () => { state.focus = state.focus === way.line ? null : way.line; drawLikelihoods(); show(state.frame); });
+    row.classList.toggle('faded', faded(candidate.track));
+    row.addEventListener('click', () => { state.focus = state.focus === candidate.track ? null : candidate.track; drawLikelihoods(); show(state.frame); });
     const letter = document.createElement('span');
     letter.className = 'letter';
-    letter.textContent = letterOf(way.line);
-    letter.style.borderColor = colourOf(slotOf(way.line));
+    letter.textContent = letterOf(candidate.track);
+    letter.style.borderColor = colourOf(slotOf(candidate.track));
     cell(row, '').append(letter);
     cell(row, percent(share), 'number');
     const bar = document.createElement('span');
     bar.className = 'bar';
     const filling = document.createElement('i');
-    filling.style.cssText = `width: ${100 * share}%; background: ${colourOf(slotOf(way.line))}`;
+    filling.style.cssText = `width: ${100 * share}%; background: ${colourOf(slotOf(candidate.track))}`;
     bar.append(filling);
     cell(row, '').append(bar);
-    cell(row, data.labels[way.label]);
-    cell(row, way.ratio === null ? '' : way.ratio.toFixed(2), 'number');
-    cell(row, way.eta === null ? '' : way.eta.toFixed(3), 'number');
+    cell(row, data.labels[candidate.label]);
+    cell(row, candidate.ratio === null ? '' : candidate.ratio.toFixed(2), 'number');
+    cell(row, candidate.eta === null ? '' : candidate.eta.toFixed(3), 'number');
   }
-  for (const [label, status] of frame.lost) {
+  for (const [label, status] of frame.unsolved) {
     const row = body.insertRow();
     cell(row, '✕');
-    const told = cell(row, `${data.labels[label]}: ${data.labels[status].replace(/_/g, ' ')}`);
-    told.colSpan = 5;
+    const text = cell(row, `${data.labels[label]}: ${data.labels[status].replace(/_/g, ' ')}`);
+    text.colSpan = 5;
   }
 }
 
@@ -265,9 +267,9 @@ function play() {
   requestAnimationFrame(step);
 }
 
-const topSpeed = 1.15 * Math.max(0.01, ...hand.v, ...data.frames.map((frame) => (frame.ways.length ? Math.max(...sums(frame.ways[0].v, SPEED)) : 0)));
+const topSpeed = 1.15 * Math.max(0.01, ...hand.v, ...data.frames.map((frame) => (frame.candidates.length ? Math.max(...sums(frame.candidates[0].v, SPEED)) : 0)));
 if (data.frames.length < data.times.length) {
-  byId('decimated').textContent = `The slider stops at ${data.frames.length} of the ${data.times.length} predictions; the likelihoods are drawn of all. `;
+  byId('decimated').textContent = `The slider stops at ${data.frames.length} of the ${data.times.length} predictions; likelihoods are drawn for all of them. `;
 }
 const choice = byId('movement');
 data.movements.forEach((_, row) => choice.add(new Option(`movement ${row + 1}`, row)));

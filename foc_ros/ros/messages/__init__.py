@@ -1,18 +1,4 @@
-"""Messages to records and back. The same functions serve rclpy's messages and those read from a bag with rosbags."""
+"""ROS messages: `decode_*` turns input messages into records of the core, `encode_*` turns records into messages.
 
-from .inputs import goal_of_pose, goals_of_pose_array, hand_sample
-from .marker_scene import MarkerScene
-from .obstacle_cloud import CloudScene, cloud_obstacles
-from .types import MessageTypes, RclpyTypes, RosbagsTypes
-
-__all__ = [
-    'CloudScene',
-    'MarkerScene',
-    'MessageTypes',
-    'RclpyTypes',
-    'RosbagsTypes',
-    'cloud_obstacles',
-    'goal_of_pose',
-    'goals_of_pose_array',
-    'hand_sample',
-]
+A message is anything with the attributes of its type, from rclpy or from rosbags. May import `foc_ros.core`, and not rclpy.
+"""

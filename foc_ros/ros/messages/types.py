@@ -1,63 +1,54 @@
-"""One way to make a message, for two kinds of message classes: rclpy's (node) and rosbags' (bags without ROS).
+"""Creation of messages of two libraries with one call: rclpy's (the node) and rosbags' (bags without ROS).
 
-Neither kind checks what it is given unless asked to, and both then pass memory on as it lies: an int in a float field arrives as
-5e-324. So every value goes through the converter of its field's declared type here, and nowhere else.
+Neither library checks the values of fields by default, and both serialise the memory as it is: an integer in a float field
+arrives as 5e-324. Every value is therefore converted here to the type of its field's default.
 """
 
 from __future__ import annotations
 
 import array
-from collections.abc import Callable, Hashable, Iterable
-from functools import cache
+from abc import ABC, abstractmethod
+from collections.abc import Callable
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
-Converter = Callable[[Any], Any]
-
-TYPECODES = {
-    'float64': 'd',
-    'float32': 'f',
-    'int8': 'b',
-    'uint8': 'B',
-    'int16': 'h',
-    'uint16': 'H',
-    'int32': 'i',
-    'uint32': 'I',
-    'int64': 'q',
-    'uint64': 'Q',
-}
-"""Typecode of `array.array` and of numpy alike, per type name of a .msg file. byte (octet), bool and string have none."""
-
 CHECKS = '_check_fields'
-"""Slot of rclpy's messages that says whether their properties check what they are given."""
-
-_IDL_NAMES = {'double': 'float64', 'float': 'float32', 'boolean': 'bool', 'octet': 'byte'}
+"""Slot of rclpy's messages that turns on the checks of their properties."""
 
 
-class MessageTypes(Hashable, Protocol):
-    """Makes messages by type name."""
+class _Layout(NamedTuple):
+    """A message class, whether it checks fields (None for rosbags), and each field's attribute, converter and default."""
+
+    message_class: type
+    is_checked: bool | None
+    fields: dict[str, tuple[str, Callable[[Any], Any], Any]]
+
+
+class MessageTypes(ABC):
+    """The message classes of one library."""
+
+    def __init__(self) -> None:
+        self._layouts: dict[str, _Layout] = {}
 
     def make(self, name: str, /, **values: Any) -> Any:
-        """Return a message of type `name` ('std_msgs/msg/Header'); fields not given have their defaults.
+        """Create a message of type `name`, such as 'std_msgs/msg/Header'; fields that are not given have their defaults.
 
-        Messages may share what is in them, defaults above all, so none is to be changed. Raises TypeError for a field the type
-        does not have.
+        Messages share the values of their fields, defaults above all, so they must not be changed. rosbags knows no defaults but
+        zero: give a Quaternion its w. Raises TypeError for a field that the type does not have.
         """
-
-
-class RclpyTypes:
-    """The message classes of rclpy, imported when first used."""
-
-    def make(self, name: str, /, **values: Any) -> Any:
-        """Return a message of type `name`; see :class:`MessageTypes`."""
-        kind, checks, fields = _rclpy_type(name)
-        message, given = object.__new__(kind), 0  # its constructor would make the defaults of all fields, those given too
-        setattr(message, CHECKS, checks)
+        try:
+            message_class, is_checked, fields = self._layouts[name]
+        except KeyError:
+            message_class, is_checked, fields = self._layouts[name] = self._find_layout(name)
+        message: Any = object.__new__(message_class)  # the constructor is slower: it creates the default of every field
+        given = 0
+        if is_checked is not None:
+            setattr(message, CHECKS, is_checked)
         for field, (attribute, convert, default) in fields.items():
             if field in values:
                 setattr(message, attribute, convert(values[field]))
@@ -65,111 +56,76 @@ class RclpyTypes:
             else:
                 setattr(message, attribute, default)
         if given < len(values):
-            _refuse_unknown(name, values, fields)
+            raise TypeError(f'{name} has no field {", ".join(sorted(set(values) - set(fields)))}')
         return message
 
+    @abstractmethod
+    def _find_layout(self, name: str) -> _Layout:
+        """Return the layout of a message type."""
 
-class RosbagsTypes:
-    """The message classes of a rosbags typestore, which knows no defaults but zero: give a Quaternion its w."""
+
+class RclpyTypes(MessageTypes):
+    """The message classes of rclpy, each imported when it is first used."""
+
+    def _find_layout(self, name: str) -> _Layout:
+        # values are stored where the fields' properties store them; the properties are used only if they check
+        message_class = find_message_class(name)
+        blank = message_class()
+        is_checked, names = getattr(blank, CHECKS), message_class.get_fields_and_field_types()
+        defaults = {field: getattr(blank, field) for field in names}
+        fields = {
+            field: (field if is_checked else f'_{field}', _find_converter(value), value) for field, value in defaults.items()
+        }
+        return _Layout(message_class, is_checked, fields)
+
+
+class RosbagsTypes(MessageTypes):
+    """The message classes of a rosbags typestore."""
 
     def __init__(self, typestore: Typestore) -> None:
+        super().__init__()
         self.typestore = typestore
-        self._known: dict[str, dict[str, tuple[Converter, Converter]]] = {}
 
-    def make(self, name: str, /, **values: Any) -> Any:
-        """Return a message of type `name`; see :class:`MessageTypes`."""
-        if name not in self._known:
-            self._known[name] = {field: self._of_field(kind) for field, kind in self.typestore.fielddefs[name][1]}
-        known = self._known[name]
-        _refuse_unknown(name, values, known)
-        made = {
-            field: convert(values[field]) if field in values else default(None) for field, (convert, default) in known.items()
-        }
-        return self.typestore.types[name](**made)
+    def _find_layout(self, name: str) -> _Layout:
+        defaults = {field: self._find_default(kind) for field, kind in self.typestore.fielddefs[name][1]}
+        fields = {field: (field, _find_converter(value), value) for field, value in defaults.items()}
+        return _Layout(self.typestore.types[name], None, fields)
 
-    def _of_field(self, kind: tuple[Any, Any]) -> tuple[Converter, Converter]:
-        """Return the converter of a value and the maker of the default for one field definition of the typestore."""
+    def _find_default(self, kind: tuple[Any, Any]) -> Any:
+        """Return the default of a field definition of the typestore."""
         node, detail = kind
-        if node.name == 'BASE':
-            scalar = _scalar(detail[0])
-            empty = '' if detail[0] == 'string' else 0
-            return scalar, lambda _: scalar(empty)
         if node.name == 'NAME':
-            return _same, lambda _: self.make(detail)
-        (element, element_detail), length = detail
-        count = length if node.name == 'ARRAY' else 0
-        if element.name == 'BASE' and element_detail[0] in TYPECODES:
-            dtype = np.dtype(TYPECODES[element_detail[0]])
-            return lambda value: _numpy(value, dtype), lambda _: np.zeros(count, dtype)
-        convert, default = self._of_field((element, element_detail))
-        return lambda value: [convert(item) for item in value], lambda _: [default(None) for _ in range(count)]
+            return self.make(detail)
+        if node.name == 'BASE':
+            name = detail[0]
+            return '' if name == 'string' else False if name == 'bool' else 0 if name == 'byte' else np.zeros(1, name)[0].item()
+        element, length = detail
+        default, count = self._find_default(element), length if node.name == 'ARRAY' else 0
+        is_numeric = isinstance(default, (int, float)) and element[1][0] not in ('bool', 'byte')
+        return np.zeros(count, element[1][0]) if is_numeric else [default] * count
 
 
-@cache
-def _rclpy_type(name: str) -> tuple[type[Any], bool, dict[str, tuple[str, Converter, Any]]]:
-    """Return a message class, whether rclpy checks fields, and by field where its value goes, its converter, its default.
-
-    A value goes where the field's property would put it; through the property only where that has something to check.
-    """
+def find_message_class(name: str) -> Any:
+    """Return rclpy's class of a message type such as 'std_msgs/msg/Header'."""
     package, _, leaf = name.split('/')
-    kind = getattr(import_module(f'{package}.msg'), leaf)
-    blank = kind()
-    checks, declared = getattr(blank, CHECKS), kind.get_fields_and_field_types()
-    fields = {
-        field: (field if checks else f'_{field}', _rclpy_converter(declared[field]), getattr(blank, field)) for field in declared
-    }
-    return kind, checks, fields
+    return getattr(import_module(f'{package}.msg'), leaf)
 
 
-def _rclpy_converter(kind: str) -> Converter:
-    """Return the converter for a field type such as 'double', 'sequence<uint8>', 'double[36]' or 'std_msgs/Header'."""
-    element = kind.removeprefix('sequence<').removesuffix('>').split(',')[0].split('[')[0]
-    element = _IDL_NAMES.get(element, element)
-    if '/' in element:
-        return list if kind.startswith('sequence<') else _same
-    if kind.startswith('sequence<') and element in TYPECODES:
-        return lambda value: _array(value, TYPECODES[element])
-    if '[' in kind and element in TYPECODES:
-        return lambda value: _numpy(value, np.dtype(TYPECODES[element]))
-    scalar = _octet if element == 'byte' else _scalar(element)
-    return scalar if element == kind or kind in _IDL_NAMES else lambda value: [scalar(item) for item in value]
-
-
-def _scalar(kind: str) -> Converter:
-    if kind.startswith(('string', 'wstring')):
-        return str
-    return float if kind.startswith('float') else bool if kind == 'bool' else int
-
-
-def _octet(value: Any) -> bytes:
-    """rclpy wants a byte field as bytes of length 1, rosbags as an int; callers give an int."""
-    return bytes([value])
-
-
-def _array(value: Any, typecode: str) -> array.array[Any]:
-    if isinstance(value, (bytes, bytearray)):
-        return array.array(typecode, bytes(value))
-    return array.array(typecode, np.ascontiguousarray(value, dtype=typecode).tobytes())
-
-
-def _numpy(value: Any, dtype: np.dtype[Any]) -> np.ndarray[Any, Any]:
-    if isinstance(value, (bytes, bytearray)):
-        return np.frombuffer(bytes(value), dtype=dtype)
-    return np.array(value, dtype=dtype)
-
-
-def _same(value: Any) -> Any:
-    return value
-
-
-def _refuse_unknown(name: str, values: Iterable[str], known: Iterable[str]) -> None:
-    unknown = set(values) - set(known)
-    if unknown:
-        raise TypeError(f'{name} has no field {", ".join(sorted(unknown))}')
+def _find_converter(default: Any) -> Callable[[Any], Any]:
+    """Return the function that converts a value to the type of a default; messages are kept as they are."""
+    if isinstance(default, array.array):
+        typecode = default.typecode
+        return lambda value: array.array(typecode, value if isinstance(value, bytes) else np.asarray(value, typecode).tobytes())
+    if isinstance(default, np.ndarray):
+        dtype = default.dtype
+        return lambda value: np.frombuffer(value, dtype) if isinstance(value, bytes) else np.array(value, dtype)
+    if isinstance(default, bytes):
+        return lambda value: bytes([value])  # a byte field of rclpy; rosbags takes the integer
+    return type(default) if isinstance(default, (float, int, str, list)) else lambda value: value
 
 
 def stamp(types: MessageTypes, stamp_ns: int) -> Any:
-    """Return a builtin_interfaces/Time of nanoseconds, held at the ends of what its 32 bits can say."""
+    """Return a builtin_interfaces/Time of nanoseconds; beyond its 32 bits, the seconds are the first or last possible."""
     seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
     return types.make('builtin_interfaces/msg/Time', sec=min(max(seconds, -(2**31)), 2**31 - 1), nanosec=nanoseconds)
 

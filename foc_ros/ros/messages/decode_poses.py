@@ -1,0 +1,68 @@
+"""Decoding of hand poses and goals. Numbers are checked here, once; the code behind relies on these checks."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from foc_ros.core.errors import MessageError
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, as_readonly
+
+from .plane import project
+
+MAX_COORDINATE = 1e4
+"""Largest coordinate of a hand, a goal or an obstacle [m]; a larger one has a wrong unit."""
+
+MAX_GOALS = 256
+
+
+def decode_hand_sample(message: Any, plane: str) -> HandSample:
+    """Decode a geometry_msgs/PoseStamped as a hand sample; the orientation is not used.
+
+    Raises MessageError for a coordinate that is not finite or beyond MAX_COORDINATE, and for a stamp of 0, which means "not set".
+    """
+    stamp_ns = stamp_of(message.header)
+    if stamp_ns == 0:
+        raise MessageError('header.stamp', 'a time after 0', '0 s')
+    position, height = project(_decode_point(message.pose.position, 'pose.position'), plane)
+    return HandSample(stamp_ns, as_readonly(position), float(height), str(message.header.frame_id))
+
+
+def decode_goals(message: Any, plane: str) -> tuple[Array, str]:
+    """Decode a geometry_msgs/PoseArray as goals (g, 2) [m] and their frame; an array without poses gives g = 0."""
+    if len(message.poses) > MAX_GOALS:
+        raise MessageError('poses', f'at most {MAX_GOALS} goals', len(message.poses))
+    points = [_decode_point(pose.position, f'poses[{i}].position') for i, pose in enumerate(message.poses)]
+    return project(np.array(points, dtype=float).reshape(-1, 3), plane)[0], str(message.header.frame_id)
+
+
+def decode_goal(message: Any, plane: str) -> tuple[Array, str]:
+    """Decode a geometry_msgs/PoseStamped as one goal (1, 2) [m] and its frame; the stamp is not used."""
+    return project([_decode_point(message.pose.position, 'pose.position')], plane)[0], str(message.header.frame_id)
+
+
+def stamp_of(header: Any, field: str = 'header.stamp') -> int:
+    """Decode the stamp of a std_msgs/Header [ns]; field: its name in errors."""
+    seconds, nanoseconds = int(header.stamp.sec), int(header.stamp.nanosec)
+    if seconds < 0:
+        raise MessageError(f'{field}.sec', 'at least 0', seconds)
+    if not 0 <= nanoseconds < NANOSECONDS:
+        raise MessageError(f'{field}.nanosec', f'below {NANOSECONDS}', nanoseconds)
+    return seconds * NANOSECONDS + nanoseconds
+
+
+def _decode_point(point: Any, field: str) -> tuple[float, float, float]:
+    coordinates = float(point.x), float(point.y), float(point.z)
+    for axis, value in zip('xyz', coordinates, strict=True):
+        check_coordinate(f'{field}.{axis}', value)
+    return coordinates
+
+
+def check_coordinate(field: str, value: float) -> None:
+    """Raise MessageError for a coordinate that is not finite or beyond MAX_COORDINATE."""
+    if not math.isfinite(value):
+        raise MessageError(field, 'a finite number [m]', value)
+    if abs(value) > MAX_COORDINATE:
+        raise MessageError(field, f'a coordinate within {MAX_COORDINATE:g} m of the origin', f'{value:g}')

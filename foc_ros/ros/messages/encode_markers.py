@@ -1,0 +1,161 @@
+"""Encoding of a prediction as a MarkerArray: paths, ellipses and labels of all candidates, and the uncertain obstacles.
+
+Every array first deletes the markers of the one before, and all markers expire after LIFETIME_S, so that the drawing of a
+prediction that is not renewed disappears.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Prediction
+
+from .plane import lift
+from .ranking import ranked
+from .types import MessageTypes, header
+
+CYLINDER, LINE_STRIP, TEXT = 3, 4, 9
+DELETE_ALL = 3
+LIFETIME_S = 1.0
+ELLIPSES = 6
+"""Number of ellipses along each path."""
+MAX_DRAWN = 128
+"""Number of obstacles drawn, the nearest to the hand: thousands of markers would take longer than the prediction."""
+THICKNESS, TEXT_HEIGHT = 0.002, 0.012
+
+Colour = tuple[float, float, float, float]
+GREY: Colour = (0.55, 0.55, 0.55, 0.5)
+OBSTACLE: Colour = (0.45, 0.45, 0.5, 0.9)
+DEVIATION: Colour = (0.85, 0.35, 0.2, 0.25)
+UNLIKELY, LIKELY = np.array([0.25, 0.45, 0.85]), np.array([0.95, 0.6, 0.05])
+
+
+def encode_markers(prediction: Prediction, obstacles: Obstacles, plane: str, types: MessageTypes) -> Any:
+    """Encode the MarkerArray; unsolved candidates are grey and labelled with their status; obstacles: those at the stamp."""
+    encoder = _MarkerEncoder(prediction, plane, types)
+    unsolved = [outcome for outcome in prediction.candidates if not outcome.is_solved]
+    markers = [encoder.encode('', 0, 0, action=DELETE_ALL)]
+    for index, outcome in enumerate([*ranked(prediction), *unsolved]):
+        markers.extend(encoder.encode_candidate(index, outcome))
+    markers.extend(encoder.encode_obstacles(obstacles))
+    return types.make('visualization_msgs/msg/MarkerArray', markers=markers)
+
+
+@dataclass(frozen=True)
+class _MarkerEncoder:
+    """Encodes markers in the plane of one prediction; the fields that all of them share are made once."""
+
+    prediction: Prediction
+    plane: str
+    types: MessageTypes
+
+    @cached_property
+    def _shared_fields(self) -> dict[str, Any]:
+        return {
+            'header': header(self.types, self.prediction.stamp_ns, self.prediction.frame_id),
+            'lifetime': self.types.make('builtin_interfaces/msg/Duration', sec=int(LIFETIME_S)),
+        }
+
+    def encode_candidate(self, index: int, outcome: PredictedCandidate) -> Iterator[Any]:
+        solution, likelihood = outcome.solution, outcome.likelihood
+        line = solution.path if np.isfinite(solution.path).all() and len(solution.path) else outcome.candidate.guess
+        if outcome.is_solved:
+            red, green, blue = UNLIKELY + likelihood * (LIKELY - UNLIKELY)
+            colour, text = (red, green, blue, 0.4 + 0.6 * likelihood), f'{100 * likelihood:.0f} %'
+            yield from self._encode_ellipses(index, outcome, colour)
+        else:
+            colour, text = GREY, solution.status.value
+        points = self._lift(line)
+        width = 0.002 + 0.004 * likelihood
+        yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=[self._encode_point(*p) for p in points])
+        label = f'{outcome.candidate.label} {text}'
+        yield self.encode('label', index, TEXT, colour, (0, 0, TEXT_HEIGHT), points[len(points) // 2], text=label)
+
+    def _encode_ellipses(self, index: int, outcome: PredictedCandidate, colour: Colour) -> Iterator[Any]:
+        """Yield ellipses of one standard deviation about the mean, spread over the path."""
+        steps = _spread_steps(len(outcome.solution.mean))
+        variances, axes = np.linalg.eigh(outcome.solution.covariance[steps, :2, :2])
+        diameters = (2.0 * np.sqrt(np.maximum(variances, 0.0))).tolist()
+        angles = np.arctan2(axes[:, 1, 0], axes[:, 0, 0]).tolist()
+        faint = (*colour[:3], 0.3 * colour[3])
+        for i, centre in enumerate(self._lift(outcome.solution.path[steps])):
+            yield self.encode('deviation', 1000 * index + i, CYLINDER, faint, (*diameters[i], THICKNESS), centre, angles[i])
+
+    def encode_obstacles(self, obstacles: Obstacles) -> Iterator[Any]:
+        near = self._find_nearest(obstacles)
+        centres = self._lift(near.centre)
+        for name, radii, colour in (
+            ('obstacle', near.radius, OBSTACLE),
+            ('obstacle_deviation', near.radius + near.radius_stddev, DEVIATION),
+        ):
+            for i, (centre, diameter) in enumerate(zip(centres, (2 * radii).tolist(), strict=True)):
+                yield self.encode(name, i, CYLINDER, colour, (diameter, diameter, 10 * THICKNESS), centre)
+
+    def _find_nearest(self, obstacles: Obstacles) -> Obstacles:
+        if len(obstacles) <= MAX_DRAWN or not self.prediction.candidates:
+            return obstacles.take(list(range(min(len(obstacles), MAX_DRAWN))))
+        hand = self.prediction.candidates[0].candidate.guess[0]
+        distances = np.linalg.norm(obstacles.centre - hand, axis=1) - obstacles.radius
+        return obstacles.take(np.argsort(distances, kind='stable')[:MAX_DRAWN])
+
+    def encode(
+        self,
+        name: str,
+        identity: int,
+        kind: int,
+        colour: Colour = GREY,
+        scale: tuple[float, float, float] = (1, 1, 1),
+        centre: Sequence[float] = (0.0, 0.0, 0.0),
+        angle: float = 0.0,
+        **rest: Any,
+    ) -> Any:
+        make = self.types.make
+        x, y, z, w = _compute_rotation(angle, self.plane) if kind == CYLINDER else (0.0, 0.0, 0.0, 1.0)
+        orientation = make('geometry_msgs/msg/Quaternion', x=x, y=y, z=z, w=w)
+        return make(
+            'visualization_msgs/msg/Marker',
+            ns=name,
+            id=identity,
+            type=kind,
+            pose=make('geometry_msgs/msg/Pose', position=self._encode_point(*centre), orientation=orientation),
+            scale=make('geometry_msgs/msg/Vector3', **dict(zip('xyz', scale, strict=True))),
+            color=make('std_msgs/msg/ColorRGBA', **dict(zip('rgba', colour, strict=True))),
+            **self._shared_fields,
+            **rest,
+        )
+
+    def _lift(self, positions: Array) -> list[list[float]]:
+        """Return positions in the plane (m, 2) as points in space."""
+        points: list[list[float]] = lift(positions, self.prediction.height, self.plane).tolist()
+        return points
+
+    def _encode_point(self, x: float, y: float, z: float) -> Any:
+        return self.types.make('geometry_msgs/msg/Point', x=x, y=y, z=z)
+
+
+@lru_cache(maxsize=4)
+def _spread_steps(samples: int) -> NDArray[np.intp]:
+    """Return the indices of up to ELLIPSES samples, evenly spread, with the last and without the first."""
+    return np.unique(np.linspace(0, samples - 1, ELLIPSES + 1).round().astype(np.intp)[1:])
+
+
+_PLANE_ROTATION = {
+    'xy': (0.0, 0.0, 0.0, 1.0),
+    'xz': (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)),
+    'yz': (0.5, 0.5, 0.5, 0.5),
+}
+"""Quaternion (x, y, z, w) that rotates the x and y axes onto the axes of the plane."""
+
+
+def _compute_rotation(angle: float, plane: str) -> tuple[float, float, float, float]:
+    """Return the quaternion of a cylinder that stands on the plane, its x axis at an angle [rad] to the plane's first axis."""
+    x, y, z, w = _PLANE_ROTATION[plane]
+    sine, cosine = math.sin(angle / 2), math.cos(angle / 2)
+    return x * cosine + y * sine, y * cosine - x * sine, z * cosine + w * sine, w * cosine - z * sine

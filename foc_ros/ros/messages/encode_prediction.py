@@ -1,0 +1,95 @@
+"""Encoding of a prediction: a cloud with the whole answer, a table of likelihoods, the most likely path, and markers.
+
+The cloud, the table and the path hold solved candidates only. A candidate's index is its rank, so the most likely one has index
+0. All messages carry the stamp and the frame of the hand sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foc_ros.core.types import NANOSECONDS, Obstacles, Prediction
+
+from .encode_inputs import encode_table, hand_pose
+from .encode_markers import encode_markers
+from .plane import lift
+from .ranking import cost_ratios, ranked
+from .types import MessageTypes, header
+
+_FLOATS = ('x', 'y', 'z', 't', 'vx', 'vy', 'vz', 'xx', 'xy', 'xz', 'yy', 'yz', 'zz')
+CLOUD_ROW = np.dtype([*((name, '<f4') for name in _FLOATS), ('candidate', '<u4'), ('likelihood', '<f4')])
+"""One time sample of one candidate [m, s, m/s, m^2]."""
+LIKELIHOOD_COLUMNS = ('likelihood', 'effort', 'cost_ratio', 'eta')
+
+
+def prediction_cloud(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
+    """Encode all solved candidates as a PointCloud2 of N + 1 rows each; no rows if nothing was solved."""
+    return encode_table(types, header(types, prediction.stamp_ns, prediction.frame_id), _build_table(prediction, plane))
+
+
+def _build_table(prediction: Prediction, plane: str) -> NDArray[np.void]:
+    """Return the rows of all solved candidates, one candidate after the other, filled column by column."""
+    outcomes = ranked(prediction)
+    solutions = [outcome.solution for outcome in outcomes]
+    lengths = [len(solution.mean) for solution in solutions]
+    rows = np.zeros(sum(lengths), dtype=CLOUD_ROW)
+    if not len(rows):
+        return rows
+    mean = np.concatenate([solution.mean for solution in solutions])
+    covariance = np.concatenate([solution.covariance[:, :2, :2] for solution in solutions])
+    for place, axis in enumerate(plane):
+        rows[axis], rows['v' + axis], rows[axis + axis] = mean[:, place], mean[:, 2 + place], covariance[:, place, place]
+    rows[plane], rows[next(axis for axis in 'xyz' if axis not in plane)] = covariance[:, 0, 1], prediction.height
+    rows['t'] = np.concatenate([solution.times for solution in solutions])
+    rows['candidate'] = np.repeat(np.arange(len(outcomes)), lengths)
+    rows['likelihood'] = np.repeat([outcome.likelihood for outcome in outcomes], lengths)
+    return rows
+
+
+def likelihood_array(prediction: Prediction, types: MessageTypes) -> Any:
+    """Encode one row per solved candidate, with the columns LIKELIHOOD_COLUMNS, as a Float64MultiArray.
+
+    The first dimension's label joins the labels of the candidates by ';'. effort: the remaining one [m^2/s^6].
+    """
+    outcomes = ranked(prediction)
+    ratios = cost_ratios(outcomes)
+    rows = [(o.likelihood, o.solution.effort, ratio, o.solution.eta) for o, ratio in zip(outcomes, ratios, strict=True)]
+    labels, width = ';'.join(outcome.candidate.label for outcome in outcomes), len(LIKELIHOOD_COLUMNS)
+    dimensions = [
+        types.make('std_msgs/msg/MultiArrayDimension', label=label, size=size, stride=stride)
+        for label, size, stride in ((labels, len(rows), width * len(rows)), (','.join(LIKELIHOOD_COLUMNS), width, width))
+    ]
+    layout = types.make('std_msgs/msg/MultiArrayLayout', dim=dimensions)
+    return types.make('std_msgs/msg/Float64MultiArray', layout=layout, data=np.array(rows, dtype=float).ravel())
+
+
+def encode_path(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
+    """Encode the most likely candidate as a nav_msgs/Path with stamps in the future; no poses if nothing was solved."""
+    stamp_ns, frame_id = prediction.stamp_ns, prediction.frame_id
+    poses: list[Any] = []
+    for outcome in ranked(prediction)[:1]:
+        points = lift(outcome.solution.path, prediction.height, plane).tolist()
+        for seconds, point in zip(outcome.solution.times.tolist(), points, strict=True):
+            poses.append(hand_pose(types, stamp_ns + round(seconds * NANOSECONDS), frame_id, point))
+    return types.make('nav_msgs/msg/Path', header=header(types, stamp_ns, frame_id), poses=poses)
+
+
+Encoder = Callable[[Prediction, Obstacles, str, MessageTypes], Any]
+OUTPUTS: dict[str, tuple[str, Encoder]] = {
+    'prediction': ('sensor_msgs/msg/PointCloud2', lambda prediction, _, plane, types: prediction_cloud(prediction, plane, types)),
+    'likelihoods': ('std_msgs/msg/Float64MultiArray', lambda prediction, _, __, types: likelihood_array(prediction, types)),
+    'path': ('nav_msgs/msg/Path', lambda prediction, _, plane, types: encode_path(prediction, plane, types)),
+    'markers': ('visualization_msgs/msg/MarkerArray', encode_markers),
+}
+"""Message type and encoder of every output, by the name of its topic below the node's name."""
+
+
+def output_messages(
+    prediction: Prediction, obstacles: Obstacles, plane: str, types: MessageTypes, wanted: Iterable[str] = OUTPUTS
+) -> dict[str, Any]:
+    """Encode the wanted outputs, by name; obstacles: those at the stamp, for the markers. Raises FocError as `ranked` does."""
+    return {name: OUTPUTS[name][1](prediction, obstacles, plane, types) for name in wanted}

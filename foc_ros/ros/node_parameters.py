@@ -1,0 +1,106 @@
+"""The parameters of `foc_ros.core.config` on a node: their declaration with ranges, and their changes while it runs.
+
+Parameters that are set together are checked together, and all of them are applied or none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclpy.exceptions import ParameterNotDeclaredException
+from rclpy.parameter import Parameter as RosParameter
+
+from foc_ros.core.config import Config, Parameter, flatten, updated
+from foc_ros.core.errors import ParameterError
+
+from .parameters import AUTOSTART, KNOWN, NODE_ONLY
+
+
+def declare_parameters(node: Any, config: Config) -> Config:
+    """Declare every parameter on a node and return the configuration with which it starts.
+
+    config: the defaults. The node must be created with `automatically_declare_parameters_from_overrides`: the values that it was
+    started with are checked together, and unknown names are logged as warnings. Raises ParameterError.
+    """
+    given = {name: parameter.value for name, parameter in node.get_parameters_by_prefix('').items()}
+    for name in given:
+        if name in KNOWN:
+            node.undeclare_parameter(name)
+        elif name.split('.')[0] not in NODE_ONLY:
+            node.get_logger().warning(f'parameter {name} is unknown and has no effect')
+    config = updated(config, {name: value for name, value in given.items() if name in KNOWN})
+    values = flatten(config)
+    rows = [(name, values[name], _build_descriptor(parameter)) for name, parameter in KNOWN.items()]
+    node.declare_parameters('', rows, ignore_override=True)
+    return config
+
+
+def read_config(node: Any) -> Config:
+    """Return the configuration of a node's declared parameters."""
+    return updated(Config(), {name: node.get_parameter(name).value for name in KNOWN})
+
+
+def declare_autostart(node: Any) -> bool:
+    """Declare the parameter that makes a managed node activate itself when it is created, and return its value."""
+    value = True
+    if node.has_parameter(AUTOSTART):
+        value = node.get_parameter(AUTOSTART).value
+        node.undeclare_parameter(AUTOSTART)
+    if not isinstance(value, bool):
+        raise ParameterError(AUTOSTART, 'true or false', repr(value))
+    description = 'configure and activate the node when it starts; false: a lifecycle manager does it'
+    node.declare_parameter(AUTOSTART, value, ParameterDescriptor(description=description, read_only=True), ignore_override=True)
+    return value
+
+
+def _build_descriptor(parameter: Parameter) -> ParameterDescriptor:
+    bound, choices, ranges = parameter.bound, tuple(parameter.bound.choices), {}
+    if bound.low is not None and bound.high is not None:
+        if isinstance(parameter.default, int):
+            ranges['integer_range'] = [IntegerRange(from_value=int(bound.low), to_value=int(bound.high), step=1)]
+        else:
+            ranges['floating_point_range'] = [FloatingPointRange(from_value=float(bound.low), to_value=float(bound.high))]
+    return ParameterDescriptor(
+        name=parameter.name,
+        description=f'{bound.meaning} [{bound.unit}]' if bound.unit else bound.meaning,
+        additional_constraints=f'one of {", ".join(choices)}' if choices else '',
+        read_only=bound.read_only,
+        **ranges,
+    )
+
+
+class LiveParameters:
+    """The parameters of a running node; `apply` is called with every new configuration. Attributes: config, the present one."""
+
+    def __init__(self, node: Any, config: Config, apply: Callable[[Config], None]) -> None:
+        self.config = config
+        self._node, self._apply = node, apply
+        node.add_pre_set_parameters_callback(self._convert)
+        node.add_on_set_parameters_callback(self._check)
+        node.add_post_set_parameters_callback(self._accept)
+
+    def _convert(self, changed: list[RosParameter]) -> list[RosParameter]:
+        """Convert integers given for floats; refuse unknown parameters by name, which rclpy does not."""
+        unknown = [each.name for each in changed if not self._node.has_parameter(each.name)]
+        if unknown:
+            raise ParameterNotDeclaredException(unknown)
+        return [
+            RosParameter(each.name, value=float(each.value))
+            if each.type_ == RosParameter.Type.INTEGER and each.name in KNOWN and isinstance(KNOWN[each.name].default, float)
+            else each
+            for each in changed
+        ]
+
+    def _check(self, changed: list[RosParameter]) -> SetParametersResult:
+        try:
+            updated(self.config, {each.name: each.value for each in changed if each.name in KNOWN})
+        except ParameterError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _accept(self, changed: list[RosParameter]) -> None:
+        if any(each.name in KNOWN for each in changed):
+            self.config = read_config(self._node)
+            self._apply(self.config)

@@ -1,0 +1,209 @@
+"""Encoding of a prediction, checked with independent readers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from message_helpers import STORE, both_kinds, message_types
+from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction, three_ways
+
+from foc_ros.core.errors import FocError
+from foc_ros.core.types import PredictedCandidate, Prediction, Status, make_obstacles
+from foc_ros.ros.messages.encode_prediction import OUTPUTS, output_messages
+from foc_ros.ros.messages.plane import lift
+from foc_ros.ros.messages.ranking import MAX_RATIO
+from foc_ros.ros.messages.types import MessageTypes
+
+BAGS = message_types('rosbags')
+NAMES = ['x', 'y', 'z', 't', 'vx', 'vy', 'vz', 'xx', 'xy', 'xz', 'yy', 'yz', 'zz', 'candidate', 'likelihood']
+
+
+def made(name: str, of: Prediction, types: MessageTypes = BAGS, plane: str = 'xy') -> Any:
+    return output_messages(of, OBSTACLES, plane, types, [name])[name]
+
+
+def columns(cloud: Any) -> dict[str, np.ndarray]:
+    """Read a cloud by its own field descriptions."""
+    raw = np.frombuffer(bytes(cloud.data), np.uint8).reshape(cloud.height * cloud.width, cloud.point_step)
+    dtypes = {7: '<f4', 6: '<u4'}
+    return {
+        field.name: raw[:, field.offset : field.offset + 4].copy().view(dtypes[field.datatype])[:, 0] for field in cloud.fields
+    }
+
+
+@both_kinds
+@pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
+def test_the_cloud_contains_every_solved_candidate(types: MessageTypes, plane: str) -> None:
+    ways = three_ways()
+    cloud = made('prediction', ways, types, plane)
+    table = columns(cloud)
+    assert list(table) == NAMES
+    assert (cloud.height, cloud.width, cloud.row_step, len(cloud.data)) == (
+        1,
+        2 * (STEPS + 1),
+        2 * (STEPS + 1) * 60,
+        2 * (STEPS + 1) * 60,
+    )
+    assert (cloud.header.stamp.sec, cloud.header.stamp.nanosec, cloud.header.frame_id) == (5, 0, 'world')
+    for index, each in enumerate(ways.solved_candidates):
+        rows = table['candidate'] == index
+        solution = each.solution
+        np.testing.assert_allclose(table['t'][rows], DT * np.arange(STEPS + 1), rtol=1e-6)
+        np.testing.assert_allclose(table['likelihood'][rows], each.likelihood, rtol=1e-6)
+        xyz = np.stack([table[name][rows] for name in 'xyz'], axis=-1)
+        np.testing.assert_allclose(xyz, lift(solution.path, 0.2, plane), rtol=1e-6, atol=1e-9)
+        velocity = np.stack([table[f'v{name}'][rows] for name in 'xyz'], axis=-1)
+        np.testing.assert_allclose(velocity, lift(solution.mean[:, 2:4], 0.0, plane), rtol=1e-6, atol=1e-9)
+        lifted = lift(np.eye(2), 0.0, plane)
+        space = lifted.T @ solution.covariance[:, :2, :2] @ lifted
+        for i, j in zip(*np.triu_indices(3), strict=True):
+            np.testing.assert_allclose(table['xyz'[i] + 'xyz'[j]][rows], space[:, i, j], rtol=1e-6)
+
+
+@both_kinds
+def test_the_likelihoods_are_a_table_with_labels(types: MessageTypes) -> None:
+    message = made('likelihoods', three_ways(), types)
+    rows, columns_ = message.layout.dim
+    assert (rows.label, rows.size, rows.stride) == ('goal0:+l1;goal0:-l1', 2, 8)
+    assert (columns_.label, columns_.size, columns_.stride) == ('likelihood,effort,cost_ratio,eta', 4, 4)
+    table = np.array(message.data).reshape(rows.size, columns_.size)
+    np.testing.assert_allclose(table, [[0.7, 20.0, 1.0, 0.93], [0.3, 20.0, 2.5, 0.91]])
+
+
+@both_kinds
+def test_the_path_is_the_most_likely_one_with_stamps_in_the_future(types: MessageTypes) -> None:
+    ways = three_ways()
+    message = made('path', ways, types, 'xz')
+    stamps = [pose.header.stamp.sec * 10**9 + pose.header.stamp.nanosec for pose in message.poses]
+    assert stamps == [5_000_000_000 + 50_000_000 * i for i in range(STEPS + 1)]
+    points = [(pose.pose.position.x, pose.pose.position.y, pose.pose.position.z) for pose in message.poses]
+    np.testing.assert_array_equal(points, lift(ways.solved_candidates[0].solution.path, 0.2, 'xz'))
+    assert {pose.header.frame_id for pose in message.poses} == {'world'} == {message.header.frame_id}
+    assert {pose.pose.orientation.w for pose in message.poses} == {1.0}
+
+
+def test_the_candidate_called_most_likely_is_first_even_if_another_is_likelier() -> None:
+    ways = prediction(outcome('a', 0.52, 0.1), outcome('b', 0.48, -0.1), most_likely='b')
+    assert made('likelihoods', ways).layout.dim[0].label == 'b;a'
+    table = columns(made('prediction', ways))
+    np.testing.assert_allclose(table['likelihood'][table['candidate'] == 0], 0.48, rtol=1e-6)
+    assert made('path', ways).poses[2].pose.position.y < 0
+
+
+@both_kinds
+@pytest.mark.parametrize('outcomes', [(), (outcome(status=Status.DEADLINE),)])
+def test_nothing_solved_is_an_empty_answer(types: MessageTypes, outcomes: tuple[PredictedCandidate, ...]) -> None:
+    messages = output_messages(prediction(*outcomes), OBSTACLES, 'xy', types)
+    assert (messages['prediction'].width, len(messages['prediction'].data)) == (0, 0)
+    assert [field.name for field in messages['prediction'].fields] == NAMES
+    assert (messages['likelihoods'].layout.dim[0].size, len(messages['likelihoods'].data)) == (0, 0)
+    assert not len(messages['path'].poses)
+    assert messages['path'].header.stamp.sec == 5
+
+
+def test_cost_ratios_stay_finite() -> None:
+    ways = prediction(outcome('a', 1.0, cost=0.0), outcome('b', 0.0, cost=1.0), outcome('c', 0.0, cost=0.0))
+    table = np.array(made('likelihoods', ways).data).reshape(-1, 4)
+    np.testing.assert_array_equal(table[:, 2], [1.0, MAX_RATIO, 1.0])
+
+
+@pytest.mark.parametrize('value', [np.nan, np.inf, 1e31])
+@pytest.mark.parametrize('where', ['mean', 'covariance', 'effort', 'eta'])
+def test_a_number_that_is_not_finite_is_not_encoded(value: float, where: str) -> None:
+    good = getattr(outcome().solution, where)
+    bad = np.array(good)
+    bad.flat[-1] = value
+    ways = prediction(outcome('bad', **{where: bad if np.ndim(good) else value}))
+    for name in OUTPUTS:
+        with pytest.raises(FocError, match='candidate bad: the solution holds a number that is not finite'):
+            made(name, ways)
+
+
+@both_kinds
+def test_markers_show_every_candidate_and_obstacle(types: MessageTypes) -> None:
+    markers = made('markers', three_ways(), types).markers
+    assert (markers[0].action, markers[0].ns) == (3, '')
+    by_name: dict[str, list[Any]] = {}
+    for each in markers[1:]:
+        assert (each.header.stamp.sec, each.header.frame_id, each.lifetime.sec) == (5, 'world', 1)
+        by_name.setdefault(each.ns, []).append(each)
+    assert sorted(by_name) == ['deviation', 'label', 'obstacle', 'obstacle_deviation', 'path']
+    assert all(len({each.id for each in group}) == len(group) for group in by_name.values())
+    assert [len(each.points) for each in by_name['path']] == [STEPS + 1] * 3
+    assert [each.text for each in by_name['label']] == ['goal0:+l1 70 %', 'goal0:-l1 30 %', 'goal0:+l2 infeasible']
+    grey = by_name['path'][2].color
+    assert grey.r == grey.g == grey.b
+    assert [each.scale.x for each in by_name['obstacle']] == pytest.approx([0.06, 0.04])
+    assert [each.scale.x for each in by_name['obstacle_deviation']] == pytest.approx([0.07, 0.04])
+
+
+def rotated(quaternion: Any, vector: np.ndarray) -> np.ndarray:
+    axis = np.array([quaternion.x, quaternion.y, quaternion.z])
+    return vector + 2 * np.cross(axis, np.cross(axis, vector) + quaternion.w * vector)
+
+
+@pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
+def test_an_ellipse_has_the_axes_of_the_covariance(plane: str) -> None:
+    markers = [each for each in made('markers', three_ways(), plane=plane).markers if each.ns == 'deviation']
+    for each in markers:
+        drawn = sum(
+            (size / 2) ** 2 * np.outer(axis, axis)
+            for size, axis in (
+                (each.scale.x, rotated(each.pose.orientation, np.array([1.0, 0, 0]))),
+                (each.scale.y, rotated(each.pose.orientation, np.array([0, 1.0, 0]))),
+            )
+        )
+        lifted = lift(np.eye(2), 0.0, plane)
+        np.testing.assert_allclose(drawn, lifted.T @ [[4e-6, 1e-6], [1e-6, 9e-6]] @ lifted, atol=1e-12)
+
+
+def test_a_candidate_without_a_path_shows_its_guess() -> None:
+    lost = outcome(status=Status.INFEASIBLE, mean=np.full((STEPS + 1, 6), np.nan))
+    markers = made('markers', prediction(lost)).markers
+    line = next(each for each in markers if each.ns == 'path')
+    np.testing.assert_allclose([(p.x, p.y) for p in line.points], lost.candidate.guess)
+
+
+def test_the_nearest_of_many_obstacles_are_drawn() -> None:
+    crowd = make_obstacles([[0.01 * i, 0.0] for i in range(1000, 0, -1)], 0.001)
+    markers = output_messages(three_ways(), crowd, 'xy', BAGS, ['markers'])['markers'].markers
+    drawn = [each.pose.position.x for each in markers if each.ns == 'obstacle']
+    assert sorted(drawn) == pytest.approx([0.01 * i for i in range(1, 129)])
+
+
+@both_kinds
+def test_every_output_is_the_same_after_serialisation(types: MessageTypes) -> None:
+    for name, message in output_messages(three_ways(), OBSTACLES, 'xy', types).items():
+        kind = OUTPUTS[name][0]
+        if hasattr(message, '__msgtype__'):
+            raw = STORE.serialize_cdr(message, kind)
+        else:
+            from rclpy.serialization import serialize_message
+
+            raw = serialize_message(message)
+        back = STORE.deserialize_cdr(raw, kind)
+        twin = output_messages(three_ways(), OBSTACLES, 'xy', BAGS, [name])[name]
+        assert bytes(STORE.serialize_cdr(back, kind)) == bytes(STORE.serialize_cdr(twin, kind))
+
+
+ways = st.lists(st.tuples(st.floats(0, 1), st.floats(-0.3, 0.3), st.floats(0, 1e6), st.sampled_from(list(Status))), max_size=5)
+
+
+@given(ways, st.sampled_from(['xy', 'xz', 'yz']), st.floats(-1e4, 1e4))
+def test_any_prediction_can_be_read_from_its_cloud(
+    rows: list[tuple[float, float, float, Status]], plane: str, height: float
+) -> None:
+    outcomes = [outcome(f'c{i}', p, bend, cost, status=status) for i, (p, bend, cost, status) in enumerate(rows)]
+    given_prediction = prediction(*outcomes, height=height)
+    table = columns(made('prediction', given_prediction, plane=plane))
+    solved = given_prediction.solved_candidates
+    assert set(table['candidate']) == set(range(len(solved)))
+    for index, each in enumerate(solved):
+        rows_ = table['candidate'] == index
+        xyz = np.stack([table[name][rows_] for name in 'xyz'], axis=-1)
+        np.testing.assert_allclose(xyz, lift(each.solution.path, height, plane), rtol=1e-6, atol=1e-9)
+    assert all(np.isfinite(column).all() for column in table.values())

@@ -1,0 +1,85 @@
+"""Every example runs and makes a figure, and the Python code on the pages does what the pages say."""
+
+from __future__ import annotations
+
+import re
+import runpy
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import foc_ros
+from foc_ros.core import registry
+
+mpl = pytest.importorskip('matplotlib', reason='matplotlib is not installed')
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES = sorted((ROOT / 'examples').glob('*.py'))
+PAGES = [ROOT / 'README.md', *sorted((ROOT / 'doc').glob('*.md'))]
+EXAMPLE_S = 100
+"""An example takes a few seconds; this is for a busy machine on which the kernels are not compiled yet."""
+
+
+def python_blocks(page: Path) -> list[str]:
+    """Return the blocks of Python code of a page, in their order."""
+    return re.findall(r'^```python\n(.*?)^```', page.read_text('utf-8'), re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture
+def pyplot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[object]:
+    """Figures are kept and not shown; the registries are as before afterwards."""
+    monkeypatch.setenv('MPLBACKEND', 'Agg')
+    mpl.use('Agg')
+    import matplotlib.pyplot as plt
+
+    monkeypatch.setattr(plt, 'show', lambda: None)
+    monkeypatch.chdir(tmp_path)
+    for parts in (each for each in vars(registry).values() if isinstance(each, registry.Registry)):
+        monkeypatch.setattr(parts, '_parts', dict(parts._parts))
+    plt.close('all')
+    yield plt
+    plt.close('all')
+
+
+def test_there_are_examples_with_titles() -> None:
+    assert len(EXAMPLES) >= 10
+    gallery = (ROOT / 'doc' / 'gallery.md').read_text('utf-8')
+    for example in EXAMPLES:
+        docstring = re.match(r'"""\n(.+)\n(=+)\n\n', example.read_text('utf-8'))
+        assert docstring and len(docstring[1]) == len(docstring[2]), f'{example.name} has no title'
+        assert f'[{docstring[1]}](../examples/{example.name})' in gallery, f'doc/gallery.md does not list {example.name}'
+
+
+@pytest.mark.timeout(EXAMPLE_S)
+@pytest.mark.parametrize('example', EXAMPLES, ids=lambda example: example.stem)
+def test_the_example_runs_and_makes_a_figure(example: Path, pyplot: object) -> None:
+    runpy.run_path(str(example), run_name='__main__')
+    figures = pyplot.get_fignums()
+    assert figures, f'{example.name} makes no figure'
+    for number in figures:
+        pyplot.figure(number).savefig(f'{number}.png')
+
+
+@pytest.mark.parametrize('example', EXAMPLES, ids=lambda example: example.stem)
+def test_the_example_is_short(example: Path) -> None:
+    assert 20 <= len(example.read_text('utf-8').splitlines()) <= 80
+
+
+@pytest.mark.timeout(EXAMPLE_S)
+@pytest.mark.parametrize('page', [page for page in PAGES if python_blocks(page)], ids=lambda page: page.name)
+def test_the_code_on_the_page_runs(page: Path, tmp_path: Path) -> None:
+    """All blocks of a page run in their order in one process of their own, where warnings are errors."""
+    script = tmp_path / 'page.py'
+    script.write_text('\n\n'.join(["import matplotlib\n\nmatplotlib.use('Agg')", *python_blocks(page)]), encoding='utf-8')
+    command = [sys.executable, '-W', 'error', '-W', 'ignore::DeprecationWarning', str(script)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=EXAMPLE_S, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_api_reference_lists_every_public_name() -> None:
+    page = (ROOT / 'doc' / 'api.md').read_text('utf-8')
+    documented = set(re.findall(r'^\.\. auto\w+:: (\w+)', page, re.MULTILINE))
+    assert documented == set(foc_ros.__all__)

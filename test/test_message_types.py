@@ -1,0 +1,80 @@
+"""Messages made for rclpy and for rosbags: the same fields, the right containers, and the same bytes."""
+
+from __future__ import annotations
+
+import array
+import re
+
+import numpy as np
+import pytest
+from ros_helpers import require_ros
+from rosbags.typesys import Stores, get_typestore
+
+from foc_ros.ros.messages import types as conversion_types
+from foc_ros.ros.messages.types import MessageTypes, RclpyTypes, RosbagsTypes
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+
+
+def samples(types: MessageTypes) -> list[object]:
+    """Return one message for each kind of field, with numbers of the wrong type."""
+    point = types.make('geometry_msgs/msg/Point', x=1, y=np.float32(0.5), z=np.int64(-3))
+    quaternion = types.make('geometry_msgs/msg/Quaternion', x=0, y=0, z=0, w=1)
+    pose = types.make('geometry_msgs/msg/Pose', position=point, orientation=quaternion)
+    header = conversion_types.header(types, 3_000_000_004, 'world')
+    key = types.make('diagnostic_msgs/msg/KeyValue', key='k', value='v')
+    positions = np.arange(2, dtype=np.float32)
+    return [
+        point,
+        types.make('geometry_msgs/msg/PoseWithCovariance', pose=pose, covariance=range(36)),
+        types.make('std_msgs/msg/Float64MultiArray', data=[1, 2, 3]),
+        types.make('sensor_msgs/msg/JointState', name=['a', 'b'], position=positions, velocity=[1], effort=[5]),
+        types.make('sensor_msgs/msg/PointCloud2', data=b'\x01\x02', header=header),
+        types.make('diagnostic_msgs/msg/DiagnosticStatus', level=2, name='n', values=[key, key]),
+        types.make('diagnostic_msgs/msg/DiagnosticArray'),
+    ]
+
+
+@pytest.fixture
+def rclpy_types() -> RclpyTypes:
+    require_ros()
+    return RclpyTypes()
+
+
+@pytest.mark.parametrize('index', range(7))
+def test_both_libraries_have_the_same_values(rclpy_types: RclpyTypes, index: int) -> None:
+    from rclpy.serialization import serialize_message
+
+    ours, bags = samples(rclpy_types)[index], samples(RosbagsTypes(STORE))[index]
+    name = bags.__msgtype__
+    decoded = STORE.deserialize_cdr(serialize_message(ours), name)
+    assert STORE.serialize_cdr(decoded, name) == STORE.serialize_cdr(bags, name)
+
+
+def test_containers_are_those_of_each_library(rclpy_types: RclpyTypes) -> None:
+    ours = rclpy_types.make('sensor_msgs/msg/PointCloud2', data=np.arange(3))
+    bags = RosbagsTypes(STORE).make('sensor_msgs/msg/PointCloud2', data=b'\x00\x01\x02')
+    assert isinstance(ours.data, array.array) and ours.data.typecode == 'B' and list(ours.data) == [0, 1, 2]
+    assert isinstance(bags.data, np.ndarray) and bags.data.dtype == np.uint8 and list(bags.data) == [0, 1, 2]
+
+
+def test_integers_become_floats_in_float_fields(rclpy_types: RclpyTypes) -> None:
+    for types in (rclpy_types, RosbagsTypes(STORE)):
+        point = types.make('geometry_msgs/msg/Point', x=1, y=np.float32(2), z=np.int32(3))
+        assert [type(v) for v in (point.x, point.y, point.z)] == [float] * 3
+        assert (point.x, point.y, point.z) == (1.0, 2.0, 3.0)
+
+
+def test_an_unknown_field_is_named(rclpy_types: RclpyTypes) -> None:
+    for types in (rclpy_types, RosbagsTypes(STORE)):
+        with pytest.raises(TypeError, match=re.escape('geometry_msgs/msg/Point has no field radius')):
+            types.make('geometry_msgs/msg/Point', radius=1.0)
+
+
+@pytest.mark.parametrize(
+    ('stamp_ns', 'expected'),
+    [(0, (0, 0)), (1_500_000_000, (1, 500_000_000)), (-1, (-1, 999_999_999)), (2**80, (2**31 - 1, 2**80 % 10**9))],
+)
+def test_stamps_split_and_stay_in_range(stamp_ns: int, expected: tuple[int, int]) -> None:
+    made = conversion_types.stamp(RosbagsTypes(STORE), stamp_ns)
+    assert (made.sec, made.nanosec) == expected

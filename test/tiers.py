@@ -1,0 +1,119 @@
+"""Which tests are `long` and which are `process`: the two markers by which `make check`, `test` and `test-long` choose.
+
+`LONG` lists the long tests. The mark `process` is derived from the code: a test has it if the test, a fixture of it or a helper
+in this folder starts a process, a ROS graph or a browser. Tests that do so through the package are listed in `PROCESS`. The
+lists consist of shell patterns for 'file::function'. `test_tiers.py` fails if a pattern matches no test.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from collections.abc import Callable, Iterator
+from fnmatch import fnmatchcase
+from pathlib import Path
+from types import CodeType
+from typing import Any
+
+import pytest
+
+FOLDER = Path(__file__).resolve().parent
+
+LONG = (
+    # studies of the solver over many scenes
+    'test_effort_over_eta.py::test_effort_is_continuous*',
+    'test_effort_over_eta.py::test_no_strategy_needs_less_effort_than_optimal_in_the_same_class',
+    'test_flicker.py::test_*symmetric_obstacle*',
+    'test_guarantee.py::*',
+    'test_slow_path.py::*',
+    # all steps of a fit, of the paper's studies and of long reports
+    'test_fit.py::test_strategy_fixed_has_its_tau_and_lambda_fitted',
+    'test_fit.py::test_without_obstacles_goals_*',
+    'test_paper.py::test_same_files_each_time',
+    'test_report.py::test_a_long_recording_is_thinned_out*',
+    'test_report.py::test_every_movement_is_shown_up_to_a_number',
+    'test_report_page.py::test_*a_broken_page*',
+    'test_report_page.py::test_a_long_recording_says_where_the_slider_stops',
+    # the commands of the documentation
+    'test_shown_commands.py::test_commands_work_as_shown',
+    # a node under load, and a process that is stopped or killed
+    'test_cluster.py::test_a_scheduler_that_dies_ends_the_run_in_words',
+    'test_demo.py::test_the_live_predictions_are_those_of_the_recording',
+    'test_node_hostile.py::test_*a_flood_of_obstacles*',
+    'test_node_hostile.py::test_a_node_that_is_killed_and_started_again',
+    'test_node_process.py::test_a_*work*without_an_error',
+    'test_node_process.py::test_a_node_*every_pose_of_a_tracker',
+    'test_node_rates.py::*',
+)
+
+PROCESS = (
+    'test_cluster.py::*',
+    'test_demo_*.py::test_the_node_*',
+    'test_fit.py::*',
+    'test_fit_*.py::test_a_setting_that_predicts_nothing_*',
+    'test_evaluate.py::test_the_number_of_workers_does_not_matter',
+    'test_paper.py::*',
+)
+
+STARTERS = {'subprocess', 'free_domain', 'chromium', 'worker_tasks'}
+"""Names whose use in a test, a fixture or a helper means that a process, a ROS graph or a browser is started."""
+
+
+def is_listed(file: str, function: str, patterns: tuple[str, ...]) -> bool:
+    """Return whether one of the patterns matches a test function."""
+    return any(fnmatchcase(f'{file}::{function}', pattern) for pattern in patterns)
+
+
+def starts_process(item: pytest.Function) -> bool:
+    """Return whether the code of a test, of its fixtures or of the helpers that they call contains one of `STARTERS`."""
+    fixtures = [definition.func for found in item._fixtureinfo.name2fixturedefs.values() for definition in found]
+    seen: set[Callable[..., Any]] = set()
+    return any(uses_starter(inspect.unwrap(function), seen) for function in (item.function, *fixtures))
+
+
+def uses_starter(function: Any, seen: set[Callable[..., Any]]) -> bool:
+    """Return whether a function, or a function or class of this folder that it refers to, contains one of `STARTERS`."""
+    code = getattr(function, '__code__', None)
+    if code is None or function in seen:
+        return False
+    seen.add(function)
+    names = set(find_names(code))
+    if names & STARTERS:
+        return True
+    for value in map(function.__globals__.get, names):
+        parts = vars(value).values() if inspect.isclass(value) else (value,)
+        for part in (inspect.unwrap(part) for part in parts if inspect.isfunction(part)):
+            if Path(part.__code__.co_filename).parent == FOLDER and uses_starter(part, seen):
+                return True
+    return False
+
+
+def find_names(code: CodeType) -> Iterator[str]:
+    """Yield the names that a code object and the code objects nested in it refer to."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from find_names(constant)
+
+
+def add_marks(items: list[pytest.Item]) -> None:
+    """Mark the collected tests."""
+    for item in items:
+        if not isinstance(item, pytest.Function):
+            continue
+        file, function = item.path.name, item.originalname
+        if is_listed(file, function, LONG):
+            item.add_marker(pytest.mark.long)
+        if is_listed(file, function, PROCESS) or starts_process(item):
+            item.add_marker(pytest.mark.process)
+
+
+def list_test_functions() -> set[tuple[str, str]]:
+    """Return the file and name of all test functions of this folder."""
+    found = set()
+    for path in FOLDER.glob('test_*.py'):
+        tree = ast.parse(path.read_text(encoding='utf-8'))
+        found |= {
+            (path.name, node.name) for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and node.name[:5] == 'test_'
+        }
+    return found
