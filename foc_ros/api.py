@@ -20,6 +20,7 @@ from foc_ros.core.memory import Memory
 from foc_ros.core.obstacles.scene import ObstacleSource
 from foc_ros.core.obstacles.shapes import Circle, collect_obstacles
 from foc_ros.core.ocp import monte_carlo as sampling
+from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.predictor import predict
 from foc_ros.core.reaching_scene import ReachingScene, build_scene_problems, check_outside, solve_scene
@@ -202,8 +203,8 @@ class Solution(types.Solution):
         Times [s], mean positions [m], and mean and covariance of the state: position, velocity and what else the plant has.
     control, effort : ndarray of shape (N, 2), float
         Jerk [m/s^3] for the triple integrator, force [N] for the damped mass; the sum of its squares.
-    eta : float
-        Probability of avoidance that the solution achieves for each obstacle and step.
+    eta, problem : float, Problem
+        Probability of avoidance that the solution achieves for each obstacle and step, and the problem that was solved.
     """
 
     label: str = ''
@@ -451,9 +452,20 @@ def register_strategy(name: str, function: Callable[..., Any]) -> None:
     name : str
         A new name; `InputError` is raised if it is taken.
     function : callable
-        ``function(problem, start, settings, deadline)``, which returns the result that `foc_ros.core.ocp.strategies` describes.
+        ``function(problem, start, settings, deadline)``, which returns a `StrategyResult`: see `foc_ros.core.ocp.strategies`.
     """
     STRATEGIES.register(name, function)
+
+
+def get_strategy(name: str) -> Callable[..., Any]:
+    """Return a strategy by its name, for a strategy that builds on another one; `InputError` is raised for an unknown name."""
+    strategy: Callable[..., Any] = STRATEGIES.get(name)
+    return strategy
+
+
+def compute_eta(problem: Problem, control: types.Array) -> float:
+    """Return the eta that a stacked control (2N,) achieves: the smallest over all obstacles and steps."""
+    return find_minimum_safety_factor(problem, control, between_steps=False).eta
 
 
 def register_plant(name: str, factory: Callable[..., Any]) -> None:

@@ -27,18 +27,15 @@ CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003)
 
 
 @pytest.fixture
-def register():
+def register(monkeypatch):
     """Register plants for one test."""
-    names = []
 
     def add(name, factory):
         foc_ros.register_plant(name, factory)
-        names.append(name)
         return Config().with_values({'foc.plant': name})
 
+    monkeypatch.setattr(PLANTS, '_parts', dict(PLANTS._parts))
     yield add
-    for name in names:
-        del PLANTS._parts[name]
     make_plant_model.cache_clear()
 
 
