@@ -11,29 +11,35 @@ from dataclasses import replace
 
 import matplotlib.pyplot as plt
 import numpy as np
-from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 
 import foc_ros
+from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.strategies import StrategyResult
 from foc_ros.core.registry import STRATEGIES
 
 LARGEST_TAU, BISECTIONS = 0.01, 25
 
 
-def solve_constant_precision(problem, start, settings, deadline) -> StrategyResult:  # noqa: ANN001
+def solve_constant_precision(problem, start, settings, deadline) -> StrategyResult:
     """Return the solution with the smallest tau that meets eta at lambda = foc.lam."""
-    low, high, best = 0.0, LARGEST_TAU, None
-    for tau in [LARGEST_TAU, 0.0] + BISECTIONS * [None]:
-        tau = (low + high) / 2 if tau is None else tau
+
+    def solve(tau: float) -> tuple[StrategyResult, bool]:
         result = STRATEGIES.get('fixed')(problem, start, replace(settings, tau=tau), deadline)
-        is_solved = result.status is foc_ros.Status.SOLVED
-        if is_solved and find_minimum_safety_factor(problem, result.control, between_steps=False).eta >= problem.eta:
-            high, best = tau, result
-        elif best is None:
-            return replace(result, status=foc_ros.Status.ETA_UNREACHABLE, message='eta is out of reach', aims_at_eta=True)
+        eta = find_minimum_safety_factor(problem, result.control, between_steps=False).eta
+        return replace(result, aims_at_eta=True), result.status is foc_ros.Status.SOLVED and eta >= problem.eta
+
+    low, high = 0.0, LARGEST_TAU
+    best, is_enough = solve(high)
+    if not is_enough:
+        return replace(best, status=foc_ros.Status.ETA_UNREACHABLE, message=f'eta is out of reach at tau = {high:g} m^2')
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        result, is_enough = solve(middle)
+        if is_enough:
+            high, best = middle, result
         else:
-            low = tau
-    return replace(best, aims_at_eta=True)
+            low = middle
+    return best
 
 
 foc_ros.register_strategy('constant_precision', solve_constant_precision)

@@ -27,8 +27,7 @@ from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import cold_start
 from foc_ros.core.reaching_scene import build_scene_problems, solve_scene
 from foc_ros.core.types import Array, Obstacles, Solution, make_obstacles
-from foc_ros.io.guess import guess_path
-from foc_ros.io.scene_file import load_scene
+from foc_ros.io.scene_file import guess_path, load_scene
 from foc_ros.reporting.drawing import class_style, draw_candidates, draw_scene, draw_tag, new_figure, stddev_ellipse
 from foc_ros.reporting.plots import bounds_of, number_labels, save
 from foc_ros.reporting.snapshots import build_candidate_views

@@ -55,7 +55,9 @@ NOT_RUN = {
     '.venv/bin/python scripts/make_accuracy_figures.py': f'{LONG}; test_accuracy_page.py checks the page',
     'foc_ros paper --output paper_output': 'takes half a minute; test_paper.py runs the studies on a coarser grid',
     # CONTRIBUTING
+    'make check': BY_CI,
     'make test': BY_CI,
+    'make test-long': BY_CI,
     'make lint': BY_CI,
     'make doc': BY_CI,
     'make bench': LONG,
