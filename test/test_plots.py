@@ -24,7 +24,7 @@ from foc_ros.reporting.drawing import (
     CLASSES,
     ELLIPSES_PER_CANDIDATE,
     NO_CLASS_COLOUR,
-    candidate_style,
+    get_candidate_style,
     get_class_style,
     make_stddev_ellipse,
 )
@@ -64,7 +64,7 @@ def luminance(colour: tuple[float, float, float]) -> float:
 
 def test_colours_show_on_white_and_the_likely_candidate_is_the_thickest() -> None:
     assert all(1.05 / (luminance(colour) + 0.05) > 1.5 for colour in (*CLASS_COLOURS, NO_CLASS_COLOUR))
-    widths = [candidate_style(0, likelihood)['linewidth'] for likelihood in np.linspace(0.0, 1.0, 20)]
+    widths = [get_candidate_style(0, likelihood)['linewidth'] for likelihood in np.linspace(0.0, 1.0, 20)]
     assert np.all(np.diff(widths) > 0.0)
     styles = [get_class_style(slot) for slot in range(CLASSES)]
     assert len(set(styles)) == CLASSES

@@ -76,13 +76,13 @@ def get_letter(slot: int | None) -> str:
     return ' ' if slot is None else ascii_uppercase[slot]
 
 
-def candidate_style(slot: int | None, likelihood: float) -> dict[str, Any]:
+def get_candidate_style(slot: int | None, likelihood: float) -> dict[str, Any]:
     """Return the line style of a candidate: colour and dash of its slot, the thicker the more likely."""
     colour, dash = (NO_CLASS_COLOUR, '-') if slot is None else get_class_style(slot)
     return {'color': colour, 'linestyle': dash, 'linewidth': 1.2 + 3.0 * likelihood}
 
 
-def ellipse_axes(covariance: Array) -> tuple[Array, Array, Array]:
+def compute_ellipse_axes(covariance: Array) -> tuple[Array, Array, Array]:
     """Return greater and smaller standard deviation and the angle of the greater [degrees]; covariance (..., 2, 2)."""
     variances, vectors = np.linalg.eigh(covariance)
     stddevs = np.sqrt(np.maximum(variances, 0.0))
@@ -91,7 +91,7 @@ def ellipse_axes(covariance: Array) -> tuple[Array, Array, Array]:
 
 def make_stddev_ellipse(centre: Array, covariance: Array, stddevs: float = STDDEVS) -> Ellipse:
     """Return the ellipse of the given number of standard deviations; centre (2,) [m], covariance (2, 2) [m^2]."""
-    greater, smaller, angle = ellipse_axes(covariance)
+    greater, smaller, angle = compute_ellipse_axes(covariance)
     return Ellipse(tuple(centre), 2.0 * stddevs * float(greater), 2.0 * stddevs * float(smaller), angle=float(angle))
 
 
@@ -121,7 +121,7 @@ def draw_candidates(axes: Any, candidates: Sequence[CandidateView], slots: Mappi
     slots: by label; a candidate without a slot has no letter.
     """
     for rank, each in reversed(list(enumerate(candidates))):
-        style, letter = candidate_style(slots.get(each.label), each.likelihood), get_letter(slots.get(each.label))
+        style, letter = get_candidate_style(slots.get(each.label), each.likelihood), get_letter(slots.get(each.label))
         for row in np.unique(np.linspace(0, len(each.path) - 1, ELLIPSES_PER_CANDIDATE).astype(int)):
             ellipse = make_stddev_ellipse(each.path[row], each.covariance[row])
             ellipse.set(facecolor=to_rgba(style['color'], 0.1), edgecolor=to_rgba(style['color'], 0.5), linewidth=0.6, zorder=2)
@@ -174,7 +174,7 @@ def draw_speeds(
     """Draw predicted speeds and the measured speed within a span [ns], which is dotted after the stamp of the snapshot."""
     now_s = (snapshot.stamp_ns - origin_ns) / NANOSECONDS
     for each in reversed(snapshot.candidates):
-        axes.plot(now_s + each.times, each.speed, **candidate_style(slots.get(each.label), each.likelihood))
+        axes.plot(now_s + each.times, each.speed, **get_candidate_style(slots.get(each.label), each.likelihood))
     times = hand.seconds_after(origin_ns)
     for rows, dash, width in ((hand.between(*span), ':', 1.6), (hand.between(span[0], snapshot.stamp_ns), '-', 2.0)):
         axes.plot(times[rows], hand.speed[rows], color='black', linewidth=width, linestyle=dash)

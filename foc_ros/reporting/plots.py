@@ -125,14 +125,14 @@ def number_labels(candidates: Sequence[CandidateView]) -> dict[str, int]:
 
 
 def compute_bounds(
-    obstacles: Obstacles, goals: Array, ways: Sequence[CandidateView], *points: Array, margin: float = 0.04
+    obstacles: Obstacles, goals: Array, candidates: Sequence[CandidateView], *points: Array, margin: float = 0.04
 ) -> Bounds:
     """Return limits of x and y [m] around obstacles, goals, candidates with their ellipses, and further points (m, 2).
 
     margin: as a share of the greater side.
     """
     reach = (obstacles.radius + STDDEVS * obstacles.radius_stddev)[:, None]
-    spread = [(each.path, STDDEVS * np.sqrt(np.diagonal(each.covariance, axis1=1, axis2=2))) for each in ways]
+    spread = [(each.path, STDDEVS * np.sqrt(np.diagonal(each.covariance, axis1=1, axis2=2))) for each in candidates]
     edges = [centre + sign * width for centre, width in [(obstacles.centre, reach), *spread] for sign in (-1.0, 1.0)]
     enclosed = np.concatenate([*edges, np.reshape(goals, (-1, 2)), *points])
     low, high = (enclosed.min(axis=0), enclosed.max(axis=0)) if len(enclosed) else (np.zeros(2), np.ones(2))

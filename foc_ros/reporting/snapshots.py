@@ -141,7 +141,7 @@ def is_same_prediction(cloud: Any, likelihoods: Any) -> bool:
 
 
 def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles, goals: Array) -> Snapshot:
-    """Return the snapshot in one pair of messages of `~/prediction` and `~/likelihoods`.
+    """Return the snapshot in a pair of messages of `~/prediction` and `~/likelihoods`: inverse of `messages.encode_prediction`.
 
     obstacles and goals (g, 2) [m] are those at the stamp of the messages. Raises MessageError if the two messages hold different
     predictions.

@@ -22,7 +22,7 @@ POLICY = "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; sc
 """Content security policy of every page: a browser shows what the page holds and fetches nothing."""
 
 
-def own_part(name: str) -> str:
+def read_part(name: str) -> str:
     """Return the text of a file of this folder."""
     return (FOLDER / name).read_text(encoding='utf-8')
 
@@ -35,7 +35,7 @@ def load_plotly() -> str:
 
 
 _TEMPLATES = Environment(autoescape=True, undefined=StrictUndefined, loader=FileSystemLoader(FOLDER), trim_blocks=True)
-_TEMPLATES.globals.update(policy=POLICY, source=own_part, plotly=load_plotly)
+_TEMPLATES.globals.update(policy=POLICY, source=read_part, plotly=load_plotly)
 _TEMPLATES.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
 _PARTS: Any = _TEMPLATES.get_template('parts.html').module
 
