@@ -1,7 +1,9 @@
 # make setup [PYTHON=python3.12] [ROS=wheels|system]   create .venv with everything; repeated only if something has changed
-# make check       lint, and the tests of single parts within this process: less than a minute on two cores
-# make test        all tests but the long ones, with other processes, ROS graphs and browsers: less than three minutes
+# make check       lint, and the tests that run within one process: less than a minute on two cores
+# make test        all tests but the long ones: less than three minutes
 # make test-long   the long studies, tests under load and the commands of the documentation
+#                  test/tiers.py lists the long tests (mark `long`) and finds those that start another process, a ROS graph or a
+#                  browser (mark `process`); make check is pytest -m 'not long and not process'
 # make lint        ruff, mypy and the import contracts
 # make demo        the demo: the node and the packaged recording
 # make doc         the documentation as HTML, in build/doc/index.html
@@ -116,5 +118,6 @@ pages: $(STAMP)
 	$(BIN)/python scripts/make_parameter_page.py
 
 clean:
+	rm -rf doc/auto_examples doc/sg_execution_times.rst
 	rm -rf $(VENV) build dist install log demo_output paper_output *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -37,6 +37,7 @@ setup(
     install_requires=[
         'numba>=0.58',
         'numpy>=1.23',
+        'pebble>=5',
         'piqp>=0.6',
         'qpsolvers>=4.3',
         'PyYAML>=6.0',
@@ -47,11 +48,11 @@ setup(
     extras_require={
         # rclpy with Fast DDS and the common interfaces as wheels, for machines without a ROS installation
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
-        'report': ['matplotlib>=3.6', 'plotly>=5.24'],
+        'report': ['Jinja2>=3.1', 'matplotlib>=3.6', 'plotly>=5.24'],
         # recordings on the workers of a Dask cluster
         'cluster': ['distributed>=2024.1'],
         # the documentation as a web site
-        'doc': ['furo>=2024.8', 'myst-parser>=4', 'sphinx>=8'],
+        'doc': ['furo>=2024.8', 'matplotlib>=3.6', 'myst-parser>=4', 'numpydoc>=1.7', 'sphinx>=8', 'sphinx-gallery>=0.17'],
         # what the benchmark compares with
         'bench': ['casadi>=3.6', 'cvxpy>=1.4', 'daqp>=0.5', 'matplotlib>=3.6', 'scipy>=1.15'],
         'test': [

@@ -269,7 +269,7 @@ def solve(
     target, config = check_vector('goal', goal, 2), _fix_parameters(config, eta, strategy, duration_s)
     scene = _build_scene(start, target[None], obstacles, config)
     if guess is not None:
-        from foc_ros.io.guess import guess_path
+        from foc_ros.io.scene_file import guess_path
 
         points = check_array('guess', guess, (None, 2))
         scene = replace(scene, guess=guess_path(scene.hand.mean[:2], target, config.foc.steps, via=points))

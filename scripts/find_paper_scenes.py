@@ -1,16 +1,17 @@
 #!/usr/bin/env python3
 """Find the scenes of `foc_ros.analysis.paper.scenes`: the paper gives no coordinates, so they are searched for, with seeds.
 
-python scripts/find_paper_scenes.py strategies|ways [--seeds FIRST LAST] [--refine]
+python scripts/find_paper_scenes.py strategies|classes [--seeds FIRST LAST] [--refine]
 
-For each seed a random scene is taken (with --refine: the present one), and changed at random while that lowers its score. Printed
-is where each climb ended, with its score: |log| distances of effort ratios from the paper's, and what its trends forbid.
+For each seed the script takes a random scene (with --refine: the present one) and changes it at random while that lowers its
+score: the |log| distances of effort ratios from those of the paper, and penalties for trends that are missing. It prints the end
+of each search.
 
-strategies: one way past one to three circles. J_LV / J_HC is below 1 at the first eta and above 1 from 0.94 on, and rises, for
+strategies: one class past one to three circles. J_LV / J_HC is below 1 at the first eta and above 1 from 0.94 on, and rises, for
 c = 0.15; for c = 0.05 it is never above 1, and below it at the last eta; and at eta 0.94 LV passes slower than HC.
-ways: two ways round the same circle, one of them between it and others. J_H1 / J_H2 is 1 up to eta 0.9, for LV and HC; at 0.9615
-it is 0.33 for LV and 0.67 for HC; it falls in between; and there the other circles make the second way dearer, as its being
-cluttered should. For HC the distances count half: the paper stresses LV.
+classes: two classes about the same circle, one of them between it and others. J_H1 / J_H2 is 1 up to eta 0.9, for LV and HC; at
+0.9615 it is 0.33 for LV and 0.67 for HC; it falls in between; and there the other circles make the second class dearer, because
+it is cluttered. For HC the distances count half: the paper stresses LV.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ from itertools import product
 
 import numpy as np
 
-from foc_ros.analysis.paper.reaching import Method, PaperScene, PathClass, solve_class, speed_to_obstacles
-from foc_ros.analysis.paper.scenes import NOISE, SMALL_NOISE, STRATEGY_SCENE, WAYS_SCENE
+from foc_ros.analysis.paper.reaching import Method, PaperScene, PathClass, measure_solution, solve_class
+from foc_ros.analysis.paper.scenes import CLASSES_SCENE, NOISE, SMALL_NOISE, STRATEGY_SCENE
 from foc_ros.analysis.paper.studies import PAPER_ETA, PAPER_RATIOS
 from foc_ros.core.types import LEFT, RIGHT, Array, Status
 
@@ -32,24 +33,24 @@ STRIDES = np.array([0.012, 0.012, 0.004, 0.0006])
 """Size of a change of x, y, radius and its standard deviation [m], at first."""
 LOW, HIGH = np.array([0.04, -0.2, 0.012, 0.001]), np.array([0.24, 0.2, 0.04, 0.005])
 ALIKE = 1.25
-"""Factor within which two ways should cost the same up to eta 0.9."""
+"""Factor within which two classes should cost the same up to eta 0.9."""
 CROWDED = 1.25
-"""Factor by which the other circles should make the second way dearer at PAPER_ETA."""
+"""Factor by which the other circles should make the second class dearer at PAPER_ETA."""
 UNSOLVED = 3.0
-"""What an eta adds to the score at which a ratio is not known."""
+"""Penalty for an eta at which a ratio is not known."""
 PATIENCE = 12
-"""Changes in a row that lowered nothing, after which a climb ends."""
+"""Changes in a row that lowered nothing, after which a search ends."""
 HOPELESS = 12.0
-"""A first score from which no climb is begun."""
+"""First score above which no search begins."""
 
 Faults = Callable[[PaperScene], Iterator[float]]
 
 
-def log_ratio(scene: PaperScene, eta: float, over: tuple[PathClass, Method], under: tuple[PathClass, Method]) -> float:
+def compute_log_ratio(scene: PaperScene, eta: float, over: tuple[PathClass, Method], under: tuple[PathClass, Method]) -> float:
     """Return the logarithm of the ratio of two efforts, NaN where one is not solved."""
     efforts = []
-    for way, method in (over, under):
-        solution = solve_class(scene, way, method, eta)
+    for path_class, method in (over, under):
+        solution = solve_class(scene, path_class, method, eta)
         if solution.status is not Status.SOLVED:
             return np.nan
         efforts.append(solution.effort)
@@ -57,28 +58,29 @@ def log_ratio(scene: PaperScene, eta: float, over: tuple[PathClass, Method], und
 
 
 def strategies_scene(generator: np.random.Generator) -> PaperScene:
-    """Return a random scene with one way, to the left of most of its circles."""
+    """Return a random scene with one class, to the left of most of its circles."""
     n = int(generator.integers(1, 4))
     circles = generator.uniform((0.04, -0.06, 0.015, 0.001), (0.18, 0.04, 0.035, 0.004), (n, 4))
-    return _scene(circles, (PathClass('left', 0.06, ()),))
+    return _make_scene(circles, (PathClass('left', 0.06, ()),))
 
 
 def strategies_faults(scene: PaperScene) -> Iterator[float]:
-    """Yield what keeps a scene from showing what studies 1, 3 and 4 show."""
-    way = scene.ways[0]
+    """Yield penalties for the trends of studies 1, 3 and 4 that a scene lacks."""
+    path_class = scene.ways[0]
     found: dict[tuple[float, float], float] = {}
     for noise, eta in product((SMALL_NOISE, NOISE), reversed(ETAS)):
-        found[noise, eta] = log_ratio(scene, eta, (way, Method(noise, 'lv')), (way, Method(noise, 'hc')))
+        found[noise, eta] = compute_log_ratio(scene, eta, (path_class, Method(noise, 'lv')), (path_class, Method(noise, 'hc')))
         yield UNSOLVED if np.isnan(found[noise, eta]) else 100 * max(found[noise, eta], 0.0) if noise == SMALL_NOISE else 0.0
     rising, low = (np.array([found[noise, eta] for eta in ETAS]) for noise in (NOISE, SMALL_NOISE))
     if np.isfinite([*rising, *low]).all():
         yield 10 * np.maximum(-np.diff(rising), 0).sum() + 10 * max(rising[0] + 0.02, 0) + max(0.5 - rising[ETAS.index(0.95)], 0)
         yield 10 * max(low[-1] + 0.05, 0) + 2 * np.maximum(np.diff(low), 0).sum()
-    slow, fast = (speed_to_obstacles(scene, solve_class(scene, way, Method(NOISE, strategy), 0.94)) for strategy in ('lv', 'hc'))
+    solutions = (solve_class(scene, path_class, Method(NOISE, strategy), 0.94) for strategy in ('lv', 'hc'))
+    slow, fast = (measure_solution(scene, each)['speed_to_obstacles'] for each in solutions)
     yield 3 * max(slow / fast - 0.75, 0)
 
 
-def ways_scene(generator: np.random.Generator) -> PaperScene:
+def classes_scene(generator: np.random.Generator) -> PaperScene:
     """Return a random scene: H1 passes the first circle on the left, H2 on the right, between it and the others."""
     x, y, radius = generator.uniform((0.06, -0.006, 0.015), (0.15, -0.001, 0.03))
     others = []
@@ -87,17 +89,17 @@ def ways_scene(generator: np.random.Generator) -> PaperScene:
         below = np.sqrt(max((radius + wide + gap) ** 2 - ahead**2, 0.0))
         others.append((x + ahead, y - below, wide, generator.uniform(0.001, 0.004)))
     circles = np.array([(x, y, radius, generator.uniform(0.001, 0.004)), *others])
-    return _scene(circles, (PathClass('H1', 0.06, (('0', LEFT),)), PathClass('H2', -0.05, (('0', RIGHT), ('1', LEFT)))))
+    return _make_scene(circles, (PathClass('H1', 0.06, (('0', LEFT),)), PathClass('H2', -0.05, (('0', RIGHT), ('1', LEFT)))))
 
 
-def ways_faults(scene: PaperScene) -> Iterator[float]:
-    """Yield what keeps a scene from showing what studies 5 and 6 show."""
+def classes_faults(scene: PaperScene) -> Iterator[float]:
+    """Yield penalties for the trends of studies 5 and 6 that a scene lacks."""
     first, second = scene.ways
     found: dict[tuple[str, float], float] = {}
     for eta, (strategy, number, weight) in product((PAPER_ETA, *ETAS), (('lv', 5, 1.0), ('hc', 6, 0.5))):
         if (strategy, eta) in found:
             continue
-        ratio = log_ratio(scene, eta, (first, Method(NOISE, strategy)), (second, Method(NOISE, strategy)))
+        ratio = compute_log_ratio(scene, eta, (first, Method(NOISE, strategy)), (second, Method(NOISE, strategy)))
         found[strategy, eta] = ratio
         if np.isnan(ratio):
             yield UNSOLVED
@@ -106,22 +108,22 @@ def ways_faults(scene: PaperScene) -> Iterator[float]:
         elif eta == PAPER_ETA:
             yield 2 * weight * abs(ratio - np.log(PAPER_RATIOS[number]))
     for strategy, weight in (('lv', 1.0), ('hc', 0.5)):
-        yield 4 * weight * max(np.log(CROWDED) - crowding(scene, second, Method(NOISE, strategy)), 0.0)
+        yield 4 * weight * max(np.log(CROWDED) - compute_crowding(scene, second, Method(NOISE, strategy)), 0.0)
     for strategy in ('lv', 'hc'):
         late = np.array([found[strategy, eta] for eta in ETAS if eta >= 0.9])
         yield 2 * float(np.maximum(np.diff(late), 0).sum()) if np.isfinite(late).all() else 0.0
 
 
-def crowding(scene: PaperScene, way: PathClass, method: Method) -> float:
-    """Return the logarithm of what the circles after the first multiply a way's effort by at PAPER_ETA; 0 if unsolved."""
-    alone = PaperScene(scene.goal_x, scene.circles[:1], (PathClass(way.name, way.amplitude, way.sides[:1]),))
-    efforts = [solve_class(each, each_way, method, PAPER_ETA) for each, each_way in ((scene, way), (alone, alone.ways[0]))]
+def compute_crowding(scene: PaperScene, path_class: PathClass, method: Method) -> float:
+    """Return the logarithm of the factor of the circles after the first on the effort of a class at PAPER_ETA; 0 if unsolved."""
+    alone = PaperScene(scene.goal_x, scene.circles[:1], (PathClass(path_class.name, path_class.amplitude, path_class.sides[:1]),))
+    efforts = [solve_class(*each, method, PAPER_ETA) for each in ((scene, path_class), (alone, alone.ways[0]))]
     solved = all(each.status is Status.SOLVED for each in efforts)
     return float(np.log(efforts[0].effort / efforts[1].effort)) if solved else 0.0
 
 
-def score(faults: Iterable[float], bound: float) -> float:
-    """Return the sum, or what it has come to when it is beyond a bound."""
+def sum_up(faults: Iterable[float], bound: float) -> float:
+    """Return the sum, or a partial sum that is beyond a bound."""
     total = 0.0
     for fault in faults:
         total += float(fault)
@@ -130,35 +132,35 @@ def score(faults: Iterable[float], bound: float) -> float:
     return total
 
 
-def climbed(scene: PaperScene, faults: Faults, generator: np.random.Generator) -> tuple[float, PaperScene]:
+def improve(scene: PaperScene, faults: Faults, generator: np.random.Generator) -> tuple[float, PaperScene]:
     """Change a scene at random as long as that lowers its score."""
-    best, failures = score(faults(scene), HOPELESS), 0
+    best, failures = sum_up(faults(scene), HOPELESS), 0
     while failures < PATIENCE and best < HOPELESS:
         stride = STRIDES * 0.88**failures
-        changed = _scene(np.array(scene.circles) + stride * generator.normal(size=(len(scene.circles), 4)), scene.ways)
-        other = score(faults(changed), best)
+        changed = _make_scene(np.array(scene.circles) + stride * generator.normal(size=(len(scene.circles), 4)), scene.ways)
+        other = sum_up(faults(changed), best)
         best, scene, failures = (other, changed, 0) if other < best else (best, scene, failures + 1)
     return best, scene
 
 
-def _scene(circles: Array, ways: tuple[PathClass, ...]) -> PaperScene:
+def _make_scene(circles: Array, ways: tuple[PathClass, ...]) -> PaperScene:
     held = np.clip(circles, LOW, HIGH)
     return PaperScene(GOAL_X, tuple((x, y, radius, stddev) for x, y, radius, stddev in held.round(4).tolist()), ways)
 
 
 SEARCHES = {
     'strategies': (strategies_scene, strategies_faults, STRATEGY_SCENE),
-    'ways': (ways_scene, ways_faults, WAYS_SCENE),
+    'classes': (classes_scene, classes_faults, CLASSES_SCENE),
 }
 
 if __name__ == '__main__':
     parser = argparse.ArgumentParser(description='Find scenes that show what the paper shows.')
     parser.add_argument('what', choices=sorted(SEARCHES))
     parser.add_argument('--seeds', nargs=2, type=int, default=(0, 40), metavar=('FIRST', 'LAST'))
-    parser.add_argument('--refine', action='store_true', help='climb from the present scene')
+    parser.add_argument('--refine', action='store_true', help='begin with the present scene')
     arguments = parser.parse_args()
     make, faults, present = SEARCHES[arguments.what]
     for seed in range(*arguments.seeds):
         generator = np.random.default_rng(seed)
-        best, scene = climbed(present if arguments.refine else make(generator), faults, generator)
+        best, scene = improve(present if arguments.refine else make(generator), faults, generator)
         print(f'{best:.3f} seed {seed}: {scene.circles}', flush=True)

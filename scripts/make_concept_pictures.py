@@ -25,10 +25,9 @@ from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import cold_start
-from foc_ros.core.scene_solver import scene_problems, solve_scene
+from foc_ros.core.reaching_scene import build_scene_problems, solve_scene
 from foc_ros.core.types import Array, Obstacles, Solution, make_obstacles
-from foc_ros.io.guess import guess_path
-from foc_ros.io.scene_file import load_scene
+from foc_ros.io.scene_file import guess_path, load_scene
 from foc_ros.reporting.drawing import class_style, draw_candidates, draw_scene, draw_tag, new_figure, stddev_ellipse
 from foc_ros.reporting.plots import bounds_of, number_labels, save
 from foc_ros.reporting.snapshots import build_candidate_views
@@ -129,7 +128,7 @@ def strategies() -> Figure:
 def classes() -> Figure:
     """Return the solved candidates of the scene of the examples."""
     scene = load_scene(SCENE)
-    candidates = build_candidate_views(solve_scene(scene, scene_problems(scene)))
+    candidates = build_candidate_views(solve_scene(scene, build_scene_problems(scene)))
     with new_figure(7.4, 5.6) as figure:
         axes = figure.subplots()
         draw_scene(axes, scene.obstacles, scene.goals, bounds_of(scene.obstacles, scene.goals, candidates))

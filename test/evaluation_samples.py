@@ -1,4 +1,4 @@
-"""Observations and recordings made by hand, for the tests of the evaluation."""
+"""ObservedRecording and recordings made by hand, for the tests of the evaluation."""
 
 from __future__ import annotations
 
@@ -6,56 +6,57 @@ from pathlib import Path
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.observations import TIMES_S, Observation, Observations, Truth, Ways
+from foc_ros.analysis.evaluation.ground_truth import TIMES_S, GroundTruth
+from foc_ros.analysis.evaluation.observations import CandidateTable, Observation, ObservedRecording
 from foc_ros.core.homotopy.branch_times import BranchTimes
 from foc_ros.core.types import LEFT, RIGHT
 
 H = len(TIMES_S)
 
 
-def ways(sides, goal=None, likelihood=None, to_go=None, solved=None, price=0.0) -> Ways:
-    """Candidates that pass obstacles on sides (k, n); each its own way, all parting now."""
+def make_candidates(sides, goal=None, likelihood=None, cost_to_go=None, solved=None, time_price=0.0) -> CandidateTable:
+    """Return candidates that pass obstacles on sides (k, n); each in its own class, all branching now."""
     k, n = np.shape(sides)
     solved = np.ones(k, dtype=bool) if solved is None else np.array(solved)
     even = np.where(solved, 1.0 / solved.sum(), 0.0)
-    return Ways(
-        labels=tuple(f'way{i}' for i in range(k)),
+    return CandidateTable(
+        labels=tuple(f'class{i}' for i in range(k)),
         goal=np.zeros(k, dtype=int) if goal is None else np.array(goal),
-        solved=solved,
-        spent=0.0,
-        to_go=np.ones(k) if to_go is None else np.array(to_go, dtype=float),
+        is_solved=solved,
+        effort_spent=0.0,
+        cost_to_go=np.ones(k) if cost_to_go is None else np.array(cost_to_go, dtype=float),
         likelihood=even if likelihood is None else np.array(likelihood, dtype=float),
         length=np.arange(1.0, k + 1.0),
-        price=price,
+        time_price=time_price,
         time_s=np.ones(k),
-        named=np.ones((k, n), dtype=bool),
+        is_named=np.ones((k, n), dtype=bool),
         sides=np.array(sides, dtype=np.int8).reshape(k, n),
         mean=np.zeros((k, H, 2)),
         covariance=np.tile(np.eye(2), (k, H, 1, 1)),
-        late=np.zeros((k, H, 2)),
-        partings=BranchTimes(np.where(np.eye(k, dtype=bool), np.inf, 0.0), np.arange(k)),
+        duration_sensitivity=np.zeros((k, H, 2)),
+        branch_times=BranchTimes(np.where(np.eye(k, dtype=bool), np.inf, 0.0), np.arange(k)),
     )
 
 
 def observation(
-    candidates: Ways,
+    candidates: CandidateTable,
     centre=((1.0, 0.0),),
     row=(0,),
     true_sides=(LEFT,),
-    ahead=None,
+    is_ahead=None,
     goals=((2.0, 0.0),),
     goal=0,
     hand=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
-    since_s=1.0,
+    movement_age_s=1.0,
     progress=0.0,
     approach=0.0,
     positions=None,
 ) -> Observation:
-    """A hand on its way along x among obstacles."""
+    """Return the observation of a hand that moves along x among obstacles."""
     centre = np.array(centre, dtype=float).reshape(-1, 2)
-    truth = Truth(
+    truth = GroundTruth(
         sides=np.array(true_sides, dtype=np.int8),
-        ahead=np.ones(len(centre), dtype=bool) if ahead is None else np.array(ahead),
+        is_ahead=np.ones(len(centre), dtype=bool) if is_ahead is None else np.array(is_ahead),
         goal=goal,
         positions=np.zeros((H, 2)) if positions is None else np.array(positions, dtype=float),
         progress=progress,
@@ -64,29 +65,29 @@ def observation(
     return Observation(
         stamp_ns=0,
         hand=np.array(hand, dtype=float),
-        since_s=since_s,
+        movement_age_s=movement_age_s,
         ids=tuple(str(i) for i in range(len(centre))),
         centre=centre,
         row=np.array(row, dtype=int),
-        along=np.array([1.0, 0.0]),
+        direction=np.array([1.0, 0.0]),
         goals=np.array(goals, dtype=float),
-        ways=candidates,
+        candidates=candidates,
         most_likely=candidates.labels[0],
         truth=truth,
     )
 
 
-def recorded(*each: Observation, name: str = 'one') -> Observations:
-    return Observations(name, each, {})
+def recorded(*each: Observation, name: str = 'one') -> ObservedRecording:
+    return ObservedRecording(name, each, {})
 
 
-TWO_WAYS = ways([[LEFT], [RIGHT]])
+TWO_CLASSES = make_candidates([[LEFT], [RIGHT]])
 
 PARAMETERS = '/**: {ros__parameters: {rate_hz: 4.0, foc.steps: 20, foc.strategy: fixed, foc.tau: 1.0e-4, foc.lam: 0.0}}'
 
 
 def reach(aside: float, end: tuple[float, float], seconds: float = 1.0, rest: float = 0.2, rate: float = 40.0):
-    """Times and positions of a minimum-jerk reach from the origin, bent aside by so much half way, resting before and after."""
+    """Return times and positions of a minimum-jerk reach from the origin, bent aside half way, with rests before and after."""
     t = np.arange(0.0, seconds + 2.0 * rest, 1.0 / rate)
     s = np.clip((t - rest) / seconds, 0.0, 1.0)
     share = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)

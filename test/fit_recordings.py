@@ -1,4 +1,4 @@
-"""Recordings of a made-up operator, for the tests of `fit`."""
+"""Recordings of a simulated operator, for the tests of `fit`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from foc_ros.analysis.fitting.demonstrations import Demonstration
+from foc_ros.analysis.fitting.recorded_hand import RecordedHand
 from foc_ros.core.types import Obstacles
 
 OBSTACLE = (0.15, 0.0, 0.03)
@@ -14,7 +14,7 @@ GOALS = np.array([[0.3, -0.1], [0.3, 0.0], [0.3, 0.1]])
 
 
 def reach(goal: np.ndarray, bow: float, duration_s: float, hz: float, rng: np.random.Generator, noise: float) -> np.ndarray:
-    """A minimum-jerk reach from the origin, bowed to the left, with rests of 0.1 s: rows of time and noisy position."""
+    """Return a minimum-jerk reach from the origin, bowed to the left, with rests of 0.1 s: rows of time and noisy position."""
     times = np.arange(-0.1, duration_s + 0.1, 1.0 / hz)
     share = np.clip(times / duration_s, 0.0, 1.0)
     done = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
@@ -42,6 +42,6 @@ def write_tables(folder: Path, count: int = 6, obstacle: bool = True, hz: float 
     return folder
 
 
-def demonstration(name: str, times: np.ndarray, positions: np.ndarray, obstacles: Obstacles, goals: np.ndarray) -> Demonstration:
-    """A demonstration from its samples."""
-    return Demonstration(name, np.round(times * 1e9).astype(np.int64), positions, obstacles, goals)
+def recorded_hand(name: str, times: np.ndarray, positions: np.ndarray, obstacles: Obstacles, goals: np.ndarray) -> RecordedHand:
+    """Return a recorded hand from its samples."""
+    return RecordedHand(name, np.round(times * 1e9).astype(np.int64), positions, obstacles, goals)

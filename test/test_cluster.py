@@ -1,13 +1,13 @@
-"""A Dask cluster of two worker processes on this machine does the work: same results, and a dead worker costs one recording."""
+"""A Dask cluster of two worker processes on this machine gives the same results; a killed worker fails one recording only."""
 
 import argparse
 from collections.abc import Iterator
 
 import pytest
 import worker_tasks
-from test_workers import ITEMS, SQUARES
+from test_parallel import ITEMS, SQUARES
 
-from foc_ros.analysis.evaluation.workers import Failure, run, workers
+from foc_ros.analysis.parallel import Failure, open_executor, run
 from foc_ros.core.errors import InputError, RecordingError
 
 distributed = pytest.importorskip('distributed', reason='the extra cluster is not installed')
@@ -27,12 +27,12 @@ def address() -> Iterator[str]:
 
 
 def test_the_cluster_gives_the_same_results(address: str) -> None:
-    with workers(argparse.Namespace(scheduler=address)) as executor:
+    with open_executor(argparse.Namespace(scheduler=address)) as executor:
         assert list(run(worker_tasks.squared, ITEMS, executor)) == SQUARES
 
 
 def test_a_killed_worker_of_the_cluster_fails_what_it_was_doing_and_nothing_else(address: str) -> None:
-    with workers(argparse.Namespace(scheduler=address)) as executor:
+    with open_executor(argparse.Namespace(scheduler=address)) as executor:
         found = dict(run(worker_tasks.deadly, ITEMS, executor))
     for name, square in SQUARES:
         if name in ('r3', 'r5'):
@@ -43,7 +43,7 @@ def test_a_killed_worker_of_the_cluster_fails_what_it_was_doing_and_nothing_else
 
 def test_a_scheduler_that_dies_ends_the_run_in_words() -> None:
     local = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=':0')
-    with local as cluster, workers(argparse.Namespace(scheduler=cluster.scheduler_address)) as executor:
+    with local as cluster, open_executor(argparse.Namespace(scheduler=cluster.scheduler_address)) as executor:
         results = run(worker_tasks.sleepy, [('a', 0.0), ('b', 1.0), ('c', 1.0)], executor)
         assert next(results) == ('a', 0.0)
         cluster.close()
@@ -52,7 +52,7 @@ def test_a_scheduler_that_dies_ends_the_run_in_words() -> None:
 
 
 def test_a_scheduler_without_workers_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('foc_ros.analysis.evaluation.cluster.CONNECT_S', 0.3)
+    monkeypatch.setattr('foc_ros.analysis.dask_cluster.CONNECT_S', 0.3)
     refused = pytest.raises(InputError, match='--scheduler: expected a Dask scheduler with workers, got none at')
     with distributed.LocalCluster(n_workers=0, dashboard_address=':0') as cluster, refused:
-        workers(argparse.Namespace(scheduler=cluster.scheduler_address))
+        open_executor(argparse.Namespace(scheduler=cluster.scheduler_address))

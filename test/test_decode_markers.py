@@ -13,20 +13,20 @@ from message_helpers import SECOND, both_kinds, marker, marker_array, message_ty
 
 from foc_ros.core.errors import MessageError
 from foc_ros.ros.messages import decode_markers
-from foc_ros.ros.messages.decode_markers import MarkerScene
+from foc_ros.ros.messages.decode_markers import MarkerTable
 from foc_ros.ros.messages.types import MessageTypes
 
 BAGS = message_types('rosbags')
 
 
-def after(*messages: object, now_ns: int = SECOND, stddev: float = 0.0) -> MarkerScene:
-    scene = MarkerScene()
+def after(*messages: object, now_ns: int = SECOND, stddev: float = 0.0) -> MarkerTable:
+    scene = MarkerTable()
     for message in messages:
-        scene = scene.updated(message, now_ns, 'xy', stddev)
+        scene = scene.with_message(message, now_ns, 'xy', stddev)
     return scene
 
 
-def ids(scene: MarkerScene, now_ns: int = SECOND) -> tuple[str, ...]:
+def ids(scene: MarkerTable, now_ns: int = SECOND) -> tuple[str, ...]:
     return scene.obstacles(now_ns).ids
 
 
@@ -73,19 +73,19 @@ def test_one_array_is_read_in_order() -> None:
 
 def test_a_lifetime_starts_at_the_stamp() -> None:
     scene = after(marker_array(BAGS, marker(BAGS, id=1, lifetime=0.5, stamp_ns=4 * SECOND), marker(BAGS, id=2)))
-    assert scene.unchanged(4 * SECOND) == (-math.inf, 4.5 * SECOND)
-    assert scene.unchanged(5 * SECOND) == (4.5 * SECOND, math.inf)
+    assert scene.find_unchanged_interval(4 * SECOND) == (-math.inf, 4.5 * SECOND)
+    assert scene.find_unchanged_interval(5 * SECOND) == (4.5 * SECOND, math.inf)
     assert ids(scene, int(4.5 * SECOND) - 1) == ('a/1', 'a/2')
     assert ids(scene, int(4.5 * SECOND)) == ('a/2',)
-    later = scene.updated(marker_array(BAGS), 5 * SECOND, 'xy', 0.0)
+    later = scene.with_message(marker_array(BAGS), 5 * SECOND, 'xy', 0.0)
     assert list(later.markers) == [('a', 2)]
-    assert later.unchanged(5 * SECOND) == (-math.inf, math.inf)
+    assert later.find_unchanged_interval(5 * SECOND) == (-math.inf, math.inf)
 
 
 def test_the_lifetime_of_an_unstamped_marker_starts_now_if_the_time_is_known() -> None:
     message = marker_array(BAGS, marker(BAGS, lifetime=0.5, stamp_ns=0))
-    assert after(message, now_ns=7 * SECOND).unchanged(7 * SECOND) == (-math.inf, 7.5 * SECOND)
-    assert after(message, now_ns=0).unchanged(0) == (-math.inf, math.inf)
+    assert after(message, now_ns=7 * SECOND).find_unchanged_interval(7 * SECOND) == (-math.inf, 7.5 * SECOND)
+    assert after(message, now_ns=0).find_unchanged_interval(0) == (-math.inf, math.inf)
     assert after(message).stamp_ns == 0
 
 
@@ -121,7 +121,7 @@ def test_another_type_replaces_an_obstacle_and_is_counted() -> None:
 def test_a_message_with_a_wrong_marker_is_refused(types: MessageTypes, changes: dict[str, object], words: str) -> None:
     scene = after(marker_array(types, marker(types, id=7)))
     with pytest.raises(MessageError, match=re.escape(words)):
-        scene.updated(marker_array(types, marker(types, id=1), marker(types, id=2, **changes)), SECOND, 'xy', 0.0)
+        scene.with_message(marker_array(types, marker(types, id=1), marker(types, id=2, **changes)), SECOND, 'xy', 0.0)
     assert ids(scene) == ('a/7',)
 
 
@@ -134,7 +134,7 @@ def test_the_number_of_markers_is_bounded(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(decode_markers, 'MAX_ROWS', 3)
     scene = after(marker_array(BAGS, *[marker(BAGS, id=i) for i in range(3)]))
     with pytest.raises(MessageError, match='markers: expected at most 3 obstacles held at a time, got 4'):
-        scene.updated(marker_array(BAGS, marker(BAGS, id=3)), SECOND, 'xy', 0.0)
+        scene.with_message(marker_array(BAGS, marker(BAGS, id=3)), SECOND, 'xy', 0.0)
 
 
 def test_ids_contain_no_separator_and_remain_distinct() -> None:
@@ -146,7 +146,7 @@ def test_ids_contain_no_separator_and_remain_distinct() -> None:
 
 def test_an_update_does_not_change_the_old_table() -> None:
     old = after(marker_array(BAGS, marker(BAGS, id=1)))
-    old.updated(marker_array(BAGS, marker(BAGS, action=3, ns='')), SECOND, 'xy', 0.0)
+    old.with_message(marker_array(BAGS, marker(BAGS, action=3, ns='')), SECOND, 'xy', 0.0)
     assert ids(old) == ('a/1',)
     with pytest.raises(TypeError):
         old.markers['a', 1] = None  # type: ignore[index]

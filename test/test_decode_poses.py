@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from message_helpers import SECOND, both_kinds, message_types, pose_array, pose_stamped
 
 from foc_ros.core.errors import MessageError
-from foc_ros.ros.messages.decode_poses import MAX_GOALS, goal_of_pose, goals_of_pose_array, hand_sample
+from foc_ros.ros.messages.decode_poses import MAX_GOALS, decode_goal, decode_goals, decode_hand_sample
 from foc_ros.ros.messages.types import MessageTypes
 
 coordinates = st.tuples(*[st.floats(-1e4, 1e4)] * 3)
@@ -19,7 +19,7 @@ coordinates = st.tuples(*[st.floats(-1e4, 1e4)] * 3)
 
 @both_kinds
 def test_a_hand_pose_becomes_a_sample(types: MessageTypes) -> None:
-    sample = hand_sample(pose_stamped(types, (0.1, 0.2, 0.3), 5 * SECOND + 7, 'base'), 'xz')
+    sample = decode_hand_sample(pose_stamped(types, (0.1, 0.2, 0.3), 5 * SECOND + 7, 'base'), 'xz')
     assert sample.stamp_ns == 5 * SECOND + 7
     assert sample.frame_id == 'base'
     assert tuple(sample.position) == (0.1, 0.3)
@@ -31,7 +31,7 @@ def test_a_hand_pose_becomes_a_sample(types: MessageTypes) -> None:
 def test_the_orientation_is_not_used(types: MessageTypes) -> None:
     message = pose_stamped(types, (0.1, 0.2, 0.3))
     message.pose.orientation = types.make('geometry_msgs/msg/Quaternion', x=float('nan'), y=7.0, z=0.0, w=0.0)
-    assert tuple(hand_sample(message, 'xy').position) == (0.1, 0.2)
+    assert tuple(decode_hand_sample(message, 'xy').position) == (0.1, 0.2)
 
 
 @both_kinds
@@ -51,12 +51,12 @@ def test_a_coordinate_that_is_not_finite_or_too_large_is_refused(
     position = [0.0, 0.0, 0.0]
     position[axis] = value
     with pytest.raises(MessageError, match=words) as caught:
-        hand_sample(pose_stamped(types, position), 'xy')
+        decode_hand_sample(pose_stamped(types, position), 'xy')
     assert caught.value.field == f'pose.position.{"xyz"[axis]}'
     with pytest.raises(MessageError, match=words):
-        goal_of_pose(pose_stamped(types, position), 'xy')
+        decode_goal(pose_stamped(types, position), 'xy')
     with pytest.raises(MessageError, match=rf'poses\[1\]\.position\.{"xyz"[axis]}'):
-        goals_of_pose_array(pose_array(types, [(0, 0, 0), position]), 'xy')
+        decode_goals(pose_array(types, [(0, 0, 0), position]), 'xy')
 
 
 @both_kinds
@@ -72,38 +72,38 @@ def test_a_wrong_stamp_is_refused(types: MessageTypes, sec: int, nanosec: int, w
     message = pose_stamped(types, (0, 0, 0))
     message.header.stamp.sec, message.header.stamp.nanosec = sec, nanosec
     with pytest.raises(MessageError, match=words):
-        hand_sample(message, 'xy')
+        decode_hand_sample(message, 'xy')
 
 
 @both_kinds
 def test_goals_need_no_stamp(types: MessageTypes) -> None:
-    goals, frame_id = goal_of_pose(pose_stamped(types, (1.0, 2.0, 3.0), 0, 'base'), 'yz')
+    goals, frame_id = decode_goal(pose_stamped(types, (1.0, 2.0, 3.0), 0, 'base'), 'yz')
     assert frame_id == 'base'
     np.testing.assert_array_equal(goals, [[2.0, 3.0]])
 
 
 @both_kinds
 def test_goals_keep_their_order(types: MessageTypes) -> None:
-    goals, frame_id = goals_of_pose_array(pose_array(types, [(1.0, 2.0, 3.0), (4.0, 5.0, 6.0)]), 'xy')
+    goals, frame_id = decode_goals(pose_array(types, [(1.0, 2.0, 3.0), (4.0, 5.0, 6.0)]), 'xy')
     assert frame_id == 'world'
     np.testing.assert_array_equal(goals, [[1.0, 2.0], [4.0, 5.0]])
 
 
 @both_kinds
 def test_an_array_without_poses_has_no_goals(types: MessageTypes) -> None:
-    assert goals_of_pose_array(pose_array(types, []), 'xy')[0].shape == (0, 2)
+    assert decode_goals(pose_array(types, []), 'xy')[0].shape == (0, 2)
 
 
 def test_too_many_goals_are_refused() -> None:
     types = message_types('rosbags')
-    assert len(goals_of_pose_array(pose_array(types, [(0, 0, 0)] * MAX_GOALS), 'xy')[0]) == MAX_GOALS
+    assert len(decode_goals(pose_array(types, [(0, 0, 0)] * MAX_GOALS), 'xy')[0]) == MAX_GOALS
     with pytest.raises(MessageError, match=f'poses: expected at most {MAX_GOALS} goals, got {MAX_GOALS + 1}'):
-        goals_of_pose_array(pose_array(types, [(0, 0, 0)] * (MAX_GOALS + 1)), 'xy')
+        decode_goals(pose_array(types, [(0, 0, 0)] * (MAX_GOALS + 1)), 'xy')
 
 
 @given(coordinates, st.integers(1, 2**31 * SECOND - 1), st.text(max_size=5))
 def test_every_pose_in_bounds_is_decoded_exactly(position: tuple[float, float, float], stamp_ns: int, frame_id: str) -> None:
-    sample = hand_sample(pose_stamped(message_types('rosbags'), position, stamp_ns, frame_id), 'xy')
+    sample = decode_hand_sample(pose_stamped(message_types('rosbags'), position, stamp_ns, frame_id), 'xy')
     assert (*sample.position, sample.height) == position
     assert (sample.stamp_ns, sample.frame_id) == (stamp_ns, frame_id)
 
@@ -114,7 +114,7 @@ def test_any_pose_is_decoded_or_refused(position: tuple[float, float, float], se
     message.header.stamp.sec, message.header.stamp.nanosec = sec, nanosec
     good = all(abs(value) <= 1e4 for value in position) and sec >= 0 and nanosec < SECOND and (sec, nanosec) != (0, 0)
     if good:
-        assert hand_sample(message, 'xy').stamp_ns == sec * SECOND + nanosec
+        assert decode_hand_sample(message, 'xy').stamp_ns == sec * SECOND + nanosec
     else:
         with pytest.raises(MessageError, match=r'expected .*, got '):
-            hand_sample(message, 'xy')
+            decode_hand_sample(message, 'xy')

@@ -24,8 +24,8 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.types import Prediction
 from foc_ros.io.bags import TYPESTORE, Item
 from foc_ros.reporting.snapshots import build_snapshot
-from foc_ros.ros.messages.input_messages import goal_poses, hand_pose, obstacle_cloud
-from foc_ros.ros.messages.outputs import likelihood_array, prediction_cloud
+from foc_ros.ros.messages.encode_inputs import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.ros.messages.encode_prediction import likelihood_array, prediction_cloud
 from foc_ros.ros.messages.types import RosbagsTypes
 
 TYPES = RosbagsTypes(TYPESTORE)
@@ -65,7 +65,7 @@ def test_recorder_keeps_every_prediction_with_its_scene() -> None:
     assert [sample.stamp_ns for sample in recorder.samples] == [START_NS + n * STEP_NS for n in range(5)]
     assert [snapshot.stamp_ns for snapshot in recorder.snapshots] == [START_NS + n * STEP_NS for n in range(5)]
     snapshot = recorder.snapshots[3]
-    expected = build_snapshot(messages(3)[2], snapshot.obstacles, snapshot.goals)
+    expected = build_snapshot(messages(3)[2])
     assert [(each.label, each.likelihood) for each in snapshot.candidates] == [
         (each.label, each.likelihood) for each in expected.candidates
     ]

@@ -1,4 +1,4 @@
-"""The packaged recording equals the output of its script, is small, can be read by other tools, and holds the described reaches."""
+"""The packaged recording equals the output of its script, is small, and can be read by other tools."""
 
 from __future__ import annotations
 

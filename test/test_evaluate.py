@@ -1,4 +1,4 @@
-"""The command `evaluate`: kinds of data, failures by name, workers, JSON, page."""
+"""The command `evaluate`: kinds of data, failures by name, workers, JSON, page, and baselines from outside."""
 
 from __future__ import annotations
 
@@ -10,7 +10,11 @@ import numpy as np
 import pytest
 from evaluation_samples import reach, write_tables
 
+from foc_ros.analysis.evaluation import Forecast, Observation, Question, register_baseline
+from foc_ros.analysis.evaluation.baselines import BASELINES
 from foc_ros.cli.main import main
+from foc_ros.core.errors import InputError
+from foc_ros.core.registry import Registry
 
 ASIDE = {'left': 0.06, 'right': -0.06, 'left too': 0.05}
 OBSTACLE = [(0.15, 0.0, 0.03)]
@@ -18,15 +22,15 @@ GOAL = [(0.3, 0.0)]
 
 
 @pytest.fixture(autouse=True)
-def at_hand(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work is done in this process, where it is not the processes that are tested: to start one takes a second."""
+def use_one_thread(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compute in this process, unless a test is about processes, because starting one takes a second."""
     if 'workers' not in request.fixturenames:
-        monkeypatch.setattr('foc_ros.cli.evaluate.workers', lambda _: ThreadPoolExecutor(1))
+        monkeypatch.setattr('foc_ros.cli.evaluate.open_executor', lambda _: ThreadPoolExecutor(1))
 
 
 @pytest.fixture
 def tables(tmp_path: Path) -> Path:
-    """Three reaches round one obstacle."""
+    """Write three reaches past one obstacle."""
     return write_tables(tmp_path / 'data', {name: reach(aside, GOAL[0]) for name, aside in ASIDE.items()}, GOAL, OBSTACLE)
 
 
@@ -39,20 +43,42 @@ def answer(data: Path, capsys: pytest.CaptureFixture[str], *options: str, code: 
     return json.loads(capsys.readouterr().out)
 
 
-def test_reaches_round_an_obstacle(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_reaches_past_an_obstacle_are_scored_by_class(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = answer(tables, capsys)
     assert found['recordings'] == 3 and found['failed'] == {} and found['predictions'] >= 12
     assert set(found['questions']) == {'way', 'gap'}
-    way = found['questions']['way']
-    assert way['uniform']['gain'] == 0.0 and way['uniform']['log_likelihood'] == pytest.approx(np.log(0.5))
-    # a bent reach tells early on which side it will pass
-    assert way['foc']['gain'] > 0.1 and way['constant velocity']['gain'] > 0.0
-    assert sum(each['predictions'] for each in way['foc']['by_tenth']) == way['foc']['predictions']
-    assert sum(each['count'] for each in way['foc']['reliability']) == way['foc']['predictions']
+    by_class = found['questions']['way']
+    assert by_class['uniform']['gain'] == 0.0 and by_class['uniform']['log_likelihood'] == pytest.approx(np.log(0.5))
+    # a bent reach shows early on which side it will pass
+    assert by_class['foc']['gain'] > 0.1 and by_class['constant velocity']['gain'] > 0.0
+    assert sum(each['predictions'] for each in by_class['foc']['by_tenth']) == by_class['foc']['predictions']
+    assert sum(each['count'] for each in by_class['foc']['reliability']) == by_class['foc']['predictions']
     assert found['parameters']['foc.steps'] == 20
 
 
-def test_reaches_without_obstacles_are_asked_for_their_goal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def forecast_first(observation: Observation, question: Question, confidence: float) -> Forecast:
+    """Name the first answer of the candidates, whatever the hand does."""
+    return Forecast.from_answer(question.answers[question.given[0]], confidence, question)
+
+
+def test_a_baseline_from_outside_is_compared(
+    tables: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    extended = Registry('baseline', {})
+    for name in BASELINES:
+        extended.register(name, BASELINES.get(name))
+    monkeypatch.setattr('foc_ros.analysis.evaluation.baselines.BASELINES', extended)
+    register_baseline('first answer', forecast_first, (0.0, 0.5))
+    with pytest.raises(InputError, match='baseline: expected a new name beside foc, foc, held out'):
+        register_baseline('uniform', forecast_first)
+    found = answer(tables, capsys)
+    assert list(found['questions']['way'])[-2:] == ['straight minimum jerk', 'first answer']
+    scores = found['questions']['way']['first answer']
+    assert scores['predictions'] == found['questions']['way']['foc']['predictions'] and scores['log_likelihood'] < 0.0
+    assert found['settings']['way']['first answer'] in (0.0, 0.5)
+
+
+def test_reaches_without_obstacles_are_scored_by_goal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     goals = [(0.3, 0.0), (0.0, 0.3), (-0.3, 0.0)]
     data = write_tables(tmp_path / 'free', {f'to{i}': reach(0.0, goal) for i, goal in enumerate(goals)}, goals)
     found = answer(data, capsys)
@@ -67,7 +93,7 @@ def test_the_number_of_workers_does_not_matter(tables: Path, capsys: pytest.Capt
     assert answer(tables, capsys) == answer(tables, capsys, '--workers', workers)
 
 
-def test_bags_are_judged_as_their_tables(tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bags_are_scored_as_their_tables(tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bags = tmp_path / 'bags'
     csv = [str(tables / name) for name in ('recordings.csv', 'obstacles.csv', 'goals.csv')]
     assert main(['convert', csv[0], '--obstacles', csv[1], '--goals', csv[2], '--output', str(bags)]) == 0
@@ -75,14 +101,14 @@ def test_bags_are_judged_as_their_tables(tables: Path, tmp_path: Path, capsys: p
     (bags / 'parameters.yaml').write_text((tables / 'parameters.yaml').read_text())
     whole = answer(bags, capsys)
     expected = answer(tables, capsys)
-    # bags come by name, the rows of a table as they are
+    # bags are sorted by name, the recordings of a table are not
     for question, by_predictor in expected['questions'].items():
         for predictor, scores in by_predictor.items():
             assert whole['questions'][question][predictor]['log_likelihood'] == pytest.approx(scores['log_likelihood'])
     assert main(['evaluate', str(bags / 'left'), '--workers', '1', '--params', str(bags / 'parameters.yaml')]) == 0
 
 
-def test_a_bad_recording_fails_by_its_name_and_the_others_are_judged(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bad_recording_fails_by_name_and_the_others_are_scored(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with (tables / 'recordings.csv').open('a') as file:
         file.write('broken,0.0,0.0,0.0\nbroken,0.1,nan,0.0\nbackward,1.0,0.0,0.0\nbackward,0.5,0.1,0.0\nshort,0.0,0.0,0.0\n')
     assert run(tables, '--json') == 2
@@ -94,7 +120,7 @@ def test_a_bad_recording_fails_by_its_name_and_the_others_are_judged(tables: Pat
     assert 'foc_ros evaluate: broken: ' in captured.err
 
 
-def test_where_nothing_can_be_judged_the_exit_code_is_3(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_exit_code_is_3_where_nothing_can_be_scored(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     data = write_tables(tmp_path / 'none', {'blocked': reach(0.0, (0.3, 0.0))}, [(0.3, 0.0)], [(0.3, 0.0, 0.05)])
     assert run(data) == 3
     captured = capsys.readouterr()
@@ -118,8 +144,8 @@ def test_data_that_cannot_be_used_is_one_line_and_exit_2(tables: Path, capsys, c
     assert captured.out == '' and words in captured.err and captured.err.count('\n') == 1
 
 
-def test_a_label_that_is_not_the_way_taken_is_told(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    # along x, low x is on neither side; by convention the left counts as high
+def test_a_label_of_another_class_is_reported(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # low x is on neither side of a movement along x; by convention the left counts as high
     labels = {'left': 1, 'right': 0, 'left too': 0}
     (tables / 'labels.csv').write_text('recording,gap\n' + ''.join(f'{name},{gap}\n' for name, gap in labels.items()))
     found = answer(tables, capsys)

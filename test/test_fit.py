@@ -1,4 +1,4 @@
-"""`fit` from the command line: recordings in, a parameter file out that the node takes as it is."""
+"""`fit` from the command line: it turns recordings into a parameter file that the node accepts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bag_helpers import write_bag
 from fit_recordings import write_tables
 
 from foc_ros.analysis.fitting import fit as fitting
-from foc_ros.analysis.fitting import movements
+from foc_ros.analysis.fitting import predictor_settings
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config, flatten, updated
 from foc_ros.ros.parameters import dump_parameter_file, load_parameter_file
@@ -24,10 +24,10 @@ QUICK = {'foc.steps': 15, 'homotopy.max_candidates': 2, 'duration.fitts_a_s': 0.
 
 
 @pytest.fixture(autouse=True)
-def few_predictions(monkeypatch: pytest.MonkeyPatch) -> None:
+def use_few_predictions(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fitting, 'PREDICTIONS', 3)
     for name, few in {'DURATIONS': (), 'NOISES': (0.5,), 'ETAS': (0.7,)}.items():
-        monkeypatch.setattr(movements, name, few)
+        monkeypatch.setattr(predictor_settings, name, few)
 
 
 def _fit(folder: Path, capsys: pytest.CaptureFixture[str], *arguments: str, **parameters: Any) -> tuple[dict[str, Any], Config]:
@@ -59,16 +59,18 @@ def test_everything_is_fitted_and_written_for_the_node(past_an_obstacle: Path, c
     unfitted = {name: value for name, value in values.items() if name not in answer['parameters'] | answer['chosen']}
     assert unfitted == {name: value for name, value in flatten(updated(Config(), QUICK)).items() if name in unfitted}
     assert answer['parameters']['estimator.position_stddev']['value'] == pytest.approx(5e-4, rel=0.2)
-    ways = answer['scores']['ways']
-    assert ways['fitted'] >= ways['without the recording'] and ways['fitted'] > ways['uniform']
-    assert set(ways) == {'uniform', 'as given', 'fitted', 'without the recording', 'without its way'}
+    classes = answer['scores']['ways']
+    assert classes['fitted'] >= classes['without the recording'] and classes['fitted'] > classes['uniform']
+    assert set(classes) == {'uniform', 'as given', 'fitted', 'without the recording', 'without its way'}
     assert 0.5 < answer['scores']['inside_90']['fitted'] <= 1.0
     assert answer['node'][0].startswith('python -m foc_ros node ')
-    _node_comes_up(answer['node'][0], config)
+    _check_node_starts(answer['node'][0], config)
     assert any('too alike to tell intercept and slope apart' in words for words in answer['warnings'])
 
 
-def test_without_obstacles_goals_are_told_apart_and_margins_are_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_obstacles_goals_are_distinguished_and_margins_are_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     answer, config = _fit(write_tables(tmp_path / 'data', obstacle=False), capsys, **{'homotopy.max_candidates': 3})
     assert not {'foc.eta', 'foc.noise_x', 'foc.noise_y'} & set(answer['parameters'])
     assert (config.foc.eta, config.foc.noise_x) == (Config().foc.eta, Config().foc.noise_x)
@@ -80,7 +82,7 @@ def test_strategy_fixed_has_its_tau_and_lambda_fitted(past_an_obstacle: Path, ca
     answer, config = _fit(past_an_obstacle, capsys, **{'foc.strategy': 'fixed', 'foc.tau': 1e-4})
     assert {'foc.tau', 'foc.lam'} <= set(answer['parameters'])
     assert 'foc.eta' not in answer['parameters']
-    # made with a bow of 60 mm: the plan nearest to it keeps as far away
+    # the recordings have a bow of 60 mm, and the nearest plan keeps as far away
     assert config.foc.tau > 5e-4
 
 
@@ -93,17 +95,17 @@ def test_one_bag_and_a_broken_one(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert any(words.startswith('cross-validation: 1 recordings are too few') for words in answer['warnings'])
 
 
-def test_words_for_people(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_result_is_printed_as_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag, given, output = write_bag(tmp_path / 'bag'), tmp_path / 'given.yaml', tmp_path / 'out.yaml'
     given.write_text(dump_parameter_file(updated(Config(), {**QUICK, 'foc.strategy': 'hc'})))
     assert main(['fit', str(bag), '--output', str(output), '--params', str(given), '--workers', '1']) == 0
     words = capsys.readouterr().out
-    assert 'likelihood of the way taken' in words and 'note: ' in words
+    assert 'log-likelihood of the class taken' in words and 'note: ' in words
     assert f'python -m foc_ros node --ros-args --params-file {output}' in words
 
 
-def _node_comes_up(printed: str, config: Config) -> None:
-    """Run the command as printed, and ask the node for its parameters."""
+def _check_node_starts(printed: str, config: Config) -> None:
+    """Run the printed command and read the parameters of the node."""
     ros_helpers.require_ros()
     from rcl_interfaces.srv import GetParameters
 

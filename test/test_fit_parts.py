@@ -1,20 +1,19 @@
-"""Estimator, durations and resampling: what is fitted without a prediction."""
+"""Estimator, durations and resampling: parameters that are fitted without a prediction."""
 
 import numpy as np
 import pytest
-from fit_recordings import GOALS, demonstration, reach
+from fit_recordings import GOALS, reach, recorded_hand
 
 from foc_ros.analysis.fitting.duration_fit import fit_duration
-from foc_ros.analysis.fitting.estimator_fit import fit_estimator
-from foc_ros.analysis.fitting.innovations import Innovations
-from foc_ros.analysis.fitting.resampling import quadratic
+from foc_ros.analysis.fitting.estimator_fit import Innovations, fit_estimator
+from foc_ros.analysis.fitting.resampling import expand_quadratic
 from foc_ros.core.config import Config, updated
 from foc_ros.core.estimation.kalman_filter import gramian, transition, update
 from foc_ros.core.types import HandSample, make_obstacles
 
 
 def _drifting(seed: int, stddev: float, density: float, count: int = 6) -> list:
-    """Hands driven by white jerk, as the filter expects them."""
+    """Return hands that are driven by white jerk, as the filter expects."""
     rng = np.random.default_rng(seed)
     times = np.cumsum(rng.uniform(0.01, 0.03, 200))
     found = []
@@ -23,7 +22,7 @@ def _drifting(seed: int, stddev: float, density: float, count: int = 6) -> list:
         for dt in np.diff(times, prepend=times[0] - 0.02):
             state = transition(dt) @ state + density * np.linalg.cholesky(gramian(dt)) @ rng.standard_normal((3, 2))
             path.append(state[0] + rng.normal(0.0, stddev, 2))
-        found.append(demonstration(f'{number}', times, np.array(path), make_obstacles(), GOALS))
+        found.append(recorded_hand(f'{number}', times, np.array(path), make_obstacles(), GOALS))
     return found
 
 
@@ -31,7 +30,7 @@ def test_innovations_are_those_of_the_estimator() -> None:
     each = _drifting(1, 1e-3, 3.0, 1)[0]
     gap = each.stamps_ns.copy()
     gap[100:] += 1_000_000_000
-    each = demonstration('gap', gap * 1e-9, each.positions, each.obstacles, each.goals)
+    each = recorded_hand('gap', gap * 1e-9, each.positions, each.obstacles, each.goals)
     config, total, state = Config().estimator, 0.0, None
     for stamp_ns, position in zip(each.stamps_ns.tolist(), each.positions, strict=True):
         following = update(state, HandSample(stamp_ns, position), config).state
@@ -57,16 +56,16 @@ def test_the_deviations_that_made_the_data_are_found(stddev: float, density: flo
         assert 0.8 * found.low < true < 1.2 * found.high
 
 
-def test_noise_below_what_shows_is_said_not_to_be_told() -> None:
+def test_noise_below_the_resolution_is_reported_as_undetermined() -> None:
     _, warnings = fit_estimator(_drifting(3, 1e-9, 3.0), Config())
-    assert any(words.startswith('estimator.position_stddev: the recordings do not tell it') for words in warnings)
+    assert any(words.startswith('estimator.position_stddev: the recordings do not determine it') for words in warnings)
 
 
 def _reaches(durations: list[float], goals: np.ndarray) -> list:
     rng = np.random.default_rng(4)
     rows = [reach(goal, 0.0, seconds, 100.0, rng, 2e-4) for seconds, goal in zip(durations, goals, strict=True)]
     return [
-        demonstration(f'{k}', each[:, 0], each[:, 1:], make_obstacles(), goal[None])
+        recorded_hand(f'{k}', each[:, 0], each[:, 1:], make_obstacles(), goal[None])
         for k, (each, goal) in enumerate(zip(rows, goals, strict=True))
     ]
 
@@ -88,11 +87,11 @@ def test_the_cost_of_time_is_found() -> None:
     estimates, _ = fit_duration(_reaches([2.0] * 4, np.tile([0.3, 0.0], (4, 1))), updated(Config(), given))
     found = estimates['duration.time_cost']
     assert found.low <= found.value <= found.high
-    # the filter lags: it takes an acceleration that fades for one that lasts
+    # the filter lags because it models a fading acceleration as a lasting one
     assert (3600 * 0.3**2 / found.value) ** (1 / 6) == pytest.approx(2.0, rel=0.2)
 
 
-def test_intercept_and_slope_are_told_by_distances_that_differ() -> None:
+def test_distances_that_differ_determine_intercept_and_slope() -> None:
     config = updated(Config(), {'estimator.position_stddev': 2e-4})
     distances = np.array([0.05, 0.1, 0.2, 0.4, 0.8])
     durations = 0.5 + 0.3 * np.log2(distances / config.duration.target_width + 1)
@@ -101,28 +100,30 @@ def test_intercept_and_slope_are_told_by_distances_that_differ() -> None:
     fitted = estimates['duration.fitts_a_s'].value + estimates['duration.fitts_b_s'].value * np.log2(
         distances / config.duration.target_width + 1
     )
-    # a movement begins late for the filter: the time lost is the same for all
+    # the filter detects each onset equally late
     assert (fitted - durations).min() > -0.25 and (fitted - durations).max() < 0.0
     assert np.ptp(fitted - durations) < 0.05
 
 
 def test_without_a_goal_reached_durations_are_kept() -> None:
     far = _reaches([1.0], np.array([[0.3, 0.0]]))[0]
-    missed = demonstration('missed', far.times, far.positions, far.obstacles, np.array([[0.9, 0.0]]))
+    missed = recorded_hand('missed', far.times, far.positions, far.obstacles, np.array([[0.9, 0.0]]))
     estimates, warnings = fit_duration([missed], Config())
     assert estimates == {} and 'no recording has a movement that ends near a goal' in warnings[0]
 
 
-def test_resamples_spread_as_the_mean_of_a_sample_does() -> None:
+def test_resamples_scatter_as_the_mean_of_a_sample_does() -> None:
     data = np.random.default_rng(6).normal(2.0, 0.5, 400)
     low, high = np.array([-10.0]), np.array([10.0])
-    found = quadratic(lambda x: -0.5 * ((data - x[0]) / 0.5) ** 2, np.array([data.mean()]), low, high)
-    ends = np.ravel(found.interval())
+    found = expand_quadratic(lambda x: -0.5 * ((data - x[0]) / 0.5) ** 2, np.array([data.mean()]), low, high)
+    ends = np.ravel(found.compute_interval())
     assert ends == pytest.approx(data.mean() + 1.96 * data.std() / 20 * np.array([-1, 1]), abs=0.006)
     assert found.deviation == pytest.approx([0.5 / 20], rel=1e-3)
 
 
-def test_a_sum_that_the_data_tell_does_not_tell_its_parts() -> None:
+def test_a_determined_sum_does_not_determine_its_parts() -> None:
     data = np.random.default_rng(8).normal(1.0, 0.1, 50)
-    found = quadratic(lambda x: -50.0 * (data - x[0] - x[1]) ** 2, np.array([0.5, 0.5]), np.full(2, -10.0), np.full(2, 10.0))
+    found = expand_quadratic(
+        lambda x: -50.0 * (data - x[0] - x[1]) ** 2, np.array([0.5, 0.5]), np.full(2, -10.0), np.full(2, 10.0)
+    )
     assert found.undetermined == [0, 1]

@@ -1,4 +1,4 @@
-"""The page of a fit: what was fitted, beside what was given, in words that are escaped."""
+"""The page of a fit: fitted values beside given ones, with escaped text."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ def test_the_page_holds_values_intervals_scores_and_warnings(tmp_path: Path) -> 
     assert page.count('<img') == 1
 
 
-def test_nothing_to_draw_is_a_table_alone(tmp_path: Path) -> None:
+def test_a_fit_without_parameters_has_tables_only(tmp_path: Path) -> None:
     write_report(tmp_path, 'x', ANSWER | {'parameters': {}}, {'ways': 'log-likelihood'})
     assert '<img' not in (tmp_path / 'fit.html').read_text(encoding='utf-8')
 
 
-def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_rejected(tmp_path: Path) -> None:
     (tmp_path / 'file').write_text('mine')
     with pytest.raises(InputError, match='--report'):
         write_report(tmp_path / 'file', 'x', ANSWER, {'ways': 'log-likelihood'})

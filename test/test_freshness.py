@@ -22,7 +22,7 @@ def build_freshness(**times: float) -> Freshness:
 
 
 def test_an_input_that_was_never_received_is_not_silent() -> None:
-    assert Freshness().not_ready_reason(1e6, CONFIG, ()) is None
+    assert Freshness().find_not_ready_reason(1e6, CONFIG, ()) is None
 
 
 @pytest.mark.parametrize(
@@ -35,21 +35,21 @@ def test_an_input_that_was_never_received_is_not_silent() -> None:
     ],
 )
 def test_one_silent_input_stops_predictions(times: dict[str, float], words: str | None) -> None:
-    found = build_freshness(**times).not_ready_reason(10.0, CONFIG, BOTH)
+    found = build_freshness(**times).find_not_ready_reason(10.0, CONFIG, BOTH)
     assert (found and found[1]) == words
-    assert build_freshness(**times).not_ready_reason(10.0, NEVER, BOTH) is None
+    assert build_freshness(**times).find_not_ready_reason(10.0, NEVER, BOTH) is None
 
 
 def test_a_source_that_is_received_again_is_not_silent() -> None:
     freshness = build_freshness(hand_pose=10.0, obstacles=1.0)
-    assert freshness.not_ready_reason(10.0, CONFIG, ['cloud']) is not None
+    assert freshness.find_not_ready_reason(10.0, CONFIG, ['cloud']) is not None
     freshness.note_received(CLOUD, 10.0)
-    assert freshness.not_ready_reason(10.0, CONFIG, ['cloud']) is None
+    assert freshness.find_not_ready_reason(10.0, CONFIG, ['cloud']) is None
 
 
 def pose(freshness: Freshness, stamp_s: float, clock_s: float, *, restarted: bool = False) -> str | None:
     freshness.note_pose(round(stamp_s * NANOSECONDS), round(clock_s * NANOSECONDS), 0.5, restarted=restarted)
-    found = freshness.not_ready_reason(0.0, CONFIG, ())
+    found = freshness.find_not_ready_reason(0.0, CONFIG, ())
     return found and found[1]
 
 
@@ -60,7 +60,7 @@ def test_poses_stamped_by_ros_time_are_judged_by_it() -> None:
     assert pose(freshness, 100.1, 100.7) == words
     assert 'newer' in (pose(freshness, 101.3, 100.7) or '')
     assert pose(freshness, 101.4, 101.4) is None
-    assert freshness.not_ready_reason(0.0, NEVER, ()) is None
+    assert freshness.find_not_ready_reason(0.0, NEVER, ()) is None
 
 
 def test_the_stamps_of_a_recording_are_not_judged_until_a_movement_begins_at_ros_time() -> None:

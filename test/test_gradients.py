@@ -1,4 +1,4 @@
-"""What the QPs are built of, against a step-by-step simulation of the model and its finite differences."""
+"""The parts of the QPs against a step-by-step simulation of the model and its finite differences."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ EVERY_PLANT = pytest.mark.parametrize('plant', PLANTS)
 
 
 def weighted_problem(plant: str, seed: int = 0) -> Problem:
-    """Return a problem with every term of the cost: positions reach the goal exactly, other states by weights, and on the way."""
+    """Return a problem with every term of the cost: positions reach the goal exactly, others by weights at every step."""
     generator = np.random.default_rng(seed)
     n = len(PLANTS[plant].A)
     root = 1e-2 * generator.standard_normal((n, n))
@@ -35,8 +35,8 @@ def weighted_problem(plant: str, seed: int = 0) -> Problem:
         0.9,
         initial_covariance=root @ root.T,
     )
-    ends, way = 10 ** generator.uniform(3, 6, n), 10 ** generator.uniform(1, 3, n)
-    return replace(made, at_goal=np.arange(n) < 2, end_weights=ends, way_weights=way)
+    terminal, stage = 10 ** generator.uniform(3, 6, n), 10 ** generator.uniform(1, 3, n)
+    return replace(made, at_goal=np.arange(n) < 2, terminal_weights=terminal, stage_weights=stage)
 
 
 def simulated(problem: Problem, plant: str, control: np.ndarray) -> tuple[np.ndarray, float]:
@@ -47,7 +47,7 @@ def simulated(problem: Problem, plant: str, control: np.ndarray) -> tuple[np.nda
         mean = A @ mean + B @ u
         covariance = A @ covariance @ A.T + B @ np.diag((problem.noise * u) ** 2) @ B.T
         variances = covariance.diagonal()
-        weights = problem.end_weights if t == STEPS else problem.way_weights
+        weights = problem.terminal_weights if t == STEPS else problem.stage_weights
         cost += weights @ ((mean - problem.goal) ** 2 + variances) + LAMBDA * variances[:2].sum()
     return mean, float(cost)
 
@@ -87,13 +87,13 @@ def test_every_entry_of_the_hessian_is_a_second_difference(plant):
     """Of the effort and all variances; the means' errors are the goal's, and no part of the diagonal."""
     problem = weighted_problem(plant)
     everything = np.ones(len(problem.goal), dtype=bool)
-    problem = replace(problem, at_goal=everything, way_weights=0.0 * problem.way_weights)
+    problem = replace(problem, at_goal=everything, stage_weights=0.0 * problem.stage_weights)
     hessian = effort_cost(problem, LAMBDA).hessian
     units = np.eye(2 * STEPS)
 
     def J(u: np.ndarray) -> float:
         mean, cost = simulated(problem, plant, u)
-        return cost - float(problem.end_weights @ (mean - problem.goal) ** 2)
+        return cost - float(problem.terminal_weights @ (mean - problem.goal) ** 2)
 
     differences = [J(unit) - 2 * J(0 * unit) + J(-unit) for unit in units]
     np.testing.assert_allclose(hessian, differences, rtol=1e-7)
@@ -144,7 +144,7 @@ def test_curvature_of_the_surrogate_is_that_of_the_standard_deviation():
     generator = np.random.default_rng(5)
     control, step = generator.normal(0.0, 30.0, (2, 100))
     active, multipliers = WorkingSet(np.array([0, 0]), np.array([19, 24])), np.array([3e4, 5e3])
-    bent = surrogate_qp(problem, control, active, multipliers, k, complete=False).cost
+    curved = surrogate_qp(problem, control, active, multipliers, k, complete=False).cost
     plain = surrogate_qp(problem, control, WorkingSet(), np.zeros(0), k, complete=False).cost
     offset = problem.positions(control)[None] - problem.centres
     distance = np.hypot(offset[..., 0], offset[..., 1])
@@ -161,6 +161,6 @@ def test_curvature_of_the_surrogate_is_that_of_the_standard_deviation():
     slope, bend = (forth - back) / (2 * h), (forth - 2 * here + back) / h**2
     convex = k / (2 * distance) * (bend + slope**2 / here)
     expected = float(multipliers @ convex[active.obstacle, active.step])
-    assert step @ ((bent.hessian - plain.hessian) * step) == pytest.approx(expected, rel=1e-5)
+    assert step @ ((curved.hessian - plain.hessian) * step) == pytest.approx(expected, rel=1e-5)
     # about the control: the curvature alone pulls nowhere there
-    np.testing.assert_allclose(bent.linear, (bent.hessian - plain.hessian) * control, atol=1e-9)
+    np.testing.assert_allclose(curved.linear, (curved.hessian - plain.hessian) * control, atol=1e-9)

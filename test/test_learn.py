@@ -1,4 +1,4 @@
-"""replay --learn: a demonstrated reach becomes a way of the library, once, and comes back in the next replay."""
+"""replay --learn: a demonstrated reach enters the library once and is recalled in the next replay."""
 
 from __future__ import annotations
 
@@ -32,16 +32,17 @@ def test_a_reach_is_learned_once(bag: Path, tmp_path: Path, capsys: pytest.Captu
     file = tmp_path / 'ways.json'
     assert run(bag, '--learn', str(file), '--json') == 0
     assert json.loads(capsys.readouterr().out)['summary']['learned'] == 1
-    (way,) = load_library(str(file))
+    (demonstration,) = load_library(str(file))
     held = file.read_text()
-    assert way.ids and np.hypot(*(way.path[-1] - way.path[0])) > 0.1
+    path = demonstration.path
+    assert demonstration.ids and np.hypot(*(path[-1] - path[0])) > 0.1
     assert run(bag, '--learn', str(file), '--json') == 0
     assert json.loads(capsys.readouterr().out)['summary']['learned'] == 0
     assert file.read_text() == held
     assert run(bag, library=str(file)) == 0
 
 
-def test_a_reach_that_ends_on_its_way_is_not_learned(tmp_path: Path) -> None:
+def test_a_reach_that_ends_before_its_goal_is_not_learned(tmp_path: Path) -> None:
     bag, file = write_bag(tmp_path / 'short', messages(seconds=0.4)), tmp_path / 'ways.json'
     assert run(bag, '--learn', str(file)) == 0
     assert load_library(str(file)) == ()
@@ -71,8 +72,8 @@ def test_a_place_that_cannot_be_written_is_exit_2_in_one_line(bag: Path, capsys:
 def test_a_full_library_stays_as_it_was(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / 'ways.json'
     far = make_obstacles([[0.1, 1.0]], 0.01)
-    ways = [record_demonstration('other', np.array([[0.0, 0.1 * k], [0.3, 0.1 * k]]), far) for k in range(MOST_WAYS)]
-    save_library(file, ways)
+    demonstrations = [record_demonstration('other', np.array([[0.0, 0.1 * k], [0.3, 0.1 * k]]), far) for k in range(MOST_WAYS)]
+    save_library(file, demonstrations)
     held = file.read_bytes()
     assert run(bag, '--learn', str(file)) == 2
     assert 'ways: expected at most 500, got 501 with the new ones' in capsys.readouterr().err

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foc_ros.analysis.evaluation.path import reached
-from foc_ros.analysis.evaluation.recordings import find_recordings
+from foc_ros.analysis.goal_reached import find_reached_goal
+from foc_ros.analysis.recordings import find_recordings
 
 SCRIPT = Path(__file__).parents[1] / 'scripts' / 'make_reaches.py'
 
@@ -25,7 +25,7 @@ def test_every_reach_begins_at_rest_and_ends_near_its_goal(kind: str, noise_m: f
     assert len(recordings) == script.COUNT
     for number, recording in enumerate(recordings.values()):
         path = np.array([[row.number('x_m'), row.number('y_m')] for row in recording.rows])
-        assert reached(path, recording.goals[:, :2])[0] == number % len(recording.goals)
+        assert find_reached_goal(path, recording.goals[:, :2])[0] == number % len(recording.goals)
         assert np.ptp(path[:4], axis=0).max() < 10.0 * noise_m
         distance = np.hypot(*(path[-20:].mean(axis=0) - recording.goals[number % len(recording.goals), :2]))
         assert noise_m / 10.0 < distance < largest_m

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from foc_ros.core.dynamics.condensed import position_variances, variance_weights
+from foc_ros.core.dynamics.condensed import PositionNoise, position_variances, variance_weights
 from foc_ros.core.dynamics.noise import propagate_covariance, scale_noise, stack_noise
 from foc_ros.core.dynamics.plants import condense, damped_mass, triple_integrator
+from foc_ros.core.kernels import freeze
 
 PLANTS = pytest.mark.parametrize('plant', [triple_integrator(0.03), damped_mass(0.04, 1.5, 4.0)], ids=['jerk', 'force'])
 
@@ -35,7 +36,8 @@ def test_position_variance_is_diagonal_in_the_squared_control(plant):
     stacked, noise = condense(plant, 15), np.array([0.3, 0.1])
     control = generator.standard_normal(30)
     full = propagate_covariance(stacked, np.zeros((16, len(plant.A), len(plant.A))), stack_noise(noise, 15) ** 2, control)[1:]
-    xx, yy, xy = position_variances(stacked.maps, stack_noise(noise, 15) ** 2, control, np.zeros((3, 15)))
+    position_noise = freeze(PositionNoise(stacked.maps, stack_noise(noise, 15) ** 2, np.zeros((3, 15))))
+    xx, yy, xy = position_variances(position_noise, control)
     np.testing.assert_allclose([xx, yy, xy], [full[:, 0, 0], full[:, 1, 1], full[:, 0, 1]], atol=1e-15)
 
 
@@ -43,10 +45,12 @@ def test_position_variance_is_diagonal_in_the_squared_control(plant):
 def test_weighted_variances_are_sums_of_squared_responses(plant):
     generator = np.random.default_rng(5)
     stacked, n = condense(plant, 15), len(plant.A)
-    end, way = generator.uniform(size=(2, n))
+    terminal, stage = generator.uniform(size=(2, n))
     squared = stacked.response**2
     np.testing.assert_allclose(
-        variance_weights(stacked.states, end, way), end @ squared[-1] + way @ squared[:-1].sum(axis=0), rtol=1e-12
+        variance_weights(stacked.states, terminal, stage),
+        terminal @ squared[-1] + stage @ squared[:-1].sum(axis=0),
+        rtol=1e-12,
     )
 
 

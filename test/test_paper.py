@@ -1,10 +1,11 @@
-"""The paper redone: its trends are there, the files are the same each time, wrong output is refused."""
+"""The studies of the paper: trends appear, files are reproducible, and an output that cannot be written is rejected."""
 
 from __future__ import annotations
 
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,9 @@ import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
-from foc_ros.analysis.paper.reaching import clearance, path_length, speed
+from foc_ros.analysis.paper.reaching import compute_speed, measure_solution
 from foc_ros.analysis.paper.studies import PAPER_ETA, QUICK, EffortCurve, RatioCurve, Studies
-from foc_ros.analysis.paper.trends import crossings, trends
+from foc_ros.analysis.paper.trends import check_trends, find_crossings
 from foc_ros.cli.paper import perform
 from foc_ros.core.types import Status
 
@@ -28,39 +29,41 @@ def output(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope='module')
 def found(output: Path) -> Studies:
-    """All studies on the coarse grid, from end to end."""
+    """Compute all studies on the coarse grid, from end to end."""
     return perform(output, QUICK)
 
 
 def ratio(found: Studies, number: int) -> RatioCurve:
-    """The continuous ratio of a study, solved at every eta."""
+    """Return the continuous ratio of a study, solved at every eta."""
     first = found[number].ratios[0]
-    for curve in (first.over, first.under):
+    for curve in (first.numerator, first.denominator):
         assert {each.status for each in curve.solutions} == {Status.SOLVED}, curve.name
     return first
 
 
-def test_1_lv_is_slow_and_near_hc_goes_wide(found: Studies) -> None:
+def test_1_lv_is_slow_and_near_while_hc_keeps_away(found: Studies) -> None:
     study = found[1]
-    lv, hc = study.shown[0.94]['LV'], study.shown[0.94]['HC']
-    assert clearance(study.scene, lv) < 0.9 * clearance(study.scene, hc)
-    assert speed(lv)[:25].mean() < 0.9 * speed(hc)[:25].mean()
-    assert speed(lv).argmax() > speed(hc).argmax()
+    lv, hc = study.solutions[0.94]['LV'], study.solutions[0.94]['HC']
+    clearance = {name: measure_solution(study.scene, each)['clearance'] for name, each in study.solutions[0.94].items()}
+    assert clearance['LV'] < 0.9 * clearance['HC']
+    assert compute_speed(lv)[:25].mean() < 0.9 * compute_speed(hc)[:25].mean()
+    assert compute_speed(lv).argmax() > compute_speed(hc).argmax()
     assert lv.tau < hc.tau and lv.lam > hc.lam
 
 
-def test_2_more_eta_costs_lv_its_spread_and_hc_its_way(found: Studies) -> None:
-    low, high = found[2].shown[0.86], found[2].shown[0.95]
+def test_2_more_eta_narrows_lv_and_lengthens_hc(found: Studies) -> None:
+    low, high = found[2].solutions[0.86], found[2].solutions[0.95]
     narrowed = {name: np.trace(high[name].covariance[25, :2, :2]) / np.trace(low[name].covariance[25, :2, :2]) for name in low}
     assert narrowed['LV'] < narrowed['HC'] < 1.0
     for shown in (low, high):
-        assert path_length(shown['LV']) < path_length(shown['HC'])
+        length = {name: measure_solution(found[2].scene, each)['path_length'] for name, each in shown.items()}
+        assert length['LV'] < length['HC']
 
 
 def test_3_ratio_of_strategies_rises_through_1(found: Studies) -> None:
     curve = ratio(found, 3)
     assert curve.values[0] < 1.0 < 1.5 < curve.at(0.95)
-    assert len(crossings(curve)) == 1
+    assert len(find_crossings(curve)) == 1
     assert np.diff(curve.values[curve.etas >= 0.86]).min() > 0.0
 
 
@@ -70,7 +73,7 @@ def test_4_with_little_noise_it_stays_below_1(found: Studies) -> None:
     assert curve.values[-1] < 0.97
 
 
-def test_5_and_6_ways_cost_the_same_up_to_a_knee_then_the_open_one_less(found: Studies) -> None:
+def test_5_and_6_classes_cost_the_same_up_to_a_knee_then_the_open_one_costs_less(found: Studies) -> None:
     lv, hc = ratio(found, 5), ratio(found, 6)
     for curve in (lv, hc):
         early = curve.values[curve.etas <= 0.9]
@@ -81,40 +84,40 @@ def test_5_and_6_ways_cost_the_same_up_to_a_knee_then_the_open_one_less(found: S
 
 
 def test_7_optimal_is_cheapest_and_all_keep_eta(found: Studies) -> None:
-    efforts = {curve.name: curve.efforts for curve in found.optimal.efforts}
+    efforts = {curve.name: curve.efforts for curve in found[7].efforts}
     assert np.isfinite(list(efforts.values())).all()
     for name in ('LV', 'HC'):
         assert (efforts['optimal'] < 1.001 * efforts[name]).all()
-    for rolled in found.optimal.rolled.values():
-        assert set(rolled) == set(QUICK.rolled)
+    for rolled in found[7].rolled_out.values():
+        assert set(rolled) == set(QUICK.rolled_out)
         assert all(each.step[2] > eta for eta, each in rolled.items())
 
 
-def test_stepping_is_another_thing(found: Studies) -> None:
-    """The printed growth overshoots: when the loop ends eta is exceeded, and LV costs many times what the smallest s costs."""
+def test_stepping_overshoots(found: Studies) -> None:
+    """With the printed growth the loop ends above the wanted eta, and LV costs many times what the smallest s costs."""
     _, printed, _ = found[3].ratios
     assert printed.name == 'algorithm 1, Δ = 10'
-    for stepped in (printed.over, printed.under):
+    for stepped in (printed.numerator, printed.denominator):
         for eta, each in zip(stepped.etas, stepped.solutions, strict=True):
             assert each.status is not Status.SOLVED or each.eta >= eta
     assert printed.at(0.94) > 2 * ratio(found, 3).at(0.93)
 
 
-def test_every_trend_is_judged_and_holds(found: Studies) -> None:
-    judged = trends(found)
-    assert [each.study for each in judged] == [1, 2, 3, 4, 5, 6, 7]
-    assert [each.study for each in judged if not each.holds] == []
+def test_every_trend_is_checked_and_holds(found: Studies) -> None:
+    checked = check_trends(found)
+    assert [each.study for each in checked] == [1, 2, 3, 4, 5, 6, 7]
+    assert [each.study for each in checked if not each.holds] == []
 
 
-def test_a_trend_that_is_not_there_is_seen(found: Studies) -> None:
-    """Numbers of H1 and H2 exchanged, and of LV and HC: nothing that is said of them holds any more."""
-    paper = list(found.paper)
-    for row in (2, 3, 4):
-        first = paper[row].ratios[0]
-        turned = RatioCurve(first.name, first.under, first.over)
-        paper[row] = type(paper[row])(**{**vars(paper[row]), 'ratios': (turned, *paper[row].ratios[1:])})
-    judged = trends(Studies(tuple(paper), found.optimal, found.reported))
-    assert {3, 4, 5} <= {each.study for each in judged if not each.holds}
+def test_a_missing_trend_is_reported(found: Studies) -> None:
+    """Where the numbers of H1 and H2, and of LV and HC, are exchanged, no statement about them holds."""
+    changed = dict(found)
+    for number in (3, 4, 5):
+        first = found[number].ratios[0]
+        swapped = RatioCurve(first.name, first.denominator, first.numerator)
+        changed[number] = replace(found[number], ratios=(swapped, *found[number].ratios[1:]))
+    checked = check_trends(changed)
+    assert {3, 4, 5} <= {each.study for each in checked if not each.holds}
 
 
 def test_crossings() -> None:
@@ -122,11 +125,11 @@ def test_crossings() -> None:
         solutions = tuple(type('Solved', (), {'effort': effort, 'status': Status.SOLVED})() for effort in efforts)
         return EffortCurve('', tuple(0.5 + 0.1 * row for row in range(len(efforts))), solutions)
 
-    assert crossings(RatioCurve('', curve(0.5, 2.0, 8.0), curve(1.0, 1.0, 1.0))) == [pytest.approx(0.55)]
-    assert crossings(RatioCurve('', curve(0.5, 0.9), curve(1.0, 1.0))) == []
+    assert find_crossings(RatioCurve('', curve(0.5, 2.0, 8.0), curve(1.0, 1.0, 1.0))) == [pytest.approx(0.55)]
+    assert find_crossings(RatioCurve('', curve(0.5, 0.9), curve(1.0, 1.0))) == []
 
 
-def test_files_hold_what_was_computed(found: Studies, output: Path) -> None:
+def test_files_hold_the_computed_numbers(found: Studies, output: Path) -> None:
     assert {file.name for file in output.iterdir()} == FILES
     numbers = json.loads((output / 'numbers.json').read_text('utf-8'))
     for name, number, paper in (('LV', 5, 0.33), ('HC', 6, 0.67)):
@@ -139,10 +142,10 @@ def test_files_hold_what_was_computed(found: Studies, output: Path) -> None:
 
 
 def test_same_files_each_time(found: Studies, output: Path, tmp_path: Path) -> None:
-    """Figures, too, to the byte: without dates, in the order of the studies."""
-    from foc_ros.reporting import paper_figures as figures
+    """The figures are equal to the byte, without dates and in the order of the studies."""
+    from foc_ros.reporting import paper_figures
 
-    figures.write(found, tmp_path, ('png', 'pdf'))
+    paper_figures.write_figures(found, tmp_path, ('png', 'pdf'))
     for file in tmp_path.iterdir():
         assert file.read_bytes() == (output / file.name).read_bytes(), file.name
 

@@ -152,10 +152,10 @@ def node_with(ros: Graph, **overrides: object) -> Any:
 
 
 def test_a_node_declares_every_parameter_with_description_and_range(ros: Graph) -> None:
-    from foc_ros.ros.node_parameters import config_of, declare_all
+    from foc_ros.ros.node_parameters import declare_parameters, read_config
 
     node = node_with(ros)
-    assert declare_all(node, Config()) == Config() == config_of(node)
+    assert declare_parameters(node, Config()) == Config() == read_config(node)
     for parameter in parameters():
         descriptor = node.describe_parameter(parameter.name)
         assert node.get_parameter(parameter.name).value == parameter.default
@@ -169,35 +169,35 @@ def test_a_node_declares_every_parameter_with_description_and_range(ros: Graph) 
 
 
 def test_a_node_starts_with_its_parameter_overrides(ros: Graph) -> None:
-    from foc_ros.ros.node_parameters import config_of, declare_all
+    from foc_ros.ros.node_parameters import declare_parameters, read_config
 
     node = node_with(ros, rate_hz=20, foc__eta=0.7, use_sim_time=False)
-    config = declare_all(node, Config())
-    assert config == updated(Config(), {'rate_hz': 20.0, 'foc.eta': 0.7}) == config_of(node)
+    config = declare_parameters(node, Config())
+    assert config == updated(Config(), {'rate_hz': 20.0, 'foc.eta': 0.7}) == read_config(node)
     assert isinstance(node.get_parameter('rate_hz').value, float)
 
 
 def test_a_node_does_not_start_with_a_value_out_of_bounds(ros: Graph) -> None:
-    from foc_ros.ros.node_parameters import declare_all
+    from foc_ros.ros.node_parameters import declare_parameters
 
     with pytest.raises(ParameterError, match=re.escape('foc.eta: expected a number in [0, 0.999], got 2.0')):
-        declare_all(node_with(ros, foc__eta=2.0), Config())
+        declare_parameters(node_with(ros, foc__eta=2.0), Config())
 
 
 def test_a_node_reads_the_file_that_replay_reads(tmp_path: Path) -> None:
     from ros_helpers import graph
 
-    from foc_ros.ros.node_parameters import declare_all
+    from foc_ros.ros.node_parameters import declare_parameters
 
     config = updated(Config(), {'foc.lv_delta': 5e-5, 'foc.lam': 1e15, 'frame_id': 'base', 'foc.steps': 33})
     file = tmp_path / 'params.yaml'
     file.write_text(dump_parameter_file(config), 'utf-8')
     with graph(['--ros-args', '--params-file', str(file)]) as ros:
-        assert declare_all(node_with(ros), Config()) == config == load_parameter_file(file)
+        assert declare_parameters(node_with(ros), Config()) == config == load_parameter_file(file)
 
 
 def test_an_unknown_parameter_of_a_node_is_logged_as_a_warning(ros: Graph) -> None:
-    from foc_ros.ros.node_parameters import declare_all
+    from foc_ros.ros.node_parameters import declare_parameters
 
     class Log:
         def __init__(self) -> None:
@@ -208,7 +208,7 @@ def test_an_unknown_parameter_of_a_node_is_logged_as_a_warning(ros: Graph) -> No
 
     node, log = node_with(ros, foc__etta=0.5), Log()
     node.get_logger = lambda: log
-    declare_all(node, Config())
+    declare_parameters(node, Config())
     assert log.lines == ['parameter foc.etta is unknown and has no effect']
 
 

@@ -109,7 +109,7 @@ def test_a_snapshot_figure_shows_past_and_future_of_the_hand() -> None:
     made = samples()
     hand = build_hand_trajectory(made)
     (span,) = hand.find_movements(0.05)
-    during = [build_snapshot(each, *scene()) for each in predictions(made) if span[0] <= each.stamp_ns <= span[1]]
+    during = [build_snapshot(each) for each in predictions(made) if span[0] <= each.stamp_ns <= span[1]]
     row = len(during) // 3
     snapshot = during[row]
     bounds = bounds_of(*scene(), snapshot.candidates)

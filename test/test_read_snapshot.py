@@ -12,7 +12,7 @@ from foc_ros.core.errors import MessageError
 from foc_ros.core.types import Prediction
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.reporting.snapshots import build_snapshot, is_same_prediction, read_snapshot
-from foc_ros.ros.messages.outputs import likelihood_array, prediction_cloud
+from foc_ros.ros.messages.encode_prediction import likelihood_array, prediction_cloud
 from foc_ros.ros.messages.types import RosbagsTypes
 
 TYPES = RosbagsTypes(TYPESTORE)
@@ -23,7 +23,7 @@ PLANES = ('xy', 'xz', 'yz')
 def test_round_trip(plane: str) -> None:
     made = prediction(START_NS, np.array([0.01, -0.02]))
     read = read_snapshot(prediction_cloud(made, plane, TYPES), likelihood_array(made, TYPES), plane, *scene())
-    known = build_snapshot(made, *scene())
+    known = build_snapshot(made)
     assert (read.stamp_ns, read.most_likely) == (known.stamp_ns, known.most_likely)
     assert [each.label for each in read.candidates] == [each.label for each in known.candidates]
     for got, expected in zip(read.candidates, known.candidates, strict=True):
@@ -37,7 +37,7 @@ def test_the_most_likely_candidate_by_hysteresis_is_first() -> None:
     made = replace(prediction(START_NS, np.zeros(2)), most_likely='goal1:+1-post')
     read = read_snapshot(prediction_cloud(made, 'xy', TYPES), likelihood_array(made, TYPES), 'xy', *scene())
     assert read.most_likely == read.candidates[0].label == 'goal1:+1-post'
-    assert [each.label for each in read.candidates] == [each.label for each in build_snapshot(made, *scene()).candidates]
+    assert [each.label for each in read.candidates] == [each.label for each in build_snapshot(made).candidates]
 
 
 def test_nothing_solved() -> None:

@@ -1,4 +1,4 @@
-"""The pictures of README and concepts exist and their scripts draw the described contents; the tables of the examples are current."""
+"""The pictures of README and concepts exist, their scripts draw them, and the tables of the examples are current."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
-from report_samples import predictions, samples, scene
+from report_samples import predictions, samples
 
 from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
 
@@ -39,9 +39,7 @@ def test_the_pictures_are_in_the_readme(name: str, start: bytes) -> None:
 def test_the_animation_covers_a_movement(tmp_path: Path) -> None:
     moving = script('make_demo_animation')
     made = samples(1)
-    drawn = list(
-        moving.pictures(build_hand_trajectory(made), [build_snapshot(each, *scene()) for each in predictions(made)], (0,))
-    )
+    drawn = list(moving.pictures(build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made)], (0,)))
     assert 10 < len(drawn) <= moving.PICTURES
     lengths = [len(figure.axes[1].lines[0].get_xdata()) for figure, _ in drawn]
     assert all(np.diff(lengths) > 0)
@@ -52,7 +50,7 @@ def test_the_animation_covers_a_movement(tmp_path: Path) -> None:
 def test_the_readme_picture_shows_the_beginning_of_its_movement() -> None:
     still = script('make_readme_picture')
     made = samples(still.MOVEMENT)
-    hand, snapshots = build_hand_trajectory(made), [build_snapshot(each, *scene()) for each in predictions(made, every=2)]
+    hand, snapshots = build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made, every=2)]
     start_ns = hand.find_movements(0.05)[still.MOVEMENT - 1][0]
     shown = min(snapshots, key=lambda each: abs(each.stamp_ns - start_ns - still.AFTER_S * 1e9))
     drawn = [line.get_xydata() for line in still.picture(hand, snapshots).axes[0].lines]

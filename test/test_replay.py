@@ -14,7 +14,7 @@ from foc_ros.analysis.replay import Replay, replay
 from foc_ros.cli.main import main
 from foc_ros.core.config import updated
 from foc_ros.io.bags import BagReader
-from foc_ros.ros.messages.input_messages import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.ros.messages.encode_inputs import goal_poses, hand_pose, obstacle_cloud
 
 FEW = 0.12
 """Seconds of a reach that are enough for a few predictions."""

@@ -14,7 +14,7 @@ import pytest
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 pytest.importorskip('plotly', reason='plotly is not installed')
 
-from report_samples import OBSTACLES, START_NS, prediction, predictions, samples, scene
+from report_samples import OBSTACLES, START_NS, prediction, predictions, samples
 
 from foc_ros.core.errors import InputError
 from foc_ros.core.types import HandSample, Prediction
@@ -49,7 +49,7 @@ class Page(HTMLParser):
 
 def report(directory: Path, reaches: int = 1, title: str = 'A title') -> list[Path]:
     made = samples(reaches)
-    snapshots = [build_snapshot(each, *scene()) for each in predictions(made)]
+    snapshots = [build_snapshot(each) for each in predictions(made)]
     return write_report(directory, title, build_hand_trajectory(made), snapshots, {'recording': 'some <bag> & more'})
 
 
@@ -101,7 +101,7 @@ def test_page_holds_the_likelihoods_of_all_predictions(tmp_path: Path) -> None:
 def test_paths_on_the_page_are_those_predicted(tmp_path: Path) -> None:
     made = samples()
     expected = predictions(made)
-    write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each, *scene()) for each in expected], {})
+    write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in expected], {})
     data = page_data_of(tmp_path)
     for frame, known in zip(data['frames'], expected, strict=True):
         for candidate, outcome in zip(frame['candidates'], known.solved_candidates, strict=True):
@@ -114,7 +114,7 @@ def test_paths_on_the_page_are_those_predicted(tmp_path: Path) -> None:
 
 def test_a_long_recording_is_thinned_out(tmp_path: Path) -> None:
     made = samples(5)
-    snapshots = [build_snapshot(each, *scene()) for each in predictions(made, every=1)]
+    snapshots = [build_snapshot(each) for each in predictions(made, every=1)]
     write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {})
     data = page_data_of(tmp_path)
     assert len(data['times']) == len(snapshots) == 750 > len(data['frames']) == MOST_FRAMES
@@ -133,7 +133,7 @@ def page_data_of(directory: Path) -> dict[str, Any]:
 def test_numbers_agree_with_the_predictions(tmp_path: Path) -> None:
     made = samples()
     expected = predictions(made)
-    write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each, *scene()) for each in expected], {})
+    write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in expected], {})
     numbers = json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))
     assert numbers['hand_samples'] == len(made)
     assert len(numbers['predictions']) == len(expected)
@@ -163,21 +163,19 @@ def test_a_report_without_predictions_says_so(tmp_path: Path) -> None:
 
 def test_a_report_without_solved_candidates_says_so(tmp_path: Path) -> None:
     lost = [each for each in prediction(START_NS, np.zeros(2)).candidates if not each.is_solved]
-    snapshots = [build_snapshot(Prediction(START_NS + n, 'world', 0.0, tuple(lost), None), *scene()) for n in range(3)]
+    snapshots = [build_snapshot(Prediction(START_NS + n, 'world', 0.0, tuple(lost), None)) for n in range(3)]
     write_report(tmp_path, 'x', build_hand_trajectory(samples()), snapshots, {})
     assert 'In 3 of 3 predictions no candidate could be solved.' in Page(tmp_path / 'index.html').text
 
 
 def test_a_hand_that_never_moves(tmp_path: Path) -> None:
     still = [HandSample(START_NS + n * 10_000_000, np.zeros(2)) for n in range(50)]
-    write_report(
-        tmp_path, 'x', build_hand_trajectory(still), [build_snapshot(prediction(still[20].stamp_ns, np.zeros(2)), *scene())], {}
-    )
+    write_report(tmp_path, 'x', build_hand_trajectory(still), [build_snapshot(prediction(still[20].stamp_ns, np.zeros(2)))], {})
     assert (tmp_path / 'moment_01.png').exists()
 
 
 def test_numbers_that_are_not_finite_become_null(tmp_path: Path) -> None:
-    made = build_snapshot(prediction(START_NS, np.zeros(2)), *scene())
+    made = build_snapshot(prediction(START_NS, np.zeros(2)))
     lost = replace(made, candidates=(replace(made.candidates[0], eta=float('nan')), *made.candidates[1:]))
     write_report(tmp_path, 'x', build_hand_trajectory(samples()), [lost], {})
     text = (tmp_path / 'predictions.json').read_text(encoding='utf-8')

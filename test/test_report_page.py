@@ -13,7 +13,7 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 pytest.importorskip('plotly', reason='plotly is not installed')
 
 from browser_helpers import check_report, chromium, screenshot, show
-from report_samples import predictions, samples, scene
+from report_samples import predictions, samples
 
 from foc_ros.reporting.report import write_report
 from foc_ros.reporting.report_data import MOST_FRAMES
@@ -35,7 +35,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
         directory,
         HOSTILE,
         build_hand_trajectory(made),
-        [build_snapshot(each, *scene()) for each in predictions(made)],
+        [build_snapshot(each) for each in predictions(made)],
         {HOSTILE: HOSTILE},
     )
     return directory
@@ -77,9 +77,7 @@ def test_playing_stops_at_the_end_of_a_movement(browser: Any, report: Path) -> N
 
 def test_a_long_recording_says_where_the_slider_stops(browser: Any, tmp_path: Path) -> None:
     made = samples(5)
-    write_report(
-        tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each, *scene()) for each in predictions(made, every=1)], {}
-    )
+    write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made, every=1)], {})
     check_report(browser, tmp_path)
     assert f'{MOST_FRAMES} of the 750 predictions' in browser.find_element('id', 'decimated').text
 

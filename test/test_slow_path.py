@@ -1,7 +1,8 @@
-"""The fast path answers as the slow one: at where it ends, one full QP, with every row and no working set, returns the same mean.
+"""The fast solution is that of the slow way: one full QP, linearised there, with every row and no working set, returns the same
+mean.
 
-A QP linearised at its own answer is what sequential QPs end with: whoever follows them slowly, stays there. `lv` and `hc` keep
-clear between the steps too; their QP has a row for every obstacle at every step and at every time of a contact.
+Sequential QPs end where a QP returns the control that it is linearised at. `lv` and `hc` keep clear between the steps too; their
+QP has a row for every obstacle at every step and at every time of a contact.
 """
 
 import numpy as np
@@ -9,10 +10,11 @@ import pytest
 from reach_helpers import solved
 from varied_reaches import varied_reach
 
+from foc_ros.core.kernels import freeze
 from foc_ros.core.obstacles.chance_constraint import k_of_eta
 from foc_ros.core.ocp.contacts.hermite import interpolate, interpolation_row
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.ocp.qp import ReachingQP, clearance_qp, effort_cost
+from foc_ros.core.ocp.qp import ObstacleRows, ReachingQP, clearance_qp, effort_cost
 from foc_ros.core.ocp.strategies.optimal import surrogate_qp
 from foc_ros.core.ocp.working_set import WorkingSet, solve_full
 from foc_ros.core.types import Solution, Status
@@ -21,27 +23,28 @@ SCENES = 300
 AGREE_M = 1e-6
 
 
-def at_any_time(problem: Problem, solution: Solution) -> ReachingQP:
+def clearance_qp_with_contacts(problem: Problem, solution: Solution) -> ReachingQP:
     """Return the QP of `clearance_qp` with rows at the steps and at the times of the contacts, linearised at the solution."""
     steps = problem.horizon.steps
     further = np.array([time for _, time, _ in solution.multipliers])
     times = np.concatenate((np.arange(1, steps + 1), further))
-    motion, course = problem.horizon.motion, problem.course(solution.control.T.ravel())
-    maps = np.array([[interpolation_row(motion, time, x, y) for time in further] for x, y in ((1.0, 0.0), (0.0, 1.0))])
+    motion, trajectory = problem.terms.motion, problem.trajectory(solution.control.T.ravel())
+    maps = np.array([[interpolation_row(motion.responses, time, x, y) for time in further] for x, y in ((1.0, 0.0), (0.0, 1.0))])
     maps = maps.reshape(2, len(further), 2 * steps)
     centres = problem.obstacles.centre[:, None] + times[None, :, None] * problem.drift[:, None]
-    away = np.array([interpolate(course, time, 0) for time in times]) - centres
+    away = np.array([interpolate(trajectory, time, 0) for time in times]) - centres
     normals = away / np.linalg.norm(away, axis=2, keepdims=True)
-    free = np.array([interpolate(problem.free_course, time, 0) for time in times])
+    free = np.array([interpolate(motion.free, time, 0) for time in times])
     limits = np.sqrt(problem.size[0] + solution.tau)[:, None] + np.einsum('mta,mta->mt', normals, centres - free)
     positions = problem.horizon.maps[:2]
-    return ReachingQP(effort_cost(problem, solution.lam), positions, np.ones((2, 2 * steps)), normals, limits, maps)
+    rows = freeze(ObstacleRows(positions, maps, np.ones((2, 2 * steps)), normals, limits))
+    return ReachingQP(effort_cost(problem, solution.lam), rows)
 
 
 def slow_path(problem: Problem, solution: Solution, strategy: str) -> np.ndarray:
     """Return the mean (N, 2) of the full QP at a solution."""
     if strategy in ('lv', 'hc'):
-        qp = at_any_time(problem, solution)
+        qp = clearance_qp_with_contacts(problem, solution)
     elif strategy == 'fixed' or not solution.multipliers:
         qp = clearance_qp(problem, effort_cost(problem, solution.lam), solution.path[1:], solution.tau)
     else:
@@ -83,9 +86,9 @@ def test_the_mean_keeps_clear_between_the_steps(strategy):
         solution = solved(problem, guess, strategy)
         if solution.status is not Status.SOLVED:
             continue
-        course = problem.course(solution.control.T.ravel())
+        trajectory = problem.trajectory(solution.control.T.ravel())
         times = np.linspace(1.0, problem.horizon.steps, 50 * (problem.horizon.steps - 1) + 1)
-        positions = np.array([interpolate(course, time, 0) for time in times])
+        positions = np.array([interpolate(trajectory, time, 0) for time in times])
         away = positions - problem.obstacles.centre[:, None] - times[:, None] * problem.drift[:, None]
         spare = np.linalg.norm(away, axis=2) - np.sqrt(problem.size[0] + solution.tau)[:, None]
         assert spare.min() > -1e-7 * problem.extent

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from report_samples import START_NS, prediction, predictions, samples, scene
+from report_samples import START_NS, prediction, predictions, samples
 
 from foc_ros.core.types import HandSample
 from foc_ros.reporting.snapshots import HandTrajectory, build_hand_trajectory, build_snapshot
@@ -12,7 +12,7 @@ from foc_ros.reporting.snapshots import HandTrajectory, build_hand_trajectory, b
 
 def test_a_snapshot_holds_the_numbers_of_its_prediction() -> None:
     made = prediction(START_NS, np.zeros(2), 0.6)
-    snapshot = build_snapshot(made, *scene())
+    snapshot = build_snapshot(made)
     assert [each.label for each in snapshot.candidates] == ['goal0:+1', 'goal0:-1', 'goal1:+1-post']
     assert snapshot.unsolved == (('goal1:+1+post', 'eta_unreachable'),)
     best = snapshot.candidates[0]
@@ -23,7 +23,7 @@ def test_a_snapshot_holds_the_numbers_of_its_prediction() -> None:
 
 
 def test_speed_is_that_of_the_velocity() -> None:
-    candidate = build_snapshot(prediction(START_NS, np.zeros(2)), *scene()).candidates[0]
+    candidate = build_snapshot(prediction(START_NS, np.zeros(2))).candidates[0]
     lengths = np.linalg.norm(np.diff(candidate.path, axis=0), axis=1)
     assert np.sum((candidate.speed[1:] + candidate.speed[:-1]) / 2 * 0.05) == pytest.approx(lengths.sum(), rel=0.02)
 
@@ -68,4 +68,4 @@ def test_tremor_is_no_movement() -> None:
 
 def test_a_snapshot_has_the_stamp_of_its_prediction() -> None:
     made = samples()
-    assert [build_snapshot(each, *scene()).stamp_ns for each in predictions(made)] == [each.stamp_ns for each in made[::4]]
+    assert [build_snapshot(each).stamp_ns for each in predictions(made)] == [each.stamp_ns for each in made[::4]]

@@ -173,6 +173,12 @@ def test_json_of_an_unsolved_candidate_holds_what_was_reached(tmp_path: Path, ca
     assert shut['violation_at']['obstacle'] in ('0', '1')
 
 
+def test_a_damped_mass_has_no_acceleration(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for each in candidates(tmp_path, capsys, {**SCENE, 'plant': 'damped_mass'}):
+        assert each['acceleration'] is None
+        assert np.shape(each['velocity']) == (51, 2) and np.shape(each['covariance']) == (51, 4, 4)
+
+
 def test_a_state_without_acceleration_is_encoded_with_null() -> None:
     mean, covariance = np.zeros((3, 4)), np.zeros((3, 4, 4))
     solution = Solution(Status.SOLVED, '', 0.1, mean, covariance, np.ones((2, 2)), 1.0, {}, 0.0, 1.0, 0.9)

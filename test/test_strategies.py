@@ -1,4 +1,4 @@
-"""What each strategy promises, on scenes of the tests' own."""
+"""The promises of each strategy."""
 
 import re
 from dataclasses import replace
@@ -11,13 +11,12 @@ from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import Deadline, OutOfTimeError
 from foc_ros.core.dynamics.plants import condense, damped_mass, triple_integrator_horizon
 from foc_ros.core.errors import SceneError
-from foc_ros.core.obstacles.chance_constraint import eta_of_k
-from foc_ros.core.ocp.chance_evaluation import evaluate_chance_constraint, evaluate_safety_factors
-from foc_ros.core.ocp.minimum_k import assess_between
+from foc_ros.core.obstacles.chance_constraint import constraint_moments, eta_of_k
+from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
-from foc_ros.core.ocp.strategies.algorithm1 import algorithm1
+from foc_ros.core.ocp.strategies.algorithm1 import solve_algorithm1
 from foc_ros.core.ocp.strategies.optimal import surrogate_qp
 from foc_ros.core.ocp.warm_start import cold_start, correct_to_goal, warm_start
 from foc_ros.core.ocp.working_set import WorkingSet
@@ -42,15 +41,15 @@ def test_result_is_consistent_with_itself(strategy):
     problem = one_obstacle()
     solution = solved(problem, BOWED, strategy)
     control = solution.control.T.ravel()
-    assessment = evaluate_chance_constraint(problem, control) if strategy == 'optimal' else assess_between(problem, control)
+    minimum = find_minimum_safety_factor(problem, control, between_steps=strategy != 'optimal')
     assert solution.effort == pytest.approx(control @ control)
-    assert solution.eta == pytest.approx(eta_of_k(assessment.smallest_k))
+    assert solution.eta == pytest.approx(eta_of_k(minimum.k))
     assert solution.eta >= 0.9 - 1e-6
     assert solution.eta_at is not None
     identity, step = solution.eta_at
     assert identity == '0'
-    assert assessment.smallest_k <= evaluate_safety_factors(problem, control).min() * (1 + 1e-12)
-    assert (0, step) == assessment.place
+    assert minimum.k <= find_minimum_safety_factor(problem, control, between_steps=False).k * (1 + 1e-12)
+    assert (0, step) == minimum[1:]
     np.testing.assert_allclose(solution.path[1:], problem.positions(control), atol=1e-12)
     np.testing.assert_allclose(solution.mean[0], problem.initial_mean)
     np.testing.assert_allclose(solution.mean[-1], problem.goal, atol=1e-7)
@@ -96,7 +95,7 @@ def test_monte_carlo_keeps_the_guarantee(strategy, eta):
 
 
 @pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
-def test_an_unreachable_eta_is_said_with_the_largest_that_is_reached(strategy):
+def test_the_message_of_an_unreachable_eta_names_the_largest_that_is_reached(strategy):
     solution = solved(one_obstacle(0.999, (0.6, 0.6)), BOWED, strategy)
     assert solution.status is Status.ETA_UNREACHABLE
     assert 0 < solution.eta < 0.999
@@ -113,7 +112,7 @@ def test_no_way_through_is_infeasible_with_a_path_to_look_at(strategy):
     assert solution.status is Status.INFEASIBLE
     assert solution.eta == 0.0
     assert np.isfinite(solution.mean).all()
-    assert 'no way' in solution.message
+    assert 'no path' in solution.message
 
 
 @pytest.mark.parametrize('strategy', ['lv', 'optimal'])
@@ -148,7 +147,7 @@ def test_moving_and_uncertain_centres_are_avoided_where_they_will_be(strategy):
 
 
 @EVERY
-def test_a_damped_mass_goes_through_the_same_door(strategy):
+def test_every_strategy_solves_for_a_damped_mass(strategy):
     stacked = condense(damped_mass(0.02, 1.0, 2.0), 50)
     obstacles = make_obstacles([[0.12, 0.0]], [0.03], [0.003])
     problem = rest_to_goal(stacked, np.zeros(4), np.array([0.3, 0.0]), obstacles, np.array([0.1, 0.1]), 0.9)
@@ -167,35 +166,32 @@ def test_gradient_of_the_surrogate_rows_is_that_of_finite_differences():
     qp = surrogate_qp(problem, control, WorkingSet(), np.zeros(0), 2.0)
 
     def f(u):
-        return -assessed(problem, u, 2.0)
+        return -surrogate_slack(problem, u, 2.0)
 
     offset = problem.positions(control)[None] - problem.centres
     differences = (f(control + step) - f(control - step)) / 2 / (2 * np.hypot(offset[..., 0], offset[..., 1]))
     np.testing.assert_allclose(-qp.row_values(step), differences, atol=1e-6 * np.abs(differences).max())
 
 
-def assessed(problem, control, k):
+def surrogate_slack(problem, control, k):
     """Return -f, the slack of the surrogate, for every obstacle and step."""
-    from foc_ros.core.obstacles.chance_constraint import variances
-
-    offset = problem.positions(control)[None] - problem.centres
-    var = variances(offset, problem.position_variance(control), problem.size[1], problem.obstacles.centre_covariance)
-    return (offset**2).sum(axis=-1) - problem.size[0][:, None] - k * np.sqrt(var)
+    circles = problem.terms.chance.circles
+    mean, variance = constraint_moments(problem.positions(control), problem.position_variance(control), circles)
+    return -mean - k * np.sqrt(variance)
 
 
-def test_algorithm1_as_printed_overshoots_what_the_continuous_walk_finds():
+def test_algorithm1_as_printed_overshoots_the_solution_of_the_continuous_path():
     problem = one_obstacle(0.9)
-    stepped = algorithm1(problem, BOWED[1:], 5e-5, 10.0, 1.0)
-    walked = solved(problem, BOWED, 'lv', growth=10.0)
-    assert stepped.solution is not None
-    effort = stepped.solution.control @ stepped.solution.control
+    stepped = solve_algorithm1(problem, cold_start(BOWED), FocConfig(algorithm1_growth=10.0))
+    followed = solved(problem, BOWED, 'lv', growth=10.0)
+    effort = stepped.control @ stepped.control
     if stepped.status is Status.SOLVED:
-        assert effort >= walked.effort * (1 - 1e-6)
+        assert effort >= followed.effort * (1 - 1e-6)
     else:
         assert 'infeasible' in stepped.message or 'not settled' in stepped.message
-    gentle = algorithm1(problem, BOWED[1:], 5e-5, 1.5, 1.0)
+    gentle = solve_algorithm1(problem, cold_start(BOWED), FocConfig(algorithm1_growth=1.5))
     assert gentle.status is Status.SOLVED
-    assert evaluate_chance_constraint(problem, gentle.solution.control).eta >= 0.9
+    assert find_minimum_safety_factor(problem, gentle.control, between_steps=False).eta >= 0.9
 
 
 @EVERY
@@ -209,7 +205,7 @@ def test_a_warm_start_finds_what_a_cold_one_finds(strategy):
 
 
 @EVERY
-def test_a_warm_start_is_led_to_the_goal_from_where_the_hand_really_is(strategy):
+def test_a_warm_start_is_corrected_to_the_goal_from_where_the_hand_really_is(strategy):
     before = solved(one_obstacle(0.86), BOWED, strategy)
     state = np.array([0.002, 0.001, 0.03, 0.01, 0.8, 0.2])  # not where the plan would be, and far from its acceleration
     problem = replace(one_obstacle(0.86), initial_mean=state)

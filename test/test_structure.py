@@ -20,6 +20,8 @@ UNCLEAR_NAMES = {
     'lineage', 'fixed',
 }
 # fmt: on
+ALLOWED = {('core/ocp/strategies/fixed.py', 'fixed')}
+"""The file of a strategy has the name that users give to the parameter `foc.strategy`."""
 
 
 def parse_package() -> Iterator[tuple[str, ast.Module]]:
@@ -57,5 +59,5 @@ def test_functions_have_at_most_eight_parameters() -> None:
 
 def test_names_of_modules_and_their_contents_are_clear() -> None:
     names = [(path, name) for path, tree in parse_package() for name in (Path(path).stem, *find_module_names(tree))]
-    unclear = [f'{path}: {name}' for path, name in names if name in UNCLEAR_NAMES]
+    unclear = [f'{path}: {name}' for path, name in names if name in UNCLEAR_NAMES and (path, name) not in ALLOWED]
     assert not unclear, '\n'.join(unclear)

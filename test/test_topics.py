@@ -7,7 +7,7 @@ import re
 import pytest
 
 from foc_ros.core.errors import RecordingError
-from foc_ros.io.topics import assign
+from foc_ros.io.topics import assign_topics
 
 POSE, CLOUD, MARKERS, POSES = (
     'geometry_msgs/msg/PoseStamped',
@@ -40,20 +40,24 @@ PLAIN = {'/hand_pose': POSE, '/obstacles': CLOUD, '/goals': POSES}
     ],
 )
 def test_topics_are_found(topics: dict[str, str], expected: dict[str, str]) -> None:
-    roles = assign(topics)
+    roles = assign_topics(topics)
     assert {role: roles[role] for role in expected} == expected
     assert len(set(roles.values())) == len(roles)
 
 
 def test_a_choice_overrides_names() -> None:
     topics = {**PLAIN, '/left/measured_cp': POSE, '/right/measured_cp': POSE}
-    assert assign(topics, {'hand_pose': '/right/measured_cp'})['hand_pose'] == '/right/measured_cp'
+    assert assign_topics(topics, {'hand_pose': '/right/measured_cp'})['hand_pose'] == '/right/measured_cp'
 
 
 @pytest.mark.parametrize(
     ('topics', 'chosen', 'message'),
     [
-        ({'/obstacles': CLOUD, '/goals': POSES}, None, 'no topic for hand_pose (geometry_msgs/msg/PoseStamped); the recording has /goals'),
+        (
+            {'/obstacles': CLOUD, '/goals': POSES},
+            None,
+            'no topic for hand_pose (geometry_msgs/msg/PoseStamped); the recording has /goals',
+        ),
         ({'/hand_pose': POSE, '/goals': POSES}, None, 'no topic for obstacles (sensor_msgs/msg/PointCloud2) or obstacle_markers'),
         ({'/hand_pose': POSE, '/obstacles': CLOUD}, None, 'no topic for goals (geometry_msgs/msg/PoseArray) or goal_pose'),
         ({}, None, 'the recording has no topics'),
@@ -70,4 +74,4 @@ def test_a_choice_overrides_names() -> None:
 )
 def test_a_wrong_choice_of_topics_is_refused(topics: dict[str, str], chosen: dict[str, str] | None, message: str) -> None:
     with pytest.raises(RecordingError, match=re.escape(message)):
-        assign(topics, chosen)
+        assign_topics(topics, chosen)

@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from foc_ros.io import topics
-from foc_ros.ros.messages.outputs import LIKELIHOOD_COLUMNS, OUTPUTS
+from foc_ros.ros.messages.encode_prediction import LIKELIHOOD_COLUMNS, OUTPUTS
 
 CONFIG = Path(__file__).parents[1] / 'config'
 TYPES = {f'/{name}': kind for name, kind in topics.TYPES.items()} | {f'/foc/{name}': kind for name, (kind, _) in OUTPUTS.items()}

@@ -23,7 +23,7 @@ LONG = (
     # studies of the solver over many scenes
     'test_effort_over_eta.py::test_effort_is_continuous*',
     'test_effort_over_eta.py::test_no_strategy_needs_less_effort_than_optimal_in_the_same_class',
-    'test_flicker.py::test_a_symmetric_obstacle_does_not_make_the_choice_flicker',
+    'test_flicker.py::test_*symmetric_obstacle*',
     'test_guarantee.py::*',
     'test_slow_path.py::*',
     # all steps of a fit, of the paper's studies and of long reports
@@ -47,7 +47,10 @@ LONG = (
 )
 
 PROCESS = (
+    'test_cluster.py::*',
+    'test_demo_*.py::test_the_node_*',
     'test_fit.py::*',
+    'test_fit_*.py::test_a_setting_that_predicts_nothing_*',
     'test_evaluate.py::test_the_number_of_workers_does_not_matter',
     'test_paper.py::*',
 )

@@ -1,4 +1,4 @@
-"""What worker processes are given to do in tests: importable by name."""
+"""Functions for the worker processes of tests, importable by name."""
 
 import os
 import signal
@@ -25,6 +25,13 @@ def faulty(number: int) -> int:
     if number == 2:
         raise KeyError('two')
     return number
+
+
+class Unloadable:
+    """An argument that can be pickled but not loaded."""
+
+    def __reduce__(self) -> tuple:
+        return (int, ('no number',))
 
 
 def worker_pid(number: int) -> int:

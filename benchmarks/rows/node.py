@@ -111,7 +111,7 @@ class Player:
         return [self.arrived[stamp] - at for stamp, at in sent.items() if stamp in self.arrived], count
 
     def _publish_scene(self, stamp_ns: int) -> None:
-        from foc_ros.ros.messages.input_messages import goal_poses, obstacle_cloud
+        from foc_ros.ros.messages.encode_inputs import goal_poses, obstacle_cloud
 
         circles = self.reach.obstacles
         table = zip(circles.centre, circles.radius, circles.radius_stddev, strict=True)
@@ -121,7 +121,7 @@ class Player:
 
     def _publish_hand(self, stamp_ns: int, tick: int) -> None:
         """Publish a hand that circles slowly around its start, so that all classes stay open."""
-        from foc_ros.ros.messages.input_messages import hand_pose
+        from foc_ros.ros.messages.encode_inputs import hand_pose
 
         angle = 2 * np.pi * tick * PERIOD_S / 3.0
         position = (0.005 * (1 - np.cos(angle)), 0.005 * np.sin(angle), 0.0)

@@ -47,18 +47,18 @@ def measure_against_daqp(is_quick: bool) -> Result:
 
 
 def _measure_against_naive(solver: str, target: Target | None, is_quick: bool) -> Result:
-    from peers.naive import run_algorithm1
+    from peers.naive import NaiveSolution, run_algorithm1
+
+    def solve_naive() -> NaiveSolution | None:
+        return run_algorithm1(build_problem(), GUESS[1:], solver, (DELTA, GROWTH, XI))
 
     repetitions = 3 if is_quick else 25
     timings = _time(
         ('lv, Delta 1.5, from the guess', lambda: _solve_cold(LV)),
-        (
-            f'algorithm 1 with Delta 1.5, each QP full and dense by {solver}',
-            lambda: run_algorithm1(build_problem(), GUESS[1:], solver, (DELTA, GROWTH, XI)),
-        ),
+        (f'algorithm 1 with Delta 1.5, each QP full and dense by {solver}', solve_naive),
         repetitions,
     )
-    naive, ours = run_algorithm1(build_problem(), GUESS[1:], solver, (DELTA, GROWTH, XI)), _solve_cold(LV)
+    naive, ours = solve_naive(), _solve_cold(LV)
     if naive is None:
         raise RuntimeError(f'{solver} found no solution')
     same = _solve_cold(replace(LV, strategy='fixed', tau=naive.tau, lam=naive.lam))

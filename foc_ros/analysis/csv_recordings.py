@@ -1,4 +1,4 @@
-"""Motion capture in CSV tables as the messages that a tracker and a perception node would have sent."""
+"""Motion capture in CSV tables, as the messages that a tracker and a perception node would have sent."""
 
 from __future__ import annotations
 
@@ -13,24 +13,21 @@ from foc_ros.core.errors import RecordingError
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.bags import TYPESTORE, BagWriter
 from foc_ros.io.csv_tables import Row, rows
-from foc_ros.ros.messages.input_messages import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.ros.messages.encode_inputs import goal_poses, hand_pose, obstacle_cloud
 from foc_ros.ros.messages.types import RosbagsTypes
 
 FRAME = 'world'
 EPOCH_NS = NANOSECONDS
-"""Stamp of t_s = 0: not 0, which means `not set` in a message."""
-
+"""Stamp of t_s = 0. It is not 0, which means `not set` in a message."""
 LATEST_S, LONGEST_S = 2e9, 86400.0
-"""Bounds on a time (the seconds of a stamp have 31 bits) and on a recording's length: beyond a day, two clocks are mixed up."""
-
-SCENE_PERIOD_NS = NANOSECONDS // 2
-SCENE_LEAD_NS = NANOSECONDS // 10
-"""The scene is told twice a second, and first a tenth of a second before the first hand pose."""
+"""Bounds on a time (a stamp has 31 bits for seconds) and on a recording's length (beyond a day, two clocks are mixed up) [s]."""
+SCENE_PERIOD_NS, SCENE_LEAD_NS = NANOSECONDS // 2, NANOSECONDS // 10
+"""The scene is sent twice a second, for the first time a tenth of a second before the first hand pose."""
 
 
 @dataclass(frozen=True)
 class Movement:
-    """One recording: stamps [ns], never falling, and positions (n, 3) [m]."""
+    """One recording: stamps [ns] that never fall, and positions (n, 3) [m]."""
 
     name: str
     stamps_ns: tuple[int, ...]
@@ -38,67 +35,73 @@ class Movement:
 
 
 def read_movements(file: Path) -> list[Movement]:
-    """Return the recordings in order of their first rows; within one, time must not run backward."""
-    return [movement_of(name, rows_of) for name, rows_of in movement_rows(file).items()]
+    """Return the recordings in the order of their first rows; within one recording, time must not run backward."""
+    return [parse_movement(name, table) for name, table in read_movement_rows(file).items()]
 
 
-def movement_rows(file: Path) -> dict[str, list[Row]]:
-    """Return the rows of each recording, in order of their first rows; at least one."""
+def read_movement_rows(file: Path) -> dict[str, list[Row]]:
+    """Return the rows of each recording, at least one, in the order of their first rows."""
     found: dict[str, list[Row]] = {}
     for row in rows(file, ('recording', 't_s', 'x_m', 'y_m')):
         if not row.cells['recording']:
             raise row.fault('recording', 'a name')
         found.setdefault(row.cells['recording'], []).append(row)
-    if not found:
-        raise RecordingError(f'{file}: expected at least one row, got none')
+    _check_not_empty(file, found)
     return found
 
 
-def movement_of(name: str, table: Iterable[Row]) -> Movement:
+def parse_movement(name: str, table: Iterable[Row]) -> Movement:
     """Return one recording from its rows; raises RecordingError for a cell out of bounds and for time that runs backward."""
     samples: list[tuple[float, ...]] = []
     for row in table:
         bounds = (samples[-1][0], samples[0][0] + LONGEST_S) if samples else (0.0, LATEST_S)
-        time = row.number('t_s', *bounds)
-        samples.append((time, row.number('x_m'), row.number('y_m'), row.number('z_m', default=0.0)))
+        samples.append((row.number('t_s', *bounds), *_parse_position(row)))
     return Movement(name, tuple(EPOCH_NS + round(each[0] * NANOSECONDS) for each in samples), np.array(samples)[:, 1:])
 
 
 def read_obstacles(file: Path) -> list[tuple[float, ...]]:
-    """Return obstacles as rows x, y, z, radius, radius_stddev, id; ids default to the position in the table; none is allowed."""
+    """Return obstacles as rows x, y, z, radius, radius_stddev, id, possibly none; ids default to the position in the table."""
     found: dict[int, tuple[float, ...]] = {}
-    for place, row in enumerate(rows(file, ('x_m', 'y_m', 'radius_m'))):
-        identity = row.whole('id', -(2**31), 2**31 - 1, default=place)
+    for number, row in enumerate(rows(file, ('x_m', 'y_m', 'radius_m'))):
+        identity = row.whole('id', -(2**31), 2**31 - 1, default=number)
         if identity in found:
             raise row.fault('id', 'another id than the rows above')
         radius, stddev = row.number('radius_m', 0.0), row.number('radius_stddev_m', 0.0, default=0.0)
-        found[identity] = (row.number('x_m'), row.number('y_m'), row.number('z_m', default=0.0), radius, stddev, identity)
+        found[identity] = (*_parse_position(row), radius, stddev, identity)
     return list(found.values())
 
 
 def read_goals(file: Path) -> Array:
     """Return goals (g, 3) [m], at least one."""
-    goals = [(row.number('x_m'), row.number('y_m'), row.number('z_m', default=0.0)) for row in rows(file, ('x_m', 'y_m'))]
-    if not goals:
-        raise RecordingError(f'{file}: expected at least one row, got none')
+    goals = [_parse_position(row) for row in rows(file, ('x_m', 'y_m'))]
+    _check_not_empty(file, goals)
     return np.array(goals)
 
 
 def write_movement(bag: Path, movement: Movement, obstacles: list[tuple[float, ...]], goals: Array | None) -> None:
-    """Write one bag: /hand_pose, /obstacles and, where there are any, /goals, in order of their stamps."""
+    """Write one bag with /hand_pose, /obstacles and, where there are any, /goals, in the order of their stamps."""
     with BagWriter(bag) as writer:
-        for stamp_ns, topic, message in messages(movement, obstacles, goals):
+        for stamp_ns, topic, message in recorded_messages(movement, obstacles, goals):
             writer.write(topic, message, stamp_ns)
 
 
-def messages(movement: Movement, obstacles: list[tuple[float, ...]], goals: Array | None) -> list[tuple[int, str, Any]]:
-    """Return the messages of a bag as (stamp [ns], topic, message), in order of their stamps."""
+def recorded_messages(movement: Movement, obstacles: list[tuple[float, ...]], goals: Array | None) -> list[tuple[int, str, Any]]:
+    """Return the messages of a bag as (stamp [ns], topic, message), in the order of their stamps."""
     types = RosbagsTypes(TYPESTORE)
-    made: list[tuple[int, str, Any]] = []
+    found: list[tuple[int, str, Any]] = []
     for stamp_ns in range(movement.stamps_ns[0] - SCENE_LEAD_NS, movement.stamps_ns[-1] + 1, SCENE_PERIOD_NS):
-        made.append((stamp_ns, '/obstacles', obstacle_cloud(types, stamp_ns, FRAME, obstacles)))
+        found.append((stamp_ns, '/obstacles', obstacle_cloud(types, stamp_ns, FRAME, obstacles)))
         if goals is not None:
-            made.append((stamp_ns, '/goals', goal_poses(types, stamp_ns, FRAME, goals)))
+            found.append((stamp_ns, '/goals', goal_poses(types, stamp_ns, FRAME, goals)))
     for stamp_ns, position in zip(movement.stamps_ns, movement.positions, strict=True):
-        made.append((stamp_ns, '/hand_pose', hand_pose(types, stamp_ns, FRAME, position)))
-    return sorted(made, key=lambda each: each[0])
+        found.append((stamp_ns, '/hand_pose', hand_pose(types, stamp_ns, FRAME, position)))
+    return sorted(found, key=lambda each: each[0])
+
+
+def _parse_position(row: Row) -> tuple[float, float, float]:
+    return row.number('x_m'), row.number('y_m'), row.number('z_m', default=0.0)
+
+
+def _check_not_empty(file: Path, found: Any) -> None:
+    if not found:
+        raise RecordingError(f'{file}: expected at least one row, got none')

@@ -1,4 +1,4 @@
-"""Demonstrations in a recording: each movement that ends near a goal becomes a way of the class library."""
+"""Demonstrations in a recording: each movement that ends at a goal becomes an entry of the class library."""
 
 from __future__ import annotations
 
@@ -11,16 +11,18 @@ from foc_ros.core.obstacles.scene import Scene
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import Array
 
+from .goal_reached import AT_GOAL_M, find_goal_at_end
 from .replay import Step
 
-AT_GOAL = 0.05
-"""A movement that ends no farther from a goal than this reached it [m]."""
-SHORTEST = 0.05
+SHORTEST_M = 0.05
 """Shorter movements demonstrate nothing [m]."""
 
 
 class Learner:
-    """Takes the steps of a replay. Attributes: ways, those known before and those learned; learned, how many are new."""
+    """Takes the steps of a replay.
+
+    Attributes: ways, all demonstrations, those known before and those learned; learned, the number of new ones.
+    """
 
     def __init__(self, pipeline: Pipeline, known: Sequence[Demonstration]) -> None:
         self.ways = list(known)
@@ -32,7 +34,7 @@ class Learner:
         self._stamp_ns = 0
 
     def add(self, step: Step) -> None:
-        """Follow the hand."""
+        """Append the hand's position to the movement, or begin a new movement."""
         state = self._pipeline.hand_state
         if step.sample is None or state is None:
             return
@@ -44,15 +46,15 @@ class Learner:
             self._scene, self._stamp_ns = step.scene, state.stamp_ns
 
     def finish(self) -> None:
-        """End the movement; learn it if it reached a goal by a way that is not known."""
+        """End the movement; learn it if it ends at a goal and was not known."""
         path, self._path = np.array(self._path), []
         goals, frame_id = self._scene.goals, self._pipeline.frame_id
         if len(path) < 2 or goals is None or not len(goals) or frame_id is None:
             return
-        if np.hypot(*np.diff(path, axis=0).T).sum() < SHORTEST or np.hypot(*(goals - path[-1]).T).min() > AT_GOAL:
+        goal, distance_m = find_goal_at_end(path, goals)
+        if np.hypot(*np.diff(path, axis=0).T).sum() < SHORTEST_M or distance_m > AT_GOAL_M:
             return
-        goal = goals[int(np.hypot(*(goals - path[-1]).T).argmin())]
-        way = record_demonstration(frame_id, np.vstack([path, goal]), self._scene.obstacles(self._stamp_ns))
-        if not any(is_same_demonstration(way, known) for known in self.ways):
-            self.ways.append(way)
+        found = record_demonstration(frame_id, np.vstack([path, goals[goal]]), self._scene.obstacles(self._stamp_ns))
+        if not any(is_same_demonstration(found, known) for known in self.ways):
+            self.ways.append(found)
             self.learned += 1

@@ -1,4 +1,4 @@
-"""A recording through the predictor in its own time: no ROS, no clock, no waiting; the same answer each time."""
+"""A recording through the predictor in the recording's own time: without ROS, clock or waiting, so that results repeat."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from foc_ros.ros.intake import Intake
 
 @dataclass(frozen=True)
 class Step:
-    """What one recorded message led to.
+    """One recorded message and its effect.
 
-    item: the message; sample: the hand sample it was, None for other messages and for one that was refused; prediction: made
-    upon it, None where none was due or possible; scene: that it was made in.
+    item: the message; sample: its hand sample, None for other messages and for a rejected one; prediction: made from the sample,
+    None where none was due or possible; scene: the scene of the prediction.
     """
 
     item: Item
@@ -41,12 +41,12 @@ class Replay:
         self.intake = Intake(self.pipeline)
 
     def steps(self, items: Iterable[Item]) -> Iterator[Step]:
-        """Take the messages in their order and yield what each led to."""
+        """Process the messages in their order and yield the effect of each."""
         for item in items:
-            verdict = self.intake.take(item.role, item.message)
+            status = self.intake.take(item.role, item.message)
             is_hand = item.role == HAND
             prediction = self.pipeline.predict() if is_hand and self.pipeline.due else None
-            sample = self.intake.sample if is_hand and verdict is not None and verdict.taken else None
+            sample = self.intake.sample if is_hand and status is not None and status.taken else None
             yield Step(item, sample, prediction, self.pipeline.scene)
 
 

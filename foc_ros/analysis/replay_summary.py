@@ -1,4 +1,4 @@
-"""What a replay amounts to: how much was predicted, what was refused, what failed, and how long it took."""
+"""The summary of a replay: counts of predictions, rejections and failures, and computing times."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from foc_ros.io.topics import HAND
 from .replay import Step
 
 FAILED = 'candidate_'
-"""The pipeline counts a candidate that was not solved under this and its status."""
+"""The pipeline counts a candidate that was not solved under this prefix and its status."""
 
 
 @dataclass
 class Summary:
     """Counts over the steps of one replay.
 
-    samples: hand poses read; predictions; solved: those with a solved candidate; seconds: wall time of each prediction.
+    samples: hand poses read; predictions; solved: predictions with a solved candidate; seconds: wall time of each prediction.
     """
 
     samples: int = 0
@@ -40,34 +40,34 @@ class Summary:
     def answer(self, counts: Mapping[str, int], duration_s: float) -> dict[str, Any]:
         """Return all as plain values; counts: of the intake; duration_s: of the recording.
 
-        refused: messages, samples and predictions that came to nothing, and restarts, by kind; failures: candidates by status.
+        refused: rejected messages, samples and predictions, and restarts, by kind; failures: candidates by status.
         """
         failures = Counter({name.removeprefix(FAILED): count for name, count in counts.items() if name.startswith(FAILED)})
-        p50, p99 = np.percentile(self.seconds, (50, 99)) if self.seconds else (None, None)
+        p50, p99 = (1e3 * np.percentile(self.seconds, (50, 99))).tolist() if self.seconds else (None, None)
         return {
             'samples': self.samples,
             'predictions': self.predictions,
             'solved': self.solved,
             'refused': {name: count for name, count in sorted(counts.items()) if not name.startswith(FAILED)},
             'failures': dict(sorted(failures.items())),
-            'prediction_ms': {'p50': None if p50 is None else 1e3 * p50, 'p99': None if p99 is None else 1e3 * p99},
+            'prediction_ms': {'p50': p50, 'p99': p99},
             'duration_s': duration_s,
         }
 
 
 def facts(answer: Mapping[str, Any]) -> dict[str, str]:
-    """Return a summary's answer in words, for a table or a report."""
+    """Return the answer of a summary in words, for a table or a report."""
     times = answer['prediction_ms']
     return {
         'recording': f'{answer["duration_s"]:.1f} s',
         'hand poses': str(answer['samples']),
         'predictions': f'{answer["predictions"]}, {answer["solved"]} with a solved candidate',
-        'refused': _listed(answer['refused']),
-        'candidates not solved': _listed(answer['failures']),
-        **({'ways learned': str(answer['learned'])} if 'learned' in answer else {}),
+        'rejected': _list_counts(answer['refused']),
+        'candidates not solved': _list_counts(answer['failures']),
+        **({'demonstrations learned': str(answer['learned'])} if 'learned' in answer else {}),
         'time per prediction': '-' if times['p50'] is None else f'{times["p50"]:.1f} ms median, {times["p99"]:.1f} ms p99',
     }
 
 
-def _listed(counts: Mapping[str, int]) -> str:
+def _list_counts(counts: Mapping[str, int]) -> str:
     return ', '.join(f'{name} {count}' for name, count in counts.items()) or 'none'

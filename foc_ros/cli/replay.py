@@ -20,7 +20,7 @@ from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
 from foc_ros.io.class_library import load_library, save_library
 from foc_ros.io.json_output import encode_prediction
 from foc_ros.io.terminal import show_table, track
-from foc_ros.ros.messages.outputs import output_messages
+from foc_ros.ros.messages.encode_prediction import output_messages
 from foc_ros.ros.messages.types import RosbagsTypes
 from foc_ros.ros.parameters import given_config
 
@@ -103,8 +103,7 @@ def _bag_writer(reader: BagReader, writer: BagWriter, plane: str) -> Consumer:
     def write(step: Step) -> None:
         writer.copy(step.item, reader)
         if step.prediction is not None:
-            obstacles = step.scene.obstacles(step.prediction.stamp_ns)
-            for name, message in output_messages(step.prediction, obstacles, plane, types).items():
+            for name, message in output_messages(step.prediction, step.prediction.obstacles, plane, types).items():
                 writer.write(f'{NODE}/{name}', message, step.item.log_ns)
 
     return write

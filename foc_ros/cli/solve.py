@@ -12,7 +12,7 @@ from typing import Any
 from foc_ros.core.errors import InputError
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.scene_solver import scene_problems, solve_scene
+from foc_ros.core.reaching_scene import build_scene_problems, solve_scene
 from foc_ros.core.types import PredictedCandidate
 from foc_ros.io.json_output import encode_candidate, encode_solution
 from foc_ros.io.scene_file import load_scene
@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     if samples is not None and not 1 <= samples <= MOST_SAMPLES:
         raise InputError('--monte-carlo', f'a number in [1, {MOST_SAMPLES}]', samples)
     scene = load_scene(arguments.scene)
-    problems = scene_problems(scene)
+    problems = build_scene_problems(scene)
     candidates = solve_scene(scene, problems)
     encoded = [_encode(each, problems[each.candidate.goal], samples) for each in candidates]
     if arguments.plot is not None:

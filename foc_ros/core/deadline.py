@@ -1,4 +1,4 @@
-"""A time by which a solve has to end: looked at before every QP."""
+"""The time by which a solve has to end. It is checked before every QP."""
 
 from __future__ import annotations
 
@@ -6,20 +6,25 @@ import time
 
 
 class OutOfTimeError(Exception):
-    """The deadline has passed. Never leaves the numeric core: it becomes a status."""
+    """The deadline has passed. This exception stays inside the numeric core, which turns it into a status."""
 
 
 class Deadline:
-    """Passes `seconds` after it is made, or after `began`; never for None. A result that comes in time does not depend on it.
+    """A moment to be checked against the clock. A result that is ready in time does not depend on it.
 
-    began: by time.perf_counter() [s].
+    Parameters
+    ----------
+    seconds
+        Time allowed [s]; None for no limit.
+    began
+        When that time began, by `time.perf_counter()` [s]; None for now.
     """
 
     def __init__(self, seconds: float | None = None, began: float | None = None) -> None:
         self.at = None if seconds is None else (time.perf_counter() if began is None else began) + seconds
 
     def check(self) -> None:
-        """Raise OutOfTimeError once the deadline has passed."""
+        """Raise OutOfTimeError if the deadline has passed."""
         if self.at is not None and time.perf_counter() > self.at:
             raise OutOfTimeError
 

@@ -1,34 +1,49 @@
-"""Kernels in machine code: plain functions on arrays, compiled by numba where they are defined.
+"""Kernels: plain functions on numbers, arrays and NamedTuples of them, compiled to machine code by numba.
 
-The first import on a machine compiles them, which takes some seconds; numba keeps the result beside the source, or in the user's
-cache directory where that cannot be written. Numba looks only at the file of a kernel, not at those that it calls, so what is
-older than any of them is removed from beside the sources here.
+There are two kinds. An entry kernel (`compiled`, `compiled_exactly`) is called from Python: it is compiled where it is defined,
+for the types that its annotations name, and the machine code is kept beside the source, or in the user's cache directory where
+that cannot be written. An inner kernel (`compiled_with_caller`) is called by other kernels only: it is compiled as part of each
+entry kernel that needs it, for the types of that call, and it may be given NamedTuples that a kernel has built.
+
+The first import on a machine compiles all entry kernels, which takes some time. Numba checks only the file of an entry kernel for
+changes, not the files of what it calls, so `forget_outdated` removes machine code that is older than any of these.
 """
 
 from __future__ import annotations
 
+import re
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import TypeAlias, TypeVar, cast
+from typing import Any, ForwardRef, NamedTuple, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numba import njit, types
 from numpy.typing import NDArray
 
 Vector: TypeAlias = NDArray[np.float64]
+"""One axis, C-contiguous; like all arguments of entry kernels, it may be read-only."""
 Matrix: TypeAlias = NDArray[np.float64]
+"""Two axes, C-contiguous."""
 Tensor: TypeAlias = NDArray[np.float64]
+"""Three axes, C-contiguous."""
 Indices: TypeAlias = NDArray[np.intp]
+"""One axis of whole numbers, of any stride; contiguous in a NamedTuple."""
 Table: TypeAlias = NDArray[np.intp]
+"""Two axes of whole numbers."""
 Points: TypeAlias = NDArray[np.complex128]
+"""One axis of points of the plane."""
 PointTable: TypeAlias = NDArray[np.complex128]
+"""Two axes of points of the plane."""
 Flags: TypeAlias = NDArray[np.bool_]
+"""One axis of truth values."""
 FlagTable: TypeAlias = NDArray[np.bool_]
-"""Arguments of kernels: C-contiguous arrays, tables of two axes, a tensor of three, indices of any stride; read-only ones too."""
+"""Two axes of truth values."""
 Scratch: TypeAlias = NDArray[np.float64]
+"""One axis that the kernel may write to."""
 Register: TypeAlias = NDArray[np.intp]
-"""Arrays of a kernel's own that it lends to another one to write to."""
+"""One axis of whole numbers that the kernel may write to."""
 
 _TYPES = {
     'float': types.float64,
@@ -47,19 +62,25 @@ _TYPES = {
     'Scratch': types.Array(types.float64, 1, 'C'),
     'Register': types.Array(types.intp, 1, 'C'),
 }
-KEPT = '*.nb[ic]'
+_FIELD_TYPES = _TYPES | {'Indices': types.Array(types.intp, 1, 'C', readonly=True)}
+"""In a NamedTuple a type has to match exactly: numba converts arrays from writeable to read-only or to any stride, not tuples."""
+MACHINE_CODE = '*.nb[ic]'
 """Numba's files of machine code, named source.kernel-line.python.nbi and .nbc."""
+SOURCE_OF_KERNELS = re.compile(rb'@compiled|\(NamedTuple\)')
+"""Text in every source of a kernel, or of a NamedTuple that one takes; it occurs in this module too."""
 REORDERED = {'contract', 'reassoc'}
-"""Freedom of the compiler: sums in another order, fused products. Not that numbers are finite."""
+"""What the compiler may change: the order of sums, and fused products. It may not assume that numbers are finite."""
 
 
 def forget_outdated(folder: Path) -> None:
-    """Remove kept machine code that is older than the source of any kernel in a folder and those below."""
-    kept = list(folder.glob(f'**/__pycache__/{KEPT}'))
-    sources = {each.parent.parent / f'{each.name.partition(".")[0]}.py' for each in kept}
-    changed = max((each.stat().st_mtime for each in sources if each.exists()), default=0.0)
+    """Remove machine code in a folder and those below that is older than any source there of a kernel or its NamedTuples."""
+    kept = list(folder.glob(f'**/__pycache__/{MACHINE_CODE}'))
+    if not kept:
+        return
+    sources = [each for each in folder.glob('**/*.py') if SOURCE_OF_KERNELS.search(each.read_bytes())]
+    changed = max((each.stat().st_mtime for each in sources), default=0.0)
     for each in kept:
-        with suppress(OSError):  # another process was faster, or it is not ours to remove
+        with suppress(OSError):  # another process was faster, or we may not remove the file
             if each.stat().st_mtime < changed:
                 each.unlink()
 
@@ -67,23 +88,59 @@ def forget_outdated(folder: Path) -> None:
 forget_outdated(Path(__file__).parent)
 
 Kernel = TypeVar('Kernel', bound=Callable[..., object])
+Group = TypeVar('Group', bound=NamedTuple)
 
 
 def compiled(kernel: Kernel) -> Kernel:
-    """Compile a function for the types that its annotations name; it changes only what it is lent and never raises."""
-    return _compiled(kernel, REORDERED)
+    """Compile an entry kernel for the types that its annotations name.
+
+    Parameters
+    ----------
+    kernel
+        A function that writes only to `Scratch` and `Register` arguments and never raises. Each parameter is annotated by a
+        number type, by an alias of this module, or by a NamedTuple class whose fields are annotated so. Numba accepts a
+        NamedTuple only if all its arrays are C-contiguous and read-only: see `freeze`.
+    """
+    return _compile_entry(kernel, REORDERED)
 
 
 def compiled_exactly(kernel: Kernel) -> Kernel:
-    """Compile one whose signs and ties decide: every product and sum is rounded as it stands, so that a b - b a is zero."""
-    return _compiled(kernel, set())
+    """Compile an entry kernel in which each product and sum is rounded as written, so that a b - b a is exactly zero."""
+    return _compile_entry(kernel, set())
 
 
-def _compiled(kernel: Kernel, freedom: set[str]) -> Kernel:
-    signature = tuple(_TYPES[str(kind)] for name, kind in kernel.__annotations__.items() if name != 'return')
+def compiled_with_caller(kernel: Kernel) -> Kernel:
+    """Compile an inner kernel with each entry kernel that calls it, for the types of that call."""
+    return cast('Kernel', njit(fastmath=REORDERED, error_model='numpy')(kernel))
+
+
+def freeze(group: Group) -> Group:
+    """Make the arrays of a NamedTuple read-only, those of NamedTuples in it too, and return it for an entry kernel."""
+    for each in cast('tuple[object, ...]', group):
+        if isinstance(each, np.ndarray):
+            each.setflags(write=False)
+        elif isinstance(each, tuple):
+            freeze(cast('Any', each))
+    return group
+
+
+def _compile_entry(kernel: Kernel, freedom: set[str]) -> Kernel:
+    scope = kernel.__globals__
+    signature = tuple(_find_type(each, scope, _TYPES) for name, each in kernel.__annotations__.items() if name != 'return')
     try:
         return cast('Kernel', njit(signature, cache=True, fastmath=freedom, error_model='numpy')(kernel))
-    except RuntimeError as error:  # no directory to keep it in: compile in every process
+    except RuntimeError as error:  # no directory to keep machine code in: compile in every process
         if 'cannot cache' not in str(error):
             raise
         return cast('Kernel', njit(signature, fastmath=freedom, error_model='numpy')(kernel))
+
+
+def _find_type(annotation: object, scope: dict[str, Any], known: dict[str, types.Type]) -> types.Type:
+    """Return the numba type of an annotation, a name in the scope of a module."""
+    name = annotation.__forward_arg__ if isinstance(annotation, ForwardRef) else str(annotation)
+    if name in known:
+        return known[name]
+    group = scope[name]
+    inside = vars(sys.modules[group.__module__])
+    fields = [_find_type(each, inside, _FIELD_TYPES) for each in group.__annotations__.values()]
+    return cast('types.Type', types.BaseTuple.from_types(fields, group))  # type: ignore[no-untyped-call]

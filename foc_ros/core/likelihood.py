@@ -48,7 +48,7 @@ class CostModel(NamedTuple):
 
     def compute_cost(self, solution: Solution) -> float:
         """Return the cost J_i [m^2/s^5] of a class: an integral of squared jerk, so that classes of other durations compare."""
-        return self.shared + solution.effort * solution.dt + self.time_price * float(solution.times[-1])
+        return self.shared + solution.effort * solution.dt + self.time_price * (solution.dt * len(solution.control))
 
 
 def make_cost_model(effort_spent: float, config: Config) -> CostModel:

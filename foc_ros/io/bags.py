@@ -87,7 +87,7 @@ class BagReader:
 
     def _assign_topics(self) -> dict[str, str]:
         kinds = {each.topic: each.msgtype for each in self._reader.connections}
-        roles = topics.assign(kinds, self._chosen)
+        roles = topics.assign_topics(kinds, self._chosen)
         for each in self._reader.connections:
             if each.topic in roles.values() and each.msgtype != kinds[each.topic]:
                 raise RecordingError(f'topic {each.topic}: expected one message type, got {each.msgtype} and {kinds[each.topic]}')

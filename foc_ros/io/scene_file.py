@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 import reprlib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,8 @@ import numpy as np
 
 from foc_ros.core.config import Config, updated
 from foc_ros.core.errors import ParameterError, SceneError
-from foc_ros.core.types import Array, HandState, Obstacles, Record, make_obstacles
+from foc_ros.core.reaching_scene import ReachingScene, check_outside
+from foc_ros.core.types import Array, HandState, Obstacles, make_obstacles
 
 from .documents import read_document
 
@@ -45,44 +45,23 @@ OBSTACLE_FIELDS = ('x', 'y', 'radius', 'radius_stddev', 'id')
 _NUMERAL = re.compile(r'[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+')
 
 
-@dataclass(frozen=True, eq=False)
-class SceneFile(Record):
-    """One reaching problem.
-
-    hand: state at the start; goals (g, 2) [m]; noise (2,): c per step; guess (N + 1, 2) [m]: of the only class to solve, None if
-    classes are searched; config: the parameters of the file, and the defaults of the others.
-    """
-
-    hand: HandState
-    goals: Array
-    obstacles: Obstacles
-    noise: Array
-    guess: Array | None
-    config: Config
-
-    @property
-    def duration_s(self) -> float:
-        """Duration of the movement [s]."""
-        return self.config.duration.fixed_s
-
-
-def load_scene(file: Path | str) -> SceneFile:
+def load_scene(file: Path | str) -> ReachingScene:
     """Read a scene file. Raises SceneError, naming field, value and bound, and RecordingError for an unreadable file."""
     return parse_scene(read_document(Path(file)))
 
 
-def parse_scene(document: object) -> SceneFile:
+def parse_scene(document: object) -> ReachingScene:
     """Return the scene of a document of mappings, lists and numbers; raises SceneError."""
     scene = _read_mapping('scene', document, FIELDS)
     config = _read_config(scene)
     obstacles = _read_obstacles(scene.get('obstacles', []))
     hand, goals = _read_hand(scene), _read_goals(scene)
-    _check_is_outside('start', hand.mean[:2], obstacles)
+    check_outside('start', hand.mean[:2], obstacles)
     for goal in goals:
-        _check_is_outside('goal' if 'goal' in scene else 'goals', goal, obstacles)
+        check_outside('goal' if 'goal' in scene else 'goals', goal, obstacles)
     noise = np.array([config.foc.noise_x, config.foc.noise_y])
     guess = _read_guess(scene['guess'], hand.mean[:2], goals, config.foc.steps) if 'guess' in scene else None
-    return SceneFile(hand, goals, obstacles, noise, guess, config)
+    return ReachingScene(hand, goals, obstacles, noise, guess, config)
 
 
 def guess_path(start: Array, goal: Array, steps: int, amplitude: float = 0.0, via: Array | None = None) -> Array:
@@ -175,14 +154,6 @@ def _read_guess(given: object, start: Array, goals: Array, steps: int) -> Array:
     if 'amplitude' not in mapping:
         raise SceneError('guess.amplitude', 'a number', 'nothing')
     return guess_path(start, goals[0], steps, amplitude=_read_number('guess.amplitude', mapping['amplitude']))
-
-
-def _check_is_outside(field: str, point: Array, obstacles: Obstacles) -> None:
-    for name, centre, radius in zip(obstacles.ids, obstacles.centre, obstacles.radius, strict=True):
-        distance = float(np.hypot(*(point - centre)))
-        if distance < radius:
-            found = f'{point.tolist()}, {distance:.4g} m from its centre'
-            raise SceneError(field, f'a point outside obstacle {name}, of radius {radius:g} m', found)
 
 
 def _read_mapping(field: str, value: object, known: tuple[str, ...]) -> Mapping[str, Any]:

@@ -1,4 +1,4 @@
-"""What a command shows: a progress bar on standard error, and only on a terminal; tables on standard output."""
+"""What a command shows: a progress bar on standard error where that is a terminal, and tables on standard output."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from rich.progress import Progress
 from rich.table import Table
 
 T = TypeVar('T')
-WIDE = 400
-"""Columns within which no table is cut off; it takes no more than it needs."""
+MAX_COLUMNS = 400
+"""Width up to which no table is cut off [characters]; a table takes no more than it needs."""
 
 
 def track(items: Iterable[T], words: str, total: int) -> Iterator[T]:
-    """Yield the items, with a bar that says how far they are."""
+    """Yield the items and show a progress bar; words: its description; total: number of items."""
     console = Console(stderr=True)
     if not console.is_terminal:
         yield from items
@@ -28,9 +28,9 @@ def track(items: Iterable[T], words: str, total: int) -> Iterator[T]:
 
 def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:
     """Print a table on standard output, as wide as it needs to be."""
-    made = Table(title=None if title is None else escape(title), title_justify='left', box=SIMPLE_HEAD, pad_edge=False)
+    table = Table(title=None if title is None else escape(title), title_justify='left', box=SIMPLE_HEAD, pad_edge=False)
     for column in columns:
-        made.add_column(column, no_wrap=True)
+        table.add_column(column, no_wrap=True)
     for row in rows:
-        made.add_row(*row)
-    Console(width=WIDE).print(made)
+        table.add_row(*row)
+    Console(width=MAX_COLUMNS).print(table)

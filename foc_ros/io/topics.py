@@ -26,7 +26,7 @@ OUTPUTS = ('prediction', 'likelihoods', 'path', 'markers')
 """Last parts of the node's own outputs, which are never used as an input because of their type."""
 
 
-def assign(topics: Mapping[str, str], chosen: Mapping[str, str] | None = None) -> dict[str, str]:
+def assign_topics(topics: Mapping[str, str], chosen: Mapping[str, str] | None = None) -> dict[str, str]:
     """Return the topic of every role that the recording contains.
 
     topics: message type by topic; chosen: topic by role, overriding names and types. Raises RecordingError for an impossible

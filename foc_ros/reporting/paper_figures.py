@@ -1,4 +1,4 @@
-"""One figure per study, in the look of all our pictures."""
+"""One figure for each study, in the common style of the pictures."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from foc_ros.analysis.paper.reaching import PaperScene, speed
-from foc_ros.analysis.paper.studies import COUNT, PAPER_ETA, PAPER_RATIOS, OptimalStudy, Studies, Study
+from foc_ros.analysis.paper.reaching import PaperScene, compute_speed
+from foc_ros.analysis.paper.studies import PAPER_ETA, PAPER_RATIOS, Studies, Study
 from foc_ros.core.types import Solution
 
 from .drawing import ELLIPSES_PER_WAY, Bounds, class_style, draw_scene, new_figure, stddev_ellipse
@@ -20,41 +20,39 @@ if TYPE_CHECKING:
 
 WIDTH_IN = 9.0
 STYLES = {'LV': 0, 'HC': 1, 'optimal': 2, 'H1': 3, 'H2': 4}
-"""Colour of each strategy and way."""
+"""Colour of each strategy and homotopy class."""
 RATIO_STYLES = (('black', '-', None), ('#009E73', '', 's'), ('#CC79A7', '', 'o'))
-"""Colour, dash and marker: the continuous curve, then what the paper's stepping gives, which is no curve."""
+"""Colour, dash and marker: of the continuous curve, then of the paper's stepping, which gives points."""
 PAPER_MARK = '#D55E00'
-TICKS: tuple[tuple[float, tuple[float, ...]], ...] = (
-    (0.15, (1.0, 1.05, 1.1, 9.0, 9.5)),
-    (1.2, (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)),
-    (3.5, (1.0, 2.0, 5.0)),
-    (np.inf, (1.0,)),
-)
-"""Round numbers in each decade of an axis, by the decades that it is less wide than."""
+NARROW_DECADES = 1.0
+"""Span below which an axis of a ratio has ticks at equal distances, not at powers of ten and their double and fivefold."""
 LEAST_SPAN = 1.12
-"""How far from 1 the axis of a ratio goes at least, either way, as a factor."""
+"""Least factor from 1 to either end of the axis of a ratio."""
 
 
-def write(found: Studies, directory: Path, suffixes: Sequence[str]) -> None:
-    """Write study1 to study7 in every format; InputError where a file cannot be written."""
-    drawn = {study.number: study_figure(study) for study in found.paper} | {COUNT: optimal_figure(found.optimal)}
-    for number, figure in drawn.items():
+def write_figures(studies: Studies, directory: Path, suffixes: Sequence[str]) -> None:
+    """Write study1 to study7 in every format; raises InputError where a file cannot be written."""
+    for number, study in studies.items():
+        figure = draw_efforts(study) if study.efforts else draw_study(study)
         for suffix in suffixes:
             save(figure, directory / f'study{number}.{suffix}')
 
 
-def study_figure(study: Study) -> Figure:
-    """Return the figure of a study: a row with scene and speeds for every eta that is shown, then the ratio if there is one."""
-    bounds = _bounds(study)
-    heights = [0.5 * WIDTH_IN * (bounds[3] - bounds[2]) / (bounds[1] - bounds[0]) + 0.7 for _ in study.shown]
+def draw_study(study: Study) -> Figure:
+    """Return the figure of a study: a row with scene and speeds for every eta of the solutions, then the ratios, if any."""
+    bounds = _find_bounds(study)
+    heights = [0.5 * WIDTH_IN * (bounds[3] - bounds[2]) / (bounds[1] - bounds[0]) + 0.7 for _ in study.solutions]
     heights += [3.4] if study.ratios else []
     with new_figure(WIDTH_IN, sum(heights) + 0.4) as figure:
         rows = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
-        top = 1.08 * max((float(speed(each).max()) for shown in study.shown.values() for each in shown.values()), default=1.0)
-        for row, (eta, shown) in zip(rows, study.shown.items(), strict=False):
+        top = 1.08 * max(
+            (float(compute_speed(each).max()) for solutions in study.solutions.values() for each in solutions.values()),
+            default=1.0,
+        )
+        for row, (eta, solutions) in zip(rows, study.solutions.items(), strict=False):
             scene, speeds = row.subplots(1, 2, width_ratios=(1.7, 1.0))
-            _draw_paths(scene, study.scene, shown, bounds)
-            _draw_speeds(speeds, shown, top)
+            _draw_paths(scene, study.scene, solutions, bounds)
+            _draw_speeds(speeds, solutions, top)
             scene.text(0.02, 0.97, f'η = {eta:g}', transform=scene.transAxes, va='top', fontsize=11)
         if study.ratios:
             alone, beside = rows[-1].subplots(1, 2)
@@ -63,14 +61,14 @@ def study_figure(study: Study) -> Figure:
     return figure
 
 
-def optimal_figure(study: OptimalStudy) -> Figure:
-    """Return the figure of study 7: efforts over eta, and how often roll-outs stay clear."""
+def draw_efforts(study: Study) -> Figure:
+    """Return the figure of study 7: efforts over eta, and the share of roll-outs that stay clear."""
     with new_figure(WIDTH_IN, 3.9) as figure:
         efforts, clear = figure.subplots(1, 2)
         for curve in study.efforts:
             colour, dash = class_style(STYLES[curve.name])
             efforts.plot(curve.etas, curve.efforts, color=colour, linestyle=dash, linewidth=1.8, label=curve.name)
-            rolled = study.rolled[curve.name]
+            rolled = study.rolled_out[curve.name]
             at_step, on_path = [each.step[0] for each in rolled.values()], [each.path[0] for each in rolled.values()]
             clear.plot(list(rolled), at_step, color=colour, linestyle='-', marker='o', markersize=4)
             clear.plot(list(rolled), on_path, color=colour, linestyle=':', marker='v', markersize=4)
@@ -83,22 +81,22 @@ def optimal_figure(study: OptimalStudy) -> Figure:
         clear.plot([], [], color='0.3', linestyle=':', marker='v', markersize=4, label='on the whole path')
         clear.set(xlabel='wanted η', ylabel='share of roll-outs that stay clear')
         clear.legend(frameon=False, loc='lower right')
-        figure.suptitle(f'Study 7: strategy optimal beside LV and HC, c = {study.noise:g}')
+        figure.suptitle(f'Study {study.number}: {study.title}')
     return figure
 
 
-def _bounds(study: Study) -> Bounds:
-    solutions = [each for shown in study.shown.values() for each in shown.values()]
+def _find_bounds(study: Study) -> Bounds:
+    solutions = [each for solutions in study.solutions.values() for each in solutions.values()]
     ends = [each.path[-1] + sign * np.sqrt(each.covariance[-1].diagonal()[:2]) for each in solutions for sign in (-1, 1)]
     points = [np.zeros((1, 2)), *(each.path for each in solutions), *(end[None] for end in ends)]
     return bounds_of(study.scene.obstacles, study.scene.goal[None], (), *points)
 
 
-def _draw_paths(axes: Any, scene: PaperScene, shown: Mapping[str, Solution], bounds: Bounds) -> None:
-    """Draw the scene, each way through it, and ellipses of one standard deviation of the position."""
+def _draw_paths(axes: Any, scene: PaperScene, solutions: Mapping[str, Solution], bounds: Bounds) -> None:
+    """Draw the scene, the mean paths through it, and ellipses of one standard deviation of the position."""
     draw_scene(axes, scene.obstacles, scene.goal[None], bounds, named=False)
     axes.plot(0.0, 0.0, marker='o', markersize=6, color='black', zorder=5)
-    for name, solution in shown.items():
+    for name, solution in solutions.items():
         colour, dash = class_style(STYLES[name])
         axes.plot(*solution.path.T, color=colour, linestyle=dash, linewidth=2.0, zorder=4)
         for row in np.unique(np.linspace(0, len(solution.path) - 1, 2 * ELLIPSES_PER_WAY).astype(int)):
@@ -107,16 +105,18 @@ def _draw_paths(axes: Any, scene: PaperScene, shown: Mapping[str, Solution], bou
             axes.add_patch(ellipse)
 
 
-def _draw_speeds(axes: Any, shown: Mapping[str, Solution], top: float) -> None:
-    for name, solution in shown.items():
+def _draw_speeds(axes: Any, solutions: Mapping[str, Solution], top: float) -> None:
+    for name, solution in solutions.items():
         colour, dash = class_style(STYLES[name])
-        axes.plot(solution.times, speed(solution), color=colour, linestyle=dash, linewidth=2.0, label=name)
+        axes.plot(solution.times, compute_speed(solution), color=colour, linestyle=dash, linewidth=2.0, label=name)
     axes.set(xlabel='time [s]', ylabel='speed [m/s]', ylim=(0.0, top))
     axes.legend(frameon=False)
 
 
 def _draw_ratios(alone: Any, beside: Any, study: Study) -> None:
-    """Draw the ratio over eta on logarithmic scales: the continuous one alone, then with what the paper's stepping gives."""
+    """Draw the ratio over eta on logarithmic scales: the continuous one alone, then beside those of the paper's stepping."""
+    from matplotlib.ticker import LogLocator, MaxNLocator
+
     first = study.ratios[0]
     for axes, shown in ((alone, study.ratios[:1]), (beside, study.ratios)):
         axes.axhline(1.0, color='0.5', linewidth=1.0)
@@ -126,18 +126,15 @@ def _draw_ratios(alone: Any, beside: Any, study: Study) -> None:
         if study.number in PAPER_RATIOS:
             mark = {'color': PAPER_MARK, 'linestyle': '', 'marker': 'X', 'markersize': 9}
             axes.plot(PAPER_ETA, PAPER_RATIOS[study.number], label='the paper', **mark)
-        axes.set(yscale='log', xlabel='wanted η', ylabel=' / '.join(f'$J_{{{each.name}}}$' for each in (first.over, first.under)))
+        axes.set(
+            yscale='log',
+            xlabel='wanted η',
+            ylabel=' / '.join(f'$J_{{{each.name}}}$' for each in (first.numerator, first.denominator)),
+        )
         low, high = axes.get_ylim()
         axes.set_ylim(min(low, 1 / LEAST_SPAN), max(high, LEAST_SPAN))
-        ticks = _ticks(*axes.get_ylim())
-        axes.set_yticks(ticks, [f'{tick:g}' for tick in ticks])
+        is_narrow = np.log10(np.divide(*axes.get_ylim()[::-1])) < NARROW_DECADES
+        axes.yaxis.set_major_locator(MaxNLocator(6) if is_narrow else LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.yaxis.set_major_formatter('{x:g}')
         axes.minorticks_off()
         axes.legend(frameon=False, fontsize=8, loc='lower left', bbox_to_anchor=(0.0, 1.0), ncols=2)
-
-
-def _ticks(low: float, high: float) -> list[float]:
-    """Return round numbers of a logarithmic axis: the narrower it is, the more in each decade."""
-    decades = np.log10(high / low)
-    parts = next(parts for widest, parts in TICKS if decades < widest)
-    powers = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
-    return [tick for power in powers for part in parts if low <= (tick := float(f'{part * 10.0**power:.3g}')) <= high]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from foc_ros.core.errors import InputError
-from foc_ros.core.types import NANOSECONDS, Array, Obstacles, PredictedCandidate, Prediction, make_obstacles
+from foc_ros.core.types import NANOSECONDS, Array, Obstacles, PredictedCandidate, Prediction
 
 from .drawing import (
     CLASSES,
@@ -54,13 +54,11 @@ def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
     import matplotlib.pyplot as plt
 
     candidates = build_candidate_views(prediction.solved_candidates)
-    obstacles = getattr(prediction, 'obstacles', make_obstacles())
-    goals = np.reshape(getattr(prediction, 'goals', ()), (-1, 2))
-    bounds = bounds_of(obstacles, goals, candidates)
+    bounds = bounds_of(prediction.obstacles, prediction.goals, candidates)
     with plt.rc_context(STYLE):
         if axes is None:
             axes = plt.figure(figsize=(WIDTH_IN, _get_height(bounds, candidates)), layout='constrained').subplots()
-        draw_scene(axes, obstacles, goals, bounds)
+        draw_scene(axes, prediction.obstacles, prediction.goals, bounds)
         draw_candidates(axes, candidates, number_labels(candidates))
     return axes
 

@@ -46,9 +46,8 @@ class ReportCollector:
         """Keep the hand sample and the prediction of a step."""
         if step.sample is not None:
             self.samples.append(step.sample)
-        if step.prediction is not None and step.scene.goals is not None:
-            obstacles = step.scene.obstacles(step.prediction.stamp_ns)
-            self.snapshots.append(build_snapshot(step.prediction, obstacles, step.scene.goals))
+        if step.prediction is not None:
+            self.snapshots.append(build_snapshot(step.prediction))
 
     def write(self, directory: Path, title: str, summary: Mapping[str, str]) -> None:
         """Write the report; see :func:`write_report`."""

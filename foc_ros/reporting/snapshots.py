@@ -10,8 +10,8 @@ import numpy as np
 
 from foc_ros.core.errors import MessageError
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Obstacles, PredictedCandidate, Prediction, Record
-from foc_ros.ros.messages.inputs import stamp_of
-from foc_ros.ros.messages.outputs import CLOUD_ROW, LIKELIHOOD_COLUMNS
+from foc_ros.ros.messages.decode_poses import stamp_of
+from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS
 from foc_ros.ros.messages.plane import project
 from foc_ros.ros.messages.ranking import cost_ratios, ranked
 
@@ -125,14 +125,12 @@ def _build_candidate_view(candidate: PredictedCandidate, cost_ratio: float) -> C
     return CandidateView(*values, solution.times, solution.path, speed, covariance)
 
 
-def build_snapshot(prediction: Prediction, obstacles: Obstacles, goals: Array) -> Snapshot:
-    """Return the snapshot of a prediction; obstacles and goals (g, 2) [m] are those it was made for.
-
-    Raises FocError if the prediction holds a number that is not finite.
-    """
+def build_snapshot(prediction: Prediction) -> Snapshot:
+    """Return the snapshot of a prediction; raises FocError if the prediction holds a number that is not finite."""
     unsolved = tuple((each.candidate.label, each.solution.status.value) for each in prediction.candidates if not each.is_solved)
     candidates = build_candidate_views(ranked(prediction))
-    return Snapshot(prediction.stamp_ns, obstacles, goals, candidates, prediction.most_likely, unsolved, prediction.solve_s)
+    scene = prediction.obstacles, prediction.goals
+    return Snapshot(prediction.stamp_ns, *scene, candidates, prediction.most_likely, unsolved, prediction.solve_s)
 
 
 def is_same_prediction(cloud: Any, likelihoods: Any) -> bool:
@@ -143,7 +141,7 @@ def is_same_prediction(cloud: Any, likelihoods: Any) -> bool:
 
 
 def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles, goals: Array) -> Snapshot:
-    """Return the snapshot in one pair of messages of `~/prediction` and `~/likelihoods`: the inverse of `ros.messages.outputs`.
+    """Return the snapshot in one pair of messages of `~/prediction` and `~/likelihoods`: the inverse of `ros.messages.encode_prediction`.
 
     obstacles and goals (g, 2) [m] are those at the stamp of the messages. Raises MessageError if the two messages hold different
     predictions.

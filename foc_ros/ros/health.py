@@ -64,7 +64,7 @@ class Freshness:
         """Forget whether the poses are stamped by ROS time."""
         self._has_ros_time = self._is_moving = False
 
-    def not_ready_reason(self, now_s: float, config: Config, sources: Iterable[str]) -> tuple[str, str] | None:
+    def find_not_ready_reason(self, now_s: float, config: Config, sources: Iterable[str]) -> tuple[str, str] | None:
         """Return why the clocks allow no prediction, as (kind, text); None if they allow it.
 
         sources: of obstacles; one that is silent is enough, because its silence does not mean that its obstacles have gone.
@@ -101,7 +101,7 @@ class _Input:
 
 
 class Monitor:
-    """Counts and times of what the node did; :meth:`health` judges what happened since its last call."""
+    """Counts and times of what the node did; :meth:`report` judges what happened since its last call."""
 
     def __init__(self, now_s: float) -> None:
         self._inputs: dict[str, _Input] = {}
@@ -137,7 +137,7 @@ class Monitor:
         self._counts['internal_errors'] += 1
         self._error = f'{type(error).__name__}: {error}'
 
-    def health(self, now_s: float, intake: Intake, state: str, not_ready_reason: str | None) -> Health:
+    def report(self, now_s: float, intake: Intake, state: str, not_ready_reason: str | None) -> Health:
         """Return the health since the last call; state: of the managed node; not_ready_reason: text, None if ready."""
         pipeline, seconds = intake.pipeline, max(now_s - self._reported_s, 1e-3)
         totals = Counter(intake.counts) + self._counts

@@ -12,9 +12,9 @@ from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
 
-from .messages.decode_markers import MarkerScene
+from .messages.decode_markers import MarkerTable
 from .messages.decode_point_cloud import decode_point_cloud
-from .messages.decode_poses import goal_of_pose, goals_of_pose_array, hand_sample
+from .messages.decode_poses import decode_goal, decode_goals, decode_hand_sample
 
 
 class Intake:
@@ -28,7 +28,7 @@ class Intake:
         self.pipeline = pipeline
         self.sample: HandSample | None = None
         self.last_refusal: str | None = None
-        self._markers = MarkerScene()
+        self._markers = MarkerTable()
         self._markers_ns = 0
         self._markers_unchanged = (-math.inf, math.inf)
         self._counts: Counter[str] = Counter()
@@ -36,8 +36,8 @@ class Intake:
             topics.HAND: self._take_hand,
             topics.CLOUD: self._take_cloud,
             topics.MARKERS: self._take_markers,
-            topics.GOALS: lambda message: pipeline.set_goals(*goals_of_pose_array(message, pipeline.config.plane)),
-            topics.GOAL: lambda message: pipeline.set_goals(*goal_of_pose(message, pipeline.config.plane)),
+            topics.GOALS: lambda message: pipeline.set_goals(*decode_goals(message, pipeline.config.plane)),
+            topics.GOAL: lambda message: pipeline.set_goals(*decode_goal(message, pipeline.config.plane)),
         }
 
     @property
@@ -59,7 +59,7 @@ class Intake:
         return status
 
     def _take_hand(self, message: Any) -> SampleStatus:
-        self.sample = hand_sample(message, self.pipeline.config.plane)
+        self.sample = decode_hand_sample(message, self.pipeline.config.plane)
         status = self.pipeline.hand(self.sample)
         start_ns, end_ns = self._markers_unchanged
         if status.taken and not start_ns <= self.sample.stamp_ns < end_ns:
@@ -74,11 +74,11 @@ class Intake:
     def _take_markers(self, message: Any) -> SampleStatus:
         config = self.pipeline.config
         # markers received before the working frame was known are discarded if they are in another frame
-        before = self._markers if self.pipeline.frame_id in (None, self._markers.frame_id) else MarkerScene()
-        markers = before.updated(message, self._now_ns(), config.plane, config.scene.marker_radius_stddev)
+        before = self._markers if self.pipeline.frame_id in (None, self._markers.frame_id) else MarkerTable()
+        markers = before.with_message(message, self._now_ns(), config.plane, config.scene.marker_radius_stddev)
         return self._count_dropped(topics.MARKERS, markers.dropped, self._set_markers(markers))
 
-    def _set_markers(self, markers: MarkerScene) -> SampleStatus:
+    def _set_markers(self, markers: MarkerTable) -> SampleStatus:
         """Pass the existing markers to the pipeline.
 
         Several publishers with different delays may add to the table, so a stamp a little behind the newest one does not make the
@@ -91,7 +91,7 @@ class Intake:
         now_ns = self._now_ns()
         status = self.pipeline.set_obstacles('markers', markers.obstacles(now_ns), stamp_ns, frame_id)
         if status.taken:
-            self._markers, self._markers_ns, self._markers_unchanged = markers, stamp_ns, markers.unchanged(now_ns)
+            self._markers, self._markers_ns, self._markers_unchanged = markers, stamp_ns, markers.find_unchanged_interval(now_ns)
         return status
 
     def _now_ns(self) -> int:

@@ -35,7 +35,7 @@ from .intake import Intake
 from .lifecycle import answer_refused_transitions
 from .messages.encode_prediction import output_messages
 from .messages.types import RclpyTypes
-from .node_parameters import LiveParameters, declare_all, declare_autostart
+from .node_parameters import LiveParameters, declare_autostart, declare_parameters
 from .transforms import Transforms
 
 THROTTLE_S = 5.0
@@ -50,7 +50,7 @@ class FocNode(LifecycleNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('foc', automatically_declare_parameters_from_overrides=True, **options)
-        self._live_parameters = LiveParameters(self, declare_all(self, Config()), self._reconfigure)
+        self._live_parameters = LiveParameters(self, declare_parameters(self, Config()), self._reconfigure)
         self._library = load_library(self._live_parameters.config.homotopy.library)
         autostart = declare_autostart(self)
         self._types = RclpyTypes()
@@ -163,7 +163,7 @@ class FocNode(LifecycleNode):
 
     def _find_clock_reason(self) -> tuple[str, str] | None:
         """Return why the clocks allow no prediction, as (kind, text); the pipeline decides all that depends on stamps."""
-        return self._freshness.not_ready_reason(monotonic(), self.pipeline.config, self.pipeline.scene.parts)
+        return self._freshness.find_not_ready_reason(monotonic(), self.pipeline.config, self.pipeline.scene.parts)
 
     def _predict(self) -> None:
         start_s = monotonic()
@@ -189,7 +189,7 @@ class FocNode(LifecycleNode):
     def _publish_health(self) -> None:
         clock_reason = self._find_clock_reason()
         not_ready_reason = self.pipeline.blocked() or (clock_reason and clock_reason[1])
-        health = self._monitor.health(monotonic(), self.intake, self._state, not_ready_reason)
+        health = self._monitor.report(monotonic(), self.intake, self._state, not_ready_reason)
         name, stamp_ns = self.get_fully_qualified_name(), self.get_clock().now().nanoseconds
         self._publish(self._diagnostics, encode_diagnostics(health, name, stamp_ns, self._types))
 

@@ -18,7 +18,7 @@ from foc_ros.core.errors import ParameterError
 from .parameters import AUTOSTART, KNOWN, NODE_ONLY
 
 
-def declare_all(node: Any, config: Config) -> Config:
+def declare_parameters(node: Any, config: Config) -> Config:
     """Declare every parameter on a node and return the configuration with which it starts.
 
     config: the defaults. The node must be created with `automatically_declare_parameters_from_overrides`: the values that it was
@@ -37,7 +37,7 @@ def declare_all(node: Any, config: Config) -> Config:
     return config
 
 
-def config_of(node: Any) -> Config:
+def read_config(node: Any) -> Config:
     """Return the configuration of a node's declared parameters."""
     return updated(Config(), {name: node.get_parameter(name).value for name in KNOWN})
 
@@ -102,5 +102,5 @@ class LiveParameters:
 
     def _accept(self, changed: list[RosParameter]) -> None:
         if any(each.name in KNOWN for each in changed):
-            self.config = config_of(self._node)
+            self.config = read_config(self._node)
             self._apply(self.config)

@@ -1,7 +1,8 @@
 """The minimum-jerk movement from the hand straight to a goal, obstacles disregarded: the simplest model of a reach.
 
-The quintic from position, velocity and acceleration to rest in T, in closed form (Mueller, Hehn and D'Andrea 2015,
-doi:10.1109/TRO.2015.2479878): jerk alpha t^2 / 2 + beta t + gamma, where with what a hand without jerk would miss at T,
+The quintic from position, velocity and acceleration to rest after T has a closed form (Mueller, Hehn and D'Andrea 2015,
+doi:10.1109/TRO.2015.2479878). Its jerk is alpha t^2 / 2 + beta t + gamma. With (dp, dv, da), by which a hand without jerk would
+miss the goal at T,
 
     (alpha, beta, gamma) = M (dp, dv, da),
     M = [[720, -360 T, 60 T^2], [-360 T, 168 T^2, -24 T^3], [60 T^2, -24 T^3, 3 T^4]] / T^5.
@@ -16,44 +17,44 @@ from foc_ros.core.types import Array
 from .observations import Observation
 
 
-def straight_cost(seen: Observation) -> Array:
-    """Return the cost [m^2/s^5] of the movement to each goal, (g,): the integral of squared jerk, and what its time costs."""
-    (alpha, beta, gamma), T = _jerk(seen)
+def compute_straight_costs(observation: Observation) -> Array:
+    """Return the cost [m^2/s^5] of the movement to each goal, (g,): the integral of squared jerk and the price of its time."""
+    alpha, beta, gamma, T = _compute_jerk(observation)
     effort = (
         gamma**2 * T + beta * gamma * T**2 + (beta**2 + alpha * gamma) * T**3 / 3 + alpha * beta * T**4 / 4 + alpha**2 * T**5 / 20
     )
-    return np.asarray(effort.sum(axis=1) + seen.ways.price * T[:, 0])
+    return np.asarray(effort.sum(axis=1) + observation.candidates.time_price * T[:, 0])
 
 
-def straight_positions(seen: Observation, goal: int, seconds: Array) -> Array:
-    """Return where the movement to a goal is (h, 2) [m] some seconds (h,) from now; at the goal once it has ended."""
-    (alpha, beta, gamma), T = _jerk(seen)
-    t = np.minimum(seconds, T[goal, 0])[:, None]
-    x, v, a = _state(seen)
-    made = gamma[goal] * t**3 / 6 + beta[goal] * t**4 / 24 + alpha[goal] * t**5 / 120
-    return np.asarray(x + v * t + a * t**2 / 2 + made)
+def compute_straight_positions(observation: Observation, goal: int, seconds: Array) -> Array:
+    """Return the positions (h, 2) [m] of the movement to a goal some seconds (h,) from now; at the goal once it has ended."""
+    alpha, beta, gamma, T = (each[goal] for each in _compute_jerk(observation))
+    t = np.minimum(seconds, T[0])[:, None]
+    x, v, a = _find_state(observation)
+    return np.asarray(x + v * t + a * t**2 / 2 + (gamma * t**3 / 6 + beta * t**4 / 24 + alpha * t**5 / 120))
 
 
-def _state(seen: Observation) -> Array:
-    """Return position, velocity and acceleration (3, 2); those of a hand at rest are noise, as to the predictor."""
-    state = seen.hand.reshape(3, 2).copy()
-    if seen.since_s == 0.0:
+def _find_state(observation: Observation) -> Array:
+    """Return position, velocity and acceleration (3, 2); at rest the last two are noise, and 0 as in the predictor."""
+    state = observation.hand.reshape(3, 2).copy()
+    if observation.movement_age_s == 0.0:
         state[1:] = 0.0
     return state
 
 
-def _jerk(seen: Observation) -> tuple[tuple[Array, Array, Array], Array]:
+def _compute_jerk(observation: Observation) -> tuple[Array, Array, Array, Array]:
     """Return alpha, beta and gamma, (g, 2) each, and T (g, 1) [s] of the movement to each goal."""
-    x, v, a = _state(seen)
-    T = np.array([_time_to(seen, goal) for goal in range(len(seen.goals))])[:, None]
-    dp, dv, da = seen.goals - x - v * T - a * T**2 / 2, -v - a * T, -a
+    x, v, a = _find_state(observation)
+    T = np.array([_find_time(observation, goal) for goal in range(len(observation.goals))])[:, None]
+    dp, dv, da = observation.goals - x - v * T - a * T**2 / 2, -v - a * T, -a
     alpha = (720 * dp - 360 * T * dv + 60 * T**2 * da) / T**5
     beta = (-360 * T * dp + 168 * T**2 * dv - 24 * T**3 * da) / T**5
     gamma = (60 * T**2 * dp - 24 * T**3 * dv + 3 * T**4 * da) / T**5
-    return (alpha, beta, gamma), T
+    return alpha, beta, gamma, T
 
 
-def _time_to(seen: Observation, goal: int) -> float:
-    """Return the time that the predictor gave the movement to a goal, or the longest one where it had no way there."""
-    times = seen.ways.time_s[seen.ways.goal == goal]
-    return float(times[0]) if len(times) else float(seen.ways.time_s.max())
+def _find_time(observation: Observation, goal: int) -> float:
+    """Return the time that the predictor gave the movement to a goal, or the longest time where no candidate leads there."""
+    candidates = observation.candidates
+    times = candidates.time_s[candidates.goal == goal]
+    return float(times[0]) if len(times) else float(candidates.time_s.max())

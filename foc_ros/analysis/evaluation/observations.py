@@ -1,6 +1,6 @@
-"""What was predicted in a recording, beside what really came: all that scores and fits need, without a predictor.
+"""Observations: what was predicted in a recording, beside what really came. Scores and fits need nothing else.
 
-A recording is replayed once; how its costs become likelihoods can then be tried out in no time.
+A recording is replayed once. How costs become likelihoods can then be tried on the observations without a predictor.
 """
 
 from __future__ import annotations
@@ -10,93 +10,175 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.homotopy.branch_times import BranchTimes
-from foc_ros.core.types import Array, Record
+from foc_ros.analysis.recordings import Recording
+from foc_ros.analysis.replay import Replay, Step
+from foc_ros.core.config import Config, DurationConfig
+from foc_ros.core.dynamics.predictive_covariance import duration_sensitivity
+from foc_ros.core.errors import RecordingError
+from foc_ros.core.estimation.duration import is_passing, time_price
+from foc_ros.core.homotopy.branch_times import BranchTimes, compute_branch_times
+from foc_ros.core.obstacles.chance_constraint import centre_trajectories
+from foc_ros.core.types import NANOSECONDS, Array, HandState, Obstacles, PredictedCandidate, Prediction, Record
 
-TIMES_S = tuple(0.125 * step for step in range(1, 9))
-"""Times ahead at which predicted positions are compared with the true ones [s]."""
-HORIZONS_S = (0.25, 0.5, 1.0)
-"""Those of them that are reported."""
-
-Bools = NDArray[np.bool_]
-Sides = NDArray[np.int8]
+from .ground_truth import (
+    TIMES_S,
+    Bools,
+    GroundTruth,
+    RecordedPath,
+    Rows,
+    Sides,
+    find_direction,
+    find_ground_truth,
+    find_rows,
+    find_sides,
+)
 
 
 @dataclass(frozen=True, eq=False)
-class Ways(Record):
-    """The k candidates of one prediction.
+class CandidateTable(Record):
+    """The k candidates of one prediction, about n obstacles.
 
-    labels; goal (k,): row of the goals; solved (k,); spent [m^2/s^5]: effort since onset, the same for all; to_go (k,)
-    [m^2/s^5]: effort through each and what its time costs; likelihood (k,): as published, 0 unless solved; length (k,) [m]: of
-    the shortest path in its class; price [m^2/s^6]: of time; time_s (k,): to its goal; named (k, n): whether the obstacle is in
-    the candidate's name; sides (k, n): LEFT or RIGHT, on which it passes each of the n obstacles; mean (k, h, 2) [m] and
-    covariance (k, h, 2, 2) [m^2]: of the position at `TIMES_S`; late (k, h, 2) [m]: by how much it lags behind for each share of
-    the time to the goal that the plan takes longer; partings: when they part.
+    labels; goal (k,): row of the goals; is_solved (k,); effort_spent [m^2/s^5]: since onset, the same for all; cost_to_go (k,)
+    [m^2/s^5]: effort to go and what its time costs; likelihood (k,): as published, 0 unless solved; length (k,) [m]: of the
+    shortest path in its class; time_price [m^2/s^6]; time_s (k,): time to the goal; is_named (k, n): whether the obstacle is in
+    the label; sides (k, n): LEFT or RIGHT, on which the candidate passes each obstacle; mean (k, h, 2) [m] and covariance
+    (k, h, 2, 2) [m^2]: of the position at `TIMES_S`; duration_sensitivity (k, h, 2) [m]: by how much the position lags behind for
+    each share of the time to go that the movement takes longer; branch_times: when the candidates part.
     """
 
     labels: tuple[str, ...]
     goal: NDArray[np.int64]
-    solved: Bools
-    spent: float
-    to_go: Array
+    is_solved: Bools
+    effort_spent: float
+    cost_to_go: Array
     likelihood: Array
     length: Array
-    price: float
+    time_price: float
     time_s: Array
-    named: Bools
+    is_named: Bools
     sides: Sides
     mean: Array
     covariance: Array
-    late: Array
-    partings: BranchTimes
+    duration_sensitivity: Array
+    branch_times: BranchTimes
 
     def __len__(self) -> int:
         return len(self.labels)
 
 
 @dataclass(frozen=True, eq=False)
-class Truth(Record):
-    """What the hand really did after one prediction.
-
-    sides (n,): LEFT or RIGHT, the side of each obstacle on which the rest of the path runs; ahead (n,): whether the row of the
-    obstacle is still to be passed; goal: row of the goal where the recording ends, None where it ends at none, or at one that was
-    not there yet; positions (h, 2) [m]: at `TIMES_S`, nan beyond the end; progress in [0, 1]: share of the way that lies behind;
-    approach in [0, 1]: share of the way from the last row, or the start, to the next one, nan where none is to come.
-    """
-
-    sides: Sides
-    ahead: Bools
-    goal: int | None
-    positions: Array
-    progress: float
-    approach: float
-
-
-@dataclass(frozen=True, eq=False)
 class Observation(Record):
-    """One prediction: at stamp_ns, from a hand whose mean is hand (6,), its movement since_s old (0 at rest) [s].
+    """One prediction at stamp_ns, from a hand with mean hand (6,), movement_age_s after the onset of its movement (0 at rest).
 
-    ids, centre (n, 2) [m]: of the obstacles at that stamp; row (n,): the row of obstacles that each is in, 0 first; along (2,):
-    the unit vector on which rows are ordered; goals (g, 2) [m]; most_likely: the label that leads after hysteresis.
+    ids, centre (n, 2) [m]: of the obstacles at that stamp; row (n,): the row of each obstacle, 0 first; direction (2,): the unit
+    vector along which rows are ordered; goals (g, 2) [m]; candidates; most_likely: the leading label after hysteresis; truth.
     """
 
     stamp_ns: int
     hand: Array
-    since_s: float
+    movement_age_s: float
     ids: tuple[str, ...]
     centre: Array
-    row: NDArray[np.int64]
-    along: Array
+    row: Rows
+    direction: Array
     goals: Array
-    ways: Ways
+    candidates: CandidateTable
     most_likely: str | None
-    truth: Truth
+    truth: GroundTruth
+
+    @property
+    def left(self) -> Array:
+        """The unit vector (2,) to the left of the direction."""
+        return np.array([-self.direction[1], self.direction[0]])
 
 
 @dataclass(frozen=True, eq=False)
-class Observations:
-    """One recording: its name, its predictions in order, and counts by kind of what was refused or failed."""
+class ObservedRecording:
+    """One recording: its name, its observations in order, and counts of rejections and failures by kind."""
 
     name: str
-    each: tuple[Observation, ...]
+    observations: tuple[Observation, ...]
     counts: dict[str, int]
+
+
+def observe(recording: Recording, config: Config) -> ObservedRecording:
+    """Replay a recording; raises RecordingError where it cannot be read or nothing could be predicted in it."""
+    replayed = Replay(config)
+    stamps: list[int] = []
+    positions: list[Array] = []
+    made: list[tuple[Step, HandState]] = []
+    for step in replayed.steps(recording.items()):
+        if step.sample is not None:
+            stamps.append(step.sample.stamp_ns)
+            positions.append(step.sample.position)
+        if step.prediction is not None and step.prediction.solved_candidates:
+            assert replayed.pipeline.hand_state is not None
+            made.append((step, replayed.pipeline.hand_state))
+    if not made:
+        reason = replayed.pipeline.blocked() or replayed.intake.last_refusal or 'no candidate could be solved'
+        raise RecordingError(f'{recording.name}: nothing could be predicted: {reason}')
+    goals = made[-1][0].scene.goals
+    assert goals is not None
+    path = RecordedPath(np.array(stamps), np.array(positions), goals)
+    found = [_make_observation(step, hand, path, config.duration) for step, hand in made if hand.stamp_ns <= path.end_ns]
+    if not found:
+        raise RecordingError(f'{recording.name}: nothing was predicted before its goal was reached')
+    return ObservedRecording(recording.name, tuple(found), replayed.intake.counts)
+
+
+def _make_observation(step: Step, hand: HandState, path: RecordedPath, duration: DurationConfig) -> Observation:
+    prediction, goals = step.prediction, step.scene.goals
+    assert prediction is not None and goals is not None
+    obstacles = step.scene.obstacles(prediction.stamp_ns)
+    direction = find_direction(path.positions[0], goals)
+    row = find_rows(obstacles.centre, obstacles.radius, direction)
+    return Observation(
+        stamp_ns=prediction.stamp_ns,
+        hand=hand.mean,
+        movement_age_s=0.0 if hand.onset_ns is None else (hand.stamp_ns - hand.onset_ns) / NANOSECONDS,
+        ids=obstacles.ids,
+        centre=obstacles.centre,
+        row=row,
+        direction=direction,
+        goals=goals,
+        candidates=_tabulate_candidates(prediction, obstacles, hand.effort_spent, duration),
+        most_likely=prediction.most_likely,
+        truth=find_ground_truth(prediction.stamp_ns, path, obstacles, row, direction, goals),
+    )
+
+
+def _tabulate_candidates(
+    prediction: Prediction, obstacles: Obstacles, effort_spent: float, duration: DurationConfig
+) -> CandidateTable:
+    predicted, price, passing = prediction.candidates, time_price(duration), is_passing(duration)
+    solutions = [each.solution for each in predicted]
+    steps = [np.minimum(np.rint(np.array(TIMES_S) / each.dt).astype(int), len(each.mean) - 1) for each in solutions]
+    named = [[identity in dict(each.candidate.sides) for identity in obstacles.ids] for each in predicted]
+    return CandidateTable(
+        labels=tuple(each.candidate.label for each in predicted),
+        goal=np.array([each.candidate.goal for each in predicted]),
+        is_solved=np.array([each.is_solved for each in predicted]),
+        effort_spent=effort_spent,
+        cost_to_go=np.array([each.effort * each.dt + price * each.times[-1] for each in solutions]),
+        likelihood=np.array([each.likelihood for each in predicted]),
+        length=np.array([each.candidate.length for each in predicted]),
+        time_price=price,
+        time_s=np.array([each.times[-1] for each in solutions]),
+        is_named=np.array(named, dtype=bool).reshape(len(predicted), len(obstacles)),
+        sides=np.array([_find_predicted_sides(each, obstacles) for each in predicted]),
+        mean=np.array([each.mean[at, :2] for each, at in zip(solutions, steps, strict=True)]),
+        covariance=np.array([each.covariance[at, :2, :2] for each, at in zip(solutions, steps, strict=True)]),
+        duration_sensitivity=np.array(
+            [duration_sensitivity(each, passing)[at, :2] for each, at in zip(solutions, steps, strict=True)]
+        ),
+        branch_times=compute_branch_times(predicted, obstacles),
+    )
+
+
+def _find_predicted_sides(predicted: PredictedCandidate, obstacles: Obstacles) -> Sides:
+    """Return the sides (n,) of a candidate: those of its solved path, or those in its label where it could not be solved."""
+    solution = predicted.solution
+    centres = centre_trajectories(obstacles.centre, solution.dt * obstacles.velocity, len(solution.mean) - 1)
+    named = {} if predicted.is_solved else dict(predicted.candidate.sides)
+    sides = find_sides(solution.path, centres)
+    return np.array([named.get(identity, side) for identity, side in zip(obstacles.ids, sides, strict=True)], dtype=np.int8)

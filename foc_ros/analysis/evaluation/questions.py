@@ -1,11 +1,11 @@
-"""What a prediction is asked, which answers are open, and which one came true.
+"""The questions that are put to a prediction, the possible answers, and the true one.
 
-- `way`: on which sides will the hand pass the obstacles still ahead?
+- `way`: in which homotopy class will the hand pass the obstacles still ahead?
 - `gap`: the same for the next row of obstacles only.
 - `goal`: which goal will it reach?
 
-Asked only where at least two answers are open: of rows with m_1, m_2, ... obstacles (m_1 + 1)(m_2 + 1)..., of g goals g.
-Candidates may also weave through a row; such an answer can be given, but is not among the open ones that a guess is spread over.
+A question is put only where at least two answers are possible: rows of m_1, m_2, ... obstacles have (m_1 + 1)(m_2 + 1)... and g
+goals have g. Candidates may also weave through a row; such an answer can be given, but a uniform guess does not count it.
 """
 
 from __future__ import annotations
@@ -19,83 +19,95 @@ from numpy.typing import NDArray
 
 from foc_ros.core.types import LEFT, Record
 
-from .observations import Observation, Observations
+from .observations import Observation, ObservedRecording
 
-WAY, GAP, GOAL = 'way', 'gap', 'goal'
+PATH_CLASS, GAP, GOAL = 'way', 'gap', 'goal'
 
 Answer = tuple[int, ...]
-"""Sides of the obstacles asked about, LEFT or RIGHT, in their order; or the row of a goal."""
+"""Sides of the obstacles in question, LEFT or RIGHT, in their order; or the row of a goal."""
+Questions = list[tuple[Observation, 'Question']]
 
 
 @dataclass(frozen=True, eq=False)
 class Question(Record):
     """One question to one prediction.
 
-    name; obstacles (a,): rows of those asked about; open: number of open answers; answers: those that a candidate gives, and the
-    true one; given (k,): which of these each candidate gives; is_open: whether each is one of the open ones; truth: the place of
-    the true one.
+    name; obstacles (a,): rows of those in question; possible: number of possible answers; answers: those that a candidate gives,
+    and the true one; given (k,): index of the answer of each candidate; is_possible: whether each answer is one of the possible
+    ones; truth: index of the true answer.
     """
 
     name: str
     obstacles: NDArray[np.intp]
-    open: int
+    possible: int
     answers: tuple[Answer, ...]
     given: NDArray[np.intp]
-    is_open: NDArray[np.bool_]
+    is_possible: NDArray[np.bool_]
     truth: int
 
     @property
     def unlisted(self) -> int:
-        """Number of open answers that no candidate gives and that did not come true."""
-        return max(self.open - int(self.is_open.sum()), 0)
+        """Number of possible answers that no candidate gives and that are not the true one."""
+        return max(self.possible - int(self.is_possible.sum()), 0)
 
 
-def relevant(recording: Observations) -> frozenset[str]:
-    """Return the obstacles that matter in a recording: those in the name of any candidate."""
+def ask_all(recording: ObservedRecording, name: str) -> Questions:
+    """Return a question with every observation of a recording to which it can be put."""
+    relevant = find_relevant_obstacles(recording)
+    pairs = ((observation, ask(name, observation, relevant)) for observation in recording.observations)
+    return [(observation, question) for observation, question in pairs if question is not None]
+
+
+def ask_main(recording: ObservedRecording) -> Questions:
+    """Return the questions that one set of parameters is fitted to: path classes, or goals where no path class is in question."""
+    return ask_all(recording, PATH_CLASS) or ask_all(recording, GOAL)
+
+
+def find_relevant_obstacles(recording: ObservedRecording) -> frozenset[str]:
+    """Return the obstacles that are in the label of any candidate of a recording."""
     found: set[str] = set()
-    for each in recording.each:
-        found.update(each.ids[row] for row in np.flatnonzero(each.ways.named.any(axis=0)))
+    for each in recording.observations:
+        found.update(each.ids[row] for row in np.flatnonzero(each.candidates.is_named.any(axis=0)))
     return frozenset(found)
 
 
-def question(name: str, seen: Observation, obstacles: frozenset[str]) -> Question | None:
-    """Return a question, None where fewer than two answers are open or the truth is not known; obstacles: those that matter."""
+def ask(name: str, observation: Observation, relevant: frozenset[str]) -> Question | None:
+    """Return a question about the relevant obstacles, None where fewer than two answers are possible or the truth is unknown."""
     if name == GOAL:
-        return _about_goals(seen)
-    ahead = np.flatnonzero(seen.truth.ahead & np.array([identity in obstacles for identity in seen.ids], dtype=bool))
+        return _ask_goal(observation)
+    is_relevant = np.array([identity in relevant for identity in observation.ids], dtype=bool)
+    ahead = np.flatnonzero(observation.truth.is_ahead & is_relevant)
     if name == GAP and len(ahead):
-        ahead = ahead[seen.row[ahead] == seen.row[ahead].min()]
+        ahead = ahead[observation.row[ahead] == observation.row[ahead].min()]
     if not len(ahead):
         return None
-    _, members = np.unique(seen.row[ahead], return_counts=True)
-    given = [tuple(each) for each in seen.ways.sides[:, ahead].tolist()]
-    truth = tuple(seen.truth.sides[ahead].tolist())
-    answers, places = _listed([*given, truth])
-    opened = np.array([_is_open(answer, seen, ahead) for answer in answers])
-    return Question(name, ahead, int(np.prod(members + 1)), answers, places[:-1], opened, int(places[-1]))
+    _, members = np.unique(observation.row[ahead], return_counts=True)
+    given = [tuple(each) for each in observation.candidates.sides[:, ahead].tolist()]
+    answers, indices = _index_answers([*given, tuple(observation.truth.sides[ahead].tolist())])
+    is_possible = np.array([_leads_through_one_gap_each(answer, observation, ahead) for answer in answers])
+    return Question(name, ahead, int(np.prod(members + 1)), answers, indices[:-1], is_possible, int(indices[-1]))
 
 
-def _about_goals(seen: Observation) -> Question | None:
-    if seen.truth.goal is None or len(seen.goals) < 2:
+def _ask_goal(observation: Observation) -> Question | None:
+    count = len(observation.goals)
+    if observation.truth.goal is None or count < 2:
         return None
-    answers = tuple((goal,) for goal in range(len(seen.goals)))
-    none = np.zeros(0, dtype=np.intp)
-    everyone = np.ones(len(answers), dtype=bool)
-    return Question(GOAL, none, len(answers), answers, seen.ways.goal.astype(np.intp), everyone, seen.truth.goal)
+    answers, given = tuple((goal,) for goal in range(count)), observation.candidates.goal.astype(np.intp)
+    return Question(GOAL, np.zeros(0, dtype=np.intp), count, answers, given, np.ones(count, dtype=bool), observation.truth.goal)
 
 
-def _listed(given: Iterable[Answer]) -> tuple[tuple[Answer, ...], NDArray[np.intp]]:
-    places: dict[Answer, int] = {}
-    order = [places.setdefault(answer, len(places)) for answer in given]
-    return tuple(places), np.array(order, dtype=np.intp)
+def _index_answers(given: Iterable[Answer]) -> tuple[tuple[Answer, ...], NDArray[np.intp]]:
+    indices: dict[Answer, int] = {}
+    order = [indices.setdefault(answer, len(indices)) for answer in given]
+    return tuple(indices), np.array(order, dtype=np.intp)
 
 
-def _is_open(answer: Answer, seen: Observation, ahead: NDArray[np.intp]) -> bool:
-    """Tell whether sides lead through one gap of each row: left of some obstacles from the right on, right of all the others."""
-    aside = seen.centre[ahead] @ np.array([-seen.along[1], seen.along[0]])
-    for row in np.unique(seen.row[ahead]):
-        members = np.flatnonzero(seen.row[ahead] == row)
-        passes = [answer[member] == LEFT for member in members[np.argsort(aside[members], kind='stable')]]
-        if any(later and not earlier for earlier, later in pairwise(passes)):
+def _leads_through_one_gap_each(answer: Answer, observation: Observation, ahead: NDArray[np.intp]) -> bool:
+    """Tell whether sides lead through one gap of each row: left of its rightmost obstacles, right of all the others."""
+    offset = observation.centre[ahead] @ observation.left
+    for row in np.unique(observation.row[ahead]):
+        members = np.flatnonzero(observation.row[ahead] == row)
+        is_left = [answer[member] == LEFT for member in members[np.argsort(offset[members], kind='stable')]]
+        if any(later and not earlier for earlier, later in pairwise(is_left)):
             return False
     return True

@@ -5,95 +5,84 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from .questions import GAP, GOAL, WAY
-from .scores import TENTHS
+from .metrics import TENTHS
+from .questions import GAP, GOAL, PATH_CLASS
 
 Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 """Title, columns, rows."""
 
-GAINS = {
-    WAY: 'Way through the rows ahead: log-likelihood above uniform [nat], by tenths of the movement',
+GAIN_TITLES = {
+    PATH_CLASS: 'Homotopy class through the rows ahead: log-likelihood above uniform [nat], by tenths of the movement',
     GOAL: 'Goal: log-likelihood above uniform [nat], by tenths of the movement',
 }
-RIGHT = 'Gap in the next row: right [%], by tenths of the way from row to row'
-INSIDE = {
-    'inside': 'ellipse of the most likely way',
-    'inside_taken': 'ellipse of the way taken',
-    'inside_all': 'smallest region of all ways together',
+GAP_TITLE = 'Gap in the next row: correct [%], by tenths of the distance from row to row'
+REGIONS = {
+    'inside': 'ellipse of the most likely candidate',
+    'inside_taken': 'ellipse of the candidate taken',
+    'inside_all': 'smallest region of all candidates',
 }
 
 
-def tables(answer: Mapping[str, Any]) -> Iterator[Table]:
-    """Yield the tables of an answer as of `answer.answer_of`."""
+def make_tables(answer: Mapping[str, Any]) -> Iterator[Table]:
+    """Yield the tables of an answer of `evaluate --json`."""
     questions = answer['questions']
-    for name, title in GAINS.items():
+    tenths = ('', *(str(tenth + 1) for tenth in range(TENTHS)))
+    for name, title in GAIN_TITLES.items():
         if name in questions:
-            yield (
-                title,
-                _columns('all', 'ECE', 'Brier', 'right', 'leads from'),
-                [_gains(predictor, scores) for predictor, scores in questions[name].items()],
-            )
+            columns = (*tenths, 'all', 'ECE', 'Brier', 'correct [%]', 'leads from [%]')
+            yield title, columns, [_format_gains(predictor, scores) for predictor, scores in questions[name].items()]
     if GAP in questions:
-        yield RIGHT, _columns('from half way'), [_right(predictor, scores) for predictor, scores in questions[GAP].items()]
-    yield from _positions(answer['positions'])
-    yield _facts(answer)
+        lines = [
+            (predictor, *(_percent(each['right']) for each in (*scores['by_tenth'], {'right': scores['right_from_half_way']})))
+            for predictor, scores in questions[GAP].items()
+        ]
+        yield GAP_TITLE, (*tenths, 'second half'), lines
+    yield from _make_position_tables(answer['positions'])
+    yield '', ('', ''), list(_list_facts(answer))
 
 
-def _columns(*more: str) -> tuple[str, ...]:
-    return ('', *(str(tenth + 1) for tenth in range(TENTHS)), *more)
+def _format_gains(predictor: str, scores: Mapping[str, Any]) -> tuple[str, ...]:
+    tenths = [_number(each['gain'], 2) for each in scores['by_tenth']]
+    rest = [_number(scores[name], 3) for name in ('gain', 'expected_calibration_error', 'brier')]
+    return (predictor, *tenths, *rest, _percent(scores['right']), _percent(scores['leads_for_good_from']))
 
 
-def _gains(predictor: str, scores: Mapping[str, Any]) -> tuple[str, ...]:
-    tenths = [number(each['gain'], 2) for each in scores['by_tenth']]
-    rest = number(scores['gain'], 3), number(scores['expected_calibration_error'], 3), number(scores['brier'], 3)
-    return (predictor, *tenths, *rest, percent(scores['right']), percent(scores['leads_for_good_from']))
-
-
-def _right(predictor: str, scores: Mapping[str, Any]) -> tuple[str, ...]:
-    return (predictor, *(percent(each['right']) for each in scores['by_tenth']), percent(scores['right_from_half_way']))
-
-
-def _positions(positions: Mapping[str, Any]) -> Iterator[Table]:
+def _make_position_tables(positions: Mapping[str, Any]) -> Iterator[Table]:
     horizons = list(positions['inside']['0.5'])
     errors = [
-        (name, *(number(1e3 * by[kind][each], 1) if by[kind][each] is not None else '-' for kind in by for each in horizons))
-        for name, by in positions['displacement_m'].items()
+        (name, *(_number(each if each is None else 1e3 * each, 1) for by in kinds.values() for each in by.values()))
+        for name, kinds in positions['displacement_m'].items()
     ]
     columns = ('', *(f'{kind} {each} s' for kind in ('average', 'final') for each in horizons))
     yield 'Displacement error [mm]', columns, errors
     inside = [
-        (f'{words}, {100 * float(level):g} %', *(percent(by[each]) for each in horizons))
-        for name, words in INSIDE.items()
+        (f'{words}, {100 * float(level):g} %', *(_percent(by[each]) for each in horizons))
+        for name, words in REGIONS.items()
         for level, by in positions[name].items()
     ]
     yield 'True positions inside [%]', ('', *(f'{each} s' for each in horizons)), inside
 
 
-def _facts(answer: Mapping[str, Any]) -> Table:
-    rows: list[tuple[str, ...]] = [
-        ('recordings', f'{answer["recordings"]}, {len(answer["failed"])} failed'),
-        ('predictions', str(answer['predictions'])),
-        *(
-            (f'best for {question}: {name}', _setting(setting))
-            for question, by_predictor in answer['settings'].items()
-            for name, setting in by_predictor.items()
-            if setting is not None
-        ),
-    ]
-    return '', ('', ''), rows
+def _list_facts(answer: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    yield 'recordings', f'{answer["recordings"]}, {len(answer["failed"])} failed'
+    yield 'predictions', str(answer['predictions'])
+    for question, by_predictor in answer['settings'].items():
+        for name, setting in by_predictor.items():
+            if setting is not None:
+                yield f'best setting for {question}: {name}', _format_setting(setting)
 
 
-def _setting(setting: Any) -> str:
+def _format_setting(setting: Any) -> str:
     if isinstance(setting, Mapping):
         return ', '.join(f'{name} {value:g}' for name, value in setting.items())
-    return ', '.join(f'{value:.4g}' for value in setting) if isinstance(setting, Sequence) else f'{setting:.4g}'
+    if isinstance(setting, Sequence) and not isinstance(setting, str):
+        return ', '.join(_format_setting(value) for value in setting)
+    return f'{setting:.4g}' if isinstance(setting, float) else str(setting)
 
 
-def number(value: float | None, digits: int) -> str:
-    """Return a number with so many digits; a dash for none."""
+def _number(value: float | None, digits: int) -> str:
     return '-' if value is None else f'{value:.{digits}f}'
 
 
-def percent(value: float | None) -> str:
-    """Return a share in per cent; a dash for none."""
+def _percent(value: float | None) -> str:
     return '-' if value is None else f'{100 * value:.1f}'

@@ -1,8 +1,11 @@
-"""How long the operator's movements take: the duration model's constants, by the time that was really left at each sample.
+"""The duration of movements: the constants of the duration models, and how long a hand at rest waits.
 
-The estimates minimise the mean absolute error of the time to go, over the samples of a movement and then over the recordings: the
-likeliest values where errors follow Laplace's distribution, which the few that dawdle do not rule. With Fitts' law,
-intercept and slope are told apart only by distances that differ; else their ratio is kept and one factor is fitted.
+The constants minimise the mean absolute error of the time to go, over the samples of a movement and then over the recordings.
+They are the likeliest values where errors follow Laplace's distribution, so that a few slow movements have little weight. With
+Fitts' law, only distances that differ tell intercept and slope apart; otherwise their ratio is kept and one factor is fitted.
+
+The wait is the mean time to the next movement over all samples at rest. That is the likeliest mean of an exponential
+distribution, which does not depend on how long the hand has waited already.
 """
 
 from __future__ import annotations
@@ -13,31 +16,31 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize
 
-from foc_ros.analysis.evaluation.path import Path
+from foc_ros.analysis.evaluation.ground_truth import RecordedPath
+from foc_ros.analysis.goal_reached import has_covered_distance
 from foc_ros.core.config import Config, DurationConfig, updated
 from foc_ros.core.estimation.duration import estimate_times_to_go
 from foc_ros.core.types import NANOSECONDS, Array, HandState
 
-from .demonstrations import Demonstration
-from .estimates import Estimate, applied, bounded
-from .resampling import CENTRAL, RESAMPLES, SEED
+from .estimates import CENTRAL, Estimate, Estimates, apply_estimates, clip_to_bounds
+from .recorded_hand import RecordedHand
+from .resampling import RESAMPLES, SEED, draw_resamples
 
 CONSTANTS = {
     'fixed': {'duration.fixed_s': 1.0},
     'fitts': {'duration.fitts_a_s': 1.0, 'duration.fitts_b_s': 1.0},
     'cost_of_time': {'duration.time_cost': -6.0},
 }
-"""By model, the constants that make durations longer, each with its power in a factor on all durations (`time_cost`)."""
-DISTANCED = ('fitts', 'cost_of_time')
-"""Models of which durations follow from distances."""
+"""By model, the constants that determine durations, each with its power in a factor on all durations."""
+DISTANCE_MODELS = ('fitts', 'cost_of_time')
+"""Models whose durations depend on the distance."""
 NARROW_BITS = 0.5
 """Standard deviation of the index of difficulty below which intercept and slope are not told apart [bit]."""
 FACTORS = tuple(2.0 ** (np.arange(-10, 11) / 4.0))
-"""Factors on the values given among which the best is sought first: 0.18 to 5.7."""
-REACHED = 0.25
-"""Share of the first distance from a goal within which it was reached."""
-LEAST_LEFT_S = 0.1
-"""Samples nearer to the end than this tell nothing: the end itself is known no better."""
+"""Factors on the given values, 0.18 to 5.7, among which the best is sought first."""
+MIN_TIME_S = 0.1
+"""Least time to the end of a sample that is used, because the end itself is known no better."""
+WAIT = 'duration.wait_s'
 
 Sample = tuple[HandState, Array, float]
 """State of the hand, goal (2,) [m], time left [s]."""
@@ -46,11 +49,11 @@ Sample = tuple[HandState, Array, float]
 class TimesToGo:
     """The samples in movement of each recording that reached a goal."""
 
-    def __init__(self, demonstrations: Sequence[Demonstration], config: Config) -> None:
-        taken = [_samples(each, config) for each in demonstrations]
-        self.samples = [each for each in taken if each]
+    def __init__(self, hands: Sequence[RecordedHand], config: Config) -> None:
+        samples = [_find_samples(each, config) for each in hands]
+        self.samples = [each for each in samples if each]
 
-    def errors(self, duration: DurationConfig) -> Array:
+    def compute_errors(self, duration: DurationConfig) -> Array:
         """Return the mean absolute error of the time to go in each recording, (n,) [s]."""
         return np.array(
             [
@@ -59,83 +62,95 @@ class TimesToGo:
             ]
         )
 
-    def difficulties(self, width: float) -> Array:
+    def compute_difficulties(self, width: float) -> Array:
         """Return the index of difficulty of each movement, (n,) [bit]."""
         distances = [np.hypot(*(each[0][1] - each[0][0].onset_position)) for each in self.samples]  # type: ignore[operator]
         return np.log2(np.array(distances) / width + 1.0)
 
 
-def _samples(demonstration: Demonstration, config: Config) -> list[Sample]:
-    path = Path(demonstration.stamps_ns, demonstration.positions, demonstration.goals)
-    if path.goal is None:
+def _find_samples(hand: RecordedHand, config: Config) -> list[Sample]:
+    path = RecordedPath(hand.stamps_ns, hand.positions, hand.goals)
+    if path.goal is None or not has_covered_distance(hand.positions, hand.goals[path.goal]):
         return []
-    goal = demonstration.goals[path.goal]
-    apart = np.hypot(*(demonstration.positions - goal).T)
-    if apart.min() > REACHED * apart[0]:
-        return []
-    left = [(state, (path.end_ns - state.stamp_ns) / NANOSECONDS) for state in demonstration.states(config)]
-    return [(state, goal, seconds) for state, seconds in left if state.onset_ns is not None and seconds > LEAST_LEFT_S]
+    left = [(state, (path.end_ns - state.stamp_ns) / NANOSECONDS) for state in hand.estimate_states(config)]
+    goal = hand.goals[path.goal]
+    return [(state, goal, seconds) for state, seconds in left if state.onset_ns is not None and seconds > MIN_TIME_S]
 
 
-def fit_duration(demonstrations: Sequence[Demonstration], config: Config) -> tuple[dict[str, Estimate], list[str]]:
-    """Return the estimates, and warnings in words."""
-    times = TimesToGo(demonstrations, config)
+def fit_duration(hands: Sequence[RecordedHand], config: Config) -> tuple[Estimates, list[str]]:
+    """Return the estimates of the constants of the configured model, and warnings in words."""
+    times = TimesToGo(hands, config)
     if not times.samples:
         return {}, ['duration: no recording has a movement that ends near a goal; its parameters are kept']
     names, powers = tuple(CONSTANTS[config.duration.model]), np.array(list(CONSTANTS[config.duration.model].values()))
     given = np.array([getattr(config.duration, name.partition('.')[2]) for name in names])
-    errors = np.array([times.errors(_changed(config.duration, names, given * factor**powers)) for factor in FACTORS])
-    best = _finer(errors)
-    how, warnings = 'time to go', []
+
+    def compute_errors(values: Array) -> Array:
+        leaves = [name.partition('.')[2] for name in names]
+        return times.compute_errors(replace(config.duration, **dict(zip(leaves, values.tolist(), strict=True))))
+
+    errors = np.array([compute_errors(given * factor**powers) for factor in FACTORS])
+    best, warnings = _find_best_factor(errors), []
     value = given * best**powers
-    if len(names) == 2 and times.difficulties(config.duration.target_width).std() > NARROW_BITS:
-        value = _both(times, config.duration, names, value)
-    elif len(names) == 2:
-        warnings.append(
-            'duration.fitts_a_s, duration.fitts_b_s: the movements are too alike to tell intercept and slope apart '
-            f'(indices of difficulty {times.difficulties(config.duration.target_width).std():.2g} bit about their mean, '
-            f'{NARROW_BITS:g} are needed): their ratio is kept'
-        )
-    spread = _resampled(errors) / best
-    low, high = np.percentile(spread, CENTRAL)
-    found = {}
+    if len(names) == 2:
+        spread_bits = times.compute_difficulties(config.duration.target_width).std()
+        if spread_bits > NARROW_BITS:
+            found = minimize(lambda values: float(compute_errors(np.abs(values)).mean()), value, method='Nelder-Mead')
+            value = np.abs(found.x)
+        else:
+            warnings.append(
+                'duration.fitts_a_s, duration.fitts_b_s: the movements are too alike to tell intercept and slope apart '
+                f'(indices of difficulty with a standard deviation of {spread_bits:.2g} bit, {NARROW_BITS:g} are needed): their '
+                'ratio is kept'
+            )
+    low, high = np.percentile(_resample_best_factor(errors) / best, CENTRAL)
+    estimates = {}
     for name, each, power in zip(names, value.tolist(), powers, strict=True):
         ends = sorted((each * min(low, 1.0) ** power, each * max(high, 1.0) ** power))
-        found[name] = Estimate(name, bounded(name, each), float(ends[0]), float(ends[1]), how)
-    return found, warnings
+        estimates[name] = Estimate(name, clip_to_bounds(name, each), float(ends[0]), float(ends[1]), 'time to go')
+    return estimates, warnings
 
 
-def other_models(demonstrations: Sequence[Demonstration], config: Config) -> list[Config]:
-    """Return the configuration with each model of duration that can serve any distance, its constants fitted, but for its own."""
-    others = [updated(config, {'duration.model': model}) for model in DISTANCED if model != config.duration.model]
-    return [applied(each, fit_duration(demonstrations, each)[0]) for each in others]
+def fit_other_models(hands: Sequence[RecordedHand], config: Config) -> list[Config]:
+    """Return the configuration with each other model of duration that depends on distance, its constants fitted."""
+    others = [updated(config, {'duration.model': model}) for model in DISTANCE_MODELS if model != config.duration.model]
+    return [apply_estimates(each, fit_duration(hands, each)[0]) for each in others]
 
 
-def _finer(errors: Array) -> float:
-    """Return the best factor, by a parabola through the best on the grid and its neighbours."""
+def fit_wait(hands: Sequence[RecordedHand], config: Config) -> Estimates:
+    """Return the estimate of the wait, none where no hand waits before a movement."""
+    waits = [mean for each in hands if (mean := _compute_mean_wait(each, config)) is not None]
+    if not waits:
+        return {}
+    resampled = draw_resamples(len(waits)) @ np.array(waits) / len(waits)
+    value = clip_to_bounds(WAIT, float(np.mean(waits)))
+    return {WAIT: Estimate.from_resamples(WAIT, value, resampled, 'time until movements begin')}
+
+
+def _compute_mean_wait(hand: RecordedHand, config: Config) -> float | None:
+    """Return the mean time [s] from the samples at rest to the movement that follows, until the goal is reached."""
+    path = RecordedPath(hand.stamps_ns, hand.positions, hand.goals)
+    waits, onset_ns = list[float](), None
+    for state in reversed(hand.estimate_states(config)):
+        if state.stamp_ns > path.end_ns:
+            continue
+        if state.onset_ns is not None:
+            onset_ns = state.onset_ns
+        elif onset_ns is not None:
+            waits.append((onset_ns - state.stamp_ns) / NANOSECONDS)
+    return float(np.mean(waits)) if waits else None
+
+
+def _find_best_factor(errors: Array) -> float:
+    """Return the best factor, by a parabola through the best of `FACTORS` and its neighbours."""
     mean = errors.mean(axis=1)
-    place = int(np.clip(mean.argmin(), 1, len(FACTORS) - 2))
-    before, here, after = mean[place - 1 : place + 2]
+    index = int(np.clip(mean.argmin(), 1, len(FACTORS) - 2))
+    before, here, after = mean[index - 1 : index + 2]
     bend = before - 2.0 * here + after
     shift = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
-    step = np.log(FACTORS[1] / FACTORS[0])
-    return float(FACTORS[place] * np.exp(step * np.clip(shift, -1.0, 1.0)))
+    return float(FACTORS[index] * np.exp(np.log(FACTORS[1] / FACTORS[0]) * np.clip(shift, -1.0, 1.0)))
 
 
-def _resampled(errors: Array) -> Array:
+def _resample_best_factor(errors: Array) -> Array:
     draws, n = np.random.default_rng(SEED), errors.shape[1]
-    return np.array([_finer(errors[:, draws.integers(n, size=n)]) for _ in range(RESAMPLES)])
-
-
-def _both(times: TimesToGo, duration: DurationConfig, names: tuple[str, ...], start: Array) -> Array:
-    """Return intercept and slope, each by itself."""
-    found = minimize(
-        lambda values: float(times.errors(_changed(duration, names, np.abs(values))).mean()), start, method='Nelder-Mead'
-    )
-    values: Array = np.abs(found.x)
-    return values
-
-
-def _changed(duration: DurationConfig, names: tuple[str, ...], values: Array) -> DurationConfig:
-    leaves = [name.partition('.')[2] for name in names]
-    return replace(duration, **dict(zip(leaves, values.tolist(), strict=True)))
+    return np.array([_find_best_factor(errors[:, draws.integers(n, size=n)]) for _ in range(RESAMPLES)])

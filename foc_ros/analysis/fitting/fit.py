@@ -1,146 +1,106 @@
-"""All parameters in turn: what needs no prediction first, then what needs replays, then what one replay tells of the rest."""
+"""All parameters in turn: first those that need no prediction, then those that need replays, then the rest from one replay."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.observations import Observations
-from foc_ros.analysis.evaluation.recordings import Recording
-from foc_ros.analysis.evaluation.workers import collected
+from foc_ros.analysis.parallel import collect
+from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config, updated
 from foc_ros.core.errors import RecordingError
 
-from . import choices, doubts
-from .demonstrations import Demonstration, demonstration
-from .duration_fit import fit_duration
-from .estimates import bounded
-from .estimator_fit import fit_estimator
-from .fading_fit import fit_fading
-from .followed import fit_followed
-from .found import Fit
-from .movements import etas, movements, noises
-from .plans import Reach, reach
-from .recovery import fit_plans
-from .replays import Replays, observed
-from .search import search
-from .wait_fit import fit_wait
+from . import covariance_fit, likelihood_fit
+from .duration_fit import fit_duration, fit_wait
+from .estimates import Fit, clip_to_bounds
+from .estimator_fit import fit_estimator, fit_fading
+from .plan_fit import Reach, fit_plans, make_reach
+from .predictor_settings import fit_max_candidates, make_eta_settings, make_movement_settings, make_noise_settings
+from .recorded_hand import RecordedHand, read_hand
+from .setting_search import Replays, observe_by_motor_noise, search_settings
 
 PREDICTIONS = 10
-"""About as many predictions are made in each recording: neighbours tell the same."""
-FEWEST = 3
+"""About as many predictions are made in each recording, because neighbours say the same."""
+MIN_FOLDS = 3
 """Recordings below which there is no cross-validation."""
 
 
-def fit(recordings: Mapping[str, Recording], config: Config, executor: Executor) -> Fit:
-    """Fit everything to recordings; raises RecordingError where none can be used."""
-    found = Fit(config)
-    demonstrations = _read(recordings, found, executor)
-    usable = {each.name: recordings[each.name] for each in demonstrations}
-    found.take(fit_estimator(demonstrations, found.config))
-    found.take(fit_fading(demonstrations, found.config))
-    found.take(fit_duration(demonstrations, found.config))
-    found.take(fit_wait(demonstrations, found.config))
-    found.take(fit_followed(demonstrations, found.config))
+def fit_parameters(recordings: Mapping[str, Recording], config: Config, executor: Executor) -> Fit:
+    """Fit all parameters to recordings; raises RecordingError where no recording can be used."""
+    fit = Fit(config)
+    hands = _read_hands(recordings, fit, executor)
+    usable = {each.name: recordings[each.name] for each in hands}
+    fit.take(*fit_estimator(hands, fit.config))
+    fit.take(*fit_fading(hands, fit.config))
+    fit.take(*fit_duration(hands, fit.config))
+    fit.take(fit_wait(hands, fit.config))
+    fit.take(*fit_max_candidates(hands, fit.config))
     if config.foc.strategy == 'fixed':
-        found.take(fit_plans(_reaches(demonstrations, found), found.config))
-    thin = _thin(demonstrations, config)
-    _search(demonstrations, found, Replays(usable, thin, executor))
-    _choose(usable, found, thin, executor)
-    return found
+        fit.take(*fit_plans(_make_reaches(hands, fit), fit.config))
+    duration_s = float(np.median([each.times[-1] for each in hands]))
+    thinned = {'rate_hz': clip_to_bounds('rate_hz', min(config.rate_hz, PREDICTIONS / max(duration_s, 1e-3)))}
+    _search(hands, fit, Replays(usable, thinned, executor))
+    _fit_to_one_replay(usable, fit, thinned, executor)
+    return fit
 
 
-def _search(demonstrations: Sequence[Demonstration], found: Fit, replays: Replays) -> None:
-    """Fit what needs replays."""
-    if not any(len(each.obstacles) for each in demonstrations):
-        found.warnings.append(
-            'foc.eta, foc.noise_x, foc.noise_y: no recording has an obstacle, and without one neither margins nor '
-            'what widens them can be told: they are kept'
+def _search(hands: Sequence[RecordedHand], fit: Fit, replays: Replays) -> None:
+    """Fit the parameters that need replays."""
+    if not any(len(each.obstacles) for each in hands):
+        fit.warnings.append(
+            'foc.eta, foc.noise_x, foc.noise_y: no recording has an obstacle, and without one the recordings determine neither '
+            'margins nor noise: they are kept'
         )
-    elif found.config.foc.strategy != 'fixed':
+    elif fit.config.foc.strategy != 'fixed':
         # with strategy `fixed` eta has no effect, and lambda was found for the noise as it is
-        search('noise', noises(found.config), replays, found)
-        search('eta', etas(found.config), replays, found)
-    search('movement', movements(demonstrations, found.config), replays, found)
+        search_settings('noise', make_noise_settings(fit.config), replays, fit)
+        search_settings('eta', make_eta_settings(fit.config), replays, fit)
+    search_settings('movement', make_movement_settings(hands, fit.config), replays, fit)
 
 
-def _read(recordings: Mapping[str, Recording], found: Fit, executor: Executor) -> list[Demonstration]:
-    read, failed = collected(partial(demonstration, config=found.config), list(recordings.items()), executor, 'read')
-    found.failed.update(failed)
-    if not read:
-        raise RecordingError(f'no recording can be used: {"; ".join(f"{name}: {why}" for name, why in found.failed.items())}')
-    found.recordings = len(read)
-    return read
+def _read_hands(recordings: Mapping[str, Recording], fit: Fit, executor: Executor) -> list[RecordedHand]:
+    hands, failed = collect(partial(read_hand, config=fit.config), list(recordings.items()), executor, 'read')
+    fit.failed.update(failed)
+    if not hands:
+        raise RecordingError(f'no recording can be used: {"; ".join(f"{name}: {why}" for name, why in fit.failed.items())}')
+    fit.recordings = len(hands)
+    return hands
 
 
-def _reaches(demonstrations: Sequence[Demonstration], found: Fit) -> list[Reach]:
+def _make_reaches(hands: Sequence[RecordedHand], fit: Fit) -> list[Reach]:
     reaches = []
-    for each in demonstrations:
+    for each in hands:
         try:
-            reaches.append(reach(each, found.config))
+            reaches.append(make_reach(each, fit.config))
         except RecordingError as error:
-            found.failed[each.name] = str(error)
+            fit.failed[each.name] = str(error)
     if not reaches:
-        raise RecordingError(f'no movement reaches a goal: {"; ".join(found.failed.values())}')
+        raise RecordingError(f'no movement reaches a goal: {"; ".join(fit.failed.values())}')
     return reaches
 
 
-def _thin(demonstrations: Sequence[Demonstration], config: Config) -> dict[str, float]:
-    """Return the rate at which the recordings are replayed, as changed parameters."""
-    duration_s = float(np.median([each.times[-1] for each in demonstrations]))
-    return {'rate_hz': bounded('rate_hz', min(config.rate_hz, PREDICTIONS / max(duration_s, 1e-3)))}
-
-
-def _choose(recordings: Mapping[str, Recording], found: Fit, thin: Mapping[str, float], executor: Executor) -> None:
-    """Fit the likelihood and the doubt about plans to one replay, and score them held out."""
-    observations, failed = observed(recordings, updated(found.config, thin), executor, 'replay')
-    found.failed.update(failed)
-    if not observations:
+def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: Mapping[str, float], executor: Executor) -> None:
+    """Fit the likelihood and the widening of the covariance to one replay, and score them held out."""
+    observed, failed = observe_by_motor_noise(recordings, updated(fit.config, thinned), executor, 'replay')
+    fit.failed.update(failed)
+    if not observed:
         raise RecordingError(f'nothing could be predicted: {"; ".join(failed.values())}')
-    table, names = choices.choice_table(observations, found.config, executor), [each.name for each in observations]
+    cross = len(observed) >= MIN_FOLDS
+    table = likelihood_fit.tabulate_likelihoods(observed, fit.config, executor)
     if np.isnan(table.values).all():
-        found.warnings.append(
+        fit.warnings.append(
             'likelihood.beta: no recording has an obstacle to pass on one of two sides, or a second goal: it is kept'
         )
     else:
-        found.warnings.extend(choices.unheard(observations))
-        columns = choices.plain_or_ahead(table, names)
-        found.take(choices.likelihood_estimates(table, columns))
-        found.scores.update(_choice_scores(table, columns, observations))
-    densities = doubts.density_table(observations, found.config)
-    found.take((doubts.doubt_estimates(densities), []))
-    found.scores.update(_position_scores(densities, found.config, observations))
-    if len(observations) < FEWEST:
-        found.warnings.append(f'cross-validation: {len(observations)} recordings are too few, {FEWEST} are needed')
-
-
-def _choice_scores(table: choices.Table, columns: Sequence[int], observations: Sequence[Observations]) -> dict[str, Any]:
-    names, took = [each.name for each in observations], choices.classes(observations)
-    scores = {
-        'uniform': choices.uniform(observations),
-        'as given': table.values[:, 0],
-        'fitted': table.values[:, table.best(columns)],
-    }
-    if len(names) >= FEWEST:
-        scores['without the recording'] = table.held_out(columns, names)
-        if len(set(took)) > 1:
-            scores['without its way'] = table.held_out(columns, took)
-    return {'ways': {name: float(np.nanmean(values)) for name, values in scores.items()}}
-
-
-def _position_scores(table: choices.Table, config: Config, observations: Sequence[Observations]) -> dict[str, Any]:
-    names, columns = [each.name for each in observations], list(range(len(table.settings)))
-    cross = len(names) >= FEWEST
-    scores = {'motor noise alone': table.values[:, 0], 'fitted': table.values[:, table.best(columns)]}
-    if cross:
-        scores['without the recording'] = table.held_out(columns, names)
-    tried = doubts.doubts(table, names if cross else None)
-    held = {name: doubts.coverage(observations, config, each) for name, each in tried.items()}
-    return {
-        'positions': {name: float(np.nanmean(values)) for name, values in scores.items()},
-        **{kind: {name: each[kind] for name, each in held.items()} for kind in ('inside_90', 'inside_all_90')},
-    }
+        fit.warnings.extend(likelihood_fit.warn_of_missed_classes(observed))
+        columns = likelihood_fit.choose_form(table, [each.name for each in observed])
+        fit.take(*likelihood_fit.estimate_likelihood(table, columns))
+        fit.scores.update(likelihood_fit.score_classes(table, columns, observed, cross))
+    densities = covariance_fit.tabulate_densities(observed, fit.config)
+    fit.take(covariance_fit.estimate_widening(densities))
+    fit.scores.update(covariance_fit.score_positions(densities, fit.config, observed, cross))
+    if not cross:
+        fit.warnings.append(f'cross-validation: {len(observed)} recordings are too few, {MIN_FOLDS} are needed')

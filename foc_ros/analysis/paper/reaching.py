@@ -1,4 +1,4 @@
-"""One way through one scene, solved: the unit that every study is made of."""
+"""One homotopy class of one scene, solved and measured: the unit that every study consists of."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import cold_start
 from foc_ros.core.types import Array, Obstacles, Solution, Status, make_obstacles
-from foc_ros.io.guess import guess_path
+from foc_ros.io.scene_file import guess_path
 
 STEPS, DURATION_S = 50, 1.0
-EQUALLY_NEAR = 1e-6
-"""Difference of two distances that is none [m]."""
+EQUAL_M = 1e-6
+"""Distances that differ by less than this are equal [m]."""
 HORIZON = triple_integrator_horizon(DURATION_S / STEPS, STEPS)
 
 
 @dataclass(frozen=True)
 class PathClass:
-    """One way round: the bow of its guess to the left [m], and the side on which it passes obstacles, by id."""
+    """A homotopy class: the amplitude of its guess to the left [m], and the side on which it passes obstacles, by id."""
 
     name: str
     amplitude: float
@@ -35,7 +35,7 @@ class PathClass:
 class PaperScene:
     """A reach from rest at the origin to rest at a goal on the x axis, in DURATION_S.
 
-    goal_x [m]; circles: x, y, mean and standard deviation of the radius [m] of each obstacle; ways: those that are studied.
+    goal_x [m]; circles: x, y, mean and standard deviation of the radius [m] of each obstacle; ways: the classes that are studied.
     """
 
     goal_x: float
@@ -53,14 +53,14 @@ class PaperScene:
         """The goal, (2,) [m]."""
         return np.array([self.goal_x, 0.0])
 
-    def problem(self, noise: float, eta: float) -> Problem:
+    def make_problem(self, noise: float, eta: float) -> Problem:
         """Return the problem with noise c on both axes, per step, and a wanted eta."""
         return rest_to_goal(HORIZON, np.zeros(6), self.goal, self.obstacles, np.full(2, noise), eta)
 
 
 @dataclass(frozen=True)
 class Method:
-    """How a problem is solved: strategy with its settings, where they are not the defaults; noise c per step."""
+    """How a problem is solved: noise c per step, and a strategy with its settings where they are not the defaults."""
 
     noise: float
     strategy: str
@@ -68,48 +68,46 @@ class Method:
 
     @property
     def config(self) -> FocConfig:
-        """The settings that the forward optimal control takes."""
+        """The settings as the configuration of the forward optimal control."""
         return replace(FocConfig(strategy=self.strategy), **dict(self.settings))  # type: ignore[arg-type]
 
 
-def solve_class(scene: PaperScene, way: PathClass, method: Method, eta: float) -> Solution:
-    """Solve one way from its guess, on its own: no study depends on the order of its solutions.
+def solve_class(scene: PaperScene, path_class: PathClass, method: Method, eta: float) -> Solution:
+    """Solve one class from its guess, so that no study depends on the order of its solutions.
 
-    A solution that slid into another way has the status LEFT_CLASS.
+    A solution that slid into another class has the status LEFT_CLASS.
     """
-    guess = guess_path(np.zeros(2), scene.goal, STEPS, way.amplitude)
-    solution = solve_problem(scene.problem(method.noise, eta), cold_start(guess), method.config)
+    guess = guess_path(np.zeros(2), scene.goal, STEPS, path_class.amplitude)
+    solution = solve_problem(scene.make_problem(method.noise, eta), cold_start(guess), method.config)
     sides = path_sides(solution.path, scene.obstacles)
-    if solution.status is Status.SOLVED and any(sides.get(identity) != side for identity, side in way.sides):
+    if solution.status is Status.SOLVED and any(sides.get(identity) != side for identity, side in path_class.sides):
         return replace(solution, status=Status.LEFT_CLASS, message='the solution slid into another class')
     return solution
 
 
-def clearance(scene: PaperScene, solution: Solution) -> float:
-    """Return the least distance of the mean path from the mean edge of an obstacle [m]."""
-    away = np.linalg.norm(solution.path[:, None] - scene.obstacles.centre[None], axis=-1)
-    return float((away - scene.obstacles.radius).min())
+def measure_solution(scene: PaperScene, solution: Solution) -> dict[str, float]:
+    """Return the numbers by which solutions are compared, by name.
+
+    clearance: least distance of the mean path from the mean edge of an obstacle [m]; path_length: of the mean path [m];
+    largest_stddev: root of the largest sum over the axes of the position's variance [m]; speed_to_obstacles: mean speed up to
+    where the mean is nearest to the edge of an obstacle [m/s].
+    """
+    speed, obstacles = compute_speed(solution), scene.obstacles
+    distance = (np.linalg.norm(solution.path[:, None] - obstacles.centre, axis=-1) - obstacles.radius).min(axis=1)
+    nearest = np.flatnonzero(distance < distance.min() + EQUAL_M)[-1]  # the mean often touches a circle at two steps
+    return {
+        'effort': solution.effort,
+        'eta': solution.eta,
+        'tau': solution.tau,
+        'lambda': solution.lam,
+        'clearance': float(distance.min()),
+        'path_length': float(np.linalg.norm(np.diff(solution.path, axis=0), axis=1).sum()),
+        'largest_stddev': float(np.sqrt(solution.covariance[:, 0, 0] + solution.covariance[:, 1, 1]).max()),
+        'peak_speed': float(speed.max()),
+        'speed_to_obstacles': float(speed[: nearest + 1].mean()),
+    }
 
 
-def speed(solution: Solution) -> Array:
+def compute_speed(solution: Solution) -> Array:
     """Return the speed of the mean, (N + 1,) [m/s]."""
-    along: Array = np.linalg.norm(solution.mean[:, 2:4], axis=1)
-    return along
-
-
-def speed_to_obstacles(scene: PaperScene, solution: Solution) -> float:
-    """Return the speed of the mean up to where it is nearest to the edge of an obstacle, over time [m/s]."""
-    away = np.linalg.norm(solution.path[:, None] - scene.obstacles.centre[None], axis=-1) - scene.obstacles.radius
-    nearest = away.min(axis=1)
-    last = np.flatnonzero(nearest < nearest.min() + EQUALLY_NEAR)[-1]  # the mean often touches a circle at two steps
-    return float(speed(solution)[: last + 1].mean())
-
-
-def path_length(solution: Solution) -> float:
-    """Return the length of the mean path [m]."""
-    return float(np.linalg.norm(np.diff(solution.path, axis=0), axis=1).sum())
-
-
-def largest_stddev(solution: Solution) -> float:
-    """Return the root of the largest sum over the axes of the position's variance along the way [m]."""
-    return float(np.sqrt(solution.covariance[:, 0, 0] + solution.covariance[:, 1, 1]).max())
+    return np.asarray(np.linalg.norm(solution.mean[:, 2:4], axis=1))

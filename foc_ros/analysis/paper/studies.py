@@ -1,13 +1,13 @@
-"""What every study computes; nothing here is drawn or written.
+"""The computations of every study, without drawing or writing.
 
-1-2: strategies LV and HC side by side; 3-4: the ratio of their efforts over eta; 5-6: the ratio of the efforts of two ways round;
-7: strategy `optimal` beside both, which the paper does not have.
+1-2: strategies LV and HC side by side; 3-4: the ratio of their efforts over eta; 5-6: the ratio of the efforts of two homotopy
+classes; 7: strategy `optimal` beside both, which the paper does not have.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,31 +15,34 @@ from foc_ros.core.ocp.monte_carlo import MonteCarlo, monte_carlo
 from foc_ros.core.types import Array, Solution, Status
 
 from .reaching import Method, PaperScene, PathClass, solve_class
-from .scenes import NOISE, SMALL_NOISE, STRATEGY_SCENE, WAYS_SCENE
+from .scenes import CLASSES_SCENE, NOISE, SMALL_NOISE, STRATEGY_SCENE
 
+COUNT = 7
 PAPER_ETA = 0.9615
 PAPER_RATIOS = {5: 0.33, 6: 0.67}
 """The two ratios that the paper gives in numbers, both at PAPER_ETA, by study."""
-LV_DELTA, HC_DELTA = 5e-5, 1e-4
-"""Steps of tau of the paper's algorithm 1, of its strategies [m^2]."""
-PRINTED_GROWTH, GENTLE_GROWTH = 10.0, 1.5
+DELTA = {'lv': 5e-5, 'hc': 1e-4}
+"""Steps of tau of the paper's algorithm 1, by strategy [m^2]."""
+GROWTHS = (10.0, 1.5)
 """Delta of algorithm 1: as printed, and one that ends near the values of tau and lambda that the paper reports."""
 REPORTED = {'LV': (0.0009, 2.28e6), 'HC': (0.0012, 0.9e6)}
 """(tau [m^2], lambda) at eta 0.94 in the paper."""
-
-
-@dataclass(frozen=True)
-class Grid:
-    """How finely is looked: etas of the continuous curves, of the stepped ones, of the roll-outs; roll-outs per point."""
-
-    fine: tuple[float, ...]
-    stepped: tuple[float, ...]
-    rolled: tuple[float, ...]
-    samples: int
+STRATEGY_CLASS = STRATEGY_SCENE, STRATEGY_SCENE.ways[0]
+"""Scene and homotopy class in which strategies are compared."""
 
 
 def _range(first: float, last: float, step: float) -> tuple[float, ...]:
     return tuple(float(eta) for eta in np.round(np.arange(first, last + step / 2, step), 6))
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The resolution: etas of the continuous curves, of the stepped ones and of the roll-outs; roll-outs at each eta."""
+
+    fine: tuple[float, ...]
+    stepped: tuple[float, ...]
+    rolled_out: tuple[float, ...]
+    samples: int
 
 
 FULL = Grid(
@@ -48,18 +51,13 @@ FULL = Grid(
     (0.7, 0.8, 0.86, 0.9, 0.93, 0.95, PAPER_ETA),
     20_000,
 )
-QUICK = Grid(
-    (0.7, 0.8, 0.86, 0.9, 0.93, 0.95, PAPER_ETA, 0.965),
-    (0.7, 0.86, 0.94),
-    (0.7, 0.9, PAPER_ETA),
-    4_000,
-)
+QUICK = Grid((0.7, 0.8, 0.86, 0.9, 0.93, 0.95, PAPER_ETA, 0.965), (0.7, 0.86, 0.94), (0.7, 0.9, PAPER_ETA), 4_000)
 """Enough to see the trends."""
 
 
 @dataclass(frozen=True, eq=False)
 class EffortCurve:
-    """Solutions of one way by one method over wanted etas."""
+    """Solutions of one class by one method over wanted etas."""
 
     name: str
     etas: tuple[float, ...]
@@ -67,158 +65,131 @@ class EffortCurve:
 
     @property
     def efforts(self) -> Array:
-        """Effort of each, NaN where it is not solved [m^2/s^6]."""
+        """Effort of each solution, NaN where it is not solved [m^2/s^6]."""
         return np.array([each.effort if each.status is Status.SOLVED else np.nan for each in self.solutions])
 
 
 @dataclass(frozen=True, eq=False)
 class RatioCurve:
-    """Efforts of one over those of another, at the same wanted etas."""
+    """The ratio of two efforts at the same wanted etas."""
 
     name: str
-    over: EffortCurve
-    under: EffortCurve
+    numerator: EffortCurve
+    denominator: EffortCurve
 
     @property
     def etas(self) -> Array:
         """Wanted etas."""
-        return np.array(self.over.etas)
+        return np.array(self.numerator.etas)
 
     @property
     def values(self) -> Array:
         """Ratio at each eta, NaN where one of the two is not solved."""
-        return self.over.efforts / self.under.efforts
+        return self.numerator.efforts / self.denominator.efforts
 
     def at(self, eta: float) -> float:
         """Return the ratio at an eta of the grid."""
-        return float(self.values[self.over.etas.index(eta)])
+        return float(self.values[self.numerator.etas.index(eta)])
 
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """One of studies 1 to 6: solutions to be shown, by eta and name; ratios over eta, the continuous one first."""
+    """One study: solutions by eta and name; ratios over eta, the continuous one first.
+
+    efforts over eta, and roll-outs by name at some of the etas: of study 7.
+    """
 
     number: int
     title: str
     scene: PaperScene
     noise: float
-    shown: dict[float, dict[str, Solution]]
+    solutions: dict[float, dict[str, Solution]] = field(default_factory=dict)
     ratios: tuple[RatioCurve, ...] = ()
+    efforts: tuple[EffortCurve, ...] = ()
+    rolled_out: dict[str, dict[float, MonteCarlo]] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, eq=False)
-class OptimalStudy:
-    """Study 7: efforts over eta of `optimal`, LV and HC, and roll-outs of each by name at some of the etas."""
-
-    scene: PaperScene
-    noise: float
-    efforts: tuple[EffortCurve, ...]
-    rolled: dict[str, dict[float, MonteCarlo]]
+Studies = dict[int, Study]
+"""All studies by number."""
 
 
-@dataclass(frozen=True, eq=False)
-class Studies:
-    """Everything that was computed; reported: the paper's own tau and lambda, tried in study 1's scene."""
-
-    paper: tuple[Study, ...]
-    optimal: OptimalStudy
-    reported: dict[str, Solution]
-
-    def __getitem__(self, number: int) -> Study:
-        return self.paper[number - 1]
-
-
-def studies(grid: Grid = FULL) -> Iterator[Study | OptimalStudy]:
+def compute_studies(grid: Grid = FULL) -> Iterator[Study]:
     """Compute study after study."""
-    yield _strategies_shown(1, f'strategies LV and HC, c = {NOISE:g}', (0.94,))
-    yield _strategies_shown(2, f'strategies LV and HC, c = {NOISE:g}', (0.86, 0.95))
-    yield _strategies_compared(3, NOISE, grid)
-    yield _strategies_compared(4, SMALL_NOISE, grid)
-    yield _ways_compared(5, 'LV', 'lv', LV_DELTA, grid)
-    yield _ways_compared(6, 'HC', 'hc', HC_DELTA, grid)
-    yield _optimal_beside(grid)
+    yield _solve_strategies(1, (0.94,))
+    yield _solve_strategies(2, (0.86, 0.95))
+    yield _compare_strategies(3, NOISE, grid)
+    yield _compare_strategies(4, SMALL_NOISE, grid)
+    yield _compare_classes(5, 'lv', grid)
+    yield _compare_classes(6, 'hc', grid)
+    yield _compare_optimal(grid)
 
 
-COUNT = 7
-
-
-def collect_studies(computed: Iterable[Study | OptimalStudy]) -> Studies:
-    """Return all studies together."""
-    each = list(computed)
-    paper = tuple(one for one in each if isinstance(one, Study))
-    last = next(one for one in each if isinstance(one, OptimalStudy))
-    return Studies(paper, last, _reported())
-
-
-def _strategies_shown(number: int, title: str, etas: tuple[float, ...]) -> Study:
-    scene = STRATEGY_SCENE
-    methods = {'LV': Method(NOISE, 'lv'), 'HC': Method(NOISE, 'hc')}
-    shown = {eta: {name: solve_class(scene, scene.ways[0], method, eta) for name, method in methods.items()} for eta in etas}
-    return Study(number, title, scene, NOISE, shown)
-
-
-def _strategies_compared(number: int, noise: float, grid: Grid) -> Study:
-    scene, way = STRATEGY_SCENE, STRATEGY_SCENE.ways[0]
-    continuous = RatioCurve(
-        'continuous',
-        _curve('LV', scene, way, Method(noise, 'lv'), grid.fine),
-        _curve('HC', scene, way, Method(noise, 'hc'), grid.fine),
-    )
-    stepped = [
-        RatioCurve(
-            _stepped_name(growth),
-            _curve('LV', scene, way, _stepping(noise, LV_DELTA, growth), grid.stepped),
-            _curve('HC', scene, way, _stepping(noise, HC_DELTA, growth), grid.stepped),
-        )
-        for growth in (PRINTED_GROWTH, GENTLE_GROWTH)
-    ]
-    return Study(number, f'effort of LV over that of HC, c = {noise:g}', scene, noise, {}, (continuous, *stepped))
-
-
-def _ways_compared(number: int, name: str, strategy: str, delta: float, grid: Grid) -> Study:
-    scene = WAYS_SCENE
-    methods = {
-        'continuous': (Method(NOISE, strategy), grid.fine),
-        **{_stepped_name(growth): (_stepping(NOISE, delta, growth), grid.stepped) for growth in (PRINTED_GROWTH, GENTLE_GROWTH)},
-    }
-    shown = {eta: {way.name: solve_class(scene, way, Method(NOISE, strategy), eta) for way in scene.ways} for eta in (0.9, 0.965)}
-    ratios = tuple(
-        RatioCurve(label, *(_curve(way.name, scene, way, method, etas) for way in scene.ways))
-        for label, (method, etas) in methods.items()
-    )
-    return Study(number, f'two ways round, strategy {name}, c = {NOISE:g}', scene, NOISE, shown, ratios)
-
-
-def _optimal_beside(grid: Grid) -> OptimalStudy:
-    scene, way = STRATEGY_SCENE, STRATEGY_SCENE.ways[0]
-    methods = {name: Method(NOISE, strategy) for name, strategy in (('LV', 'lv'), ('HC', 'hc'), ('optimal', 'optimal'))}
-    efforts = tuple(_curve(name, scene, way, method, grid.fine) for name, method in methods.items())
-    rolled: dict[str, dict[float, MonteCarlo]] = {}
-    for curve in efforts:
-        found = {eta: each for eta, each in zip(curve.etas, curve.solutions, strict=True) if each.status is Status.SOLVED}
-        rolled[curve.name] = {
-            eta: monte_carlo(scene.problem(NOISE, eta), found[eta].control.T.ravel(), grid.samples)
-            for eta in grid.rolled
-            if eta in found
-        }
-    return OptimalStudy(scene, NOISE, efforts, rolled)
-
-
-def _reported() -> dict[str, Solution]:
-    scene, way = STRATEGY_SCENE, STRATEGY_SCENE.ways[0]
+def solve_reported() -> dict[str, Solution]:
+    """Solve the scene of study 1 with the tau and lambda that the paper reports."""
     return {
-        name: solve_class(scene, way, Method(NOISE, 'fixed', (('tau', tau), ('lam', lam))), 0.94)
+        name: solve_class(*STRATEGY_CLASS, Method(NOISE, 'fixed', (('tau', tau), ('lam', lam))), 0.94)
         for name, (tau, lam) in REPORTED.items()
     }
 
 
-def _curve(name: str, scene: PaperScene, way: PathClass, method: Method, etas: tuple[float, ...]) -> EffortCurve:
-    return EffortCurve(name, etas, tuple(solve_class(scene, way, method, eta) for eta in etas))
+def _solve_strategies(number: int, etas: tuple[float, ...]) -> Study:
+    solutions = {
+        eta: {name: solve_class(*STRATEGY_CLASS, Method(NOISE, strategy), eta) for name, strategy in (('LV', 'lv'), ('HC', 'hc'))}
+        for eta in etas
+    }
+    return Study(number, f'strategies LV and HC, c = {NOISE:g}', STRATEGY_SCENE, NOISE, solutions)
 
 
-def _stepping(noise: float, delta: float, growth: float) -> Method:
-    return Method(noise, 'algorithm1', (('algorithm1_delta', delta), ('algorithm1_growth', growth)))
+def _compare_strategies(number: int, noise: float, grid: Grid) -> Study:
+    by_strategy = {strategy: _make_methods(strategy, noise, grid) for strategy in ('lv', 'hc')}
+    ratios = tuple(
+        RatioCurve(
+            name,
+            *(_solve_curve(strategy.upper(), *STRATEGY_CLASS, *methods[name]) for strategy, methods in by_strategy.items()),
+        )
+        for name in by_strategy['lv']
+    )
+    return Study(number, f'effort of LV over that of HC, c = {noise:g}', STRATEGY_SCENE, noise, ratios=ratios)
 
 
-def _stepped_name(growth: float) -> str:
-    return f'algorithm 1, Δ = {growth:g}'
+def _compare_classes(number: int, strategy: str, grid: Grid) -> Study:
+    scene = CLASSES_SCENE
+    solutions = {
+        eta: {each.name: solve_class(scene, each, Method(NOISE, strategy), eta) for each in scene.ways} for eta in (0.9, 0.965)
+    }
+    ratios = tuple(
+        RatioCurve(name, *(_solve_curve(each.name, scene, each, method, etas) for each in scene.ways))
+        for name, (method, etas) in _make_methods(strategy, NOISE, grid).items()
+    )
+    title = f'two homotopy classes, strategy {strategy.upper()}, c = {NOISE:g}'
+    return Study(number, title, scene, NOISE, solutions, ratios)
+
+
+def _compare_optimal(grid: Grid) -> Study:
+    efforts = tuple(
+        _solve_curve(name, *STRATEGY_CLASS, Method(NOISE, strategy), grid.fine)
+        for name, strategy in (('LV', 'lv'), ('HC', 'hc'), ('optimal', 'optimal'))
+    )
+    rolled_out = {
+        curve.name: {
+            eta: monte_carlo(STRATEGY_SCENE.make_problem(NOISE, eta), solution.control.T.ravel(), grid.samples)
+            for eta, solution in zip(curve.etas, curve.solutions, strict=True)
+            if eta in grid.rolled_out and solution.status is Status.SOLVED
+        }
+        for curve in efforts
+    }
+    title = f'strategy optimal beside LV and HC, c = {NOISE:g}'
+    return Study(7, title, STRATEGY_SCENE, NOISE, efforts=efforts, rolled_out=rolled_out)
+
+
+def _make_methods(strategy: str, noise: float, grid: Grid) -> dict[str, tuple[Method, tuple[float, ...]]]:
+    """Return the continuous strategy and its stepping by algorithm 1, with the etas of each, by name."""
+    delta = ('algorithm1_delta', DELTA[strategy])
+    return {'continuous': (Method(noise, strategy), grid.fine)} | {
+        f'algorithm 1, Δ = {growth:g}': (Method(noise, 'algorithm1', (delta, ('algorithm1_growth', growth))), grid.stepped)
+        for growth in GROWTHS
+    }
+
+
+def _solve_curve(name: str, scene: PaperScene, path_class: PathClass, method: Method, etas: tuple[float, ...]) -> EffortCurve:
+    return EffortCurve(name, etas, tuple(solve_class(scene, path_class, method, eta) for eta in etas))

@@ -21,7 +21,7 @@ from foc_ros.io import topics
 from foc_ros.io.bags import Item
 from foc_ros.reporting.snapshots import Snapshot, is_same_prediction, read_snapshot
 from foc_ros.ros.intake import Intake
-from foc_ros.ros.messages.inputs import stamp_of
+from foc_ros.ros.messages.decode_poses import stamp_of
 
 WINDOW_S = 1.0
 """Seconds over which rates are counted."""

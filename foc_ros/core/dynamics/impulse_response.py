@@ -1,8 +1,8 @@
-"""What a control does to a linear plant: sums of impulse responses, which do not depend on when the impulse was.
+"""The effect of a control on a linear plant, as sums of impulse responses.
 
-A quantity at step s owes h(s - k) to a unit control at step k <= s of a channel, with h(0) = 0, and nothing to what comes later:
-one response of N + 1 numbers stands for a whole map. Responses (q, 2, N + 1) are those of q quantities to both channels; controls
-are stacked, (2N,), the first channel at steps 0..N-1, then the second.
+A unit control at step k of one channel changes a quantity at step s by h(s - k), with h(0) = 0 and no effect on earlier steps.
+One response of N + 1 numbers therefore stands for a whole matrix. Responses (q, 2, N + 1) are those of q quantities to both
+channels; a control is stacked, (2N,): the first channel at steps 0..N-1, then the second.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ def apply_impulse_response(responses: Tensor, control: Vector) -> Matrix:
     moved = np.zeros((quantities, times))
     for q in range(quantities):
         for channel in range(2):
-            if not responses[q, channel].any():  # axes that know nothing of each other
+            if not responses[q, channel].any():  # each axis responds to its own channel only
                 continue
             for k in range(times - 1):
-                push = control[channel * (times - 1) + k]
+                value = control[channel * (times - 1) + k]
                 for s in range(k + 1, times):
-                    moved[q, s] += responses[q, channel, s - k] * push
+                    moved[q, s] += responses[q, channel, s - k] * value
     return moved

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from foc_ros.core.kernels import Indices
 from foc_ros.core.types import LEFT, RIGHT, Array
 
 from .guesses import TautPath, lay_out
@@ -67,7 +68,7 @@ class PartialGraph(NamedTuple):
 
     graph: TangentGraph
     rows: list[int]
-    others: Array
+    others: Indices
     named: list[int]
     limit: float
     max_key: float
@@ -115,7 +116,7 @@ def _choose_circles(scene: SearchScene, named: list[int], nearest: list[int]) ->
 def _build_partial_graph(scene: SearchScene, goal: int, rows: list[int], named: list[int]) -> PartialGraph:
     """Build the graph of some obstacles for one goal; a graph without all named ones is one to grow, up to MOST."""
     graph = connect_hand(build_tangent_graph(scene.centre[rows], scene.radius[goal, rows], scene.goals), scene.hand)
-    others = np.setdiff1d(np.arange(len(scene.centre)), rows)
+    others = np.delete(np.arange(len(scene.centre)), rows)
     limit = float(scene.excess[others].min(initial=np.inf)) * math.dist(scene.goals[goal], scene.hand)
     is_enough = len(rows) >= MOST or set(rows).issuperset(named)
     return PartialGraph(graph, rows, others, named, limit, np.inf if is_enough else limit)
@@ -148,7 +149,7 @@ def _find_named_paths(scene: SearchScene, partial: PartialGraph, query: ClassQue
         yield from sorted(classes, key=lambda found: found[:2])
 
 
-def _find_met(scene: SearchScene, found: PathClass, others: Array) -> list[int]:
+def _find_met(scene: SearchScene, found: PathClass, others: Indices) -> list[int]:
     """Return those of other obstacles (rows) that a path meets."""
     apart = found.path.space_points(FINENESS)[:, None] - scene.centre[others]
     is_met = np.hypot(apart[..., 0], apart[..., 1]) < scene.radius[found.goal, others] - GRAZE

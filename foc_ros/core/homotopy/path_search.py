@@ -21,7 +21,7 @@ import numpy as np
 from foc_ros.core.types import Array
 
 from .sides import TURN
-from .tangent_graph import TURN_BACK, TangentGraph, measure_arc
+from .tangent_graph import TURN_BACK, TangentGraph
 
 COAST_S = 0.2
 """A path that leaves at an angle p to the velocity v ranks as if |v| (1 - cos p) times this longer: a hand coasts first."""
@@ -62,51 +62,49 @@ class Arrival(NamedTuple):
 def find_shortest_paths(graph: TangentGraph, query: PathQuery, notes: Counter[str]) -> Iterator[list[Arrival]]:
     """Yield the shortest paths to a goal, one for each signature, in the order of their keys, equally long ones together.
 
-    A path that winds about a named circle is not followed. notes: `search_cut` is increased if states are left at the end.
+    The estimate for a path is its key plus the length of the shortest path from its end to the goal, whatever the signature. A
+    path that winds about a named circle is not followed. notes: `search_cut` is increased if states are left at the end.
     """
-    runs, radius, signatures = graph.runs, graph.circles.radius.tolist(), SignatureCounter(graph, query.named)
-    head, length, goal_node = runs.head.tolist(), runs.length.tolist(), 2 * (len(radius) + query.goal) + 1
-    leave, reach, clear = runs.leave_angle.tolist(), runs.reach_angle.tolist(), runs.clear_angle.tolist()
-    to_goal = _bound_rest(graph, goal_node, query.goal)
-    # estimated key at the goal, number of the entry, key, runs, signature without the last run
-    frontier, numbers = list[tuple[float, int, float, tuple[int, ...], Signature]](), count()
-    for run in range(graph.first_run[-1], len(head)):
-        key = length[run] + COAST_S * (math.hypot(*query.velocity) - float(runs.heading[run] @ query.velocity))
-        if to_goal[run] < math.inf:
-            heappush(frontier, (key + to_goal[run], next(numbers), key, (run,), (0,) * len(query.named)))
+    rest, signatures, numbers = graph.rest[query.goal].tolist(), SignatureCounter(graph, query.named), count()
+    last = set(np.flatnonzero(graph.runs.head == 2 * (len(graph.circles.radius) + query.goal) + 1).tolist())
+    first_arc = np.searchsorted(graph.arcs.before, np.arange(len(rest) + 1)).tolist()
+    # estimate, number of the entry, key, runs, signature without the last run
+    frontier = list[tuple[float, int, float, tuple[int, ...], Signature]]()
+    for run, key in enumerate(_compute_first_keys(graph, query.velocity), graph.first_run[-1]):
+        if rest[run] < math.inf:
+            heappush(frontier, (key + rest[run], next(numbers), key, (run,), (0,) * len(query.named)))
     known, arrived = set[tuple[int, Signature]](), list[Arrival]()
     while frontier and len(known) < query.max_states:
         if arrived and frontier[0][0] >= arrived[-1].key + TIE:
             yield arrived
             arrived = []
         _, _, key, path, signature = heappop(frontier)
-        run, node = path[-1], head[path[-1]]
-        signature = signatures.extend(signature, path)
-        state = -1 if query.is_complete and node == goal_node else run, signature
+        run, signature = path[-1], signatures.extend(signature, path)
+        state = -1 if query.is_complete and run in last else run, signature
         if state in known or max(signature, default=0) > 1 or min(signature, default=0) < -1:
             continue
         known.add(state)
-        if node == goal_node:
+        if run in last:
             swept = (query.bearing_change + TURN * np.array(signature)).tolist()
             if all(abs(angle) < TURN for angle in swept):
                 arrived.append(Arrival(key, path, swept))
             continue
-        for following in range(graph.first_run[node], graph.first_run[node + 1]):
-            angle = measure_arc(leave[following], reach[run], 2 * (node & 1) - 1)
-            onward = key + radius[node >> 1] * angle + length[following]
-            if angle <= clear[run] and onward + to_goal[following] < query.max_key:
-                heappush(frontier, (onward + to_goal[following], next(numbers), onward, (*path, following), signature))
+        arcs = slice(first_arc[run], first_arc[run + 1])
+        for following, step in zip(graph.arcs.after[arcs].tolist(), graph.arcs.step[arcs].tolist(), strict=True):
+            if key + step + rest[following] < query.max_key:
+                heappush(frontier, (key + step + rest[following], next(numbers), key + step, (*path, following), signature))
     if arrived:
         yield arrived
     notes['search_cut'] += bool(frontier)
 
 
-def _bound_rest(graph: TangentGraph, goal_node: int, goal: int) -> list[float]:
-    """Return lower bounds for the lengths from the ends of the runs to a goal [m], infinite for runs to other goals."""
-    rest, head = np.hypot(*(graph.runs.end - graph.goals[goal]).T), graph.runs.head
-    rest[(head >= 2 * len(graph.circles.radius)) & (head != goal_node)] = np.inf
-    bounds: list[float] = rest.tolist()
-    return bounds
+def _compute_first_keys(graph: TangentGraph, velocity: Array) -> list[float]:
+    """Compute the keys of the runs from the hand [m]: their lengths and what coasting adds."""
+    first = slice(graph.first_run[-1], None)
+    keys: list[float] = (
+        graph.runs.length[first] + COAST_S * (math.hypot(*velocity) - graph.runs.heading[first] @ velocity)
+    ).tolist()
+    return keys
 
 
 class SignatureCounter:

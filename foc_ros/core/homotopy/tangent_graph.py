@@ -12,6 +12,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
 
 from foc_ros.core.kernels import Flags, FlagTable, Indices, Matrix, Table, Tensor, Vector, compiled_exactly
 from foc_ros.core.types import Array
@@ -62,16 +64,30 @@ class Runs(NamedTuple):
     crossings: Indices
 
 
-class TangentGraph(NamedTuple):
-    """Circles, goals (g, 2) [m], and runs in the order of the nodes that they leave; first_run (2 n + 1,): the first one of each.
+class Arcs(NamedTuple):
+    """Pairs of runs between which a path follows an arc, in the order of the first run.
 
-    The runs from first_run[2 n] on leave the hand.
+    before, after (t,): the two runs; step (t,): lengths of the arc and of the second run together [m].
+    """
+
+    before: Indices
+    after: Indices
+    step: Vector
+
+
+class TangentGraph(NamedTuple):
+    """Circles, goals (g, 2) [m], runs in the order of the nodes that they leave, and arcs between them.
+
+    first_run (2 n + 1,): the first run from each node; the runs from the last of these on leave the hand. rest (g, m): least
+    length of a path from the end of each run to each goal [m], infinite if there is none.
     """
 
     circles: Circles
     goals: Matrix
     runs: Runs
-    first_run: list[int]
+    arcs: Arcs
+    first_run: Indices
+    rest: Matrix
 
 
 def build_tangent_graph(centre: Array, radius: Array, goals: Array) -> TangentGraph:
@@ -84,24 +100,55 @@ def build_tangent_graph(centre: Array, radius: Array, goals: Array) -> TangentGr
 
 def connect_hand(graph: TangentGraph, hand: Array) -> TangentGraph:
     """Return the graph with the runs from a hand (2,) [m] to all circles and goals."""
-    circles, n, g = graph.circles, len(graph.circles.radius), len(graph.goals)
+    circles, n, (g, m) = graph.circles, len(graph.circles.radius), graph.rest.shape
     head = np.append(np.flatnonzero(np.repeat(circles.is_outer, 2)), 2 * (n + np.arange(g)) + 1)
     runs = _find_runs(circles, np.concatenate((graph.goals, hand[None])), np.full(len(head), 2 * (n + g) + 1), head)
-    return graph._replace(runs=Runs._make(np.concatenate(pair) for pair in zip(graph.runs, runs, strict=True)))
+    both = Runs._make(np.concatenate(pair) for pair in zip(graph.runs, runs, strict=True))
+    arcs = _find_arcs(circles, both, graph.first_run, np.arange(m, len(both.head)))
+    rest = np.where(runs.head == 2 * (n + np.arange(g))[:, None] + 1, 0.0, np.inf)
+    for goal in range(g):
+        np.minimum.at(rest[goal], arcs.before - m, arcs.step + graph.rest[goal, arcs.after])
+    arcs = Arcs._make(np.concatenate(pair) for pair in zip(graph.arcs, arcs, strict=True))
+    return graph._replace(runs=both, arcs=arcs, rest=np.concatenate((graph.rest, rest), axis=1))
 
 
-def measure_arc(leave_angle: float, reach_angle: float, sense: int) -> float:
-    """Return the angle [rad] of the arc along a circle from where one run reaches it to where the next run leaves it."""
+def measure_arcs(leave_angle: Vector, reach_angle: Vector, sense: Indices) -> Vector:
+    """Return the angles [rad] of the arcs along circles from where one run reaches them to where the next run leaves them."""
     angle = sense * (leave_angle - reach_angle)
-    return angle + TURN if angle < -TURN_BACK else angle
+    return np.where(angle < -TURN_BACK, angle + TURN, angle)
 
 
 @lru_cache(maxsize=8)
 def _build_from_bytes(centre: bytes, radius: bytes, goals: bytes) -> TangentGraph:
     circles = _build_circles(np.frombuffer(centre).reshape(-1, 2), np.frombuffer(radius))
-    points = np.frombuffer(goals).reshape(-1, 2)
+    points, n = np.frombuffer(goals).reshape(-1, 2), len(circles.radius)
     runs = _find_runs(circles, points, *_list_pairs(tuple(circles.is_outer.tolist()), len(points)))
-    return TangentGraph(circles, points, runs, np.searchsorted(runs.tail, np.arange(2 * len(circles.radius) + 1)).tolist())
+    first_run = np.searchsorted(runs.tail, np.arange(2 * n + 1))
+    arcs = _find_arcs(circles, runs, first_run, np.arange(len(runs.head)))
+    rest = [_measure_rest(arcs, runs.head == 2 * (n + goal) + 1) for goal in range(len(points))]
+    return TangentGraph(circles, points, runs, arcs, first_run, np.array(rest).reshape(len(points), len(runs.head)))
+
+
+def _measure_rest(arcs: Arcs, is_last: Flags) -> Vector:
+    """Return the least lengths (m,) [m] of the paths from the ends of the runs to a goal, at which some of the runs end."""
+    if not is_last.any():
+        return np.full(len(is_last), np.inf)
+    backwards = csr_matrix((np.maximum(arcs.step, 0.0), (arcs.after, arcs.before)), 2 * is_last.shape)
+    rest: Vector = dijkstra(backwards, indices=np.flatnonzero(is_last), min_only=True)
+    return rest
+
+
+def _find_arcs(circles: Circles, runs: Runs, first_run: Indices, rows: Indices) -> Arcs:
+    """Find the arcs from the ends of some of the runs, up to the next overlapping circle."""
+    rows = rows[runs.head[rows] < 2 * len(circles.radius)]
+    first = first_run[runs.head[rows]]
+    count = first_run[runs.head[rows] + 1] - first
+    before, after = np.repeat(rows, count), np.arange(count.sum()) + np.repeat(first - np.cumsum(count) + count, count)
+    node = runs.head[before]
+    angle = measure_arcs(runs.leave_angle[after], runs.reach_angle[before], 2 * (node & 1) - 1)
+    is_clear = angle <= runs.clear_angle[before]
+    step = circles.radius[node >> 1] * angle + runs.length[after]
+    return Arcs(before[is_clear], after[is_clear], step[is_clear])
 
 
 def _build_circles(centre: Matrix, radius: Vector) -> Circles:
@@ -204,11 +251,12 @@ def count_crossings(centre: Matrix, radius: Vector, holds: FlagTable, ends: Tabl
     for run in range(len(ends)):
         for k in range(n):
             for end in range(2):
-                i = ends[run, end]
-                # exact where the circle is its own: no rounding may move the point across the ray
-                seen[end] = touch[run, end] if k == i else centre[i] + touch[run, end] - centre[k]
+                i, x, y = ends[run, end], touch[run, end, 0], touch[run, end, 1]
+                if i != k:
+                    x, y = centre[i, 0] + x - centre[k, 0], centre[i, 1] + y - centre[k, 1]
+                seen[end, 0], seen[end, 1] = x, y
                 if i < n:
                     east_x, east_y = centre[i, 0] + radius[i] - centre[k, 0], centre[i, 1] - centre[k, 1]
-                    crossings[run, end, k] = count_arc_crossing(east_x, east_y, seen[end, 0], seen[end, 1], holds[i, k])
+                    crossings[run, end, k] = count_arc_crossing(east_x, east_y, x, y, holds[i, k])
             crossings[run, 0, k] += count_crossing(seen[0, 0], seen[0, 1], seen[1, 0], seen[1, 1])
     return crossings

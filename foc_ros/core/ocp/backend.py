@@ -1,27 +1,34 @@
-"""The seam to QP solvers: PIQP through its own interface, any qpsolvers backend by name for cross-checks."""
+"""Solvers of quadratic programmes: PIQP through its own interface, any other that qpsolvers knows by its name.
+
+A solver is a function from `DenseQP` to `Answer`. It never raises for a problem that it cannot solve.
+"""
 
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+import warnings
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple, TypeAlias, cast
 
 import numpy as np
 import piqp
 
+from foc_ros.core import registry
+from foc_ros.core.errors import InputError
 from foc_ros.core.types import Array
 
 ATTEMPTS = ((1e-10, 0.99, False), (1e-9, 0.9, False), (1e-7, 0.9, True))
-"""Accuracy (absolute and relative, on problems scaled to numbers around 1), share of the way to the boundary that a step may go,
-and cost scaling asked of PIQP, one after the other. With 0.99 it can step to and fro for ever on three variables."""
+"""Settings of PIQP that are tried in this order: accuracy (absolute and relative, for problems scaled to numbers around 1), share
+of the way to the boundary that a step may take, cost scaling. With 0.99 PIQP can oscillate for ever on three variables."""
 INFEASIBLE = 1e-10
-"""Accuracy of PIQP's own proofs of infeasibility: with its default, 1e-4, rows that hardly give way pass for a contradiction."""
+"""Accuracy of PIQP's proofs of infeasibility. With its default, 1e-4, it takes rows that hardly give way for a contradiction."""
 MAX_ITERATIONS = 100
 """Of one attempt; 5 to 15 are usual."""
 
 
-@dataclass(frozen=True)
-class DenseQP:
-    """minimise 1/2 x'Px + c'x subject to A x = b, G x >= g, x >= lower: A, G and lower may be None."""
+class DenseQP(NamedTuple):
+    """minimise 1/2 x'Px + c'x subject to A x = b, G x >= g, x >= lower; A, G and lower may be None."""
 
     P: Array
     c: Array
@@ -32,56 +39,81 @@ class DenseQP:
     lower: Array | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """solved, and the minimiser; or not, and the last iterate, which may prove why."""
+class Answer(NamedTuple):
+    """Whether the problem was solved, and the minimiser; if not, the last iterate, which may prove that there is none."""
 
     solved: bool
     x: Array
 
 
+Solver: TypeAlias = Callable[[DenseQP], Answer]
+# the registry of the whole package, where it has one for QP backends
+QP_BACKENDS = getattr(registry, 'QP_BACKENDS', None) or registry.Registry('QP backend', {'piqp': f'{__name__}:solve_piqp'})
+
+
+def find_solver(name: str) -> Solver:
+    """Return the registered solver of a name, or else the one that qpsolvers has under it.
+
+    Raises
+    ------
+    InputError
+        If neither knows the name.
+    """
+    if name in QP_BACKENDS:
+        return cast('Solver', QP_BACKENDS.get(name))
+    from qpsolvers import available_solvers
+
+    if name not in available_solvers:
+        raise InputError('QP backend', f'one of {", ".join(dict.fromkeys((*QP_BACKENDS, *available_solvers)))}', repr(name))
+    return partial(solve_named, backend=name)
+
+
 def solve_piqp(qp: DenseQP, attempts: int = len(ATTEMPTS)) -> Answer:
-    """Solve by PIQP, with other settings if it fails with the first, as often as there are attempts.
+    """Solve by PIQP, and if it fails again with other settings, up to a number of attempts.
 
     PIQP can call a feasible problem infeasible, or miss an accuracy that rounding does not allow.
     """
     P = np.asfortranarray(qp.P)
     A = None if qp.A is None else np.asfortranarray(qp.A)
     G = None if qp.G is None else np.asfortranarray(qp.G)
-    for accuracy, reach, scale_cost in ATTEMPTS[:attempts]:
-        solver = _solver(accuracy, reach, scale_cost)
+    for accuracy, share, scale_cost in ATTEMPTS[:attempts]:
+        solver = _get_piqp(accuracy, share, scale_cost)
         solver.setup(P, qp.c, A, qp.b, G, qp.g, None, qp.lower, None)
         if solver.solve() == piqp.PIQP_SOLVED:
             return Answer(True, np.array(solver.result.x))
     return Answer(False, np.array(solver.result.x))
 
 
-class _Made(threading.local):
-    """Solvers that this thread has made: each setup begins anew, and only the settings stay."""
+class _SolversOfThread(threading.local):
+    """PIQP solvers that this thread has made. Each setup starts afresh; only the settings are kept."""
 
     def __init__(self) -> None:
         self.solvers: dict[tuple[float, float, bool], piqp.DenseSolver] = {}
 
 
-_MADE = _Made()
+_SOLVERS = _SolversOfThread()
 
 
-def _solver(accuracy: float, reach: float, scale_cost: bool) -> piqp.DenseSolver:
-    kept = _MADE.solvers
-    if (accuracy, reach, scale_cost) not in kept:
-        solver = kept[accuracy, reach, scale_cost] = piqp.DenseSolver()
+def _get_piqp(accuracy: float, share: float, scale_cost: bool) -> piqp.DenseSolver:
+    kept = _SOLVERS.solvers
+    if (accuracy, share, scale_cost) not in kept:
+        solver = kept[accuracy, share, scale_cost] = piqp.DenseSolver()
         settings = solver.settings
         settings.eps_abs = settings.eps_rel = settings.eps_duality_gap_abs = settings.eps_duality_gap_rel = accuracy
-        settings.tau, settings.preconditioner_scale_cost, settings.max_iter = reach, scale_cost, MAX_ITERATIONS
+        settings.tau, settings.preconditioner_scale_cost, settings.max_iter = share, scale_cost, MAX_ITERATIONS
         if hasattr(settings, 'eps_dual_inf'):  # from 0.7 on
             settings.eps_dual_inf = settings.eps_primal_inf = INFEASIBLE
-    return kept[accuracy, reach, scale_cost]
+    return kept[accuracy, share, scale_cost]
 
 
 def solve_named(qp: DenseQP, backend: str) -> Answer:
-    """Solve by a qpsolvers backend such as `daqp` or `quadprog`."""
-    from qpsolvers import Problem, solve_problem
+    """Solve by a qpsolvers backend such as `daqp` or `quadprog`. Its last iterate is not known: zeros stand for it."""
+    from qpsolvers import Problem, ProblemError, solve_problem
 
     G, h = (None, None) if qp.G is None or qp.g is None else (-qp.G, -qp.g)
-    solution = solve_problem(Problem(qp.P, qp.c, G, h, qp.A, qp.b, qp.lower), solver=backend)
+    try:
+        with warnings.catch_warnings(action='ignore'):
+            solution = solve_problem(Problem(qp.P, qp.c, G, h, qp.A, qp.b, qp.lower), solver=backend)
+    except ProblemError:  # say a matrix that this solver finds indefinite
+        return Answer(False, np.zeros_like(qp.c))
     return Answer(bool(solution.found), np.asarray(solution.x) if solution.found else np.zeros_like(qp.c))

@@ -1,61 +1,61 @@
-"""One reaching problem: from a hand state to a goal among obstacles, stacked over its horizon."""
+"""One reaching problem, from a hand state to a goal among obstacles, with its data over the horizon."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.dynamics.condensed import (
-    build_goal_rows,
-    find_duplicates,
-    find_inside_margin,
-    mean_positions,
-    position_variances,
-    propagate_without_control,
-    scene_extent,
-    variance_weights,
-)
+from foc_ros.core.dynamics.condensed import PositionNoise, position_variances, variance_weights
 from foc_ros.core.dynamics.noise import stack_noise
 from foc_ros.core.dynamics.plants import Horizon, states_at_goal
 from foc_ros.core.errors import SceneError
-from foc_ros.core.obstacles.chance_constraint import centre_trajectories, centres_by_obstacle, k_of_eta, size_moments
+from foc_ros.core.kernels import freeze
+from foc_ros.core.obstacles.chance_constraint import UncertainCircles, centre_trajectories, k_of_eta, size_moments
 from foc_ros.core.types import Array, Obstacles, Record
 
 from .contacts.hermite import compute_trajectory
+from .terms import ChanceTerms, CostTerms, InitialError, Motion, MovingCircles, ProblemTerms
 
 BOTH = np.ones(2)
-ALIKE = 1e-6
-"""Difference between two circles, relative to the scene, at which they count as the same."""
-
-
-class Chances(NamedTuple):
-    """`Horizon.maps`, and of a `Problem` what has the same names; its `size` in two; its obstacles' covariances (m, 2, 2)."""
-
-    maps: Array
-    free_variance: Array
-    error_course: Array
-    initial_covariance: Array
-    noise_variance: Array
-    centres: Array
-    size_mean: Array
-    size_variance: Array
-    centre_covariance: Array
-    leaving: Array
+SAME_CIRCLE = 1e-6
+"""Difference between two circles, relative to the scene, below which they count as the same."""
+SMALLEST_EXTENT = 1e-6
+"""Least size of a scene [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Problem(Record):
-    """What the forward optimal control is asked.
+    """The task of the forward optimal control, and what follows from it (computed once, when it is first needed).
 
-    horizon: the plant over N steps; initial_mean (n,) and initial_covariance (n, n): the state now; error_map (N + 1, n, n): what
-    an error of the initial state becomes at steps 0..N (`horizon.powers` where nobody corrects it); goal (n,), of which the
-    states in at_goal (n,) bool are reached exactly by the mean; end_weights and way_weights (n,): w of the mean error and
-    variance at the last step and at each step before it; noise (2,): c per step; obstacles: circles now; eta: wanted probability
-    of avoidance per obstacle and step; recovery_s: time in which a hand that is inside a margin has to be out of it [s].
+    Parameters
+    ----------
+    horizon
+        The plant over N steps, for n states of which the first four are position and velocity.
+    initial_mean, initial_covariance
+        The state now: (n,) and (n, n).
+    error_map
+        (N + 1, n, n): the effect of an error of the initial state at steps 0..N; `horizon.powers` where nothing corrects it.
+    goal
+        Goal state (n,).
+    noise
+        c of each channel for one step, (2,).
+    obstacles
+        The circles now.
+    eta
+        Wanted probability of avoidance, for each obstacle and step.
+    at_goal
+        (n,) bool: the states that the mean reaches exactly at the goal.
+    terminal_weights, stage_weights
+        (n,): weights w of the squared mean error and of the variance of each state at the last step, and at each step before it.
+    recovery_s
+        Time in which a hand that is inside a margin has to leave it [s].
+    qp_backend
+        Name of the solver of quadratic programmes.
     """
 
     horizon: Horizon
@@ -67,68 +67,38 @@ class Problem(Record):
     obstacles: Obstacles
     eta: float
     at_goal: NDArray[np.bool_]
-    end_weights: Array
-    way_weights: Array
+    terminal_weights: Array
+    stage_weights: Array
     recovery_s: float = 0.0
+    qp_backend: str = 'piqp'
 
     @cached_property
     def extent(self) -> float:
-        """Size of the scene that tolerances are relative to: the way to the goal, or the largest circle if that is more [m]."""
-        way_x, way_y, *_ = (self.goal - self.initial_mean).tolist()
-        return scene_extent(way_x, way_y, self.obstacles.radius)
+        """Size of the scene, to which tolerances are relative [m]: distance to the goal, or the largest radius."""
+        x, y = (self.goal[:2] - self.initial_mean[:2]).tolist()
+        return max(math.hypot(x, y), SMALLEST_EXTENT, float(self.obstacles.radius.max(initial=0.0)))
 
     @cached_property
-    def without_control(self) -> tuple[Array, Array, Array]:
-        """The mean without control: states at steps 0..N (N + 1, n), positions at steps 1..N (N, 2) [m], and `free_course`."""
-        return propagate_without_control(self.horizon.powers, self.initial_mean, self.horizon.dt)
+    def terms(self) -> ProblemTerms:
+        """The data of the problem as kernels take them."""
+        scale = np.array([1.0, 1.0, self.horizon.dt, self.horizon.dt])
+        initial = self.initial_covariance
+        errors = self.error_map[:, :4].swapaxes(0, 1) if initial.any() else np.zeros((4, 0, len(initial)))
+        covariance = self.free_covariance[1:]
+        free = np.stack((covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]))
+        chance = ChanceTerms(
+            PositionNoise(self.horizon.maps, self.noise_variance, free),
+            InitialError(np.ascontiguousarray(errors * scale[:, None, None]), initial),
+            UncertainCircles(self.obstacles.centre, self.drift, *self.size, self.obstacles.centre_covariance, self.ignored_until),
+        )
+        motion = Motion(self.horizon.motion, np.ascontiguousarray(self.free[:, :4].T * scale[:, None]))
+        cost = CostTerms(self.weighted_variance, self.summed_variance, *self.goal_rows)
+        return freeze(ProblemTerms(motion, cost, chance, self.courses, self.extent))
 
-    @property
+    @cached_property
     def free(self) -> Array:
         """Mean state at steps 0..N without control, (N + 1, n)."""
-        return self.without_control[0]
-
-    @property
-    def free_position(self) -> Array:
-        """Mean position at steps 1..N without control, (N, 2) [m]."""
-        return self.without_control[1]
-
-    @property
-    def free_course(self) -> Array:
-        """Mean position and velocity per step without control, x, y, vx, vy at steps 0..N, (4, N + 1) [m]."""
-        return self.without_control[2]
-
-    @cached_property
-    def error_course(self) -> Array:
-        """What an error of the initial state becomes in position and velocity per step, at steps 0..N, (4, N + 1, n).
-
-        Without steps where there is no such error.
-        """
-        if not self.initial_covariance.any():
-            return np.zeros((4, 0, len(self.initial_mean)))
-        scale = np.array([1.0, 1.0, self.horizon.dt, self.horizon.dt])
-        return np.ascontiguousarray(self.error_map[:, :4].swapaxes(0, 1) * scale[:, None, None])
-
-    @cached_property
-    def circles(self) -> tuple[Array, Array, Array, Array]:
-        """What kernels ask about courses and circles: responses of the course, and it without control; centres and drifts."""
-        return self.horizon.motion, self.free_course, self.obstacles.centre, self.drift
-
-    @cached_property
-    def costs(self) -> tuple[Array, Array, Array, Array, Array]:
-        """What kernels ask about the cost: what weighs the squared control, and the goal's rows, targets and softness."""
-        return self.weighted_variance, self.summed_variance, *self.goal_rows
-
-    @cached_property
-    def chances(self) -> Chances:
-        """What kernels ask about the chance constraint."""
-        course = self.horizon.maps, self.free_variance, self.error_course, self.initial_covariance, self.noise_variance
-        return Chances(*course, self.centres, *self.size, self.obstacles.centre_covariance, self.leaving)
-
-    @cached_property
-    def drift(self) -> Array:
-        """How far each centre moves in a step, (m, 2) [m]."""
-        drift: Array = self.obstacles.velocity * self.horizon.dt
-        return drift
+        return self.horizon.powers @ self.initial_mean
 
     @cached_property
     def free_covariance(self) -> Array:
@@ -139,54 +109,51 @@ class Problem(Record):
         return carried
 
     @cached_property
-    def free_variance(self) -> Array:
-        """Rows xx, yy, xy of the free position covariance at steps 1..N, (3, N) [m^2]."""
-        covariance = self.free_covariance[1:]
-        return np.stack((covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]))
-
-    @cached_property
-    def centres(self) -> Array:
-        """Mean centres of the obstacles at steps 1..N, (m, N, 2) [m]."""
-        return centres_by_obstacle(self.obstacles.centre, self.drift, self.horizon.steps)
+    def drift(self) -> Array:
+        """How far each centre moves in a step, (m, 2) [m]."""
+        drift: Array = self.obstacles.velocity * self.horizon.dt
+        return drift
 
     @cached_property
     def courses(self) -> Array:
-        """Mean centres of the obstacles at steps 0..N, step by step, (N + 1, m, 2) [m]."""
+        """Mean centres of the obstacles at steps 0..N, (N + 1, m, 2) [m]."""
         return centre_trajectories(self.obstacles.centre, self.drift, self.horizon.steps)
+
+    @property
+    def centres(self) -> Array:
+        """Mean centres of the obstacles at steps 1..N, obstacle by obstacle, (m, N, 2) [m]."""
+        return self.courses[1:].swapaxes(0, 1)
 
     @cached_property
     def first_alike(self) -> NDArray[np.intp]:
-        """For each obstacle the first one that is the same circle, (m,): a mean that touches both is held by one of them."""
-        return find_duplicates(self.obstacles.centre, self.drift, np.sqrt(self.size[0]), ALIKE * self.extent)
-
-    @cached_property
-    def centres_from_free(self) -> Array:
-        """`centres`, less the mean position without control, (m, N, 2) [m]."""
-        return self.centres - self.free[1:, :2]
-
-    @cached_property
-    def distance_now(self) -> Array:
-        """Distance of the hand from each centre now, (m,) [m]."""
-        away = self.initial_mean[:2] - self.obstacles.centre
-        return np.hypot(away[:, 0], away[:, 1])
+        """For each obstacle the row of the first one that is the same circle, (m,): of equal circles only one is in contact."""
+        rows = np.column_stack((self.obstacles.centre, self.drift, np.sqrt(self.size[0])))
+        if not len(rows):
+            return np.zeros(0, np.intp)
+        is_alike = np.abs(rows[:, None] - rows).max(axis=2) < SAME_CIRCLE * self.extent
+        first: NDArray[np.intp] = is_alike.argmax(axis=1)
+        return first
 
     @cached_property
     def inside_margin(self) -> NDArray[np.bool_]:
-        """Whether the hand is now inside the margin of each obstacle, (m,): never, without a recovery time."""
+        """Whether the hand is now inside the margin of each obstacle, (m,); never without a recovery time."""
         if self.recovery_s <= 0 or not len(self.obstacles):
             return np.zeros(len(self.obstacles), dtype=np.bool_)
-        circles = self.obstacles.centre, *self.size, self.obstacles.centre_covariance
-        return find_inside_margin(self.initial_mean, self.initial_covariance, *circles, k_of_eta(self.eta))
+        offset = self.initial_mean[:2] - self.obstacles.centre
+        covariance = self.initial_covariance[:2, :2] + self.obstacles.centre_covariance
+        variance = self.size[1] + 4 * np.einsum('mi,mij,mj->m', offset, covariance, offset)
+        inside: NDArray[np.bool_] = self.size[0] - (offset**2).sum(axis=1) + k_of_eta(self.eta) * np.sqrt(variance) > 0.0
+        return inside
 
     @cached_property
-    def leaving(self) -> Array:
-        """Steps from now in which each obstacle does not count, because the hand is still leaving its margin, (m,)."""
-        leaving: Array = self.inside_margin.astype(np.float64) * (self.recovery_s / self.horizon.dt)
-        return leaving
+    def ignored_until(self) -> Array:
+        """Steps from now before which each obstacle does not count, because the hand is still leaving its margin, (m,)."""
+        ignored: Array = self.inside_margin.astype(np.float64) * (self.recovery_s / self.horizon.dt)
+        return ignored
 
     @cached_property
     def size(self) -> tuple[Array, Array]:
-        """E[R^2] and Var[R^2] of each obstacle, (m,) each [m^2, m^4]."""
+        """E[R^2] [m^2] and Var[R^2] [m^4] of each obstacle, (m,) each."""
         return size_moments(self.obstacles)
 
     @cached_property
@@ -195,52 +162,81 @@ class Problem(Record):
         return stack_noise(self.noise**2, self.horizon.steps)
 
     @cached_property
-    def unweighted(self) -> Array:
-        """Weights of the position's maps in obstacle rows, (2, 2N): one."""
-        return np.ones((2, 2 * self.horizon.steps))
-
-    @cached_property
     def summed_variance(self) -> Array:
-        """(2N,): sum over steps of the variances of x and y is this times u^2, plus the free part."""
+        """(2N,): the sum over steps of the variances of x and y is this times u^2, plus the free part."""
         summed: Array = variance_weights(self.horizon.states[:2], BOTH, BOTH) * self.noise_variance
         return summed
 
     @cached_property
     def weighted_variance(self) -> Array:
         """(2N,): the variance terms of J_X are this times u^2, plus the free part."""
-        weighted: Array = variance_weights(self.horizon.states, self.end_weights, self.way_weights) * self.noise_variance
+        weights = self.terminal_weights, self.stage_weights
+        weighted: Array = variance_weights(self.horizon.states, *weights) * self.noise_variance
         return weighted
 
     @cached_property
     def goal_rows(self) -> tuple[Array, Array, Array]:
         """Rows (r, 2N), targets (r,) and softness (r,) that bring the mean to the goal.
 
-        Softness 0 is an equality; 1 / (2 w) is a term w (X_i - goal_i)^2 of the cost.
+        Softness 0 is an equality; softness 1 / (2 w) is a term w (X_i - goal_i)^2 of the cost.
         """
-        rows, targets, softness = build_goal_rows(self.horizon.last, self.goal - self.free[-1], self.at_goal, self.end_weights)
-        if not self.way_weights.any():
+        weighted = np.flatnonzero(~self.at_goal & (self.terminal_weights > 0.0))
+        order = np.concatenate((np.flatnonzero(self.at_goal), weighted))
+        rows, targets = self.horizon.last[order], (self.goal - self.free[-1])[order]
+        softness = np.zeros(len(order))
+        softness[len(order) - len(weighted) :] = 0.5 / self.terminal_weights[weighted]
+        if not self.stage_weights.any():
             return rows, targets, softness
-        way, steps = np.flatnonzero(self.way_weights > 0), self.horizon.steps
-        before, missing = self.horizon.response[:-1, way], (self.goal - self.free[1:-1])[:, way]
+        stage, steps = np.flatnonzero(self.stage_weights > 0), self.horizon.steps
+        before, missing = self.horizon.response[:-1, stage], (self.goal - self.free[1:-1])[:, stage]
         return (
             np.concatenate((rows, before.reshape(-1, 2 * steps))),
             np.concatenate((targets, missing.ravel())),
-            np.concatenate((softness, np.tile(0.5 / self.way_weights[way], steps - 1))),
+            np.concatenate((softness, np.tile(0.5 / self.stage_weights[stage], steps - 1))),
         )
+
+    def circles(self, tau: float) -> MovingCircles:
+        """Return the circles with the distance to keep from them, sqrt(E[R^2] + tau), for tau [m^2].
+
+        Less is required where the hand is nearer now, and has a recovery time: see `clearance.required_distance`.
+        """
+        reach: Array = np.sqrt(self.size[0] + tau)
+        missing, pace = np.zeros(len(reach)), 0.0
+        if self.recovery_s > 0:
+            missing, pace = reach - self._distance_now, self.horizon.dt / self.recovery_s
+        return freeze(MovingCircles(self.obstacles.centre, self.drift, reach, missing, pace))
+
+    @cached_property
+    def _distance_now(self) -> Array:
+        """Distance of the hand from each centre now, (m,) [m]."""
+        offset = self.initial_mean[:2] - self.obstacles.centre
+        return np.hypot(offset[:, 0], offset[:, 1])
+
+    def trajectory(self, control: Array) -> Array:
+        """Return the mean x, y, vx, vy of a stacked control (2N,) at steps 0..N, (4, N + 1), velocities per step [m]."""
+        return compute_trajectory(self.terms.motion, np.ascontiguousarray(control, dtype=float))
 
     def positions(self, control: Array) -> Array:
-        """Mean positions at steps 1..N from the stacked control, (N, 2) [m]."""
-        return mean_positions(self.horizon.maps[:2], np.ascontiguousarray(control, dtype=float), self.free_position)
-
-    def course(self, control: Array) -> Array:
-        """Mean position and velocity per step from the stacked control, x, y, vx, vy at steps 0..N, (4, N + 1) [m]."""
-        return compute_trajectory(self.horizon.motion, self.free_course, np.ascontiguousarray(control, dtype=float))
+        """Return the mean positions of a stacked control (2N,) at steps 1..N, (N, 2) [m]."""
+        return np.ascontiguousarray(self.trajectory(control)[:2, 1:].T)
 
     def position_variance(self, control: Array) -> Array:
-        """Rows xx, yy, xy of the position covariance at steps 1..N, (3, N) [m^2]."""
-        return position_variances(
-            self.horizon.maps, self.noise_variance, np.ascontiguousarray(control, dtype=float), self.free_variance
-        )
+        """Return the position covariance of a stacked control (2N,) at steps 1..N as rows xx, yy, xy, (3, N) [m^2]."""
+        return position_variances(self.terms.chance.noise, np.ascontiguousarray(control, dtype=float))
+
+
+class ProblemOptions(TypedDict, total=False):
+    """What may differ from the default problem of `rest_to_goal`.
+
+    goal_weight: weight w of the position variance at the end; passing: whether the hand passes the goal at any constant velocity
+    instead of resting there; recovery_s, initial_covariance and error_map: as in `Problem`.
+    """
+
+    goal_weight: float
+    passing: bool
+    recovery_s: float
+    initial_covariance: Array
+    error_map: Array
 
 
 def rest_to_goal(
@@ -250,21 +246,36 @@ def rest_to_goal(
     obstacles: Obstacles,
     noise: Array,
     eta: float,
-    initial_covariance: Array | None = None,
-    error_map: Array | None = None,
-    goal_weight: float = 0.0,
-    recovery_s: float = 0.0,
-    passing: bool = False,
+    **options: Unpack[ProblemOptions],
 ) -> Problem:
-    """Build the default problem: the mean reaches the goal position (2,) [m] exactly, at rest.
+    """Build the default problem: the mean reaches the goal position exactly, at rest.
 
-    goal_weight: w of the position variance at the end; passing: at any velocity instead, which no longer changes. Raises
-    SceneError for anything not finite.
+    Parameters
+    ----------
+    horizon
+        The plant over N steps, for n states.
+    initial_mean
+        State now, (n,).
+    goal_position
+        (2,) [m].
+    obstacles
+        The circles now.
+    noise
+        c of each channel for one step, (2,).
+    eta
+        Wanted probability of avoidance, for each obstacle and step.
+    **options
+        See :class:`ProblemOptions`.
+
+    Raises
+    ------
+    SceneError
+        If a number is not finite.
     """
     n = len(initial_mean)
     goal = np.zeros(n)
     goal[:2] = goal_position
-    covariance = np.zeros((n, n)) if initial_covariance is None else np.asarray(initial_covariance, dtype=float)
+    covariance = np.asarray(options.get('initial_covariance', np.zeros((n, n))), dtype=float)
     for field, value in (('start', initial_mean), ('goal', goal_position), ('noise', noise), ('start covariance', covariance)):
         if not np.isfinite(value).all():
             raise SceneError(field, 'finite numbers', np.asarray(value).tolist())
@@ -272,13 +283,13 @@ def rest_to_goal(
         horizon=horizon,
         initial_mean=np.asarray(initial_mean, dtype=float),
         initial_covariance=covariance,
-        error_map=horizon.powers if error_map is None else error_map,
+        error_map=options.get('error_map', horizon.powers),
         goal=goal,
         noise=np.asarray(noise, dtype=float),
         obstacles=obstacles,
         eta=eta,
-        at_goal=states_at_goal(n, passing),
-        end_weights=np.where(np.arange(n) < 2, goal_weight, 0.0),
-        way_weights=np.zeros(n),
-        recovery_s=recovery_s,
+        at_goal=states_at_goal(n, options.get('passing', False)),
+        terminal_weights=np.where(np.arange(n) < 2, options.get('goal_weight', 0.0), 0.0),
+        stage_weights=np.zeros(n),
+        recovery_s=options.get('recovery_s', 0.0),
     )

@@ -1,10 +1,10 @@
-"""The forward optimal control of one candidate: a strategy applied to a problem from a guess, and its result in full."""
+"""The forward optimal control of one candidate: a strategy is applied to a problem, and its result evaluated in full."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,164 +12,136 @@ from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
 from foc_ros.core.dynamics.impulse_response import apply_impulse_response
 from foc_ros.core.dynamics.noise import propagate_covariance
+from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled
+from foc_ros.core.registry import STRATEGIES
 from foc_ros.core.types import Array, Solution, Status, as_readonly
 
-from .chance_evaluation import Assessment, evaluate_chance_constraint
-from .contacts.contacts import Contacts
-from .cost_terms import compute_cost_terms, compute_violation, equivalent_weights
-from .minimum_k import MinimumSafetyFactor, assess_between
+from .clearance import find_deepest
+from .minimum_safety_factor import MinimumSafetyFactor, find_minimum_safety_factor
 from .problem import Problem
-from .qp import clearance_qp, effort_cost
-from .sqp import converge
-from .strategies.algorithm1 import algorithm1
-from .strategies.lv_hc import follow_path
-from .strategies.optimal import optimise
-from .strategies.penalty_path import PenaltyPath
+from .strategies import StrategyResult, give_up_out_of_time
 from .warm_start import Start
-from .working_set import WorkingSet, solve
 
-SHORT_OF_ETA = 1e-5
-"""What a solved one may be short of eta by rounding."""
-
-
-@dataclass(frozen=True)
-class _Ended:
-    """How a strategy ended: a control with the (tau, lambda) it belongs to, its contacts, its smallest k if known."""
-
-    status: Status
-    message: str
-    control: Array
-    tau: float
-    lam: float
-    qp_solves: int
-    contacts: Contacts
-    iterations: int | None = None
-    slope: float = 0.0
-    least: MinimumSafetyFactor | None = None
+ETA_TOLERANCE = 1e-5
+"""How far a solution may fall short of eta by rounding."""
+NO_VIOLATION = 1e-7
+"""Shortfall of a distance that counts as rounding [m]."""
 
 
 def solve_problem(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline = NEVER) -> Solution:
-    """Solve one problem in the class in which it starts.
+    """Solve one problem in the homotopy class in which it starts, by the strategy of the settings.
 
-    deadline: looked at before each QP. Never raises for a problem that has no solution: the status
-    says so, and the mean is then the best effort (the largest eta that the strategy reached, or the smallest violation).
+    Parameters
+    ----------
+    problem
+        The problem.
+    start
+        Where the strategy begins.
+    settings
+        The strategy, its parameters, and the QP backend.
+    deadline
+        Checked before each QP.
+
+    Returns
+    -------
+    Solution
+        If the problem has no solution, its status says so, and its mean is the best that was found: the largest eta that the
+        strategy reached, or the smallest violation. No exception is raised for that.
     """
     began = time.perf_counter()
+    backend = getattr(settings, 'qp_backend', 'piqp')
+    if backend != problem.qp_backend:
+        problem = replace(problem, qp_backend=backend)
     try:
-        ended = _STRATEGIES[settings.strategy](problem, start, settings, deadline)
+        result: StrategyResult = STRATEGIES.get(settings.strategy)(problem, start, settings, deadline)
     except OutOfTimeError:
-        control, message = effort_cost(problem, 0.0).goal_control, 'out of time: the movement shown looks at no obstacle'
-        ended = _Ended(Status.DEADLINE, message, control, 0.0, 0.0, 0, Contacts())
-    continuous = _STRATEGIES[settings.strategy] is _continuous
-    assessment = (
-        assess_between(problem, ended.control, ended.least) if continuous else evaluate_chance_constraint(problem, ended.control)
-    )
-    if ended.status is Status.SOLVED and settings.strategy != 'fixed' and assessment.eta < problem.eta - SHORT_OF_ETA:
-        message = f'the solution achieves eta {assessment.eta:.6g} only'
-        ended = replace(ended, status=Status.ITERATION_LIMIT, message=message)
-    return _solution(problem, ended, assessment, time.perf_counter() - began, optimal=settings.strategy == 'optimal')
+        result = give_up_out_of_time(problem)
+    minimum = result.minimum
+    if minimum is None:
+        minimum = find_minimum_safety_factor(problem, result.control, between_steps=False)
+    if result.status is Status.SOLVED and result.aims_at_eta and minimum.eta < problem.eta - ETA_TOLERANCE:
+        message = f'the solution achieves eta {minimum.eta:.6g} only'
+        result = replace(result, status=Status.ITERATION_LIMIT, message=message)
+    return _evaluate(problem, result, minimum, began)
 
 
-def _continuous(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline) -> _Ended:
-    delta = settings.lv_delta if settings.strategy == 'lv' else settings.hc_delta
-    curve = PenaltyPath(delta, settings.growth, settings.lam)
-    walked = follow_path(problem, start, curve, deadline)
-    if walked.status is Status.DEADLINE and walked.point is None:
-        raise OutOfTimeError
-    if walked.point is None:
-        return _best_effort(problem, start, *curve.at(0.0), walked.qp_solves)
-    point = walked.point
-    reached = *curve.at(point.s), walked.qp_solves
-    return _Ended(walked.status, walked.message, point.control, *reached, point.contacts, slope=walked.slope, least=point.least)
-
-
-def _optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadline) -> _Ended:
-    optimum = optimise(problem, start, deadline)
-    if optimum is None:
-        return _best_effort(problem, start, 0.0, 0.0, 0)
-    contacts = Contacts.at_steps(optimum.active, optimum.multipliers)
-    return _Ended(optimum.status, optimum.message, optimum.control, 0.0, 0.0, optimum.qp_solves, contacts)
-
-
-def _algorithm1(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline) -> _Ended:
-    rates = settings.algorithm1_delta, settings.algorithm1_growth, settings.algorithm1_xi
-    stepped = algorithm1(problem, start.positions, *rates, deadline)
-    last = stepped.solution
-    if last is None:
-        return _best_effort(problem, start, stepped.tau, stepped.lam, stepped.qp_solves)
-    reached = stepped.tau, stepped.lam, stepped.qp_solves
-    contacts = Contacts.at_steps(last.active, last.multipliers)
-    return _Ended(stepped.status, stepped.message, last.control, *reached, contacts, stepped.iterations)
-
-
-def _fixed(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline) -> _Ended:
-    working, _ = start.contacts.rows(problem.horizon.steps)
-    converged = converge(problem, start.positions, working, settings.tau, settings.lam, deadline)
-    if converged is None:
-        return _best_effort(problem, start, settings.tau, settings.lam, 0)
-    status = Status.SOLVED if converged.stays else Status.ITERATION_LIMIT
-    message = 'solved' if converged.stays else 'the linearisation had not settled when its QPs ran out'
-    return _Ended(status, message, converged.control, settings.tau, settings.lam, converged.qp_solves, converged.contacts)
-
-
-def _best_effort(problem: Problem, start: Start, tau: float, lam: float, qp_solves: int) -> _Ended:
-    """Let the contradicting rows share the violation, at the start: what the hand can do where nothing meets them all."""
-    elastic = solve(clearance_qp(problem, effort_cost(problem, lam), start.positions, tau), WorkingSet(), elastic=True)
-    if elastic is None:
-        control, contacts = np.zeros(2 * problem.horizon.steps), Contacts()
-    else:
-        control, contacts = elastic.control, Contacts.at_steps(elastic.active, elastic.multipliers)
-        qp_solves += elastic.solves
-    message = 'no way between the obstacles of this class meets the goal: the path shown violates them least'
-    return _Ended(Status.INFEASIBLE, message, control, tau, lam, qp_solves, contacts)
-
-
-_STRATEGIES = {'lv': _continuous, 'hc': _continuous, 'optimal': _optimal, 'algorithm1': _algorithm1, 'fixed': _fixed}
-
-
-def _solution(problem: Problem, ended: _Ended, assessment: Assessment, seconds: float, *, optimal: bool) -> Solution:
-    horizon, ids = problem.horizon, problem.obstacles.ids
-    mean = problem.free + apply_impulse_response(horizon.states, ended.control).T
-    covariance = propagate_covariance(horizon, problem.free_covariance, problem.noise_variance, ended.control)
-    violation, violated = compute_violation(problem, mean, ended.tau)
-    held = [(ended.tau, ended.lam)] * len(ended.contacts)
-    if optimal:
-        held = equivalent_weights(problem, ended.control, ended.contacts, max(assessment.smallest_k, 0.0))
+def _evaluate(problem: Problem, result: StrategyResult, minimum: MinimumSafetyFactor, began: float) -> Solution:
+    """Return the solution of a result that began at a time of `time.perf_counter` [s]."""
+    horizon, control, contacts = problem.horizon, result.control, result.contacts
+    mean = problem.free + apply_impulse_response(horizon.states, control).T
+    covariance = propagate_covariance(horizon, problem.free_covariance, problem.noise_variance, control)
+    violation, violated = compute_violation(problem, mean, result.tau)
+    weights = result.equivalent_weights
+    names = [problem.obstacles.ids[row] for row in contacts.obstacle.tolist()]
     return Solution(
-        status=ended.status,
-        message=_words(problem, ended, assessment, violation),
+        status=result.status,
+        message=_complete_message(problem, result, violation),
         dt=horizon.dt,
         mean=as_readonly(mean),
         covariance=as_readonly(covariance),
-        control=ended.control.reshape(2, -1).T,
-        effort=float(ended.control @ ended.control),
-        costs=compute_cost_terms(problem, ended.control, mean, covariance, ended.lam),
-        tau=ended.tau,
-        lam=ended.lam,
-        eta=assessment.eta,
-        eta_at=_named(ids, assessment.place),
-        eta_reachable=assessment.eta if ended.status is Status.ETA_UNREACHABLE else None,
+        control=control.reshape(2, -1).T,
+        effort=float(control @ control),
+        costs=compute_cost_terms(problem, control, mean, covariance, result.lam),
+        tau=result.tau,
+        lam=result.lam,
+        eta=minimum.eta,
+        eta_at=_name(problem.obstacles.ids, (minimum.obstacle, minimum.time)) if len(problem.obstacles) else None,
+        eta_reachable=minimum.eta if result.status is Status.ETA_UNREACHABLE else None,
         violation=violation,
-        violation_at=_named(ids, violated),
-        multipliers=tuple(
-            (ids[row], time, force) for row, time, force in zip(*(each.tolist() for each in ended.contacts.columns), strict=True)
-        ),
-        held=tuple(held),
-        slope=ended.slope,
-        qp_solves=ended.qp_solves,
-        iterations=ended.iterations,
-        solve_s=seconds,
+        violation_at=_name(problem.obstacles.ids, violated),
+        multipliers=tuple(zip(names, contacts.time.tolist(), contacts.multiplier.tolist(), strict=True)),
+        held=((result.tau, result.lam),) * len(names) if weights is None else tuple(weights),
+        slope=result.slope,
+        qp_solves=result.qp_solves,
+        iterations=result.iterations,
+        solve_s=time.perf_counter() - began,
     )
 
 
-def _named(ids: Sequence[str], place: tuple[int, float] | None) -> tuple[str, float] | None:
+def _name(ids: Sequence[str], place: tuple[int, float] | None) -> tuple[str, float] | None:
     return None if place is None else (ids[place[0]], place[1])
 
 
-def _words(problem: Problem, ended: _Ended, assessment: Assessment, violation: float) -> str:
-    message = ended.message
-    if ended.status is Status.INFEASIBLE and violation > 0:
+def _complete_message(problem: Problem, result: StrategyResult, violation: float) -> str:
+    """Return the message of a result with the size of its violation and the obstacles whose margins do not count yet."""
+    message = result.message
+    if result.status is Status.INFEASIBLE and violation > 0:
         message += f', by up to {violation:.3g} m'
-    if assessment.relaxed:
-        message += f'; inside the margin of {", ".join(assessment.relaxed)} now: eta holds from {problem.recovery_s:g} s on'
+    left = [name for name, is_inside in zip(problem.obstacles.ids, problem.inside_margin.tolist(), strict=True) if is_inside]
+    if left:
+        message += f'; the hand is inside the margin of {", ".join(left)} now: eta holds from {problem.recovery_s:g} s on'
     return message
+
+
+def compute_cost_terms(problem: Problem, control: Array, mean: Array, covariance: Array, lam: float) -> dict[str, float]:
+    """Return every term of J_aug by name [m^2/s^6]: effort, weighted mean errors and variances, and the lambda term.
+
+    control (2N,); mean (N + 1, n) and covariance (N + 1, n, n) that follow from it; lam: lambda [1/s^6].
+    """
+    weights = problem.terminal_weights, problem.stage_weights
+    mean_error, variance, summed = sum_errors(mean, covariance, problem.goal, *weights)
+    effort = float(control @ control)
+    return {'effort': effort, 'mean_error': mean_error, 'variance': variance, 'lambda_variance': lam * summed}
+
+
+@compiled
+def sum_errors(mean: Matrix, covariance: Tensor, goal: Vector, terminal: Vector, stage: Vector) -> tuple[float, float, float]:
+    """Return weighted squared errors of a mean (N + 1, n), weighted variances, and the sum of the variances of x and y."""
+    times, n = mean.shape
+    squared, variance, summed = 0.0, 0.0, 0.0
+    for t in range(1, times):
+        for i in range(n):
+            weight = terminal[i] if t == times - 1 else stage[i]
+            squared += weight * (mean[t, i] - goal[i]) ** 2
+            variance += weight * covariance[t, i, i]
+        summed += covariance[t, 0, 0] + covariance[t, 1, 1]
+    return squared, variance, summed
+
+
+def compute_violation(problem: Problem, mean: Array, tau: float) -> tuple[float, tuple[int, int] | None]:
+    """Return by how much a mean (N + 1, n) comes nearer than required [m], and where: row of the obstacle and step 1..N.
+
+    0 and None where it never does. What is required is `Problem.circles`.
+    """
+    missing, row, step = find_deepest(np.ascontiguousarray(mean[1:, :2]), problem.circles(tau))
+    return (missing, (row, step)) if missing > NO_VIOLATION else (0.0, None)

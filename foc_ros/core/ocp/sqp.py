@@ -1,49 +1,65 @@
-"""Sequential QPs: linearise at a guess, solve, linearise at the answer, until it stays.
+"""Sequential quadratic programming: linearise at a guess, solve, linearise at the solution, until it stays.
 
-Each QP cuts off more than the circles do, wherever it is linearised, so every answer is feasible. Between QPs a few Newton steps
-jump to where the sequence would creep, if that lowers the cost too; where they fail, the next linearisation is taken further and
-further ahead.
+Every half-plane lies outside its circle, wherever it is linearised, so that every solution is feasible. Between QPs a few Newton
+steps on the contacts jump to where the sequence would creep, if that lowers the cost too; where they fail, the next linearisation
+is extrapolated further and further.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
 
 from foc_ros.core.deadline import NEVER, Deadline
+from foc_ros.core.kernels import freeze
 from foc_ros.core.types import Array
 
-from .contacts.checks import STAYS, newton_at_fixed_times
 from .contacts.contacts import Contacts
-from .contacts.kkt_point import KktPoint
+from .contacts.kkt_point import STAYS, KktPoint, solve_at_fixed_times
 from .problem import Problem
 from .qp import NO_TIMES, Cost, clearance_qp, effort_cost
 from .working_set import WorkingSet, solve
 
 NEAR = 0.01
-"""Largest move of the mean from which Newton steps are tried even if the active rows changed; relative."""
+"""Largest move of the mean, relative to the scene, from which Newton steps are tried although the active rows changed."""
 MAX_QPS = 60
-"""Linearisations after which it counts as unsettled."""
+"""Linearisations after which the sequence counts as unsettled."""
 ALIGNED = 0.99
-"""Cosine between two moves in a row that counts as the same direction."""
+"""Cosine between two consecutive moves that counts as the same direction."""
 PATIENCE = 6
-"""Moves in the same direction before the sequence is helped on."""
+"""Moves in the same direction before the sequence is extrapolated."""
 LARGEST_STRETCH = 15.0
-"""Most moves that the next linearisation is taken ahead."""
-
+"""Most moves by which the next linearisation is extrapolated."""
 
 Jump: TypeAlias = Callable[[Array, Contacts], KktPoint | None]
 
 
-@dataclass(frozen=True, eq=False)
-class Converged:
-    """A control that its own linearisation returns: stacked control (2N,), positions (N, 2) at steps 1..N, active rows.
+@dataclass(frozen=True)
+class SqpOptions:
+    """How the sequence proceeds.
 
-    qp_solves: QPs solved, rounds of the working set counted each; linearisations: how many there were; stays: whether it settled;
-    jumped: what `converge`'s jump found, if that ended it.
+    verified: end by a QP that stays, not by Newton steps; between (e,): further times at which rows hold, as in `clearance_qp`;
+    max_qps: linearisations, at least 1; thorough: as in `working_set.solve`; jump: function that is tried at the solution of each
+    QP, with its control and contacts, and whose result ends the sequence.
+    """
+
+    verified: bool = True
+    between: Array = field(default_factory=lambda: NO_TIMES)
+    max_qps: int = MAX_QPS
+    thorough: bool = True
+    jump: Jump | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SqpResult:
+    """How a sequence of QPs ended.
+
+    control (2N,), its positions (N, 2) at steps 1..N, its active rows and contacts; qp_solves: QPs solved, each round of a
+    working set counted; linearisations: how many there were; stays: whether the last one returned its own control; jumped: the
+    result of the jump, if that ended the sequence.
     """
 
     control: Array
@@ -63,79 +79,97 @@ def converge(
     tau: float,
     lam: float,
     deadline: Deadline = NEVER,
-    *,
-    verified: bool = True,
-    between: Array = NO_TIMES,
-    most: int = MAX_QPS,
-    thorough: bool = True,
-    jump: Jump | None = None,
-) -> Converged | None:
-    """Solve the reformulated problem at (tau, lambda) from a guess (N, 2); None where its rows contradict each other.
+    options: SqpOptions = SqpOptions(),
+) -> SqpResult | None:
+    """Solve the reformulated problem at (tau, lambda) by sequential QPs.
 
-    verified: end by a QP that stays, not by Newton steps. between (e,): `clearance_qp`. most: linearisations, at least 1;
-    thorough: `solve`. jump: tried at the solution of each QP, its control and contacts; what it finds ends the sequence. Raises
-    OutOfTimeError past the deadline.
+    Parameters
+    ----------
+    problem
+        The problem.
+    guess
+        Positions (N, 2) at steps 1..N to linearise at first [m].
+    working
+        Rows to begin with.
+    tau, lam
+        Clearance term [m^2] and weight of the variances [1/s^6].
+    deadline
+        Checked before each QP.
+    options
+        How the sequence proceeds.
+
+    Returns
+    -------
+    SqpResult | None
+        None where the rows of a QP contradict each other.
+
+    Raises
+    ------
+    OutOfTimeError
+        Past the deadline.
     """
-    times = np.concatenate((np.arange(1.0, problem.horizon.steps + 1.0), between))
+    times = np.concatenate((np.arange(1.0, problem.horizon.steps + 1.0), options.between))
     cost = effort_cost(problem, lam)
     solves, creep = 0, _Creep()
     previous: tuple[bytes, bytes] | None = None
-    for count in range(1, most + 1):
+    for count in range(1, options.max_qps + 1):
         deadline.check()
-        solution = solve(clearance_qp(problem, cost, guess, tau, between=between), working, thorough=thorough)
+        qp = clearance_qp(problem, cost, guess, tau, between=options.between)
+        solution = solve(qp, working, thorough=options.thorough)
         if solution is None:
             return None
         solves += solution.solves
-        working, positions = solution.active, problem.positions(solution.control)
+        control, working = solution.control, solution.active
+        positions = problem.positions(control)
         move = float(np.abs(positions - guess).max()) / problem.extent
-        contacts = Contacts(working.obstacle, times[working.step], solution.multipliers)
-        if move < STAYS or count == most:
-            return Converged(solution.control, positions, working, contacts, solves, count, stays=move < STAYS)
-        found = jump(solution.control, contacts) if jump is not None else None
-        if found is not None:
-            positions = problem.positions(found.control)
-            return Converged(found.control, positions, working, found.contacts, solves, count, stays=True, jumped=found)
+        contacts = freeze(Contacts(working.obstacle, times[working.step], solution.multipliers))
+        if move < STAYS or count == options.max_qps:
+            return SqpResult(control, positions, working, contacts, solves, count, stays=move < STAYS)
+        point = options.jump(control, contacts) if options.jump is not None else None
+        if point is not None:
+            positions = problem.positions(point.control)
+            return SqpResult(point.control, positions, working, point.contacts, solves, count, stays=True, jumped=point)
         rows = (working.obstacle.tobytes(), working.step.tobytes())
         better = None
         if len(working) and (rows == previous or move < NEAR):
-            better = newton_at_fixed_times(problem, cost, solution.control, contacts, tau)
-        if better is not None and _cost(cost, better[0]) <= _cost(cost, solution.control) * (1 + 1e-12):
+            better = solve_at_fixed_times(problem, control, contacts, tau, lam)
+        if better is not None and _quadratic_cost(cost, better[0]) <= _quadratic_cost(cost, control) * (1 + 1e-12):
             control, contacts = better
             positions = problem.positions(control)
-            if not verified:
-                return Converged(control, positions, working, contacts, solves, count, stays=True)
-            guess = creep.jumped(positions)
+            if not options.verified:
+                return SqpResult(control, positions, working, contacts, solves, count, stays=True)
+            guess = creep.restart(positions)
         else:
-            guess = creep.ahead(positions)
+            guess = creep.extrapolate(positions)
         previous = rows
-    raise AssertionError('most is at least 1')
+    raise AssertionError('max_qps is at least 1')
 
 
-def _cost(cost: Cost, control: Array) -> float:
+def _quadratic_cost(cost: Cost, control: Array) -> float:
     return float(control @ (cost.hessian * control))
 
 
 class _Creep:
-    """Steps ahead of a sequence that creeps: after some moves in the same direction, twice as far each time it goes on."""
+    """Extrapolates a sequence that creeps: after some moves in the same direction, by twice as much each time it goes on."""
 
     def __init__(self) -> None:
         self.last: Array | None = None
         self.direction: Array | None = None
         self.aligned = 0
 
-    def ahead(self, positions: Array) -> Array:
-        """Return where to linearise next: at the last answer, an array of any shape, or beyond it."""
+    def extrapolate(self, positions: Array) -> Array:
+        """Return where to linearise next: at the last solution, an array of any shape, or beyond it."""
         if self.last is None:
             self.last = positions
             return positions
         direction = positions - self.last
-        aligned = self.direction is not None and _cosine(direction, self.direction) > ALIGNED
-        self.aligned = self.aligned + 1 if aligned else 0
+        is_aligned = self.direction is not None and _cosine(direction, self.direction) > ALIGNED
+        self.aligned = self.aligned + 1 if is_aligned else 0
         self.last, self.direction = positions, direction
         return positions + min(2.0 ** max(self.aligned - PATIENCE, 0) - 1.0, LARGEST_STRETCH) * direction
 
-    def jumped(self, positions: Array) -> Array:
-        """Forget the creep: the sequence goes on from somewhere else."""
+    def restart(self, positions: Array) -> Array:
+        """Return where to linearise next after a jump: at its result."""
         self.last, self.direction, self.aligned = positions, None, 0
         return positions
 

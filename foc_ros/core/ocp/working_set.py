@@ -1,46 +1,46 @@
-"""Solve the QP of one linearisation in the range space of the few obstacle rows that matter.
+"""Solution of the QP of one linearisation in the range space of the few obstacle rows that matter.
 
-A working set of rows M adds multipliers y >= 0 found from min 1/2 y'Ky - m'y, K = M P M', m what the goal's control u_goal leaves
-missing, and u = u_goal + P M'y (P: `qp.Cost`). Rows that u violates join the set until there are none: the result is that of the
-QP with every row.
+A working set of rows M has multipliers y >= 0, which minimise 1/2 y'Ky - m'y with K = M P M' and m what the goal's control u_goal
+leaves missing, and u = u_goal + P M'y (P: `qp.GoalSolution`). Rows that u violates are added until there are none: the result is
+that of the QP with every row.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled
-from foc_ros.core.linear_algebra import factorise_cholesky, multiply, multiply_vector, solve_lower, solve_lower_transposed
+from foc_ros.core.kernels import Indices, Matrix, Vector, compiled
+from foc_ros.core.linear_algebra import factorise_cholesky, multiply_vector, solve_lower, solve_lower_transposed
 from foc_ros.core.types import Array
 
-from .backend import DenseQP, solve_named, solve_piqp
-from .qp import Cost, ReachingQP, collect_rows, find_violated, schur_complement
+from .backend import DenseQP, find_solver, solve_piqp
+from .qp import GoalSolution, ObstacleRows, ReachingQP, collect_rows, find_violated, schur_complement
 
 Index = NDArray[np.intp]
 
 TOLERANCE = 1e-9
-"""Violation of an obstacle row that is not worth another round [m]."""
+"""Violation of an obstacle row that does not need another round [m]."""
 MAX_ROUNDS = 25
 """Rounds of the working set before the full QP is solved instead; two or three are usual."""
 ELASTICITY = 1e-6
-"""Softness of elastic rows, as a share of what a unit multiplier moves them: a lone row gives way by a millionth."""
+"""Softness of elastic rows, as a share of the effect of a unit multiplier on its own row: a lone row gives way by a millionth."""
 MOST_ELASTIC = 150
-"""Elastic rows beyond which no more are taken in: what they ask for is out of reach by far."""
+"""Number of elastic rows beyond which no more are added: such rows are out of reach by far."""
 IMMOVABLE = 1e-12
-"""Share of a row's freedom that the goal leaves it, below which the goal fixes it: the last step's, above all."""
+"""Share of a row's freedom that the goal leaves, below which the goal decides the row: above all at the last step."""
 RESIDUAL = 1e-6
-"""What rows may miss, and rows with a multiplier may have to spare, before the full QP is solved instead; relative."""
+"""Relative violation of rows, and slack of rows with a multiplier, beyond which the full QP is solved instead."""
 FARKAS = 1e-4
-"""How little, relative to what is missing, the combination of rows may move that proves a contradiction."""
+"""Largest effect of a combination of rows, relative to what is missing in it, that proves a contradiction."""
 NEGLIGIBLE = 1e-7
-"""Multiplier that counts as zero, relative to the largest, in units in which every row moves itself by one."""
-SHARP = 1e-10
-"""What the equations of the multipliers that are not zero may be off by when solved for directly."""
+"""Multiplier that counts as zero, relative to the largest, in units in which each row's multiplier changes it by one."""
+EXACT = 1e-10
+"""Largest residual of the equations of the multipliers that are not zero, when they are solved directly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,58 +66,24 @@ class WorkingSet:
         """Return the set of the rows to keep (k,)."""
         return WorkingSet(self.obstacle[keep], self.step[keep])
 
+    def unite(self, obstacle: Index, step: Index, steps: int) -> WorkingSet:
+        """Return these rows and others, each once, in order of obstacle and step (0..steps - 1)."""
+        flat = np.union1d(self.obstacle * steps + self.step, obstacle * steps + step)
+        return WorkingSet(*np.divmod(flat, steps))
+
 
 @dataclass(frozen=True, eq=False)
 class QPSolution:
-    """control (2N,); active: the rows with a positive multiplier; multipliers (k,) of those; solves: QPs it took."""
+    """The control (2N,); the active rows, which have a positive multiplier; these multipliers (k,); number of QPs solved."""
 
     control: Array
     active: WorkingSet
     multipliers: Array
-    solves: int
-
-
-def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False, thorough: bool = True) -> QPSolution | None:
-    """Return the solution, None where no control meets every row.
-
-    working: rows to begin with, say those of the last solve. elastic: rows that contradict each other share the violation
-    instead (least squares, each weighted by what its control can move; the first `MOST_ELASTIC` of many), so that there always is
-    an answer. thorough: where the working set comes to no end, solve with every row at once, which can take a hundred times as
-    long.
-    """
-    goal_control, (inverse, _, factor) = qp.cost.goal_control, qp.cost.factors
-    control, multipliers = goal_control, np.zeros(0)
-    for solves in range(1, MAX_ROUNDS + 1):
-        if len(working):
-            softness = ELASTICITY if elastic else 0.0
-            space = reduce_to_range_space(*qp.terms, *working.rows, inverse, factor, goal_control, softness)
-            pressing = multipliers_of(*space[1:], elastic=elastic)
-            if pressing is DualStatus.CONTRADICTION:
-                return None
-            if pressing is DualStatus.UNSOLVED:
-                break
-            multipliers, control = pressing, apply_multipliers(pressing, space[0], goal_control)
-        # rows just solved for are met but for rounding; an elastic row may stay violated
-        obstacle, step = find_violated(*qp.terms, control, *working.rows, TOLERANCE)
-        if not len(obstacle) or (elastic and len(working) > MOST_ELASTIC):
-            active = multipliers > 0
-            return QPSolution(control, working.only(active), multipliers[active], solves)
-        kept = working if elastic else working.only(multipliers > 0)
-        working = WorkingSet(*unite_rows(*kept.rows, obstacle, step, qp.limits.shape[1]))
-    return solve_full(qp) if thorough and not elastic else None
-
-
-@compiled
-def unite_rows(
-    obstacle: Indices, step: Indices, other_obstacle: Indices, other_step: Indices, steps: int
-) -> tuple[Indices, Indices]:
-    """Return the rows of two sets, each once, in order of obstacle and step (0..steps - 1)."""
-    flat = np.unique(np.concatenate((obstacle * steps + step, other_obstacle * steps + other_step)))
-    return flat // steps, flat % steps
+    solves: int = 0
 
 
 class DualStatus(Enum):
-    """Why there is no control for a working set: its rows contradict each other, or the solver failed."""
+    """Why there are no multipliers for a working set: its rows contradict each other, or the solver failed."""
 
     CONTRADICTION = 'contradiction'
     UNSOLVED = 'unsolved'
@@ -126,88 +92,124 @@ class DualStatus(Enum):
 Failed: TypeAlias = Literal[DualStatus.CONTRADICTION, DualStatus.UNSOLVED]
 
 
-def solve_with_rows(cost: Cost, rows: Array, limits: Array) -> Array | Failed:
+class DualQP(NamedTuple):
+    """The QP for the multipliers of k rows M, in units in which a row's multiplier changes it by one, and at most one is missing.
+
+    effects: M P (k, 2N), without these units; gram: K (k, k); missing (k,): what the goal's control leaves missing; unit (k,): of
+    each multiplier; immovable: the most that is missing in a row which the goal alone decides [m]. Such a row takes no part in K.
+    """
+
+    effects: Matrix
+    gram: Matrix
+    missing: Vector
+    unit: Vector
+    immovable: float
+
+
+def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False, thorough: bool = True) -> QPSolution | None:
+    """Solve a QP by its working set.
+
+    Parameters
+    ----------
+    qp
+        The QP, which names its solver.
+    working
+        Rows to begin with, for instance those of the last solution.
+    elastic
+        Whether rows that contradict each other share the violation (least squares, each weighted by the effect of its control;
+        the first `MOST_ELASTIC` of many), so that there always is a solution.
+    thorough
+        Whether to solve with every row at once where the working set does not end, which can take a hundred times as long.
+
+    Returns
+    -------
+    QPSolution | None
+        None where no control meets every row.
+    """
+    goal = qp.cost.goal_solution
+    control, multipliers = goal.control, np.zeros(0)
+    for solves in range(1, MAX_ROUNDS + 1):
+        if len(working):
+            dual = reduce_to_range_space(qp.obstacle_rows, *working.rows, goal, ELASTICITY if elastic else 0.0)
+            found = solve_dual(dual, qp.backend, elastic=elastic)
+            if found is DualStatus.CONTRADICTION:
+                return None
+            if found is DualStatus.UNSOLVED:
+                break
+            multipliers, control = found, goal.control + found @ dual.effects
+        # rows just solved for are met but for rounding; an elastic row may stay violated
+        obstacle, step = find_violated(qp.obstacle_rows, control, *working.rows, TOLERANCE)
+        if not len(obstacle) or (elastic and len(working) > MOST_ELASTIC):
+            active = multipliers > 0
+            return QPSolution(control, working.only(active), multipliers[active], solves)
+        kept = working if elastic else working.only(multipliers > 0)
+        working = kept.unite(obstacle, step, qp.limits.shape[1])
+    return solve_full(qp) if thorough and not elastic else None
+
+
+def solve_with_rows(goal: GoalSolution, rows: Array, limits: Array, backend: str) -> Array | Failed:
     """Return the control (2N,) of the least cost with rows (k, 2N) u >= limits (k,)."""
-    inverse, _, factor = cost.factors
-    space = range_space(rows, inverse, factor, limits, cost.goal_control, 0.0)
-    pressing = multipliers_of(*space[1:], elastic=False)
-    return pressing if isinstance(pressing, DualStatus) else apply_multipliers(pressing, space[0], cost.goal_control)
+    dual = range_space(rows, limits, goal, 0.0)
+    multipliers = solve_dual(dual, backend)
+    return multipliers if isinstance(multipliers, DualStatus) else goal.control + multipliers @ dual.effects
 
 
-def multipliers_of(gram: Array, missing: Array, unit: Array, stuck: float, *, elastic: bool) -> Array | Failed:
-    """Return the multipliers y (k,) >= 0 of least 1/2 y'Ky - m'y, given as of `range_space`."""
-    if stuck > TOLERANCE and not elastic:
+def solve_dual(dual: DualQP, backend: str, *, elastic: bool = False) -> Array | Failed:
+    """Return the multipliers y (k,) >= 0 of least 1/2 y'Ky - m'y."""
+    gram, missing = dual.gram, dual.missing
+    if dual.immovable > TOLERANCE and not elastic:
         return DualStatus.CONTRADICTION
-    answer = solve_piqp(DenseQP(gram.T, -missing, lower=np.zeros(len(missing))))
+    answer = find_solver(backend)(DenseQP(gram.T, -missing, lower=np.zeros(len(missing))))
     if not answer.solved:
-        # Farkas: a combination y >= 0 of the rows that moves nothing and yet is missing something
+        # Farkas: a combination y >= 0 of the rows that changes nothing although something is missing
         ray = answer.x / max(float(answer.x.max()), 1e-300)
         return DualStatus.CONTRADICTION if np.abs(gram @ ray).max() < FARKAS * float(missing @ ray) else DualStatus.UNSOLVED
-    multipliers, largest, short, slack = refine_multipliers(gram, missing, unit, answer.x)
+    multipliers, largest, short, slack = refine_multipliers(gram, missing, dual.unit, answer.x)
     if short > RESIDUAL * (largest if elastic else 1.0) or slack > RESIDUAL * largest**2:
         return DualStatus.UNSOLVED
     return multipliers
 
 
 @compiled
-def range_space(
-    rows: Matrix, inverse: Vector, factor: Matrix, limits: Vector, goal_control: Vector, softness: float
-) -> tuple[Matrix, Matrix, Vector, Vector, float]:
-    """Return what the rows' multipliers do, in units in which each row moves itself by one, and the most that is missing is one.
-
-    M P (k, 2N); K (k, k), softness added to its diagonal; what the goal's control misses (k,); the unit of each multiplier (k,);
-    and the most that is missing in a row which the goal alone decides [m]: such a row has no part in the rest.
-    """
-    pressed, gram = schur_complement(rows, inverse, factor)
-    k, stuck = len(limits), -np.inf
-    scaled, scale = limits - multiply_vector(rows, goal_control), np.ones(k)
+def range_space(rows: Matrix, limits: Vector, goal: GoalSolution, softness: float) -> DualQP:
+    """Return the dual QP of k rows (k, 2N) with limits (k,); softness is added to the diagonal of K."""
+    effects, gram = schur_complement(rows, goal.inverse, goal.factor)
+    k, immovable = len(limits), -np.inf
+    missing, unit = limits - multiply_vector(rows, goal.control), np.ones(k)
     for i in range(k):
-        wanted = 0.0
+        alone = 0.0
         for u in range(rows.shape[1]):
-            wanted += rows[i, u] * rows[i, u] * inverse[u]
-        if gram[i, i] < IMMOVABLE * wanted:
-            stuck = max(stuck, scaled[i])
-            gram[i], gram[:, i], scaled[i] = 0.0, 0.0, 0.0
+            alone += rows[i, u] * rows[i, u] * goal.inverse[u]
+        if gram[i, i] < IMMOVABLE * alone:
+            immovable = max(immovable, missing[i])
+            gram[i], gram[:, i], missing[i] = 0.0, 0.0, 0.0
             gram[i, i] = 1.0
     for i in range(k):
-        scale[i] = 1.0 / np.sqrt(gram[i, i])
-        scaled[i] *= scale[i]
+        unit[i] = 1.0 / np.sqrt(gram[i, i])
+        missing[i] *= unit[i]
     for i in range(k):
         for j in range(k):
-            gram[i, j] *= scale[i] * scale[j]
+            gram[i, j] *= unit[i] * unit[j]
         gram[i, i] += softness
-    size = max(np.abs(scaled).max(), 1e-300)
-    return pressed, gram, scaled / size, scale * size, stuck
+    size = max(np.abs(missing).max(), 1e-300)
+    return DualQP(effects, gram, missing / size, unit * size, immovable)
 
 
 @compiled
-def reduce_to_range_space(
-    responses: Tensor,
-    further: Tensor,
-    weights: Matrix,
-    coefficients: Tensor,
-    limits: Matrix,
-    obstacle: Indices,
-    step: Indices,
-    inverse: Vector,
-    factor: Matrix,
-    goal_control: Vector,
-    softness: float,
-) -> tuple[Matrix, Matrix, Vector, Vector, float]:
-    """Return the `range_space` of the rows of k pairs of obstacle and step."""
-    wanted = np.empty(len(step))
+def reduce_to_range_space(rows: ObstacleRows, obstacle: Indices, step: Indices, goal: GoalSolution, softness: float) -> DualQP:
+    """Return the dual QP of k pairs of obstacle and step."""
+    limits = np.empty(len(step))
     for i in range(len(step)):
-        wanted[i] = limits[obstacle[i], step[i]]
-    rows = collect_rows(responses, further, weights, coefficients, obstacle, step)
-    return range_space(rows, inverse, factor, wanted, goal_control, softness)
+        limits[i] = rows.limits[obstacle[i], step[i]]
+    return range_space(collect_rows(rows, obstacle, step), limits, goal, softness)
 
 
 @compiled
 def refine_multipliers(gram: Matrix, missing: Vector, unit: Vector, answer: Vector) -> tuple[Vector, float, float, float]:
-    """Sharpen an interior-point answer: solve for the multipliers that are not zero, if that keeps their signs.
+    """Refine an interior-point solution: solve directly for the multipliers that are not zero, if that keeps their signs.
 
     Returns them (k,) without their units, the largest in its unit, but at least 1, the most that a row misses, and the largest
-    product of a multiplier and what its row has to spare.
+    product of a multiplier and the slack of its row.
     """
     active = np.flatnonzero(answer > NEGLIGIBLE * max(0.0, answer.max()))
     n = len(active)
@@ -218,16 +220,16 @@ def refine_multipliers(gram: Matrix, missing: Vector, unit: Vector, answer: Vect
         for j in range(n):
             inner[i, j] = gram[active[i], active[j]]
     factor = factorise_cholesky(inner, 0.0)
-    sharp = solve_lower_transposed(factor, solve_lower(factor, wanted)[:, 0].copy())
-    off = 0.0  # infinite where a sign is lost, or the rows are not independent: then the answer stays as it is
+    exact = solve_lower_transposed(factor, solve_lower(factor, wanted)[:, 0].copy())
+    residual = 0.0  # infinite where a sign is lost, or the rows are not independent: then the answer stays as it is
     for i in range(n):
         left = -wanted[i, 0]
         for j in range(n):
-            left += inner[i, j] * sharp[j]
-        off = max(off, abs(left)) if sharp[i] > 0 else np.inf
-    if off < SHARP:
+            left += inner[i, j] * exact[j]
+        residual = max(residual, abs(left)) if exact[i] > 0 else np.inf
+    if residual < EXACT:
         for i in range(n):
-            multipliers[active[i]] = sharp[i]
+            multipliers[active[i]] = exact[i]
     short, slack = 0.0, 0.0
     for i in range(len(answer)):
         left = -missing[i]
@@ -237,34 +239,26 @@ def refine_multipliers(gram: Matrix, missing: Vector, unit: Vector, answer: Vect
     return multipliers * unit, max(multipliers.max(), 1.0), short, slack
 
 
-@compiled
-def apply_multipliers(multipliers: Vector, pressed: Matrix, goal_control: Vector) -> Vector:
-    """Return the control (2N,) that multipliers (k,) of rows make of the goal's: u_goal + P M'y, for M P (k, 2N)."""
-    control: Vector = goal_control + multiply(np.expand_dims(multipliers, 0), pressed)[0]
-    return control
+def solve_full(qp: ReachingQP, backend: str | None = None) -> QPSolution | None:
+    """Solve with every row at once, by the solver of the QP or another one: slow, for cross-checks and as a last resort.
 
-
-def solve_full(qp: ReachingQP, backend: str = 'piqp') -> QPSolution | None:
-    """Solve with every row at once, by PIQP or any qpsolvers backend: the slow road, for cross-checks and as a last resort.
-
-    Its active rows are those met with less than 1e-7 m to spare; their multipliers are not returned (NaN).
+    The active rows are those met with less than 1e-7 m to spare; their multipliers are not known (NaN).
     """
-    cost = qp.cost
+    cost, backend = qp.cost, backend or qp.backend
     obstacle, step = np.divmod(np.arange(qp.limits.size), qp.limits.shape[1])
     hard = cost.softness == 0
     unit = np.sqrt(1.0 / cost.hessian)  # makes the Hessian of the scaled control 1
     soft = cost.goal_rows[~hard] * unit
     pull = soft.T / cost.softness[~hard]
-    c = -pull @ cost.goal_targets[~hard] - (0.0 if cost.linear is None else unit * cost.linear)
     dense = DenseQP(
         np.eye(len(unit)) + pull @ soft,
-        c,
+        -pull @ cost.goal_targets[~hard] - unit * cost.linear,
         cost.goal_rows[hard] * unit,
         cost.goal_targets[hard],
         qp.rows(obstacle, step) * unit,
         qp.limits.ravel(),
     )
-    scaled = solve_piqp(dense, attempts=1) if backend == 'piqp' else solve_named(dense, backend)
+    scaled = solve_piqp(dense, attempts=1) if backend == 'piqp' else find_solver(backend)(dense)
     if not scaled.solved:
         return None
     control = unit * scaled.x

@@ -40,7 +40,7 @@ class MarkerObstacle:
 
 
 @dataclass(frozen=True)
-class MarkerScene:
+class MarkerTable:
     """The present markers; immutable: an update returns a new table.
 
     frame_id: of all markers; stamp_ns: newest stamp of the last message, 0 if it had none; dropped: markers of the last message
@@ -52,7 +52,7 @@ class MarkerScene:
     stamp_ns: int = 0
     dropped: Mapping[str, int] = field(default_factory=dict)
 
-    def updated(self, message: Any, now_ns: int, plane: str, radius_stddev: float) -> MarkerScene:
+    def with_message(self, message: Any, now_ns: int, plane: str, radius_stddev: float) -> MarkerTable:
         """Return the table after a MarkerArray.
 
         now_ns: start of the lifetime of an unstamped marker; 0 if unknown, and the marker does not expire. radius_stddev: [m].
@@ -86,7 +86,7 @@ class MarkerScene:
                 held[key] = _decode_marker(marker, name, stamp_ns or now_ns, plane, radius_stddev)
         if len(held) > MAX_ROWS:
             raise MessageError('markers', f'at most {MAX_ROWS} obstacles held at a time', len(held))
-        return MarkerScene(MappingProxyType(held), frame_id, newest_ns, MappingProxyType(dropped))
+        return MarkerTable(MappingProxyType(held), frame_id, newest_ns, MappingProxyType(dropped))
 
     def obstacles(self, now_ns: int) -> Obstacles:
         """Return the obstacles that exist at a time [ns]; the id of an obstacle is ns/id."""
@@ -98,7 +98,7 @@ class MarkerScene:
             tuple(_encode_identity(key) for key in held),
         )
 
-    def unchanged(self, now_ns: int) -> tuple[float, float]:
+    def find_unchanged_interval(self, now_ns: int) -> tuple[float, float]:
         """Return the interval [start, end) [ns] about a time within which no marker expires."""
         ends = [marker.expires_ns for marker in self.markers.values() if marker.expires_ns is not None]
         earlier, later = (end for end in ends if end <= now_ns), (end for end in ends if end > now_ns)

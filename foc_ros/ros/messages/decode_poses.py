@@ -18,7 +18,7 @@ MAX_COORDINATE = 1e4
 MAX_GOALS = 256
 
 
-def hand_sample(message: Any, plane: str) -> HandSample:
+def decode_hand_sample(message: Any, plane: str) -> HandSample:
     """Decode a geometry_msgs/PoseStamped as a hand sample; the orientation is not used.
 
     Raises MessageError for a coordinate that is not finite or beyond MAX_COORDINATE, and for a stamp of 0, which means "not set".
@@ -30,7 +30,7 @@ def hand_sample(message: Any, plane: str) -> HandSample:
     return HandSample(stamp_ns, as_readonly(position), float(height), str(message.header.frame_id))
 
 
-def goals_of_pose_array(message: Any, plane: str) -> tuple[Array, str]:
+def decode_goals(message: Any, plane: str) -> tuple[Array, str]:
     """Decode a geometry_msgs/PoseArray as goals (g, 2) [m] and their frame; an array without poses gives g = 0."""
     if len(message.poses) > MAX_GOALS:
         raise MessageError('poses', f'at most {MAX_GOALS} goals', len(message.poses))
@@ -38,7 +38,7 @@ def goals_of_pose_array(message: Any, plane: str) -> tuple[Array, str]:
     return project(np.array(points, dtype=float).reshape(-1, 3), plane)[0], str(message.header.frame_id)
 
 
-def goal_of_pose(message: Any, plane: str) -> tuple[Array, str]:
+def decode_goal(message: Any, plane: str) -> tuple[Array, str]:
     """Decode a geometry_msgs/PoseStamped as one goal (1, 2) [m] and its frame; the stamp is not used."""
     return project([_decode_point(message.pose.position, 'pose.position')], plane)[0], str(message.header.frame_id)
 

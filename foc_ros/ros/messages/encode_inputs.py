@@ -18,7 +18,7 @@ CLOUD_ROW = np.dtype([(name, '<i4' if name == 'id' else '<f4') for name in _NAME
 """One obstacle of the `obstacles` table [m], and its id."""
 
 
-def pose(types: MessageTypes, position: Iterable[float]) -> Any:
+def encode_pose(types: MessageTypes, position: Iterable[float]) -> Any:
     """Encode a geometry_msgs/Pose without rotation."""
     x, y, z = position
     return types.make(
@@ -35,12 +35,14 @@ def _no_rotation(types: MessageTypes) -> Any:
 
 def hand_pose(types: MessageTypes, stamp_ns: int, frame_id: str, position: Iterable[float]) -> Any:
     """Encode a geometry_msgs/PoseStamped."""
-    return types.make('geometry_msgs/msg/PoseStamped', header=header(types, stamp_ns, frame_id), pose=pose(types, position))
+    return types.make(
+        'geometry_msgs/msg/PoseStamped', header=header(types, stamp_ns, frame_id), pose=encode_pose(types, position)
+    )
 
 
 def goal_poses(types: MessageTypes, stamp_ns: int, frame_id: str, positions: Array) -> Any:
     """Encode goals (g, 3) as a geometry_msgs/PoseArray."""
-    poses = [pose(types, position) for position in positions]
+    poses = [encode_pose(types, position) for position in positions]
     return types.make('geometry_msgs/msg/PoseArray', header=header(types, stamp_ns, frame_id), poses=poses)
 
 

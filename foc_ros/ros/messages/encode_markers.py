@@ -37,7 +37,7 @@ DEVIATION: Colour = (0.85, 0.35, 0.2, 0.25)
 UNLIKELY, LIKELY = np.array([0.25, 0.45, 0.85]), np.array([0.95, 0.6, 0.05])
 
 
-def marker_array(prediction: Prediction, obstacles: Obstacles, plane: str, types: MessageTypes) -> Any:
+def encode_markers(prediction: Prediction, obstacles: Obstacles, plane: str, types: MessageTypes) -> Any:
     """Encode the MarkerArray; unsolved candidates are grey and labelled with their status; obstacles: those at the stamp."""
     encoder = _MarkerEncoder(prediction, plane, types)
     unsolved = [outcome for outcome in prediction.candidates if not outcome.is_solved]
@@ -117,16 +117,19 @@ class _MarkerEncoder:
         **rest: Any,
     ) -> Any:
         make = self.types.make
-        orientation = _compute_rotation(angle, self.plane) if kind == CYLINDER else (0.0, 0.0, 0.0, 1.0)
-        pose = make(
-            'geometry_msgs/msg/Pose',
-            position=self._encode_point(*centre),
-            orientation=make('geometry_msgs/msg/Quaternion', **dict(zip('xyzw', orientation, strict=True))),
+        x, y, z, w = _compute_rotation(angle, self.plane) if kind == CYLINDER else (0.0, 0.0, 0.0, 1.0)
+        orientation = make('geometry_msgs/msg/Quaternion', x=x, y=y, z=z, w=w)
+        return make(
+            'visualization_msgs/msg/Marker',
+            ns=name,
+            id=identity,
+            type=kind,
+            pose=make('geometry_msgs/msg/Pose', position=self._encode_point(*centre), orientation=orientation),
+            scale=make('geometry_msgs/msg/Vector3', **dict(zip('xyz', scale, strict=True))),
+            color=make('std_msgs/msg/ColorRGBA', **dict(zip('rgba', colour, strict=True))),
+            **self._shared_fields,
+            **rest,
         )
-        size = make('geometry_msgs/msg/Vector3', **dict(zip('xyz', scale, strict=True)))
-        color = make('std_msgs/msg/ColorRGBA', **dict(zip('rgba', colour, strict=True)))
-        fields = {'ns': name, 'id': identity, 'type': kind, 'pose': pose, 'scale': size, 'color': color}
-        return make('visualization_msgs/msg/Marker', **fields, **self._shared_fields, **rest)
 
     def _lift(self, positions: Array) -> list[list[float]]:
         """Return positions in the plane (m, 2) as points in space."""

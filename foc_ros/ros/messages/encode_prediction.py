@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from foc_ros.core.types import NANOSECONDS, Obstacles, Prediction
 
 from .encode_inputs import encode_table, hand_pose
-from .encode_markers import marker_array
+from .encode_markers import encode_markers
 from .plane import lift
 from .ranking import cost_ratios, ranked
 from .types import MessageTypes, header
@@ -67,7 +67,7 @@ def likelihood_array(prediction: Prediction, types: MessageTypes) -> Any:
     return types.make('std_msgs/msg/Float64MultiArray', layout=layout, data=np.array(rows, dtype=float).ravel())
 
 
-def path(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
+def encode_path(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
     """Encode the most likely candidate as a nav_msgs/Path with stamps in the future; no poses if nothing was solved."""
     stamp_ns, frame_id = prediction.stamp_ns, prediction.frame_id
     poses: list[Any] = []
@@ -82,8 +82,8 @@ Encoder = Callable[[Prediction, Obstacles, str, MessageTypes], Any]
 OUTPUTS: dict[str, tuple[str, Encoder]] = {
     'prediction': ('sensor_msgs/msg/PointCloud2', lambda prediction, _, plane, types: prediction_cloud(prediction, plane, types)),
     'likelihoods': ('std_msgs/msg/Float64MultiArray', lambda prediction, _, __, types: likelihood_array(prediction, types)),
-    'path': ('nav_msgs/msg/Path', lambda prediction, _, plane, types: path(prediction, plane, types)),
-    'markers': ('visualization_msgs/msg/MarkerArray', marker_array),
+    'path': ('nav_msgs/msg/Path', lambda prediction, _, plane, types: encode_path(prediction, plane, types)),
+    'markers': ('visualization_msgs/msg/MarkerArray', encode_markers),
 }
 """Message type and encoder of every output, by the name of its topic below the node's name."""
 

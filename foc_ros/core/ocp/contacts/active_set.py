@@ -1,87 +1,60 @@
-"""Contacts that come and go, in machine code: what is let go, what is touched anew, and when that has come to an end."""
+"""Active set iteration over contacts: which are released, which are added, and when the set has settled."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled
-from foc_ros.core.ocp.qp import control_to_goal, goal_factors
+from foc_ros.core.kernels import Matrix, Vector, compiled_with_caller
+from foc_ros.core.ocp.clearance import find_penetrations
+from foc_ros.core.ocp.qp import GoalSolution
+from foc_ros.core.ocp.terms import MovingCircles, ProblemTerms
 
-from .hermite import compute_trajectory, find_penetrations
+from .contacts import Contacts
+from .hermite import compute_trajectory
 from .newton import newton_on_contacts
 
 SETTLED = 1e-5
-"""Largest move of a contact at which the steps end, relative to the scene: they converge quadratically, so 1e-9 is left."""
+"""Largest move of a contact, relative to the scene, at which the Newton iteration ends. Quadratic convergence leaves about
+1e-9."""
 CLEAR = 3e-8
-"""Depth in a circle that is rounding; relative."""
-CHANGES = 8
-"""How often contacts may be let go or found anew."""
-NEW = 1e-6
-"""Force at which a new contact begins, relative to the largest: hardly any curvature."""
+"""Depth in a circle that counts as rounding, relative to the scene."""
+MAX_CHANGES = 8
+"""How often contacts may be released or added."""
+NEW_MULTIPLIER = 1e-6
+"""Multiplier with which a new contact begins, relative to the largest, so that it bends the cost hardly at all."""
 
 
-@compiled
+@compiled_with_caller
 def update_active_contacts(
-    motion: Tensor,
-    free: Matrix,
-    centre: Matrix,
-    drift: Matrix,
-    reach: Vector,
-    short: Vector,
-    pace: float,
-    hessian: Vector,
-    goal_rows: Matrix,
-    goal_targets: Vector,
-    softness: Vector,
-    obstacle: Indices,
-    time: Vector,
-    force: Vector,
-    near: Vector,
-    extent: float,
-) -> tuple[bool, bool, Vector, Matrix, Indices, Vector, Vector]:
-    """Find the least cost `qp.effort_cost` near a control (2N,) that keeps clear of every circle at every time.
+    terms: ProblemTerms, circles: MovingCircles, goal: GoalSolution, contacts: Contacts, near: Vector
+) -> tuple[bool, bool, Vector, Matrix, Contacts]:
+    """Find the least cost near a control (2N,) that keeps clear of every circle at every time, from contacts to begin with.
 
-    From contacts (k,) to begin with, which slide: those that pull are let go, and where a circle is entered there is a new one.
-    motion ... pace: as in `touching`; hessian (2N,) and the goal: as in `qp.Cost`; extent: of the scene [m].
-    Returns whether there is one, and whether it has other contacts, so that it may pass circles on another side; the control, its
-    course, and its contacts' obstacles, times and forces.
+    Contacts slide; those with a negative multiplier are released, and a circle that is penetrated becomes a new one. Returns
+    whether there is a solution, whether it has other contacts, so that it may be in another homotopy class, the control, its
+    trajectory and its contacts.
     """
-    inverse, root, factor = goal_factors(hessian, goal_rows, softness)
-    goal_control = control_to_goal(root, factor, goal_targets)
-    control, obstacle, time, force = near.copy(), obstacle.copy(), time.copy(), force.copy()
-    for count in range(CHANGES + 1):
-        if len(force):
-            found, control, time, force = newton_on_contacts(
-                motion,
-                free,
-                inverse,
-                factor,
-                goal_control,
-                centre,
-                drift,
-                reach,
-                short,
-                pace,
-                obstacle,
-                time,
-                force,
-                control,
-                1,
-                SETTLED * extent,
-            )
+    motion = terms.motion
+    control, obstacle = near.copy(), contacts.obstacle.copy()
+    time, multiplier = contacts.time.copy(), contacts.multiplier.copy()
+    for count in range(MAX_CHANGES + 1):
+        if len(multiplier):
+            active = Contacts(obstacle, time, multiplier)
+            found, control, active = newton_on_contacts(motion, circles, goal, active, control, True, SETTLED * terms.extent)
             if not found:
                 break
+            time, multiplier = active.time, active.multiplier
         else:
-            control = goal_control.copy()
-        pushing = np.flatnonzero(force > 0.0)
-        if len(pushing) < len(force):
-            obstacle, time, force = obstacle[pushing], time[pushing], force[pushing]
+            control = goal.control.copy()
+        pushing = np.flatnonzero(multiplier > 0.0)
+        if len(pushing) < len(multiplier):
+            obstacle, time, multiplier = obstacle[pushing], time[pushing], multiplier[pushing]
             continue
-        course = compute_trajectory(motion, free, control)
-        new = find_penetrations(course, centre, drift, reach, short, pace, CLEAR * extent)
+        trajectory = compute_trajectory(motion, control)
+        new = find_penetrations(trajectory, circles, CLEAR * terms.extent)
         if len(new) == 0:
-            return True, count > 0, control, course, obstacle, time, force
-        slight = NEW * (force.max() if len(force) else 1.0)
+            return True, count > 0, control, trajectory, Contacts(obstacle, time, multiplier)
+        slight = NEW_MULTIPLIER * (multiplier.max() if len(multiplier) else 1.0)
         obstacle = np.concatenate((obstacle, new[:, 0].astype(np.intp)))
-        time, force = np.concatenate((time, new[:, 1])), np.concatenate((force, np.full(len(new), slight)))
-    return False, False, control, free.copy(), obstacle, time, force
+        time, multiplier = np.concatenate((time, new[:, 1])), np.concatenate((multiplier, np.full(len(new), slight)))
+    return False, False, control, motion.free.copy(), Contacts(obstacle, time, multiplier)

@@ -1,70 +1,72 @@
-"""Where the mean is held off circles: obstacle, time and force of each contact."""
+"""Contacts of the mean with circles, as data."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.core.kernels import Indices, Vector, compiled
-from foc_ros.core.ocp.working_set import Index, WorkingSet
+from foc_ros.core.kernels import Indices, Vector, compiled, freeze
+from foc_ros.core.ocp.working_set import WorkingSet
 from foc_ros.core.types import Array
 
-MERGED = 1.5
-"""Distance in steps at which two contacts with one circle are one, that rows at steps have to straddle."""
+MERGE_DISTANCE = 1.5
+"""Distance in steps up to which neighbouring contacts with one circle become one: rows at steps straddle a contact."""
 
 
-@dataclass(frozen=True, eq=False)
-class Contacts:
-    """k contacts: obstacle (k,), its row; time (k,) in steps from now, fractions allowed; force (k,), the multiplier [m/s^6]."""
+class Contacts(NamedTuple):
+    """k contacts, with frozen arrays.
 
-    obstacle: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
-    time: Array = field(default_factory=lambda: np.zeros(0))
-    force: Array = field(default_factory=lambda: np.zeros(0))
+    obstacle (k,): row of the circle; time (k,): in steps from now, fractions allowed; multiplier (k,): how much the cost grows
+    with each metre more of distance to keep [m/s^6].
+    """
 
-    def __len__(self) -> int:
-        return len(self.obstacle)
-
-    @property
-    def columns(self) -> tuple[Index, Array, Array]:
-        """Obstacles, times and forces."""
-        return self.obstacle, self.time, self.force
+    obstacle: Indices
+    time: Vector
+    multiplier: Vector
 
     @staticmethod
     def at_steps(rows: WorkingSet, multipliers: Array) -> Contacts:
-        """Return obstacle rows, which hold at steps, with their multipliers (k,) as contacts."""
-        return Contacts(rows.obstacle, rows.step.astype(np.float64) + 1.0, multipliers)
+        """Return the contacts of obstacle rows, which hold at steps, with their multipliers (k,)."""
+        return freeze(Contacts(rows.obstacle, rows.step.astype(np.float64) + 1.0, multipliers))
 
     def rows(self, steps: int) -> tuple[WorkingSet, Array]:
-        """Return the rows at the nearest steps, each once, in order, and the force on each."""
+        """Return the rows at the nearest steps, each once, in order, and the multiplier of each."""
         step = np.clip(np.rint(self.time).astype(np.intp), 1, steps) - 1
         flat, which = np.unique(self.obstacle * steps + step, return_inverse=True)
-        force = np.zeros(len(flat))
-        np.add.at(force, which, self.force)
-        return WorkingSet(*np.divmod(flat, steps)), force
+        multiplier = np.zeros(len(flat))
+        np.add.at(multiplier, which, self.multiplier)
+        return WorkingSet(*np.divmod(flat, steps)), multiplier
+
+    def merge(self, first_alike: Indices) -> Contacts:
+        """Return one contact for each place, where these come from rows at steps or another problem: see `merge_contacts`."""
+        return freeze(merge_contacts(self, first_alike))
+
+
+NO_CONTACTS = freeze(Contacts(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0)))
 
 
 @compiled
-def merge(obstacle: Indices, time: Vector, force: Vector, first_alike: Indices) -> tuple[Indices, Vector, Vector]:
-    """Return contacts (k,) in order, neighbours with the same circle as one: at the centre of their forces, with their sum.
+def merge_contacts(contacts: Contacts, first_alike: Indices) -> Contacts:
+    """Return contacts in order, with neighbours on the same circle as one: at the centre of their multipliers, with their sum.
 
-    first_alike (m,): for each circle the first that is the same. Forces that are not known, as the full QP leaves them, count
-    as 1.
+    first_alike (m,): for each circle the first that is the same. Multipliers that are not known, as after a full QP, count as 1.
     """
-    k, count = len(obstacle), 0
-    circle, at, push = np.empty(k, np.intp), np.empty(k), np.empty(k)
+    k, count = len(contacts.time), 0
+    circle, time, weight = np.empty(k, np.intp), np.empty(k), np.empty(k)
     for i in range(k):
-        j, place = first_alike[obstacle[i]], i
-        while place > 0 and (circle[place - 1] > j or (circle[place - 1] == j and at[place - 1] > time[i])):
-            circle[place], at[place], push[place] = circle[place - 1], at[place - 1], push[place - 1]
+        j, place, multiplier = first_alike[contacts.obstacle[i]], i, contacts.multiplier[i]
+        while place > 0 and (circle[place - 1] > j or (circle[place - 1] == j and time[place - 1] > contacts.time[i])):
+            circle[place], time[place], weight[place] = circle[place - 1], time[place - 1], weight[place - 1]
             place -= 1
-        circle[place], at[place], push[place] = j, time[i], force[i] if np.isfinite(force[i]) and force[i] > 0.0 else 1.0
-    total, turned, last = np.zeros(k), np.zeros(k), -np.inf
+        circle[place], time[place] = j, contacts.time[i]
+        weight[place] = multiplier if np.isfinite(multiplier) and multiplier > 0.0 else 1.0
+    total, moment, last = np.zeros(k), np.zeros(k), -np.inf
     for i in range(k):
-        if i == 0 or circle[i] != circle[count - 1] or at[i] - last > MERGED:
+        if i == 0 or circle[i] != circle[count - 1] or time[i] - last > MERGE_DISTANCE:
             circle[count] = circle[i]
             count += 1
-        last = at[i]
-        total[count - 1] += push[i]
-        turned[count - 1] += push[i] * at[i]
-    return circle[:count].copy(), turned[:count] / total[:count], total[:count].copy()
+        last = time[i]
+        total[count - 1] += weight[i]
+        moment[count - 1] += weight[i] * time[i]
+    return Contacts(circle[:count].copy(), moment[:count] / total[:count], total[:count].copy())

@@ -1,136 +1,158 @@
-"""One point on the curve in one call: its contacts settled by Newton steps, its class held, and the k that it achieves."""
+"""Points that satisfy the Karush-Kuhn-Tucker conditions at given (tau, lambda): found by Newton steps, and checked by a QP."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.core.homotopy import is_same_class, sweep_angles
-from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled
-from foc_ros.core.ocp.minimum_k import MinimumSafetyFactor, minimum_safety_factor
+from foc_ros.core.dynamics.condensed import largest_shift
+from foc_ros.core.homotopy import compute_swept_angles, is_same_class, sweep_angles
+from foc_ros.core.kernels import Matrix, Vector, compiled, freeze
+from foc_ros.core.ocp.clearance import find_deepest, find_penetrations, required_distance
+from foc_ros.core.ocp.minimum_safety_factor import MinimumSafetyFactor, minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.ocp.qp import required_margins
+from foc_ros.core.ocp.qp import NO_TIMES, compute_hessian, effort_cost, solve_goal
+from foc_ros.core.ocp.terms import Motion, MovingCircles, ProblemTerms
+from foc_ros.core.ocp.working_set import DualStatus, solve_with_rows
 from foc_ros.core.types import Array
 
-from .active_set import update_active_contacts
+from .active_set import CLEAR, SETTLED, update_active_contacts
 from .contacts import Contacts
-from .hermite import compute_trajectory
+from .hermite import compute_trajectory, interpolate, interpolation_row
+from .newton import newton_on_contacts
 
-ITS_OWN = np.zeros(0)
+STAYS = 3e-7
+"""Largest move of the mean, relative to the scene, at which a linearisation counts as returning its own control."""
+CROSSING = 0.1
+"""Depth in a circle between two steps, relative to the smallest reach, from which the mean may be on the wrong side of it."""
+ANY_CLASS = np.zeros(0)
 
 
-@dataclass(frozen=True, eq=False)
-class KktPoint:
-    """A control (2N,), the contacts that hold it, and the smallest k that it achieves, with its place."""
+class KktPoint(NamedTuple):
+    """A control (2N,), the contacts that hold it, and its minimum safety factor, between the steps too."""
 
-    control: Array
+    control: Vector
     contacts: Contacts
-    least: MinimumSafetyFactor
+    minimum: MinimumSafetyFactor
 
 
 def solve_kkt_point(
-    problem: Problem, control: Array, contacts: Contacts, tau: float, lam: float, way: Array | None = None
+    problem: Problem, control: Array, contacts: Contacts, tau: float, lam: float, class_angles: Array | None = None
 ) -> KktPoint | None:
-    """Find the solution at (tau, lambda) near a control (2N,) that keeps out of circles between the steps too.
+    """Find the solution at (tau, lambda) that keeps out of circles between the steps too, near a control.
 
-    contacts: to begin with; way (m,): the class that it has to be in, as of `newton.way_of`; that of the control if not given.
-    None where there is none in that class.
+    Parameters
+    ----------
+    problem
+        The problem.
+    control
+        Stacked control to begin with, (2N,).
+    contacts
+        Contacts to begin with.
+    tau, lam
+        Clearance term [m^2] and weight of the variances [1/s^6].
+    class_angles
+        (m,): angles that the mean has to sweep about the centres, to within half a turn, which define its homotopy class;
+        those of the control if not given.
+
+    Returns
+    -------
+    KktPoint | None
+        None where there is none in that class.
     """
-    found, solution, obstacle, time, force, least = kkt_point_kernel(
-        *problem.circles,
-        *required_margins(problem, tau),
-        *problem.costs,
-        lam,
-        *contacts.columns,
-        np.ascontiguousarray(control, dtype=float),
-        problem.extent,
-        *problem.chances,
-        problem.courses,
-        ITS_OWN if way is None else way,
-    )
-    return KktPoint(solution, Contacts(obstacle, time, force), least) if found else None
+    control = np.ascontiguousarray(control, dtype=float)
+    angles = ANY_CLASS if class_angles is None else class_angles
+    found, point = _solve_kkt_point(problem.terms, problem.circles(tau), lam, contacts, control, angles)
+    return KktPoint(point.control, freeze(point.contacts), point.minimum) if found else None
 
 
 @compiled
-def path(course: Matrix) -> Matrix:
-    """Return the positions (N + 1, 2) [m] of a course (4, N + 1)."""
-    return course[:2].T.copy()
-
-
-@compiled
-def kkt_point_kernel(
-    motion: Tensor,
-    free: Matrix,
-    centre: Matrix,
-    drift: Matrix,
-    reach: Vector,
-    short: Vector,
-    pace: float,
-    weighted_variance: Vector,
-    summed_variance: Vector,
-    goal_rows: Matrix,
-    goal_targets: Vector,
-    softness: Vector,
-    lam: float,
-    obstacle: Indices,
-    time: Vector,
-    force: Vector,
-    near: Vector,
-    extent: float,
-    maps: Tensor,
-    free_variance: Matrix,
-    error_course: Tensor,
-    initial_covariance: Matrix,
-    noise_variance: Vector,
-    centres: Tensor,
-    size_mean: Vector,
-    size_variance: Vector,
-    centre_covariance: Tensor,
-    leaving: Vector,
-    courses: Tensor,
-    way: Vector,
-) -> tuple[bool, Vector, Indices, Vector, Vector, tuple[float, int, float]]:
-    """Return whether there is a point, its control, its contacts' obstacles, times and forces, and `least_k`: see `settled`."""
-    hessian = 2.0 * (1.0 + weighted_variance + lam * summed_variance)
-    found, changed, control, course, obstacle, time, force = update_active_contacts(
-        motion,
-        free,
-        centre,
-        drift,
-        reach,
-        short,
-        pace,
-        hessian,
-        goal_rows,
-        goal_targets,
-        softness,
-        obstacle,
-        time,
-        force,
-        near,
-        extent,
-    )
-    if found and (changed or len(way) > 0):  # with the same contacts it is in the class of the control
-        wanted = way if len(way) > 0 else sweep_angles(path(compute_trajectory(motion, free, near)), courses)
-        found = is_same_class(sweep_angles(path(course), courses), wanted)
+def _solve_kkt_point(
+    terms: ProblemTerms, circles: MovingCircles, lam: float, contacts: Contacts, near: Vector, class_angles: Vector
+) -> tuple[bool, KktPoint]:
+    """Return whether there is a point near a control (2N,), and the point; class_angles (m,): none for those of the control."""
+    cost, motion = terms.cost, terms.motion
+    hessian = compute_hessian(cost, lam)
+    goal = solve_goal(hessian, np.zeros_like(hessian), cost.goal_rows, cost.goal_targets, cost.softness)
+    found, is_changed, control, trajectory, active = update_active_contacts(terms, circles, goal, contacts, near)
+    if found and (is_changed or len(class_angles) > 0):  # with the same contacts it is in the class of the control
+        wanted = class_angles
+        if len(class_angles) == 0:
+            wanted = sweep_angles(compute_trajectory(motion, near)[:2].T.copy(), terms.centre_trajectories)
+        found = is_same_class(sweep_angles(trajectory[:2].T.copy(), terms.centre_trajectories), wanted)
     if not found:
-        return False, control, obstacle, time, force, (0.0, 0, 0.0)
-    least = minimum_safety_factor(
-        motion,
-        course,
-        centre,
-        drift,
-        maps,
-        free_variance,
-        error_course,
-        initial_covariance,
-        noise_variance,
-        centres,
-        size_mean,
-        size_variance,
-        centre_covariance,
-        leaving,
-        control,
+        return False, KktPoint(control, active, MinimumSafetyFactor(0.0, 0, 0.0))
+    return True, KktPoint(control, active, minimum_safety_factor(motion, terms.chance, trajectory, control, True))
+
+
+def solve_at_fixed_times(
+    problem: Problem, control: Array, contacts: Contacts, tau: float, lam: float
+) -> tuple[Array, Contacts] | None:
+    """Find the solution near a control (2N,) whose contacts hold at given steps; None where it is none, or enters a circle."""
+    circles = problem.circles(tau)
+    found, control, contacts = _solve_at_fixed_times(
+        problem.terms, circles, lam, contacts, np.ascontiguousarray(control, dtype=float)
     )
-    return True, control, obstacle, time, force, least
+    if not found or (contacts.multiplier <= 0).any():
+        return None
+    deepest, _, _ = find_deepest(problem.positions(control), circles)
+    return None if deepest > CLEAR * problem.extent else (control, freeze(contacts))
+
+
+@compiled
+def _solve_at_fixed_times(
+    terms: ProblemTerms, circles: MovingCircles, lam: float, contacts: Contacts, near: Vector
+) -> tuple[bool, Vector, Contacts]:
+    """Return what `newton_on_contacts` does for contacts that do not slide."""
+    cost, hessian = terms.cost, compute_hessian(terms.cost, lam)
+    goal = solve_goal(hessian, np.zeros_like(hessian), cost.goal_rows, cost.goal_targets, cost.softness)
+    active = Contacts(contacts.obstacle.copy(), contacts.time.copy(), contacts.multiplier.copy())
+    return newton_on_contacts(terms.motion, circles, goal, active, near.copy(), False, SETTLED * terms.extent)
+
+
+def is_fixed_point(problem: Problem, control: Array, contacts: Contacts, tau: float, lam: float) -> bool:
+    """Tell whether the QP linearised at a control (2N,), with a row for each contact, has that control as its solution."""
+    if not len(contacts.time):
+        return True
+    rows, limits = linearise_contacts(problem.terms.motion, problem.circles(tau), control, contacts)
+    answer = solve_with_rows(effort_cost(problem, lam).goal_solution, rows, limits, problem.qp_backend)
+    if isinstance(answer, DualStatus):
+        return False
+    return largest_shift(problem.horizon.maps[:2], control, answer) < STAYS * problem.extent
+
+
+@compiled
+def linearise_contacts(motion: Motion, circles: MovingCircles, control: Vector, contacts: Contacts) -> tuple[Matrix, Vector]:
+    """Return rows n.S(s) (k, 2N) and limits (k,) on them [m]: the half-planes that touch the circles at the contacts."""
+    k = len(contacts.time)
+    rows, limits = np.empty((k, len(control))), np.empty(k)
+    trajectory = compute_trajectory(motion, control)
+    for i in range(k):
+        j, s = contacts.obstacle[i], contacts.time[i]
+        at, free = interpolate(trajectory, s, 0), interpolate(motion.free, s, 0)
+        cx, cy = circles.centre[j, 0] + s * circles.drift[j, 0], circles.centre[j, 1] + s * circles.drift[j, 1]
+        distance = np.hypot(at[0] - cx, at[1] - cy)
+        x, y = (at[0] - cx) / distance, (at[1] - cy) / distance
+        rows[i] = interpolation_row(motion.responses, s, x, y)
+        limits[i] = required_distance(circles, j, s)[0] + x * (cx - free[0]) + y * (cy - free[1])
+    return rows, limits
+
+
+def find_crossings(problem: Problem, control: Array, tau: float) -> Array:
+    """Return the times at which the mean of a control (2N,) is so deep in a circle that it may cross it between two steps."""
+    circles = problem.circles(tau)
+    if not len(circles.reach):
+        return NO_TIMES
+    times: Array = find_penetrations(problem.trajectory(control), circles, CROSSING * float(circles.reach.min()))[:, 1]
+    return times
+
+
+def compute_class_angles(problem: Problem, control: Array) -> Array:
+    """Return the angles (m,) that the mean of a control (2N,) sweeps about the centres, which define its homotopy class."""
+    return compute_swept_angles(problem.trajectory(control)[:2].T, problem.courses)
+
+
+def is_in_class(problem: Problem, control: Array, class_angles: Array) -> bool:
+    """Tell whether the mean of a control (2N,) passes every circle on the same side as one with these angles (m,)."""
+    return is_same_class(compute_class_angles(problem, control), class_angles)

@@ -1,10 +1,24 @@
-"""One contact problem in machine code: the mean pressed against circles, where it touches them and how hard."""
+"""Newton iteration on the optimality conditions of a mean that is in contact with circles.
+
+The mean behaves like a loaded beam. Let a contact at time s have distance d from the centre and multiplier y along its normal
+n. A multiplier f along its tangent t turns the normal by f d / y. As the mean passes with velocity v and acceleration a, its
+distance falls and rises again with curvature b = n.a + (t.v)^2 / d, so that a multiplier m on the rate of the distance moves the
+contact by m / y in time. With the rows
+    h = n.S(s),    r = dh/ds = n.S'(s) + (t.v / d) t.S(s),    g = t.S(s),
+S(s) the effect of the control on the position, and C the Schur complement M P M' of rows M, each Newton step solves
+    C_hh y + C_hr m + C_hg f = what h misses,
+    C_rh y + (C_rr + b / y_last) m + C_rg f = what r misses,
+    C_gh y + C_gr m + (C_gg - d / y_last) f = what g misses.
+The solution is a minimum if the first two blocks are positive definite, and d / y_last less the Schur complement of C_gg is so
+too: with a larger multiplier the mean would slip round the circle. A contact that is held at its time has no multiplier m, and is
+less stable: the mean may slip past it.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled
+from foc_ros.core.kernels import Indices, Matrix, Vector, compiled_with_caller
 from foc_ros.core.linear_algebra import (
     factorise_cholesky,
     multiply,
@@ -13,71 +27,48 @@ from foc_ros.core.linear_algebra import (
     solve_lower,
     solve_lower_transposed,
 )
-from foc_ros.core.ocp.qp import schur_complement
+from foc_ros.core.ocp.clearance import required_distance
+from foc_ros.core.ocp.qp import GoalSolution, schur_complement
+from foc_ros.core.ocp.terms import Motion, MovingCircles
 
-from .hermite import around, compute_trajectory, contact_rows, interpolate, interpolation_row, required_distance
+from .contacts import Contacts
+from .hermite import contact_rows, interpolate, trajectory_around
 
 MAX_STEPS = 12
-UNSETTLED = 4
+SETTLING_STEPS = 4
 """Steps after which the moves have to shrink."""
-WAVERING = 2.0
-"""Growth of the moves from one step to the next at which they are then given up."""
-LONGEST = 2.0
-"""Steps in time that a contact may slide at once."""
-SLIGHT = 1e-3
-"""Least force of a contact that bends the way round its circle, relative to the largest: a negative one would not hold."""
-FLAT = 1e-2
-"""Least bend of the distance over time at a contact, as a share of what a straight way past it has: while steps are made."""
-TINY = 1e-30
+LARGEST_GROWTH = 2.0
+"""Growth of the moves from one step to the next beyond which the iteration is then given up."""
+LONGEST_SLIDE = 2.0
+"""Most steps in time that a contact may slide at once."""
+SMALLEST_MULTIPLIER = 1e-3
+"""Least multiplier in the curvature terms, relative to the largest: with a negative one they would not be positive definite."""
+SMALLEST_CURVATURE = 1e-2
+"""Least curvature of the distance over time at a contact while steps are made, as a share of that of a straight pass."""
+STANDSTILL_CURVATURE = 1e-30
 """The same of a mean that stands still."""
-SHARED = 1e-13
-"""Softness of a contact relative to what it moves itself: contacts that say the same twice share the force."""
+REGULARISATION = 1e-13
+"""Softness of a contact relative to its own effect: two contacts with the same row then share the multiplier."""
 
 
-@compiled
-def half_planes_between(
-    motion: Tensor,
-    free: Matrix,
-    centre: Matrix,
-    drift: Matrix,
-    reach: Vector,
-    short: Vector,
-    pace: float,
-    control: Vector,
-    obstacle: Indices,
-    time: Vector,
-) -> tuple[Matrix, Vector]:
-    """Return `qp.half_planes` for contacts at any time: rows (k, 2N) n.S(s) and limits (k,) on them [m]; see `touching`."""
-    k = len(obstacle)
-    rows, limits = np.empty((k, len(control))), np.empty(k)
-    course = compute_trajectory(motion, free, control)
-    for i in range(k):
-        j, s = obstacle[i], time[i]
-        at, without = interpolate(course, s, 0), interpolate(free, s, 0)
-        cx, cy = centre[j, 0] + s * drift[j, 0], centre[j, 1] + s * drift[j, 1]
-        distance = np.hypot(at[0] - cx, at[1] - cy)
-        x, y = (at[0] - cx) / distance, (at[1] - cy) / distance
-        rows[i] = interpolation_row(motion, s, x, y)
-        limits[i] = required_distance(reach[j], short[j], pace, s)[0] + x * (cx - without[0]) + y * (cy - without[1])
-    return rows, limits
+@compiled_with_caller
+def newton_step(schur: Matrix, missing: Matrix, curvature: Vector, distance: Vector, slides: Indices) -> tuple[bool, Matrix]:
+    """Solve for one Newton step: whether there is a solution, and the multipliers (1, 3k) of the rows h, r and g.
 
-
-@compiled
-def newton_step(
-    give: Matrix, missing: Matrix, bend: Vector, distance: Vector, force: Vector, slides: Indices
-) -> tuple[bool, Matrix, Vector]:
-    """One step of `touching`: whether it has an answer, the weights (1, 3k) of the rows y, m, f, and y (k,)."""
-    k = len(force)
+    schur (3k, 3k): C; missing (3k, 1); curvature and distance (k,): b / y_last and d / y_last; slides (k,): 0 for contacts that
+    are held at their times. The tangential block is solved in units in which its diagonal term d / y_last is one.
+    """
+    k = len(distance)
     A, B, unit = np.empty((2 * k, 2 * k)), np.empty((2 * k, k)), np.empty(2 * k)
     wanted = missing[: 2 * k].copy()
     for i in range(2 * k):
         for j in range(2 * k):
-            A[i, j] = give[i, j]
+            A[i, j] = schur[i, j]
         for j in range(k):
-            B[i, j] = give[i, 2 * k + j]
+            B[i, j] = schur[i, 2 * k + j]
     for i in range(k):
-        A[k + i, k + i] += bend[i] / force[i]
-        if slides[i] == 0:  # held in time: no moment
+        A[k + i, k + i] += curvature[i]
+        if slides[i] == 0:
             for j in range(2 * k):
                 A[k + i, j], A[j, k + i] = 0.0, 0.0
             for j in range(k):
@@ -88,134 +79,112 @@ def newton_step(
     for i in range(2 * k):
         for j in range(2 * k):
             A[i, j] *= unit[i] * unit[j]
-        A[i, i] += SHARED
+        A[i, i] += REGULARISATION
         B[i] *= unit[i]
         wanted[i] *= unit[i]
     normal = factorise_cholesky(A, 0.0)
-    eased, along = solve_lower(normal, B), solve_lower(normal, wanted)[:, 0].copy()
-    stiffness, pull = np.empty((k, k)), np.empty((k, 1))
+    coupling, along = solve_lower(normal, B), solve_lower(normal, wanted)[:, 0].copy()
+    stiffness, pull, scale = np.empty((k, k)), np.empty((k, 1)), 1.0 / np.sqrt(distance)
     for i in range(k):
         pull[i, 0] = -missing[2 * k + i, 0]
         for q in range(2 * k):
-            pull[i, 0] += eased[q, i] * along[q]
+            pull[i, 0] += coupling[q, i] * along[q]
         for j in range(k):
-            stiffness[i, j] = -give[2 * k + i, 2 * k + j]
+            stiffness[i, j] = -schur[2 * k + i, 2 * k + j]
             for q in range(2 * k):
-                stiffness[i, j] += eased[q, i] * eased[q, j]
-        stiffness[i, i] += distance[i] / force[i]
+                stiffness[i, j] += coupling[q, i] * coupling[q, j]
+        stiffness[i, i] += distance[i]
     for i in range(k):
-        pull[i] *= np.sqrt(force[i] / distance[i])
+        pull[i] *= scale[i]
         for j in range(k):
-            stiffness[i, j] *= np.sqrt(force[i] / distance[i] * force[j] / distance[j])
+            stiffness[i, j] *= scale[i] * scale[j]
     tangent = factorise_cholesky(stiffness, 0.0)
     across = solve_lower_transposed(tangent, solve_lower(tangent, pull)[:, 0].copy())
-    weights = np.empty((1, 3 * k))
+    step = np.empty((1, 3 * k))
     for i in range(k):
-        across[i] *= np.sqrt(force[i] / distance[i])
-        weights[0, 2 * k + i] = across[i]
+        across[i] *= scale[i]
+        step[0, 2 * k + i] = across[i]
         for q in range(2 * k):
-            along[q] -= eased[q, i] * across[i]
+            along[q] -= coupling[q, i] * across[i]
     along = solve_lower_transposed(normal, along)
     for i in range(2 * k):
-        weights[0, i] = along[i] * unit[i]
-    return bool(np.isfinite(weights).all()), weights, weights[0, :k].copy()
+        step[0, i] = along[i] * unit[i]
+    return bool(np.isfinite(step).all()), step
 
 
-@compiled
+@compiled_with_caller
 def newton_on_contacts(
-    motion: Tensor,
-    free: Matrix,
-    inverse: Vector,
-    factor: Matrix,
-    goal_control: Vector,
-    centre: Matrix,
-    drift: Matrix,
-    reach: Vector,
-    short: Vector,
-    pace: float,
-    obstacle: Indices,
-    begin: Vector,
-    force: Vector,
+    motion: Motion,
+    circles: MovingCircles,
+    goal: GoalSolution,
+    contacts: Contacts,
     near: Vector,
-    sliding: int,
-    settled: float,
-) -> tuple[bool, Vector, Vector, Vector]:
-    """Press the mean against circles until it touches them.
+    may_slide: bool,
+    tolerance: float,
+) -> tuple[bool, Vector, Contacts]:
+    """Find the control of least cost that keeps the given contacts, near a control (2N,).
 
-    The mean gives way like a beam. A contact at time s and distance d, with force y along its normal n, turns by f d / y under
-    a force f along its tangent t. As the mean passes at velocity v and acceleration a, its distance falls and grows again with
-    the bend b = n.a + (t.v)^2 / d, so a moment m on the rate of the distance moves the contact by m / y in time. With the rows
-        h = n.S(s),    r = dh/ds = n.S'(s) + (t.v / d) t.S(s),    g = t.S(s),
-    S(s) what the control does to the position, and C the compliance P between rows,
-        C_hh y + C_hr m + C_hg f = what h misses,
-        C_rh y + (C_rr + b / y_last) m + C_rg f = what r misses,
-        C_gh y + C_gr m + (C_gg - d / y_last) f = what g misses.
-    It is a minimum if the first two are positive definite, and d / y_last less what is left of C_gg is too: pressed any harder,
-    the mean would slip round the circle. A contact that is held in time has no moment, and holds less: the mean may slip past it.
-
-    motion (4, 2, N + 1), free (4, N + 1): the course, as in `between`; centre, drift, reach, short, pace: the circles, as
-    there; obstacle, begin, force (k,): the contacts; near (2N,): where to begin; sliding: 1, or 0 for contacts held in time;
-    settled [m]: a move of the contacts that ends the steps. Returns whether there is such a minimum, the control, times (k,)
-    and forces (k,); where some turn out to pull, at once, with control and times as they were to begin with.
+    may_slide: whether the times of contacts are unknowns too; tolerance [m]: move of the contacts at which the iteration ends.
+    Returns whether there is such a minimum, the control and the contacts. If a multiplier becomes negative, the iteration ends at
+    once with the control and contacts that it began with, and that multiplier.
     """
-    k, end = len(obstacle), motion.shape[2] - 1.0
-    control, time, pressing, last = near.copy(), begin.copy(), force.copy(), np.inf
-    rows, missing = np.empty((3 * k, len(inverse))), np.empty((3 * k, 1))
+    k, steps = len(contacts.time), motion.responses.shape[2] - 1
+    control, time, multiplier, last = near.copy(), contacts.time.copy(), contacts.multiplier.copy(), np.inf
+    rows, missing = np.empty((3 * k, len(goal.inverse))), np.empty((3 * k, 1))
     normal, first = np.empty((k, 2)), np.empty((k, 2))
-    distance, bend, passing = np.empty(k), np.empty(k), np.empty(k)
+    distance, curvature, passing = np.empty(k), np.empty(k), np.empty(k)
     slides = np.empty(k, np.intp)
     for count in range(MAX_STEPS):
-        flat = False
+        is_flat = False
         for i in range(k):
-            j, s = obstacle[i], time[i]
-            wanted, faster, harder = required_distance(reach[j], short[j], pace, s)
-            t = min(int(s), motion.shape[2] - 2)
-            course = around(motion, free, control, t)
-            at, velocity, acceleration = (
-                interpolate(course, s - t, 0),
-                interpolate(course, s - t, 1),
-                interpolate(course, s - t, 2),
-            )
-            x, y = at[0] - centre[j, 0] - s * drift[j, 0], at[1] - centre[j, 1] - s * drift[j, 1]
+            j, s = contacts.obstacle[i], time[i]
+            required, growth, acceleration = required_distance(circles, j, s)
+            t = min(int(s), steps - 1)
+            around = trajectory_around(motion, control, t)
+            at, velocity, bend = interpolate(around, s - t, 0), interpolate(around, s - t, 1), interpolate(around, s - t, 2)
+            dx, dy = circles.drift[j, 0], circles.drift[j, 1]
+            x, y = at[0] - circles.centre[j, 0] - s * dx, at[1] - circles.centre[j, 1] - s * dy
             distance[i] = np.hypot(x, y)
             x, y = x / distance[i], y / distance[i]
             normal[i, 0], normal[i, 1] = x, y
-            vx, vy = velocity[0] - drift[j, 0], velocity[1] - drift[j, 1]
-            passing[i], rate = x * vy - y * vx, x * vx + y * vy - faster
-            slides[i] = sliding if not (s <= 1.0 and rate > 0.0) and not (s >= end and rate < 0.0) else 0
-            past = passing[i] ** 2 / distance[i]
-            bend[i] = x * acceleration[0] + y * acceleration[1] + past - harder
-            if slides[i] == 1 and bend[i] < FLAT * past + TINY:
-                bend[i], flat = FLAT * past + TINY, True
-            rows[i::k] = contact_rows(motion, s, x, y, passing[i] / distance[i])
-            missing[i, 0], missing[k + i, 0], missing[2 * k + i, 0] = wanted - distance[i], -rate, 0.0
+            vx, vy = velocity[0] - dx, velocity[1] - dy
+            passing[i], rate = x * vy - y * vx, x * vx + y * vy - growth
+            is_at_end = (s <= 1.0 and rate > 0.0) or (s >= steps and rate < 0.0)
+            slides[i] = 1 if may_slide and not is_at_end else 0
+            straight = passing[i] ** 2 / distance[i]
+            curvature[i] = x * bend[0] + y * bend[1] + straight - acceleration
+            if slides[i] == 1 and curvature[i] < SMALLEST_CURVATURE * straight + STANDSTILL_CURVATURE:
+                curvature[i], is_flat = SMALLEST_CURVATURE * straight + STANDSTILL_CURVATURE, True
+            rows[i::k] = contact_rows(motion.responses, s, x, y, passing[i] / distance[i])
+            missing[i, 0], missing[k + i, 0], missing[2 * k + i, 0] = required - distance[i], -rate, 0.0
         if count == 0:
             first[:] = normal
-        missing += multiply_transposed(rows, np.expand_dims(control - goal_control, 0))
-        pressed, give = schur_complement(rows, inverse, factor)
-        at_least = np.maximum(pressing, SLIGHT * pressing.max())
-        found, weights, pressing = newton_step(give, missing, bend, distance, at_least, slides)
+        missing += multiply_transposed(rows, np.expand_dims(control - goal.control, 0))
+        effects, schur = schur_complement(rows, goal.inverse, goal.factor)
+        weight = np.maximum(multiplier, SMALLEST_MULTIPLIER * multiplier.max())
+        found, step = newton_step(schur, missing, curvature / weight, distance / weight, slides)
         if not found:
             break
-        if pressing.min() < 0.0:
-            kept_force = force.copy()
-            kept_force[pressing.argmin()] = pressing.min()
-            return True, near.copy(), begin.copy(), kept_force
+        multiplier = step[0, :k].copy()
+        if multiplier.min() < 0.0:
+            pulling = contacts.multiplier.copy()
+            pulling[multiplier.argmin()] = multiplier.min()
+            return True, near.copy(), Contacts(contacts.obstacle.copy(), contacts.time.copy(), pulling)
         before = control
-        control = goal_control + multiply(weights, pressed)[0]
+        control = goal.control + multiply(step, effects)[0]
         moved, move = multiply_vector(rows, control - before), 0.0
         for i in range(k):
             move = max(move, abs(moved[i]), abs(moved[2 * k + i]))
             if slides[i] == 1:
-                slide = min(max(weights[0, k + i] / at_least[i], -LONGEST), LONGEST)
-                time[i] = min(max(time[i] + slide, 1.0), end)
+                slide = min(max(step[0, k + i] / weight[i], -LONGEST_SLIDE), LONGEST_SLIDE)
+                time[i] = min(max(time[i] + slide, 1.0), steps)
                 move = max(move, abs(slide * passing[i]))
-        if move < settled:
-            turned = False  # round to the other side of a circle: another way
+        if move < tolerance:
+            is_turned = False  # a contact went round to the other side of its circle: another homotopy class
             for i in range(k):
-                turned = turned or normal[i, 0] * first[i, 0] + normal[i, 1] * first[i, 1] < 0.0
-            return not flat and not turned, control, time, pressing
-        if count >= UNSETTLED and move > WAVERING * last:
+                is_turned = is_turned or normal[i, 0] * first[i, 0] + normal[i, 1] * first[i, 1] < 0.0
+            return not is_flat and not is_turned, control, Contacts(contacts.obstacle.copy(), time, multiplier)
+        if count >= SETTLING_STEPS and move > LARGEST_GROWTH * last:
             break
         last = move
-    return False, goal_control.copy(), time, pressing
+    return False, goal.control.copy(), Contacts(contacts.obstacle.copy(), time, multiplier)

@@ -1,110 +1,127 @@
-"""Strategies `lv` and `hc`: the smallest s on a curve of clearance and precision that meets the surrogate.
+"""Strategies `lv` and `hc`: the smallest s on a penalty path that meets the surrogate.
 
-tau = delta s, lambda = lambda0 growth^s: a small delta slows down (`lv`), a large one goes wide (`hc`). The paper steps along it
-in whole s (algorithm 1); here s is continuous, so that the effort follows eta as cost ratios need.
+tau = delta s, lambda = lambda0 growth^s: a small delta slows the hand down (low velocity, `lv`), a large one leads it past at a
+distance (high clearance, `hc`). The paper steps along the path in whole s (algorithm 1); here s is continuous, so that the effort
+is a continuous function of eta, as ratios of costs need.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
+from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
 from foc_ros.core.homotopy import compute_swept_angles
 from foc_ros.core.obstacles.chance_constraint import eta_of_k, k_of_eta
-from foc_ros.core.ocp.contacts.checks import merge_contacts
+from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.warm_start import Start, correct_to_goal
 from foc_ros.core.types import Status
 
+from . import StrategyResult, find_best_effort, give_up_out_of_time
 from .penalty_path import STRIDE, PathFollower, PathPoint, PenaltyPath
 
 WARM_STRIDE = 0.5
-"""The longest first look around the s of a warm start."""
-SHORTEST = 2.0**-10
-"""The stride of a look around at which an end that is infeasible counts as reached."""
+"""The longest first stride from the s of a warm start."""
+SHORTEST_STRIDE = 2.0**-10
+"""The stride from a warm start at which an end that is infeasible counts as reached."""
 USUAL_SLOPE = 0.3
-"""What k usually gains per unit of s: a first look goes as far as this says where an earlier solution does not know better."""
-TINY = 1e-6
-"""The shortest stride of a look around, which goes to where the slope of k leads."""
+"""Usual gain of k per unit of s: the first stride from a warm start without a slope of its own assumes it."""
+SMALLEST_STRIDE = 1e-6
+"""The shortest stride that the slope of k may ask for."""
 PATIENCE = 2
-"""Strides in a row, no shorter than `WARM_STRIDE`, without a larger k after which a look around gives up: k may fall for a
-while. A walk from the beginning of the curve goes to its end, over every dip."""
+"""Consecutive strides from a warm start, no shorter than `WARM_STRIDE`, without a larger k, after which the search is given up: k
+may fall for a while. A search from the beginning of the path goes to its end, past every dip."""
 CLOSE = 1e-5
 """Relative excess of k over the wanted one at which the root is found."""
 CELL = 1.0
-"""Bracket in s down to which it is halved: k(s) may fall for a while where it is least at the goal, and cross a value twice."""
+"""Bracket in s down to which it is bisected: k(s) may fall for a while where its minimum is at the goal, and cross k twice."""
 NARROW = 1e-4
-"""Bracket in s at which the root is as good as found: k jumps there, because the mean slips into another minimum."""
+"""Bracket in s at which the search for the root ends: k jumps there, because the mean passes into another minimum."""
 MAX_TRIALS = 60
 
 
-@dataclass(frozen=True, eq=False)
-class PathResult:
-    """How a walk ended: status, words, the point it ended at (None: no feasible point at all), QPs solved, dk/ds there or 0."""
-
-    status: Status
-    message: str
-    point: PathPoint | None
-    qp_solves: int
-    slope: float = 0.0
+def solve_lv(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline = NEVER) -> StrategyResult:
+    """Solve a problem by slowing down."""
+    return follow_path(problem, start, PenaltyPath(settings.lv_delta, settings.growth, settings.lam), deadline)
 
 
-def follow_path(problem: Problem, start: Start, curve: PenaltyPath, deadline: Deadline = NEVER) -> PathResult:
-    """Find the smallest s whose converged solution meets the surrogate.
+def solve_hc(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline = NEVER) -> StrategyResult:
+    """Solve a problem by keeping a distance."""
+    return follow_path(problem, start, PenaltyPath(settings.hc_delta, settings.growth, settings.lam), deadline)
 
-    A warm start follows what was found before: it looks around the s it had, and where there is nothing, from the beginning of
-    the curve on. It goes by Newton steps alone, and ends where they do.
+
+def follow_path(problem: Problem, start: Start, path: PenaltyPath, deadline: Deadline = NEVER) -> StrategyResult:
+    """Find the smallest s whose solution meets the surrogate.
+
+    A warm start follows the earlier solution: it searches around the s of that, and from the beginning of the path where there is
+    nothing. It uses Newton steps alone, and ends where they fail.
     """
-    walker = PathFollower(problem, curve, deadline, follows=start.lam is not None)
+    follower = PathFollower(problem, path, deadline, newton_only=start.lam is not None)
     try:
-        return _walk(walker, start)
+        result = _search(follower, start)
     except OutOfTimeError:
-        reached = 'nothing' if walker.best is None else f'eta {eta_of_k(walker.best.k):.4g}'
-        return PathResult(Status.DEADLINE, f'out of time, with {reached} found', walker.best, walker.qp_solves)
+        best = follower.best
+        result = give_up_out_of_time(problem)
+        if best is not None:
+            result = _result(follower, Status.DEADLINE, f'out of time, with eta {eta_of_k(best.k):.4g} found', best)
+    if result.minimum is None:
+        result = replace(result, minimum=find_minimum_safety_factor(problem, result.control, between_steps=True))
+    return result
 
 
-def _walk(walker: PathFollower, start: Start) -> PathResult:
-    problem, curve, wanted = walker.problem, walker.curve, k_of_eta(walker.problem.eta)
+def _result(follower: PathFollower, status: Status, message: str, point: PathPoint, slope: float = 0.0) -> StrategyResult:
+    """Return the result that ends at a point."""
+    control, contacts, minimum = point.solution
+    weights = follower.path.at(point.s)
+    return StrategyResult(status, message, control, contacts, *weights, follower.qp_solves, slope=slope, minimum=minimum)
+
+
+def _search(follower: PathFollower, start: Start) -> StrategyResult:
+    problem, wanted = follower.problem, k_of_eta(follower.problem.eta)
     stride, patience = STRIDE, math.inf
     if start.control is None or start.lam is None:
-        first = walker.beginning(start.positions)
+        first = follower.solve_first(start.positions)
     else:
-        way = compute_swept_angles(np.concatenate((problem.initial_mean[None, :2], start.positions)), problem.courses)
-        control = correct_to_goal(problem, start.control, start.positions)
-        first = walker.followed(curve.s_of(start.lam), control, merge_contacts(problem, start.contacts), way)
+        positions = np.concatenate((problem.initial_mean[None, :2], start.positions))
+        angles = compute_swept_angles(positions, problem.courses)
+        control, contacts = correct_to_goal(problem, start.control, start.positions), start.contacts.merge(problem.first_alike)
+        first = follower.solve_by_newton(follower.path.s_of(start.lam), control, contacts, angles)
         if first is None:
-            first = walker.beginning(start.positions, way)
+            first = follower.solve_first(start.positions, angles)
         else:
-            stride, patience = _ahead(first, wanted, start.slope or USUAL_SLOPE, WARM_STRIDE), PATIENCE
+            stride, patience = _stride_to(first, wanted, start.slope or USUAL_SLOPE, WARM_STRIDE), PATIENCE
     if first is None:
-        return PathResult(Status.INFEASIBLE, 'no way between the obstacles keeps clear of them', None, walker.qp_solves)
-    low, high = _bracket(walker, first, wanted, stride, patience)
+        return find_best_effort(problem, start, *follower.path.at(0.0), follower.qp_solves)
+    low, high = _bracket(follower, first, wanted, stride, patience)
     if high is None:
-        message = f'eta {problem.eta:g} is out of reach: the largest on the curve is {eta_of_k(low.k):.4g}, at s = {low.s:.3g}'
-        return PathResult(Status.ETA_UNREACHABLE, message, low, walker.qp_solves)
-    point, slope = (high, start.slope) if low is high else _root(walker, low, high, wanted, guided=start.lam is not None)
-    if not walker.verified(point):
-        return PathResult(Status.ITERATION_LIMIT, 'the QP linearised at the solution has another one', point, walker.qp_solves)
-    return PathResult(Status.SOLVED, 'solved', point, walker.qp_solves, slope)
+        message = f'eta {problem.eta:g} is out of reach: the largest on the path is {eta_of_k(low.k):.4g}, at s = {low.s:.3g}'
+        return _result(follower, Status.ETA_UNREACHABLE, message, low)
+    point, slope = high, start.slope
+    if low is not high:
+        point, slope = _find_root(follower, low, high, wanted, is_warm=start.lam is not None)
+    if not follower.is_verified(point):
+        return _result(follower, Status.ITERATION_LIMIT, 'the QP linearised at the solution has another one', point)
+    return _result(follower, Status.SOLVED, 'solved', point, slope)
 
 
 def _bracket(
-    walker: PathFollower, first: PathPoint, wanted: float, stride: float, patience: float
+    follower: PathFollower, first: PathPoint, wanted: float, stride: float, patience: float
 ) -> tuple[PathPoint, PathPoint | None]:
-    """Return the last point below the wanted k and the first at or above it; or else any point, and one after it that is close.
+    """Return the last point below the wanted k and the first at or above it, or any point and one after it that is close enough.
 
-    Both the same where the first is close enough, or the curve's beginning is enough; no upper one where the wanted k is out of
-    reach: then the best point.
+    Both are the same where the first is close enough, or where the beginning of the path meets the wanted k. Where that is out of
+    reach, the best point is returned, and None.
     """
     if _is_close(first, wanted):
         return first, first
     if first.k >= wanted:
         high = first
-        for point in _strides(walker, first, wanted, -stride):
+        for point in _follow(follower, first, wanted, -stride):
             if _is_close(point, wanted):
                 return high, point
             if point.k < wanted:
@@ -112,7 +129,7 @@ def _bracket(
             high = point
         return high, high
     low, best, since = first, first, 0
-    for point in _strides(walker, first, wanted, stride):
+    for point in _follow(follower, first, wanted, stride):
         if point.k >= wanted:
             return low, point
         since = 0 if point.k > best.k else since + (point.s - low.s >= WARM_STRIDE)
@@ -123,38 +140,39 @@ def _bracket(
     return best, None
 
 
-def _strides(walker: PathFollower, first: PathPoint, wanted: float, stride: float) -> Iterator[PathPoint]:
-    """Yield points further and further along the curve, or back for a negative stride; towards an infeasible end in quarters.
+def _follow(follower: PathFollower, first: PathPoint, wanted: float, stride: float) -> Iterator[PathPoint]:
+    """Yield points further and further along the path, or back for a negative stride; near an infeasible end by quarter strides.
 
-    Warm ones go by the slope of k. Cold ones go the same way whatever k is wanted, so that more eta never comes out cheaper.
+    From a warm start the strides follow the slope of k. From a cold one they do not depend on the wanted k, so that more eta is
+    never cheaper.
     """
-    guided = abs(stride) < STRIDE
-    point, end = first, walker.end if stride > 0 else 0.0
-    shortest = (SHORTEST if guided else WARM_STRIDE) / 2
+    is_warm = abs(stride) < STRIDE
+    point, end = first, follower.end if stride > 0 else 0.0
+    shortest = (SHORTEST_STRIDE if is_warm else WARM_STRIDE) / 2
     while point.s != end:
         s = min(point.s + stride, end) if stride > 0 else max(point.s + stride, end)
-        further = walker.beside(s, point)
+        further = follower.solve_beside(s, point)
         if further is None:
             stride /= 4
             end = point.s + 3 * stride
             if abs(stride) < shortest:
                 return
             continue
-        stride = _next_stride(point, further, wanted, stride) if guided else math.copysign(min(4 * abs(stride), STRIDE), stride)
+        stride = _next_stride(point, further, wanted, stride) if is_warm else math.copysign(min(4 * abs(stride), STRIDE), stride)
         point = further
         yield point
 
 
 def _next_stride(before: PathPoint, point: PathPoint, wanted: float, stride: float) -> float:
-    """Go to where k would be the wanted one if it went on as it does, on the same way; at most four times the last stride."""
+    """Return the stride to where k, extrapolated, is the wanted one; the same direction, at most four times the last stride."""
     largest = min(4 * abs(stride), STRIDE)
     slope = (point.k - before.k) / (point.s - before.s)
-    return math.copysign(_ahead(point, wanted, slope, largest) if slope > 0 else largest, stride)
+    return math.copysign(_stride_to(point, wanted, slope, largest) if slope > 0 else largest, stride)
 
 
-def _ahead(point: PathPoint, wanted: float, slope: float, most: float) -> float:
-    """Return how far from a point k is the wanted one if it grows with a slope, in the middle of what counts as close."""
-    return min(max(abs(_aim(wanted) - point.k) / slope, TINY), most)
+def _stride_to(point: PathPoint, wanted: float, slope: float, most: float) -> float:
+    """Return the stride from a point to the middle of what counts as close, if k grows with a slope; at most so much."""
+    return min(max(abs(_aim(wanted) - point.k) / slope, SMALLEST_STRIDE), most)
 
 
 def _aim(wanted: float) -> float:
@@ -165,16 +183,18 @@ def _is_close(point: PathPoint, wanted: float) -> bool:
     return wanted <= point.k <= wanted * (1 + CLOSE)
 
 
-def _root(walker: PathFollower, low: PathPoint, high: PathPoint, wanted: float, *, guided: bool) -> tuple[PathPoint, float]:
-    """Find k(s) = wanted between a point below and one at or above, by Illinois steps; returns one at or above, and dk/ds.
+def _find_root(
+    follower: PathFollower, low: PathPoint, high: PathPoint, wanted: float, *, is_warm: bool
+) -> tuple[PathPoint, float]:
+    """Find k(s) = wanted between a point below and one at or above by the Illinois method; return one at or above, and dk/ds.
 
-    Comes from below only: of several solutions at the same s, those that are met first as s grows. A wide bracket is halved
-    first, at points that do not depend on the wanted k. A guided search spares both: it comes from the nearer end. Aims at the
-    middle of what counts as close, and halves the bracket where three steps in a row came out on the same side: where k jumps,
-    that is the way to the jump.
+    Points are solved from the one below, to find those of several solutions at the same s that come first as s grows, and a wide
+    bracket is bisected first, at points that do not depend on the wanted k. A search from a warm start does neither: it solves
+    from the nearer end. The aim is the middle of what counts as close. After three steps on the same side the bracket is
+    bisected, which leads to the jump where k jumps.
     """
-    while high.s - low.s > CELL and not guided:
-        middle = walker.beside((low.s + high.s) / 2, low)
+    while high.s - low.s > CELL and not is_warm:
+        middle = follower.solve_beside((low.s + high.s) / 2, low)
         if middle is None:
             break
         low, high = (low, middle) if middle.k >= wanted else (middle, high)
@@ -184,7 +204,7 @@ def _root(walker: PathFollower, low: PathPoint, high: PathPoint, wanted: float, 
         if high.k <= wanted * (1 + CLOSE) or high.s - low.s < NARROW:
             break
         s = (low.s + high.s) / 2 if abs(side) > 2 else (low.s * above - high.s * below) / (above - below)
-        point = walker.beside(s, high if guided and high.s - s < s - low.s else low)
+        point = follower.solve_beside(s, high if is_warm and high.s - s < s - low.s else low)
         if point is None:
             break
         if point.k >= wanted:

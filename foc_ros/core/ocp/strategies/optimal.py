@@ -1,144 +1,142 @@
 """Strategy `optimal`: the least cost subject to the surrogate itself.
 
-f(u) = E[R^2] - |d(u)|^2 + k sqrt(Var(u)) <= 0 for every obstacle and step, d = mean(p) - mean(o). Each QP takes f linear at the
-last u, divided by 2 |d| so that a row is a distance, and bends the cost by what the multipliers y say of sqrt(Var): its convex
-part, y 2 k / (|d| sqrt(Var)) times the variance map, on the Hessian's diagonal. That is a lambda for every step and a tau for
-every row.
+f(u) = E[R^2] - |d(u)|^2 + k sqrt(Var(u)) <= 0 for every obstacle and step, d = mean(p) - mean(o). Each QP linearises f at the
+last u, divided by 2 |d| so that a row is a distance. The multipliers y add the convex part of the curvature of sqrt(Var) to the
+cost: y 2 k / (|d| sqrt(Var)) times the variance map, on the diagonal of the Hessian. That is a lambda for every step and a tau
+for every row.
 
 Var itself grows with |d|. Far from the solution the rows leave that out, as the paper's linearisation does: with it, a row whose
-spread exceeds its distance would ask the hand to come nearer, through the obstacle. Once settled, it is taken in, and the
-solution is a minimum of the problem as it stands.
+standard deviation exceeds its distance would ask the hand to come nearer, through the obstacle. Once the sequence has settled,
+the rows include it, and the solution is a minimum of the problem as it stands.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
-from foc_ros.core.dynamics.condensed import apart, mean_positions, position_variances
-from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled
-from foc_ros.core.obstacles.chance_constraint import eta_of_k, k_of_eta, variances
-from foc_ros.core.ocp.chance_evaluation import evaluate_chance_constraint
+from foc_ros.core.dynamics.condensed import largest_shift, position_variances
+from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled, freeze
+from foc_ros.core.obstacles.chance_constraint import constraint_moments, eta_of_k, k_of_eta
+from foc_ros.core.ocp.clearance import required_distance
+from foc_ros.core.ocp.contacts.contacts import Contacts
+from foc_ros.core.ocp.contacts.hermite import compute_trajectory
+from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.ocp.qp import Cost, ReachingQP, effort_cost, row_values, wanted_distance
-from foc_ros.core.ocp.sqp import converge
+from foc_ros.core.ocp.qp import NO_FURTHER_ROWS, Cost, ObstacleRows, ReachingQP, effort_cost, evaluate_rows
+from foc_ros.core.ocp.sqp import SqpOptions, converge
+from foc_ros.core.ocp.terms import ChanceTerms, Motion, MovingCircles
 from foc_ros.core.ocp.warm_start import Start
-from foc_ros.core.ocp.working_set import WorkingSet, solve
+from foc_ros.core.ocp.working_set import QPSolution, WorkingSet, solve
 from foc_ros.core.types import Array, Status
 
+from . import StrategyResult, find_best_effort
+
 SETTLED = 1e-6
-"""Largest move of the mean, relative to the way, at which the sequence has settled."""
-ROUGHLY = 1e-2
+"""Largest move of the mean, relative to the scene, at which the sequence has settled."""
+ROUGHLY_SETTLED = 1e-2
 """The same for the rows that leave the growth of Var out."""
 MAX_QPS = 30
 """Of one search for a minimum with the rows that leave the growth of Var out."""
 MAX_COMPLETE_QPS = 120
-"""The same with the true rows, which near the minimum creep along a circle more often."""
+"""The same with the complete rows, which near the minimum creep along a circle more often."""
 DIVERGED = 1e20
-"""Multiplier at which the sequence runs away: the bend that it puts on the cost leaves no digit for anything else."""
+"""Multiplier at which the sequence has diverged: its curvature leaves no digit for anything else in the cost."""
 SMALLEST_STEP = 1.0 / 16
-"""Smallest share of the way to the wanted k that is tried at once before k is called out of reach."""
+"""Smallest share of the way to the wanted k that is tried at once before k counts as out of reach."""
 
 
-@dataclass(frozen=True, eq=False)
-class Optimum:
-    """How the search ended: control (2N,), the rows that hold it with their multipliers, QPs solved."""
-
-    status: Status
-    message: str
-    control: Array
-    active: WorkingSet
-    multipliers: Array
-    qp_solves: int
-
-
-@dataclass(frozen=True, eq=False)
-class _Iterate:
-    """A control, its active rows and their multipliers."""
-
-    control: Array
-    active: WorkingSet
-    multipliers: Array
-
-
-def optimise(problem: Problem, start: Start, deadline: Deadline = NEVER) -> Optimum | None:
-    """Find a local minimum from a start; None where even the obstacle rows there contradict each other."""
+def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadline = NEVER) -> StrategyResult:
+    """Find a local minimum from a start."""
     search = _Search(problem, deadline)
     try:
         status, message = search.run(start)
     except OutOfTimeError:
-        if search.iterate is None:
+        if search.best is None:
             raise
         status, message = Status.DEADLINE, f'out of time, with eta {eta_of_k(search.reached):.4g} reached'
-    if search.iterate is None:
-        return None
-    found = search.iterate
-    return Optimum(status, message, found.control, found.active, found.multipliers, search.qp_solves)
+    if search.best is None:
+        return find_best_effort(problem, start)
+    control, contacts = search.best.control, Contacts.at_steps(search.best.active, search.best.multipliers)
+    k = max(find_minimum_safety_factor(problem, control, between_steps=False).k, 0.0)
+    weights = compute_equivalent_weights(problem, control, contacts, k)
+    return StrategyResult(status, message, control, contacts, qp_solves=search.qp_solves, equivalent_weights=weights)
+
+
+def compute_equivalent_weights(problem: Problem, control: Array, contacts: Contacts, k: float) -> list[tuple[float, float]]:
+    """Return the (tau [m^2], lambda [1/s^6]) of each contact, all at steps, with which it would hold the surrogate at k.
+
+    tau = k sqrt(Var[C]) is by how much E[C] has to be below zero; lambda = y k |d| / sqrt(Var[C]), for a multiplier y [m/s^6], is
+    the cost of a variance along the normal of the contact, at its step.
+    """
+    positions, circles = problem.positions(control), problem.terms.chance.circles
+    _, variance = constraint_moments(positions, problem.position_variance(control), circles)
+    rows = contacts.obstacle, np.rint(contacts.time).astype(np.intp) - 1
+    stddev, distance = np.sqrt(variance[rows]), np.hypot(*(positions[rows[1]] - problem.centres[rows]).T)
+    lams = contacts.multiplier * k * distance / np.maximum(stddev, 1e-12)
+    return list(zip((k * stddev).tolist(), lams.tolist(), strict=True))
 
 
 class _Search:
-    """Raises k from what the least effort gives to what is wanted: at once if that settles, else in smaller steps."""
+    """Raises k from that of the least effort to the wanted one: at once if that settles, else in smaller steps."""
 
     def __init__(self, problem: Problem, deadline: Deadline) -> None:
         self.problem, self.deadline, self.qp_solves = problem, deadline, 0
         self.wanted, self.reached = k_of_eta(problem.eta), 0.0
-        self.iterate: _Iterate | None = None
+        self.best: QPSolution | None = None
 
     def run(self, start: Start) -> tuple[Status, str]:
-        """Leave the best iterate in `iterate` and the k that it reaches in `reached`; return how it ended."""
+        """Leave the best solution in `best` and its k in `reached`; return how the search ended."""
         active, multipliers = start.contacts.rows(self.problem.horizon.steps)
         if start.control is not None and len(active):
-            settled = self.repeat(_Iterate(start.control, active, multipliers), self.wanted, SETTLED, complete=True)
+            settled = self.settle(QPSolution(start.control, active, multipliers), self.wanted, SETTLED, complete=True)
             if settled is not None:
-                self.iterate, self.reached = settled, self.wanted
+                self.best, self.reached = settled, self.wanted
                 return Status.SOLVED, 'solved'
-        free = converge(self.problem, start.positions, active, 0.0, 0.0, self.deadline, verified=False)
+        options = SqpOptions(verified=False)
+        free = converge(self.problem, start.positions, active, 0.0, 0.0, self.deadline, options)
         if free is None:
             return Status.INFEASIBLE, 'no control meets every linearised obstacle row'
         self.qp_solves += free.qp_solves
-        self.iterate = _Iterate(free.control, free.active, free.contacts.force)
-        self.reached = evaluate_chance_constraint(self.problem, free.control).smallest_k
+        self.best = QPSolution(free.control, free.active, free.contacts.multiplier)
+        self.reached = find_minimum_safety_factor(self.problem, free.control, between_steps=False).k
         if self.reached >= self.wanted:
             return Status.SOLVED, 'solved'
-        return self.raised(self.iterate)
+        return self.raise_k(self.best)
 
-    def raised(self, iterate: _Iterate) -> tuple[Status, str]:
+    def raise_k(self, latest: QPSolution) -> tuple[Status, str]:
         """Raise k from `reached`."""
         share = 1.0
         while share >= SMALLEST_STEP:
             target = self.wanted if share == 1 else self.reached + share * (self.wanted - self.reached)
-            settled = self.settle(iterate, target)
+            # roughly with the rows that leave the growth of Var out, then with the complete ones
+            rough = self.settle(latest, target, ROUGHLY_SETTLED, complete=False)
+            settled = None if rough is None else self.settle(rough, target, SETTLED, complete=True)
             if settled is None:
                 share /= 2
                 continue
-            self.iterate, self.reached, iterate = settled, target, settled
+            self.best, self.reached, latest = settled, target, settled
             if target == self.wanted:
                 return Status.SOLVED, 'solved'
             share = min(1.0, 2 * share)
         message = f'eta {self.problem.eta:g} is out of reach: the largest found is {eta_of_k(self.reached):.4g}'
         return Status.ETA_UNREACHABLE, message
 
-    def settle(self, iterate: _Iterate, k: float) -> _Iterate | None:
-        """Settle the surrogate at k: roughly with the rows that leave the growth of Var out, then with the true ones."""
-        rough = self.repeat(iterate, k, ROUGHLY, complete=False)
-        return None if rough is None else self.repeat(rough, k, SETTLED, complete=True)
-
-    def repeat(self, iterate: _Iterate, k: float, tolerance: float, *, complete: bool) -> _Iterate | None:
+    def settle(self, latest: QPSolution, k: float, tolerance: float, *, complete: bool) -> QPSolution | None:
         """Repeat the QP until it moves the mean by less than the tolerance, relative to the scene; None if it does not."""
         problem, position = self.problem, self.problem.horizon.maps[:2]
         for _ in range(MAX_COMPLETE_QPS if complete else MAX_QPS):
             self.deadline.check()
-            qp = surrogate_qp(problem, iterate.control, iterate.active, iterate.multipliers, k, complete=complete)
-            solution = solve(qp, iterate.active)
+            qp = surrogate_qp(problem, latest.control, latest.active, latest.multipliers, k, complete=complete)
+            solution = solve(qp, latest.active)
             if solution is None or not solution.multipliers.max(initial=0.0) < DIVERGED:
                 return None
             self.qp_solves += solution.solves
-            move = apart(position, iterate.control, solution.control)
-            iterate = _Iterate(solution.control, solution.active, solution.multipliers)
+            move = largest_shift(position, latest.control, solution.control)
+            latest = solution
             if move < tolerance * problem.extent:
-                return iterate
+                return latest
         return None
 
 
@@ -149,110 +147,63 @@ def surrogate_qp(
 
     complete: with the derivative of Var by the position.
     """
-    maps = problem.horizon.maps
-    slopes, limits, weights = surrogate_rows(
-        maps,
-        problem.noise_variance,
-        problem.free_position,
-        problem.free_variance,
-        np.ascontiguousarray(control, dtype=float),
-        problem.centres,
-        problem.size[1],
-        problem.obstacles.centre_covariance,
-        wanted_distance(problem, 0.0),
-        k,
-        1.0 if complete else 0.0,
-    )
-    return ReachingQP(_bent(problem, control, active, multipliers, slopes), maps, weights, slopes, limits)
+    control, motion, chance = np.ascontiguousarray(control, dtype=float), problem.terms.motion, problem.terms.chance
+    slopes, limits, weights = linearise_surrogate(motion, chance, problem.circles(0.0), control, k, complete)
+    cost = effort_cost(problem, 0.0)
+    if len(active):
+        curvature = compute_curvature(chance.noise.responses, slopes, *active.rows, multipliers, chance.noise.noise_variance)
+        rows = cost.goal_rows, cost.goal_targets, cost.softness
+        cost = Cost(cost.hessian + curvature, curvature * control, *rows)
+    obstacle_rows = ObstacleRows(problem.horizon.maps, NO_FURTHER_ROWS, weights, slopes, limits)
+    return ReachingQP(cost, freeze(obstacle_rows), problem.qp_backend)
 
 
 @compiled
-def linearised(
-    offset: Tensor,
-    covariance: Matrix,
-    size_variance: Vector,
-    centre_covariance: Tensor,
-    wanted: Matrix,
-    k: float,
-    turning: float,
-) -> tuple[Tensor, Matrix]:
-    """Linearise -f / (2 |d|), which is to be >= 0, by position and covariance xx, yy, xy: slopes (m, N, 5), values (m, N) [m].
+def linearise_surrogate(
+    motion: Motion, chance: ChanceTerms, circles: MovingCircles, control: Vector, k: float, complete: bool
+) -> tuple[Tensor, Matrix, Matrix]:
+    """Linearise -f / (2 |d|) >= 0 at a control (2N,) as rows: slopes (m, N, 5), limits (m, N), weights (5, 2N) of the control.
 
-    offset d (m, N, 2), covariance (3, N) of the position; turning: 1 to count that Var changes with d too, 0 to leave it out.
+    The slopes are those by x, y and the covariances xx, yy, xy; circles: with the distance to keep at tau = 0.
     """
-    m, steps, _ = offset.shape
+    positions, covariance = compute_trajectory(motion, control)[:2, 1:].T.copy(), position_variances(chance.noise, control)
+    m, steps = len(circles.reach), len(positions)
     slopes, surplus = np.empty((m, steps, 5)), np.empty((m, steps))
-    var = variances(offset, covariance, size_variance, centre_covariance)
+    _, variance = constraint_moments(positions, covariance, chance.circles)
     for j in range(m):
+        own = chance.circles.centre_covariance[j]
         for t in range(steps):
-            distance = max(np.hypot(offset[j, t, 0], offset[j, t, 1]), 1e-9)
-            x, y = offset[j, t, 0] / distance, offset[j, t, 1] / distance
-            stddev = np.sqrt(max(var[j, t], 1e-24))
-            xx = covariance[0, t] + centre_covariance[j, 0, 0]
-            yy = covariance[1, t] + centre_covariance[j, 1, 1]
-            xy = covariance[2, t] + centre_covariance[j, 0, 1]
-            turn, pull = 2 * k / stddev * turning, 2 * k * distance / stddev
+            dx = positions[t, 0] - (circles.centre[j, 0] + (t + 1) * circles.drift[j, 0])
+            dy = positions[t, 1] - (circles.centre[j, 1] + (t + 1) * circles.drift[j, 1])
+            distance = max(np.hypot(dx, dy), 1e-9)
+            x, y = dx / distance, dy / distance
+            stddev = np.sqrt(max(variance[j, t], 1e-24))
+            xx, yy, xy = covariance[0, t] + own[0, 0], covariance[1, t] + own[1, 1], covariance[2, t] + own[0, 1]
+            turn, pull = 2 * k / stddev if complete else 0.0, 2 * k * distance / stddev
             slopes[j, t, 0] = x - turn * (xx * x + xy * y)
             slopes[j, t, 1] = y - turn * (xy * x + yy * y)
             slopes[j, t, 2], slopes[j, t, 3], slopes[j, t, 4] = -pull * x * x, -pull * y * y, -2 * pull * x * y
-            reach = wanted[j, t if wanted.shape[1] > 1 else 0]
+            reach = required_distance(circles, j, t + 1.0)[0]
             surplus[j, t] = (distance * distance - reach * reach - k * stddev) / (2 * distance)
-    return slopes, surplus
-
-
-@compiled
-def surrogate_rows(
-    maps: Tensor,
-    noise_variance: Vector,
-    free_position: Matrix,
-    free_variance: Matrix,
-    control: Vector,
-    centres: Tensor,
-    size_variance: Vector,
-    centre_covariance: Tensor,
-    wanted: Matrix,
-    k: float,
-    turning: float,
-) -> tuple[Tensor, Matrix, Matrix]:
-    """Return `linearised` at a control (2N,) as rows on u: slopes (m, N, 5), limits (m, N) and the maps' weights (5, 2N)."""
-    offset = np.expand_dims(mean_positions(maps[:2], control, free_position), 0) - centres
-    covariance = position_variances(maps, noise_variance, control, free_variance)
-    slopes, surplus = linearised(offset, covariance, size_variance, centre_covariance, wanted, k, turning)
     weights = np.ones((5, len(control)))
-    weights[2:] = noise_variance * control
-    return slopes, row_values(maps, np.empty((0, 0, 0)), weights, slopes, control) - surplus, weights
-
-
-def _bent(problem: Problem, control: Array, active: WorkingSet, multipliers: Array, slopes: Array) -> Cost:
-    """Return the cost with the curvature of the active rows' standard deviations, about the control."""
-    if not len(active):
-        return effort_cost(problem, 0.0)
-    variances = problem.noise_variance, problem.weighted_variance
-    return Cost(*bent(problem.horizon.maps, slopes, *active.rows, multipliers, *variances, control), *problem.goal_rows)
+    weights[2:] = chance.noise.noise_variance * control
+    return slopes, evaluate_rows(chance.noise.responses, np.empty((0, 0, 0)), weights, slopes, control) - surplus, weights
 
 
 @compiled
-def bent(
-    maps: Tensor,
-    slopes: Tensor,
-    obstacle: Indices,
-    step: Indices,
-    multipliers: Vector,
-    noise_variance: Vector,
-    weighted_variance: Vector,
-    control: Vector,
-) -> tuple[Vector, Vector]:
-    """Return the Hessian (2N,) that k rows of slopes (m, N, 5), with multipliers (k,), bend, and the linear term (2N,) of that.
+def compute_curvature(
+    responses: Tensor, slopes: Tensor, obstacle: Indices, step: Indices, multipliers: Vector, noise_variance: Vector
+) -> Vector:
+    """Return what k rows of slopes (m, N, 5) with multipliers (k,) add to the diagonal Hessian, (2N,).
 
-    maps (5, 2, N + 1): `Horizon.maps`; noise_variance, weighted_variance (2N,): of the problem; control (2N,): bent about.
+    responses (5, 2, N + 1): `Horizon.maps`; noise_variance (2N,): c^2.
     """
-    steps = maps.shape[2] - 1
-    bend = np.zeros(2 * steps)
+    steps = responses.shape[2] - 1
+    curvature = np.zeros(2 * steps)
     for i in range(len(step)):
         for q in range(2, 5):
             weight = -multipliers[i] * slopes[obstacle[i], step[i], q]
             for channel in range(2):
                 for k in range(step[i] + 1):
-                    bend[channel * steps + k] += weight * maps[q, channel, step[i] + 1 - k]
-    bend *= noise_variance
-    return 2.0 * (1.0 + weighted_variance) + bend, bend * control
+                    curvature[channel * steps + k] += weight * responses[q, channel, step[i] + 1 - k]
+    return curvature * noise_variance

@@ -1,42 +1,48 @@
-"""Points on the curve of clearance and precision that `lv` and `hc` walk along, each found from a neighbour's solution.
+"""Points on the penalty path that `lv` and `hc` follow: pairs (tau, lambda), each solved from the solution of a neighbour.
 
-The clearance is kept between the steps too: a contact with a circle then slides on along it as the hand slows down, where rows at
-the steps would make it jump from one pair of steps to the next, and the effort with it.
+The clearance is kept between the steps too, by contacts that slide along circles: see `contacts`.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.ocp.contacts.checks import class_angles, find_crossings, is_fixed_point, is_in_class, merge_contacts
 from foc_ros.core.ocp.contacts.contacts import Contacts
-from foc_ros.core.ocp.contacts.kkt_point import KktPoint, solve_kkt_point
-from foc_ros.core.ocp.minimum_k import MinimumSafetyFactor, find_minimum_safety_factor
+from foc_ros.core.ocp.contacts.kkt_point import (
+    KktPoint,
+    compute_class_angles,
+    find_crossings,
+    is_fixed_point,
+    is_in_class,
+    solve_kkt_point,
+)
+from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.ocp.qp import NO_TIMES, effort_cost
-from foc_ros.core.ocp.sqp import MAX_QPS, Converged, Jump, converge
+from foc_ros.core.ocp.qp import NO_TIMES
+from foc_ros.core.ocp.sqp import MAX_QPS, SqpOptions, SqpResult, converge
 from foc_ros.core.ocp.working_set import WorkingSet
 from foc_ros.core.types import Array
 
 STRIDE = 4.0
-"""First look along the curve, in s: lambda grows by 16 from one to the next."""
-SPAN = 60.0
-"""The largest s in any case: without noise, say, when lambda weighs nothing."""
+"""First stride along the path, in s: with a growth of 2, lambda grows by 16."""
+LONGEST_PATH = 60.0
+"""The largest s in any case, for instance without noise, when lambda weighs nothing."""
 LARGEST_SHARE = 1e6
-"""Where the walk ends: a variance weight so many times the effort is all that counts, and k has stopped growing."""
-LEAPS = 8
-"""How often more times are added for a mean that leaps over circles between the steps."""
+"""Weight of the variances relative to the effort at which the path ends: nothing else counts then, and k has stopped growing."""
+MAX_CROSSINGS = 8
+"""How often times are added for a mean that crosses circles between the steps."""
 FURTHER_QPS = 16
-"""Linearisations after which no point is found by QPs along the curve; at its beginning there may be more."""
+"""Linearisations after which the QPs are given up at a point further along the path; at its beginning there may be more."""
 
 
 @dataclass(frozen=True)
 class PenaltyPath:
-    """tau = delta s [m^2], lambda = first_lambda growth^s."""
+    """tau = delta s [m^2], lambda = first_lambda growth^s [1/s^6]."""
 
     delta: float
     growth: float
@@ -47,125 +53,113 @@ class PenaltyPath:
         return self.delta * s, self.first_lambda * self.growth**s
 
     def s_of(self, lam: float) -> float:
-        """Return the s of a lambda on the curve."""
+        """Return the s of a lambda on the path."""
         return max(0.0, math.log(lam / self.first_lambda) / math.log(self.growth)) if lam > self.first_lambda > 0 else 0.0
 
-    def end(self, problem: Problem) -> float:
-        """Return the largest s worth trying."""
+    def find_end(self, problem: Problem) -> float:
+        """Return the largest s that is tried."""
         variance = float(problem.summed_variance.max())
         if not self.first_lambda * variance > 0:
-            return SPAN
-        return min(max(STRIDE, math.log(LARGEST_SHARE / (self.first_lambda * variance)) / math.log(self.growth)), SPAN)
+            return LONGEST_PATH
+        return min(max(STRIDE, math.log(LARGEST_SHARE / (self.first_lambda * variance)) / math.log(self.growth)), LONGEST_PATH)
 
 
 @dataclass(frozen=True, eq=False)
 class PathPoint:
-    """One converged solution on the curve: control (2N,), the contacts that hold it, the smallest k with its place.
-
-    least: as of `least_k.smallest`; rough: held by the rows of QPs, and so perhaps slightly inside a circle between two of them.
-    """
+    """A solution at s. has_rows: its contacts are rows of QPs, so that it may be slightly inside a circle between two steps."""
 
     s: float
-    control: Array
-    contacts: Contacts
-    least: MinimumSafetyFactor
-    rough: bool = False
+    solution: KktPoint
+    has_rows: bool = False
 
     @property
     def k(self) -> float:
-        """The k that it achieves."""
-        return self.least[0]
+        """The minimum safety factor."""
+        return self.solution.minimum.k
 
 
 class PathFollower:
-    """Evaluates points, each from a neighbour's solution, and counts."""
+    """Solves points on a path, each from a neighbour, remembers the one with the largest k, and counts QPs.
 
-    def __init__(self, problem: Problem, curve: PenaltyPath, deadline: Deadline, *, follows: bool) -> None:
-        self.problem, self.curve, self.end, self.deadline = problem, curve, curve.end(problem), deadline
-        self.follows = follows
+    newton_only: whether a neighbour's solution is followed by Newton steps alone, without QPs where these fail.
+    """
+
+    def __init__(self, problem: Problem, path: PenaltyPath, deadline: Deadline, *, newton_only: bool) -> None:
+        self.problem, self.path, self.end, self.deadline = problem, path, path.find_end(problem), deadline
+        self.newton_only = newton_only
         self.qp_solves = 0
         self.best: PathPoint | None = None
 
-    def beginning(self, guess: Array, way: Array | None = None) -> PathPoint | None:
-        """Converge at the beginning of the curve, from a guess (N, 2)."""
-        return self.point(0.0, guess, WorkingSet(), way, thorough=True)
+    def solve_first(self, guess: Array, class_angles: Array | None = None) -> PathPoint | None:
+        """Solve at the beginning of the path, from a guess (N, 2), in a homotopy class if its angles (m,) are given."""
+        return self._solve_by_qps(0.0, guess, WorkingSet(), class_angles, thorough=True)
 
-    def point(self, s: float, guess: Array, working: WorkingSet, way: Array | None, *, thorough: bool) -> PathPoint | None:
-        """Converge at s from a guess (N, 2): by QPs, until sliding contacts find it from there; else where the QPs settle.
+    def solve_beside(self, s: float, neighbour: PathPoint) -> PathPoint | None:
+        """Solve at s from a neighbour, in its class: by Newton steps; by QPs where these fail, unless it is `newton_only`."""
+        self.deadline.check()
+        control, contacts, _ = neighbour.solution
+        merged = contacts.merge(self.problem.first_alike) if neighbour.has_rows else contacts
+        point = self.solve_by_newton(s, control, merged)
+        if point is not None or self.newton_only:
+            return point
+        guess, (working, _) = self.problem.positions(control), merged.rows(self.problem.horizon.steps)
+        return self._solve_by_qps(s, guess, working, compute_class_angles(self.problem, control), thorough=False)
 
-        way: the class that it has to be in, any if it is None; thorough: spare no effort.
+    def solve_by_newton(
+        self, s: float, control: Array, contacts: Contacts, class_angles: Array | None = None
+    ) -> PathPoint | None:
+        """Solve at s from a control (2N,) by Newton steps, in its class or that of given angles (m,)."""
+        found = solve_kkt_point(self.problem, control, contacts, *self.path.at(s), class_angles)
+        return None if found is None else self._remember(PathPoint(s, found))
+
+    def is_verified(self, point: PathPoint) -> bool:
+        """Tell whether the QP linearised at a point has the same solution."""
+        self.qp_solves += 1
+        return is_fixed_point(self.problem, point.solution.control, point.solution.contacts, *self.path.at(point.s))
+
+    def _solve_by_qps(
+        self, s: float, guess: Array, working: WorkingSet, class_angles: Array | None, *, thorough: bool
+    ) -> PathPoint | None:
+        """Solve at s from a guess (N, 2) by QPs, until Newton steps lead from one of them to a solution, or the QPs settle.
+
+        thorough: spare no effort.
         """
-        tau, lam = self.curve.at(s)
-
-        def jump(control: Array, contacts: Contacts) -> KktPoint | None:
-            return solve_kkt_point(self.problem, control, merge_contacts(self.problem, contacts), tau, lam, way)
-
-        found = self.sequence(guess, working, tau, lam, jump, thorough=thorough)
+        found = self._run_qps(s, guess, working, class_angles, thorough=thorough)
         if found is None or not found.stays:
             return None
         if found.jumped is not None:
-            return self.reached(s, found.jumped)
-        if way is not None and not is_in_class(self.problem, found.control, way):
+            return self._remember(PathPoint(s, found.jumped))
+        if class_angles is not None and not is_in_class(self.problem, found.control, class_angles):
             return None
-        return self.reached(
-            s, KktPoint(found.control, found.contacts, find_minimum_safety_factor(self.problem, found.control)), rough=True
-        )
+        minimum = find_minimum_safety_factor(self.problem, found.control, between_steps=True)
+        return self._remember(PathPoint(s, KktPoint(found.control, found.contacts, minimum), has_rows=True))
 
-    def sequence(
-        self, guess: Array, working: WorkingSet, tau: float, lam: float, jump: Jump, *, thorough: bool
-    ) -> Converged | None:
-        """Converge by QPs with rows at the steps, and at more times where the mean would leap over a circle between them."""
-        most = MAX_QPS if thorough else FURTHER_QPS
-        between = NO_TIMES
-        for _ in range(LEAPS):
-            found = converge(
-                self.problem,
-                guess,
-                working,
-                tau,
-                lam,
-                self.deadline,
-                verified=False,
-                between=between,
-                most=most,
-                thorough=thorough,
-                jump=jump,
-            )
+    def _run_qps(
+        self, s: float, guess: Array, working: WorkingSet, class_angles: Array | None, *, thorough: bool
+    ) -> SqpResult | None:
+        """Converge with rows at the steps, and at more times where the mean would cross a circle between them."""
+        problem, (tau, lam) = self.problem, self.path.at(s)
+        left, between = MAX_QPS if thorough else FURTHER_QPS, NO_TIMES
+
+        def jump(control: Array, contacts: Contacts) -> KktPoint | None:
+            return solve_kkt_point(problem, control, contacts.merge(problem.first_alike), tau, lam, class_angles)
+
+        run = partial(SqpOptions, verified=False, thorough=thorough, jump=jump)
+        for _ in range(MAX_CROSSINGS):
+            found = converge(problem, guess, working, tau, lam, self.deadline, run(between=between, max_qps=left))
             if found is None:
                 return None
             self.qp_solves += found.qp_solves
-            leaps = NO_TIMES if found.jumped is not None else find_crossings(self.problem, found.control, tau)
-            if not len(leaps):
+            crossings = NO_TIMES if found.jumped is not None else find_crossings(problem, found.control, tau)
+            if not len(crossings):
                 return found
-            most -= found.linearisations
-            if most < 1:
+            left -= found.linearisations
+            if left < 1:
                 return None
-            between, working = np.union1d(between, leaps), found.active.within(self.problem.horizon.steps)
+            between, working = np.union1d(between, crossings), found.active.within(problem.horizon.steps)
         return None
 
-    def beside(self, s: float, neighbour: PathPoint) -> PathPoint | None:
-        """Converge at s from a neighbour, in its class: by Newton steps; by QPs where these fail, unless it only follows."""
-        self.deadline.check()
-        contacts = merge_contacts(self.problem, neighbour.contacts) if neighbour.rough else neighbour.contacts
-        point = self.followed(s, neighbour.control, contacts)
-        if point is not None or self.follows:
-            return point
-        guess, (working, _) = self.problem.positions(neighbour.control), contacts.rows(self.problem.horizon.steps)
-        return self.point(s, guess, working, class_angles(self.problem, neighbour.control), thorough=False)
-
-    def followed(self, s: float, control: Array, contacts: Contacts, way: Array | None = None) -> PathPoint | None:
-        """Converge at s from a control (2N,) by Newton steps, in its class or that of a way."""
-        found = solve_kkt_point(self.problem, control, contacts, *self.curve.at(s), way)
-        return None if found is None else self.reached(s, found)
-
-    def reached(self, s: float, found: KktPoint, *, rough: bool = False) -> PathPoint:
+    def _remember(self, point: PathPoint) -> PathPoint:
         """Return the point, and remember it if its k is the largest so far."""
-        point = PathPoint(s, found.control, found.contacts, found.least, rough)
         self.best = point if self.best is None or point.k > self.best.k else self.best
         return point
-
-    def verified(self, point: PathPoint) -> bool:
-        """Whether the QP linearised at a point has the same solution."""
-        self.qp_solves += 1
-        tau, lam = self.curve.at(point.s)
-        return is_fixed_point(self.problem, effort_cost(self.problem, lam), point.control, point.contacts, tau)

@@ -1,0 +1,78 @@
+"""The recordings of a folder, bags or CSV tables alike, as streams of recorded messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from foc_ros.core.errors import RecordingError
+from foc_ros.core.types import Array
+from foc_ros.io.bags import BagReader, Item
+from foc_ros.io.csv_tables import Row
+
+from .csv_recordings import parse_movement, read_goals, read_movement_rows, read_obstacles, recorded_messages
+
+RECORDINGS, OBSTACLES, GOALS, LABELS = 'recordings.csv', 'obstacles.csv', 'goals.csv', 'labels.csv'
+BAG_SUFFIXES = ('.mcap', '.db3')
+
+
+@dataclass(frozen=True)
+class BagRecording:
+    """A bag; path: its directory, or one file."""
+
+    name: str
+    path: Path
+
+    def items(self) -> Iterator[Item]:
+        """Yield the recorded messages; raises RecordingError."""
+        with BagReader(self.path) as reader:
+            yield from reader
+
+
+@dataclass(frozen=True)
+class TableRecording:
+    """One recording of a table; its rows are checked when they are read, so that a bad row fails its own recording only."""
+
+    name: str
+    rows: tuple[Row, ...]
+    obstacles: tuple[tuple[float, ...], ...]
+    goals: Array
+
+    def items(self) -> Iterator[Item]:
+        """Yield the messages that `convert` would write; raises RecordingError."""
+        movement = parse_movement(self.name, self.rows)
+        for stamp_ns, topic, message in recorded_messages(movement, list(self.obstacles), self.goals):
+            yield Item(topic.removeprefix('/'), topic, stamp_ns, message, b'')
+
+
+Recording = BagRecording | TableRecording
+
+
+def find_recordings(data: Path) -> dict[str, Recording]:
+    """Return the recordings of a folder by name.
+
+    data: a folder with recordings.csv, goals.csv and, where there are obstacles, obstacles.csv; a folder of bags; or a bag.
+    Raises RecordingError where it is none of these.
+    """
+    if (data / RECORDINGS).exists():
+        obstacles = tuple(read_obstacles(data / OBSTACLES)) if (data / OBSTACLES).exists() else ()
+        goals = read_goals(data / GOALS)
+        tables = read_movement_rows(data / RECORDINGS)
+        return {name: TableRecording(name, tuple(rows), obstacles, goals) for name, rows in tables.items()}
+    if data.is_file() or (data / 'metadata.yaml').exists():
+        bags = [data.resolve()]
+    elif data.is_dir():
+        bags = [path for path in sorted(data.iterdir()) if _may_be_bag(path)]
+    else:
+        raise RecordingError(f'{data}: no such file or directory')
+    if not bags:
+        raise RecordingError(f'{data}: expected bags, or {RECORDINGS} with {GOALS}, got neither')
+    return {path.name: BagRecording(path.name, path) for path in bags}
+
+
+def _may_be_bag(path: Path) -> bool:
+    """Tell bags from other files; a directory with bag files but without metadata counts, so that it is reported as broken."""
+    if path.name.startswith('.'):
+        return False
+    return path.suffix in BAG_SUFFIXES if path.is_file() else any(file.suffix in BAG_SUFFIXES for file in path.iterdir())

@@ -1,0 +1,68 @@
+"""Moments of the linearised constraint against samples, and the bound that Cantelli's inequality gives."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from foc_ros.core.kernels import freeze
+from foc_ros.core.obstacles.chance_constraint import (
+    CERTAIN_K,
+    UncertainCircles,
+    centre_trajectories,
+    constraint_moments,
+    eta_of_k,
+    k_of_eta,
+    safety_factor,
+    size_moments,
+)
+from foc_ros.core.types import Obstacles, make_obstacles
+
+
+def uncertain_circles(obstacles: Obstacles, ignored_until: float = 0.0) -> UncertainCircles:
+    n = len(obstacles)
+    drift, ignored = np.zeros((n, 2)), np.full(n, ignored_until)
+    return freeze(UncertainCircles(obstacles.centre, drift, *size_moments(obstacles), obstacles.centre_covariance, ignored))
+
+
+@given(st.floats(0.0, 0.999))
+def test_eta_and_k_are_inverse(eta):
+    assert eta_of_k(k_of_eta(eta)) == pytest.approx(eta, abs=1e-12)
+
+
+def test_a_violated_surrogate_guarantees_nothing():
+    assert eta_of_k(-3.0) == 0.0
+
+
+def test_without_variance_k_is_certain_either_way():
+    assert (safety_factor(-1.0, 0.0), safety_factor(1.0, 0.0)) == (CERTAIN_K, -CERTAIN_K)
+
+
+def test_moments_are_those_of_samples_for_correlated_axes_and_uncertain_centres():
+    generator = np.random.default_rng(5)
+    samples = 400_000
+    covariance = np.array([[4e-4, 1.5e-4], [1.5e-4, 2e-4]])
+    centre_covariance = np.array([[1e-4, -5e-5], [-5e-5, 9e-5]])
+    obstacle = make_obstacles([[0.1, 0.05]], [0.03], [0.004], centre_covariance=centre_covariance)
+    mean = np.array([0.16, 0.02])
+    d = mean - obstacle.centre[0]
+    E, V = constraint_moments(mean[None], covariance[[0, 1, 0], [0, 1, 1]].reshape(3, 1), uncertain_circles(obstacle))
+    E, V = E[0, 0], V[0, 0]
+    position = generator.multivariate_normal(mean, covariance, samples)
+    centre = generator.multivariate_normal(obstacle.centre[0], centre_covariance, samples)
+    radius = generator.normal(0.03, 0.004, samples)
+    C = radius**2 - d @ d - 2 * (position - centre - d) @ d
+    assert abs(C.mean() - E) < 4.5 * C.std() / np.sqrt(samples)
+    assert C.var() == pytest.approx(V, rel=0.01)
+    assert np.mean(C <= 0) >= eta_of_k(-E / np.sqrt(V))
+
+
+def test_a_circle_does_not_count_before_the_hand_has_left_its_margin():
+    circles = uncertain_circles(make_obstacles([[0.0, 0.0]], [0.03], [0.002]), ignored_until=2.5)
+    mean, _ = constraint_moments(np.zeros((4, 2)), np.zeros((3, 4)), circles)
+    np.testing.assert_array_equal(np.isneginf(mean), [[True, True, False, False]])
+
+
+def test_centres_move_with_their_velocity():
+    moved = centre_trajectories(np.array([[1.0, 2.0]]), 0.1 * np.array([[0.5, -1.0]]), 3)
+    np.testing.assert_allclose(moved[:, 0], [[1.0, 2.0], [1.05, 1.9], [1.1, 1.8], [1.15, 1.7]])

@@ -1,0 +1,67 @@
+"""Rows of obstacles, the recorded path, and the goal that it reached, against values computed by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from foc_ros.analysis.evaluation.ground_truth import RecordedPath, find_direction, find_rows, find_rows_ahead, locate_rows
+from foc_ros.analysis.goal_reached import find_reached_goal
+
+DIRECTION = np.array([1.0, 0.0])
+
+
+def test_obstacles_that_overlap_along_the_direction_stand_in_one_row() -> None:
+    centre = np.array([[3.0, 0.0], [1.0, 1.0], [1.15, -1.0], [2.0, 0.0]])
+    assert find_rows(centre, np.full(4, 0.1), DIRECTION).tolist() == [2, 0, 0, 1]
+    assert find_rows(np.zeros((0, 2)), np.zeros(0), DIRECTION).shape == (0,)
+
+
+def test_a_row_stands_at_the_middle_of_its_obstacles() -> None:
+    np.testing.assert_allclose(locate_rows(np.array([3.0, 1.0, 1.2]), np.array([1, 0, 0])), [1.1, 3.0])
+
+
+def test_a_row_is_passed_for_good_only_when_the_path_does_not_come_back() -> None:
+    place = np.array([0.0, 1.5, 0.5, 2.5])
+    assert find_rows_ahead(np.array([1.0, 2.0, 3.0]), place).tolist() == [True, True, False]
+    assert find_rows_ahead(np.array([1.0, 2.0, 3.0]), place[1:]).tolist() == [True, True, False]
+    assert find_rows_ahead(np.array([1.0, 2.0, 3.0]), place[3:]).tolist() == [False, False, False]
+
+
+def test_the_direction_is_towards_the_mean_of_the_goals() -> None:
+    np.testing.assert_allclose(find_direction(np.array([1.0, 1.0]), np.array([[2.0, 3.0], [0.0, 3.0]])), [0.0, 1.0])
+    np.testing.assert_allclose(find_direction(np.zeros(2), np.zeros((1, 2))), [1.0, 0.0])
+
+
+GOALS = np.array([[1.0, 0.0], [0.0, 1.0]])
+
+
+@pytest.mark.parametrize(
+    ('path', 'expected'),
+    [
+        pytest.param([(0.0, 0.0), (0.9, 0.0), (1.1, 0.1), (1.3, 0.1)], (0, 1), id='overshoots'),
+        pytest.param([(0.0, 0.0), (0.9, 0.0), (0.1, 0.9)], (1, 2), id='both, the last counts'),
+        pytest.param([(0.0, 0.0), (0.2, 0.1)], (None, 1), id='none'),
+    ],
+)
+def test_the_goal_reached_is_the_last_one_that_the_path_came_near(path, expected) -> None:
+    assert find_reached_goal(np.array(path), GOALS) == expected
+
+
+def test_a_single_goal_is_reached_wherever_the_path_is_nearest() -> None:
+    assert find_reached_goal(np.array([(0.0, 0.0), (0.5, 0.0), (0.4, 0.0)]), GOALS[:1]) == (0, 1)
+
+
+def test_progress_is_the_share_of_distance_and_noise_at_rest_adds_none() -> None:
+    rest = np.array([[0.0, 0.0], [0.001, 0.0], [-0.001, 0.0], [0.001, 0.001]])
+    positions = np.vstack([rest, [[0.25, 0.0], [0.5, 0.0], [1.0, 0.0]], [[1.0, 0.1]]])
+    path = RecordedPath(np.arange(8) * 100_000_000, positions, GOALS)
+    assert path.goal == 0 and path.end_ns == 600_000_000
+    np.testing.assert_allclose(path.progress, [0.0, 0.0, 0.0, 0.0, 0.25, 0.5, 1.0, 1.0])
+
+
+def test_true_positions_are_interpolated_and_unknown_beyond_the_end() -> None:
+    path = RecordedPath(np.array([0, 500_000_000, 1_000_000_000]), np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]), GOALS)
+    np.testing.assert_allclose(
+        path.interpolate(250_000_000, np.array([0.25, 0.5, 1.0])), [[0.5, 0.0], [0.75, 0.0], [np.nan, np.nan]]
+    )

@@ -1,0 +1,108 @@
+"""Observations hold what the predictor publishes, and its likelihoods can be computed from them."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from evaluation_samples import reach, write_tables
+
+from foc_ros.analysis.csv_recordings import EPOCH_NS, read_goals, read_movements, read_obstacles, write_movement
+from foc_ros.analysis.evaluation.forecasts import power_rule_shares
+from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
+from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
+from foc_ros.analysis.recordings import BagRecording, find_recordings
+from foc_ros.analysis.replay import Replay
+from foc_ros.core.config import Config, updated
+from foc_ros.core.types import LEFT
+from foc_ros.io.bags import TYPESTORE, BagReader, Item
+from foc_ros.ros.messages.encode_inputs import goal_poses
+from foc_ros.ros.messages.types import RosbagsTypes
+
+FAST = {'rate_hz': 4.0, 'foc.steps': 20, 'foc.strategy': 'fixed', 'foc.tau': 1e-4, 'foc.lam': 0.0, 'homotopy.max_candidates': 6}
+PLAIN = updated(Config(), FAST)
+AHEAD = updated(PLAIN, {'likelihood.beta': 3.0, 'likelihood.spent_share': 0.3, 'likelihood.lookahead_s': 0.4})
+PRICED = updated(PLAIN, {'duration.model': 'cost_of_time', 'duration.time_cost': 50.0})
+OBSTACLES = [(0.12, 0.0, 0.02), (0.22, 0.03, 0.02)]
+GOALS = [(0.32, 0.05), (0.32, -0.05)]
+
+
+@pytest.fixture(scope='module')
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_tables(tmp_path_factory.mktemp('data'), {'one': reach(0.06, GOALS[0])}, GOALS, OBSTACLES)
+
+
+def observe_one(data: Path, config: Config) -> ObservedRecording:
+    return observe(find_recordings(data)['one'], config)
+
+
+@pytest.mark.parametrize('config', [PLAIN, AHEAD, PRICED])
+def test_the_published_likelihoods_follow_from_the_observations(data: Path, config: Config) -> None:
+    recording = observe_one(data, config)
+    assert len(recording.observations) >= 4
+    for each in recording.observations:
+        np.testing.assert_allclose(
+            power_rule_shares(each, config.likelihood)[each.candidates.is_solved],
+            each.candidates.likelihood[each.candidates.is_solved],
+        )
+
+
+def test_other_parameters_on_observations_give_the_likelihoods_of_a_replay_with_them(data: Path) -> None:
+    for plain, ahead in zip(observe_one(data, PLAIN).observations, observe_one(data, AHEAD).observations, strict=True):
+        tried = dict(zip(plain.candidates.labels, power_rule_shares(plain, AHEAD.likelihood), strict=True))
+        published = dict(zip(ahead.candidates.labels, ahead.candidates.likelihood, strict=True))
+        assert tried == pytest.approx(published)
+
+
+def test_a_bag_is_observed_as_replay_predicts_it(data: Path, tmp_path: Path) -> None:
+    bag = tmp_path / 'one'
+    write_movement(
+        bag,
+        read_movements(data / 'recordings.csv')[0],
+        read_obstacles(data / 'obstacles.csv'),
+        read_goals(data / 'goals.csv'),
+    )
+    recording = observe(BagRecording('one', bag), PLAIN)
+    with BagReader(bag) as reader:
+        predictions = [step.prediction for step in Replay(PLAIN).steps(reader) if step.prediction is not None]
+    for each, prediction in zip(recording.observations, predictions, strict=False):
+        assert each.stamp_ns == prediction.stamp_ns and each.most_likely == prediction.most_likely
+        assert each.candidates.likelihood.tolist() == [outcome.likelihood for outcome in prediction.candidates]
+    assert pickle.dumps(recording.observations[0].candidates) == pickle.dumps(observe_one(data, PLAIN).observations[0].candidates)
+
+
+def test_the_ground_truth_is_that_of_the_path(data: Path) -> None:
+    recording = observe_one(data, PLAIN)
+    relevant = find_relevant_obstacles(recording)
+    assert relevant == {'0', '1'}
+    first, last = recording.observations[0], recording.observations[-1]
+    assert first.row.tolist() == [0, 1] and first.truth.goal == 0
+    assert first.truth.sides.tolist() == [LEFT, LEFT] and first.truth.is_ahead.all()
+    assert ask(PATH_CLASS, first, relevant).possible == 4 and ask(GAP, first, relevant).possible == 2
+    assert ask(GOAL, first, relevant).truth == 0
+    progress = [each.truth.progress for each in recording.observations]
+    assert progress[0] == 0.0 and progress == sorted(progress) and progress[-1] > 0.5
+    assert not last.truth.is_ahead[0] and np.isnan(last.truth.positions[-1]).all()
+
+
+def test_the_same_recording_gives_the_same_observations(data: Path) -> None:
+    assert pickle.dumps(observe_one(data, PLAIN)) == pickle.dumps(observe_one(data, PLAIN))
+
+
+def test_no_goal_is_true_for_predictions_with_other_goals(data: Path) -> None:
+    class Changing:
+        name = 'changing'
+
+        def items(self):
+            """Yield three goals half way; the two earlier ones return with the next message of the tables."""
+            goals = goal_poses(RosbagsTypes(TYPESTORE), EPOCH_NS, 'world', np.array([(0.1 * k, 0.3, 0.0) for k in range(3)]))
+            for item in find_recordings(data)['one'].items():
+                yield item
+                if item.role == 'hand_pose' and EPOCH_NS + 600_000_000 < item.log_ns < EPOCH_NS + 700_000_000:
+                    yield Item('goals', '/goals', item.log_ns, goals, b'')
+
+    recording = observe(Changing(), PLAIN)
+    assert {len(each.goals) for each in recording.observations} == {2, 3}
+    assert all(each.truth.goal == (0 if len(each.goals) == 2 else None) for each in recording.observations)

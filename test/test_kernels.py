@@ -1,0 +1,71 @@
+"""Machine code that is kept between two processes is never older than its sources, and kernels take NamedTuples."""
+
+from __future__ import annotations
+
+import os
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from foc_ros.core.kernels import Matrix, Vector, compiled, compiled_with_caller, forget_outdated, freeze
+
+KERNEL, GROUP = '@compiled\ndef kernel(): ...', 'class Group(NamedTuple): ...'
+
+
+@pytest.mark.parametrize(
+    ('changed', 'stays'),
+    [('callee.py', False), ('caller.py', False), ('inner.py', False), ('group.py', False), ('other.py', True), (None, True)],
+)
+def test_machine_code_older_than_any_source_of_a_kernel_is_removed(tmp_path, changed, stays):
+    """A kernel contains a copy of the kernels that it calls, with code of their own or without, and of its argument types."""
+    below = tmp_path / 'below'
+    for folder, source in ((tmp_path, 'caller'), (below, 'callee')):
+        (folder / '__pycache__').mkdir(parents=True)
+        (folder / f'{source}.py').write_text(KERNEL)
+        for name in (f'{source}.py', f'__pycache__/{source}.kernel-1.py311.nbi', f'__pycache__/{source}.kernel-1.py311.1.nbc'):
+            (folder / name).touch()
+            os.utime(folder / name, (1.0, 1.0 if name.endswith('.py') else 2.0))
+    for name, text in (('inner', KERNEL.replace('@compiled', '@compiled_with_caller')), ('group', GROUP), ('other', 'x = 1')):
+        (below / f'{name}.py').write_text(text)
+        os.utime(below / f'{name}.py', (1.0, 1.0))
+    if changed is not None:
+        os.utime(next(tmp_path.rglob(changed)), (3.0, 3.0))
+    forget_outdated(tmp_path)
+    assert len(list(tmp_path.rglob('*.nb*'))) == (4 if stays else 0)
+
+
+class Line(NamedTuple):
+    points: Matrix
+    weight: float
+
+
+class Lines(NamedTuple):
+    first: Line
+    offset: Vector
+
+
+@compiled_with_caller
+def weigh(line: Line) -> Line:
+    return Line(line.points * line.weight, 1.0)
+
+
+@compiled
+def add_up(lines: Lines, times: int) -> tuple[float, Line]:
+    line = weigh(lines.first)
+    for _ in range(times):
+        line = weigh(line)
+    return line.points.sum() + lines.offset.sum(), line
+
+
+def test_an_entry_kernel_takes_nested_tuples_and_an_inner_one_those_that_a_kernel_has_built():
+    points = np.arange(6.0).reshape(3, 2)
+    total, line = add_up(freeze(Lines(Line(points, 2.0), np.ones(4))), 3)
+    assert total == 2 * 15 + 4
+    assert isinstance(line, Line)
+    np.testing.assert_array_equal(line.points, 2 * points)
+
+
+def test_a_tuple_that_is_not_frozen_is_refused():
+    with pytest.raises(TypeError, match='No matching definition'):
+        add_up(Lines(Line(np.zeros((3, 2)), 2.0), np.ones(4)), 3)

@@ -1,0 +1,95 @@
+"""The numbers of a solution against finite differences and geometry."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from reach_helpers import bowed, one_obstacle, reach, solved
+
+from foc_ros.core.types import Status, make_obstacles
+
+BOWED = bowed((0, 0), (0.3, 0), 50, 0.08)
+EVERY = ['lv', 'hc', 'optimal', 'fixed', 'algorithm1']
+WALL = make_obstacles([[0.15, 0.02], [0.15, -0.02]], [0.03, 0.03], ids=('left', 'right'))
+
+
+@pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
+def test_the_largest_reachable_eta_is_reported(strategy):
+    solution = solved(one_obstacle(0.999, (0.6, 0.6)), BOWED, strategy)
+    assert solution.status is Status.ETA_UNREACHABLE
+    assert 0 < solution.eta_reachable == solution.eta < 0.999
+    again = solved(one_obstacle(0.98 * solution.eta_reachable, (0.6, 0.6)), BOWED, strategy)
+    assert again.status is Status.SOLVED
+    assert again.eta_reachable is None
+
+
+@pytest.mark.parametrize('strategy', EVERY)
+def test_an_infeasible_geometry_says_how_much_it_lacks_and_where(strategy):
+    solution = solved(reach(WALL), bowed((0, 0), (0.3, 0), 50, 0.0), strategy)
+    assert solution.status is Status.INFEASIBLE
+    distance = np.hypot(*(solution.path[1:, None] - WALL.centre).T)
+    assert solution.violation == pytest.approx((0.03 - distance).max(), abs=1e-9)
+    assert solution.violation > 0.005, 'between centres 4 cm apart there are 2 cm to each at best, of 3'
+    identity, step = solution.violation_at
+    assert 0.03 - distance[WALL.ids.index(identity), step - 1] == pytest.approx(solution.violation, abs=1e-9)
+    said = float(re.search(r'by up to (\S+) m', solution.message)[1])
+    assert said == pytest.approx(solution.violation, rel=1e-2)
+    assert solution.qp_solves >= 1
+
+
+@pytest.mark.parametrize('strategy', EVERY)
+def test_what_is_solved_violates_nothing(strategy):
+    solution = solved(one_obstacle(0.85), BOWED, strategy, tau=1e-3, lam=10.0)
+    assert solution.status is Status.SOLVED
+    assert (solution.violation, solution.violation_at) == (0.0, None)
+
+
+def augmented(solution):
+    return sum(solution.costs.values())
+
+
+def test_multipliers_are_what_a_metre_of_distance_costs():
+    """J_aug of `fixed` by tau: rows ask for sqrt(E[R^2] + tau), so dJ/dtau is the sum of the multipliers / (2 sqrt(...))."""
+    tau, step = 1e-3, 1e-6
+    less, middle, more = (solved(one_obstacle(), BOWED, 'fixed', tau=tau + by, lam=1e3) for by in (-step, 0.0, step))
+    measured = (augmented(more) - augmented(less)) / (2 * step)
+    reach_m = math.sqrt(0.03**2 + 0.003**2 + tau)
+    assert sum(value for _, _, value in middle.multipliers) / (2 * reach_m) == pytest.approx(measured, rel=1e-3)
+    assert middle.held == ((tau, 1e3),) * len(middle.multipliers)
+
+
+def test_multipliers_of_optimal_are_what_a_metre_of_distance_costs():
+    """J by k: a row asks for k sqrt(Var) / (2 |d|) more, and tau is k sqrt(Var)."""
+    k, step = 2.0, 1e-3
+    less, middle, more = (solved(one_obstacle(x**2 / (1 + x**2)), BOWED, 'optimal') for x in (k - step, k, k + step))
+    assert middle.status is Status.SOLVED
+    distance = np.hypot(*(middle.path - [0.12, 0.0]).T)
+    rows = zip(middle.multipliers, middle.held, strict=True)
+    predicted = sum(value * tau / k / (2 * distance[int(at)]) for (_, at, value), (tau, _) in rows)
+    assert predicted == pytest.approx((more.effort - less.effort) / (2 * step), rel=2e-3)
+
+
+def test_the_rows_of_optimal_have_a_tau_and_a_lambda_each():
+    """Tau is what the mean keeps beyond E[R^2]; lambda what a variance at the step costs: here one of the centre itself."""
+    variance = 1e-8
+
+    def optimum(centre_variance):
+        made = make_obstacles([[0.12, 0.0]], [0.03], [0.003], centre_covariance=centre_variance * np.eye(2))
+        return solved(reach(made, eta=0.8), BOWED, 'optimal')
+
+    less, middle, more = (optimum(1e-6 + by) for by in (-variance, 0.0, variance))
+    assert middle.held
+    kept = np.sum((middle.path - [0.12, 0.0]) ** 2, axis=1) - (0.03**2 + 0.003**2)
+    for (_, at, _), (tau, lam) in zip(middle.multipliers, middle.held, strict=True):
+        assert tau == pytest.approx(kept[int(at)], rel=1e-3)
+        assert lam > 0
+    assert (middle.tau, middle.lam) == (0.0, 0.0)
+    assert sum(lam for _, lam in middle.held) == pytest.approx((more.effort - less.effort) / (2 * variance), rel=1e-2)
+
+
+def test_every_qp_is_counted_and_the_loop_of_algorithm1_beside():
+    solution = solved(one_obstacle(0.85), BOWED, 'algorithm1')
+    assert solution.status is Status.SOLVED
+    assert solution.qp_solves >= solution.iterations > round(solution.tau / 5e-5)
+    assert solved(one_obstacle(0.85), BOWED, 'lv').iterations is None
