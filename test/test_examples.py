@@ -19,8 +19,8 @@ mpl = pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / 'examples').glob('*.py'))
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'doc').glob('*.md'))]
-EXAMPLE_S = 100
-"""An example takes a few seconds; this is for a busy machine on which the kernels are not compiled yet."""
+EXAMPLE_S = 280
+"""Time limit: an example takes a few seconds, and minutes on a busy machine that has to compile the kernels first."""
 
 
 def python_blocks(page: Path) -> list[str]:
