@@ -50,7 +50,7 @@ class Baseline:
 BASELINES = Registry('baseline', {})
 
 
-def register_baseline(name: str, forecast: ForecastFunction, settings: tuple[Any, ...] | SettingsFunction = (None,)) -> None:
+def register_baseline(name: str, forecast: ForecastFunction, settings: Sequence[Any] | SettingsFunction = (None,)) -> None:
     """Add a predictor to those that `evaluate` compares.
 
     Parameters
@@ -77,7 +77,7 @@ def register_baseline(name: str, forecast: ForecastFunction, settings: tuple[Any
 def make_baselines(recordings: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[Baseline, ...]:
     """Return all registered predictors; published: the parameters that the recordings were replayed with."""
     return tuple(
-        Baseline(name, forecast, settings if isinstance(settings, tuple) else settings(recordings, published))
+        Baseline(name, forecast, tuple(settings(recordings, published) if callable(settings) else settings))
         for name, (forecast, settings) in ((name, BASELINES.get(name)) for name in BASELINES)
     )
 
