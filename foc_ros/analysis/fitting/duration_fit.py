@@ -100,8 +100,8 @@ def fit_duration(hands: Sequence[RecordedHand], config: Config) -> tuple[Estimat
         else:
             warnings.append(
                 'duration.fitts_a_s, duration.fitts_b_s: the movements are too alike to tell intercept and slope apart '
-                f'(indices of difficulty with a standard deviation of {deviation_bits:.2g} bit, {NARROW_BITS:g} are needed): their '
-                'ratio is kept'
+                f'(indices of difficulty with a standard deviation of {deviation_bits:.2g} bit, {NARROW_BITS:g} are needed): '
+                'their ratio is kept'
             )
     low, high = np.percentile(_resample_best_factor(errors) / best, CENTRAL)
     estimates = {}
