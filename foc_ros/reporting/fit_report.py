@@ -7,7 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from foc_ros.analysis.fitting.tables import format_parameters, format_scores
+from foc_ros.analysis.fitting.tables import PARAMETER_COLUMNS, SCORE_COLUMNS, format_parameters, format_scores
 from foc_ros.core.errors import InputError
 
 from .drawing import get_class_style, open_figure
@@ -21,14 +21,14 @@ CAPTION = (
 )
 
 
-def write_report(directory: Path, title: str, answer: Mapping[str, Any], scores: Mapping[str, str]) -> None:
-    """Write the page; answer: as of `fit --json`; scores: the title of each score. Raises InputError where that fails."""
+def write_report(directory: Path, title: str, answer: Mapping[str, Any]) -> None:
+    """Write the page; answer: as of `fit --json`. Raises InputError where that cannot be done."""
     warnings = [*answer['warnings'], *(f'{name}: {reason}' for name, reason in answer['failed'].items())]
     body = (
         _draw_parameters(answer['parameters'])
-        + render_table(('parameter', 'given', 'fitted', '95 %', 'data'), format_parameters(answer))
+        + render_table(PARAMETER_COLUMNS, format_parameters(answer))
         + '<h2>Scores</h2>'
-        + render_table(('score', 'setting', 'value'), format_scores(answer['scores'], scores))
+        + render_table(SCORE_COLUMNS, format_scores(answer))
         + '<h2>Run the node with these parameters</h2>'
         + render_table((), [('parameter file', answer['output']), *zip(('without ROS', 'with ROS'), answer['node'], strict=True)])
     )

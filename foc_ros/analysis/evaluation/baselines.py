@@ -50,7 +50,7 @@ class Baseline:
 BASELINES = Registry('baseline', {})
 
 
-def register_baseline(name: str, forecast: ForecastFunction, settings: tuple[Any, ...] | SettingsFunction = (None,)) -> None:
+def register_baseline(name: str, forecast: ForecastFunction, settings: Sequence[Any] | SettingsFunction = (None,)) -> None:
     """Add a predictor to those that `evaluate` compares.
 
     Parameters
@@ -82,11 +82,11 @@ def make_baselines(recordings: Sequence[ObservedRecording], published: Likelihoo
 def _make_baseline(
     name: str,
     forecast: ForecastFunction,
-    settings: tuple[Any, ...] | SettingsFunction,
+    settings: Sequence[Any] | SettingsFunction,
     recordings: Sequence[ObservedRecording],
     published: LikelihoodConfig,
 ) -> Baseline:
-    return Baseline(name, forecast, settings if isinstance(settings, tuple) else settings(recordings, published))
+    return Baseline(name, forecast, tuple(settings(recordings, published) if callable(settings) else settings))
 
 
 def make_plain_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[LikelihoodConfig, ...]:

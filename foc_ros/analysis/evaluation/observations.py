@@ -94,11 +94,10 @@ class Observation(Record):
 
 @dataclass(frozen=True, eq=False)
 class ObservedRecording:
-    """One recording: its name, its observations in order, and counts of rejections and failures by kind."""
+    """One recording: its name and its observations in order."""
 
     name: str
     observations: tuple[Observation, ...]
-    counts: dict[str, int]
 
 
 def observe(recording: Recording, config: Config) -> ObservedRecording:
@@ -123,7 +122,7 @@ def observe(recording: Recording, config: Config) -> ObservedRecording:
     found = [_make_observation(step, hand, path, config.duration) for step, hand in made if hand.stamp_ns <= path.end_ns]
     if not found:
         raise RecordingError(f'{recording.name}: nothing was predicted before its goal was reached')
-    return ObservedRecording(recording.name, tuple(found), replayed.intake.counts)
+    return ObservedRecording(recording.name, tuple(found))
 
 
 def _make_observation(step: Step, hand: HandState, path: RecordedPath, duration: DurationConfig) -> Observation:

@@ -93,15 +93,15 @@ def fit_duration(hands: Sequence[RecordedHand], config: Config) -> tuple[Estimat
     best, warnings = _find_best_factor(errors), []
     value = given * best**powers
     if len(names) == 2:
-        spread_bits = times.compute_difficulties(config.duration.target_width).std()
-        if spread_bits > NARROW_BITS:
+        deviation_bits = times.compute_difficulties(config.duration.target_width).std()
+        if deviation_bits > NARROW_BITS:
             found = minimize(lambda values: float(compute_errors(np.abs(values)).mean()), value, method='Nelder-Mead')
             value = np.abs(found.x)
         else:
             warnings.append(
                 'duration.fitts_a_s, duration.fitts_b_s: the movements are too alike to tell intercept and slope apart '
-                f'(indices of difficulty with a standard deviation of {spread_bits:.2g} bit, {NARROW_BITS:g} are needed): their '
-                'ratio is kept'
+                f'(indices of difficulty with a standard deviation of {deviation_bits:.2g} bit, {NARROW_BITS:g} are needed): '
+                'their ratio is kept'
             )
     low, high = np.percentile(_resample_best_factor(errors) / best, CENTRAL)
     estimates = {}
