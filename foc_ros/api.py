@@ -24,7 +24,7 @@ from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.predictor import predict
 from foc_ros.core.reaching_scene import ReachingScene, build_scene_problems, check_outside, solve_scene
-from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
+from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
 from foc_ros.core.types import (
     NANOSECONDS,
     Candidate,
@@ -454,7 +454,7 @@ def register_strategy(name: str, function: Callable[..., Any]) -> None:
     function : callable
         ``function(problem, start, settings, deadline)``, which returns a `StrategyResult`: see `foc_ros.core.ocp.strategies`.
     """
-    STRATEGIES.register(name, function)
+    _register(STRATEGIES, name, function)
 
 
 def get_strategy(name: str) -> Callable[..., Any]:
@@ -493,7 +493,7 @@ def register_plant(name: str, factory: Callable[..., Any]) -> None:
     >>> foc_ros.solve((0, 0), (0.3, 0), config=config).mean.shape
     (51, 4)
     """
-    PLANTS.register(name, factory)
+    _register(PLANTS, name, factory)
 
 
 def register_qp_backend(name: str, solver: Callable[..., Any]) -> None:
@@ -506,7 +506,7 @@ def register_qp_backend(name: str, solver: Callable[..., Any]) -> None:
     solver : callable
         ``solver(qp)``, from a `foc_ros.core.ocp.backend.DenseQP` to an `Answer`.
     """
-    QP_BACKENDS.register(name, solver)
+    _register(QP_BACKENDS, name, solver)
 
 
 def register_likelihood_rule(name: str, function: Callable[..., Any]) -> None:
@@ -525,4 +525,10 @@ def register_likelihood_rule(name: str, function: Callable[..., Any]) -> None:
     >>> import foc_ros
     >>> foc_ros.register_likelihood_rule('exponential', lambda costs, config: -config.beta * costs)
     """
-    LIKELIHOOD_RULES.register(name, function)
+    _register(LIKELIHOOD_RULES, name, function)
+
+
+def _register(registry: Registry, name: str, part: Callable[..., Any]) -> None:
+    if not callable(part):
+        raise InputError(f'{registry.kind} {name}', 'a function', repr(part))
+    registry.register(name, part)
