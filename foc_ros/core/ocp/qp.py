@@ -68,7 +68,7 @@ def effort_cost(problem: Problem, lam: float) -> Cost:
     """Return the cost J_aug at a lambda [1/s^6], with the problem's goal."""
     terms = problem.terms.cost
     hessian = compute_hessian(terms, lam)
-    return Cost(hessian, np.zeros_like(hessian), terms.goal_rows, terms.goal_targets, terms.softness)
+    return Cost(hessian, np.zeros(len(hessian)), terms.goal_rows, terms.goal_targets, terms.softness)
 
 
 @compiled

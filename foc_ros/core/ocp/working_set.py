@@ -45,7 +45,7 @@ EXACT = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class WorkingSet:
-    """Obstacle rows taken into account: obstacle and step index (0..N-1), (k,) each."""
+    """Obstacle rows taken into account: obstacle and step index (0..N-1), (k,) each, contiguous."""
 
     obstacle: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
     step: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
@@ -262,5 +262,5 @@ def solve_full(qp: ReachingQP, backend: str | None = None) -> QPSolution | None:
     if not scaled.solved:
         return None
     control = unit * scaled.x
-    active = WorkingSet(*np.nonzero(qp.row_values(control) - qp.limits < 1e-7))
+    active = WorkingSet(*map(np.ascontiguousarray, np.nonzero(qp.row_values(control) - qp.limits < 1e-7)))
     return QPSolution(control, active, np.full(len(active), np.nan), 1)

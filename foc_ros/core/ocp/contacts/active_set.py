@@ -13,7 +13,7 @@ from .contacts import Contacts
 from .hermite import compute_trajectory
 from .newton import newton_on_contacts
 
-SETTLED = 1e-5
+NEWTON_TOLERANCE = 1e-5
 """Largest move of a contact, relative to the scene, at which the Newton iteration ends. Quadratic convergence leaves about
 1e-9."""
 CLEAR = 3e-8
@@ -40,7 +40,9 @@ def update_active_contacts(
     for count in range(MAX_CHANGES + 1):
         if len(multiplier):
             active = Contacts(obstacle, time, multiplier)
-            found, control, active = newton_on_contacts(motion, circles, goal, active, control, True, SETTLED * terms.extent)
+            found, control, active = newton_on_contacts(
+                motion, circles, goal, active, control, True, NEWTON_TOLERANCE * terms.extent
+            )
             if not found:
                 break
             time, multiplier = active.time, active.multiplier

@@ -17,7 +17,7 @@ from foc_ros.core.ocp.terms import Motion, MovingCircles, ProblemTerms
 from foc_ros.core.ocp.working_set import DualStatus, solve_with_rows
 from foc_ros.core.types import Array
 
-from .active_set import CLEAR, SETTLED, update_active_contacts
+from .active_set import CLEAR, NEWTON_TOLERANCE, update_active_contacts
 from .contacts import Contacts
 from .hermite import compute_trajectory, interpolate, interpolation_row
 from .newton import newton_on_contacts
@@ -108,7 +108,7 @@ def _solve_at_fixed_times(
     cost, hessian = terms.cost, compute_hessian(terms.cost, lam)
     goal = solve_goal(hessian, np.zeros_like(hessian), cost.goal_rows, cost.goal_targets, cost.softness)
     active = Contacts(contacts.obstacle.copy(), contacts.time.copy(), contacts.multiplier.copy())
-    return newton_on_contacts(terms.motion, circles, goal, active, near.copy(), False, SETTLED * terms.extent)
+    return newton_on_contacts(terms.motion, circles, goal, active, near.copy(), False, NEWTON_TOLERANCE * terms.extent)
 
 
 def is_fixed_point(problem: Problem, control: Array, contacts: Contacts, tau: float, lam: float) -> bool:

@@ -33,9 +33,9 @@ from foc_ros.core.types import Array, Status
 
 from . import StrategyResult, find_best_effort
 
-SETTLED = 1e-6
+TOLERANCE = 1e-6
 """Largest move of the mean, relative to the scene, at which the sequence has settled."""
-ROUGHLY_SETTLED = 1e-2
+ROUGH_TOLERANCE = 1e-2
 """The same for the rows that leave the growth of Var out."""
 MAX_QPS = 30
 """Of one search for a minimum with the rows that leave the growth of Var out."""
@@ -90,9 +90,9 @@ class _Search:
         """Leave the best solution in `best` and its k in `reached`; return how the search ended."""
         active, multipliers = start.contacts.rows(self.problem.horizon.steps)
         if start.control is not None and len(active):
-            settled = self.settle(QPSolution(start.control, active, multipliers), self.wanted, SETTLED, complete=True)
-            if settled is not None:
-                self.best, self.reached = settled, self.wanted
+            found = self.repeat_qps(QPSolution(start.control, active, multipliers), self.wanted, TOLERANCE, complete=True)
+            if found is not None:
+                self.best, self.reached = found, self.wanted
                 return Status.SOLVED, 'solved'
         options = SqpOptions(verified=False)
         free = converge(self.problem, start.positions, active, 0.0, 0.0, self.deadline, options)
@@ -111,19 +111,19 @@ class _Search:
         while share >= SMALLEST_STEP:
             target = self.wanted if share == 1 else self.reached + share * (self.wanted - self.reached)
             # roughly with the rows that leave the growth of Var out, then with the complete ones
-            rough = self.settle(latest, target, ROUGHLY_SETTLED, complete=False)
-            settled = None if rough is None else self.settle(rough, target, SETTLED, complete=True)
-            if settled is None:
+            rough = self.repeat_qps(latest, target, ROUGH_TOLERANCE, complete=False)
+            found = None if rough is None else self.repeat_qps(rough, target, TOLERANCE, complete=True)
+            if found is None:
                 share /= 2
                 continue
-            self.best, self.reached, latest = settled, target, settled
+            self.best, self.reached, latest = found, target, found
             if target == self.wanted:
                 return Status.SOLVED, 'solved'
             share = min(1.0, 2 * share)
         message = f'eta {self.problem.eta:g} is out of reach: the largest found is {eta_of_k(self.reached):.4g}'
         return Status.ETA_UNREACHABLE, message
 
-    def settle(self, latest: QPSolution, k: float, tolerance: float, *, complete: bool) -> QPSolution | None:
+    def repeat_qps(self, latest: QPSolution, k: float, tolerance: float, *, complete: bool) -> QPSolution | None:
         """Repeat the QP until it moves the mean by less than the tolerance, relative to the scene; None if it does not."""
         problem, position = self.problem, self.problem.horizon.maps[:2]
         for _ in range(MAX_COMPLETE_QPS if complete else MAX_QPS):
