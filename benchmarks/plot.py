@@ -17,8 +17,8 @@ from matplotlib.axes import Axes
 from rows.tick_sequence import TickSequence, time_ticks_in_turn
 from scenes import Reach, add_far_obstacles, build_4x8, build_rows
 
-from foc_ros.reporting.drawing import new_figure
-from foc_ros.reporting.plots import save
+from foc_ros.reporting.drawing import open_figure
+from foc_ros.reporting.plots import save_figure
 
 PICTURE = Path(__file__).resolve().parents[1] / 'doc' / 'images' / 'speed.png'
 TICKS = 16
@@ -34,13 +34,13 @@ def main() -> None:
         'obstacles (8 near, the rest far; 4 classes)': {8 + n: add_far_obstacles(base, n, 5) for n in FAR},
         'steps N (4 classes, 8 obstacles)': {n: base.change_config({'foc.steps': n}) for n in STEPS},
     }
-    with new_figure(11.0, 3.6) as figure:
+    with open_figure(11.0, 3.6) as figure:
         axes: list[Axes] = list(figure.subplots(1, 3, sharey=True))
         for panel, (label, reaches) in zip(axes, panels.items(), strict=True):
             draw_panel(panel, label, reaches)
         axes[0].set_ylabel('warm tick [ms]')
         axes[1].legend(frameon=False, loc='lower right')
-    save(figure, sys.argv[1] if len(sys.argv) > 1 else PICTURE)
+    save_figure(figure, sys.argv[1] if len(sys.argv) > 1 else PICTURE)
 
 
 def draw_panel(panel: Axes, label: str, reaches: dict[int, Reach]) -> None:

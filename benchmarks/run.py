@@ -65,11 +65,11 @@ def build_page(rows: list[Row]) -> str:
     """Return the rows as an HTML page, with a description of what each compares."""
     compared = [(row['name'], f'{row["ours"]}, against: {row["peer"]}', row['agreement']) for row in rows if 'error' not in row]
     body = (
-        page.table(HEADINGS, map(format_cells, rows))
+        page.render_table(HEADINGS, map(format_cells, rows))
         + '<h2>What is compared</h2>'
-        + page.table(('row', 'of what', 'agreement'), compared)
+        + page.render_table(('row', 'of what', 'agreement'), compared)
     )
-    return page.page_of('Benchmark', body, [f'{row["name"]}: {row["error"]}' for row in rows if 'error' in row])
+    return page.render_page('Benchmark', body, [f'{row["name"]}: {row["error"]}' for row in rows if 'error' in row])
 
 
 def build_markdown(rows: list[Row]) -> str:

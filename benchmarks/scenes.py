@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.config import Config, updated
-from foc_ros.core.dynamics.plants import triple_integrator_horizon
+from foc_ros.core.config import Config, replace_values
+from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
 from foc_ros.core.estimation.kalman_filter import FilterState, update
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.types import HandSample, Obstacles, make_obstacles
@@ -41,7 +41,7 @@ def build_guess(steps: int = 50, amplitude: float = 0.09) -> Array:
 
 def build_problem(steps: int = 50, initial_mean: Array | None = None) -> Problem:
     """Return the reaching problem of one class, by default from rest at the origin."""
-    horizon = triple_integrator_horizon(DURATION_S / steps, steps)
+    horizon = build_triple_integrator_horizon(DURATION_S / steps, steps)
     initial = np.zeros(6) if initial_mean is None else initial_mean
     return rest_to_goal(horizon, initial, GOAL, build_obstacles(), np.array([NOISE, NOISE]), ETA)
 
@@ -70,7 +70,7 @@ class Reach:
 
     def change_config(self, values: dict[str, object]) -> Reach:
         """Return the reach with other parameters, by dotted name."""
-        return replace(self, config=updated(self.config, values))
+        return replace(self, config=replace_values(self.config, values))
 
 
 def add_far_obstacles(reach: Reach, count: int, seed: int, nearest: float = 1.0) -> Reach:
@@ -86,7 +86,7 @@ def add_far_obstacles(reach: Reach, count: int, seed: int, nearest: float = 1.0)
 def build_reach(obstacles: Obstacles, candidates: int, goals: Array = GOAL[None], ticks: int = 40, seed: int = 3) -> Reach:
     """Return ticks at 100 Hz of a hand that drifts too slowly for a movement to have begun, so that T does not change."""
     values = {'foc.noise_x': NOISE, 'foc.noise_y': NOISE, 'foc.eta': ETA, 'homotopy.max_candidates': candidates}
-    config = updated(Config(), values | {'duration.model': 'fixed', 'duration.fixed_s': DURATION_S, 'rate_hz': RATE_HZ})
+    config = replace_values(Config(), values | {'duration.model': 'fixed', 'duration.fixed_s': DURATION_S, 'rate_hz': RATE_HZ})
     generator = np.random.default_rng(seed)
     state: FilterState | None = None
     hands = []

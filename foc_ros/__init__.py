@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from foc_ros.core.errors import SceneError as SceneError
     from foc_ros.core.obstacles.shapes import Circle as Circle
     from foc_ros.core.ocp.monte_carlo import MonteCarlo as MonteCarlo
+    from foc_ros.core.ocp.strategies import StrategyResult as StrategyResult
     from foc_ros.core.types import Candidate as Candidate
     from foc_ros.core.types import HandState as HandState
     from foc_ros.core.types import Obstacles as Obstacles
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 
 _MODULES = {
     'api': (
-        'Prediction Predictor Solution load_config monte_carlo plot_candidates register_likelihood_rule register_plant'
-        ' register_qp_backend register_strategy replay solve solve_classes'
+        'Prediction Predictor Solution compute_eta get_strategy load_config monte_carlo plot_candidates'
+        ' register_likelihood_rule register_plant register_qp_backend register_strategy replay solve solve_classes'
     ),
     'analysis.evaluation': 'register_baseline',
     'core.config': 'Config',
@@ -41,6 +42,7 @@ _MODULES = {
     'core.errors': 'FocError InputError MessageError ParameterError RecordingError SceneError',
     'core.obstacles.shapes': 'Circle',
     'core.ocp.monte_carlo': 'MonteCarlo',
+    'core.ocp.strategies': 'StrategyResult',
     'core.types': 'Candidate HandState Obstacles PredictedCandidate Status',
 }
 _MODULE_OF = {name: f'{__name__}.{module}' for module, names in _MODULES.items() for name in names.split()}

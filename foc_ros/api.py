@@ -20,10 +20,11 @@ from foc_ros.core.memory import Memory
 from foc_ros.core.obstacles.scene import ObstacleSource
 from foc_ros.core.obstacles.shapes import Circle, collect_obstacles
 from foc_ros.core.ocp import monte_carlo as sampling
+from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.predictor import predict
 from foc_ros.core.reaching_scene import ReachingScene, build_scene_problems, check_outside, solve_scene
-from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
+from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
 from foc_ros.core.types import (
     NANOSECONDS,
     Candidate,
@@ -171,10 +172,10 @@ class Predictor:
         if self._goals is None:
             raise SceneError('goals', 'at least one, by set_goals', 'none')
         updated = update(self._hand, sample, self.config.estimator)
-        if updated.status is SampleStatus.RESTARTED_BACKWARD or not updated.status.taken:
+        if updated.status is SampleStatus.RESTARTED_BACKWARD or not updated.status.is_taken:
             last = '' if self._hand is None else f', {self._hand.stamp_ns / NANOSECONDS:.9g} s'
             raise InputError('t', f'a time after the last one{last}', t)
-        if updated.status.restarted:
+        if updated.status.is_restart:
             self._memory = Memory()
         self._hand = updated.state
         if self._obstacles.stamp_ns is None:
@@ -202,8 +203,8 @@ class Solution(types.Solution):
         Times [s], mean positions [m], and mean and covariance of the state: position, velocity and what else the plant has.
     control, effort : ndarray of shape (N, 2), float
         Jerk [m/s^3] for the triple integrator, force [N] for the damped mass; the sum of its squares.
-    eta : float
-        Probability of avoidance that the solution achieves for each obstacle and step.
+    eta, problem : float, Problem
+        Probability of avoidance that the solution achieves for each obstacle and step, and the problem that was solved.
     """
 
     label: str = ''
@@ -451,9 +452,20 @@ def register_strategy(name: str, function: Callable[..., Any]) -> None:
     name : str
         A new name; `InputError` is raised if it is taken.
     function : callable
-        ``function(problem, start, settings, deadline)``, which returns the result that `foc_ros.core.ocp.strategies` describes.
+        ``function(problem, start, settings, deadline)``, which returns a `StrategyResult`: see `foc_ros.core.ocp.strategies`.
     """
-    STRATEGIES.register(name, function)
+    _register(STRATEGIES, name, function)
+
+
+def get_strategy(name: str) -> Callable[..., Any]:
+    """Return a strategy by its name, for a strategy that builds on another one; `InputError` is raised for an unknown name."""
+    strategy: Callable[..., Any] = STRATEGIES.get(name)
+    return strategy
+
+
+def compute_eta(problem: Problem, control: types.Array) -> float:
+    """Return the eta that a stacked control (2N,) achieves: the smallest over all obstacles and steps."""
+    return find_minimum_safety_factor(problem, control, between_steps=False).eta
 
 
 def register_plant(name: str, factory: Callable[..., Any]) -> None:
@@ -481,7 +493,7 @@ def register_plant(name: str, factory: Callable[..., Any]) -> None:
     >>> foc_ros.solve((0, 0), (0.3, 0), config=config).mean.shape
     (51, 4)
     """
-    PLANTS.register(name, factory)
+    _register(PLANTS, name, factory)
 
 
 def register_qp_backend(name: str, solver: Callable[..., Any]) -> None:
@@ -494,7 +506,7 @@ def register_qp_backend(name: str, solver: Callable[..., Any]) -> None:
     solver : callable
         ``solver(qp)``, from a `foc_ros.core.ocp.backend.DenseQP` to an `Answer`.
     """
-    QP_BACKENDS.register(name, solver)
+    _register(QP_BACKENDS, name, solver)
 
 
 def register_likelihood_rule(name: str, function: Callable[..., Any]) -> None:
@@ -513,4 +525,10 @@ def register_likelihood_rule(name: str, function: Callable[..., Any]) -> None:
     >>> import foc_ros
     >>> foc_ros.register_likelihood_rule('exponential', lambda costs, config: -config.beta * costs)
     """
-    LIKELIHOOD_RULES.register(name, function)
+    _register(LIKELIHOOD_RULES, name, function)
+
+
+def _register(registry: Registry, name: str, part: Callable[..., Any]) -> None:
+    if not callable(part):
+        raise InputError(f'{registry.kind} {name}', 'a function', repr(part))
+    registry.register(name, part)

@@ -66,7 +66,7 @@ def strategies_scene(generator: np.random.Generator) -> PaperScene:
 
 def strategies_faults(scene: PaperScene) -> Iterator[float]:
     """Yield penalties for the trends of studies 1, 3 and 4 that a scene lacks."""
-    path_class = scene.ways[0]
+    path_class = scene.path_classes[0]
     found: dict[tuple[float, float], float] = {}
     for noise, eta in product((SMALL_NOISE, NOISE), reversed(ETAS)):
         found[noise, eta] = compute_log_ratio(scene, eta, (path_class, Method(noise, 'lv')), (path_class, Method(noise, 'hc')))
@@ -94,7 +94,7 @@ def classes_scene(generator: np.random.Generator) -> PaperScene:
 
 def classes_faults(scene: PaperScene) -> Iterator[float]:
     """Yield penalties for the trends of studies 5 and 6 that a scene lacks."""
-    first, second = scene.ways
+    first, second = scene.path_classes
     found: dict[tuple[str, float], float] = {}
     for eta, (strategy, number, weight) in product((PAPER_ETA, *ETAS), (('lv', 5, 1.0), ('hc', 6, 0.5))):
         if (strategy, eta) in found:
@@ -117,7 +117,7 @@ def classes_faults(scene: PaperScene) -> Iterator[float]:
 def compute_crowding(scene: PaperScene, path_class: PathClass, method: Method) -> float:
     """Return the logarithm of the factor of the circles after the first on the effort of a class at PAPER_ETA; 0 if unsolved."""
     alone = PaperScene(scene.goal_x, scene.circles[:1], (PathClass(path_class.name, path_class.amplitude, path_class.sides[:1]),))
-    efforts = [solve_class(*each, method, PAPER_ETA) for each in ((scene, path_class), (alone, alone.ways[0]))]
+    efforts = [solve_class(*each, method, PAPER_ETA) for each in ((scene, path_class), (alone, alone.path_classes[0]))]
     solved = all(each.status is Status.SOLVED for each in efforts)
     return float(np.log(efforts[0].effort / efforts[1].effort)) if solved else 0.0
 
@@ -137,7 +137,9 @@ def improve(scene: PaperScene, faults: Faults, generator: np.random.Generator) -
     best, failures = sum_up(faults(scene), HOPELESS), 0
     while failures < PATIENCE and best < HOPELESS:
         stride = STRIDES * 0.88**failures
-        changed = _make_scene(np.array(scene.circles) + stride * generator.normal(size=(len(scene.circles), 4)), scene.ways)
+        changed = _make_scene(
+            np.array(scene.circles) + stride * generator.normal(size=(len(scene.circles), 4)), scene.path_classes
+        )
         other = sum_up(faults(changed), best)
         best, scene, failures = (other, changed, 0) if other < best else (best, scene, failures + 1)
     return best, scene

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from accuracy import algorithm1, effort_over_eta, guarantee, page, reference
 
-from foc_ros.reporting.plots import save
+from foc_ros.reporting.plots import save_figure
 
 
 def main() -> None:
@@ -20,7 +20,7 @@ def main() -> None:
         'algorithm1': algorithm1.draw(ends),
     }
     for name, figure in figures.items():
-        save(figure, page.IMAGES / f'{name}.png')
+        save_figure(figure, page.IMAGES / f'{name}.png')
     texts = {
         'guarantee': guarantee.format_excess(outcomes),
         'outcomes': guarantee.format_statuses(outcomes),

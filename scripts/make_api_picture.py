@@ -14,7 +14,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from foc_ros.reporting.plots import save
+from foc_ros.reporting.plots import save_figure
 
 ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / 'doc' / 'images' / 'api.png'
@@ -41,4 +41,4 @@ if __name__ == '__main__':
     mpl.use('Agg')
     parser = argparse.ArgumentParser(description="Make the picture of the README's Python example.")
     parser.add_argument('file', nargs='?', type=Path, default=PICTURE)
-    save(make_figure(), parser.parse_args().file)
+    save_figure(make_figure(), parser.parse_args().file)

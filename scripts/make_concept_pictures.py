@@ -19,7 +19,7 @@ from foc_ros.analysis.paper.scenes import NOISE as PAPER_NOISE
 from foc_ros.analysis.paper.scenes import STRATEGY_SCENE
 from foc_ros.core.config import FocConfig, LikelihoodConfig
 from foc_ros.core.dynamics.noise import scale_noise, stack_noise
-from foc_ros.core.dynamics.plants import triple_integrator_horizon
+from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
 from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
@@ -28,8 +28,8 @@ from foc_ros.core.ocp.warm_start import cold_start
 from foc_ros.core.reaching_scene import build_scene_problems, solve_scene
 from foc_ros.core.types import Array, Obstacles, Solution, make_obstacles
 from foc_ros.io.scene_file import guess_path, load_scene
-from foc_ros.reporting.drawing import class_style, draw_candidates, draw_scene, draw_tag, new_figure, stddev_ellipse
-from foc_ros.reporting.plots import bounds_of, number_labels, save
+from foc_ros.reporting.drawing import draw_candidates, draw_scene, draw_tag, get_class_style, make_stddev_ellipse, open_figure
+from foc_ros.reporting.plots import compute_bounds, number_labels, save_figure
 from foc_ros.reporting.snapshots import build_candidate_views
 
 PICTURES = Path(__file__).resolve().parents[1] / 'doc' / 'images'
@@ -48,7 +48,7 @@ def reach(
     seconds: float, obstacles: Obstacles, eta: float = 0.9, strategy: str = 'optimal', goal: Array = GOAL
 ) -> tuple[Problem, Solution]:
     """Return a reach from rest to rest at a goal, past the obstacles on the left, and its problem."""
-    horizon = triple_integrator_horizon(seconds / STEPS, STEPS)
+    horizon = build_triple_integrator_horizon(seconds / STEPS, STEPS)
     c = scale_noise(np.full(2, NOISE), REFERENCE_S, horizon.dt)
     problem = rest_to_goal(horizon, np.zeros(6), goal, obstacles, c, eta)
     return problem, solve_problem(problem, cold_start(guess_path(np.zeros(2), goal, STEPS, 0.05)), FocConfig(strategy=strategy))
@@ -65,10 +65,10 @@ def rolled(problem: Problem, solution: Solution, count: int) -> Array:
 
 def noise() -> Figure:
     """Return the picture of a quick and a slow reach: noise grows with effort."""
-    with new_figure(8.6, 3.4) as figure:
+    with open_figure(8.6, 3.4) as figure:
         paths, spread = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
         for number, (seconds, shift) in enumerate(((0.5, 0.05), (1.2, -0.05))):
-            colour, _ = class_style(number)
+            colour, _ = get_class_style(number)
             problem, solution = reach(seconds, NOTHING, goal=SLANTED)
             up = np.array([0.0, shift])
             for movement in rolled(problem, solution, 30):
@@ -88,18 +88,18 @@ def noise() -> Figure:
 
 def surrogate() -> Figure:
     """Return paths for more and more eta, and how often noisy movements really stay clear."""
-    with new_figure(8.6, 3.4) as figure:
+    with open_figure(8.6, 3.4) as figure:
         paths, shares = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
         draw_scene(paths, CIRCLE, GOAL[None], (-0.02, 0.32, -0.07, 0.12), named=False)
         for number, eta in enumerate((0.5, 0.8, 0.95)):
-            colour, dash = class_style(number)
+            colour, dash = get_class_style(number)
             _, solution = reach(1.0, CIRCLE, eta)
             paths.plot(*solution.path.T, color=colour, linestyle=dash, linewidth=2.0, label=f'η = {eta:g}')
             _ellipse(paths, solution, STEPS // 2, colour)
         paths.legend(frameon=False, loc='upper left', ncols=3)
         etas = np.array([0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95])
         clear = [_clear(eta) for eta in etas]
-        shares.plot(etas, clear, marker='o', color=class_style(2)[0], label='share of movements\nclear at the worst step')
+        shares.plot(etas, clear, marker='o', color=get_class_style(2)[0], label='share of movements\nclear at the worst step')
         shares.plot((0.5, 1.0), (0.5, 1.0), color='0.4', linestyle='--', label='what was asked for')
         shares.set(xlabel='wanted η', ylabel='share', ylim=(0.48, 1.02))
         shares.legend(frameon=False, loc='lower right')
@@ -108,13 +108,13 @@ def surrogate() -> Figure:
 
 def strategies() -> Figure:
     """Return the same scene by three strategies: paths and speeds."""
-    with new_figure(8.6, 3.4) as figure:
+    with open_figure(8.6, 3.4) as figure:
         paths, speeds = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
         scene = STRATEGY_SCENE
         draw_scene(paths, scene.obstacles, scene.goal[None], (-0.02, 0.32, -0.06, 0.14), named=False)
         for number, name in enumerate(('lv', 'hc', 'optimal')):
-            colour, dash = class_style(number)
-            solution = solve_class(scene, scene.ways[0], Method(PAPER_NOISE, name), 0.94)
+            colour, dash = get_class_style(number)
+            solution = solve_class(scene, scene.path_classes[0], Method(PAPER_NOISE, name), 0.94)
             paths.plot(*solution.path.T, color=colour, linestyle=dash, linewidth=2.0)
             for row in range(5, STEPS, 8):
                 _ellipse(paths, solution, row, colour)
@@ -129,9 +129,9 @@ def classes() -> Figure:
     """Return the solved candidates of the scene of the examples."""
     scene = load_scene(SCENE)
     candidates = build_candidate_views(solve_scene(scene, build_scene_problems(scene)))
-    with new_figure(7.4, 5.6) as figure:
+    with open_figure(7.4, 5.6) as figure:
         axes = figure.subplots()
-        draw_scene(axes, scene.obstacles, scene.goals, bounds_of(scene.obstacles, scene.goals, candidates))
+        draw_scene(axes, scene.obstacles, scene.goals, compute_bounds(scene.obstacles, scene.goals, candidates))
         draw_candidates(axes, candidates, number_labels(candidates))
         axes.plot(*scene.hand.mean[:2], marker='o', color='black')
     return figure
@@ -140,10 +140,10 @@ def classes() -> Figure:
 def likelihood() -> Figure:
     """Return the picture of likelihoods over cost ratios for three values of beta."""
     costs = np.array([1.0, 1.3, 2.0, 4.0])
-    with new_figure(8.6, 3.2) as figure:
+    with open_figure(8.6, 3.2) as figure:
         shares, pair = figure.subplots(1, 2)
         for number, beta in enumerate((0.5, 1.0, 2.0)):
-            colour, dash = class_style(number)
+            colour, dash = get_class_style(number)
             config = LikelihoodConfig(beta=beta)
             places = np.arange(len(costs)) + 0.27 * (number - 1)
             shares.bar(places, compute_likelihoods(costs, config), 0.25, color=colour, label=f'β = {beta:g}')
@@ -175,7 +175,7 @@ def _clear(eta: float) -> float:
 
 
 def _ellipse(axes: Any, solution: Solution, row: int, colour: str, shift: Array | float = 0.0) -> None:
-    ellipse = stddev_ellipse(solution.path[row] + shift, solution.covariance[row, :2, :2])
+    ellipse = make_stddev_ellipse(solution.path[row] + shift, solution.covariance[row, :2, :2])
     ellipse.set(facecolor='none', edgecolor=colour, linewidth=0.9, alpha=0.8, zorder=3)
     axes.add_patch(ellipse)
 
@@ -186,4 +186,4 @@ if __name__ == '__main__':
     directory = parser.parse_args().directory
     directory.mkdir(parents=True, exist_ok=True)
     for name, made in PARTS.items():
-        save(made(), directory / f'concept_{name}.png')
+        save_figure(made(), directory / f'concept_{name}.png')

@@ -16,14 +16,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from foc_ros.core.config import FocConfig
-from foc_ros.core.dynamics.plants import triple_integrator_horizon
+from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import cold_start, warm_start
 from foc_ros.core.types import Array, Solution, Status, make_obstacles
 from foc_ros.io.scene_file import guess_path
-from foc_ros.reporting.drawing import class_style, new_figure
-from foc_ros.reporting.plots import save
+from foc_ros.reporting.drawing import get_class_style, open_figure
+from foc_ros.reporting.plots import save_figure
 
 PICTURE = Path(__file__).resolve().parents[1] / 'doc' / 'images' / 'contacts.png'
 STEPS, DURATION_S = 50, 1.0
@@ -38,7 +38,7 @@ LAST_S = 27.0
 
 def one_obstacle(eta: float) -> Problem:
     """Return a reach of 0.3 m past one circle."""
-    horizon = triple_integrator_horizon(DURATION_S / STEPS, STEPS)
+    horizon = build_triple_integrator_horizon(DURATION_S / STEPS, STEPS)
     obstacles = make_obstacles([CENTRE], RADIUS, RADIUS_STDDEV)
     return rest_to_goal(horizon, np.zeros(6), GOAL, obstacles, np.full(2, NOISE), eta)
 
@@ -76,8 +76,8 @@ def interpolate(solution: Solution, times: Array) -> Array:
 
 def draw_circle(axes: Any, kept: float) -> None:
     """Draw the obstacle and the circle that the mean has to keep clear of."""
-    axes.add_patch(Circle(CENTRE, RADIUS, facecolor='0.75', edgecolor='0.4'))
-    axes.add_patch(Circle(CENTRE, kept, facecolor='none', edgecolor='0.4', linestyle='--'))
+    axes.add_patch(Circle(tuple(CENTRE), RADIUS, facecolor='0.75', edgecolor='0.4'))
+    axes.add_patch(Circle(tuple(CENTRE), kept, facecolor='none', edgecolor='0.4', linestyle='--'))
 
 
 def make_figure() -> Figure:
@@ -85,11 +85,11 @@ def make_figure() -> Figure:
     solution = solve_sliding(ETA)
     _, time, multiplier = max(solution.multipliers, key=lambda contact: contact[2])
     kept = float(np.sqrt(RADIUS**2 + RADIUS_STDDEV**2 + solution.tau))
-    blue, orange = class_style(0)[0], class_style(1)[0]
+    blue, orange = get_class_style(0)[0], get_class_style(1)[0]
     fine = interpolate(solution, np.linspace(0.0, STEPS, 20 * STEPS + 1))
     contact = interpolate(solution, np.array([time]))[0]
     normal = (contact - CENTRE) / np.linalg.norm(contact - CENTRE)
-    with new_figure(10.0, 3.4) as figure:
+    with open_figure(10.0, 3.4) as figure:
         overview, close_up, curves = figure.subplots(1, 3, width_ratios=(1.35, 1.0, 1.15))
         for axes in (overview, close_up):
             draw_circle(axes, kept)
@@ -131,4 +131,4 @@ if __name__ == '__main__':
     parser.add_argument('file', nargs='?', type=Path, default=PICTURE)
     file = parser.parse_args().file
     file.parent.mkdir(parents=True, exist_ok=True)
-    save(make_figure(), file)
+    save_figure(make_figure(), file)

@@ -18,8 +18,8 @@ from PIL import Image
 
 from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS
-from foc_ros.reporting.drawing import draw_candidates, draw_hand, draw_likelihoods, draw_scene, new_figure
-from foc_ros.reporting.plots import bounds_of
+from foc_ros.reporting.drawing import draw_candidates, draw_hand, draw_likelihoods, draw_scene, open_figure
+from foc_ros.reporting.plots import compute_bounds
 from foc_ros.reporting.snapshots import HandTrajectory, Snapshot
 from foc_ros.reporting.track_association import build_candidate_tracks
 
@@ -45,13 +45,13 @@ def pictures(
     """Yield the pictures, each with its duration [ms]."""
     spans = hand.find_movements(Config().estimator.onset_speed)
     goals = np.unique(np.concatenate([each.goals for each in snapshots]), axis=0)
-    bounds = bounds_of(snapshots[0].obstacles, goals, (), hand.positions)
+    bounds = compute_bounds(snapshots[0].obstacles, goals, (), hand.positions)
     for start_ns, end_ns in (spans[number] for number in chosen):
         tracks = build_candidate_tracks([each for each in snapshots if start_ns <= each.stamp_ns <= end_ns and each.candidates])
         rows = np.unique(np.linspace(0, len(tracks.snapshots) - 1, PICTURES).round().astype(int))
         for row in rows:
             snapshot = tracks.snapshots[row]
-            with new_figure(8.4, 4.2) as figure:
+            with open_figure(8.4, 4.2) as figure:
                 scene, shares = figure.subplots(1, 2, width_ratios=(1.55, 1.0))
                 draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
                 draw_candidates(scene, snapshot.candidates, tracks.slots_at(row))

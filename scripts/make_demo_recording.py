@@ -24,7 +24,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 from scipy.optimize import minimize
 
 from foc_ros.io.bags import TYPESTORE, BagWriter
-from foc_ros.ros.messages.encode_inputs import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import RosbagsTypes
 
 Array = NDArray[np.float64]
@@ -150,12 +150,13 @@ def messages() -> list[tuple[int, str, Any]]:
     for seconds in sorted({*np.arange(0.0, end_s, 1.0), *(time for time, _ in switches)}):
         far = [outward for time, outward in switches if time <= seconds][-1]
         sites = np.column_stack([FAR if far else NEAR, np.full(2, HEIGHT)])
-        out.append((_stamp(seconds), '/goals', goal_poses(types, _stamp(seconds), FRAME, sites)))
+        out.append((_stamp(seconds), '/goals', encode_goals(types, _stamp(seconds), FRAME, sites)))
     stamps = [_stamp(seconds) for seconds in np.arange(0.0, end_s, 0.2)]
-    out += [(stamp_ns, '/obstacles', obstacle_cloud(types, stamp_ns, FRAME, OBSTACLES)) for stamp_ns in stamps]
+    out += [(stamp_ns, '/obstacles', encode_obstacles(types, stamp_ns, FRAME, OBSTACLES)) for stamp_ns in stamps]
     stamps = [_stamp(STEP_S * step) for step in range(len(measured))]
     out += [
-        (stamp_ns, '/hand_pose', hand_pose(types, stamp_ns, FRAME, at)) for stamp_ns, at in zip(stamps, measured, strict=True)
+        (stamp_ns, '/hand_pose', encode_hand_pose(types, stamp_ns, FRAME, at))
+        for stamp_ns, at in zip(stamps, measured, strict=True)
     ]
     return sorted(out, key=lambda item: item[0])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from foc_ros.core.config import Config, Parameter, parameters
+from foc_ros.core.config import Config, Parameter, list_parameters
 
 PAGE = Path(__file__).parents[1] / 'doc' / 'parameters.md'
 
@@ -27,7 +27,7 @@ TABLE = """
 def page() -> str:
     """Return the page: a section for each group, in the order of the configuration."""
     text, group = HEAD, None
-    for parameter in parameters():
+    for parameter in list_parameters():
         name = parameter.name.rpartition('.')[0]
         if name != group:
             text += f'\n## {name or "General"}\n\n{_describe_group(name)}\n{TABLE}'

@@ -15,8 +15,8 @@ from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import BagReader
-from foc_ros.reporting.drawing import draw_candidates, draw_hand, draw_scene, new_figure
-from foc_ros.reporting.plots import bounds_of, number_labels, save
+from foc_ros.reporting.drawing import draw_candidates, draw_hand, draw_scene, open_figure
+from foc_ros.reporting.plots import compute_bounds, number_labels, save_figure
 from foc_ros.reporting.report import ReportCollector
 from foc_ros.reporting.snapshots import HandTrajectory, Snapshot, build_hand_trajectory
 
@@ -41,8 +41,8 @@ def picture(hand: HandTrajectory, snapshots: list[Snapshot]) -> Figure:
     span = hand.find_movements(Config().estimator.onset_speed)[MOVEMENT - 1]
     wanted_ns = span[0] + int(AFTER_S * NANOSECONDS)
     snapshot = min(snapshots, key=lambda each: abs(each.stamp_ns - wanted_ns))
-    bounds = bounds_of(snapshot.obstacles, snapshot.goals, snapshot.candidates, hand.positions[hand.between(*span)])
-    with new_figure(7.6, 6.6) as figure:
+    bounds = compute_bounds(snapshot.obstacles, snapshot.goals, snapshot.candidates, hand.positions[hand.between(*span)])
+    with open_figure(7.6, 6.6) as figure:
         scene = figure.subplots()
         draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
         draw_candidates(scene, snapshot.candidates, number_labels(snapshot.candidates))
@@ -55,4 +55,4 @@ if __name__ == '__main__':
     parser.add_argument('file', nargs='?', type=Path, default=PICTURE)
     file = parser.parse_args().file
     file.parent.mkdir(parents=True, exist_ok=True)
-    save(picture(*replayed()), file)
+    save_figure(picture(*replayed()), file)

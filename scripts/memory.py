@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 from rich.progress import track
 
-from foc_ros.core.config import Config, updated
+from foc_ros.core.config import Config, replace_values
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import HandSample, make_obstacles
 
 WARM_UP, GROWTH = 0.1, 1.05
-CONFIG = updated(Config(), {'foc.steps': 30, 'rate_hz': 100.0, 'scene.timeout_s': 0.0})
+CONFIG = replace_values(Config(), {'foc.steps': 30, 'rate_hz': 100.0, 'scene.timeout_s': 0.0})
 OBSTACLES = make_obstacles([[0.12, 0.01], [0.2, -0.03], [0.15, 0.06]], [0.02, 0.015, 0.02], 0.001)
 GOALS = np.array([[0.3, 0.0], [0.28, 0.1]])
 
@@ -42,8 +42,8 @@ def main() -> int:
     for tick in track(range(ticks), description='ticks'):
         phase = 2 * np.pi * tick / 700
         position = np.array([0.14 - 0.14 * np.cos(phase), 0.02 * np.sin(3.1 * phase)]) + generator.normal(0, 2e-4, 2)
-        pipeline.hand(HandSample(1_000_000_000 + 10_000_000 * tick, position, 0.0, 'world'))
-        predictions += pipeline.due and pipeline.predict() is not None
+        pipeline.add_hand_sample(HandSample(1_000_000_000 + 10_000_000 * tick, position, 0.0, 'world'))
+        predictions += pipeline.is_due and pipeline.predict() is not None
         if tick >= WARM_UP * ticks and tick % max(ticks // 50, 1) == 0:
             measured_mb.append(resident_mb())
     growth = max(measured_mb) / measured_mb[0]

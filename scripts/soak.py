@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from foc_ros.cli.demo.environment import free_domain, private_environment
-from foc_ros.ros.messages.encode_inputs import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import RclpyTypes
 
 PERIOD_S = 0.01
@@ -119,9 +119,9 @@ class Player:
         """Publish the messages of one period, and process messages for the rest of it."""
         stamp_ns = max(self._node.get_clock().now().nanoseconds, self._stamp_ns + BURST_NS)
         if self._turn % 10 == 0:
-            self._publishers['obstacles'].publish(obstacle_cloud(self._types, stamp_ns, FRAME, ROWS))
+            self._publishers['obstacles'].publish(encode_obstacles(self._types, stamp_ns, FRAME, ROWS))
         if self._turn % 50 == 0:
-            self._publishers['goals'].publish(goal_poses(self._types, stamp_ns, FRAME, GOALS))
+            self._publishers['goals'].publish(encode_goals(self._types, stamp_ns, FRAME, GOALS))
         self._publish_pose(stamp_ns)
         if faulty and self._turn % 20 == 7:
             self._publish_fault(self._random.choice(FAULTS), stamp_ns)
@@ -135,7 +135,7 @@ class Player:
         phase = (time.monotonic() - self._start) % 1.5 / 1.5
         progress = 0.5 - 0.5 * np.cos(2.0 * np.pi * phase)
         position = np.array([0.28 * progress if x is None else x, 0.05 * progress, 0.1])
-        self._publishers['hand_pose'].publish(hand_pose(self._types, stamp_ns, frame, position))
+        self._publishers['hand_pose'].publish(encode_hand_pose(self._types, stamp_ns, frame, position))
         self.sent[kind] += 1
         self._stamp_ns = max(self._stamp_ns, stamp_ns)
 
@@ -159,12 +159,12 @@ class Player:
         elif name in ('truncated', 'negative', 'crowd'):
             rows = [(0.0, 1.0 + 0.001 * i, 0.0, 0.001, 0.0, i) for i in range(10_000)] if name == 'crowd' else ROWS
             rows = [(0.0, 0.0, 0.0, -1.0, 0.0, 1)] if name == 'negative' else rows
-            message = obstacle_cloud(self._types, stamp_ns, FRAME, rows)
+            message = encode_obstacles(self._types, stamp_ns, FRAME, rows)
             if name == 'truncated':
                 message.data = message.data[:-3]
             self._publishers['obstacles'].publish(message)
         elif name == 'flip':
-            self._publishers['goals'].publish(goal_poses(self._types, stamp_ns, FRAME, GOALS[::-1]))
+            self._publishers['goals'].publish(encode_goals(self._types, stamp_ns, FRAME, GOALS[::-1]))
         elif name in ('parameter', 'wrong parameter') and self._parameters.service_is_ready():
             eta = 5.0 if name == 'wrong parameter' else self._random.uniform(0.5, 0.9)
             request = SetParametersAtomically.Request(parameters=[Parameter('foc.eta', value=eta).to_parameter_msg()])

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.config import Config, updated
+from foc_ros.core.config import Config, replace_values
 from foc_ros.io.bags import TYPESTORE, BagWriter
-from foc_ros.ros.messages.encode_inputs import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import RosbagsTypes
 from foc_ros.ros.parameters import dump_parameter_file
 
 TYPES = RosbagsTypes(TYPESTORE)
-CONFIG = updated(Config(), {'foc.strategy': 'fixed', 'foc.tau': 5e-4, 'foc.steps': 30})
+CONFIG = replace_values(Config(), {'foc.strategy': 'fixed', 'foc.tau': 5e-4, 'foc.steps': 30})
 """With it, every class of these recordings is solved, whatever eta is reachable."""
 FRAME = 'world'
 START_NS = 5_000_000_000
@@ -38,9 +38,11 @@ def messages(seconds: float = 0.6, rate_hz: float = 50.0, scene_hz: float = 5.0)
     """A reach past one obstacle: (topic, stamp [ns], message), in order."""
     out = []
     for time in np.arange(-0.1, seconds, 1 / scene_hz):
-        out.append(('/obstacles', ns(time), obstacle_cloud(TYPES, ns(time), FRAME, SCENE)))
-        out.append(('/goals', ns(time), goal_poses(TYPES, ns(time), FRAME, GOAL)))
-    out += [('/hand_pose', ns(time), hand_pose(TYPES, ns(time), FRAME, position)) for time, position in reach(seconds, rate_hz)]
+        out.append(('/obstacles', ns(time), encode_obstacles(TYPES, ns(time), FRAME, SCENE)))
+        out.append(('/goals', ns(time), encode_goals(TYPES, ns(time), FRAME, GOAL)))
+    out += [
+        ('/hand_pose', ns(time), encode_hand_pose(TYPES, ns(time), FRAME, position)) for time, position in reach(seconds, rate_hz)
+    ]
     return sorted(out, key=lambda item: item[1])
 
 

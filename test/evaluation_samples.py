@@ -78,7 +78,7 @@ def observation(
 
 
 def recorded(*each: Observation, name: str = 'one') -> ObservedRecording:
-    return ObservedRecording(name, each, {})
+    return ObservedRecording(name, each)
 
 
 TWO_CLASSES = make_candidates([[LEFT], [RIGHT]])

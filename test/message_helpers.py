@@ -10,7 +10,7 @@ import pytest
 import ros_helpers
 from rosbags.typesys import Stores, get_typestore
 
-from foc_ros.ros.messages.types import MessageTypes, RclpyTypes, RosbagsTypes, header
+from foc_ros.ros.messages.types import MessageTypes, RclpyTypes, RosbagsTypes, make_header
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 DATATYPES = {'i1': 1, 'u1': 2, 'i2': 3, 'u2': 4, 'i4': 5, 'u4': 6, 'f4': 7, 'f8': 8}
@@ -39,12 +39,12 @@ def pose(types: MessageTypes, position: Sequence[float]) -> Any:
 
 
 def pose_stamped(types: MessageTypes, position: Sequence[float], stamp_ns: int = SECOND, frame_id: str = 'world') -> Any:
-    return types.make('geometry_msgs/msg/PoseStamped', header=header(types, stamp_ns, frame_id), pose=pose(types, position))
+    return types.make('geometry_msgs/msg/PoseStamped', header=make_header(types, stamp_ns, frame_id), pose=pose(types, position))
 
 
 def pose_array(types: MessageTypes, positions: Iterable[Sequence[float]], frame_id: str = 'world') -> Any:
     poses = [pose(types, position) for position in positions]
-    return types.make('geometry_msgs/msg/PoseArray', header=header(types, SECOND, frame_id), poses=poses)
+    return types.make('geometry_msgs/msg/PoseArray', header=make_header(types, SECOND, frame_id), poses=poses)
 
 
 def cloud(types: MessageTypes, table: np.ndarray, stamp_ns: int = SECOND, frame_id: str = 'world', **changes: Any) -> Any:
@@ -54,7 +54,7 @@ def cloud(types: MessageTypes, table: np.ndarray, stamp_ns: int = SECOND, frame_
         for name, (kind, offset, *_) in (table.dtype.fields or {}).items()
     ]
     values: dict[str, Any] = {
-        'header': header(types, stamp_ns, frame_id),
+        'header': make_header(types, stamp_ns, frame_id),
         'height': 1,
         'width': len(table),
         'fields': fields,
@@ -76,7 +76,7 @@ def marker(
     types: MessageTypes, position: Sequence[float] = (0, 0, 0), scale: Sequence[float] = (0.1, 0.1, 0.1), **changes: Any
 ) -> Any:
     """Return a sphere that is added; changes: ns, id, type, action, lifetime [s], stamp_ns, frame_id."""
-    head = header(types, changes.pop('stamp_ns', SECOND), changes.pop('frame_id', 'world'))
+    head = make_header(types, changes.pop('stamp_ns', SECOND), changes.pop('frame_id', 'world'))
     seconds, nanoseconds = divmod(round(changes.pop('lifetime', 0) * SECOND), SECOND)
     values = {'ns': 'a', 'id': 0, 'type': 2, 'action': 0} | changes
     return types.make(

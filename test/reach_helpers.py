@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import FocConfig
-from foc_ros.core.dynamics.plants import triple_integrator_horizon
+from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import cold_start
@@ -58,7 +58,7 @@ def reach(
     """Return a rest-to-rest problem."""
     initial = np.zeros(6)
     initial[:2] = start
-    horizon = triple_integrator_horizon(duration / steps, steps)
+    horizon = build_triple_integrator_horizon(duration / steps, steps)
     return rest_to_goal(horizon, initial, np.asarray(goal, dtype=float), obstacles, np.asarray(noise, dtype=float), eta, **rest)
 
 

@@ -11,10 +11,20 @@ import foc_ros
 import foc_ros.api
 import foc_ros.core.config
 import foc_ros.core.obstacles.shapes
-from foc_ros.core.registry import LIKELIHOOD_RULES
+from foc_ros.core.dynamics.plant_models import make_plant_model
+from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
 
 CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003, name='cup')
 FAST = foc_ros.Config().with_values({'foc.steps': 20})
+
+
+@pytest.fixture(autouse=True)
+def registries(monkeypatch):
+    """What a test registers is gone after it."""
+    for registry in (LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES):
+        monkeypatch.setattr(registry, '_parts', dict(registry._parts))
+    yield
+    make_plant_model.cache_clear()
 
 
 @pytest.mark.parametrize(
@@ -26,7 +36,7 @@ def test_the_examples_of_the_docstrings_hold(module):
     assert not results.failed
 
 
-@pytest.mark.parametrize('name', [name for name in foc_ros.__all__ if name != 'register_baseline'])
+@pytest.mark.parametrize('name', foc_ros.__all__)
 def test_every_public_name_exists_and_is_documented(name):
     assert getattr(foc_ros, name).__doc__
 
@@ -235,6 +245,36 @@ def test_a_config_file_is_read_and_checked(tmp_path):
 )
 def test_representations_are_short(part, text):
     assert repr(part()).startswith(text)
+
+
+def test_a_strategy_from_outside_builds_on_another_one():
+    def solve_with_less(problem, start, settings, deadline):
+        result = foc_ros.get_strategy('lv')(problem, start, settings, deadline)
+        etas.append(foc_ros.compute_eta(problem, result.control))
+        return foc_ros.StrategyResult(result.status, 'as lv', result.control, result.contacts, result.tau, result.lam)
+
+    etas = []
+    foc_ros.register_strategy('as_lv', solve_with_less)
+    solutions = [foc_ros.solve((0, 0), (0.3, 0), [CUP], strategy=name, config=FAST) for name in ('lv', 'as_lv')]
+    np.testing.assert_array_equal(solutions[0].mean, solutions[1].mean)
+    assert solutions[1].message == 'as lv'
+    assert min(etas) >= 0.9 - 1e-5
+    with pytest.raises(foc_ros.InputError, match='strategy: expected one of lv'):
+        foc_ros.get_strategy('shortest')
+
+
+def test_a_qp_backend_from_outside_is_used():
+    def solve_and_count(qp):
+        calls.append(qp)
+        return piqp(qp)
+
+    calls, piqp = [], QP_BACKENDS.get('piqp')
+    foc_ros.register_qp_backend('counted', solve_and_count)
+    solutions = [
+        foc_ros.solve((0, 0), (0.3, 0), [CUP], config=FAST.with_values({'foc.qp_backend': name})) for name in ('piqp', 'counted')
+    ]
+    assert calls
+    np.testing.assert_allclose(solutions[0].mean, solutions[1].mean, atol=1e-9)
 
 
 def test_a_likelihood_rule_from_outside_is_used():

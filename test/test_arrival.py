@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from foc_ros.core.config import Config, updated
-from foc_ros.core.dynamics.plants import condense, triple_integrator
+from foc_ros.core.config import Config, replace_values
+from foc_ros.core.dynamics.plants import condense, discretise_triple_integrator
 from foc_ros.core.dynamics.replanning import (
     compute_error_map,
     triple_integrator_error_map,
     triple_integrator_process_covariance,
 )
-from foc_ros.core.estimation.kalman_filter import gramian, transition
+from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition
 from foc_ros.core.estimation.time_cost import compute_least_effort, find_least_cost_time
 from foc_ros.core.memory import Memory
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import HandState, make_obstacles
 
-PASSING = updated(
+PASSING = replace_values(
     Config(), {'duration.arrival': 'passing', 'duration.model': 'fixed', 'duration.fixed_s': 1.0, 'foc.process_noise': 0.5}
 )
 FREE = make_obstacles()
@@ -35,7 +35,7 @@ def test_a_hand_that_keeps_its_speed_passes_without_effort() -> None:
 
 def test_the_effort_is_the_least_that_leads_to_the_goal_without_acceleration() -> None:
     start = np.array([0.0, 0.0, 0.2, -0.1, 0.5, 1.0])
-    config = updated(PASSING, {'foc.steps': 400})
+    config = replace_values(PASSING, {'foc.steps': 400})
     (found,) = predict(config, hand(*start), FREE, np.array([[0.3, 0.1]]), Memory())[0].solved_candidates
     along = [compute_least_effort(way, *start[2 + axis :: 2], np.array([1.0]), True)[0] for axis, way in enumerate((0.3, 0.1))]
     assert found.solution.effort * found.solution.dt == pytest.approx(sum(along), rel=1e-3)
@@ -47,8 +47,8 @@ def test_effort_along_a_line_is_that_of_least_energy(length: float, speed: float
     held, times = [0, 2], np.array([0.4, 1.0, 2.5])
     expected = []
     for T in times:
-        missing = (np.array([length, 0.0, 0.0]) - transition(T) @ [0.0, speed, acceleration])[held]
-        expected.append(missing @ np.linalg.solve(gramian(T)[np.ix_(held, held)], missing))
+        missing = (np.array([length, 0.0, 0.0]) - compute_transition(T) @ [0.0, speed, acceleration])[held]
+        expected.append(missing @ np.linalg.solve(compute_gramian(T)[np.ix_(held, held)], missing))
     assert_allclose(compute_least_effort(length, speed, acceleration, times, True), expected, rtol=1e-9)
     assert find_least_cost_time(0.4, (0.5, 0.0), 0.1, (0.05, 20.0), True) == pytest.approx(0.8, rel=0.05)
 
@@ -56,7 +56,7 @@ def test_effort_along_a_line_is_that_of_least_energy(length: float, speed: float
 def test_all_errors_but_those_of_the_velocity_are_corrected() -> None:
     dt, steps = 0.05, 20
     error_map = triple_integrator_error_map(dt, steps, True)
-    assert_allclose(error_map, compute_error_map(condense(triple_integrator(dt), steps), True), atol=1e-9)
+    assert_allclose(error_map, compute_error_map(condense(discretise_triple_integrator(dt), steps), True), atol=1e-9)
     assert_allclose(error_map[-1][[0, 1, 4, 5]], 0.0, atol=1e-9)
     kept = error_map[-1][2, 2]
     assert kept == pytest.approx(error_map[-1][3, 3]) and abs(kept) > 0.1
@@ -68,7 +68,7 @@ def test_the_velocity_at_a_passed_goal_is_more_uncertain_than_at_rest() -> None:
     scene = FREE, np.array([[0.3, 0.1]]), Memory()
     now = hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0)
     passing = predict(PASSING, now, *scene)[0].solved_candidates[0].solution
-    resting = predict(updated(PASSING, {'duration.arrival': 'rest'}), now, *scene)[0].solved_candidates[0].solution
+    resting = predict(replace_values(PASSING, {'duration.arrival': 'rest'}), now, *scene)[0].solved_candidates[0].solution
     assert_allclose(resting.mean[-1, 2:], 0.0, atol=1e-9)
     assert resting.effort > 1.0
     assert passing.covariance[-1, 2, 2] > 2.0 * resting.covariance[-1, 2, 2]

@@ -15,7 +15,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from foc_ros.core.errors import RecordingError
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
-from foc_ros.ros.messages.encode_inputs import hand_pose
+from foc_ros.ros.messages.encode_inputs import encode_hand_pose
 
 
 def read(path: Path, chosen: dict[str, str] | None = None) -> list[Any]:
@@ -80,7 +80,9 @@ def test_a_copy_is_byte_for_byte(tmp_path: Path) -> None:
 
 
 def test_the_hand_can_be_chosen(tmp_path: Path) -> None:
-    bag = write_bag(tmp_path / 'arms', [*messages(), ('/left/measured_cp', START_NS, hand_pose(TYPES, 1, 'world', (9, 9, 9)))])
+    bag = write_bag(
+        tmp_path / 'arms', [*messages(), ('/left/measured_cp', START_NS, encode_hand_pose(TYPES, 1, 'world', (9, 9, 9)))]
+    )
     chosen = [item for item in read(bag, {'hand_pose': '/left/measured_cp'}) if item.role == 'hand_pose']
     assert [item.message.pose.position.x for item in chosen] == [9.0]
 

@@ -37,7 +37,7 @@ def pass_two(first: float, second: float, duration_s: float = 4.0) -> PredictedC
 def test_paths_separate_when_the_first_of_them_passes_an_obstacle_on_another_side() -> None:
     found = compute_branch_times([pass_two(0.1, 0.1), pass_two(0.1, -0.1), pass_two(-0.1, -0.1, duration_s=2.0)], TWO)
     np.testing.assert_allclose(found.after_s, [[np.inf, 3.0, 0.5], [3.0, np.inf, 0.5], [0.5, 0.5, np.inf]])
-    assert found.way.tolist() == [0, 1, 2]
+    assert found.path_class.tolist() == [0, 1, 2]
 
 
 def test_an_obstacle_that_moves_is_passed_where_it_then_is() -> None:
@@ -54,13 +54,13 @@ def test_obstacles_passed_on_one_side_or_left_behind_separate_nothing() -> None:
         [outcome([(0.0, 0.0), (2.0, 0.5), (4.0, 0.0)]), outcome([(0.0, 0.0), (2.0, -0.5), (4.0, 0.0)])], behind
     )
     assert np.isinf(found.after_s).all()
-    assert found.way.tolist() == [0, 0]
+    assert found.path_class.tolist() == [0, 0]
 
 
 def test_paths_without_an_obstacle_between_them_never_separate() -> None:
     found = compute_branch_times([outcome([(0.0, 0.0), (1.0, 1.0)], 0), outcome([(0.0, 0.0), (1.0, -1.0)], 1)], make_obstacles())
     assert np.isinf(found.after_s).all()
-    assert found.way.tolist() == [0, 0]
+    assert found.path_class.tolist() == [0, 0]
 
 
 def test_no_candidates_have_no_branch_times() -> None:

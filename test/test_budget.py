@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from foc_ros.core.candidates import EarlierSolutions
-from foc_ros.core.config import Config, updated
+from foc_ros.core.config import Config, replace_values
 from foc_ros.core.deadline import OutOfTimeError
 from foc_ros.core.estimation.kalman_filter import update
 from foc_ros.core.memory import Memory
@@ -13,7 +13,7 @@ from foc_ros.core.types import HandSample, Status, make_obstacles
 
 OBSTACLES = make_obstacles([[0.12, 0.01], [0.2, -0.03]], [0.02, 0.02], 0.001)
 GOALS = np.array([[0.3, 0.0]])
-CONFIG = updated(Config(), {'foc.steps': 20})
+CONFIG = replace_values(Config(), {'foc.steps': 20})
 HANDS = [
     update(None, HandSample(1_000_000_000 + 20_000_000 * tick, np.array([1e-4 * tick, 0.0])), CONFIG.estimator).state
     for tick in range(3)
@@ -21,7 +21,7 @@ HANDS = [
 
 
 def predicted(tick: int, memory: Memory, budget_s: float = 0.0):
-    return predict(updated(CONFIG, {'budget_s': budget_s}), HANDS[tick], OBSTACLES, GOALS, memory)
+    return predict(replace_values(CONFIG, {'budget_s': budget_s}), HANDS[tick], OBSTACLES, GOALS, memory)
 
 
 def statuses(prediction) -> list[Status]:

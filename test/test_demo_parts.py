@@ -24,8 +24,8 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.types import Prediction
 from foc_ros.io.bags import TYPESTORE, Item
 from foc_ros.reporting.snapshots import build_snapshot
-from foc_ros.ros.messages.encode_inputs import goal_poses, hand_pose, obstacle_cloud
-from foc_ros.ros.messages.encode_prediction import likelihood_array, prediction_cloud
+from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
+from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
 from foc_ros.ros.messages.types import RosbagsTypes
 
 TYPES = RosbagsTypes(TYPESTORE)
@@ -33,20 +33,22 @@ STEP_NS = 20_000_000
 
 
 def send_scene(recorder: Recorder) -> None:
-    goals = goal_poses(TYPES, START_NS, 'world', np.array([[0.3, 0.0, 0.1], [0.3, 0.12, 0.1]]))
-    cloud = obstacle_cloud(TYPES, START_NS, 'world', [(0.15, 0.0, 0.1, 0.03, 0.003, 7)])
+    goals = encode_goals(TYPES, START_NS, 'world', np.array([[0.3, 0.0, 0.1], [0.3, 0.12, 0.1]]))
+    cloud = encode_obstacles(TYPES, START_NS, 'world', [(0.15, 0.0, 0.1, 0.03, 0.003, 7)])
     for role, message in (('goals', goals), ('obstacles', cloud)):
         recorder.add_sent(Item(role, f'/{role}', START_NS, message, b''), 0.0)
 
 
 def send_hand(recorder: Recorder, number: int, now: float) -> None:
     stamp_ns = START_NS + number * STEP_NS
-    recorder.add_sent(Item('hand_pose', '/hand_pose', stamp_ns, hand_pose(TYPES, stamp_ns, 'world', (0.0, 0.0, 0.1)), b''), now)
+    recorder.add_sent(
+        Item('hand_pose', '/hand_pose', stamp_ns, encode_hand_pose(TYPES, stamp_ns, 'world', (0.0, 0.0, 0.1)), b''), now
+    )
 
 
 def messages(number: int) -> tuple[object, object, Prediction]:
     made = prediction(START_NS + number * STEP_NS, np.zeros(2), 0.3 + 0.01 * number)
-    return prediction_cloud(made, 'xy', TYPES), likelihood_array(made, TYPES), made
+    return encode_prediction_cloud(made, 'xy', TYPES), encode_likelihoods(made, TYPES), made
 
 
 def filled(count: int = 5) -> Recorder:
@@ -128,8 +130,8 @@ def test_nothing_solved_is_shown(terminal: bool) -> None:
     send_scene(recorder)
     send_hand(recorder, 0, 0.0)
     made = Prediction(START_NS, 'world', 0.1, (), None)
-    recorder.add_received('prediction', prediction_cloud(made, 'xy', TYPES), 0.0)
-    recorder.add_received('likelihoods', likelihood_array(made, TYPES), 0.0)
+    recorder.add_received('prediction', encode_prediction_cloud(made, 'xy', TYPES), 0.0)
+    recorder.add_received('likelihoods', encode_likelihoods(made, TYPES), 0.0)
     assert 'no solved candidate' in shown(recorder, terminal, np.array([1.0]))
 
 

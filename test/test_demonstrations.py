@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foc_ros.core.config import Config, HomotopyConfig, updated
+from foc_ros.core.config import Config, HomotopyConfig, replace_values
 from foc_ros.core.errors import FocError
-from foc_ros.core.homotopy import path_sides
+from foc_ros.core.homotopy import find_path_sides
 from foc_ros.core.homotopy.demonstrations import (
     MOST,
     POINTS,
@@ -54,7 +54,7 @@ def test_a_demonstration_contains_the_obstacles_that_it_passed():
 
 
 def test_a_demonstrated_class_longer_than_the_candidates_is_solved_too():
-    config = updated(Config(), {'homotopy.max_candidates': 2})
+    config = replace_values(Config(), {'homotopy.max_candidates': 2})
     without, _ = predict(config, hand(), OBSTACLES, GOAL, Memory())
     prediction, memory = predict(config, hand(), OBSTACLES, GOAL, Memory(), [DEMONSTRATION])
     labels = {one.candidate.label for one in prediction.solved_candidates}
@@ -114,7 +114,7 @@ def test_recalled_candidates_pass_the_obstacles_as_their_labels_say(height, at, 
     demonstration = record_demonstration('world', bow(height), OBSTACLES)
     goals = GOAL + np.array(shift)
     for one in recall(demonstration, goals=goals, state=hand(at)):
-        sides, shown = path_sides(one.guess, OBSTACLES), dict(zip(demonstration.ids, demonstration.sides, strict=True))
+        sides, shown = find_path_sides(one.guess, OBSTACLES), dict(zip(demonstration.ids, demonstration.sides, strict=True))
         assert one.sides == tuple((name, sides[name]) for name, _ in one.sides)
         assert all(side == shown.get(name, side) for name, side in sides.items())
         assert one.guess[0] == pytest.approx(at, abs=1e-9)
@@ -180,7 +180,7 @@ def test_files_that_are_no_library_are_refused(tmp_path, text, words):
 
 def test_hysteresis_gives_found_and_recalled_candidates_the_same_names():
     """An obstacle at the edge of the names is in the names of both found and recalled candidates, or in neither."""
-    config = updated(Config(), {'homotopy.max_candidates': 8, 'foc.strategy': 'fixed', 'foc.steps': 20})
+    config = replace_values(Config(), {'homotopy.max_candidates': 8, 'foc.strategy': 'fixed', 'foc.steps': 20})
     demonstrations = [record_demonstration('world', bow(height), OBSTACLES) for height in (-0.1, 0.03, -0.03, 0.1)]
     rng, memory = np.random.default_rng(4), Memory()
     for x in np.linspace(0.14, 0.16, 80):

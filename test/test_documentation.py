@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from foc_ros.cli.main import COMMANDS
-from foc_ros.core.config import parameters
+from foc_ros.core.config import list_parameters
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'doc').glob('**/*.md')])
@@ -53,7 +53,7 @@ def test_every_page_is_in_the_table_of_contents() -> None:
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
 def test_parameters_named_exist(page: Path) -> None:
-    known = {parameter.name for parameter in parameters()}
+    known = {parameter.name for parameter in list_parameters()}
     groups = '|'.join(sorted({name.partition('.')[0] for name in known if '.' in name}))
     for name in re.findall(rf'`((?:{groups})\.(?!py`)\w+)`', page.read_text('utf-8')):
         assert name in known, f'{page.name}: there is no parameter {name}'

@@ -6,11 +6,11 @@ from scipy.linalg import expm
 
 from foc_ros.core.dynamics.plants import (
     Plant,
+    build_triple_integrator_horizon,
     condense,
-    damped_mass,
-    states_at_goal,
-    triple_integrator,
-    triple_integrator_horizon,
+    discretise_damped_mass,
+    discretise_triple_integrator,
+    find_states_at_goal,
 )
 from foc_ros.core.dynamics.replanning import compute_error_map, triple_integrator_error_map
 from foc_ros.core.errors import InputError
@@ -25,7 +25,7 @@ def zero_order_hold(a: np.ndarray, b: np.ndarray, dt: float) -> tuple[np.ndarray
 def test_triple_integrator_is_the_exact_discretisation():
     chain = np.kron(np.diag([1.0, 1.0], k=1), np.eye(2))
     A, B = zero_order_hold(chain, np.kron([[0.0], [0.0], [1.0]], np.eye(2)), 0.02)
-    plant = triple_integrator(0.02)
+    plant = discretise_triple_integrator(0.02)
     np.testing.assert_allclose(plant.A, A, atol=1e-15)
     np.testing.assert_allclose(plant.B, B, atol=1e-15)
 
@@ -36,12 +36,14 @@ def test_damped_mass_is_the_exact_discretisation(damping):
     A, B = zero_order_hold(
         np.kron([[0.0, 1.0], [0.0, -damping / mass]], np.eye(2)), np.kron([[0.0], [1.0 / mass]], np.eye(2)), dt
     )
-    plant = damped_mass(dt, mass, damping)
+    plant = discretise_damped_mass(dt, mass, damping)
     np.testing.assert_allclose(plant.A, A, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(plant.B, B, rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize('plant', [triple_integrator(0.02), damped_mass(0.05, 2.0, 3.0)], ids=['jerk', 'force'])
+@pytest.mark.parametrize(
+    'plant', [discretise_triple_integrator(0.02), discretise_damped_mass(0.05, 2.0, 3.0)], ids=['jerk', 'force']
+)
 def test_horizon_is_what_the_plant_does_step_by_step(plant):
     generator = np.random.default_rng(1)
     steps, n = 12, len(plant.A)
@@ -56,7 +58,7 @@ def test_horizon_is_what_the_plant_does_step_by_step(plant):
 
 
 def test_the_scaled_horizon_equals_the_direct_one():
-    direct, scaled = condense(triple_integrator(0.037), 30), triple_integrator_horizon(0.037, 30)
+    direct, scaled = condense(discretise_triple_integrator(0.037), 30), build_triple_integrator_horizon(0.037, 30)
     np.testing.assert_allclose(scaled.powers, direct.powers, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(scaled.response, direct.response, rtol=1e-12, atol=1e-18)
     np.testing.assert_allclose(scaled.maps, direct.maps, rtol=1e-12, atol=1e-24)
@@ -67,7 +69,7 @@ def test_a_corrected_error_starts_in_full_and_vanishes_at_the_goal():
     error_map = triple_integrator_error_map(0.02, 50)
     np.testing.assert_allclose(error_map[0], np.eye(6))
     np.testing.assert_allclose(error_map[-1], 0.0, atol=1e-9)
-    open_loop = triple_integrator_horizon(0.02, 50).powers
+    open_loop = build_triple_integrator_horizon(0.02, 50).powers
     assert np.abs(error_map[:, 0, 4]).max() < 0.05 * np.abs(open_loop[:, 0, 4]).max()
 
 
@@ -87,20 +89,20 @@ def test_a_plant_of_wrong_shape_is_refused(A, B, dt):
 
 def test_mass_and_damping_are_checked():
     with pytest.raises(InputError, match='mass'):
-        damped_mass(0.01, 0.0, 1.0)
+        discretise_damped_mass(0.01, 0.0, 1.0)
     with pytest.raises(InputError, match='damping'):
-        damped_mass(0.01, 1.0, float('nan'))
+        discretise_damped_mass(0.01, 1.0, float('nan'))
 
 
 @pytest.mark.parametrize('passing', [False, True])
 def test_a_correction_ends_at_the_goal_and_nearer_to_the_path(passing):
     generator = np.random.default_rng(6)
-    stacked = triple_integrator_horizon(0.02, 40)
-    fixed = states_at_goal(6, passing)
+    stacked = build_triple_integrator_horizon(0.02, 40)
+    fixed = find_states_at_goal(6, passing)
     path, state = 0.01 * np.cumsum(generator.standard_normal((40, 2)), axis=0), generator.standard_normal(6)
     control = stacked.returning(path, state, fixed)
     np.testing.assert_allclose(stacked.response[-1, fixed] @ control, state[fixed], atol=1e-8)
     straight = stacked.returning(np.zeros((40, 2)), state, fixed)
     assert np.linalg.norm((stacked.position @ control).T - path) < np.linalg.norm((stacked.position @ straight).T - path)
-    own = condense(triple_integrator(0.02), 40).returning(path, state, fixed)
+    own = condense(discretise_triple_integrator(0.02), 40).compute_correction(path, state, fixed)
     np.testing.assert_allclose(stacked.position @ control, stacked.position @ own, atol=1e-9)

@@ -9,7 +9,7 @@ import pytest
 from reach_helpers import bowed, case_guess, case_problem, random_scene, reach, reference_cases, solved
 from varied_reaches import varied_reach
 
-from foc_ros.core.homotopy import path_sides
+from foc_ros.core.homotopy import find_path_sides
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.types import Solution, Status
 
@@ -83,7 +83,7 @@ def test_effort_does_not_fall_with_eta(case, strategy, request):
 def find_sides(problem: Problem, solution: Solution) -> dict[str, int]:
     """Return the side on which the mean passes each circle; circles may move."""
     centres = np.concatenate((problem.obstacles.centre[:, None], problem.centres), axis=1).swapaxes(0, 1)
-    return path_sides(solution.path, problem.obstacles, centres)
+    return find_path_sides(solution.path, problem.obstacles, centres)
 
 
 def test_no_strategy_needs_less_effort_than_optimal_in_the_same_class():

@@ -13,7 +13,7 @@ from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction, three_
 
 from foc_ros.core.errors import FocError
 from foc_ros.core.types import PredictedCandidate, Prediction, Status, make_obstacles
-from foc_ros.ros.messages.encode_prediction import OUTPUTS, output_messages
+from foc_ros.ros.messages.encode_prediction import OUTPUTS, encode_outputs
 from foc_ros.ros.messages.plane import lift
 from foc_ros.ros.messages.ranking import MAX_RATIO
 from foc_ros.ros.messages.types import MessageTypes
@@ -23,7 +23,7 @@ NAMES = ['x', 'y', 'z', 't', 'vx', 'vy', 'vz', 'xx', 'xy', 'xz', 'yy', 'yz', 'zz
 
 
 def made(name: str, of: Prediction, types: MessageTypes = BAGS, plane: str = 'xy') -> Any:
-    return output_messages(of, OBSTACLES, plane, types, [name])[name]
+    return encode_outputs(of, OBSTACLES, plane, types, [name])[name]
 
 
 def columns(cloud: Any) -> dict[str, np.ndarray]:
@@ -97,7 +97,7 @@ def test_the_candidate_called_most_likely_is_first_even_if_another_is_likelier()
 @both_kinds
 @pytest.mark.parametrize('outcomes', [(), (outcome(status=Status.DEADLINE),)])
 def test_nothing_solved_is_an_empty_answer(types: MessageTypes, outcomes: tuple[PredictedCandidate, ...]) -> None:
-    messages = output_messages(prediction(*outcomes), OBSTACLES, 'xy', types)
+    messages = encode_outputs(prediction(*outcomes), OBSTACLES, 'xy', types)
     assert (messages['prediction'].width, len(messages['prediction'].data)) == (0, 0)
     assert [field.name for field in messages['prediction'].fields] == NAMES
     assert (messages['likelihoods'].layout.dim[0].size, len(messages['likelihoods'].data)) == (0, 0)
@@ -170,14 +170,14 @@ def test_a_candidate_without_a_path_shows_its_guess() -> None:
 
 def test_the_nearest_of_many_obstacles_are_drawn() -> None:
     crowd = make_obstacles([[0.01 * i, 0.0] for i in range(1000, 0, -1)], 0.001)
-    markers = output_messages(three_ways(), crowd, 'xy', BAGS, ['markers'])['markers'].markers
+    markers = encode_outputs(three_ways(), crowd, 'xy', BAGS, ['markers'])['markers'].markers
     drawn = [each.pose.position.x for each in markers if each.ns == 'obstacle']
     assert sorted(drawn) == pytest.approx([0.01 * i for i in range(1, 129)])
 
 
 @both_kinds
 def test_every_output_is_the_same_after_serialisation(types: MessageTypes) -> None:
-    for name, message in output_messages(three_ways(), OBSTACLES, 'xy', types).items():
+    for name, message in encode_outputs(three_ways(), OBSTACLES, 'xy', types).items():
         kind = OUTPUTS[name][0]
         if hasattr(message, '__msgtype__'):
             raw = STORE.serialize_cdr(message, kind)
@@ -186,7 +186,7 @@ def test_every_output_is_the_same_after_serialisation(types: MessageTypes) -> No
 
             raw = serialize_message(message)
         back = STORE.deserialize_cdr(raw, kind)
-        twin = output_messages(three_ways(), OBSTACLES, 'xy', BAGS, [name])[name]
+        twin = encode_outputs(three_ways(), OBSTACLES, 'xy', BAGS, [name])[name]
         assert bytes(STORE.serialize_cdr(back, kind)) == bytes(STORE.serialize_cdr(twin, kind))
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foc_ros.core.config import EstimatorConfig
-from foc_ros.core.estimation.kalman_filter import FilterState, gramian, transition, update
+from foc_ros.core.estimation.kalman_filter import FilterState, compute_gramian, compute_transition, update
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, SampleStatus
 
 CONFIG = EstimatorConfig(position_stddev=0.001, jerk_density=5.0, onset_speed=0.05, gap_s=0.5)
@@ -31,8 +31,8 @@ def white_jerk(rng: np.random.Generator, dt: Array, q: float) -> Array:
     """States (n + 1, 6) of a hand driven by white jerk from rest at the origin."""
     states = [np.zeros((3, 2))]
     for step in dt:
-        noise = np.linalg.cholesky(gramian(step)) @ rng.standard_normal((3, 2))
-        states.append(transition(step) @ states[-1] + q * noise)
+        noise = np.linalg.cholesky(compute_gramian(step)) @ rng.standard_normal((3, 2))
+        states.append(compute_transition(step) @ states[-1] + q * noise)
     return np.array(states).reshape(-1, 6)
 
 
@@ -40,13 +40,17 @@ def test_gramian_is_the_integral_of_the_impulse_response() -> None:
     dt, n = 0.7, 20000
     t = (np.arange(n) + 0.5) * dt / n
     response = np.stack([t**2 / 2.0, t, np.ones(n)])
-    np.testing.assert_allclose(gramian(dt), response @ response.T * dt / n, rtol=1e-6)
+    np.testing.assert_allclose(compute_gramian(dt), response @ response.T * dt / n, rtol=1e-6)
 
 
 def test_gramian_and_transition_compose() -> None:
     a, b = 0.13, 0.4
-    np.testing.assert_allclose(transition(a) @ transition(b), transition(a + b), rtol=1e-12)
-    np.testing.assert_allclose(transition(b) @ gramian(a) @ transition(b).T + gramian(b), gramian(a + b), rtol=1e-12)
+    np.testing.assert_allclose(compute_transition(a) @ compute_transition(b), compute_transition(a + b), rtol=1e-12)
+    np.testing.assert_allclose(
+        compute_transition(b) @ compute_gramian(a) @ compute_transition(b).T + compute_gramian(b),
+        compute_gramian(a + b),
+        rtol=1e-12,
+    )
 
 
 def test_the_filter_equals_a_plain_one_with_six_states() -> None:
@@ -57,7 +61,7 @@ def test_the_filter_equals_a_plain_one_with_six_states() -> None:
     first = run(times[:1], positions[:1])[0]
     mean, covariance = first.mean, first.covariance
     for state, dt, position in zip(run(times, positions)[1:], np.diff(np.round(times, 9)), positions[1:], strict=True):
-        a, q = np.kron(transition(dt), np.eye(2)), 25.0 * np.kron(gramian(dt), np.eye(2))
+        a, q = np.kron(compute_transition(dt), np.eye(2)), 25.0 * np.kron(compute_gramian(dt), np.eye(2))
         mean, covariance = a @ mean, a @ covariance @ a.T + q
         gain = covariance @ observe.T @ np.linalg.inv(observe @ covariance @ observe.T + 1e-6 * np.eye(2))
         mean, covariance = mean + gain @ (position - observe @ mean), (np.eye(6) - gain @ observe) @ covariance

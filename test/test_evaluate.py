@@ -68,7 +68,7 @@ def test_a_baseline_from_outside_is_compared(
     for name in BASELINES:
         extended.register(name, BASELINES.get(name))
     monkeypatch.setattr('foc_ros.analysis.evaluation.baselines.BASELINES', extended)
-    register_baseline('first answer', forecast_first, (0.0, 0.5))
+    register_baseline('first answer', forecast_first, [0.0, 0.5])
     with pytest.raises(InputError, match='baseline: expected a new name beside foc, foc, held out'):
         register_baseline('uniform', forecast_first)
     found = answer(tables, capsys)

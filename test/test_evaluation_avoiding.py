@@ -11,7 +11,7 @@ from foc_ros.analysis.evaluation.evaluate import find_gaps, find_label_mismatche
 from foc_ros.analysis.evaluation.observations import observe
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
 from foc_ros.analysis.recordings import find_recordings
-from foc_ros.core.config import updated
+from foc_ros.core.config import replace_values
 from foc_ros.ros.parameters import load_parameter_file
 
 PARAMETERS = Path(__file__).parents[1] / 'doc' / 'examples' / 'thumb_stick.yaml'
@@ -20,7 +20,7 @@ PARAMETERS = Path(__file__).parents[1] / 'doc' / 'examples' / 'thumb_stick.yaml'
 @pytest.mark.skipif(not AVOIDING.is_dir(), reason='optional data ../shared/data/d3il_avoiding is not there')
 @pytest.mark.parametrize('name', ['000', '053'])
 def test_the_classes_taken_are_as_labelled(name: str, tmp_path: Path) -> None:
-    config = updated(load_parameter_file(PARAMETERS), {'rate_hz': 0.5})
+    config = replace_values(load_parameter_file(PARAMETERS), {'rate_hz': 0.5})
     recording = observe(find_recordings(AVOIDING)[name], config)
     first, relevant = recording.observations[0], find_relevant_obstacles(recording)
     assert first.row.tolist() == [0, 1, 1, 2, 2, 2]

@@ -15,16 +15,16 @@ from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
 from foc_ros.analysis.recordings import BagRecording, find_recordings
 from foc_ros.analysis.replay import Replay
-from foc_ros.core.config import Config, updated
+from foc_ros.core.config import Config, replace_values
 from foc_ros.core.types import LEFT
 from foc_ros.io.bags import TYPESTORE, BagReader, Item
-from foc_ros.ros.messages.encode_inputs import goal_poses
+from foc_ros.ros.messages.encode_inputs import encode_goals
 from foc_ros.ros.messages.types import RosbagsTypes
 
 FAST = {'rate_hz': 4.0, 'foc.steps': 20, 'foc.strategy': 'fixed', 'foc.tau': 1e-4, 'foc.lam': 0.0, 'homotopy.max_candidates': 6}
-PLAIN = updated(Config(), FAST)
-AHEAD = updated(PLAIN, {'likelihood.beta': 3.0, 'likelihood.spent_share': 0.3, 'likelihood.lookahead_s': 0.4})
-PRICED = updated(PLAIN, {'duration.model': 'cost_of_time', 'duration.time_cost': 50.0})
+PLAIN = replace_values(Config(), FAST)
+AHEAD = replace_values(PLAIN, {'likelihood.beta': 3.0, 'likelihood.spent_share': 0.3, 'likelihood.lookahead_s': 0.4})
+PRICED = replace_values(PLAIN, {'duration.model': 'cost_of_time', 'duration.time_cost': 50.0})
 OBSTACLES = [(0.12, 0.0, 0.02), (0.22, 0.03, 0.02)]
 GOALS = [(0.32, 0.05), (0.32, -0.05)]
 
@@ -97,7 +97,7 @@ def test_no_goal_is_true_for_predictions_with_other_goals(data: Path) -> None:
 
         def items(self):
             """Yield three goals half way; the two earlier ones return with the next message of the tables."""
-            goals = goal_poses(RosbagsTypes(TYPESTORE), EPOCH_NS, 'world', np.array([(0.1 * k, 0.3, 0.0) for k in range(3)]))
+            goals = encode_goals(RosbagsTypes(TYPESTORE), EPOCH_NS, 'world', np.array([(0.1 * k, 0.3, 0.0) for k in range(3)]))
             for item in find_recordings(data)['one'].items():
                 yield item
                 if item.role == 'hand_pose' and EPOCH_NS + 600_000_000 < item.log_ns < EPOCH_NS + 700_000_000:

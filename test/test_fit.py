@@ -17,7 +17,7 @@ from fit_recordings import write_tables
 from foc_ros.analysis.fitting import fit as fitting
 from foc_ros.analysis.fitting import predictor_settings
 from foc_ros.cli.main import main
-from foc_ros.core.config import Config, flatten, updated
+from foc_ros.core.config import Config, flatten, replace_values
 from foc_ros.ros.parameters import dump_parameter_file, load_parameter_file
 
 QUICK = {'foc.steps': 15, 'homotopy.max_candidates': 2, 'duration.fitts_a_s': 0.3}
@@ -32,7 +32,7 @@ def use_few_predictions(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def _fit(folder: Path, capsys: pytest.CaptureFixture[str], *arguments: str, **parameters: Any) -> tuple[dict[str, Any], Config]:
     given, output = folder.parent / 'given.yaml', folder.parent / 'fitted.yaml'
-    given.write_text(dump_parameter_file(updated(Config(), {**QUICK, **parameters})))
+    given.write_text(dump_parameter_file(replace_values(Config(), {**QUICK, **parameters})))
     code = main(['fit', str(folder), '--output', str(output), '--params', str(given), '--workers', '1', '--json', *arguments])
     printed = capsys.readouterr()
     assert code == (2 if 'bad: ' in printed.err else 0), printed.err
@@ -57,7 +57,7 @@ def test_everything_is_fitted_and_written_for_the_node(past_an_obstacle: Path, c
     for name, choice in answer['chosen'].items():
         assert values[name] == choice['value'] != choice['given']
     unfitted = {name: value for name, value in values.items() if name not in answer['parameters'] | answer['chosen']}
-    assert unfitted == {name: value for name, value in flatten(updated(Config(), QUICK)).items() if name in unfitted}
+    assert unfitted == {name: value for name, value in flatten(replace_values(Config(), QUICK)).items() if name in unfitted}
     assert answer['parameters']['estimator.position_stddev']['value'] == pytest.approx(5e-4, rel=0.2)
     classes = answer['scores']['ways']
     assert classes['fitted'] >= classes['without the recording'] and classes['fitted'] > classes['uniform']
@@ -97,7 +97,7 @@ def test_one_bag_and_a_broken_one(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 def test_the_result_is_printed_as_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag, given, output = write_bag(tmp_path / 'bag'), tmp_path / 'given.yaml', tmp_path / 'out.yaml'
-    given.write_text(dump_parameter_file(updated(Config(), {**QUICK, 'foc.strategy': 'hc'})))
+    given.write_text(dump_parameter_file(replace_values(Config(), {**QUICK, 'foc.strategy': 'hc'})))
     assert main(['fit', str(bag), '--output', str(output), '--params', str(given), '--workers', '1']) == 0
     words = capsys.readouterr().out
     assert 'log-likelihood of the class taken' in words and 'note: ' in words

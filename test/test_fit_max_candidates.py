@@ -7,7 +7,7 @@ import pytest
 
 from foc_ros.analysis.fitting.predictor_settings import CANDIDATES, MAX_CLASSES, count_classes, fit_max_candidates
 from foc_ros.analysis.fitting.recorded_hand import RecordedHand
-from foc_ros.core.config import Config, updated
+from foc_ros.core.config import Config, replace_values
 from foc_ros.core.types import make_obstacles
 
 
@@ -39,6 +39,6 @@ def test_rows_between_start_and_goal_multiply(centres, expected: int) -> None:
 def test_there_is_room_for_goals_and_classes_and_never_less_than_given(
     found: RecordedHand, given: int, expected: int | None
 ) -> None:
-    estimates, warnings = fit_max_candidates([found], updated(Config(), {CANDIDATES: given}))
+    estimates, warnings = fit_max_candidates([found], replace_values(Config(), {CANDIDATES: given}))
     assert (estimates[CANDIDATES].value if estimates else None) == expected
     assert bool(warnings) == (expected == MAX_CLASSES)

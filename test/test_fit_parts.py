@@ -7,8 +7,8 @@ from fit_recordings import GOALS, reach, recorded_hand
 from foc_ros.analysis.fitting.duration_fit import fit_duration
 from foc_ros.analysis.fitting.estimator_fit import Innovations, fit_estimator
 from foc_ros.analysis.fitting.resampling import expand_quadratic
-from foc_ros.core.config import Config, updated
-from foc_ros.core.estimation.kalman_filter import gramian, transition, update
+from foc_ros.core.config import Config, replace_values
+from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition, update
 from foc_ros.core.types import HandSample, make_obstacles
 
 
@@ -20,7 +20,9 @@ def _drifting(seed: int, stddev: float, density: float, count: int = 6) -> list:
     for number in range(count):
         state, path = np.zeros((3, 2)), []
         for dt in np.diff(times, prepend=times[0] - 0.02):
-            state = transition(dt) @ state + density * np.linalg.cholesky(gramian(dt)) @ rng.standard_normal((3, 2))
+            state = compute_transition(dt) @ state + density * np.linalg.cholesky(compute_gramian(dt)) @ rng.standard_normal(
+                (3, 2)
+            )
             path.append(state[0] + rng.normal(0.0, stddev, 2))
         found.append(recorded_hand(f'{number}', times, np.array(path), make_obstacles(), GOALS))
     return found
@@ -36,9 +38,11 @@ def test_innovations_are_those_of_the_estimator() -> None:
         following = update(state, HandSample(stamp_ns, position), config).state
         if state is not None and stamp_ns - state.stamp_ns < 5e8:
             dt = (stamp_ns - state.stamp_ns) * 1e-9
-            prior = transition(dt) @ state.covariance[::2, ::2] @ transition(dt).T + config.jerk_density**2 * gramian(dt)
+            prior = compute_transition(dt) @ state.covariance[::2, ::2] @ compute_transition(
+                dt
+            ).T + config.jerk_density**2 * compute_gramian(dt)
             S = prior[0, 0] + config.position_stddev**2
-            v = position - (transition(dt) @ state.mean.reshape(3, 2))[0]
+            v = position - (compute_transition(dt) @ state.mean.reshape(3, 2))[0]
             total -= np.log(2 * np.pi * S) + v @ v / (2 * S)
         state = following
     found = Innovations([each], config.gap_s).log_likelihood(config.position_stddev, config.jerk_density)
@@ -71,7 +75,7 @@ def _reaches(durations: list[float], goals: np.ndarray) -> list:
 
 
 def test_one_factor_is_fitted_where_distances_are_alike() -> None:
-    config = updated(Config(), {'estimator.position_stddev': 2e-4})
+    config = replace_values(Config(), {'estimator.position_stddev': 2e-4})
     given = config.duration.fitts_a_s + config.duration.fitts_b_s * np.log2(0.3 / config.duration.target_width + 1)
     goals = np.tile([0.3, 0.0], (5, 1))
     estimates, warnings = fit_duration(_reaches([2.0 * given] * 5, goals), config)
@@ -84,7 +88,7 @@ def test_one_factor_is_fitted_where_distances_are_alike() -> None:
 
 def test_the_cost_of_time_is_found() -> None:
     given = {'estimator.position_stddev': 2e-4, 'duration.model': 'cost_of_time', 'duration.time_cost': 100.0}
-    estimates, _ = fit_duration(_reaches([2.0] * 4, np.tile([0.3, 0.0], (4, 1))), updated(Config(), given))
+    estimates, _ = fit_duration(_reaches([2.0] * 4, np.tile([0.3, 0.0], (4, 1))), replace_values(Config(), given))
     found = estimates['duration.time_cost']
     assert found.low <= found.value <= found.high
     # the filter lags because it models a fading acceleration as a lasting one
@@ -92,7 +96,7 @@ def test_the_cost_of_time_is_found() -> None:
 
 
 def test_distances_that_differ_determine_intercept_and_slope() -> None:
-    config = updated(Config(), {'estimator.position_stddev': 2e-4})
+    config = replace_values(Config(), {'estimator.position_stddev': 2e-4})
     distances = np.array([0.05, 0.1, 0.2, 0.4, 0.8])
     durations = 0.5 + 0.3 * np.log2(distances / config.duration.target_width + 1)
     estimates, warnings = fit_duration(_reaches(durations.tolist(), np.column_stack([distances, np.zeros(5)])), config)

@@ -16,13 +16,13 @@ from foc_ros.analysis.fitting.predictor_settings import DURATIONS, make_movement
 from foc_ros.analysis.fitting.setting_search import Replays
 from foc_ros.analysis.parallel import IsolatedProcessPool
 from foc_ros.analysis.recordings import find_recordings
-from foc_ros.core.config import Config, updated
-from foc_ros.core.estimation.kalman_filter import transition
+from foc_ros.core.config import Config, replace_values
+from foc_ros.core.estimation.kalman_filter import compute_transition
 from foc_ros.core.types import Array, make_obstacles
 
-CONFIG = updated(Config(), {'foc.steps': 15, 'homotopy.max_candidates': 2, 'rate_hz': 4.0})
+CONFIG = replace_values(Config(), {'foc.steps': 15, 'homotopy.max_candidates': 2, 'rate_hz': 4.0})
 GOAL = np.array([[0.3, 0.0]])
-ARRIVALS = [CONFIG, updated(CONFIG, {'duration.arrival': 'passing'})]
+ARRIVALS = [CONFIG, replace_values(CONFIG, {'duration.arrival': 'passing'})]
 
 
 class KnownReplays:
@@ -64,7 +64,7 @@ def test_the_given_setting_is_kept_where_scores_are_equal() -> None:
 
 def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_recordings(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(setting_search, 'PLAINLY_WORSE', 1e6)
-    settings = [updated(CONFIG, {'foc.eta': 0.5 + 0.02 * place}) for place in range(20)]
+    settings = [replace_values(CONFIG, {'foc.eta': 0.5 + 0.02 * place}) for place in range(20)]
     quality = -np.abs(np.arange(20.0) - 13.0)[:, None] + 0.1 * np.random.default_rng(3).standard_normal((20, 40))
     replays = KnownReplays(quality)
     found = replays.search(settings)
@@ -77,7 +77,7 @@ def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_record
 def test_plainly_worse_settings_leave_at_once() -> None:
     spread = 0.2 * np.random.default_rng(4).standard_normal((6, 24))
     replays = KnownReplays(np.array([-1.0, 0.0, 0.05, -1.1, -1.2, 0.1])[:, None] + spread)
-    found = replays.search([updated(CONFIG, {'foc.eta': 0.5 + 0.02 * place}) for place in range(6)])
+    found = replays.search([replace_values(CONFIG, {'foc.eta': 0.5 + 0.02 * place}) for place in range(6)])
     assert replays.rounds == [(6, 6), (3, 12), (3, 24)]
     assert found.config.foc.eta in (0.52, 0.54, 0.6)
 
@@ -95,7 +95,7 @@ def test_classes_decide_and_positions_where_classes_are_equal() -> None:
 
 
 def test_models_durations_arrivals_and_fading_are_tried_in_all_combinations() -> None:
-    reaches, fading = _reaches(CONFIG), updated(CONFIG, {'estimator.acceleration_time_s': 0.06})
+    reaches, fading = _reaches(CONFIG), replace_values(CONFIG, {'estimator.acceleration_time_s': 0.06})
     for config, accelerations in ((CONFIG, {0.0}), (fading, {0.06, 0.0})):
         tried = make_movement_settings(reaches, config)
         assert tried[0] == config
@@ -117,7 +117,7 @@ def test_the_other_models_of_duration_come_with_their_constants_fitted() -> None
     (priced,) = fit_other_models(_reaches(CONFIG), CONFIG)
     assert priced.duration.model == 'cost_of_time'
     assert (3600.0 * 0.3**2 / priced.duration.time_cost) ** (1 / 6) == pytest.approx(1.5, rel=0.1)
-    given = updated(CONFIG, {'duration.model': 'fixed'})
+    given = replace_values(CONFIG, {'duration.model': 'fixed'})
     assert [each.duration.model for each in fit_other_models(_reaches(CONFIG), given)] == ['fitts', 'cost_of_time']
     assert fit_duration(_reaches(CONFIG), given)[0]
 
@@ -129,13 +129,13 @@ def test_the_time_in_which_accelerations_fade_is_found(fading_s: float) -> None:
     for number in range(6):
         state, path = np.array([[0.0, 0.0], [0.2, 0.0], [0.0, 0.0]]), []
         for _ in range(2000):
-            state = transition(dt) @ state
+            state = compute_transition(dt) @ state
             # white jerk drives a fading acceleration
             state[2] = state[2] * np.exp(-dt / fading_s) + 3.0 * np.sqrt(dt) * rng.standard_normal(2)
             path.append(state[0])
         hands.append(recorded_hand(str(number), dt * np.arange(2000.0), np.array(path), make_obstacles(), GOAL))
     # this filter follows accelerations at once, so that its lag does not affect the estimate
-    config = updated(CONFIG, {'estimator.position_stddev': 1e-6, 'estimator.jerk_density': 30.0})
+    config = replace_values(CONFIG, {'estimator.position_stddev': 1e-6, 'estimator.jerk_density': 30.0})
     found = fit_fading(hands, config)[0][FADING]
     assert found.low <= found.value <= found.high
     assert found.value == pytest.approx(fading_s, rel=0.25)
@@ -144,7 +144,7 @@ def test_the_time_in_which_accelerations_fade_is_found(fading_s: float) -> None:
 def test_a_lasting_acceleration_is_recognised() -> None:
     t = np.arange(0.0, 3.0, 0.02)
     hands = [recorded_hand(str(a), t, np.outer(0.5 * a * t**2, [1.0, 0.0]), make_obstacles(), GOAL) for a in (0.3, 0.5)]
-    assert fit_fading(hands, updated(CONFIG, {'estimator.position_stddev': 1e-6}))[0][FADING].value == 0.0
+    assert fit_fading(hands, replace_values(CONFIG, {'estimator.position_stddev': 1e-6}))[0][FADING].value == 0.0
 
 
 def test_hands_at_rest_give_no_fading_time() -> None:
@@ -158,7 +158,7 @@ def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twic
 ) -> None:
     recordings = find_recordings(write_tables(tmp_path / 'data', count=4, hz=30.0))
     names = list(recordings)
-    hopeless = updated(CONFIG, {'foc.noise_x': 2.0, 'foc.noise_y': 2.0})
+    hopeless = replace_values(CONFIG, {'foc.noise_x': 2.0, 'foc.noise_y': 2.0})
     with IsolatedProcessPool(1) as executor:
         replays = Replays(recordings, {}, executor)
         scores = replays.score([hopeless, CONFIG], names, 'both')

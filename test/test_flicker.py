@@ -5,7 +5,7 @@ from itertools import islice, pairwise
 import numpy as np
 import pytest
 
-from foc_ros.core.config import Config, updated
+from foc_ros.core.config import Config, replace_values
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import HandSample, make_obstacles
 
@@ -16,14 +16,14 @@ NOISE = 0.001
 
 def predictions(**settings):
     """Yield predictions at 100 Hz for a hand at rest before a circle on its straight path, with 1 mm of noise on both."""
-    config = updated(Config(), {'rate_hz': 100.0, 'foc.steps': 20, **settings})
+    config = replace_values(Config(), {'rate_hz': 100.0, 'foc.steps': 20, **settings})
     pipeline, rng = Pipeline(config), np.random.default_rng(11)
     pipeline.set_goals(np.array([[0.3, 0.0]]), 'world')
     for tick in range(SAMPLES):
         stamp_ns = 1_000_000_000 + tick * PERIOD_NS
         centre = np.array([[0.15, 0.0]]) + rng.normal(0.0, NOISE, 2)
         pipeline.set_obstacles('cloud', make_obstacles(centre, 0.03, 0.001), stamp_ns, 'world')
-        pipeline.hand(HandSample(stamp_ns, rng.normal(0.0, NOISE, 2), 0.0, 'world'))
+        pipeline.add_hand_sample(HandSample(stamp_ns, rng.normal(0.0, NOISE, 2), 0.0, 'world'))
         prediction = pipeline.predict()
         assert prediction is not None, pipeline.last_refusal
         yield prediction

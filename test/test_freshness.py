@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from foc_ros.core.config import Config, updated
+from foc_ros.core.config import Config, replace_values
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.topics import CLOUD, HAND, MARKERS
 from foc_ros.ros.health import Freshness
 
-CONFIG = updated(Config(), {'estimator.hand_timeout_s': 0.5, 'scene.timeout_s': 2.0})
-NEVER = updated(Config(), {'estimator.hand_timeout_s': 0.0, 'scene.timeout_s': 0.0})
+CONFIG = replace_values(Config(), {'estimator.hand_timeout_s': 0.5, 'scene.timeout_s': 2.0})
+NEVER = replace_values(Config(), {'estimator.hand_timeout_s': 0.0, 'scene.timeout_s': 0.0})
 BOTH = ('cloud', 'markers')
 
 
@@ -47,8 +47,8 @@ def test_a_source_that_is_received_again_is_not_silent() -> None:
     assert freshness.find_not_ready_reason(10.0, CONFIG, ['cloud']) is None
 
 
-def pose(freshness: Freshness, stamp_s: float, clock_s: float, *, restarted: bool = False) -> str | None:
-    freshness.note_pose(round(stamp_s * NANOSECONDS), round(clock_s * NANOSECONDS), 0.5, restarted=restarted)
+def pose(freshness: Freshness, stamp_s: float, clock_s: float, *, is_restart: bool = False) -> str | None:
+    freshness.note_pose(round(stamp_s * NANOSECONDS), round(clock_s * NANOSECONDS), 0.5, is_restart=is_restart)
     found = freshness.find_not_ready_reason(0.0, CONFIG, ())
     return found and found[1]
 
@@ -68,8 +68,8 @@ def test_the_stamps_of_a_recording_are_not_judged_until_a_movement_begins_at_ros
     assert pose(freshness, 10.0, 1e9) is None
     assert pose(freshness, 1e9, 1e9) is None
     assert pose(freshness, 10.0, 1e9) is None
-    assert pose(freshness, 1e9, 1e9, restarted=True) is None
-    assert pose(freshness, 10.0, 1e9, restarted=True) is not None
+    assert pose(freshness, 1e9, 1e9, is_restart=True) is None
+    assert pose(freshness, 10.0, 1e9, is_restart=True) is not None
     freshness.forget_clock()
     assert pose(freshness, 10.0, 1e9) is None
 

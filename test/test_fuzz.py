@@ -17,16 +17,16 @@ from hypothesis import strategies as st
 from message_helpers import SECOND, STORE, RosbagsTypes, cloud, obstacle_table, pose_array
 from ros_helpers import graph, require_ros
 
-from foc_ros.core.config import Config, updated
+from foc_ros.core.config import Config, replace_values
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.io import topics
 from foc_ros.ros.intake import Intake
-from foc_ros.ros.messages.encode_prediction import output_messages
+from foc_ros.ros.messages.encode_prediction import encode_outputs
 
 COUNT = int(os.environ.get('FOC_ROS_FUZZ', '2000'))
 LENGTH = 20
 TYPES = RosbagsTypes(STORE)
-CONFIG = updated(Config(), {'foc.steps': 10, 'homotopy.max_candidates': 2, 'rate_hz': 1000.0})
+CONFIG = replace_values(Config(), {'foc.steps': 10, 'homotopy.max_candidates': 2, 'rate_hz': 1000.0})
 THOROUGH = settings(
     max_examples=max(COUNT // LENGTH, 1), suppress_health_check=list(HealthCheck), deadline=None, derandomize=True, database=None
 )
@@ -69,14 +69,14 @@ def test_any_messages_in_any_order(known: bool, messages: list[tuple[str, Any]])
     pipeline = intake.pipeline
     for role, message in messages:
         verdict = intake.take(role, message)
-        if role != topics.HAND or verdict is None or not verdict.taken:
+        if role != topics.HAND or verdict is None or not verdict.is_taken:
             continue
-        prediction = pipeline.predict() if pipeline.due else None
+        prediction = pipeline.predict() if pipeline.is_due else None
         if prediction is None:
             continue
         stamp = message.header.stamp
         assert prediction.stamp_ns == stamp.sec * 1_000_000_000 + stamp.nanosec
-        sent = output_messages(prediction, pipeline.scene.obstacles(prediction.stamp_ns), 'xy', TYPES)
+        sent = encode_outputs(prediction, pipeline.scene.obstacles(prediction.stamp_ns), 'xy', TYPES)
         assert all(np.isfinite(number) for each in sent.values() for number in numbers(each))
         assert pipeline.predict() is None, 'predicted twice from one pose'
 
@@ -92,8 +92,8 @@ def test_the_messages_lead_to_predictions_and_to_refusals() -> None:
         pipeline = intake.pipeline
         for role, message in messages:
             verdict = intake.take(role, message)
-            seen['refused'] += verdict is None or not verdict.taken
-            seen['predicted'] += pipeline.due and pipeline.predict() is not None
+            seen['refused'] += verdict is None or not verdict.is_taken
+            seen['predicted'] += pipeline.is_due and pipeline.predict() is not None
 
     look()
     assert seen['predicted'] > 40

@@ -7,7 +7,7 @@ import pytest
 from reach_helpers import one_obstacle, random_scene, reach
 
 from foc_ros.core.config import FocConfig
-from foc_ros.core.dynamics.plants import condense, damped_mass, triple_integrator
+from foc_ros.core.dynamics.plants import condense, discretise_damped_mass, discretise_triple_integrator
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.qp import Cost, effort_cost, half_planes
 from foc_ros.core.ocp.solve import solve_problem
@@ -17,7 +17,7 @@ from foc_ros.core.ocp.working_set import WorkingSet
 from foc_ros.core.types import make_obstacles
 
 STEPS, LAMBDA = 12, 3e4
-PLANTS = {'jerk': triple_integrator(0.05), 'force': damped_mass(0.05, 1.5, 4.0)}
+PLANTS = {'jerk': discretise_triple_integrator(0.05), 'force': discretise_damped_mass(0.05, 1.5, 4.0)}
 EVERY_PLANT = pytest.mark.parametrize('plant', PLANTS)
 
 

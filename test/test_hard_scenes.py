@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from foc_ros.core.config import Config, updated
+from foc_ros.core.config import Config, replace_values
 from foc_ros.core.memory import Memory
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import HandState, Obstacles, Prediction, Status, make_obstacles
 
 GOAL = np.array([[0.3, 0.0]])
-CONFIG = updated(Config(), {'foc.steps': 30})
+CONFIG = replace_values(Config(), {'foc.steps': 30})
 
 
 def predicted(obstacles: Obstacles, goals: np.ndarray = GOAL, config: Config = CONFIG) -> Prediction:
@@ -83,7 +83,7 @@ def test_a_hand_at_its_goal_stays_there() -> None:
 
 
 def test_an_eta_out_of_reach_is_said_with_the_one_that_is_reached() -> None:
-    config = updated(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0})
+    config = replace_values(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0})
     prediction = predicted(make_obstacles([[0.15, 0.0]], [0.03], 0.003), config=config)
     assert prediction.solved_candidates == ()
     assert {outcome.solution.status for outcome in prediction.candidates} == {Status.ETA_UNREACHABLE}

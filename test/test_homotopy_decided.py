@@ -6,7 +6,7 @@ from homotopy_scenes import CLEARANCE, GOAL, find, gap_to_circles
 
 from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.errors import SceneError
-from foc_ros.core.homotopy import path_sides, search
+from foc_ros.core.homotopy import find_path_sides, search
 from foc_ros.core.types import LEFT, RIGHT, make_obstacles
 
 NOTHING = make_obstacles()
@@ -18,7 +18,7 @@ def sides(found):
 
 def pass_as_named(found, obstacles):
     """Whether each guess passes the named obstacles as its name says."""
-    return all(dict(one.sides).items() <= path_sides(one.guess, obstacles).items() for one in found.candidates)
+    return all(dict(one.sides).items() <= find_path_sides(one.guess, obstacles).items() for one in found.candidates)
 
 
 def test_no_obstacles_one_straight_candidate_per_goal():

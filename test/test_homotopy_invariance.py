@@ -5,7 +5,7 @@ from homotopy_scenes import GOAL, find, gap_to_circles, random_scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foc_ros.core.homotopy import path_sides
+from foc_ros.core.homotopy import find_path_sides
 from foc_ros.core.types import make_obstacles
 
 scenes = st.tuples(st.integers(0, 2**32 - 1), st.integers(1, 9))
@@ -69,7 +69,7 @@ def test_guesses_are_clear_and_really_in_their_class(scene):
         assert one.guess.shape == (201, 2)
         np.testing.assert_allclose(one.guess[[0, -1]], [[0.0, 0.0], GOAL], atol=1e-12)
         assert gap_to_circles(one.guess, obstacles) > -1e-9
-        sides = path_sides(one.guess, obstacles)
+        sides = find_path_sides(one.guess, obstacles)
         assert {identity: sides[identity] for identity, _ in one.sides} == dict(one.sides)
         assert one.label == 'goal0:' + ''.join(('+' if side > 0 else '-') + identity for identity, side in one.sides)
         steps = np.hypot(*np.diff(one.guess, axis=0).T).sum()

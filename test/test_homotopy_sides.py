@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foc_ros.core.errors import SceneError
-from foc_ros.core.homotopy import compute_swept_angles, path_sides
+from foc_ros.core.homotopy import compute_swept_angles, find_path_sides
 from foc_ros.core.types import LEFT, RIGHT, make_obstacles
 
 CASES = Path(__file__).parents[2] / 'shared' / 'reference' / 'cases.json'
@@ -22,9 +22,9 @@ def bowed(amplitude: float, m: int = 101) -> np.ndarray:
 
 
 def test_left_of_the_direction_of_travel_is_left():
-    assert path_sides(bowed(0.3), ABEAM) == {'post': LEFT}
-    assert path_sides(bowed(-0.3), ABEAM) == {'post': RIGHT}
-    assert path_sides(bowed(0.3)[::-1], ABEAM) == {'post': RIGHT}
+    assert find_path_sides(bowed(0.3), ABEAM) == {'post': LEFT}
+    assert find_path_sides(bowed(-0.3), ABEAM) == {'post': RIGHT}
+    assert find_path_sides(bowed(0.3)[::-1], ABEAM) == {'post': RIGHT}
 
 
 def test_swept_angle_of_a_quarter_circle_and_of_two_turns():
@@ -36,32 +36,32 @@ def test_swept_angle_of_a_quarter_circle_and_of_two_turns():
 
 def test_obstacles_behind_the_start_and_beyond_the_end_are_not_passed():
     obstacles = make_obstacles([[-0.1, 0.05], [1.2, 0.0], [0.5, 0.0]], 0.05)
-    assert path_sides(bowed(0.3), obstacles) == {'2': LEFT}
+    assert find_path_sides(bowed(0.3), obstacles) == {'2': LEFT}
 
 
 def test_an_obstacle_behind_is_passed_by_a_path_that_winds_about_it():
     loop = np.array([[0.0, 0.0], [-0.1, 0.2], [-0.4, 0.1], [-0.3, -0.2], [0.2, -0.3], [1.0, 0.0]])
-    assert path_sides(loop, make_obstacles([[-0.2, 0.0]], 0.05)) == {'0': RIGHT}
+    assert find_path_sides(loop, make_obstacles([[-0.2, 0.0]], 0.05)) == {'0': RIGHT}
 
 
 def test_no_obstacles_no_sides_and_a_path_of_one_point_passes_nothing():
-    assert path_sides(bowed(0.1), make_obstacles()) == {}
-    assert path_sides(np.zeros((1, 2)), ABEAM) == {}
+    assert find_path_sides(bowed(0.1), make_obstacles()) == {}
+    assert find_path_sides(np.zeros((1, 2)), ABEAM) == {}
 
 
 def test_a_moving_obstacle_counts_where_it_is_at_each_step():
     path = bowed(0.0)
     crossing = np.stack([np.full(101, 0.5), np.linspace(0.4, -0.4, 101) + 0.1], axis=1)[:, None]
     # half way, when the hand passes, it has come no nearer than 0.1 m to the left
-    assert path_sides(path, ABEAM, crossing) == {'post': RIGHT}
-    assert path_sides(path, ABEAM, crossing - [0.0, 0.2]) == {'post': LEFT}
+    assert find_path_sides(path, ABEAM, crossing) == {'post': RIGHT}
+    assert find_path_sides(path, ABEAM, crossing - [0.0, 0.2]) == {'post': LEFT}
 
 
 def test_centres_of_another_number_of_points_are_refused():
     with pytest.raises(SceneError, match='centres: expected one row for each of the 101 points, got 3 rows'):
-        path_sides(bowed(0.1), ABEAM, np.zeros((3, 1, 2)))
+        find_path_sides(bowed(0.1), ABEAM, np.zeros((3, 1, 2)))
     with pytest.raises(SceneError, match='path: expected points'):
-        path_sides(np.zeros((3, 3)), ABEAM)
+        find_path_sides(np.zeros((3, 3)), ABEAM)
 
 
 @settings(max_examples=80, deadline=None, derandomize=True)
@@ -73,7 +73,7 @@ def test_side_of_a_bowed_path_is_that_of_the_line_above_or_below(amplitude, angl
         return
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     obstacles = make_obstacles([turn @ [x, y]], 0.01)
-    assert path_sides(path @ turn.T, obstacles) == {'0': LEFT if height > y else RIGHT}
+    assert find_path_sides(path @ turn.T, obstacles) == {'0': LEFT if height > y else RIGHT}
 
 
 @pytest.mark.skipif(not CASES.is_file(), reason='optional data ../shared/reference/cases.json is not there')
@@ -85,5 +85,5 @@ def test_sides_of_the_reference_cases():
         bow = case['guess']['amplitude'] * np.sin(np.pi * share)[:, None] * np.array([-way[1], way[0]])
         path = start + (share**3 * (10 - 15 * share + 6 * share**2))[:, None] * (goal - start) + bow
         obstacles = make_obstacles([[o['x'], o['y']] for o in case['obstacles']], [o['radius'] for o in case['obstacles']])
-        real = path_sides(path, obstacles)
+        real = find_path_sides(path, obstacles)
         assert [real[identity] for identity in obstacles.ids] == case['converged_qp']['sides']

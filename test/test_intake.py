@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_array, pose_stamped
 
-from foc_ros.core.config import Config, updated
+from foc_ros.core.config import Config, replace_values
 from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.ros.intake import Intake
 
@@ -16,7 +16,7 @@ TYPES = message_types('rosbags')
 
 @pytest.fixture
 def intake() -> Intake:
-    return Intake(Pipeline(updated(Config(), {'scene.marker_radius_stddev': 0.004})))
+    return Intake(Pipeline(replace_values(Config(), {'scene.marker_radius_stddev': 0.004})))
 
 
 def move(intake: Intake, seconds: float, frame_id: str = 'world') -> SampleStatus | None:
@@ -60,13 +60,13 @@ def test_markers_of_publishers_with_different_delays_are_all_used(intake: Intake
     for name, seconds in (('a', 1.0), ('b', 0.9), ('c', 0.8)):
         assert show(intake, marker(TYPES, ns=name, stamp_ns=round(seconds * SECOND))) is SampleStatus.ACCEPTED
     assert seen(intake) == ('a/0', 'b/0', 'c/0')
-    assert intake.pipeline.scene.parts['markers'].stamp_ns == SECOND
+    assert intake.pipeline.scene.sources['markers'].stamp_ns == SECOND
 
 
 def test_deleting_all_markers_is_an_empty_scene(intake: Intake) -> None:
     move(intake, 1.0)
     assert show(intake, marker(TYPES, action=3, ns='', frame_id='')) is SampleStatus.ACCEPTED
-    assert seen(intake) == () and 'markers' in intake.pipeline.scene.parts
+    assert seen(intake) == () and 'markers' in intake.pipeline.scene.sources
 
 
 def test_markers_in_another_frame_are_discarded(intake: Intake) -> None:

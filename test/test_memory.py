@@ -5,7 +5,7 @@ import pytest
 
 from foc_ros.core import candidates as outcomes
 from foc_ros.core.candidates import EarlierSolutions
-from foc_ros.core.config import Config, updated
+from foc_ros.core.config import Config, replace_values
 from foc_ros.core.deadline import Deadline, OutOfTimeError
 from foc_ros.core.estimation.kalman_filter import update
 from foc_ros.core.memory import RETRY_AFTER, Memory
@@ -13,7 +13,7 @@ from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import LEFT, RIGHT, Candidate, HandSample, HandState, Status, make_obstacles
 
-CONFIG = updated(Config(), {'foc.steps': 20})
+CONFIG = replace_values(Config(), {'foc.steps': 20})
 
 
 def way(sides: dict[str, int], goal: int = 0) -> Candidate:
@@ -55,7 +55,7 @@ def reaching(x: float, memory: Memory, budget_s: float = 0.0):
     for tick in range(40):
         place = np.array([x - 0.004 * (39 - tick), 0.0])
         state = update(state, HandSample(1_000_000_000 + 10_000_000 * tick, place), CONFIG.estimator).state
-    return predict(updated(CONFIG, {'budget_s': budget_s}), state, obstacles, np.array([[0.3, 0.0]]), memory)
+    return predict(replace_values(CONFIG, {'budget_s': budget_s}), state, obstacles, np.array([[0.3, 0.0]]), memory)
 
 
 def test_when_an_obstacle_is_passed_the_candidates_keep_their_solutions():
@@ -92,7 +92,7 @@ def test_a_candidate_stopped_by_the_deadline_continues_from_there(monkeypatch):
 def test_an_unreachable_candidate_is_followed_and_restarted_at_intervals(monkeypatch):
     starts = []
     monkeypatch.setattr(outcomes, 'solve_problem', lambda *given: starts.append(given[1].lam is None) or solve_problem(*given))
-    config = updated(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0})
+    config = replace_values(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0})
     memory, begun = Memory(), []
     for tick in range(2 * RETRY_AFTER + 3):
         state = HandState(10_000_000 * tick, np.zeros(6), np.zeros((6, 6)))

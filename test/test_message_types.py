@@ -21,7 +21,7 @@ def samples(types: MessageTypes) -> list[object]:
     point = types.make('geometry_msgs/msg/Point', x=1, y=np.float32(0.5), z=np.int64(-3))
     quaternion = types.make('geometry_msgs/msg/Quaternion', x=0, y=0, z=0, w=1)
     pose = types.make('geometry_msgs/msg/Pose', position=point, orientation=quaternion)
-    header = conversion_types.header(types, 3_000_000_004, 'world')
+    header = conversion_types.make_header(types, 3_000_000_004, 'world')
     key = types.make('diagnostic_msgs/msg/KeyValue', key='k', value='v')
     positions = np.arange(2, dtype=np.float32)
     return [
@@ -76,5 +76,5 @@ def test_an_unknown_field_is_named(rclpy_types: RclpyTypes) -> None:
     [(0, (0, 0)), (1_500_000_000, (1, 500_000_000)), (-1, (-1, 999_999_999)), (2**80, (2**31 - 1, 2**80 % 10**9))],
 )
 def test_stamps_split_and_stay_in_range(stamp_ns: int, expected: tuple[int, int]) -> None:
-    made = conversion_types.stamp(RosbagsTypes(STORE), stamp_ns)
+    made = conversion_types.make_stamp(RosbagsTypes(STORE), stamp_ns)
     assert (made.sec, made.nanosec) == expected

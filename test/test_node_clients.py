@@ -17,12 +17,12 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from ros_helpers import Graph  # noqa: E402
 from test_node_process import running  # noqa: E402
 
-from foc_ros.core.config import parameters  # noqa: E402
+from foc_ros.core.config import list_parameters  # noqa: E402
 
 
 def test_every_parameter_is_listed_described_read_and_set(ros: Graph) -> None:
     client = ros.node('client')
-    known = {parameter.name: parameter for parameter in parameters()}
+    known = {parameter.name: parameter for parameter in list_parameters()}
     with running(ros, 'module'):
         listed = ros.call(client, ListParameters, 'foc/list_parameters', ListParameters.Request()).result.names
         assert {*known, 'autostart', 'use_sim_time'} <= set(listed)

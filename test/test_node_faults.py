@@ -16,7 +16,7 @@ from node_helpers import GOALS, QUICK, ROWS, TYPES, Bench, figures, hand_path  #
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParametersAtomically  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
-from foc_ros.core.config import Config, flatten, parameters, updated  # noqa: E402
+from foc_ros.core.config import Config, flatten, list_parameters, replace_values  # noqa: E402
 
 NAN = math.nan
 BAD_INPUTS = {
@@ -124,7 +124,7 @@ def test_the_newest_valid_scene_of_the_queue_is_used(ros: Graph) -> None:
     bench = Bench(ros)
     good = [cloud(TYPES, obstacle_table([(x, 0, 0, 0.01)]), 10 * SECOND) for x in (1, 2, 3)]
     bench.send('obstacles', *good, cloud(TYPES, obstacle_table(ROWS), data=b'abc'))
-    ros.spin_until(lambda: 'cloud' in bench.node.pipeline.scene.parts, 'a scene')
+    ros.spin_until(lambda: 'cloud' in bench.node.pipeline.scene.sources, 'a scene')
     assert bench.node.pipeline.scene.obstacles(0).centre[0, 0] == 3.0
     assert figures(bench.health())['obstacles refused'] == '1 of 2'
 
@@ -189,7 +189,7 @@ def set_on(bench: Bench, **values: Any) -> Any:
 
 def test_parameters_are_listed_described_and_read_by_others(ros: Graph) -> None:
     bench = Bench(ros)
-    names = [parameter.name for parameter in parameters()]
+    names = [parameter.name for parameter in list_parameters()]
     listed = ros.call(bench.player, ListParameters, 'foc/list_parameters', ListParameters.Request()).result.names
     assert set(names) <= set(listed)
     assert 'qos_overrides./obstacles.subscription.durability' in listed
@@ -232,7 +232,7 @@ def test_parameters_change_together_and_without_a_missed_prediction(ros: Graph) 
     assert set_on(bench, foc__eta=0.7, likelihood__beta=1, homotopy__max_candidates=1).successful
     bench.move(poses[10:])
     tables = bench.wait_for('likelihoods', 10)
-    assert bench.node.pipeline.config == updated(
+    assert bench.node.pipeline.config == replace_values(
         Config(), QUICK | {'foc.eta': 0.7, 'likelihood.beta': 1.0, 'homotopy.max_candidates': 1}
     )
     assert [table.layout.dim[0].size for table in tables] == [2] * 5 + [1] * 5

@@ -86,7 +86,7 @@ def test_cleaning_up_forgets_all_but_the_parameters(ros: Graph) -> None:
     assert change(bench, 'cleanup')
     assert state_of(bench) == 'unconfigured'
     ros.spin_until(lambda: not bench.publishers['hand_pose'].get_subscription_count(), 'the end of the subscription')
-    assert not bench.node.pipeline.scene.parts
+    assert not bench.node.pipeline.scene.sources
     assert change(bench, 'configure')
     bench.connect()
     assert bench.node.pipeline.config.foc.eta == 0.7

@@ -16,13 +16,16 @@ from bag_helpers import CONFIG, TYPES, messages, write_bag, write_parameters
 from ros_helpers import Graph
 
 from foc_ros.analysis.replay import Replay
-from foc_ros.core.config import Config, updated
+from foc_ros.core.config import Config, replace_values
 from foc_ros.io.bags import BagReader, Item
-from foc_ros.ros.messages.encode_prediction import output_messages
+from foc_ros.ros.messages.encode_prediction import encode_outputs
 
 ROOT = Path(__file__).parents[1]
 SECONDS = 0.3
-CONFIGS = {'fixed': CONFIG, 'lv': updated(Config(), {'foc.eta': 0.3, 'foc.steps': 30, 'foc.noise_x': 0.02, 'foc.noise_y': 0.02})}
+CONFIGS = {
+    'fixed': CONFIG,
+    'lv': replace_values(Config(), {'foc.eta': 0.3, 'foc.steps': 30, 'foc.noise_x': 0.02, 'foc.noise_y': 0.02}),
+}
 
 
 @contextmanager
@@ -102,7 +105,7 @@ def replayed(bag: Path, config: Config) -> list[dict[str, Any]]:
     replay = Replay(config)
     with BagReader(bag) as reader:
         return [
-            output_messages(step.prediction, step.scene.obstacles(step.prediction.stamp_ns), 'xy', TYPES)
+            encode_outputs(step.prediction, step.scene.obstacles(step.prediction.stamp_ns), 'xy', TYPES)
             for step in replay.steps(reader)
             if step.prediction is not None
         ]

@@ -15,10 +15,10 @@ from node_helpers import GOALS, QUICK, ROWS, TYPES, Bench, figures, hand_path  #
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
-from foc_ros.core.config import Config, updated  # noqa: E402
+from foc_ros.core.config import Config, replace_values  # noqa: E402
 from foc_ros.core.pipeline import Pipeline  # noqa: E402
 from foc_ros.ros.intake import Intake  # noqa: E402
-from foc_ros.ros.messages.encode_prediction import output_messages  # noqa: E402
+from foc_ros.ros.messages.encode_prediction import encode_outputs  # noqa: E402
 
 
 def stamps(messages: list[Any]) -> list[int]:
@@ -36,16 +36,16 @@ def test_every_due_hand_pose_gets_the_prediction_of_the_pipeline(ros: Graph) -> 
     bench.move(poses)
     clouds = bench.wait_for('prediction', 10)
     assert stamps(clouds) == stamps(poses)[::2]
-    pipeline = Pipeline(updated(Config(), QUICK))
+    pipeline = Pipeline(replace_values(Config(), QUICK))
     intake = Intake(pipeline)
     intake.take('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND))
     intake.take('goals', pose_array(TYPES, GOALS))
     expected = []
     for pose in poses:
         intake.take('hand_pose', pose)
-        prediction = pipeline.predict() if pipeline.due else None
+        prediction = pipeline.predict() if pipeline.is_due else None
         if prediction is not None:
-            expected.append(output_messages(prediction, pipeline.scene.obstacles(prediction.stamp_ns), 'xy', TYPES))
+            expected.append(encode_outputs(prediction, pipeline.scene.obstacles(prediction.stamp_ns), 'xy', TYPES))
     assert len(expected) == 10
     assert any(message['prediction'].width for message in expected)
     for name in ('prediction', 'likelihoods', 'path', 'markers'):
@@ -111,7 +111,7 @@ def test_a_refused_pose_triggers_no_prediction(ros: Graph) -> None:
     bench, pose = Bench(ros), hand_path(1)[0]
     bench.deliver('hand_pose', pose)
     bench.publish_scene()
-    assert bench.node.pipeline.due
+    assert bench.node.pipeline.is_due
     bench.deliver('hand_pose', pose)
     assert figures(bench.health())['count hand_duplicate'] == '1'
     assert not bench.received['prediction']
@@ -135,7 +135,7 @@ def test_only_subscribed_outputs_are_encoded(ros: Graph, monkeypatch: pytest.Mon
     from foc_ros.ros import node
 
     asked: list[list[str]] = []
-    monkeypatch.setattr(node, 'output_messages', lambda *args: asked.append(list(args[-1])) or output_messages(*args))
+    monkeypatch.setattr(node, 'output_messages', lambda *args: asked.append(list(args[-1])) or encode_outputs(*args))
     bench = Bench(ros, outputs=['likelihoods'])
     bench.publish_scene()
     bench.move(hand_path(1))
@@ -201,7 +201,7 @@ def test_a_scene_published_once_is_received_later_with_transient_local_durabilit
 
     given = [Parameter(name, value=value) for name, value in overrides.items()]
     node = ros.add(FocNode(context=ros.context, parameter_overrides=given))
-    ros.spin_until(lambda: 'cloud' in node.pipeline.scene.parts, 'the scene of before')
+    ros.spin_until(lambda: 'cloud' in node.pipeline.scene.sources, 'the scene of before')
     assert len(node.pipeline.scene.obstacles(0)) == len(ROWS)
 
 

@@ -5,10 +5,12 @@ import pytest
 
 from foc_ros.core.dynamics.condensed import PositionNoise, position_variances, variance_weights
 from foc_ros.core.dynamics.noise import propagate_covariance, scale_noise, stack_noise
-from foc_ros.core.dynamics.plants import condense, damped_mass, triple_integrator
+from foc_ros.core.dynamics.plants import condense, discretise_damped_mass, discretise_triple_integrator
 from foc_ros.core.kernels import freeze
 
-PLANTS = pytest.mark.parametrize('plant', [triple_integrator(0.03), damped_mass(0.04, 1.5, 4.0)], ids=['jerk', 'force'])
+PLANTS = pytest.mark.parametrize(
+    'plant', [discretise_triple_integrator(0.03), discretise_damped_mass(0.04, 1.5, 4.0)], ids=['jerk', 'force']
+)
 
 
 def correlated(generator, n, size=1e-3):
@@ -56,7 +58,7 @@ def test_weighted_variances_are_sums_of_squared_responses(plant):
 
 def test_covariance_is_that_of_noisy_rollouts():
     generator = np.random.default_rng(4)
-    plant, steps, samples, noise = triple_integrator(0.05), 10, 40_000, np.array([0.2, 0.1])
+    plant, steps, samples, noise = discretise_triple_integrator(0.05), 10, 40_000, np.array([0.2, 0.1])
     control, P0 = generator.standard_normal((steps, 2)) * 50, correlated(generator, 6)
     stacked = condense(plant, steps)
     closed = propagate_covariance(

@@ -4,7 +4,7 @@ import importlib.util
 import re
 from pathlib import Path
 
-from foc_ros.core.config import parameters
+from foc_ros.core.config import list_parameters
 
 ROOT = Path(__file__).parents[1]
 
@@ -14,12 +14,12 @@ def test_the_page_is_current() -> None:
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
     assert script.PAGE.read_text('utf-8') == script.page(), 'run: python scripts/make_parameter_page.py'
-    for parameter in parameters():
+    for parameter in list_parameters():
         assert f'| `{parameter.name}` |' in script.page()
 
 
 def test_every_parameter_is_read_somewhere() -> None:
     """A parameter that no code reads would be accepted and ignored."""
     code = ' '.join(file.read_text('utf-8') for file in (ROOT / 'foc_ros').rglob('*.py') if file.name != 'config.py')
-    unread = [parameter.name for parameter in parameters() if not re.search(rf'\.{parameter.name.split(".")[-1]}\b', code)]
+    unread = [parameter.name for parameter in list_parameters() if not re.search(rf'\.{parameter.name.split(".")[-1]}\b', code)]
     assert unread == []

@@ -15,13 +15,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ros_helpers import Graph
 
-from foc_ros.core.config import Config, flatten, parameters, updated
+from foc_ros.core.config import Config, flatten, list_parameters, replace_values
 from foc_ros.core.errors import FocError, ParameterError, RecordingError
 from foc_ros.ros import parameters as module
 from foc_ros.ros.parameters import dump_parameter_file, load_parameter_file
 
 ROOT = Path(__file__).parents[1]
-NAMES = [parameter.name for parameter in parameters()]
+NAMES = [parameter.name for parameter in list_parameters()]
 
 
 def load(folder: Path, text: str) -> Config:
@@ -61,9 +61,9 @@ def values_of(parameter: Any) -> st.SearchStrategy[Any]:
     return st.floats(bound.low, bound.high)
 
 
-@given(st.fixed_dictionaries({}, optional={parameter.name: values_of(parameter) for parameter in parameters()}))
+@given(st.fixed_dictionaries({}, optional={parameter.name: values_of(parameter) for parameter in list_parameters()}))
 def test_every_configuration_is_read_as_it_was_written(tmp_path_factory: pytest.TempPathFactory, values: dict[str, Any]) -> None:
-    config = updated(Config(), values)
+    config = replace_values(Config(), values)
     assert load(tmp_path_factory.getbasetemp(), dump_parameter_file(config)) == config
 
 
@@ -156,7 +156,7 @@ def test_a_node_declares_every_parameter_with_description_and_range(ros: Graph) 
 
     node = node_with(ros)
     assert declare_parameters(node, Config()) == Config() == read_config(node)
-    for parameter in parameters():
+    for parameter in list_parameters():
         descriptor = node.describe_parameter(parameter.name)
         assert node.get_parameter(parameter.name).value == parameter.default
         assert descriptor.description.startswith(parameter.bound.meaning)
@@ -173,7 +173,7 @@ def test_a_node_starts_with_its_parameter_overrides(ros: Graph) -> None:
 
     node = node_with(ros, rate_hz=20, foc__eta=0.7, use_sim_time=False)
     config = declare_parameters(node, Config())
-    assert config == updated(Config(), {'rate_hz': 20.0, 'foc.eta': 0.7}) == read_config(node)
+    assert config == replace_values(Config(), {'rate_hz': 20.0, 'foc.eta': 0.7}) == read_config(node)
     assert isinstance(node.get_parameter('rate_hz').value, float)
 
 
@@ -189,7 +189,7 @@ def test_a_node_reads_the_file_that_replay_reads(tmp_path: Path) -> None:
 
     from foc_ros.ros.node_parameters import declare_parameters
 
-    config = updated(Config(), {'foc.lv_delta': 5e-5, 'foc.lam': 1e15, 'frame_id': 'base', 'foc.steps': 33})
+    config = replace_values(Config(), {'foc.lv_delta': 5e-5, 'foc.lam': 1e15, 'frame_id': 'base', 'foc.steps': 33})
     file = tmp_path / 'params.yaml'
     file.write_text(dump_parameter_file(config), 'utf-8')
     with graph(['--ros-args', '--params-file', str(file)]) as ros:
@@ -219,4 +219,4 @@ def test_names_in_the_file_are_the_names_of_the_node() -> None:
 
 def test_parameters_of_the_node_alone_may_stand_in_the_file(tmp_path: Path) -> None:
     text = '/**: {ros__parameters: {autostart: false, use_sim_time: true, foc: {eta: 0.7}}}'
-    assert load(tmp_path, text) == updated(Config(), {'foc.eta': 0.7})
+    assert load(tmp_path, text) == replace_values(Config(), {'foc.eta': 0.7})

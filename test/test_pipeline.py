@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foc_ros.core import pipeline as module
-from foc_ros.core.config import Config, updated
+from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import SceneError
 from foc_ros.core.homotopy.demonstrations import Demonstration
 from foc_ros.core.memory import Memory
@@ -17,7 +17,7 @@ from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Obstac
 
 START = 1000 * NANOSECONDS
 MS = NANOSECONDS // 1000
-CONFIG = updated(Config(), {'rate_hz': 50.0, 'scene.timeout_s': 2.0, 'foc.steps': 20})
+CONFIG = replace_values(Config(), {'rate_hz': 50.0, 'scene.timeout_s': 2.0, 'foc.steps': 20})
 
 
 class Recorder:
@@ -61,14 +61,21 @@ def ready(config: Config = CONFIG) -> Pipeline:
 
 
 def observe(pipeline: Pipeline) -> tuple[object, ...]:
-    return pipeline.hand_state, pipeline.scene, pipeline.due, pipeline.blocked(), pipeline.engaged, pipeline.frame_id
+    return (
+        pipeline.hand_state,
+        pipeline.scene,
+        pipeline.is_due,
+        pipeline.not_ready_reason(),
+        pipeline.is_engaged,
+        pipeline.frame_id,
+    )
 
 
 def test_one_prediction_for_every_sample_that_is_due(recorder: Recorder) -> None:
     pipeline, stamps = ready(), []
     for ms in range(0, 200, 5):
-        assert pipeline.hand(hand(ms)) is SampleStatus.ACCEPTED
-        if pipeline.due:
+        assert pipeline.add_hand_sample(hand(ms)) is SampleStatus.ACCEPTED
+        if pipeline.is_due:
             prediction = pipeline.predict()
             assert prediction is not None
             stamps.append((prediction.stamp_ns - START) // MS)
@@ -77,19 +84,19 @@ def test_one_prediction_for_every_sample_that_is_due(recorder: Recorder) -> None
 
 
 def test_a_period_may_be_a_fraction_of_a_nanosecond(recorder: Recorder) -> None:
-    pipeline = ready(updated(CONFIG, {'rate_hz': 30.0}))
-    pipeline.hand(hand(0.0))
+    pipeline = ready(replace_values(CONFIG, {'rate_hz': 30.0}))
+    pipeline.add_hand_sample(hand(0.0))
     pipeline.predict()
-    pipeline.hand(HandSample(START + 33_333_333, np.zeros(2), 0.0, 'world'))
-    assert pipeline.due
+    pipeline.add_hand_sample(HandSample(START + 33_333_333, np.zeros(2), 0.0, 'world'))
+    assert pipeline.is_due
 
 
 def test_the_predictor_gets_the_scene_at_the_stamp_and_its_memory(recorder: Recorder) -> None:
     pipeline = ready()
     pipeline.set_obstacles('markers', make_obstacles([[0.5, 0.5]], 0.1, ids=('m',), velocity=[1.0, 0.0]), START, 'world')
-    pipeline.hand(hand(0.0))
+    pipeline.add_hand_sample(hand(0.0))
     first = pipeline.predict()
-    pipeline.hand(hand(100.0, 0.01))
+    pipeline.add_hand_sample(hand(100.0, 0.01))
     second = pipeline.predict()
     assert first is not None
     assert second is not None
@@ -105,34 +112,34 @@ def test_the_predictor_gets_the_scene_at_the_stamp_and_its_memory(recorder: Reco
 
 def test_no_sample_is_used_for_two_predictions(recorder: Recorder) -> None:
     pipeline = ready()
-    pipeline.hand(hand(0.0))
+    pipeline.add_hand_sample(hand(0.0))
     assert pipeline.predict() is not None
-    assert not pipeline.due
+    assert not pipeline.is_due
     assert pipeline.predict() is None
-    assert pipeline.hand(hand(0.0)) is SampleStatus.DUPLICATE
-    assert pipeline.hand(hand(-10.0)) is SampleStatus.LATE
-    assert not pipeline.due
+    assert pipeline.add_hand_sample(hand(0.0)) is SampleStatus.DUPLICATE
+    assert pipeline.add_hand_sample(hand(-10.0)) is SampleStatus.LATE
+    assert not pipeline.is_due
     assert pipeline.predict() is None
     assert pipeline.counts['predict_not_due'] == 2
 
 
 def test_every_reason_for_no_prediction_is_explained(recorder: Recorder) -> None:
     pipeline = Pipeline(CONFIG)
-    assert pipeline.blocked() == 'no hand pose yet'
-    pipeline.hand(hand(0.0))
-    assert pipeline.blocked() == 'no obstacles received yet: publish an empty cloud for an empty scene'
+    assert pipeline.not_ready_reason() == 'no hand pose yet'
+    pipeline.add_hand_sample(hand(0.0))
+    assert pipeline.not_ready_reason() == 'no obstacles received yet: publish an empty cloud for an empty scene'
     assert pipeline.predict() is None
-    assert pipeline.last_refusal == pipeline.blocked()
+    assert pipeline.last_refusal == pipeline.not_ready_reason()
     pipeline.set_obstacles('cloud', make_obstacles(), START - 3100 * MS, 'world')
-    assert pipeline.blocked() == 'no goal received'
+    assert pipeline.not_ready_reason() == 'no goal received'
     pipeline.set_goals(np.zeros((1, 2)), 'world')
-    assert pipeline.blocked() == 'obstacles are 3.1 s older than the hand pose (scene.timeout_s is 2)'
+    assert pipeline.not_ready_reason() == 'obstacles are 3.1 s older than the hand pose (scene.timeout_s is 2)'
     assert pipeline.predict() is None
     pipeline.set_obstacles('cloud', make_obstacles(), START, 'world')
-    assert pipeline.blocked() is None
-    assert pipeline.due
-    pipeline.engage(False)
-    assert pipeline.blocked() == 'disengaged'
+    assert pipeline.not_ready_reason() is None
+    assert pipeline.is_due
+    pipeline.set_engaged(False)
+    assert pipeline.not_ready_reason() == 'disengaged'
     assert pipeline.predict() is None
     assert pipeline.counts == {'predict_no_obstacles': 1, 'predict_stale': 1, 'predict_disengaged': 1}
     assert recorder.calls == []
@@ -142,19 +149,19 @@ def test_every_reason_for_no_prediction_is_explained(recorder: Recorder) -> None
 def test_obstacles_without_a_stamp_never_become_stale(recorder: Recorder, stamp: int | None) -> None:
     pipeline = ready()
     pipeline.set_obstacles('cloud', make_obstacles([[0.1, 0.0]], 0.01, velocity=[1.0, 0.0]), stamp, 'world')
-    pipeline.hand(hand(1e7))
+    pipeline.add_hand_sample(hand(1e7))
     assert pipeline.predict() is not None
     np.testing.assert_array_equal(recorder.calls[0][2].centre, [[0.1, 0.0]])
 
 
 def test_a_rejected_message_changes_nothing_and_is_counted_with_its_reason(recorder: Recorder) -> None:
     pipeline = ready()
-    pipeline.hand(hand(100.0))
+    pipeline.add_hand_sample(hand(100.0))
     rejections = [
-        (lambda: pipeline.hand(hand(100.0)), SampleStatus.DUPLICATE, 'hand_duplicate', '0 s behind the newest one'),
-        (lambda: pipeline.hand(hand(90.0)), SampleStatus.LATE, 'hand_late', '0.01 s behind the newest one'),
+        (lambda: pipeline.add_hand_sample(hand(100.0)), SampleStatus.DUPLICATE, 'hand_duplicate', '0 s behind the newest one'),
+        (lambda: pipeline.add_hand_sample(hand(90.0)), SampleStatus.LATE, 'hand_late', '0.01 s behind the newest one'),
         (
-            lambda: pipeline.hand(hand(110.0, frame='camera')),
+            lambda: pipeline.add_hand_sample(hand(110.0, frame='camera')),
             SampleStatus.WRONG_FRAME,
             'hand_wrong_frame',
             "hand_pose.header.frame_id: expected the working frame 'world', got 'camera'",
@@ -181,7 +188,7 @@ def test_a_rejected_message_changes_nothing_and_is_counted_with_its_reason(recor
     before = observe(pipeline)
     for reject, status, kind, words in rejections:
         assert reject() is status
-        assert not status.taken
+        assert not status.is_taken
         assert observe(pipeline) == before
         assert pipeline.counts[kind] == 1
         assert pipeline.last_refusal is not None
@@ -201,19 +208,19 @@ def test_the_first_hand_sample_fixes_an_open_frame(recorder: Recorder) -> None:
     pipeline.set_obstacles('cloud', make_obstacles([[0.0, 1.0]], 0.1, ids=('kept',)), START, 'world')
     pipeline.set_obstacles('markers', make_obstacles([[0.0, 2.0]], 0.1, ids=('gone',)), START, 'camera')
     pipeline.set_goals(np.zeros((1, 2)), 'camera')
-    pipeline.hand(hand(0.0))
+    pipeline.add_hand_sample(hand(0.0))
     assert pipeline.frame_id == 'world'
     assert pipeline.scene.obstacles(START).ids == ('kept',)
-    assert pipeline.blocked() == 'no goal received'
+    assert pipeline.not_ready_reason() == 'no goal received'
     assert pipeline.counts == {'obstacles_wrong_frame': 1, 'goals_wrong_frame': 1}
 
 
 def test_a_frame_from_the_parameter_holds_from_the_start(recorder: Recorder) -> None:
-    pipeline = Pipeline(updated(CONFIG, {'frame_id': 'base'}))
-    assert pipeline.hand(hand(0.0)) is SampleStatus.WRONG_FRAME
+    pipeline = Pipeline(replace_values(CONFIG, {'frame_id': 'base'}))
+    assert pipeline.add_hand_sample(hand(0.0)) is SampleStatus.WRONG_FRAME
     assert pipeline.set_goals(np.zeros((1, 2)), 'world') is SampleStatus.WRONG_FRAME
     assert pipeline.hand_state is None
-    assert pipeline.hand(hand(0.0, frame='base')) is SampleStatus.ACCEPTED
+    assert pipeline.add_hand_sample(hand(0.0, frame='base')) is SampleStatus.ACCEPTED
 
 
 @pytest.mark.parametrize(
@@ -221,12 +228,12 @@ def test_a_frame_from_the_parameter_holds_from_the_start(recorder: Recorder) -> 
     [(-600.0, SampleStatus.RESTARTED_BACKWARD), (600.0, SampleStatus.RESTARTED_GAP), (-1e5, SampleStatus.RESTARTED_BACKWARD)],
 )
 def test_a_jump_of_the_hand_stamp_restarts_the_movement(recorder: Recorder, jump: float, status: SampleStatus) -> None:
-    pipeline = ready(updated(CONFIG, {'scene.timeout_s': 0.0}))
-    pipeline.hand(hand(0.0))
+    pipeline = ready(replace_values(CONFIG, {'scene.timeout_s': 0.0}))
+    pipeline.add_hand_sample(hand(0.0))
     pipeline.predict()
-    assert pipeline.hand(hand(jump)) is status
-    assert status.restarted
-    assert pipeline.due
+    assert pipeline.add_hand_sample(hand(jump)) is status
+    assert status.is_restart
+    assert pipeline.is_due
     assert pipeline.predict() is not None
     assert recorder.calls[1][4] == Memory()
     assert pipeline.counts[f'hand_{status}'] == 1
@@ -235,62 +242,62 @@ def test_a_jump_of_the_hand_stamp_restarts_the_movement(recorder: Recorder, jump
 def test_due_samples_that_a_newer_one_replaces_are_counted(recorder: Recorder) -> None:
     pipeline = ready()
     for ms in (0.0, 5.0, 10.0, 15.0):
-        pipeline.hand(hand(ms))
+        pipeline.add_hand_sample(hand(ms))
     prediction = pipeline.predict()
     assert prediction is not None
     assert prediction.stamp_ns == START + 15 * MS
     assert pipeline.counts['hand_superseded'] == 3
-    pipeline.hand(hand(20.0))
-    pipeline.hand(hand(25.0))
+    pipeline.add_hand_sample(hand(20.0))
+    pipeline.add_hand_sample(hand(25.0))
     assert pipeline.counts['hand_superseded'] == 3
 
 
 def test_while_disengaged_the_hand_is_followed_without_predictions(recorder: Recorder) -> None:
     pipeline = ready()
-    pipeline.hand(hand(0.0))
+    pipeline.add_hand_sample(hand(0.0))
     pipeline.predict()
-    pipeline.engage(False)
-    assert pipeline.hand(hand(50.0, 0.02)) is SampleStatus.DISENGAGED
-    assert not pipeline.due
+    pipeline.set_engaged(False)
+    assert pipeline.add_hand_sample(hand(50.0, 0.02)) is SampleStatus.DISENGAGED
+    assert not pipeline.is_due
     assert pipeline.hand_state is not None
     assert pipeline.hand_state.stamp_ns == START + 50 * MS
     assert pipeline.counts['hand_disengaged'] == 1
-    pipeline.engage(True)
-    assert not pipeline.due
+    pipeline.set_engaged(True)
+    assert not pipeline.is_due
     assert pipeline.predict() is None
-    assert pipeline.hand(hand(51.0, 0.02)) is SampleStatus.ACCEPTED
-    assert pipeline.due
+    assert pipeline.add_hand_sample(hand(51.0, 0.02)) is SampleStatus.ACCEPTED
+    assert pipeline.is_due
     assert pipeline.predict() is not None
     assert recorder.calls[1][4] == Memory()
-    pipeline.hand(hand(55.0))
-    pipeline.engage(True)
-    assert not pipeline.due
+    pipeline.add_hand_sample(hand(55.0))
+    pipeline.set_engaged(True)
+    assert not pipeline.is_due
 
 
 def test_reset_forgets_the_movement_and_keeps_the_scene(recorder: Recorder) -> None:
     pipeline = ready()
-    pipeline.hand(hand(0.0))
+    pipeline.add_hand_sample(hand(0.0))
     pipeline.predict()
     scene, counts = pipeline.scene, pipeline.counts
     pipeline.reset()
     assert (pipeline.hand_state, pipeline.scene, pipeline.frame_id, pipeline.counts) == (None, scene, 'world', counts)
-    assert pipeline.blocked() == 'no hand pose yet'
-    assert pipeline.hand(hand(0.0)) is SampleStatus.ACCEPTED
+    assert pipeline.not_ready_reason() == 'no hand pose yet'
+    assert pipeline.add_hand_sample(hand(0.0)) is SampleStatus.ACCEPTED
     assert pipeline.predict() is not None
     assert recorder.calls[1][4] == Memory()
 
 
 def test_other_parameters_keep_movement_and_scene(recorder: Recorder) -> None:
     pipeline = ready()
-    pipeline.hand(hand(0.0))
+    pipeline.add_hand_sample(hand(0.0))
     pipeline.predict()
     state, scene = pipeline.hand_state, pipeline.scene
-    pipeline.reconfigure(updated(CONFIG, {'rate_hz': 10.0, 'foc.steps': 30}))
+    pipeline.reconfigure(replace_values(CONFIG, {'rate_hz': 10.0, 'foc.steps': 30}))
     assert pipeline.hand_state is state
     assert pipeline.scene is scene
-    pipeline.hand(hand(50.0))
-    assert not pipeline.due
-    pipeline.hand(hand(100.0))
+    pipeline.add_hand_sample(hand(50.0))
+    assert not pipeline.is_due
+    pipeline.add_hand_sample(hand(100.0))
     pipeline.predict()
     assert recorder.calls[1][0].foc.steps == 30
     assert recorder.calls[1][4] == Memory('call1')
@@ -299,10 +306,10 @@ def test_other_parameters_keep_movement_and_scene(recorder: Recorder) -> None:
 @pytest.mark.parametrize(('name', 'value'), [('plane', 'xz'), ('frame_id', 'base')])
 def test_another_plane_or_frame_discards_movement_and_scene(recorder: Recorder, name: str, value: str) -> None:
     pipeline = ready()
-    pipeline.hand(hand(0.0))
+    pipeline.add_hand_sample(hand(0.0))
     pipeline.reconfigure(replace(CONFIG, **{name: value}))
     assert pipeline.hand_state is None
-    assert pipeline.scene.parts == {}
+    assert pipeline.scene.sources == {}
     assert pipeline.scene.goals is None
 
 
@@ -312,9 +319,9 @@ def test_a_scene_that_the_predictor_refuses_is_counted(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(module, 'predict', refuse)
     pipeline = ready()
-    pipeline.hand(hand(0.0))
+    pipeline.add_hand_sample(hand(0.0))
     assert pipeline.predict() is None
-    assert not pipeline.due
+    assert not pipeline.is_due
     assert pipeline.counts == {'predict_failed': 1}
     assert pipeline.last_refusal == 'goals[0]: expected a goal outside of every obstacle, got (0.15, 0)'
 
@@ -343,7 +350,7 @@ class Driver:
     def feed(self, kind: str, value: object, frame: str | None) -> None:
         before, total = observe(self.pipeline), sum(self.pipeline.counts.values())
         status = getattr(self, kind)(value, frame)
-        if isinstance(status, SampleStatus) and not status.taken:
+        if isinstance(status, SampleStatus) and not status.is_taken:
             assert observe(self.pipeline) == before
             assert sum(self.pipeline.counts.values()) == total + 1
         assert sum(self.pipeline.counts.values()) >= total
@@ -351,10 +358,10 @@ class Driver:
     def hand(self, ms: int, frame: str) -> SampleStatus:
         stamp_ns = self.now_ns + ms * MS
         x = 0.3 * np.sin((stamp_ns - START) / NANOSECONDS)
-        status = self.pipeline.hand(HandSample(stamp_ns, np.array([x, 0.02]), 0.0, frame))
-        if status.taken:
-            self.now_ns, self.is_new = stamp_ns, self.pipeline.engaged
-        if status.restarted:
+        status = self.pipeline.add_hand_sample(HandSample(stamp_ns, np.array([x, 0.02]), 0.0, frame))
+        if status.is_taken:
+            self.now_ns, self.is_new = stamp_ns, self.pipeline.is_engaged
+        if status.is_restart:
             self.last_ns = None
         return status
 
@@ -367,25 +374,25 @@ class Driver:
         return self.pipeline.set_goals(np.array([[0.3, 0.0], [0.3, 0.2]])[:count], frame)
 
     def engage(self, on: bool, _: None) -> None:
-        if on != self.pipeline.engaged:
+        if on != self.pipeline.is_engaged:
             self.is_new, self.last_ns = False, None
-        self.pipeline.engage(on)
+        self.pipeline.set_engaged(on)
 
     def reset(self, _: None, __: None) -> None:
         self.pipeline.reset()
         self.is_new, self.last_ns = False, None
 
     def rate(self, rate_hz: float, _: None) -> None:
-        self.pipeline.reconfigure(updated(self.pipeline.config, {'rate_hz': rate_hz}))
+        self.pipeline.reconfigure(replace_values(self.pipeline.config, {'rate_hz': rate_hz}))
 
     def predict(self, _: None, __: None) -> None:
-        expected = self.pipeline.due and self.pipeline.blocked() is None
+        expected = self.pipeline.is_due and self.pipeline.not_ready_reason() is None
         prediction = self.pipeline.predict()
         assert (prediction is not None) == expected
         if prediction is None:
             return
         assert self.is_new
-        assert self.pipeline.engaged
+        assert self.pipeline.is_engaged
         assert prediction.stamp_ns == self.now_ns
         assert self.last_ns is None or prediction.stamp_ns - self.last_ns >= int(1e9 / self.pipeline.config.rate_hz)
         for outcome in prediction.solved_candidates:
@@ -422,7 +429,7 @@ def test_the_same_messages_give_the_same_predictions() -> None:
     def run() -> list[Prediction]:
         pipeline, predictions = ready(), []
         for ms in range(0, 300, 20):
-            pipeline.hand(hand(ms, 0.3 * (ms / 1000.0) ** 2))
+            pipeline.add_hand_sample(hand(ms, 0.3 * (ms / 1000.0) ** 2))
             prediction = pipeline.predict()
             assert prediction is not None
             predictions.append(prediction)

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 import foc_ros
 from foc_ros.core.config import Config
 from foc_ros.core.dynamics.plant_models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
-from foc_ros.core.dynamics.plants import Plant, condense, damped_mass, triple_integrator
-from foc_ros.core.dynamics.predictive_covariance import duration_sensitivity
+from foc_ros.core.dynamics.plants import Plant, condense, discretise_damped_mass, discretise_triple_integrator
+from foc_ros.core.dynamics.predictive_covariance import compute_duration_sensitivity
 from foc_ros.core.memory import Memory
 from foc_ros.core.obstacles.chance_constraint import k_of_eta
 from foc_ros.core.predictor import build_problem, predict
@@ -27,25 +27,22 @@ CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003)
 
 
 @pytest.fixture
-def register():
+def register(monkeypatch):
     """Register plants for one test."""
-    names = []
 
     def add(name, factory):
         foc_ros.register_plant(name, factory)
-        names.append(name)
         return Config().with_values({'foc.plant': name})
 
+    monkeypatch.setattr(PLANTS, '_parts', dict(PLANTS._parts))
     yield add
-    for name in names:
-        del PLANTS._parts[name]
     make_plant_model.cache_clear()
 
 
 def test_without_obstacles_the_effort_of_a_damped_mass_is_that_of_the_kkt_system():
     (found,) = predict(MASS_CONFIG, MOVING, make_obstacles(), GOAL, Memory())[0].solved_candidates
     solution = found.solution
-    horizon = condense(damped_mass(solution.dt, MASS, DAMPING), STEPS)
+    horizon = condense(discretise_damped_mass(solution.dt, MASS, DAMPING), STEPS)
     target = np.array([0.3, 0.0, 0.0, 0.0]) - horizon.powers[-1] @ MOVING.mean[:4]
     n = 2 * STEPS
     kkt = np.block([[2.0 * np.eye(n), horizon.last.T], [horizon.last, np.zeros((4, 4))]])
@@ -93,7 +90,7 @@ def test_the_duration_shifts_the_end_of_a_damped_mass_as_a_longer_plan_does():
         plans.append(predict(config, MOVING, make_obstacles(), GOAL, Memory())[0].candidates[0].solution)
     plan = plans[1]
     early, late = (np.interp(plan.times, each.times, each.path[:, 0]) for each in plans[::2])
-    found = duration_sensitivity(plan, False, make_plant_model(MASS_CONFIG.foc))[:, 0]
+    found = compute_duration_sensitivity(plan, False, make_plant_model(MASS_CONFIG.foc))[:, 0]
     middle = slice(0, int(0.95 * STEPS))
     assert_allclose(found[middle], ((early - late) / 0.02)[middle], atol=0.03 * np.abs(found).max())
 
@@ -120,7 +117,7 @@ def test_a_triple_integrator_from_outside_predicts_what_the_built_in_one_does(re
     class Outside(PlantModel):
         is_jerk_driven = True
 
-    config = register('outside', lambda settings: Outside(triple_integrator))
+    config = register('outside', lambda settings: Outside(discretise_triple_integrator))
     values = {'foc.endpoint_stddev': 0.005, 'duration.spread': 0.2, 'duration.wait_s': 0.1}
     scene = make_obstacles([[0.15, 0.01]], 0.03), GOAL
     ours, theirs = (predict(each.with_values(values), MOVING, *scene, Memory())[0] for each in (Config(), config))
@@ -157,7 +154,7 @@ def test_a_recording_is_replayed_with_a_damped_mass():
 
 
 def test_what_is_no_plant_model_is_refused(register):
-    config = register('wrong', lambda settings: triple_integrator(0.02))
+    config = register('wrong', lambda settings: discretise_triple_integrator(0.02))
     with pytest.raises(foc_ros.InputError, match='plant wrong: expected a factory that returns a PlantModel'):
         build_problem(config, MOVING, make_obstacles(), GOAL[0], 1.0)
     with pytest.raises(foc_ros.InputError, match='4 to 6 states'):

@@ -22,13 +22,20 @@ from foc_ros.core.types import make_obstacles
 from foc_ros.reporting.drawing import (
     CLASS_COLOURS,
     CLASSES,
-    ELLIPSES_PER_WAY,
+    ELLIPSES_PER_CANDIDATE,
     NO_CLASS_COLOUR,
-    candidate_style,
-    class_style,
-    stddev_ellipse,
+    get_candidate_style,
+    get_class_style,
+    make_stddev_ellipse,
 )
-from foc_ros.reporting.plots import bounds_of, make_scene_figure, make_snapshot_figure, plot_outcomes, plot_prediction, save
+from foc_ros.reporting.plots import (
+    compute_bounds,
+    make_scene_figure,
+    make_snapshot_figure,
+    plot_outcomes,
+    plot_prediction,
+    save_figure,
+)
 from foc_ros.reporting.snapshots import build_candidate_views, build_hand_trajectory, build_snapshot
 from foc_ros.reporting.track_association import build_candidate_tracks
 
@@ -40,13 +47,13 @@ PNG = b'\x89PNG\r\n\x1a\n'
 def test_ellipse_is_the_level_set_of_the_covariance(seed: int) -> None:
     root = np.random.default_rng(seed).normal(size=(2, 2))
     covariance, centre = root @ root.T, np.array([0.3, -0.1])
-    ellipse = stddev_ellipse(centre, covariance, 2.0)
+    ellipse = make_stddev_ellipse(centre, covariance, 2.0)
     edge = ellipse.get_patch_transform().transform(np.array([[1.0, 0.0], [0.0, 1.0], [-0.6, 0.8]])) - centre
     np.testing.assert_allclose(np.einsum('ki,ij,kj->k', edge, np.linalg.inv(covariance), edge), 4.0, rtol=1e-9)
 
 
 def test_ellipse_of_no_uncertainty_is_a_point() -> None:
-    ellipse = stddev_ellipse(np.zeros(2), np.array([[0.0, 0.0], [0.0, -1e-18]]))
+    ellipse = make_stddev_ellipse(np.zeros(2), np.array([[0.0, 0.0], [0.0, -1e-18]]))
     assert (ellipse.width, ellipse.height) == (0.0, 0.0)
 
 
@@ -57,9 +64,9 @@ def luminance(colour: tuple[float, float, float]) -> float:
 
 def test_colours_show_on_white_and_the_likely_candidate_is_the_thickest() -> None:
     assert all(1.05 / (luminance(colour) + 0.05) > 1.5 for colour in (*CLASS_COLOURS, NO_CLASS_COLOUR))
-    widths = [candidate_style(0, likelihood)['linewidth'] for likelihood in np.linspace(0.0, 1.0, 20)]
+    widths = [get_candidate_style(0, likelihood)['linewidth'] for likelihood in np.linspace(0.0, 1.0, 20)]
     assert np.all(np.diff(widths) > 0.0)
-    styles = [class_style(slot) for slot in range(CLASSES)]
+    styles = [get_class_style(slot) for slot in range(CLASSES)]
     assert len(set(styles)) == CLASSES
 
 
@@ -84,7 +91,7 @@ def test_scene_holds_every_obstacle_goal_and_candidate() -> None:
         assert any(np.array_equal(line, each.path) for line in drawn)
     for goal in goals:
         assert any(np.array_equal(line, [goal]) for line in drawn)
-    assert sum(type(patch) is Ellipse for patch in axes.patches) == ELLIPSES_PER_WAY * len(candidates)
+    assert sum(type(patch) is Ellipse for patch in axes.patches) == ELLIPSES_PER_CANDIDATE * len(candidates)
 
 
 def test_unsolved_outcomes_are_not_drawn() -> None:
@@ -98,7 +105,7 @@ def test_unsolved_outcomes_are_not_drawn() -> None:
 def test_bounds_hold_the_ellipses() -> None:
     obstacles, goals = scene()
     candidates = build_candidate_views(prediction(START_NS, np.zeros(2)).candidates)
-    left, right, bottom, top = bounds_of(obstacles, goals, candidates)
+    left, right, bottom, top = compute_bounds(obstacles, goals, candidates)
     assert right > 0.3 + 2 * 0.011
     assert left < 0.0
     assert bottom < -0.06
@@ -112,7 +119,7 @@ def test_a_snapshot_figure_shows_past_and_future_of_the_hand() -> None:
     during = [build_snapshot(each) for each in predictions(made) if span[0] <= each.stamp_ns <= span[1]]
     row = len(during) // 3
     snapshot = during[row]
-    bounds = bounds_of(*scene(), snapshot.candidates)
+    bounds = compute_bounds(*scene(), snapshot.candidates)
     figure = make_snapshot_figure(hand, build_candidate_tracks(during), row, span, bounds)
     drawn = [line for line in figure.axes[0].lines if line.get_color() == 'black' and len(line.get_xdata()) > 1]
     assert [line.get_linestyle() for line in drawn] == ['-', ':']
@@ -150,7 +157,7 @@ def test_equal_input_gives_equal_pictures(tmp_path: Path) -> None:
     obstacles, goals = scene()
     candidates = build_candidate_views(prediction(START_NS, np.zeros(2)).candidates)
     for name in ('one.png', 'two.png'):
-        save(make_scene_figure(obstacles, goals, candidates), tmp_path / name)
+        save_figure(make_scene_figure(obstacles, goals, candidates), tmp_path / name)
     assert (tmp_path / 'one.png').read_bytes() == (tmp_path / 'two.png').read_bytes()
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from foc_ros.core.config import Config, updated
-from foc_ros.core.dynamics.plants import condense, triple_integrator, triple_integrator_horizon
-from foc_ros.core.dynamics.predictive_covariance import duration_sensitivity, onset_delay_covariance
+from foc_ros.core.config import Config, replace_values
+from foc_ros.core.dynamics.plants import build_triple_integrator_horizon, condense, discretise_triple_integrator
+from foc_ros.core.dynamics.predictive_covariance import compute_duration_sensitivity, compute_onset_delay_covariance
 from foc_ros.core.dynamics.replanning import compute_goal_map, triple_integrator_goal_map
 from foc_ros.core.memory import Memory
 from foc_ros.core.ocp.problem import rest_to_goal
@@ -23,7 +23,7 @@ HAND = HandState(0, np.array([0.05, 0.0, 0.3, -0.1, 1.0, 0.0]), 1e-6 * np.eye(6)
 
 def _plan(duration_s: float, passing: bool, mean: np.ndarray) -> Solution:
     """Plan a movement without obstacles."""
-    stacked = triple_integrator_horizon(duration_s / STEPS, STEPS)
+    stacked = build_triple_integrator_horizon(duration_s / STEPS, STEPS)
     problem = rest_to_goal(stacked, mean, GOAL, make_obstacles([], []), np.array([0.05, 0.05]), 0.9, passing=passing)
     return solve_problem(problem, cold_start(np.linspace(mean[:2], GOAL, STEPS + 1)), Config().foc)
 
@@ -33,7 +33,7 @@ def test_a_displaced_goal_adds_a_minimum_jerk_movement() -> None:
     assert_allclose(goal_map[:, 0, 0], 10 * S**3 - 15 * S**4 + 6 * S**5, atol=2e-3)
     assert_allclose(goal_map[:, 0, 4], S**3 * (1 - S) ** 2 / 2, atol=2e-4)
     assert_allclose(goal_map[-1], np.eye(6), atol=1e-9)
-    assert_allclose(goal_map, compute_goal_map(condense(triple_integrator(0.02), STEPS)), atol=1e-9)
+    assert_allclose(goal_map, compute_goal_map(condense(discretise_triple_integrator(0.02), STEPS)), atol=1e-9)
     assert_array_equal(goal_map[0], 0.0)
 
 
@@ -55,7 +55,7 @@ def test_the_duration_sensitivity_is_the_difference_between_plans_of_other_durat
         early, late = (np.interp(now.times, each.times, each.mean[:, axis]) for each in (sooner, later))
         expected[:, axis] = (early - late) / (2.0 * share)
     middle = slice(0, int(0.95 * STEPS))  # the shorter plan ends earlier
-    found = duration_sensitivity(now, passing)[:, :2]
+    found = compute_duration_sensitivity(now, passing)[:, :2]
     assert np.abs(found).max() > 0.05
     # the free velocity at the goal changes as well, which the map does not contain
     assert_allclose(found[middle], expected[middle], atol=(0.04 if passing else 0.015) * np.abs(found).max())
@@ -64,7 +64,7 @@ def test_the_duration_sensitivity_is_the_difference_between_plans_of_other_durat
 def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoods() -> None:
     scene = make_obstacles([[0.2, 0.0]], 0.02), np.array([GOAL, [0.4, -0.1]])
     sure = predict(Config(), HAND, *scene, Memory())[0]
-    unsure = predict(updated(Config(), {'foc.endpoint_stddev': 0.006, 'duration.spread': 0.3}), HAND, *scene, Memory())[0]
+    unsure = predict(replace_values(Config(), {'foc.endpoint_stddev': 0.006, 'duration.spread': 0.3}), HAND, *scene, Memory())[0]
     assert len(sure.solved_candidates) == len(unsure.solved_candidates) >= 3
     for before, after in zip(sure.candidates, unsure.candidates, strict=True):
         assert_array_equal(before.solution.mean, after.solution.mean)
@@ -72,7 +72,7 @@ def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoo
         added = after.solution.covariance - before.solution.covariance
         assert_allclose(added[-1, :2, :2], 0.006**2 * np.eye(2), atol=1e-9)
         assert_allclose(added, added.swapaxes(1, 2), atol=1e-12)
-        late = duration_sensitivity(before.solution, False)[STEPS // 2, :2]
+        late = compute_duration_sensitivity(before.solution, False)[STEPS // 2, :2]
         across = np.array([-late[1], late[0]]) / np.hypot(*late)
         half_way = triple_integrator_goal_map(before.solution.dt, STEPS)[STEPS // 2, 0, 0]
         assert across @ added[STEPS // 2, :2, :2] @ across == pytest.approx((0.006 * half_way) ** 2)
@@ -82,7 +82,7 @@ def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoo
 def test_the_onset_delay_covariance_agrees_with_samples() -> None:
     plan, wait_s = _plan(0.8, False, np.zeros(6)), 0.15
     delays = np.random.default_rng(4).exponential(wait_s, 20_000)
-    found = onset_delay_covariance(plan, wait_s)
+    found = compute_onset_delay_covariance(plan, wait_s)
     for step in (5, 20, 40, STEPS):
         began = np.maximum(plan.times[step] - delays, 0.0)
         away = np.stack(
@@ -97,7 +97,7 @@ def test_the_onset_delay_covariance_agrees_with_samples() -> None:
 
 def test_the_onset_delay_widens_predictions_at_rest_only() -> None:
     scene = make_obstacles([], []), GOAL[None]
-    delayed = updated(Config(), {'duration.wait_s': 0.2})
+    delayed = replace_values(Config(), {'duration.wait_s': 0.2})
     for hand, widens in ((HandState(0, np.zeros(6), 1e-6 * np.eye(6)), True), (HAND, False)):
         plain, unsure = (predict(config, hand, *scene, Memory())[0].candidates[0] for config in (Config(), delayed))
         assert_array_equal(plain.solution.mean, unsure.solution.mean)

@@ -12,7 +12,7 @@ from foc_ros.core.errors import MessageError
 from foc_ros.core.types import Prediction
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.reporting.snapshots import build_snapshot, is_same_prediction, read_snapshot
-from foc_ros.ros.messages.encode_prediction import likelihood_array, prediction_cloud
+from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
 from foc_ros.ros.messages.types import RosbagsTypes
 
 TYPES = RosbagsTypes(TYPESTORE)
@@ -22,7 +22,7 @@ PLANES = ('xy', 'xz', 'yz')
 @pytest.mark.parametrize('plane', PLANES)
 def test_round_trip(plane: str) -> None:
     made = prediction(START_NS, np.array([0.01, -0.02]))
-    read = read_snapshot(prediction_cloud(made, plane, TYPES), likelihood_array(made, TYPES), plane, *scene())
+    read = read_snapshot(encode_prediction_cloud(made, plane, TYPES), encode_likelihoods(made, TYPES), plane, *scene())
     known = build_snapshot(made)
     assert (read.stamp_ns, read.most_likely) == (known.stamp_ns, known.most_likely)
     assert [each.label for each in read.candidates] == [each.label for each in known.candidates]
@@ -35,28 +35,28 @@ def test_round_trip(plane: str) -> None:
 
 def test_the_most_likely_candidate_by_hysteresis_is_first() -> None:
     made = replace(prediction(START_NS, np.zeros(2)), most_likely='goal1:+1-post')
-    read = read_snapshot(prediction_cloud(made, 'xy', TYPES), likelihood_array(made, TYPES), 'xy', *scene())
+    read = read_snapshot(encode_prediction_cloud(made, 'xy', TYPES), encode_likelihoods(made, TYPES), 'xy', *scene())
     assert read.most_likely == read.candidates[0].label == 'goal1:+1-post'
     assert [each.label for each in read.candidates] == [each.label for each in build_snapshot(made).candidates]
 
 
 def test_nothing_solved() -> None:
     made = Prediction(START_NS, 'world', 0.1, (), None)
-    read = read_snapshot(prediction_cloud(made, 'xy', TYPES), likelihood_array(made, TYPES), 'xy', *scene())
+    read = read_snapshot(encode_prediction_cloud(made, 'xy', TYPES), encode_likelihoods(made, TYPES), 'xy', *scene())
     assert (read.candidates, read.most_likely) == ((), None)
 
 
 def test_messages_of_different_predictions_are_refused() -> None:
     one, two = prediction(START_NS, np.zeros(2), 0.6), prediction(START_NS, np.zeros(2), 0.61)
-    cloud = prediction_cloud(one, 'xy', TYPES)
-    assert is_same_prediction(cloud, likelihood_array(one, TYPES))
-    assert not is_same_prediction(cloud, likelihood_array(two, TYPES))
+    cloud = encode_prediction_cloud(one, 'xy', TYPES)
+    assert is_same_prediction(cloud, encode_likelihoods(one, TYPES))
+    assert not is_same_prediction(cloud, encode_likelihoods(two, TYPES))
     with pytest.raises(MessageError, match='likelihoods'):
-        read_snapshot(cloud, likelihood_array(two, TYPES), 'xy', *scene())
+        read_snapshot(cloud, encode_likelihoods(two, TYPES), 'xy', *scene())
 
 
 def test_messages_match_after_serialisation() -> None:
     made = prediction(START_NS, np.zeros(2))
-    cloud, table = prediction_cloud(made, 'xy', TYPES), likelihood_array(made, TYPES)
+    cloud, table = encode_prediction_cloud(made, 'xy', TYPES), encode_likelihoods(made, TYPES)
     carried = [TYPESTORE.deserialize_cdr(TYPESTORE.serialize_cdr(m, m.__msgtype__), m.__msgtype__) for m in (cloud, table)]
     assert is_same_prediction(*carried)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from homotopy_scenes import GOAL, random_scene
 
-from foc_ros.core.config import Config, updated
+from foc_ros.core.config import Config, replace_values
 from foc_ros.core.memory import Memory
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import HandState, Obstacles, Prediction, make_obstacles
@@ -43,7 +43,7 @@ def solve_scene(seed: int, strategy: str) -> tuple[Prediction, Obstacles]:
     rng = np.random.default_rng(seed)
     circles = random_scene(rng, int(rng.integers(1, 9)))
     obstacles = make_obstacles(circles.centre, circles.radius, 0.001)
-    config = updated(Config(), {'homotopy.max_candidates': K, 'foc.strategy': strategy})
+    config = replace_values(Config(), {'homotopy.max_candidates': K, 'foc.strategy': strategy})
     return predict(config, HandState(1, np.zeros(6), np.zeros((6, 6))), obstacles, GOAL[None], Memory())[0], obstacles
 
 

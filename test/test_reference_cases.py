@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from reach_helpers import case_guess, case_problem, reference_cases, solved
 
-from foc_ros.core.homotopy import path_sides
+from foc_ros.core.homotopy import find_path_sides
 from foc_ros.core.types import Status
 
 CASES = pytest.mark.parametrize('case', reference_cases())
 
 
 def sides(problem, solution) -> list[int]:
-    realised = path_sides(solution.path, problem.obstacles)
+    realised = find_path_sides(solution.path, problem.obstacles)
     return [realised[identity] for identity in problem.obstacles.ids]
 
 

@@ -12,9 +12,9 @@ from bag_helpers import CONFIG, FRAME, TYPES, messages, ns, reach, write_bag, wr
 
 from foc_ros.analysis.replay import Replay, replay
 from foc_ros.cli.main import main
-from foc_ros.core.config import updated
+from foc_ros.core.config import replace_values
 from foc_ros.io.bags import BagReader
-from foc_ros.ros.messages.encode_inputs import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 
 FEW = 0.12
 """Seconds of a reach that are enough for a few predictions."""
@@ -92,11 +92,11 @@ def test_the_rate_bounds_the_predictions(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_used_is_counted_and_the_rest_goes_on(tmp_path: Path) -> None:
-    spoiled = hand_pose(TYPES, ns(0.01), FRAME, (float('nan'), 0.0, 0.0))
-    elsewhere = hand_pose(TYPES, ns(0.03), 'camera', (0.0, 0.0, 0.0))
-    negative = obstacle_cloud(TYPES, ns(0.05), FRAME, [(0.1, 0.0, 0.0, -0.1, 0.0, 1)])
-    partly = obstacle_cloud(TYPES, ns(0.07), FRAME, [(0.15, 0.0, 0.0, 0.03, 0.002, 7), (float('inf'), 0, 0, 0.1, 0, 8)])
-    late = hand_pose(TYPES, ns(0.02), FRAME, (0.0, 0.0, 0.0))
+    spoiled = encode_hand_pose(TYPES, ns(0.01), FRAME, (float('nan'), 0.0, 0.0))
+    elsewhere = encode_hand_pose(TYPES, ns(0.03), 'camera', (0.0, 0.0, 0.0))
+    negative = encode_obstacles(TYPES, ns(0.05), FRAME, [(0.1, 0.0, 0.0, -0.1, 0.0, 1)])
+    partly = encode_obstacles(TYPES, ns(0.07), FRAME, [(0.15, 0.0, 0.0, 0.03, 0.002, 7), (float('inf'), 0, 0, 0.1, 0, 8)])
+    late = encode_hand_pose(TYPES, ns(0.02), FRAME, (0.0, 0.0, 0.0))
     bad = [
         ('/hand_pose', ns(0.01), spoiled),
         ('/hand_pose', ns(0.03), elsewhere),
@@ -124,8 +124,8 @@ def test_a_table_is_printed_without_json(bag: Path, capsys: pytest.CaptureFixtur
 def test_nothing_solved_is_exit_3_and_says_why(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     stale = [each for each in messages(seconds=FEW) if each[0] == '/hand_pose']
     stale += [
-        ('/obstacles', ns(-1), obstacle_cloud(TYPES, ns(-4.5), FRAME, [])),
-        ('/goals', ns(-1), goal_poses(TYPES, ns(-1), FRAME, np.zeros((1, 3)))),
+        ('/obstacles', ns(-1), encode_obstacles(TYPES, ns(-4.5), FRAME, [])),
+        ('/goals', ns(-1), encode_goals(TYPES, ns(-1), FRAME, np.zeros((1, 3)))),
     ]
     bag = write_bag(tmp_path / 'stale', sorted(stale, key=lambda each: each[1]))
     assert run(bag) == 3
@@ -136,7 +136,7 @@ def test_nothing_solved_is_exit_3_and_says_why(tmp_path: Path, capsys: pytest.Ca
 
 
 def test_parameters_are_the_nodes(tmp_path: Path, bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    few = write_parameters(tmp_path, updated(CONFIG, {'homotopy.max_candidates': 1, 'foc.steps': 20}))
+    few = write_parameters(tmp_path, replace_values(CONFIG, {'homotopy.max_candidates': 1, 'foc.steps': 20}))
     assert main(['replay', str(bag), '--json', '--params', few]) == 0
     predictions = json.loads(capsys.readouterr().out)['predictions']
     assert {len(each['candidates']) for each in predictions} == {1}

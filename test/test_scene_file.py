@@ -179,7 +179,9 @@ def test_a_guess_leads_through_points() -> None:
 
 
 def test_the_plant_is_a_field() -> None:
-    foc = parse_scene({'start': [0, 0], 'goal': [0.3, 0], 'plant': 'damped_mass', 'plant_mass': 2, 'plant_damping': 3e0}).config.foc
+    foc = parse_scene(
+        {'start': [0, 0], 'goal': [0.3, 0], 'plant': 'damped_mass', 'plant_mass': 2, 'plant_damping': 3e0}
+    ).config.foc
     assert (foc.plant, foc.plant_mass, foc.plant_damping) == ('damped_mass', 2.0, 3.0)
-    with pytest.raises(SceneError, match='^plant: expected one of triple_integrator, damped_mass'):
+    with pytest.raises(SceneError, match=r'^plant: expected one of triple_integrator, damped_mass'):
         parse_scene({'start': [0, 0], 'goal': [0.3, 0], 'plant': 'spring'})

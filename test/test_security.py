@@ -30,7 +30,7 @@ def test_a_document_larger_than_any_scene_is_refused(tmp_path: Path) -> None:
 
 def test_a_table_larger_than_any_recording_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match='expected at most 1,000,000,000 bytes, got 1,000,000,001'):
-        next(tables.rows(sparse(tmp_path / 'large.csv', tables.MAX_BYTES + 1), ('t_s',)))
+        next(tables.read_rows(sparse(tmp_path / 'large.csv', tables.MAX_BYTES + 1), ('t_s',)))
 
 
 @pytest.mark.parametrize('text', ['!!python/object/apply:os.mkdir [made]', '!!python/name:os.system', '!include other.yaml'])

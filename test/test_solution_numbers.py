@@ -56,7 +56,7 @@ def test_multipliers_are_what_a_metre_of_distance_costs():
     measured = (augmented(more) - augmented(less)) / (2 * step)
     reach_m = math.sqrt(0.03**2 + 0.003**2 + tau)
     assert sum(value for _, _, value in middle.multipliers) / (2 * reach_m) == pytest.approx(measured, rel=1e-3)
-    assert middle.held == ((tau, 1e3),) * len(middle.multipliers)
+    assert middle.equivalent_weights == ((tau, 1e3),) * len(middle.multipliers)
 
 
 def test_multipliers_of_optimal_are_what_a_metre_of_distance_costs():
@@ -65,7 +65,7 @@ def test_multipliers_of_optimal_are_what_a_metre_of_distance_costs():
     less, middle, more = (solved(one_obstacle(x**2 / (1 + x**2)), BOWED, 'optimal') for x in (k - step, k, k + step))
     assert middle.status is Status.SOLVED
     distance = np.hypot(*(middle.path - [0.12, 0.0]).T)
-    rows = zip(middle.multipliers, middle.held, strict=True)
+    rows = zip(middle.multipliers, middle.equivalent_weights, strict=True)
     predicted = sum(value * tau / k / (2 * distance[int(at)]) for (_, at, value), (tau, _) in rows)
     assert predicted == pytest.approx((more.effort - less.effort) / (2 * step), rel=2e-3)
 
@@ -79,13 +79,15 @@ def test_the_rows_of_optimal_have_a_tau_and_a_lambda_each():
         return solved(reach(made, eta=0.8), BOWED, 'optimal')
 
     less, middle, more = (optimum(1e-6 + by) for by in (-variance, 0.0, variance))
-    assert middle.held
+    assert middle.equivalent_weights
     kept = np.sum((middle.path - [0.12, 0.0]) ** 2, axis=1) - (0.03**2 + 0.003**2)
-    for (_, at, _), (tau, lam) in zip(middle.multipliers, middle.held, strict=True):
+    for (_, at, _), (tau, lam) in zip(middle.multipliers, middle.equivalent_weights, strict=True):
         assert tau == pytest.approx(kept[int(at)], rel=1e-3)
         assert lam > 0
     assert (middle.tau, middle.lam) == (0.0, 0.0)
-    assert sum(lam for _, lam in middle.held) == pytest.approx((more.effort - less.effort) / (2 * variance), rel=1e-2)
+    assert sum(lam for _, lam in middle.equivalent_weights) == pytest.approx(
+        (more.effort - less.effort) / (2 * variance), rel=1e-2
+    )
 
 
 def test_every_qp_is_counted_and_the_loop_of_algorithm1_beside():

@@ -9,7 +9,7 @@ from reach_helpers import bowed, one_obstacle, random_scene, reach, solved
 
 from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import Deadline, OutOfTimeError
-from foc_ros.core.dynamics.plants import condense, damped_mass, triple_integrator_horizon
+from foc_ros.core.dynamics.plants import build_triple_integrator_horizon, condense, discretise_damped_mass
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacles.chance_constraint import constraint_moments, eta_of_k
 from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
@@ -148,7 +148,7 @@ def test_moving_and_uncertain_centres_are_avoided_where_they_will_be(strategy):
 
 @EVERY
 def test_every_strategy_solves_for_a_damped_mass(strategy):
-    stacked = condense(damped_mass(0.02, 1.0, 2.0), 50)
+    stacked = condense(discretise_damped_mass(0.02, 1.0, 2.0), 50)
     obstacles = make_obstacles([[0.12, 0.0]], [0.03], [0.003])
     problem = rest_to_goal(stacked, np.zeros(4), np.array([0.3, 0.0]), obstacles, np.array([0.1, 0.1]), 0.9)
     solution = solve_problem(problem, cold_start(BOWED), FocConfig(strategy=strategy))
@@ -283,4 +283,4 @@ def test_optimal_settles_wherever_the_obstacle_lies_between_two_steps(steps):
 def test_a_problem_that_is_not_finite_is_refused_by_name(field, values):
     given = {'initial_mean': np.zeros(6), 'goal_position': np.array([0.3, 0.0]), 'noise': np.array([0.1, 0.1])}
     with pytest.raises(SceneError, match=f'{field}: expected finite numbers'):
-        rest_to_goal(triple_integrator_horizon(0.02, 50), obstacles=make_obstacles(), eta=0.9, **(given | values))
+        rest_to_goal(build_triple_integrator_horizon(0.02, 50), obstacles=make_obstacles(), eta=0.9, **(given | values))

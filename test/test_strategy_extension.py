@@ -42,7 +42,7 @@ def test_it_is_solved_by_its_name():
     assert solution.eta >= 0.8 - 1e-5
     assert solution.tau == pytest.approx(2 * 2 * 0.03 * 0.003, rel=1e-2)
     assert np.hypot(*(solution.path - [0.12, 0.0]).T).min() > np.sqrt(0.03**2 + solution.tau) - 1e-6
-    assert solution.held == ((solution.tau, 1.0),) * len(solution.multipliers)
+    assert solution.equivalent_weights == ((solution.tau, 1.0),) * len(solution.multipliers)
     assert solution.qp_solves >= 1
 
 

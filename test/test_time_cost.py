@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from reach_helpers import bowed, reach
 
-from foc_ros.core.config import Config, FocConfig, updated
+from foc_ros.core.config import Config, FocConfig, replace_values
 from foc_ros.core.estimation.duration import choose_candidate_durations
-from foc_ros.core.estimation.kalman_filter import gramian, transition
+from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition
 from foc_ros.core.estimation.time_cost import compute_least_effort, find_least_cost_time
 from foc_ros.core.memory import Memory
 from foc_ros.core.ocp.solve import solve_problem
@@ -23,8 +23,8 @@ def test_effort_along_a_line_is_that_of_least_energy(length: float, speed: float
     times = np.array([0.4, 1.0, 2.5])
     expected = []
     for T in times:
-        missing = np.array([length, 0.0, 0.0]) - transition(T) @ [0.0, speed, acceleration]
-        expected.append(missing @ np.linalg.solve(gramian(T), missing))
+        missing = np.array([length, 0.0, 0.0]) - compute_transition(T) @ [0.0, speed, acceleration]
+        expected.append(missing @ np.linalg.solve(compute_gramian(T), missing))
     np.testing.assert_allclose(compute_least_effort(length, speed, acceleration, times), expected, rtol=1e-9)
 
 
@@ -57,7 +57,7 @@ def test_the_duration_of_a_curved_path_costs_little_more_than_the_true_optimum(b
     """Over a grid of durations, each solved completely, the total cost is within 2 % of the least."""
     guess = bowed([0.0, 0.0], [0.3, 0.0], 50, bow)
     length = float(np.hypot(*np.diff(guess, axis=0).T).sum())
-    config = updated(Config(), {'duration.model': 'cost_of_time', 'duration.time_cost': time_cost}).duration
+    config = replace_values(Config(), {'duration.model': 'cost_of_time', 'duration.time_cost': time_cost}).duration
     law = choose_candidate_durations(AT_REST, [Candidate('a', 0, (), guess, length)], [1.0], config)[0]
 
     def total(duration_s: float) -> float:
@@ -72,7 +72,7 @@ def test_the_duration_of_a_curved_path_costs_little_more_than_the_true_optimum(b
 def test_a_longer_path_takes_longer_with_this_model_only() -> None:
     scene = make_obstacles([[0.15, 0.03]], 0.05), np.array([[0.3, 0.0]])
     for model in ('cost_of_time', 'fitts', 'fixed'):
-        config = updated(Config(), {'duration.model': model, 'duration.time_cost': 100.0})
+        config = replace_values(Config(), {'duration.model': model, 'duration.time_cost': 100.0})
         prediction = predict(config, AT_REST, *scene, Memory())[0]
         lasts = {each.candidate.length: each.solution.times[-1] for each in prediction.solved_candidates}
         assert len(lasts) == 2
@@ -86,7 +86,7 @@ def test_a_longer_path_takes_longer_with_this_model_only() -> None:
 def test_the_price_of_time_is_part_of_the_cost_with_this_model_only() -> None:
     scene = make_obstacles([[0.15, 0.03]], 0.05), np.array([[0.3, 0.0]])
     for model, price in (('cost_of_time', 100.0), ('fitts', 0.0), ('fixed', 0.0)):
-        config = updated(Config(), {'duration.model': model, 'duration.time_cost': 100.0})
+        config = replace_values(Config(), {'duration.model': model, 'duration.time_cost': 100.0})
         solved = predict(config, AT_REST, *scene, Memory())[0].solved_candidates
         assert len(solved) == 2
         for each in solved:

@@ -59,7 +59,7 @@ def test_every_input_is_transformed_into_the_working_frame(ros: Graph) -> None:
     moving = obstacle_table([(0.2, 0.3, 0.4, 0.05, 1.0, 0.0, 0.0)], columns)
     bench.deliver('obstacles', cloud(TYPES, moving, 10 * SECOND, 'camera'))
     np.testing.assert_allclose(seen(bench), [[0.7, 0.2]])
-    held = bench.node.pipeline.scene.parts['cloud'].obstacles
+    held = bench.node.pipeline.scene.sources['cloud'].obstacles
     np.testing.assert_allclose(held.velocity, [[0.0, 1.0]], atol=1e-12)
     assert held.radius.tolist() == [0.05]
     bench.deliver('obstacle_markers', marker_array(TYPES, marker(TYPES, (0.1, 0.0, 0.0), frame_id='camera'), marker(TYPES, id=9)))

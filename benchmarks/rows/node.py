@@ -111,21 +111,21 @@ class Player:
         return [self.arrived[stamp] - at for stamp, at in sent.items() if stamp in self.arrived], count
 
     def _publish_scene(self, stamp_ns: int) -> None:
-        from foc_ros.ros.messages.encode_inputs import goal_poses, obstacle_cloud
+        from foc_ros.ros.messages.encode_inputs import encode_goals, encode_obstacles
 
         circles = self.reach.obstacles
         table = zip(circles.centre, circles.radius, circles.radius_stddev, strict=True)
         rows = [(*centre, 0.0, radius, stddev, number) for number, (centre, radius, stddev) in enumerate(table)]
-        self.publishers['obstacles'].publish(obstacle_cloud(self.types, stamp_ns, 'world', rows))
-        self.publishers['goals'].publish(goal_poses(self.types, stamp_ns, 'world', np.array([[*GOAL, 0.0]])))
+        self.publishers['obstacles'].publish(encode_obstacles(self.types, stamp_ns, 'world', rows))
+        self.publishers['goals'].publish(encode_goals(self.types, stamp_ns, 'world', np.array([[*GOAL, 0.0]])))
 
     def _publish_hand(self, stamp_ns: int, tick: int) -> None:
         """Publish a hand that circles slowly around its start, so that all classes stay open."""
-        from foc_ros.ros.messages.encode_inputs import hand_pose
+        from foc_ros.ros.messages.encode_inputs import encode_hand_pose
 
         angle = 2 * np.pi * tick * PERIOD_S / 3.0
         position = (0.005 * (1 - np.cos(angle)), 0.005 * np.sin(angle), 0.0)
-        self.publishers['hand_pose'].publish(hand_pose(self.types, stamp_ns, 'world', position))
+        self.publishers['hand_pose'].publish(encode_hand_pose(self.types, stamp_ns, 'world', position))
 
     def _spin_for(self, seconds: float) -> None:
         end = time.perf_counter() + seconds

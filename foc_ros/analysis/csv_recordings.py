@@ -12,8 +12,8 @@ import numpy as np
 from foc_ros.core.errors import RecordingError
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.bags import TYPESTORE, BagWriter
-from foc_ros.io.csv_tables import Row, rows
-from foc_ros.ros.messages.encode_inputs import goal_poses, hand_pose, obstacle_cloud
+from foc_ros.io.csv_tables import Row, read_rows
+from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import RosbagsTypes
 
 FRAME = 'world'
@@ -42,9 +42,9 @@ def read_movements(file: Path) -> list[Movement]:
 def read_movement_rows(file: Path) -> dict[str, list[Row]]:
     """Return the rows of each recording, at least one, in the order of their first rows."""
     found: dict[str, list[Row]] = {}
-    for row in rows(file, ('recording', 't_s', 'x_m', 'y_m')):
+    for row in read_rows(file, ('recording', 't_s', 'x_m', 'y_m')):
         if not row.cells['recording']:
-            raise row.fault('recording', 'a name')
+            raise row.make_error('recording', 'a name')
         found.setdefault(row.cells['recording'], []).append(row)
     _check_not_empty(file, found)
     return found
@@ -55,25 +55,25 @@ def parse_movement(name: str, table: Iterable[Row]) -> Movement:
     samples: list[tuple[float, ...]] = []
     for row in table:
         bounds = (samples[-1][0], samples[0][0] + LONGEST_S) if samples else (0.0, LATEST_S)
-        samples.append((row.number('t_s', *bounds), *_parse_position(row)))
+        samples.append((row.read_number('t_s', *bounds), *_parse_position(row)))
     return Movement(name, tuple(EPOCH_NS + round(each[0] * NANOSECONDS) for each in samples), np.array(samples)[:, 1:])
 
 
 def read_obstacles(file: Path) -> list[tuple[float, ...]]:
     """Return obstacles as rows x, y, z, radius, radius_stddev, id, possibly none; ids default to the position in the table."""
     found: dict[int, tuple[float, ...]] = {}
-    for number, row in enumerate(rows(file, ('x_m', 'y_m', 'radius_m'))):
-        identity = row.whole('id', -(2**31), 2**31 - 1, default=number)
+    for number, row in enumerate(read_rows(file, ('x_m', 'y_m', 'radius_m'))):
+        identity = row.read_integer('id', -(2**31), 2**31 - 1, default=number)
         if identity in found:
-            raise row.fault('id', 'another id than the rows above')
-        radius, stddev = row.number('radius_m', 0.0), row.number('radius_stddev_m', 0.0, default=0.0)
+            raise row.make_error('id', 'another id than the rows above')
+        radius, stddev = row.read_number('radius_m', 0.0), row.read_number('radius_stddev_m', 0.0, default=0.0)
         found[identity] = (*_parse_position(row), radius, stddev, identity)
     return list(found.values())
 
 
 def read_goals(file: Path) -> Array:
     """Return goals (g, 3) [m], at least one."""
-    goals = [_parse_position(row) for row in rows(file, ('x_m', 'y_m'))]
+    goals = [_parse_position(row) for row in read_rows(file, ('x_m', 'y_m'))]
     _check_not_empty(file, goals)
     return np.array(goals)
 
@@ -90,16 +90,16 @@ def recorded_messages(movement: Movement, obstacles: list[tuple[float, ...]], go
     types = RosbagsTypes(TYPESTORE)
     found: list[tuple[int, str, Any]] = []
     for stamp_ns in range(movement.stamps_ns[0] - SCENE_LEAD_NS, movement.stamps_ns[-1] + 1, SCENE_PERIOD_NS):
-        found.append((stamp_ns, '/obstacles', obstacle_cloud(types, stamp_ns, FRAME, obstacles)))
+        found.append((stamp_ns, '/obstacles', encode_obstacles(types, stamp_ns, FRAME, obstacles)))
         if goals is not None:
-            found.append((stamp_ns, '/goals', goal_poses(types, stamp_ns, FRAME, goals)))
+            found.append((stamp_ns, '/goals', encode_goals(types, stamp_ns, FRAME, goals)))
     for stamp_ns, position in zip(movement.stamps_ns, movement.positions, strict=True):
-        found.append((stamp_ns, '/hand_pose', hand_pose(types, stamp_ns, FRAME, position)))
+        found.append((stamp_ns, '/hand_pose', encode_hand_pose(types, stamp_ns, FRAME, position)))
     return sorted(found, key=lambda each: each[0])
 
 
 def _parse_position(row: Row) -> tuple[float, float, float]:
-    return row.number('x_m'), row.number('y_m'), row.number('z_m', default=0.0)
+    return row.read_number('x_m'), row.read_number('y_m'), row.read_number('z_m', default=0.0)
 
 
 def _check_not_empty(file: Path, found: Any) -> None:

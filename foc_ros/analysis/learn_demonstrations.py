@@ -25,7 +25,7 @@ class Learner:
     """
 
     def __init__(self, pipeline: Pipeline, known: Sequence[Demonstration]) -> None:
-        self.ways = list(known)
+        self.demonstrations = list(known)
         self.learned = 0
         self._pipeline = pipeline
         self._path: list[Array] = []
@@ -55,6 +55,6 @@ class Learner:
         if np.hypot(*np.diff(path, axis=0).T).sum() < SHORTEST_M or distance_m > AT_GOAL_M:
             return
         found = record_demonstration(frame_id, np.vstack([path, goals[goal]]), self._scene.obstacles(self._stamp_ns))
-        if not any(is_same_demonstration(found, known) for known in self.ways):
-            self.ways.append(found)
+        if not any(is_same_demonstration(found, known) for known in self.demonstrations):
+            self.demonstrations.append(found)
             self.learned += 1

@@ -21,7 +21,7 @@ from typing import Any, TypeVar
 from pebble import ProcessExpired, ProcessPool
 
 from foc_ros.core.errors import FocError, InputError, RecordingError
-from foc_ros.io.terminal import track
+from foc_ros.io.terminal import show_progress
 
 from .dask_cluster import DaskExecutor
 
@@ -113,7 +113,7 @@ def collect(
     """Run with a progress bar; return the results in the order of the items, and the reason of every failure by name."""
     results: list[R] = []
     failed: dict[str, str] = {}
-    for name, result in track(run(function, items, executor), description, len(items)):
+    for name, result in show_progress(run(function, items, executor), description, len(items)):
         if isinstance(result, Failure):
             failed[name] = result.reason
         else:

@@ -45,8 +45,8 @@ class Replay:
         for item in items:
             status = self.intake.take(item.role, item.message)
             is_hand = item.role == HAND
-            prediction = self.pipeline.predict() if is_hand and self.pipeline.due else None
-            sample = self.intake.sample if is_hand and status is not None and status.taken else None
+            prediction = self.pipeline.predict() if is_hand and self.pipeline.is_due else None
+            sample = self.intake.sample if is_hand and status is not None and status.is_taken else None
             yield Step(item, sample, prediction, self.pipeline.scene)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from foc_ros.analysis.csv_recordings import Movement, read_goals, read_movements, read_obstacles, write_movement
 from foc_ros.core.errors import RecordingError
-from foc_ros.io.terminal import track
+from foc_ros.io.terminal import show_progress
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
     for bag in bags:
         if bag.exists():
             raise RecordingError(f'{bag}: exists already and is not overwritten; choose another --output')
-    for bag, movement in track(bags.items(), 'convert', len(bags)):
+    for bag, movement in show_progress(bags.items(), 'convert', len(bags)):
         write_movement(bag, movement, obstacles, goals)
     count = sum(len(movement.stamps_ns) for movement in movements)
     print(f'{len(bags)} bags with {count} hand poses and {len(obstacles)} obstacles written to {arguments.output}')

@@ -15,7 +15,7 @@ from foc_ros.analysis.parallel import add_worker_arguments, collect, open_execut
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.core.errors import InputError
 from foc_ros.io.terminal import show_table
-from foc_ros.ros.parameters import given_config
+from foc_ros.ros.parameters import load_optional_config
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Evaluate; return 2 where a recording failed, 3 where all did."""
-    config = given_config(arguments.params)
+    config = load_optional_config(arguments.params)
     if arguments.report is not None and arguments.report.is_file():
         raise InputError('--report', 'a folder', arguments.report)
     found = find_recordings(arguments.data)

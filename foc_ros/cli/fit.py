@@ -10,19 +10,13 @@ from typing import Any
 
 from foc_ros.analysis.fitting.estimates import Fit
 from foc_ros.analysis.fitting.fit import fit_parameters
+from foc_ros.analysis.fitting.tables import PARAMETER_COLUMNS, SCORE_COLUMNS, format_parameters, format_scores
 from foc_ros.analysis.parallel import add_worker_arguments, open_executor
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.core.config import Config, flatten
 from foc_ros.core.errors import InputError
 from foc_ros.io.terminal import show_table
-from foc_ros.ros.parameters import dump_parameter_file, given_config
-
-SCORES = {
-    'ways': 'log-likelihood of the class taken [nat]',
-    'positions': 'log-density of true positions [nat]',
-    'inside_90': 'true positions in the 90 % ellipse of the likeliest candidate at 0.5 s',
-    'inside_all_90': 'true positions in the 90 % region of all candidates at 0.5 s',
-}
+from foc_ros.ros.parameters import dump_parameter_file, load_optional_config
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fit, write and show; return 2 where a recording could not be used, and the others were."""
-    config, output = given_config(arguments.params), arguments.output
+    config, output = load_optional_config(arguments.params), arguments.output
     # before the work, not after it
     if output.is_dir() or not output.resolve().parent.is_dir():
         raise InputError('--output', 'a file in a directory that exists', output)
@@ -55,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.report is not None:
         from foc_ros.reporting.fit_report import write_report
 
-        write_report(arguments.report, arguments.data.resolve().name, answer, SCORES)
+        write_report(arguments.report, arguments.data.resolve().name, answer)
     if arguments.json:
         print(json.dumps(answer, allow_nan=False))
     else:
@@ -81,12 +75,9 @@ def make_answer(fit: Fit, given: Config, output: Path) -> dict[str, Any]:
 
 
 def _show(answer: dict[str, Any]) -> None:
-    from foc_ros.analysis.fitting.tables import format_parameters, format_scores
-
-    show_table(('parameter', 'given', 'fitted', '95 %', 'data'), format_parameters(answer))
-    show_table(('score', 'setting', 'value'), format_scores(answer['scores'], SCORES))
+    show_table(PARAMETER_COLUMNS, format_parameters(answer))
+    show_table(SCORE_COLUMNS, format_scores(answer))
     for warning in answer['warnings']:
         print(f'note: {warning}')
-    here, installed = answer['node']
     words = f'{answer["recordings"]} recordings; parameters written to {answer["output"]}. Run the node with them:'
-    print(f'{words}\n  {here}\n  {installed}')
+    print('\n  '.join((words, *answer['node'])))

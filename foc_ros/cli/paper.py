@@ -10,7 +10,7 @@ from foc_ros.analysis.paper.numbers import as_json
 from foc_ros.analysis.paper.studies import COUNT, FULL, Grid, Studies, compute_studies
 from foc_ros.analysis.paper.trends import Trend, check_trends
 from foc_ros.core.errors import InputError
-from foc_ros.io.terminal import show_table, track
+from foc_ros.io.terminal import show_progress, show_table
 
 FORMATS = ('png', 'pdf')
 NUMBERS, TABLE = 'numbers.json', 'table.md'
@@ -41,7 +41,7 @@ def perform(output: Path, grid: Grid = FULL) -> Studies:
     try:
         output.mkdir(parents=True, exist_ok=True)
         (output / TABLE).write_text('', encoding='utf-8')
-        studies = {study.number: study for study in track(compute_studies(grid), 'paper', COUNT)}
+        studies = {study.number: study for study in show_progress(compute_studies(grid), 'paper', COUNT)}
         paper_figures.write_figures(studies, output, FORMATS)
         (output / NUMBERS).write_text(json.dumps(as_json(studies), indent=1, allow_nan=False) + '\n', encoding='utf-8')
         rows = [COLUMNS, ('---',) * len(COLUMNS), *map(_format_cells, check_trends(studies))]

@@ -19,10 +19,10 @@ from foc_ros.core.errors import InputError
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
 from foc_ros.io.class_library import load_library, save_library
 from foc_ros.io.json_output import encode_prediction
-from foc_ros.io.terminal import show_table, track
-from foc_ros.ros.messages.encode_prediction import output_messages
+from foc_ros.io.terminal import show_progress, show_table
+from foc_ros.ros.messages.encode_prediction import encode_outputs
 from foc_ros.ros.messages.types import RosbagsTypes
-from foc_ros.ros.parameters import given_config
+from foc_ros.ros.parameters import load_optional_config
 
 NODE = '/foc'
 """Name of the node in the topics of the output bag."""
@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Replay the recording; return 3 if no prediction has a solved candidate."""
-    replay, summary = Replay(given_config(arguments.params)), Summary()
+    replay, summary = Replay(load_optional_config(arguments.params)), Summary()
     consumers: list[Consumer] = [summary.add]
     report = learner = None
     if arguments.report is not None:
@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
         answer = summary.answer(replay.intake.counts, duration_s)
         if learner is not None:
             learner.finish()
-            save_library(arguments.learn, learner.ways)
+            save_library(arguments.learn, learner.demonstrations)
             answer['learned'] = learner.learned
         if report is not None:
             report.write(arguments.report, arguments.bag.resolve().name, facts(answer))
@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
             show_table(('', str(arguments.bag)), facts(answer).items())
     if summary.solved:
         return 0
-    reason = replay.pipeline.blocked() or replay.intake.last_refusal or 'see the candidates not solved'
+    reason = replay.pipeline.not_ready_reason() or replay.intake.last_refusal or 'see the candidates not solved'
     print(f'foc_ros replay: no prediction has a solved candidate: {reason}', file=sys.stderr)
     return 3
 
@@ -90,7 +90,7 @@ def _play(arguments: argparse.Namespace, replay: Replay, consumers: list[Consume
         if arguments.output is not None:
             writer = stack.enter_context(BagWriter(arguments.output))
             consumers = [*consumers, _bag_writer(reader, writer, replay.pipeline.config.plane)]
-        for step in replay.steps(track(reader, 'replay', reader.message_count)):
+        for step in replay.steps(show_progress(reader, 'replay', reader.message_count)):
             for consume in consumers:
                 consume(step)
         return reader.duration_s
@@ -103,7 +103,7 @@ def _bag_writer(reader: BagReader, writer: BagWriter, plane: str) -> Consumer:
     def write(step: Step) -> None:
         writer.copy(step.item, reader)
         if step.prediction is not None:
-            for name, message in output_messages(step.prediction, step.prediction.obstacles, plane, types).items():
+            for name, message in encode_outputs(step.prediction, step.prediction.obstacles, plane, types).items():
                 writer.write(f'{NODE}/{name}', message, step.item.log_ns)
 
     return write

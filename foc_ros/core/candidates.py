@@ -9,7 +9,7 @@ import numpy as np
 
 from .config import FocConfig, LikelihoodConfig
 from .deadline import NEVER, Deadline
-from .homotopy import path_sides
+from .homotopy import find_path_sides
 from .homotopy.branch_times import compute_branch_times
 from .likelihood import CostModel, compute_likelihoods
 from .ocp.problem import Problem
@@ -72,7 +72,7 @@ def _solve_candidate(
 
 def _check_class(candidate: Candidate, problem: Problem, solution: Solution, costs: CostModel) -> PredictedCandidate:
     """Find the homotopy class in which a solution really is, and its cost; the status says if it left the candidate's class."""
-    sides = path_sides(solution.path, problem.obstacles, problem.courses)
+    sides = find_path_sides(solution.path, problem.obstacles, problem.courses)
     if solution.status is Status.SOLVED and any(sides.get(identity, side) != side for identity, side in candidate.sides):
         solution = replace(solution, status=Status.LEFT_CLASS, message='the solution moved into another homotopy class')
     return PredictedCandidate(candidate, solution, sides, costs.compute_cost(solution), 0.0)

@@ -173,7 +173,7 @@ class Config:
 
     def __repr__(self) -> str:
         """Name the parameters that differ from their defaults."""
-        defaults = {parameter.name: parameter.default for parameter in parameters()}
+        defaults = {parameter.name: parameter.default for parameter in list_parameters()}
         changed = [f'{name}={value!r}' for name, value in flatten(self).items() if value != defaults[name]]
         return f'<Config {", ".join(changed) or "of defaults"}>'
 
@@ -192,7 +192,7 @@ class Config:
         Traceback (most recent call last):
         foc_ros.core.errors.ParameterError: foc.eta: expected a number in [0, 0.999], got 1.5
         """
-        return updated(self, values)
+        return replace_values(self, values)
 
 
 @dataclass(frozen=True)
@@ -204,19 +204,19 @@ class Parameter:
     bound: Bound
 
 
-def parameters(group: type = Config, prefix: str = '') -> Iterator[Parameter]:
+def list_parameters(group: type = Config, prefix: str = '') -> Iterator[Parameter]:
     """Yield every parameter of a config class, depth first, by dotted name."""
     for item in fields(group):
         if 'bound' in item.metadata:
             yield Parameter(prefix + item.name, item.default, item.metadata['bound'])
         else:
-            yield from parameters(cast('type', item.default_factory), f'{prefix}{item.name}.')
+            yield from list_parameters(cast('type', item.default_factory), f'{prefix}{item.name}.')
 
 
 def flatten(config: Config) -> dict[str, float | int | str]:
     """Return every value by dotted name."""
     values: dict[str, float | int | str] = {}
-    for parameter in parameters():
+    for parameter in list_parameters():
         value: Any = config
         for part in parameter.name.split('.'):
             value = getattr(value, part)
@@ -224,9 +224,9 @@ def flatten(config: Config) -> dict[str, float | int | str]:
     return values
 
 
-def updated(config: Config, values: Mapping[str, object]) -> Config:
+def replace_values(config: Config, values: Mapping[str, object]) -> Config:
     """Return the config with some values changed, by dotted name: `Config.with_values`."""
-    known = {parameter.name: parameter for parameter in parameters()}
+    known = {parameter.name: parameter for parameter in list_parameters()}
     for name, value in values.items():
         if name not in known:
             raise ParameterError(name, 'a known parameter', repr(value))

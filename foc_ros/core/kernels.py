@@ -16,7 +16,7 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, ForwardRef, NamedTuple, TypeAlias, TypeVar, cast
+from typing import Any, ForwardRef, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numba import njit, types
@@ -88,7 +88,7 @@ def forget_outdated(folder: Path) -> None:
 forget_outdated(Path(__file__).parent)
 
 Kernel = TypeVar('Kernel', bound=Callable[..., object])
-Group = TypeVar('Group', bound=NamedTuple)
+Group = TypeVar('Group', bound=tuple[Any, ...])
 
 
 def compiled(kernel: Kernel) -> Kernel:
@@ -110,17 +110,20 @@ def compiled_exactly(kernel: Kernel) -> Kernel:
 
 
 def compiled_with_caller(kernel: Kernel) -> Kernel:
-    """Compile an inner kernel with each entry kernel that calls it, for the types of that call."""
-    return cast('Kernel', njit(fastmath=REORDERED, error_model='numpy')(kernel))
+    """Compile an inner kernel into each entry kernel that calls it, for the types of that call.
+
+    It is inlined: passing on the arrays of a NamedTuple, which are counted references, took as long as the work in some of them.
+    """
+    return cast('Kernel', njit(fastmath=REORDERED, error_model='numpy', forceinline=True)(kernel))
 
 
 def freeze(group: Group) -> Group:
     """Make the arrays of a NamedTuple read-only, those of NamedTuples in it too, and return it for an entry kernel."""
-    for each in cast('tuple[object, ...]', group):
+    for each in group:
         if isinstance(each, np.ndarray):
             each.setflags(write=False)
         elif isinstance(each, tuple):
-            freeze(cast('Any', each))
+            freeze(each)
     return group
 
 

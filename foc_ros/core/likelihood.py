@@ -30,7 +30,7 @@ import numpy as np
 from .config import Config, LikelihoodConfig
 from .dynamics.plant_models import make_plant_model
 from .errors import InputError
-from .estimation.duration import time_price
+from .estimation.duration import get_time_price
 from .homotopy.branch_times import BranchTimes
 from .kernels import Vector, compiled
 from .registry import LIKELIHOOD_RULES
@@ -55,7 +55,7 @@ def make_cost_model(effort_spent: float, config: Config) -> CostModel:
     """Return the costs of a movement with an effort since onset [m^2/s^5]; both parts are 0 for a plant not driven by jerk."""
     if not make_plant_model(config.foc).is_jerk_driven:
         return CostModel()
-    return CostModel(compute_shared_cost(effort_spent, config.likelihood), time_price(config.duration))
+    return CostModel(compute_shared_cost(effort_spent, config.likelihood), get_time_price(config.duration))
 
 
 def compute_shared_cost(effort_spent: float, config: LikelihoodConfig) -> float:
@@ -102,7 +102,7 @@ def normalise_logs(logs: Vector) -> Vector:
 
 def _weigh_by_lookahead(logs: Array, branch_times: BranchTimes, lookahead_s: float) -> Array:
     """Return u_W + log(J_i^-beta / V_W) of each class, (k,), from the logarithms of J_i^-beta."""
-    numbers, path_class = np.unique(branch_times.way, return_inverse=True)
+    numbers, path_class = np.unique(branch_times.path_class, return_inverse=True)
     weight = np.full(len(numbers), -np.inf)
     np.logaddexp.at(weight, path_class, logs)
     after_s = np.full((len(numbers), len(numbers)), np.inf)

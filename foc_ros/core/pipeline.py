@@ -33,7 +33,7 @@ class Pipeline:
         self._library = tuple(library)
         self.hand_state: FilterState | None = None
         self.scene = Scene()
-        self.engaged = True
+        self.is_engaged = True
         self.frame_id = config.frame_id or None
         self._rejections = Rejections()
         self._memory = Memory()
@@ -57,21 +57,21 @@ class Pipeline:
         return self._rejections.last
 
     @property
-    def due(self) -> bool:
+    def is_due(self) -> bool:
         """Whether there is a new hand sample at least 1 / rate_hz after the last prediction (or any, after a restart)."""
-        if self.hand_state is None or not self._is_new or not self.engaged:
+        if self.hand_state is None or not self._is_new or not self.is_engaged:
             return False
         period_ns = int(NANOSECONDS / self.config.rate_hz)
         return self._predicted_ns is None or self.hand_state.stamp_ns - self._predicted_ns >= period_ns
 
-    def hand(self, sample: HandSample) -> SampleStatus:
+    def add_hand_sample(self, sample: HandSample) -> SampleStatus:
         """Take a hand sample. The first one fixes the working frame if the parameter does not."""
         if not self._rejections.accept_frame('hand_wrong_frame', 'hand_pose', sample.frame_id, self.frame_id):
             return SampleStatus.WRONG_FRAME
-        before, is_superseded = self.hand_state, self.due and not self._was_tried and self._find_not_ready_reason() is None
+        before, is_superseded = self.hand_state, self.is_due and not self._was_tried and self._find_not_ready_reason() is None
         updated = update(before, sample, self.config.estimator)
         status = updated.status
-        if not status.taken:
+        if not status.is_taken:
             assert before is not None
             self._rejections.reject_stamp(f'hand_{status}', 'hand_pose', sample.stamp_ns, before.stamp_ns)
             return status
@@ -80,10 +80,10 @@ class Pipeline:
         self.hand_state, self._is_new, self._was_tried = updated.state, True, False
         if is_superseded:
             self._rejections.count('hand_superseded')
-        if status.restarted:
+        if status.is_restart:
             self._rejections.count(f'hand_{status}')
             self._forget_predictions()
-        if not self.engaged:
+        if not self.is_engaged:
             self._rejections.reject('hand_disengaged', 'hand_pose: disengaged, nothing is predicted')
             return SampleStatus.DISENGAGED
         return status
@@ -96,7 +96,7 @@ class Pipeline:
         """
         if not self._rejections.accept_frame('obstacles_wrong_frame', source, frame_id, self.frame_id):
             return SampleStatus.WRONG_FRAME
-        present = self.scene.parts.get(source)
+        present = self.scene.sources.get(source)
         newest_ns = present.stamp_ns if present is not None else None
         if stamp_ns and newest_ns and 0 < newest_ns - stamp_ns <= self.config.estimator.gap_s * NANOSECONDS:
             self._rejections.reject_stamp('obstacles_late', source, stamp_ns, newest_ns)
@@ -115,7 +115,7 @@ class Pipeline:
         """Predict from the newest hand sample; if that is impossible, count it, explain it in `last_refusal`, return None."""
         self._was_tried = True
         reason = self._find_not_ready_reason()
-        if reason is None and not self.due:
+        if reason is None and not self.is_due:
             reason = ('not_due', 'no hand pose since the last prediction that is 1/rate_hz after it')
         if reason is not None:
             self._rejections.reject(f'predict_{reason[0]}', reason[1])
@@ -138,17 +138,17 @@ class Pipeline:
             self._rejections.count('predict_nothing_solved')
         return prediction
 
-    def blocked(self) -> str | None:
+    def not_ready_reason(self) -> str | None:
         """Return why nothing can be predicted now, with numbers; None if it can."""
         reason = self._find_not_ready_reason()
         return None if reason is None else reason[1]
 
-    def engage(self, on: bool) -> None:
+    def set_engaged(self, on: bool) -> None:
         """Engage or disengage: while disengaged the hand is followed, but nothing is predicted."""
-        if on != self.engaged:
+        if on != self.is_engaged:
             self._forget_predictions()
             self._is_new = False
-        self.engaged = on
+        self.is_engaged = on
 
     def reset(self) -> None:
         """Forget the movement; keep the scene, the working frame and the counts."""
@@ -168,7 +168,7 @@ class Pipeline:
 
     def _find_not_ready_reason(self) -> tuple[str, str] | None:
         """Return why the state of the pipeline allows no prediction, as (kind, message): the only place that decides this."""
-        if not self.engaged:
+        if not self.is_engaged:
             return 'disengaged', 'disengaged'
         if self.hand_state is None:
             return 'no_hand', 'no hand pose yet'
@@ -180,7 +180,7 @@ class Pipeline:
     def _fix_frame(self, frame_id: str) -> None:
         """Fix the working frame and drop what was received in another one."""
         before, self.frame_id, self.scene = self.scene, frame_id, Scene()
-        for name, source in before.parts.items():
+        for name, source in before.sources.items():
             self.set_obstacles(name, source.obstacles, source.stamp_ns, source.frame_id)
         if before.goals is not None:
             self.set_goals(before.goals, before.goals_frame)

@@ -13,7 +13,7 @@ from .config import REFERENCE_STEP_S, Config
 from .deadline import Deadline
 from .dynamics.noise import scale_noise
 from .dynamics.plant_models import make_plant_model
-from .dynamics.predictive_covariance import predictive_covariance, timing_covariances
+from .dynamics.predictive_covariance import compute_predictive_covariance, timing_covariances
 from .estimation.duration import choose_candidate_durations, estimate_times_to_go, is_passing
 from .homotopy import search
 from .homotopy.demonstrations import Demonstration, GuessTiming, recall_demonstrations
@@ -143,7 +143,7 @@ def _widen_covariances(
     """Add the predictive covariance, and that of the timing, to the covariance that motor noise causes."""
     plant = make_plant_model(config.foc)
     shared = {
-        problem: predictive_covariance(hand, problem.horizon.dt, config.foc.steps, config)
+        problem: compute_predictive_covariance(hand, problem.horizon.dt, config.foc.steps, config)
         for problem in dict.fromkeys(problems.values())
     }
     widened = []

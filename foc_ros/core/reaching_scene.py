@@ -12,7 +12,7 @@ from .config import Config
 from .dynamics.plant_models import make_plant_model
 from .errors import SceneError
 from .estimation.duration import is_passing
-from .homotopy import path_sides, search
+from .homotopy import find_path_sides, search
 from .ocp.problem import Problem
 from .predictor import build_problem
 from .types import LEFT, Array, Candidate, HandState, Obstacles, PredictedCandidate, Record
@@ -72,7 +72,7 @@ def solve_scene(scene: ReachingScene, problems: Sequence[Problem]) -> list[Predi
 
 
 def _make_guessed_candidate(guess: Array, obstacles: Obstacles) -> Candidate:
-    sides = tuple(sorted(path_sides(guess, obstacles).items()))
+    sides = tuple(sorted(find_path_sides(guess, obstacles).items()))
     label = 'goal0:' + ''.join(('+' if side == LEFT else '-') + identity for identity, side in sides)
     return Candidate(label, 0, sides, guess, 0.0)
 

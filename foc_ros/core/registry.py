@@ -5,7 +5,7 @@ A registry knows the names of its parts before it imports them, so that a parame
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -31,12 +31,10 @@ class Registry:
     def __contains__(self, name: object) -> bool:
         return name in self._locations or name in self._parts
 
-    def register(self, name: str, part: Callable[..., Any]) -> None:
-        """Add a part under a new name; raise InputError if the name is taken or empty, or the part cannot be called."""
+    def register(self, name: str, part: Any) -> None:
+        """Add a part under a new name; raise InputError if the name is taken or empty."""
         if not name or name in self:
             raise InputError(self.kind, f'a new name besides {", ".join(self)}', repr(name))
-        if not callable(part):
-            raise InputError(f'{self.kind} {name}', 'a function', repr(part))
         self._parts[name] = part
 
     def get(self, name: str) -> Any:

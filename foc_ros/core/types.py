@@ -66,12 +66,12 @@ class SampleStatus(StrEnum):
     DISENGAGED = 'disengaged'
 
     @property
-    def taken(self) -> bool:
+    def is_taken(self) -> bool:
         """Whether the message was used."""
         return self not in (SampleStatus.DUPLICATE, SampleStatus.LATE, SampleStatus.WRONG_FRAME)
 
     @property
-    def restarted(self) -> bool:
+    def is_restart(self) -> bool:
         """Whether the movement restarts from this message."""
         return self in (SampleStatus.RESTARTED_BACKWARD, SampleStatus.RESTARTED_GAP)
 
@@ -228,8 +228,8 @@ class Solution(Record):
     violation: float = 0.0
     violation_at: tuple[str, float] | None = None
     multipliers: tuple[tuple[str, float, float], ...] = ()
-    held: tuple[tuple[float, float], ...] = ()
-    slope: float = 0.0
+    equivalent_weights: tuple[tuple[float, float], ...] = ()
+    safety_factor_slope: float = 0.0
     qp_solves: int = 0
     iterations: int | None = None
     solve_s: float = 0.0

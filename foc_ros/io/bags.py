@@ -93,7 +93,7 @@ class BagReader:
                 raise RecordingError(f'topic {each.topic}: expected one message type, got {each.msgtype} and {kinds[each.topic]}')
         return roles
 
-    def connection_of(self, topic: str) -> dict[str, Any]:
+    def describe_connection(self, topic: str) -> dict[str, Any]:
         """Return a topic's type, definitions and offered quality of service, as a writer needs them."""
         connection = next(each for each in self._reader.connections if each.topic == topic)
         offered = connection.ext.offered_qos_profiles if isinstance(connection.ext, ConnectionExtRosbag2) else []
@@ -139,7 +139,7 @@ class BagWriter:
 
     def copy(self, item: Item, reader: BagReader) -> None:
         """Write a message as it was read, with its topic's definitions and offered quality of service."""
-        connection = {} if item.topic in self._connections else reader.connection_of(item.topic)
+        connection = {} if item.topic in self._connections else reader.describe_connection(item.topic)
         self._write(item.topic, item.log_ns, item.raw, connection)
 
     def _write(self, topic: str, log_ns: int, raw: bytes | memoryview, connection: Mapping[str, Any]) -> None:

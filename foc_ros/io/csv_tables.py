@@ -24,7 +24,7 @@ class Row:
     line: int
     cells: dict[str, str]
 
-    def number(self, column: str, low: float = -FARTHEST_M, high: float = FARTHEST_M, default: float | None = None) -> float:
+    def read_number(self, column: str, low: float = -FARTHEST_M, high: float = FARTHEST_M, default: float | None = None) -> float:
         """Return a cell as a number in [low, high]; default: if the table does not have the column."""
         if column not in self.cells and default is not None:
             return default
@@ -33,22 +33,22 @@ class Row:
         except ValueError:
             value = math.nan
         if not low <= value <= high:
-            raise self.fault(column, f'a number in [{low:.12g}, {high:.12g}]')
+            raise self.make_error(column, f'a number in [{low:.12g}, {high:.12g}]')
         return value
 
-    def whole(self, column: str, low: int, high: int, default: int) -> int:
+    def read_integer(self, column: str, low: int, high: int, default: int) -> int:
         """Return a cell as a whole number in [low, high]; default: if the table does not have the column."""
-        value = self.number(column, low, high, default)
+        value = self.read_number(column, low, high, default)
         if value != int(value):
-            raise self.fault(column, f'a whole number in [{low}, {high}]')
+            raise self.make_error(column, f'a whole number in [{low}, {high}]')
         return int(value)
 
-    def fault(self, column: str, expected: str) -> RecordingError:
+    def make_error(self, column: str, expected: str) -> RecordingError:
         """Return the error of a cell."""
         return RecordingError(f'{self.file}: row {self.line}, column {column}: expected {expected}, got {self.cells[column]!r}')
 
 
-def rows(file: Path, needed: tuple[str, ...]) -> Iterator[Row]:
+def read_rows(file: Path, needed: tuple[str, ...]) -> Iterator[Row]:
     """Yield the rows of a CSV file with a header; empty lines are skipped, and columns beside the needed ones are allowed.
 
     Raises RecordingError for a file that cannot be read, lacks a needed column or names one twice, and for a row with more or

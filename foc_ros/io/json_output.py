@@ -51,7 +51,7 @@ def encode_solution(solution: Solution) -> dict[str, Any]:
     rows: the active contacts; velocity and acceleration (N + 1, 2), where acceleration is null if the state of the plant holds
     only position and velocity; covariance (N + 1, n, n) of the state; control (N, 2).
     """
-    contacts = zip(solution.multipliers, solution.held, strict=True)
+    contacts = zip(solution.multipliers, solution.equivalent_weights, strict=True)
     has_acceleration = solution.mean.shape[1] >= 6
     return {
         'solve_ms': 1e3 * solution.solve_s,

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.config import Config, updated
+from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import ParameterError, SceneError
 from foc_ros.core.reaching_scene import ReachingScene, check_outside
 from foc_ros.core.types import Array, HandState, Obstacles, make_obstacles
@@ -93,10 +93,10 @@ def _read_config(scene: Mapping[str, Any]) -> Config:
     if 'noise' in scene:
         x, y = _read_list('noise', scene['noise'], 2)
         given += [('noise', 'foc.noise_x', x), ('noise', 'foc.noise_y', y)]
-    config = updated(Config(), {'duration.model': 'fixed'})
+    config = replace_values(Config(), {'duration.model': 'fixed'})
     for field, parameter, value in given:
         try:
-            config = updated(config, {parameter: _convert_numeral(value)})
+            config = replace_values(config, {parameter: _convert_numeral(value)})
         except ParameterError as error:
             raise SceneError(field, error.expected, error.got) from error
     for field in ('tau', 'lambda'):

@@ -16,7 +16,7 @@ MAX_COLUMNS = 400
 """Width up to which no table is cut off [characters]; a table takes no more than it needs."""
 
 
-def track(items: Iterable[T], words: str, total: int) -> Iterator[T]:
+def show_progress(items: Iterable[T], words: str, total: int) -> Iterator[T]:
     """Yield the items and show a progress bar; words: its description; total: number of items."""
     console = Console(stderr=True)
     if not console.is_terminal:

@@ -40,7 +40,7 @@ CLASSES = 2 * len(CLASS_COLOURS)
 """Number of slots: pairs of a colour and a dash, each with its letter."""
 STDDEVS = 1.0
 """Size of ellipses and rings in standard deviations."""
-ELLIPSES_PER_WAY = 8
+ELLIPSES_PER_CANDIDATE = 8
 NAMED_OBSTACLES = 30
 """The obstacles of larger scenes are drawn without their ids."""
 
@@ -60,13 +60,13 @@ Bounds = tuple[float, float, float, float]
 
 
 @contextmanager
-def new_figure(width_in: float, height_in: float) -> Iterator[Figure]:
+def open_figure(width_in: float, height_in: float) -> Iterator[Figure]:
     """Yield an empty figure of the given size [in]; what is drawn within the context has the common style."""
     with mpl.rc_context(STYLE):
         yield Figure(figsize=(width_in, height_in), layout='constrained')
 
 
-def class_style(number: int) -> tuple[str, str]:
+def get_class_style(number: int) -> tuple[str, str]:
     """Return colour and dash of a slot, or of anything else that is numbered."""
     return CLASS_COLOURS[number % len(CLASS_COLOURS)], ('-', '--')[number // len(CLASS_COLOURS) % 2]
 
@@ -76,22 +76,22 @@ def get_letter(slot: int | None) -> str:
     return ' ' if slot is None else ascii_uppercase[slot]
 
 
-def candidate_style(slot: int | None, likelihood: float) -> dict[str, Any]:
+def get_candidate_style(slot: int | None, likelihood: float) -> dict[str, Any]:
     """Return the line style of a candidate: colour and dash of its slot, the thicker the more likely."""
-    colour, dash = (NO_CLASS_COLOUR, '-') if slot is None else class_style(slot)
+    colour, dash = (NO_CLASS_COLOUR, '-') if slot is None else get_class_style(slot)
     return {'color': colour, 'linestyle': dash, 'linewidth': 1.2 + 3.0 * likelihood}
 
 
-def ellipse_axes(covariance: Array) -> tuple[Array, Array, Array]:
+def compute_ellipse_axes(covariance: Array) -> tuple[Array, Array, Array]:
     """Return greater and smaller standard deviation and the angle of the greater [degrees]; covariance (..., 2, 2)."""
     variances, vectors = np.linalg.eigh(covariance)
     stddevs = np.sqrt(np.maximum(variances, 0.0))
     return stddevs[..., 1], stddevs[..., 0], np.degrees(np.arctan2(vectors[..., 1, 1], vectors[..., 0, 1]))
 
 
-def stddev_ellipse(centre: Array, covariance: Array, stddevs: float = STDDEVS) -> Ellipse:
+def make_stddev_ellipse(centre: Array, covariance: Array, stddevs: float = STDDEVS) -> Ellipse:
     """Return the ellipse of the given number of standard deviations; centre (2,) [m], covariance (2, 2) [m^2]."""
-    greater, smaller, angle = ellipse_axes(covariance)
+    greater, smaller, angle = compute_ellipse_axes(covariance)
     return Ellipse(tuple(centre), 2.0 * stddevs * float(greater), 2.0 * stddevs * float(smaller), angle=float(angle))
 
 
@@ -121,9 +121,9 @@ def draw_candidates(axes: Any, candidates: Sequence[CandidateView], slots: Mappi
     slots: by label; a candidate without a slot has no letter.
     """
     for rank, each in reversed(list(enumerate(candidates))):
-        style, letter = candidate_style(slots.get(each.label), each.likelihood), get_letter(slots.get(each.label))
-        for row in np.unique(np.linspace(0, len(each.path) - 1, ELLIPSES_PER_WAY).astype(int)):
-            ellipse = stddev_ellipse(each.path[row], each.covariance[row])
+        style, letter = get_candidate_style(slots.get(each.label), each.likelihood), get_letter(slots.get(each.label))
+        for row in np.unique(np.linspace(0, len(each.path) - 1, ELLIPSES_PER_CANDIDATE).astype(int)):
+            ellipse = make_stddev_ellipse(each.path[row], each.covariance[row])
             ellipse.set(facecolor=to_rgba(style['color'], 0.1), edgecolor=to_rgba(style['color'], 0.5), linewidth=0.6, zorder=2)
             axes.add_patch(ellipse)
         axes.plot(*each.path.T, zorder=3, label=f'{letter}  {100 * each.likelihood:3.0f} %  {each.label}', **style)
@@ -145,7 +145,7 @@ def draw_hand(axes: Any, hand: HandTrajectory, now_ns: int, span: tuple[int, int
 
 def draw_movement(axes: Any, positions: Array, number: int) -> None:
     """Draw a movement (m, 2) with an arrow and its number, counted from 1."""
-    colour, dash = class_style(number)
+    colour, dash = get_class_style(number)
     axes.plot(*positions.T, color=colour, linestyle=dash, linewidth=1.8)
     tail, head = positions[len(positions) * 2 // 3], positions[len(positions) * 3 // 4]
     axes.annotate('', head, tail, arrowprops={'arrowstyle': '-|>', 'color': colour, 'linewidth': 0.0, 'mutation_scale': 16})
@@ -157,7 +157,7 @@ def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None
     times = (np.array([each.stamp_ns for each in tracks.snapshots]) - origin_ns) / NANOSECONDS
     drawn = {track: values for track, values in tracks.likelihoods().items() if track in tracks.slots}
     for rank, (track, (first, values)) in enumerate(drawn.items()):
-        colour, dash = class_style(tracks.slots[track])
+        colour, dash = get_class_style(tracks.slots[track])
         axes.plot(
             times[first : first + len(values)], values, color=colour, linestyle=dash, linewidth=1.8, marker='.', markersize=2.5
         )
@@ -174,7 +174,7 @@ def draw_speeds(
     """Draw predicted speeds and the measured speed within a span [ns], which is dotted after the stamp of the snapshot."""
     now_s = (snapshot.stamp_ns - origin_ns) / NANOSECONDS
     for each in reversed(snapshot.candidates):
-        axes.plot(now_s + each.times, each.speed, **candidate_style(slots.get(each.label), each.likelihood))
+        axes.plot(now_s + each.times, each.speed, **get_candidate_style(slots.get(each.label), each.likelihood))
     times = hand.seconds_after(origin_ns)
     for rows, dash, width in ((hand.between(*span), ':', 1.6), (hand.between(span[0], snapshot.stamp_ns), '-', 2.0)):
         axes.plot(times[rows], hand.speed[rows], color='black', linewidth=width, linestyle=dash)

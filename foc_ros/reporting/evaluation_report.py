@@ -13,9 +13,9 @@ from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS
 from foc_ros.analysis.evaluation.tables import GAP_TITLE, make_tables
 from foc_ros.core.errors import InputError
 
-from .drawing import new_figure
-from .page import page_of, picture, pictures, table
-from .plots import save
+from .drawing import open_figure
+from .page import render_page, render_picture, render_pictures, render_table
+from .plots import save_figure
 
 PAGE = 'evaluation.html'
 WIDTH_IN, HEIGHT_IN = 6.4, 4.2
@@ -28,9 +28,9 @@ CAPTIONS = {
 
 def write_report(directory: Path, title: str, answer: Mapping[str, Any]) -> None:
     """Write the page; answer: as of `evaluate --json`. Raises InputError where that cannot be done."""
-    tables = ''.join(f'<h2>{heading}</h2>{table(columns, rows)}' for heading, columns, rows in make_tables(answer))
+    tables = ''.join(f'<h2>{heading}</h2>{render_table(columns, rows)}' for heading, columns, rows in make_tables(answer))
     warnings = [f'{name}: {reason}' for name, reason in answer['failed'].items()]
-    page = page_of(f'Evaluation: {title}', pictures(_draw_questions(answer['questions'])) + tables, warnings)
+    page = render_page(f'Evaluation: {title}', render_pictures(_draw_questions(answer['questions'])) + tables, warnings)
     try:
         directory.mkdir(parents=True, exist_ok=True)
         (directory / PAGE).write_text(page, encoding='utf-8')
@@ -45,11 +45,11 @@ def _draw_questions(questions: Mapping[str, Any]) -> Iterator[str]:
             if name in questions:
                 reliability = f'{name}: how often the likeliest answer is true, over its probability.'
                 for draw, words in ((_draw_tenths, caption), (_draw_reliability, reliability)):
-                    with new_figure(WIDTH_IN, HEIGHT_IN) as figure:
+                    with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
                         draw(figure.subplots(), name, questions[name])
                     file = Path(scratch) / 'picture.png'
-                    save(figure, file)
-                    yield picture(file, words)
+                    save_figure(figure, file)
+                    yield render_picture(file, words)
 
 
 def _draw_tenths(axes: Any, name: str, by_predictor: Mapping[str, Any]) -> None:

@@ -7,12 +7,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from foc_ros.analysis.fitting.tables import format_parameters, format_scores
+from foc_ros.analysis.fitting.tables import PARAMETER_COLUMNS, SCORE_COLUMNS, format_parameters, format_scores
 from foc_ros.core.errors import InputError
 
-from .drawing import class_style, new_figure
-from .page import page_of, picture, pictures, table
-from .plots import save
+from .drawing import get_class_style, open_figure
+from .page import render_page, render_picture, render_pictures, render_table
+from .plots import save_figure
 
 PAGE = 'fit.html'
 WIDTH_IN, LINE_IN = 6.4, 0.34
@@ -21,20 +21,20 @@ CAPTION = (
 )
 
 
-def write_report(directory: Path, title: str, answer: Mapping[str, Any], scores: Mapping[str, str]) -> None:
-    """Write the page; answer: as of `fit --json`; scores: the title of each score. Raises InputError where that fails."""
+def write_report(directory: Path, title: str, answer: Mapping[str, Any]) -> None:
+    """Write the page; answer: as of `fit --json`. Raises InputError where that cannot be done."""
     warnings = [*answer['warnings'], *(f'{name}: {reason}' for name, reason in answer['failed'].items())]
     body = (
         _draw_parameters(answer['parameters'])
-        + table(('parameter', 'given', 'fitted', '95 %', 'data'), format_parameters(answer))
+        + render_table(PARAMETER_COLUMNS, format_parameters(answer))
         + '<h2>Scores</h2>'
-        + table(('score', 'setting', 'value'), format_scores(answer['scores'], scores))
+        + render_table(SCORE_COLUMNS, format_scores(answer))
         + '<h2>Run the node with these parameters</h2>'
-        + table((), [('parameter file', answer['output']), *zip(('without ROS', 'with ROS'), answer['node'], strict=True)])
+        + render_table((), [('parameter file', answer['output']), *zip(('without ROS', 'with ROS'), answer['node'], strict=True)])
     )
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        (directory / PAGE).write_text(page_of(f'Fit: {title}', body, warnings), encoding='utf-8')
+        (directory / PAGE).write_text(render_page(f'Fit: {title}', body, warnings), encoding='utf-8')
     except OSError as error:
         raise InputError('--report', 'a folder that can be written', f'{directory}: {error.strerror}') from error
 
@@ -44,8 +44,8 @@ def _draw_parameters(parameters: Mapping[str, Any]) -> str:
     drawn = {name: each for name, each in parameters.items() if each['given'] > 0.0 and each['value'] > 0.0}
     if not drawn:
         return ''
-    with new_figure(WIDTH_IN, 0.9 + LINE_IN * len(drawn)) as figure:
-        axes, (colour, _) = figure.subplots(), class_style(0)
+    with open_figure(WIDTH_IN, 0.9 + LINE_IN * len(drawn)) as figure:
+        axes, (colour, _) = figure.subplots(), get_class_style(0)
         for row, each in enumerate(drawn.values()):
             ends = [end / each['given'] for end in each['interval'] if end is not None and end > 0.0]
             axes.plot(ends, [row] * len(ends), color=colour, linewidth=3.0, alpha=0.5, solid_capstyle='butt')
@@ -58,5 +58,5 @@ def _draw_parameters(parameters: Mapping[str, Any]) -> str:
         axes.tick_params(axis='x', which='minor', labelsize=7)
     with TemporaryDirectory() as scratch:
         file = Path(scratch) / 'fit.png'
-        save(figure, file)
-        return pictures([picture(file, CAPTION)])
+        save_figure(figure, file)
+        return render_pictures([render_picture(file, CAPTION)])

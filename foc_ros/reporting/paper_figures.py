@@ -12,8 +12,8 @@ from foc_ros.analysis.paper.reaching import PaperScene, compute_speed
 from foc_ros.analysis.paper.studies import PAPER_ETA, PAPER_RATIOS, Studies, Study
 from foc_ros.core.types import Solution
 
-from .drawing import ELLIPSES_PER_WAY, Bounds, class_style, draw_scene, new_figure, stddev_ellipse
-from .plots import bounds_of, save
+from .drawing import ELLIPSES_PER_CANDIDATE, Bounds, draw_scene, get_class_style, make_stddev_ellipse, open_figure
+from .plots import compute_bounds, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +35,7 @@ def write_figures(studies: Studies, directory: Path, suffixes: Sequence[str]) ->
     for number, study in studies.items():
         figure = draw_efforts(study) if study.efforts else draw_study(study)
         for suffix in suffixes:
-            save(figure, directory / f'study{number}.{suffix}')
+            save_figure(figure, directory / f'study{number}.{suffix}')
 
 
 def draw_study(study: Study) -> Figure:
@@ -43,7 +43,7 @@ def draw_study(study: Study) -> Figure:
     bounds = _find_bounds(study)
     heights = [0.5 * WIDTH_IN * (bounds[3] - bounds[2]) / (bounds[1] - bounds[0]) + 0.7 for _ in study.solutions]
     heights += [3.4] if study.ratios else []
-    with new_figure(WIDTH_IN, sum(heights) + 0.4) as figure:
+    with open_figure(WIDTH_IN, sum(heights) + 0.4) as figure:
         rows = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
         top = 1.08 * max(
             (float(compute_speed(each).max()) for solutions in study.solutions.values() for each in solutions.values()),
@@ -63,10 +63,10 @@ def draw_study(study: Study) -> Figure:
 
 def draw_efforts(study: Study) -> Figure:
     """Return the figure of study 7: efforts over eta, and the share of roll-outs that stay clear."""
-    with new_figure(WIDTH_IN, 3.9) as figure:
+    with open_figure(WIDTH_IN, 3.9) as figure:
         efforts, clear = figure.subplots(1, 2)
         for curve in study.efforts:
-            colour, dash = class_style(STYLES[curve.name])
+            colour, dash = get_class_style(STYLES[curve.name])
             efforts.plot(curve.etas, curve.efforts, color=colour, linestyle=dash, linewidth=1.8, label=curve.name)
             rolled = study.rolled_out[curve.name]
             at_step, on_path = [each.step[0] for each in rolled.values()], [each.path[0] for each in rolled.values()]
@@ -89,7 +89,7 @@ def _find_bounds(study: Study) -> Bounds:
     solutions = [each for solutions in study.solutions.values() for each in solutions.values()]
     ends = [each.path[-1] + sign * np.sqrt(each.covariance[-1].diagonal()[:2]) for each in solutions for sign in (-1, 1)]
     points = [np.zeros((1, 2)), *(each.path for each in solutions), *(end[None] for end in ends)]
-    return bounds_of(study.scene.obstacles, study.scene.goal[None], (), *points)
+    return compute_bounds(study.scene.obstacles, study.scene.goal[None], (), *points)
 
 
 def _draw_paths(axes: Any, scene: PaperScene, solutions: Mapping[str, Solution], bounds: Bounds) -> None:
@@ -97,17 +97,17 @@ def _draw_paths(axes: Any, scene: PaperScene, solutions: Mapping[str, Solution],
     draw_scene(axes, scene.obstacles, scene.goal[None], bounds, named=False)
     axes.plot(0.0, 0.0, marker='o', markersize=6, color='black', zorder=5)
     for name, solution in solutions.items():
-        colour, dash = class_style(STYLES[name])
+        colour, dash = get_class_style(STYLES[name])
         axes.plot(*solution.path.T, color=colour, linestyle=dash, linewidth=2.0, zorder=4)
-        for row in np.unique(np.linspace(0, len(solution.path) - 1, 2 * ELLIPSES_PER_WAY).astype(int)):
-            ellipse = stddev_ellipse(solution.path[row], solution.covariance[row, :2, :2])
+        for row in np.unique(np.linspace(0, len(solution.path) - 1, 2 * ELLIPSES_PER_CANDIDATE).astype(int)):
+            ellipse = make_stddev_ellipse(solution.path[row], solution.covariance[row, :2, :2])
             ellipse.set(facecolor='none', edgecolor=colour, alpha=0.65, linewidth=0.7, zorder=3)
             axes.add_patch(ellipse)
 
 
 def _draw_speeds(axes: Any, solutions: Mapping[str, Solution], top: float) -> None:
     for name, solution in solutions.items():
-        colour, dash = class_style(STYLES[name])
+        colour, dash = get_class_style(STYLES[name])
         axes.plot(solution.times, compute_speed(solution), color=colour, linestyle=dash, linewidth=2.0, label=name)
     axes.set(xlabel='time [s]', ylabel='speed [m/s]', ylim=(0.0, top))
     axes.legend(frameon=False)

@@ -22,7 +22,7 @@ from .drawing import (
     draw_movement,
     draw_scene,
     draw_speeds,
-    new_figure,
+    open_figure,
 )
 from .snapshots import CandidateView, HandTrajectory, build_candidate_views
 
@@ -54,7 +54,7 @@ def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
     import matplotlib.pyplot as plt
 
     candidates = build_candidate_views(prediction.solved_candidates)
-    bounds = bounds_of(prediction.obstacles, prediction.goals, candidates)
+    bounds = compute_bounds(prediction.obstacles, prediction.goals, candidates)
     with plt.rc_context(STYLE):
         if axes is None:
             axes = plt.figure(figsize=(WIDTH_IN, _get_height(bounds, candidates)), layout='constrained').subplots()
@@ -68,13 +68,13 @@ def plot_outcomes(file: Path | str, obstacles: Obstacles, goals: Array, outcomes
 
     goals (g, 2) [m]. Raises InputError if the suffix is not that of a picture format or the file cannot be written.
     """
-    save(make_scene_figure(obstacles, goals, build_candidate_views(outcomes)), file)
+    save_figure(make_scene_figure(obstacles, goals, build_candidate_views(outcomes)), file)
 
 
 def make_scene_figure(obstacles: Obstacles, goals: Array, candidates: Sequence[CandidateView]) -> Figure:
     """Return a figure of one scene with the candidates in it and a legend."""
-    bounds = bounds_of(obstacles, goals, candidates)
-    with new_figure(WIDTH_IN, _get_height(bounds, candidates)) as figure:
+    bounds = compute_bounds(obstacles, goals, candidates)
+    with open_figure(WIDTH_IN, _get_height(bounds, candidates)) as figure:
         axes = figure.subplots()
         draw_scene(axes, obstacles, goals, bounds)
         draw_candidates(axes, candidates, number_labels(candidates))
@@ -85,7 +85,7 @@ def make_recording_figure(
     hand: HandTrajectory, obstacles: Obstacles, goals: Array, spans: Sequence[tuple[int, int]], bounds: Bounds
 ) -> Figure:
     """Return a figure of all movements of a recording, numbered; spans: start and end [ns] of each movement."""
-    with new_figure(WIDTH_IN, _get_height(bounds)) as figure:
+    with open_figure(WIDTH_IN, _get_height(bounds)) as figure:
         axes = figure.subplots()
         draw_scene(axes, obstacles, goals, bounds, named=False)
         axes.plot(*hand.positions.T, color='0.8', linewidth=0.8)
@@ -105,7 +105,7 @@ def make_snapshot_figure(
     origin_ns = int(hand.stamps_ns[0])
     now_s, begin_s, end_s = ((stamp - origin_ns) / NANOSECONDS for stamp in (snapshot.stamp_ns, *span))
     heights = [_get_height(bounds, snapshot.candidates), 2.1, 1.9]
-    with new_figure(WIDTH_IN, sum(heights)) as figure:
+    with open_figure(WIDTH_IN, sum(heights)) as figure:
         scene, likelihoods, speeds = figure.subplots(3, 1, height_ratios=heights)
         draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
         draw_candidates(scene, snapshot.candidates, slots)
@@ -124,13 +124,15 @@ def number_labels(candidates: Sequence[CandidateView]) -> dict[str, int]:
     return {each.label: number for number, each in enumerate(candidates[:CLASSES])}
 
 
-def bounds_of(obstacles: Obstacles, goals: Array, ways: Sequence[CandidateView], *points: Array, margin: float = 0.04) -> Bounds:
+def compute_bounds(
+    obstacles: Obstacles, goals: Array, candidates: Sequence[CandidateView], *points: Array, margin: float = 0.04
+) -> Bounds:
     """Return limits of x and y [m] around obstacles, goals, candidates with their ellipses, and further points (m, 2).
 
     margin: as a share of the greater side.
     """
     reach = (obstacles.radius + STDDEVS * obstacles.radius_stddev)[:, None]
-    spread = [(each.path, STDDEVS * np.sqrt(np.diagonal(each.covariance, axis1=1, axis2=2))) for each in ways]
+    spread = [(each.path, STDDEVS * np.sqrt(np.diagonal(each.covariance, axis1=1, axis2=2))) for each in candidates]
     edges = [centre + sign * width for centre, width in [(obstacles.centre, reach), *spread] for sign in (-1.0, 1.0)]
     enclosed = np.concatenate([*edges, np.reshape(goals, (-1, 2)), *points])
     low, high = (enclosed.min(axis=0), enclosed.max(axis=0)) if len(enclosed) else (np.zeros(2), np.ones(2))
@@ -138,7 +140,7 @@ def bounds_of(obstacles: Obstacles, goals: Array, ways: Sequence[CandidateView],
     return float(low[0] - added), float(high[0] + added), float(low[1] - added), float(high[1] + added)
 
 
-def save(figure: Figure, file: Path | str) -> None:
+def save_figure(figure: Figure, file: Path | str) -> None:
     """Write a figure in the format of the file's suffix; raises InputError if that is not possible."""
     known = figure.canvas.get_supported_filetypes()
     if Path(file).suffix.lower().removeprefix('.') not in known:

@@ -16,8 +16,8 @@ from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.types import NANOSECONDS, HandSample
 
 from .page import render
-from .plots import make_recording_figure, make_snapshot_figure, save
-from .report_data import PageData, bounds_of_recording, round_number
+from .plots import make_recording_figure, make_snapshot_figure, save_figure
+from .report_data import PageData, compute_recording_bounds, round_number
 from .snapshots import HandTrajectory, Snapshot, build_hand_trajectory, build_snapshot
 from .track_association import CandidateTracks, build_candidate_tracks
 
@@ -67,7 +67,7 @@ def write_report(
     spans = hand.find_movements(ONSET_SPEED) or [(int(hand.stamps_ns[0]), int(hand.stamps_ns[-1]))]
     tracks = build_candidate_tracks(snapshots)
     facts, warnings = {**_collect_facts(snapshots), **summary}, _collect_warnings(snapshots)
-    data = PageData(hand, tracks).build(spans, bounds_of_recording(hand, snapshots))
+    data = PageData(hand, tracks).build(spans, compute_recording_bounds(hand, snapshots))
     html = render('report.html', title=title, warnings=warnings, facts=facts, data=data)
     numbers = {
         'title': title,
@@ -92,13 +92,13 @@ def _write_pictures(directory: Path, hand: HandTrajectory, tracks: CandidateTrac
     solved = [each for each in tracks.snapshots if each.candidates]
     if not solved:
         return []
-    bounds = bounds_of_recording(hand, solved)
+    bounds = compute_recording_bounds(hand, solved)
     goals = np.unique(np.concatenate([each.goals for each in solved]), axis=0)
     figures = {'overview.png': make_recording_figure(hand, solved[0].obstacles, goals, spans, bounds)}
     for count, (row, span) in enumerate(_select_rows(tracks.snapshots, spans).items()):
         figures[f'moment_{count + 1:02d}.png'] = make_snapshot_figure(hand, tracks, row, span, bounds)
     for name, figure in figures.items():
-        save(figure, directory / name)
+        save_figure(figure, directory / name)
     return [directory / name for name in figures]
 
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from foc_ros.core.types import NANOSECONDS, Array, make_obstacles
 
-from .drawing import CLASS_COLOURS, ELLIPSES_PER_WAY, NAMED_OBSTACLES, STDDEVS, Bounds, ellipse_axes
-from .plots import bounds_of
+from .drawing import CLASS_COLOURS, ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, STDDEVS, Bounds, compute_ellipse_axes
+from .plots import compute_bounds
 from .snapshots import CandidateView, HandTrajectory, Snapshot
 from .track_association import CandidateTracks
 
@@ -46,7 +46,7 @@ class PageData:
         first prediction and its likelihoods from there on; frames: the predictions at which the slider stops.
         """
         snapshots = self._tracks.snapshots
-        frames = [self._encode_frame(row) for row in spread_rows(len(snapshots), MOST_FRAMES).tolist()]
+        frames = [self._encode_frame(row) for row in select_evenly(len(snapshots), MOST_FRAMES).tolist()]
         return {
             'unit': {'length': LENGTH, 'speed': SPEED, 'time': TIME},
             'colours': CLASS_COLOURS,
@@ -83,7 +83,7 @@ class PageData:
         }
 
     def _encode_hand(self) -> dict[str, Any]:
-        rows = spread_rows(len(self._hand.stamps_ns), MOST_HAND_SAMPLES)
+        rows = select_evenly(len(self._hand.stamps_ns), MOST_HAND_SAMPLES)
         return {
             't': _quantise_differences(self._hand.seconds_after(self._origin_ns)[rows], TIME),
             'x': _quantise_differences(self._hand.positions[rows, 0], LENGTH),
@@ -95,7 +95,7 @@ class PageData:
         return round((stamp_ns - self._origin_ns) / NANOSECONDS, 4)
 
 
-def bounds_of_recording(hand: HandTrajectory, snapshots: Sequence[Snapshot]) -> Bounds:
+def compute_recording_bounds(hand: HandTrajectory, snapshots: Sequence[Snapshot]) -> Bounds:
     """Return limits of x and y [m] around the hand, all obstacles and goals, and all but outlying paths."""
     points = [hand.positions]
     for each in snapshots:
@@ -103,7 +103,7 @@ def bounds_of_recording(hand: HandTrajectory, snapshots: Sequence[Snapshot]) -> 
         points += [each.goals, each.obstacles.centre - reach, each.obstacles.centre + reach]
     paths = [candidate.path for each in snapshots for candidate in each.candidates]
     points += [np.percentile(np.concatenate(paths), DRAWN_PERCENTILES, axis=0)] if paths else []
-    return bounds_of(make_obstacles(), np.zeros((0, 2)), (), *points, margin=0.06)
+    return compute_bounds(make_obstacles(), np.zeros((0, 2)), (), *points, margin=0.06)
 
 
 def round_number(value: float) -> float | None:
@@ -111,16 +111,16 @@ def round_number(value: float) -> float | None:
     return float(f'{value:.6g}') if np.isfinite(value) else None
 
 
-def spread_rows(count: int, most: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+def select_evenly(count: int, most: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
     """Return at most so many rows of `count`, evenly spread, the first and the last among them."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.intp))
 
 
 def _encode_candidate(candidate: CandidateView) -> dict[str, Any]:
     """Return one candidate; ellipses: x, y, greater and smaller standard deviation, angle of the greater [degrees]."""
-    points = spread_rows(len(candidate.path), PATH_POINTS)
-    marks = spread_rows(len(candidate.path), ELLIPSES_PER_WAY + 1)[1:]
-    greater, smaller, angle = ellipse_axes(candidate.covariance[marks])
+    points = select_evenly(len(candidate.path), PATH_POINTS)
+    marks = select_evenly(len(candidate.path), ELLIPSES_PER_CANDIDATE + 1)[1:]
+    greater, smaller, angle = compute_ellipse_axes(candidate.covariance[marks])
     lengths = np.column_stack([candidate.path[marks], STDDEVS * greater, STDDEVS * smaller])
     return {
         'ratio': round_number(candidate.cost_ratio),

@@ -10,10 +10,10 @@ import numpy as np
 
 from foc_ros.core.errors import MessageError
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Obstacles, PredictedCandidate, Prediction, Record
-from foc_ros.ros.messages.decode_poses import stamp_of
+from foc_ros.ros.messages.decode_poses import decode_stamp
 from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS
 from foc_ros.ros.messages.plane import project
-from foc_ros.ros.messages.ranking import cost_ratios, ranked
+from foc_ros.ros.messages.ranking import compute_cost_ratios, order_candidates
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ def build_hand_trajectory(samples: Sequence[HandSample]) -> HandTrajectory:
 def build_candidate_views(candidates: Sequence[PredictedCandidate]) -> tuple[CandidateView, ...]:
     """Return views of the solved candidates, in their order."""
     solved = tuple(each for each in candidates if each.is_solved)
-    return tuple(_build_candidate_view(each, ratio) for each, ratio in zip(solved, cost_ratios(solved), strict=True))
+    return tuple(_build_candidate_view(each, ratio) for each, ratio in zip(solved, compute_cost_ratios(solved), strict=True))
 
 
 def _build_candidate_view(candidate: PredictedCandidate, cost_ratio: float) -> CandidateView:
@@ -128,7 +128,7 @@ def _build_candidate_view(candidate: PredictedCandidate, cost_ratio: float) -> C
 def build_snapshot(prediction: Prediction) -> Snapshot:
     """Return the snapshot of a prediction; raises FocError if the prediction holds a number that is not finite."""
     unsolved = tuple((each.candidate.label, each.solution.status.value) for each in prediction.candidates if not each.is_solved)
-    candidates = build_candidate_views(ranked(prediction))
+    candidates = build_candidate_views(order_candidates(prediction))
     scene = prediction.obstacles, prediction.goals
     return Snapshot(prediction.stamp_ns, *scene, candidates, prediction.most_likely, unsolved, prediction.solve_s)
 
@@ -141,7 +141,7 @@ def is_same_prediction(cloud: Any, likelihoods: Any) -> bool:
 
 
 def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles, goals: Array) -> Snapshot:
-    """Return the snapshot in one pair of messages of `~/prediction` and `~/likelihoods`: the inverse of `ros.messages.encode_prediction`.
+    """Return the snapshot in a pair of messages of `~/prediction` and `~/likelihoods`: inverse of `messages.encode_prediction`.
 
     obstacles and goals (g, 2) [m] are those at the stamp of the messages. Raises MessageError if the two messages hold different
     predictions.
@@ -154,7 +154,7 @@ def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles
         _read_candidate(label, values, rows[rows['candidate'] == number], plane)
         for number, (label, values) in enumerate(zip(labels, columns, strict=True))
     )
-    return Snapshot(stamp_of(cloud.header), obstacles, goals, candidates, candidates[0].label if candidates else None)
+    return Snapshot(decode_stamp(cloud.header), obstacles, goals, candidates, candidates[0].label if candidates else None)
 
 
 def _read_candidate(label: str, values: Array, rows: Any, plane: str) -> CandidateView:

@@ -18,7 +18,7 @@ from foc_ros.core.types import NANOSECONDS, PredictedCandidate, Prediction
 from foc_ros.io.topics import CLOUD, HAND, MARKERS
 
 from .intake import Intake
-from .messages.types import MessageTypes, header
+from .messages.types import MessageTypes, make_header
 
 SOURCE_TOPICS = {'cloud': CLOUD, 'markers': MARKERS}
 """Topic of every source of obstacles in the scene."""
@@ -49,14 +49,14 @@ class Freshness:
         """Store the time at which a message was accepted."""
         self._received_s[role] = now_s
 
-    def note_pose(self, stamp_ns: int, clock_ns: int, timeout_s: float, *, restarted: bool) -> None:
+    def note_pose(self, stamp_ns: int, clock_ns: int, timeout_s: float, *, is_restart: bool) -> None:
         """Store the age of a hand pose by ROS time.
 
         Ages count once a movement has begun with a pose that is not older or newer than the timeout: a recording that is played
         with its own stamps, without `use_sim_time`, has none of this age.
         """
         self._age_s = (clock_ns - stamp_ns) / NANOSECONDS
-        if clock_ns and (restarted or not self._is_moving):
+        if clock_ns and (is_restart or not self._is_moving):
             self._has_ros_time = self._has_ros_time or abs(self._age_s) <= timeout_s
             self._is_moving = True
 
@@ -114,10 +114,10 @@ class Monitor:
         self._counts_before: Counter[str] = Counter()
         self._reported_s = now_s
 
-    def note_message(self, role: str, now_s: float, *, taken: bool) -> tuple[int, int]:
+    def note_message(self, role: str, now_s: float, *, is_taken: bool) -> tuple[int, int]:
         """Count an input message; return how many of this input were refused, and how many were received."""
         entry = self._inputs.setdefault(role, _Input())
-        entry.received, entry.refused, entry.last_s = entry.received + 1, entry.refused + (not taken), now_s
+        entry.received, entry.refused, entry.last_s = entry.received + 1, entry.refused + (not is_taken), now_s
         return entry.refused, entry.received
 
     def note_prediction(self, prediction: Prediction, start_s: float, now_s: float) -> None:
@@ -144,9 +144,9 @@ class Monitor:
         recent = totals - self._counts_before
         values = {
             'state': state,
-            'engaged': str(pipeline.engaged),
+            'engaged': str(pipeline.is_engaged),
             'working frame': pipeline.frame_id if pipeline.frame_id is not None else 'not known yet',
-            **{f'obstacles of {source}': str(len(part.obstacles)) for source, part in pipeline.scene.parts.items()},
+            **{f'obstacles of {source}': str(len(part.obstacles)) for source, part in pipeline.scene.sources.items()},
             'goals': 'none yet' if pipeline.scene.goals is None else str(len(pipeline.scene.goals)),
             **self._describe_inputs(now_s, seconds),
             'prediction rate [Hz]': f'{recent["predictions"] / seconds:.1f}',
@@ -169,7 +169,7 @@ class Monitor:
             return ERROR, f'{recent["internal_errors"]} internal errors, the last: {self._error}'
         if state != 'active':
             return OK, f'{state}: nothing is predicted'
-        if not pipeline.engaged:
+        if not pipeline.is_engaged:
             return OK, 'disengaged'
         faults = {name: count for name, count in recent.items() if name in FAULTS or not name.startswith(HARMLESS)}
         parts = [] if not_ready_reason is None else [f'no prediction: {not_ready_reason}']
@@ -215,4 +215,4 @@ def encode_diagnostics(health: Health, node_name: str, stamp_ns: int, types: Mes
         hardware_id=node_name,
         values=[types.make('diagnostic_msgs/msg/KeyValue', key=key, value=value) for key, value in health.values.items()],
     )
-    return types.make('diagnostic_msgs/msg/DiagnosticArray', header=header(types, stamp_ns, ''), status=[status])
+    return types.make('diagnostic_msgs/msg/DiagnosticArray', header=make_header(types, stamp_ns, ''), status=[status])

@@ -60,9 +60,9 @@ class Intake:
 
     def _take_hand(self, message: Any) -> SampleStatus:
         self.sample = decode_hand_sample(message, self.pipeline.config.plane)
-        status = self.pipeline.hand(self.sample)
+        status = self.pipeline.add_hand_sample(self.sample)
         start_ns, end_ns = self._markers_unchanged
-        if status.taken and not start_ns <= self.sample.stamp_ns < end_ns:
+        if status.is_taken and not start_ns <= self.sample.stamp_ns < end_ns:
             self._set_markers(self._markers)
         return status
 
@@ -90,7 +90,7 @@ class Intake:
         frame_id = markers.frame_id if markers.markers else self.pipeline.frame_id or markers.frame_id
         now_ns = self._now_ns()
         status = self.pipeline.set_obstacles('markers', markers.obstacles(now_ns), stamp_ns, frame_id)
-        if status.taken:
+        if status.is_taken:
             self._markers, self._markers_ns, self._markers_unchanged = markers, stamp_ns, markers.find_unchanged_interval(now_ns)
         return status
 
@@ -98,6 +98,6 @@ class Intake:
         return self.pipeline.hand_state.stamp_ns if self.pipeline.hand_state is not None else 0
 
     def _count_dropped(self, role: str, dropped: Mapping[str, int], status: SampleStatus) -> SampleStatus:
-        if status.taken:
+        if status.is_taken:
             self._counts.update({f'{role}_dropped_{reason}': count for reason, count in dropped.items()})
         return status

@@ -33,7 +33,7 @@ from .endpoints import INPUTS, create_publishers, create_subscriptions, take_que
 from .health import Freshness, Monitor, encode_diagnostics
 from .intake import Intake
 from .lifecycle import answer_refused_transitions
-from .messages.encode_prediction import output_messages
+from .messages.encode_prediction import encode_outputs
 from .messages.types import RclpyTypes
 from .node_parameters import LiveParameters, declare_autostart, declare_parameters
 from .transforms import Transforms
@@ -125,7 +125,7 @@ class FocNode(LifecycleNode):
 
     def _enter(self, state: str) -> TransitionCallbackReturn:
         self._state = state
-        self.pipeline.engage(self._is_engaged and state == 'active')
+        self.pipeline.set_engaged(self._is_engaged and state == 'active')
         return SUCCESS
 
     def _reconfigure(self, config: Config) -> None:
@@ -142,14 +142,14 @@ class FocNode(LifecycleNode):
             is_taken = self._take(role, each) or is_taken
             if is_taken and role in COMPLETE:
                 break
-        if is_taken and role == HAND and self.pipeline.due:
+        if is_taken and role == HAND and self.pipeline.is_due:
             self._predict()
 
     def _take(self, role: str, message: Any) -> bool:
         transformed = self._transforms.transform(role, message, self.pipeline.frame_id)
         status, now_s = self.intake.take(role, transformed), monotonic()
-        is_taken = status is not None and status.taken
-        refused, received = self._monitor.note_message(role, now_s, taken=is_taken)
+        is_taken = status is not None and status.is_taken
+        refused, received = self._monitor.note_message(role, now_s, is_taken=is_taken)
         if status is None or not is_taken:
             reasons = '; '.join(filter(None, [self.intake.last_refusal, self._transforms.last_error]))
             text = f'{reasons} ({refused} of {received} refused so far)'
@@ -158,12 +158,12 @@ class FocNode(LifecycleNode):
         self._freshness.note_received(role, now_s)
         if role == HAND and self.intake.sample is not None:
             clock_ns, timeout_s = self.get_clock().now().nanoseconds, self.pipeline.config.estimator.hand_timeout_s
-            self._freshness.note_pose(self.intake.sample.stamp_ns, clock_ns, timeout_s, restarted=status.restarted)
+            self._freshness.note_pose(self.intake.sample.stamp_ns, clock_ns, timeout_s, is_restart=status.is_restart)
         return True
 
     def _find_clock_reason(self) -> tuple[str, str] | None:
         """Return why the clocks allow no prediction, as (kind, text); the pipeline decides all that depends on stamps."""
-        return self._freshness.find_not_ready_reason(monotonic(), self.pipeline.config, self.pipeline.scene.parts)
+        return self._freshness.find_not_ready_reason(monotonic(), self.pipeline.config, self.pipeline.scene.sources)
 
     def _predict(self) -> None:
         start_s = monotonic()
@@ -177,7 +177,7 @@ class FocNode(LifecycleNode):
                 return
             obstacles = self.pipeline.scene.obstacles(prediction.stamp_ns)
             wanted = [name for name, publisher in self._outputs.items() if publisher.get_subscription_count()]
-            messages = output_messages(prediction, obstacles, self.pipeline.config.plane, self._types, wanted)
+            messages = encode_outputs(prediction, obstacles, self.pipeline.config.plane, self._types, wanted)
         except Exception as error:
             self.report(error)
             self.pipeline.reset()
@@ -188,7 +188,7 @@ class FocNode(LifecycleNode):
 
     def _publish_health(self) -> None:
         clock_reason = self._find_clock_reason()
-        not_ready_reason = self.pipeline.blocked() or (clock_reason and clock_reason[1])
+        not_ready_reason = self.pipeline.not_ready_reason() or (clock_reason and clock_reason[1])
         health = self._monitor.report(monotonic(), self.intake, self._state, not_ready_reason)
         name, stamp_ns = self.get_fully_qualified_name(), self.get_clock().now().nanoseconds
         self._publish(self._diagnostics, encode_diagnostics(health, name, stamp_ns, self._types))

@@ -12,7 +12,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.parameter import Parameter as RosParameter
 
-from foc_ros.core.config import Config, Parameter, flatten, updated
+from foc_ros.core.config import Config, Parameter, flatten, replace_values
 from foc_ros.core.errors import ParameterError
 
 from .parameters import AUTOSTART, KNOWN, NODE_ONLY
@@ -30,7 +30,7 @@ def declare_parameters(node: Any, config: Config) -> Config:
             node.undeclare_parameter(name)
         elif name.split('.')[0] not in NODE_ONLY:
             node.get_logger().warning(f'parameter {name} is unknown and has no effect')
-    config = updated(config, {name: value for name, value in given.items() if name in KNOWN})
+    config = replace_values(config, {name: value for name, value in given.items() if name in KNOWN})
     values = flatten(config)
     rows = [(name, values[name], _build_descriptor(parameter)) for name, parameter in KNOWN.items()]
     node.declare_parameters('', rows, ignore_override=True)
@@ -39,7 +39,7 @@ def declare_parameters(node: Any, config: Config) -> Config:
 
 def read_config(node: Any) -> Config:
     """Return the configuration of a node's declared parameters."""
-    return updated(Config(), {name: node.get_parameter(name).value for name in KNOWN})
+    return replace_values(Config(), {name: node.get_parameter(name).value for name in KNOWN})
 
 
 def declare_autostart(node: Any) -> bool:
@@ -95,7 +95,7 @@ class LiveParameters:
 
     def _check(self, changed: list[RosParameter]) -> SetParametersResult:
         try:
-            updated(self.config, {each.name: each.value for each in changed if each.name in KNOWN})
+            replace_values(self.config, {each.name: each.value for each in changed if each.name in KNOWN})
         except ParameterError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)

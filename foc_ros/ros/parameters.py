@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from foc_ros.core.config import Config, Parameter, flatten, parameters, updated
+from foc_ros.core.config import Config, Parameter, flatten, list_parameters, replace_values
 from foc_ros.core.errors import ParameterError
 from foc_ros.io.documents import read_document
 
@@ -21,11 +21,11 @@ NODE_KEYS = ('/**', 'foc', '/foc')
 AUTOSTART = 'autostart'
 NODE_ONLY = ('use_sim_time', 'start_type_description_service', 'qos_overrides', AUTOSTART)
 """Parameters of the node alone, which may stand in the same file; the predictor does not use them."""
-KNOWN = {parameter.name: parameter for parameter in parameters()}
+KNOWN = {parameter.name: parameter for parameter in list_parameters()}
 _WIDTH = 100
 
 
-def given_config(file: Path | None) -> Config:
+def load_optional_config(file: Path | None) -> Config:
     """Return the configuration of an optional parameter file; raises the errors of `load_parameter_file`."""
     return Config() if file is None else load_parameter_file(file)
 
@@ -46,7 +46,7 @@ def load_parameter_file(path: Path | str) -> Config:
             if not isinstance(section, Mapping) or not isinstance(section.get('ros__parameters'), Mapping):
                 raise ParameterError(f'{path}: {key}', 'ros__parameters with parameters below it', repr(section)[:_WIDTH])
             values.update(_flatten_group(section['ros__parameters']))
-    return updated(Config(), values)
+    return replace_values(Config(), values)
 
 
 def _flatten_group(group: Mapping[Any, object], prefix: str = '') -> Iterator[tuple[str, object]]:
@@ -71,7 +71,7 @@ def dump_parameter_file(config: Config) -> str:
     """Return a parameter file with every value, and its description, unit and range as a comment."""
     lines = ['# Parameters of foc_ros, for the node (ros2 run, launch) and for replay --params.', '/**:', '  ros__parameters:']
     values, group = flatten(config), ''
-    for parameter in sorted(parameters(), key=lambda each: '.' in each.name):
+    for parameter in sorted(list_parameters(), key=lambda each: '.' in each.name):
         head, _, leaf = parameter.name.rpartition('.')
         if head != group:
             lines.append(f'    {head}:')

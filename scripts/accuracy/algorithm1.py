@@ -11,7 +11,7 @@ from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 
 from foc_ros.core.types import Array, Solution, Status
-from foc_ros.reporting.drawing import LIKELIHOOD_COLOURS, class_style, new_figure
+from foc_ros.reporting.drawing import LIKELIHOOD_COLOURS, get_class_style, open_figure
 
 from .page import format_table
 from .scenes import Scene, build_one_obstacle, build_random
@@ -98,7 +98,7 @@ def draw(measured: list[Solutions]) -> Figure:
     taus, lams = np.linspace(0.0, 4e-3, 33), np.logspace(0, 20, 41)
     contours = np.array([0.0, 0.3, 0.5, 0.7, 0.8, 0.9, case.eta, 0.97, 1.0])
     achieved = _compute_achieved_eta(case, taus, lams)
-    with new_figure(9.6, 4.6) as figure:
+    with open_figure(9.6, 4.6) as figure:
         panels = figure.subplots(1, 2, sharey=True)
         for axes, (rate, delta) in zip(panels, DELTAS.items(), strict=True):
             drawn = axes.contourf(1e3 * taus, lams, achieved, contours, cmap=LIKELIHOOD_COLOURS, norm=BoundaryNorm(contours, 256))
@@ -120,7 +120,7 @@ def _draw_steps(axes: Any, delta: float, ends: Sequence[Solution], continuation:
     """Draw all pairs of tau and lambda on which algorithm 1 steps until its end, and the end of the continuation."""
     for number, (growth, end) in enumerate(zip(GROWTHS, ends, strict=True)):
         steps = np.arange(round(end.tau / delta) + 1)
-        colour, _ = class_style((1, 4, 3)[number])
+        colour, _ = get_class_style((1, 4, 3)[number])
         label = f'Δ = {growth:g}: {end.iterations} QPs, η {end.eta:.3f}, effort {end.effort:.1e}'
         axes.plot(1e3 * delta * steps, growth ** steps.astype(float), color=colour, marker='o', markersize=3, label=label)
         axes.plot(1e3 * end.tau, end.lam, marker='s', markersize=8, color=colour, markeredgecolor='black')

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from foc_ros.core.types import Array, Status
-from foc_ros.reporting.drawing import class_style, new_figure
+from foc_ros.reporting.drawing import get_class_style, open_figure
 
 from .page import format_table
 from .scenes import Scene, build_one_obstacle, build_random
@@ -100,12 +100,12 @@ def draw() -> Figure:
         'four obstacles, c = 0.10': build_random(12, 0.1),
     }
     etas = np.linspace(0.5, 0.95, 181)
-    with new_figure(9.6, 3.6) as figure:
+    with open_figure(9.6, 3.6) as figure:
         for axes, (name, scene) in zip(figure.subplots(1, 3), scenes.items(), strict=True):
             efforts = {strategy: _compute_efforts(scene, strategy, etas) for strategy in STRATEGIES}
             for number, strategy in enumerate(STRATEGIES):
                 relative = efforts[strategy] / efforts['optimal'][0]
-                axes.plot(etas, relative, color=class_style(number)[0], label=strategy, linewidth=1.6)
+                axes.plot(etas, relative, color=get_class_style(number)[0], label=strategy, linewidth=1.6)
             axes.set(xlabel='wanted η', yscale='log', title=name)
             ticks = (1.0, 1.1, 1.2, 1.3) if axes.get_ylim()[1] < 1.5 else (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0)
             axes.set_yticks([tick for tick in ticks if tick < axes.get_ylim()[1]], minor=False)

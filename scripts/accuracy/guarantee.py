@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from foc_ros.core.obstacles.chance_constraint import k_of_eta
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.types import Array, Status
-from foc_ros.reporting.drawing import class_style, new_figure
+from foc_ros.reporting.drawing import get_class_style, open_figure
 
 from .page import format_table
 from .scenes import build_varied, solve
@@ -98,7 +98,7 @@ def format_statuses(measured: dict[str, Outcomes]) -> str:
 
 def draw(measured: dict[str, Outcomes]) -> Figure:
     """Draw the share clear over the guaranteed eta, and the excess of each strategy."""
-    with new_figure(9.6, 4.2) as figure:
+    with open_figure(9.6, 4.2) as figure:
         left, right = figure.subplots(1, 2)
         _draw_shares(left, measured)
         _draw_excess(right, measured)
@@ -109,7 +109,7 @@ def _draw_shares(axes: Any, measured: dict[str, Outcomes]) -> None:
     etas = np.linspace(0.0, 0.999, 200)
     for number, name in enumerate(('lv', 'hc', 'optimal')):
         each = measured[name]
-        axes.plot(each.guaranteed, each.clear, '.', markersize=4, alpha=0.7, color=class_style(number)[0], label=name)
+        axes.plot(each.guaranteed, each.clear, '.', markersize=4, alpha=0.7, color=get_class_style(number)[0], label=name)
     normal = [NormalDist().cdf(k_of_eta(eta)) for eta in etas]
     axes.plot(etas, normal, color='0.3', linestyle='--', label='Φ(k): a normal constraint')
     axes.plot(etas, etas, color='black', label='η: Cantelli’s bound')
@@ -121,7 +121,7 @@ def _draw_excess(axes: Any, measured: dict[str, Outcomes]) -> None:
     values = [each.excess for each in measured.values()]
     drawn = axes.boxplot(values, orientation='horizontal', whis=(0, 100), widths=0.6, patch_artist=True)
     for number, box in enumerate(drawn['boxes']):
-        box.set(facecolor=class_style(number)[0], alpha=0.6)
+        box.set(facecolor=get_class_style(number)[0], alpha=0.6)
     for median in drawn['medians']:
         median.set(color='black')
     axes.axvline(0.0, color='black')

@@ -50,7 +50,7 @@ class Baseline:
 BASELINES = Registry('baseline', {})
 
 
-def register_baseline(name: str, forecast: ForecastFunction, settings: tuple[Any, ...] | SettingsFunction = (None,)) -> None:
+def register_baseline(name: str, forecast: ForecastFunction, settings: Sequence[Any] | SettingsFunction = (None,)) -> None:
     """Add a predictor to those that `evaluate` compares.
 
     Parameters
@@ -71,15 +71,22 @@ def register_baseline(name: str, forecast: ForecastFunction, settings: tuple[Any
     InputError
         If the name is taken or empty.
     """
-    BASELINES.register(name, (forecast, settings))
+    BASELINES.register(name, partial(_make_baseline, name, forecast, settings))
 
 
 def make_baselines(recordings: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[Baseline, ...]:
     """Return all registered predictors; published: the parameters that the recordings were replayed with."""
-    return tuple(
-        Baseline(name, forecast, settings if isinstance(settings, tuple) else settings(recordings, published))
-        for name, (forecast, settings) in ((name, BASELINES.get(name)) for name in BASELINES)
-    )
+    return tuple(BASELINES.get(name)(recordings, published) for name in BASELINES)
+
+
+def _make_baseline(
+    name: str,
+    forecast: ForecastFunction,
+    settings: Sequence[Any] | SettingsFunction,
+    recordings: Sequence[ObservedRecording],
+    published: LikelihoodConfig,
+) -> Baseline:
+    return Baseline(name, forecast, tuple(settings(recordings, published) if callable(settings) else settings))
 
 
 def make_plain_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[LikelihoodConfig, ...]:

@@ -14,7 +14,7 @@ from foc_ros.analysis.parallel import collect_all
 from foc_ros.analysis.recordings import LABELS
 from foc_ros.core.config import Config, flatten
 from foc_ros.core.types import LEFT, Array
-from foc_ros.io.csv_tables import rows
+from foc_ros.io.csv_tables import read_rows
 
 from .baselines import Baseline, make_baselines
 from .cross_validation import choose_held_out, compute_log_likelihoods
@@ -94,7 +94,7 @@ def find_label_mismatches(data: Path, recordings: Sequence[ObservedRecording]) -
     """
     if not (data / LABELS).exists():
         return {}
-    labels = {row.cells['recording']: row.cells for row in rows(data / LABELS, ('recording',))}
+    labels = {row.cells['recording']: row.cells for row in read_rows(data / LABELS, ('recording',))}
     found = {}
     for recording in recordings:
         cells = labels.get(recording.name)

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay, Step
 from foc_ros.core.config import Config, DurationConfig
-from foc_ros.core.dynamics.predictive_covariance import duration_sensitivity
+from foc_ros.core.dynamics.predictive_covariance import compute_duration_sensitivity
 from foc_ros.core.errors import RecordingError
-from foc_ros.core.estimation.duration import is_passing, time_price
+from foc_ros.core.estimation.duration import get_time_price, is_passing
 from foc_ros.core.homotopy.branch_times import BranchTimes, compute_branch_times
 from foc_ros.core.obstacles.chance_constraint import centre_trajectories
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Obstacles, PredictedCandidate, Prediction, Record
@@ -94,11 +94,10 @@ class Observation(Record):
 
 @dataclass(frozen=True, eq=False)
 class ObservedRecording:
-    """One recording: its name, its observations in order, and counts of rejections and failures by kind."""
+    """One recording: its name and its observations in order."""
 
     name: str
     observations: tuple[Observation, ...]
-    counts: dict[str, int]
 
 
 def observe(recording: Recording, config: Config) -> ObservedRecording:
@@ -115,7 +114,7 @@ def observe(recording: Recording, config: Config) -> ObservedRecording:
             assert replayed.pipeline.hand_state is not None
             made.append((step, replayed.pipeline.hand_state))
     if not made:
-        reason = replayed.pipeline.blocked() or replayed.intake.last_refusal or 'no candidate could be solved'
+        reason = replayed.pipeline.not_ready_reason() or replayed.intake.last_refusal or 'no candidate could be solved'
         raise RecordingError(f'{recording.name}: nothing could be predicted: {reason}')
     goals = made[-1][0].scene.goals
     assert goals is not None
@@ -123,7 +122,7 @@ def observe(recording: Recording, config: Config) -> ObservedRecording:
     found = [_make_observation(step, hand, path, config.duration) for step, hand in made if hand.stamp_ns <= path.end_ns]
     if not found:
         raise RecordingError(f'{recording.name}: nothing was predicted before its goal was reached')
-    return ObservedRecording(recording.name, tuple(found), replayed.intake.counts)
+    return ObservedRecording(recording.name, tuple(found))
 
 
 def _make_observation(step: Step, hand: HandState, path: RecordedPath, duration: DurationConfig) -> Observation:
@@ -150,7 +149,7 @@ def _make_observation(step: Step, hand: HandState, path: RecordedPath, duration:
 def _tabulate_candidates(
     prediction: Prediction, obstacles: Obstacles, effort_spent: float, duration: DurationConfig
 ) -> CandidateTable:
-    predicted, price, passing = prediction.candidates, time_price(duration), is_passing(duration)
+    predicted, price, passing = prediction.candidates, get_time_price(duration), is_passing(duration)
     solutions = [each.solution for each in predicted]
     steps = [np.minimum(np.rint(np.array(TIMES_S) / each.dt).astype(int), len(each.mean) - 1) for each in solutions]
     named = [[identity in dict(each.candidate.sides) for identity in obstacles.ids] for each in predicted]
@@ -169,7 +168,7 @@ def _tabulate_candidates(
         mean=np.array([each.mean[at, :2] for each, at in zip(solutions, steps, strict=True)]),
         covariance=np.array([each.covariance[at, :2, :2] for each, at in zip(solutions, steps, strict=True)]),
         duration_sensitivity=np.array(
-            [duration_sensitivity(each, passing)[at, :2] for each, at in zip(solutions, steps, strict=True)]
+            [compute_duration_sensitivity(each, passing)[at, :2] for each, at in zip(solutions, steps, strict=True)]
         ),
         branch_times=compute_branch_times(predicted, obstacles),
     )

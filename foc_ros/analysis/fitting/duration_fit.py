@@ -18,7 +18,7 @@ from scipy.optimize import minimize
 
 from foc_ros.analysis.evaluation.ground_truth import RecordedPath
 from foc_ros.analysis.goal_reached import has_covered_distance
-from foc_ros.core.config import Config, DurationConfig, updated
+from foc_ros.core.config import Config, DurationConfig, replace_values
 from foc_ros.core.estimation.duration import estimate_times_to_go
 from foc_ros.core.types import NANOSECONDS, Array, HandState
 
@@ -93,15 +93,15 @@ def fit_duration(hands: Sequence[RecordedHand], config: Config) -> tuple[Estimat
     best, warnings = _find_best_factor(errors), []
     value = given * best**powers
     if len(names) == 2:
-        spread_bits = times.compute_difficulties(config.duration.target_width).std()
-        if spread_bits > NARROW_BITS:
+        deviation_bits = times.compute_difficulties(config.duration.target_width).std()
+        if deviation_bits > NARROW_BITS:
             found = minimize(lambda values: float(compute_errors(np.abs(values)).mean()), value, method='Nelder-Mead')
             value = np.abs(found.x)
         else:
             warnings.append(
                 'duration.fitts_a_s, duration.fitts_b_s: the movements are too alike to tell intercept and slope apart '
-                f'(indices of difficulty with a standard deviation of {spread_bits:.2g} bit, {NARROW_BITS:g} are needed): their '
-                'ratio is kept'
+                f'(indices of difficulty with a standard deviation of {deviation_bits:.2g} bit, {NARROW_BITS:g} are needed): '
+                'their ratio is kept'
             )
     low, high = np.percentile(_resample_best_factor(errors) / best, CENTRAL)
     estimates = {}
@@ -113,7 +113,7 @@ def fit_duration(hands: Sequence[RecordedHand], config: Config) -> tuple[Estimat
 
 def fit_other_models(hands: Sequence[RecordedHand], config: Config) -> list[Config]:
     """Return the configuration with each other model of duration that depends on distance, its constants fitted."""
-    others = [updated(config, {'duration.model': model}) for model in DISTANCE_MODELS if model != config.duration.model]
+    others = [replace_values(config, {'duration.model': model}) for model in DISTANCE_MODELS if model != config.duration.model]
     return [apply_estimates(each, fit_duration(hands, each)[0]) for each in others]
 
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.config import Config, parameters, updated
+from foc_ros.core.config import Config, list_parameters, replace_values
 from foc_ros.core.types import Array
 
 CENTRAL = (2.5, 97.5)
 """Percentiles of an interval of 95 %."""
-BOUNDS = {parameter.name: parameter.bound for parameter in parameters()}
+BOUNDS = {parameter.name: parameter.bound for parameter in list_parameters()}
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def clip_to_bounds(name: str, value: float, least: float = 0.0) -> float:
 
 def apply_estimates(config: Config, estimates: Mapping[str, Estimate]) -> Config:
     """Return the configuration with the estimates in place."""
-    return updated(config, {name: estimate.value for name, estimate in estimates.items()})
+    return replace_values(config, {name: estimate.value for name, estimate in estimates.items()})
 
 
 @dataclass

@@ -25,7 +25,7 @@ from scipy.optimize import minimize
 
 from foc_ros.analysis.evaluation.ground_truth import HORIZONS_S
 from foc_ros.core.config import Config
-from foc_ros.core.estimation.kalman_filter import gramian, transition
+from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition
 from foc_ros.core.types import Array
 
 from .estimates import CENTRAL, Estimate, Estimates, clip_to_bounds
@@ -58,9 +58,9 @@ class Innovations:
             self._positions[: len(each.times), row] = each.positions
         self._continues = dt <= gap_s
         dt = np.where(self._continues, dt, gap_s)
-        self._transition = np.array([[transition(each) for each in row] for row in dt])
-        self._gramian = np.array([[gramian(each) for each in row] for row in dt])
-        self._start = gramian(gap_s)
+        self._transition = np.array([[compute_transition(each) for each in row] for row in dt])
+        self._gramian = np.array([[compute_gramian(each) for each in row] for row in dt])
+        self._start = compute_gramian(gap_s)
 
     def log_likelihood(self, position_stddev: float, jerk_density: float) -> Array:
         """Return the log-likelihood of the positions of each recording, (n,) [nat]; deviations in the estimator's units."""

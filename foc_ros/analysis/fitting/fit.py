@@ -10,7 +10,7 @@ import numpy as np
 
 from foc_ros.analysis.parallel import collect
 from foc_ros.analysis.recordings import Recording
-from foc_ros.core.config import Config, updated
+from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import RecordingError
 
 from . import covariance_fit, likelihood_fit
@@ -84,7 +84,7 @@ def _make_reaches(hands: Sequence[RecordedHand], fit: Fit) -> list[Reach]:
 
 def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: Mapping[str, float], executor: Executor) -> None:
     """Fit the likelihood and the widening of the covariance to one replay, and score them held out."""
-    observed, failed = observe_by_motor_noise(recordings, updated(fit.config, thinned), executor, 'replay')
+    observed, failed = observe_by_motor_noise(recordings, replace_values(fit.config, thinned), executor, 'replay')
     fit.failed.update(failed)
     if not observed:
         raise RecordingError(f'nothing could be predicted: {"; ".join(failed.values())}')

@@ -19,7 +19,7 @@ from scipy.optimize import least_squares
 from foc_ros.analysis.goal_reached import AT_GOAL_M, find_goal_at_end
 from foc_ros.core.config import REFERENCE_STEP_S, Config
 from foc_ros.core.dynamics.noise import scale_noise
-from foc_ros.core.dynamics.plants import triple_integrator_horizon
+from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
 from foc_ros.core.errors import RecordingError
 from foc_ros.core.estimation.duration import is_passing
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
@@ -98,7 +98,7 @@ def make_reach(hand: RecordedHand, config: Config) -> Reach:
     times, steps = hand.times, config.foc.steps
     dt = float(times[-1]) / steps
     problem = rest_to_goal(
-        triple_integrator_horizon(dt, steps),
+        build_triple_integrator_horizon(dt, steps),
         np.concatenate([_estimate_start(times, hand.positions), np.zeros(4)]),
         hand.goals[goal],
         hand.obstacles,

@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from foc_ros.analysis.evaluation.ground_truth import find_direction, find_rows, locate_rows
-from foc_ros.core.config import ARRIVALS, Config, flatten, updated
+from foc_ros.core.config import ARRIVALS, Config, flatten, replace_values
 
 from .duration_fit import CONSTANTS, fit_other_models
 from .estimates import Estimate, Estimates, clip_to_bounds
@@ -33,7 +33,7 @@ def make_noise_settings(config: Config) -> list[Config]:
 
 def make_eta_settings(config: Config) -> list[Config]:
     """Return the configuration, and it with other probabilities of avoiding."""
-    return list(dict.fromkeys([config, *(updated(config, {'foc.eta': eta}) for eta in ETAS)]))
+    return list(dict.fromkeys([config, *(replace_values(config, {'foc.eta': eta}) for eta in ETAS)]))
 
 
 def make_movement_settings(hands: Sequence[RecordedHand], config: Config) -> list[Config]:
@@ -43,7 +43,7 @@ def make_movement_settings(hands: Sequence[RecordedHand], config: Config) -> lis
     arrivals = dict.fromkeys([config.duration.arrival, *ARRIVALS])
     fading_times = dict.fromkeys([config.estimator.acceleration_time_s, 0.0])
     return [
-        updated(each, {'duration.arrival': arrival, 'estimator.acceleration_time_s': fading_s})
+        replace_values(each, {'duration.arrival': arrival, 'estimator.acceleration_time_s': fading_s})
         for each, arrival, fading_s in product(scaled, arrivals, fading_times)
     ]
 
@@ -72,4 +72,6 @@ def count_classes(hand: RecordedHand) -> int:
 def _scale(config: Config, powers: Mapping[str, float], factor: float) -> Config:
     """Multiply each of the parameters by its power of a factor."""
     before = flatten(config)
-    return updated(config, {name: clip_to_bounds(name, factor**power * float(before[name])) for name, power in powers.items()})
+    return replace_values(
+        config, {name: clip_to_bounds(name, factor**power * float(before[name])) for name, power in powers.items()}
+    )

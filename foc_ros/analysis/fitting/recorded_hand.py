@@ -49,12 +49,12 @@ def read_hand(recording: Recording, config: Config) -> RecordedHand:
     for item in recording.items():
         status = replayed.intake.take(item.role, item.message)
         sample = replayed.intake.sample
-        if status is not None and status.taken and sample is not None and (not samples or sample is not samples[-1]):
+        if status is not None and status.is_taken and sample is not None and (not samples or sample is not samples[-1]):
             samples = samples if not samples or sample.stamp_ns > samples[-1].stamp_ns else []
             samples.append(sample)
     goals = replayed.pipeline.scene.goals
     if goals is None or not len(goals):
-        raise RecordingError(f'{recording.name}: {replayed.pipeline.blocked() or "no goal received"}')
+        raise RecordingError(f'{recording.name}: {replayed.pipeline.not_ready_reason() or "no goal received"}')
     if len(samples) < MIN_SAMPLES:
         raise RecordingError(f'{recording.name}: expected at least {MIN_SAMPLES} hand poses, got {len(samples)}')
     stamps_ns = np.array([sample.stamp_ns for sample in samples])

@@ -26,7 +26,7 @@ from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
 from foc_ros.analysis.evaluation.questions import GAP, ask_all, ask_main
 from foc_ros.analysis.parallel import collect
 from foc_ros.analysis.recordings import Recording
-from foc_ros.core.config import Config, LikelihoodConfig, flatten, updated
+from foc_ros.core.config import Config, LikelihoodConfig, flatten, replace_values
 from foc_ros.core.types import Array
 
 from .covariance_fit import FEW_WIDENINGS, NO_WIDENING, compute_log_densities
@@ -79,7 +79,7 @@ class Replays:
         known = [self._known.setdefault(setting, {}) for setting in settings]
         missing = [(number, name) for number, done in enumerate(known) for name in names if name not in done]
         items = [
-            (f'{name} {number}', (number, self.recordings[name], updated(settings[number], self.thinned)))
+            (f'{name} {number}', (number, self.recordings[name], replace_values(settings[number], self.thinned)))
             for number, name in missing
         ]
         for number, name, found in collect(_score_replay, items, self.executor, description)[0]:
@@ -97,7 +97,7 @@ def observe_by_motor_noise(
 
 
 def _without_widening(config: Config) -> Config:
-    return updated(config, NO_WIDENING.parameters())
+    return replace_values(config, NO_WIDENING.parameters())
 
 
 def _score_replay(item: tuple[int, Recording, Config]) -> tuple[int, str, ReplayScores]:

@@ -67,7 +67,7 @@ def _list_scene(scene: PaperScene, noise: float) -> dict[str, Any]:
         'goal': [scene.goal_x, 0.0],
         'noise': [noise, noise],
         'obstacles': [dict(zip(names, circle, strict=True)) for circle in scene.circles],
-        'guesses': {each.name: {'amplitude': each.amplitude} for each in scene.ways},
+        'guesses': {each.name: {'amplitude': each.amplitude} for each in scene.path_classes},
     }
 
 

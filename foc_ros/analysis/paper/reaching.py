@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from foc_ros.core.config import FocConfig
-from foc_ros.core.dynamics.plants import triple_integrator_horizon
-from foc_ros.core.homotopy import path_sides
+from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
+from foc_ros.core.homotopy import find_path_sides
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import cold_start
@@ -19,7 +19,7 @@ from foc_ros.io.scene_file import guess_path
 STEPS, DURATION_S = 50, 1.0
 EQUAL_M = 1e-6
 """Distances that differ by less than this are equal [m]."""
-HORIZON = triple_integrator_horizon(DURATION_S / STEPS, STEPS)
+HORIZON = build_triple_integrator_horizon(DURATION_S / STEPS, STEPS)
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class PaperScene:
 
     goal_x: float
     circles: tuple[tuple[float, float, float, float], ...]
-    ways: tuple[PathClass, ...]
+    path_classes: tuple[PathClass, ...]
 
     @cached_property
     def obstacles(self) -> Obstacles:
@@ -79,7 +79,7 @@ def solve_class(scene: PaperScene, path_class: PathClass, method: Method, eta: f
     """
     guess = guess_path(np.zeros(2), scene.goal, STEPS, path_class.amplitude)
     solution = solve_problem(scene.make_problem(method.noise, eta), cold_start(guess), method.config)
-    sides = path_sides(solution.path, scene.obstacles)
+    sides = find_path_sides(solution.path, scene.obstacles)
     if solution.status is Status.SOLVED and any(sides.get(identity) != side for identity, side in path_class.sides):
         return replace(solution, status=Status.LEFT_CLASS, message='the solution slid into another class')
     return solution

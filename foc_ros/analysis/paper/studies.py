@@ -27,7 +27,9 @@ GROWTHS = (10.0, 1.5)
 """Delta of algorithm 1: as printed, and one that ends near the values of tau and lambda that the paper reports."""
 REPORTED = {'LV': (0.0009, 2.28e6), 'HC': (0.0012, 0.9e6)}
 """(tau [m^2], lambda) at eta 0.94 in the paper."""
-STRATEGY_CLASS = STRATEGY_SCENE, STRATEGY_SCENE.ways[0]
+Compared = dict[str, tuple[PathClass, str]]
+"""Homotopy class and strategy of each effort in a ratio, by name: numerator, then denominator."""
+STRATEGY_CLASS = STRATEGY_SCENE, STRATEGY_SCENE.path_classes[0]
 """Scene and homotopy class in which strategies are compared."""
 
 
@@ -115,12 +117,18 @@ Studies = dict[int, Study]
 
 def compute_studies(grid: Grid = FULL) -> Iterator[Study]:
     """Compute study after study."""
-    yield _solve_strategies(1, (0.94,))
-    yield _solve_strategies(2, (0.86, 0.95))
-    yield _compare_strategies(3, NOISE, grid)
-    yield _compare_strategies(4, SMALL_NOISE, grid)
-    yield _compare_classes(5, 'lv', grid)
-    yield _compare_classes(6, 'hc', grid)
+    scene, path_class = STRATEGY_CLASS
+    strategies = {'LV': (path_class, 'lv'), 'HC': (path_class, 'hc')}
+    for number, etas in ((1, (0.94,)), (2, (0.86, 0.95))):
+        yield Study(number, f'strategies LV and HC, c = {NOISE:g}', scene, NOISE, _solve_at(etas, scene, NOISE, strategies))
+    for number, noise in ((3, NOISE), (4, SMALL_NOISE)):
+        title = f'effort of LV over that of HC, c = {noise:g}'
+        yield Study(number, title, scene, noise, ratios=_compute_ratios(scene, noise, strategies, grid))
+    for number, strategy in ((5, 'lv'), (6, 'hc')):
+        classes = {each.name: (each, strategy) for each in CLASSES_SCENE.path_classes}
+        title = f'two homotopy classes, strategy {strategy.upper()}, c = {NOISE:g}'
+        solutions = _solve_at((0.9, 0.965), CLASSES_SCENE, NOISE, classes)
+        yield Study(number, title, CLASSES_SCENE, NOISE, solutions, _compute_ratios(CLASSES_SCENE, NOISE, classes, grid))
     yield _compare_optimal(grid)
 
 
@@ -132,37 +140,20 @@ def solve_reported() -> dict[str, Solution]:
     }
 
 
-def _solve_strategies(number: int, etas: tuple[float, ...]) -> Study:
-    solutions = {
-        eta: {name: solve_class(*STRATEGY_CLASS, Method(NOISE, strategy), eta) for name, strategy in (('LV', 'lv'), ('HC', 'hc'))}
+def _solve_at(etas: tuple[float, ...], scene: PaperScene, noise: float, compared: Compared) -> dict[float, dict[str, Solution]]:
+    return {
+        eta: {name: solve_class(scene, each, Method(noise, strategy), eta) for name, (each, strategy) in compared.items()}
         for eta in etas
     }
-    return Study(number, f'strategies LV and HC, c = {NOISE:g}', STRATEGY_SCENE, NOISE, solutions)
 
 
-def _compare_strategies(number: int, noise: float, grid: Grid) -> Study:
-    by_strategy = {strategy: _make_methods(strategy, noise, grid) for strategy in ('lv', 'hc')}
-    ratios = tuple(
-        RatioCurve(
-            name,
-            *(_solve_curve(strategy.upper(), *STRATEGY_CLASS, *methods[name]) for strategy, methods in by_strategy.items()),
-        )
-        for name in by_strategy['lv']
+def _compute_ratios(scene: PaperScene, noise: float, compared: Compared, grid: Grid) -> tuple[RatioCurve, ...]:
+    """Return the ratios of the efforts of two, by the continuous strategies and by stepping."""
+    methods = {name: _make_methods(strategy, noise, grid) for name, (_, strategy) in compared.items()}
+    return tuple(
+        RatioCurve(label, *(_solve_curve(name, scene, compared[name][0], *methods[name][label]) for name in compared))
+        for label in next(iter(methods.values()))
     )
-    return Study(number, f'effort of LV over that of HC, c = {noise:g}', STRATEGY_SCENE, noise, ratios=ratios)
-
-
-def _compare_classes(number: int, strategy: str, grid: Grid) -> Study:
-    scene = CLASSES_SCENE
-    solutions = {
-        eta: {each.name: solve_class(scene, each, Method(NOISE, strategy), eta) for each in scene.ways} for eta in (0.9, 0.965)
-    }
-    ratios = tuple(
-        RatioCurve(name, *(_solve_curve(each.name, scene, each, method, etas) for each in scene.ways))
-        for name, (method, etas) in _make_methods(strategy, NOISE, grid).items()
-    )
-    title = f'two homotopy classes, strategy {strategy.upper()}, c = {NOISE:g}'
-    return Study(number, title, scene, NOISE, solutions, ratios)
 
 
 def _compare_optimal(grid: Grid) -> Study:

@@ -21,7 +21,7 @@ from foc_ros.io import topics
 from foc_ros.io.bags import Item
 from foc_ros.reporting.snapshots import Snapshot, is_same_prediction, read_snapshot
 from foc_ros.ros.intake import Intake
-from foc_ros.ros.messages.decode_poses import stamp_of
+from foc_ros.ros.messages.decode_poses import decode_stamp
 
 WINDOW_S = 1.0
 """Seconds over which rates are counted."""
@@ -65,7 +65,7 @@ class Recorder:
             return
         if name == 'prediction':
             self._received_times.append(now)
-            sent, _ = self._sent.get(stamp_of(message.header), (now, None))
+            sent, _ = self._sent.get(decode_stamp(message.header), (now, None))
             self.delays.append(now - sent)
         self._pair(name, message)
 
@@ -92,7 +92,7 @@ class Recorder:
         self._unpaired[name].append(message)
 
     def _add_snapshot(self, cloud: Any, likelihoods: Any) -> None:
-        pipeline, stamp_ns = self._intake.pipeline, stamp_of(cloud.header)
+        pipeline, stamp_ns = self._intake.pipeline, decode_stamp(cloud.header)
         _, scene = self._sent.get(stamp_ns, (0.0, pipeline.scene))
         if scene.goals is not None:
             obstacles = scene.obstacles(stamp_ns)

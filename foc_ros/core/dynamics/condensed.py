@@ -42,7 +42,7 @@ def variance_weights(states: Array, terminal: Array, stage: Array) -> Array:
 
     states (n, 2, N + 1): impulse responses of the states; terminal, stage (n,): weights.
     """
-    squares = states**2
-    latest, before = np.tensordot(terminal, squares, 1), np.tensordot(stage, squares, 1).cumsum(axis=1)
+    squares = (states**2).reshape(len(states), -1)
+    latest, before = (terminal @ squares).reshape(2, -1), (stage @ squares).reshape(2, -1).cumsum(axis=1)
     weights: Array = latest[:, :0:-1] + before[:, -2::-1]
     return weights.ravel()

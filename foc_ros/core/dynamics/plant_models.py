@@ -25,7 +25,15 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.registry import PLANTS
 from foc_ros.core.types import Array, Solution
 
-from .plants import CACHED_HORIZONS, Horizon, Plant, condense, damped_mass, triple_integrator, triple_integrator_horizon
+from .plants import (
+    CACHED_HORIZONS,
+    Horizon,
+    Plant,
+    build_triple_integrator_horizon,
+    condense,
+    discretise_damped_mass,
+    discretise_triple_integrator,
+)
 from .replanning import (
     compute_error_map,
     compute_goal_map,
@@ -119,9 +127,9 @@ class TripleIntegratorModel(PlantModel):
     is_jerk_driven = True
 
     def __init__(self, _: FocConfig | None = None) -> None:
-        super().__init__(triple_integrator)
+        super().__init__(discretise_triple_integrator)
 
-    build_horizon = staticmethod(triple_integrator_horizon)
+    build_horizon = staticmethod(build_triple_integrator_horizon)
     compute_goal_map = staticmethod(triple_integrator_goal_map)
     compute_error_map = staticmethod(triple_integrator_error_map)
     propagate_error = staticmethod(triple_integrator_error_covariance)
@@ -139,7 +147,7 @@ TRIPLE_INTEGRATOR = TripleIntegratorModel()
 
 def make_damped_mass(settings: FocConfig) -> PlantModel:
     """Return the paper's second-order hand: a mass with viscous damping, driven by force."""
-    return PlantModel(lambda dt: damped_mass(dt, settings.plant_mass, settings.plant_damping))
+    return PlantModel(lambda dt: discretise_damped_mass(dt, settings.plant_mass, settings.plant_damping))
 
 
 @lru_cache(maxsize=CACHED_HORIZONS)

@@ -42,7 +42,7 @@ class Plant(Record):
         super().__post_init__()
 
 
-def triple_integrator(dt: float) -> Plant:
+def discretise_triple_integrator(dt: float) -> Plant:
     """Return the paper's hand: X = (x, y, vx, vy, ax, ay), U = jerk [m/s^3], piecewise constant over dt [s].
 
     Per axis A = [[1, dt, dt^2/2], [0, 1, dt], [0, 0, 1]], B = [dt^3/6, dt^2/2, dt] (paper, equation 1).
@@ -52,7 +52,7 @@ def triple_integrator(dt: float) -> Plant:
     return Plant(np.kron(axis_a, np.eye(2)), np.kron(axis_b, np.eye(2)), dt)
 
 
-def damped_mass(dt: float, mass: float, damping: float) -> Plant:
+def discretise_damped_mass(dt: float, mass: float, damping: float) -> Plant:
     """Return the paper's second-order hand: X = (x, y, vx, vy), U = force [N], mass [kg] > 0, damping [N s/m] >= 0.
 
     m dv/dt = U - b v, discretised exactly for a force that is constant over dt [s] (paper, section V).
@@ -119,7 +119,7 @@ class Horizon(Record):
         """S: matrices (2, N, 2N) from u to the positions at steps 1..N."""
         return self.response[:, :2].swapaxes(0, 1)
 
-    def returning(self, path: Array, state: Array, fixed: NDArray[np.bool_]) -> Array:
+    def compute_correction(self, path: Array, state: Array, fixed: NDArray[np.bool_]) -> Array:
         """Return the control (2N,) that corrects deviations of a path, and of the fixed states (n,) at its end.
 
         path (N, 2): deviations of the positions at steps 1..N; state (n,): of the states at step N. The control minimises
@@ -160,7 +160,7 @@ STATE_ORDER = np.array([0.0, 0.0, 1.0, 1.0, 2.0, 2.0])
 """Order of each state of the triple integrator as a derivative of the position."""
 
 
-def state_scale(dt: float) -> Array:
+def compute_state_scale(dt: float) -> Array:
     """Diagonal of D, (6,): the triple integrator's state at step dt [s] is D times its state at unit step."""
     scale: Array = dt**-STATE_ORDER
     return scale
@@ -173,25 +173,25 @@ class _Scaled(Horizon):
     unit: Horizon
 
     def returning(self, path: Array, state: Array, fixed: NDArray[np.bool_]) -> Array:
-        return self.unit.returning(path, state * self.dt**STATE_ORDER, fixed) / self.dt**3
+        return self.unit.compute_correction(path, state * self.dt**STATE_ORDER, fixed) / self.dt**3
 
 
 @lru_cache(maxsize=CACHED_HORIZONS)
 def _unit_horizon(steps: int) -> Horizon:
-    return condense(triple_integrator(1.0), steps)
+    return condense(discretise_triple_integrator(1.0), steps)
 
 
 @lru_cache(maxsize=CACHED_HORIZONS)
-def triple_integrator_horizon(dt: float, steps: int) -> Horizon:
+def build_triple_integrator_horizon(dt: float, steps: int) -> Horizon:
     """Return the triple integrator's horizon for any dt [s], scaled from the one of unit step.
 
     With X = D X', D = diag(1, 1, 1/dt, 1/dt, 1/dt^2, 1/dt^2) and U = U'/dt^3 the dynamics of X' do not depend on dt.
     """
     unit = _unit_horizon(steps)
-    scale = state_scale(dt)
+    scale = compute_state_scale(dt)
     return _Scaled(unit.powers * (scale[:, None] / scale), unit.states * (dt**3 * scale)[:, None, None], dt, unit)
 
 
-def states_at_goal(n: int, passing: bool = False) -> NDArray[np.bool_]:
+def find_states_at_goal(n: int, passing: bool = False) -> NDArray[np.bool_]:
     """Return which of n states the goal fixes, (n,): all if the hand comes to rest, all but the velocity if it passes."""
     return np.array([not (passing and 2 <= state < 4) for state in range(n)])

@@ -36,7 +36,7 @@ from foc_ros.core.types import Array, HandState, Solution
 from .plant_models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
 
 
-def predictive_covariance(hand: HandState, dt: float, steps: int, config: Config) -> Array:
+def compute_predictive_covariance(hand: HandState, dt: float, steps: int, config: Config) -> Array:
     """Return the covariance (N + 1, n, n) at steps 0..N of dt [s] that all plans of one duration share: all parts but timing."""
     plant = make_plant_model(config.foc)
     kind = dt, steps, is_passing(config.duration)
@@ -54,13 +54,13 @@ def timing_covariances(
 ) -> Iterator[Array]:
     """Yield the covariances (N + 1, n, n) at steps 0..N due to the unknown duration, and for a hand at rest due to its onset."""
     if config.spread > 0.0:
-        displaced = config.spread * duration_sensitivity(solution, is_passing(config), plant)
+        displaced = config.spread * compute_duration_sensitivity(solution, is_passing(config), plant)
         yield displaced[:, :, None] * displaced[:, None, :]
     if at_rest and config.wait_s > 0.0:
-        yield onset_delay_covariance(solution, config.wait_s)
+        yield compute_onset_delay_covariance(solution, config.wait_s)
 
 
-def onset_delay_covariance(solution: Solution, wait_s: float) -> Array:
+def compute_onset_delay_covariance(solution: Solution, wait_s: float) -> Array:
     """Return the covariance (N + 1, n, n) about a plan from rest if it begins after an exponential time of mean wait_s [s]."""
     states = solution.mean - solution.mean[0]
     products = states[:, :, None] * states[:, None, :]
@@ -73,7 +73,7 @@ def onset_delay_covariance(solution: Solution, wait_s: float) -> Array:
     return covariance
 
 
-def duration_sensitivity(solution: Solution, passing: bool, plant: PlantModel = TRIPLE_INTEGRATOR) -> Array:
+def compute_duration_sensitivity(solution: Solution, passing: bool, plant: PlantModel = TRIPLE_INTEGRATOR) -> Array:
     """Return the displacement of the states at steps 0..N, (N + 1, n), per relative increase of the duration T."""
     goal_map = plant.compute_goal_map(solution.dt, len(solution.control), passing)
     displacement: Array = goal_map @ (float(solution.times[-1]) * plant.compute_end_rate(solution))

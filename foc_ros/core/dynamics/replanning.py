@@ -22,11 +22,19 @@ from functools import lru_cache
 
 import numpy as np
 
-from foc_ros.core.estimation.kalman_filter import gramian
+from foc_ros.core.estimation.kalman_filter import compute_gramian
 from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled
 from foc_ros.core.types import Array
 
-from .plants import CACHED_HORIZONS, Horizon, Plant, condense, state_scale, states_at_goal, triple_integrator
+from .plants import (
+    CACHED_HORIZONS,
+    Horizon,
+    Plant,
+    compute_state_scale,
+    condense,
+    discretise_triple_integrator,
+    find_states_at_goal,
+)
 
 STATES = 6
 """States of the triple integrator: with this number known at compile time, `propagate_scaled` is twice as fast."""
@@ -37,7 +45,7 @@ def compute_goal_map(horizon: Horizon, passing: bool = False) -> Array:
 
     passing: the goal does not fix the velocity; the columns of states that the goal does not fix are zero.
     """
-    fixed = states_at_goal(len(horizon.powers[-1]), passing)
+    fixed = find_states_at_goal(len(horizon.powers[-1]), passing)
     last = horizon.last[fixed]
     # the rows have different units (m, m/s, ...), so they are scaled to unit length first
     scale = 1.0 / np.sqrt((last**2).sum(axis=1))
@@ -64,42 +72,42 @@ def compute_process_covariance(plant: Plant, steps: int, added: Array, passing: 
 
 @lru_cache(maxsize=CACHED_HORIZONS)
 def _unit_goal_map(steps: int, passing: bool) -> Array:
-    return compute_goal_map(condense(triple_integrator(1.0), steps), passing)
+    return compute_goal_map(condense(discretise_triple_integrator(1.0), steps), passing)
 
 
 @lru_cache(maxsize=CACHED_HORIZONS)
 def _unit_error_map(steps: int, passing: bool) -> Array:
-    return compute_error_map(condense(triple_integrator(1.0), steps), passing)
+    return compute_error_map(condense(discretise_triple_integrator(1.0), steps), passing)
 
 
 @lru_cache(maxsize=CACHED_HORIZONS)
 def _unit_process_covariance(steps: int, passing: bool) -> Array:
-    added = np.kron(gramian(1.0), np.eye(2)).astype(np.float64)
-    return compute_process_covariance(triple_integrator(1.0), steps, added, passing)
+    added = np.kron(compute_gramian(1.0), np.eye(2)).astype(np.float64)
+    return compute_process_covariance(discretise_triple_integrator(1.0), steps, added, passing)
 
 
 def triple_integrator_goal_map(dt: float, steps: int, passing: bool = False) -> Array:
     """Return `compute_goal_map` of the triple integrator for any dt [s], scaled from the map of unit step."""
-    scale = state_scale(dt)
+    scale = compute_state_scale(dt)
     goal_map: Array = _unit_goal_map(steps, passing) * (scale[:, None] / scale[None, :])
     return goal_map
 
 
 def triple_integrator_error_map(dt: float, steps: int, passing: bool = False) -> Array:
     """Return `compute_error_map` of the triple integrator for any dt [s], scaled from the map of unit step."""
-    scale = state_scale(dt)
+    scale = compute_state_scale(dt)
     error_map: Array = _unit_error_map(steps, passing) * (scale[:, None] / scale[None, :])
     return error_map
 
 
 def triple_integrator_error_covariance(covariance: Array, dt: float, steps: int, passing: bool = False) -> Array:
     """Return the covariance (N + 1, 6, 6) at steps 0..N that an initial error of covariance (6, 6) leads to; dt [s]."""
-    return propagate_scaled(_unit_error_map(steps, passing), state_scale(dt), covariance)
+    return propagate_scaled(_unit_error_map(steps, passing), compute_state_scale(dt), covariance)
 
 
 def triple_integrator_process_covariance(dt: float, steps: int, passing: bool = False) -> Array:
     """Return D at steps 0..N, (N + 1, 6, 6), for unplanned white jerk of unit spectral density; dt [s]."""
-    scale = dt**2.5 * state_scale(dt)
+    scale = dt**2.5 * compute_state_scale(dt)
     covariance: Array = _unit_process_covariance(steps, passing) * (scale[:, None] * scale[None, :])
     return covariance
 

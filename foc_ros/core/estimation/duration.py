@@ -61,7 +61,7 @@ def choose_candidate_durations(
     return [_find_duration(hand, each.length, each.guess, config) for each in candidates]
 
 
-def time_price(config: DurationConfig) -> float:
+def get_time_price(config: DurationConfig) -> float:
     """Return the cost of a second besides the effort [m^2/s^6]: zero, except with model `cost_of_time`."""
     return config.time_cost if config.model == 'cost_of_time' else 0.0
 

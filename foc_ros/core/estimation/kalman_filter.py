@@ -91,12 +91,12 @@ def update(state: FilterState | None, sample: HandSample, config: EstimatorConfi
 
 
 @compiled
-def transition(dt: float) -> Array:
+def compute_transition(dt: float) -> Array:
     """Return A(dt), (3, 3), of one axis."""
     return np.array([[1.0, dt, dt**2 / 2.0], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
 
 
-def gramian(dt: float) -> Array:
+def compute_gramian(dt: float) -> Array:
     """Return G(dt), (3, 3): the covariance that white jerk of unit density gives one axis in dt."""
     return np.array(
         [
@@ -107,7 +107,7 @@ def gramian(dt: float) -> Array:
     )
 
 
-_UNIT_ROOT = np.linalg.cholesky(gramian(1.0))
+_UNIT_ROOT = np.linalg.cholesky(compute_gramian(1.0))
 """C for dt = 1 s; the rows scale with dt^2.5, dt^1.5 and dt^0.5."""
 
 
@@ -141,7 +141,7 @@ def filter_step(
     mean: Vector, root: Matrix, dt: float, jerk_density: float, stddev: float, position: Vector
 ) -> tuple[Vector, Matrix, Matrix]:
     """Return mean (6,), covariance (6, 6) and root (3, 3) after dt [s] and a position (2,) of a standard deviation [m]."""
-    step, columns = transition(dt), np.empty((3, 6))
+    step, columns = compute_transition(dt), np.empty((3, 6))
     columns[:, :3] = multiply(step, root)
     for i in range(3):
         columns[i, 3:] = jerk_density * dt ** (2.5 - i) * _UNIT_ROOT[i]
@@ -160,7 +160,7 @@ def _start_state(sample: HandSample, config: EstimatorConfig) -> FilterState:
     """Return the state after a first position."""
     root = np.zeros((3, 3))
     root[0, 0] = config.position_stddev
-    root[1:, 1:] = config.jerk_density * np.linalg.cholesky(gramian(config.gap_s)[1:, 1:])
+    root[1:, 1:] = config.jerk_density * np.linalg.cholesky(compute_gramian(config.gap_s)[1:, 1:])
     mean = np.concatenate([sample.position, np.zeros(4)])
     return FilterState(sample.stamp_ns, mean, expand_to_both_axes(root @ root.T), sample.height, sample.frame_id, root=root)
 

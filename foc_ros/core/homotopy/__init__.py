@@ -7,6 +7,15 @@ May import `foc_ros.core.dynamics`, `obstacles`, `estimation` and the ground mod
 from .guesses import timed
 from .search import Search, search
 from .search_scene import named_obstacles
-from .sides import compute_swept_angles, is_same_class, path_sides, sweep_angles
+from .sides import compute_swept_angles, find_path_sides, is_same_class, sweep_angles
 
-__all__ = ['Search', 'compute_swept_angles', 'is_same_class', 'named_obstacles', 'path_sides', 'search', 'sweep_angles', 'timed']
+__all__ = [
+    'Search',
+    'compute_swept_angles',
+    'find_path_sides',
+    'is_same_class',
+    'named_obstacles',
+    'search',
+    'sweep_angles',
+    'timed',
+]

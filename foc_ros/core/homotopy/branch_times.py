@@ -18,16 +18,16 @@ from .sides import compute_swept_angles
 class BranchTimes(Record):
     """When k paths separate.
 
-    after_s (k, k): time until two of them separate [s], infinite if they never do, as on the diagonal. way (k,): paths with equal
-    numbers pass all obstacles on the same sides, though they may lead to different goals.
+    after_s (k, k): time until two of them separate [s], infinite if they never do, as on the diagonal. path_class (k,): paths
+    with equal numbers pass all obstacles on the same sides, though they may lead to different goals.
     """
 
     after_s: Array
-    way: NDArray[np.intp]
+    path_class: NDArray[np.intp]
 
     def take(self, rows: NDArray[np.intp]) -> BranchTimes:
         """Return the branch times of some of the paths."""
-        return BranchTimes(self.after_s[np.ix_(rows, rows)], self.way[rows])
+        return BranchTimes(self.after_s[np.ix_(rows, rows)], self.path_class[rows])
 
 
 def compute_branch_times(outcomes: Sequence[PredictedCandidate], obstacles: Obstacles) -> BranchTimes:

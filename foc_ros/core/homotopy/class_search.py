@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -32,7 +33,7 @@ NANO = 1e9
 
 
 class PathClass(NamedTuple):
-    """A homotopy class, represented by its shortest path.
+    """A homotopy class, represented by its shortest path, which consists of some runs of a graph.
 
     key, length plus what coasting adds, to the nanometre [m], and label: by these, classes rank. goal: row; course: the label
     without the goal; sides: LEFT or RIGHT by id, in the order of the label.
@@ -43,7 +44,12 @@ class PathClass(NamedTuple):
     goal: int
     course: str
     sides: tuple[tuple[str, int], ...]
-    path: TautPath
+    graph: TangentGraph
+    runs: tuple[int, ...]
+
+    def lay_out(self) -> TautPath:
+        """Return the shortest path."""
+        return lay_out(self.graph, self.runs)
 
 
 class ClassQuery(NamedTuple):
@@ -115,11 +121,19 @@ def _choose_circles(scene: SearchScene, named: list[int], nearest: list[int]) ->
 
 def _build_partial_graph(scene: SearchScene, goal: int, rows: list[int], named: list[int]) -> PartialGraph:
     """Build the graph of some obstacles for one goal; a graph without all named ones is one to grow, up to MOST."""
-    graph = connect_hand(build_tangent_graph(scene.centre[rows], scene.radius[goal, rows], scene.goals), scene.hand)
+    arrays = scene.centre[rows], scene.radius[goal, rows], scene.goals, scene.hand
+    graph = _build_graph(*[array.tobytes() for array in arrays])
     others = np.delete(np.arange(len(scene.centre)), rows)
     limit = float(scene.excess[others].min(initial=np.inf)) * math.dist(scene.goals[goal], scene.hand)
     is_enough = len(rows) >= MOST or set(rows).issuperset(named)
     return PartialGraph(graph, rows, others, named, limit, np.inf if is_enough else limit)
+
+
+@lru_cache(maxsize=4)
+def _build_graph(centre: bytes, radius: bytes, goals: bytes, hand: bytes) -> TangentGraph:
+    """Build the graph of some circles with a hand; kept for the other goals of the same search."""
+    points = np.frombuffer(centre).reshape(-1, 2), np.frombuffer(radius), np.frombuffer(goals).reshape(-1, 2)
+    return connect_hand(build_tangent_graph(*points), np.frombuffer(hand))
 
 
 def _count_classes(partial: PartialGraph) -> int:
@@ -139,19 +153,20 @@ def _find_named_paths(scene: SearchScene, partial: PartialGraph, query: ClassQue
     for tied in find_shortest_paths(partial.graph, paths, notes):
         classes = []
         for key, runs, swept in tied:
-            path, angles = lay_out(partial.graph, runs), dict(zip(held, swept, strict=True))
+            angles = dict(zip(held, swept, strict=True))
             if not is_complete:
-                by_points = compute_swept_angles(path.space_points(FINENESS), scene.centre[partial.named]).tolist()
+                points = lay_out(partial.graph, runs).space_points(FINENESS)
+                by_points = compute_swept_angles(points, scene.centre[partial.named]).tolist()
                 angles = dict(zip(partial.named, by_points, strict=True)) | angles
             sides = tuple([(query.ids[row], LEFT if angles[row] < 0.0 else RIGHT) for row in partial.named])
             course, rank = name_course(sides), round(key * NANO) / NANO
-            classes.append(PathClass(rank, f'goal{query.goal}:{course}', query.goal, course, sides, path))
+            classes.append(PathClass(rank, f'goal{query.goal}:{course}', query.goal, course, sides, partial.graph, runs))
         yield from sorted(classes, key=lambda found: found[:2])
 
 
 def _find_met(scene: SearchScene, found: PathClass, others: Indices) -> list[int]:
     """Return those of other obstacles (rows) that a path meets."""
-    apart = found.path.space_points(FINENESS)[:, None] - scene.centre[others]
+    apart = found.lay_out().space_points(FINENESS)[:, None] - scene.centre[others]
     is_met = np.hypot(apart[..., 0], apart[..., 1]) < scene.radius[found.goal, others] - GRAZE
     met: list[int] = others[is_met.any(axis=0)].tolist()
     return met

@@ -18,7 +18,7 @@ from foc_ros.core.types import Array, Candidate, HandState, Obstacles, Record
 from .class_search import name_course
 from .guesses import compute_path_lengths, timed
 from .search_scene import named_obstacles
-from .sides import path_sides
+from .sides import find_path_sides
 
 NEAR = 0.02
 """Largest distance of an obstacle or a goal from its place in the demonstration [m]."""
@@ -62,7 +62,7 @@ def record_demonstration(frame_id: str, path: Array, obstacles: Obstacles) -> De
     length = compute_path_lengths(path)
     at = np.linspace(0.0, length[-1], POINTS)
     evenly = np.column_stack([np.interp(at, length, axis) for axis in path.T]).round(DIGITS)
-    sides = path_sides(evenly, obstacles)
+    sides = find_path_sides(evenly, obstacles)
     ids = tuple(sorted(sides))
     centre = obstacles.centre[[obstacles.ids.index(identity) for identity in ids]]
     return Demonstration(frame_id, ids, tuple([sides[identity] for identity in ids]), centre.round(DIGITS), evenly)
@@ -102,7 +102,7 @@ def recall_demonstrations(
             if rest is None or not _is_free(rest, obstacles):
                 continue
             guess = timed(rest, hand.mean[2:4], timing.durations_s[goal], timing.steps)
-            sides, shown = path_sides(guess, obstacles), dict(zip(demonstration.ids, demonstration.sides, strict=True))
+            sides, shown = find_path_sides(guess, obstacles), dict(zip(demonstration.ids, demonstration.sides, strict=True))
             if not sides.keys() >= set(names[goal]) or any(shown.get(name, side) != side for name, side in sides.items()):
                 continue
             named = tuple([(name, sides[name]) for name in names[goal]])

@@ -101,9 +101,8 @@ def find_shortest_paths(graph: TangentGraph, query: PathQuery, notes: Counter[st
 def _compute_first_keys(graph: TangentGraph, velocity: Array) -> list[float]:
     """Compute the keys of the runs from the hand [m]: their lengths and what coasting adds."""
     first = slice(graph.first_run[-1], None)
-    keys: list[float] = (
-        graph.runs.length[first] + COAST_S * (math.hypot(*velocity) - graph.runs.heading[first] @ velocity)
-    ).tolist()
+    coasting = COAST_S * (math.hypot(*velocity) - graph.runs.heading[first] @ velocity)
+    keys: list[float] = (graph.runs.length[first] + coasting).tolist()
     return keys
 
 

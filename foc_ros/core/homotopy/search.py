@@ -91,7 +91,8 @@ def search(
         raise SceneError('hand_mean, goals', 'arrays (6,) and (g, 2)', f'{hand_mean.shape} and {goals.shape}')
     if len(duration_s) != len(goals):
         raise SceneError('duration_s', f'one for each of the {len(goals)} goals', len(duration_s))
-    velocity, scene = hand_mean[2:4], build_search_scene(hand_mean[:2], goals, obstacles, config.clearance, previous)
+    hand, velocity = hand_mean[:4].astype(float).reshape(2, 2)
+    scene = build_search_scene(hand, goals, obstacles, config.clearance, previous)
     reachable = np.flatnonzero(~scene.is_goal_inside).tolist()
     # a prediction cannot name a goal without a candidate
     count = max(config.max_candidates, min(len(reachable), MOST_CANDIDATES))
@@ -105,8 +106,9 @@ def search(
     chosen = _select_classes(classes, count, {candidate.label for candidate in previous}, notes)
     candidates = []
     for one in chosen:
-        guess = build_guess(scene, one.path, one.goal, velocity, duration_s[one.goal], steps)
-        candidates.append(Candidate(one.label, one.goal, one.sides, guess, one.path.length))
+        path = one.lay_out()
+        guess = build_guess(scene, path, one.goal, velocity, duration_s[one.goal], steps)
+        candidates.append(Candidate(one.label, one.goal, one.sides, guess, path.length))
     return Search(tuple(candidates), {name: number for name, number in notes.items() if number})
 
 

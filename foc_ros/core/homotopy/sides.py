@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from foc_ros.core.errors import SceneError
-from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled_exactly
+from foc_ros.core.kernels import Flags, Matrix, Tensor, Vector, compiled_exactly
 from foc_ros.core.types import LEFT, RIGHT, Array, Obstacles
 
 TURN = 2.0 * np.pi
@@ -24,7 +24,7 @@ def compute_swept_angles(path: Array, centres: Array) -> Array:
     return sweep_angles(*_check_shapes(path, centres))
 
 
-def path_sides(path: Array, obstacles: Obstacles, centres: Array | None = None) -> dict[str, int]:
+def find_path_sides(path: Array, obstacles: Obstacles, centres: Array | None = None) -> dict[str, int]:
     """Find the side on which a path passes each obstacle.
 
     A path that sweeps clockwise about a centre passes the obstacle on the left. A path passes an obstacle if the foot of the
@@ -51,11 +51,9 @@ def path_sides(path: Array, obstacles: Obstacles, centres: Array | None = None) 
         If the shapes do not fit each other.
     """
     path, centres = _check_shapes(path, obstacles.centre if centres is None else centres)
-    angles, ends = sweep_angles(path, centres), path[[0, -1], None] - centres[[0, -1]]
-    chord = ends[1] - ends[0]
-    foot, end = -(ends[0] * chord).sum(axis=1), (chord * chord).sum(axis=1)
-    is_passed = ((foot > 0.0) & (foot < end)) | (np.abs(angles) > np.pi)
-    return {obstacles.ids[k]: LEFT if angles[k] < 0.0 else RIGHT for k in np.flatnonzero(is_passed)}
+    angles = sweep_angles(path, centres)
+    is_passed = find_passed(path, centres, angles).tolist()
+    return {identity: LEFT if angles[k] < 0.0 else RIGHT for k, identity in enumerate(obstacles.ids) if is_passed[k]}
 
 
 @compiled_exactly
@@ -91,6 +89,18 @@ def sweep_angles(path: Matrix, centres: Tensor) -> Vector:
 def is_same_class(angles: Vector, others: Vector) -> bool:
     """Tell whether two paths with the same ends, which sweep the angles (n,) [rad], pass all n centres on the same sides."""
     return bool((np.abs(angles - others) < np.pi).all())
+
+
+@compiled_exactly
+def find_passed(path: Matrix, centres: Tensor, angles: Vector) -> Flags:
+    """Tell which centres (m, n, 2) or (1, n, 2) a path (m, 2) passes that sweeps the angles (n,) about them; 15 us in NumPy."""
+    is_passed = np.zeros(len(angles), np.bool_)
+    for k in range(len(angles)):
+        x, y = path[0, 0] - centres[0, k, 0], path[0, 1] - centres[0, k, 1]
+        along_x, along_y = path[-1, 0] - centres[-1, k, 0] - x, path[-1, 1] - centres[-1, k, 1] - y
+        foot = -(x * along_x + y * along_y)
+        is_passed[k] = 0.0 < foot < along_x * along_x + along_y * along_y or abs(angles[k]) > np.pi
+    return is_passed
 
 
 def _check_shapes(path: Array, centres: Array) -> tuple[Array, Array]:

@@ -26,14 +26,14 @@ class ObstacleSource:
 class Scene(Record):
     """Obstacles by source, in order of arrival, and the goals (g, 2) [m], None until some were received."""
 
-    parts: dict[str, ObstacleSource] = field(default_factory=dict)
+    sources: dict[str, ObstacleSource] = field(default_factory=dict)
     goals: Array | None = None
     goals_frame: str = ''
 
     def with_source(self, name: str, source: ObstacleSource) -> Scene:
         """Return the scene with the obstacles of one source replaced; this source is now the latest."""
-        parts = {other: part for other, part in self.parts.items() if other != name}
-        return replace(self, parts=parts | {name: source})
+        parts = {other: part for other, part in self.sources.items() if other != name}
+        return replace(self, sources=parts | {name: source})
 
     def with_goals(self, goals: Array, frame_id: str) -> Scene:
         """Return the scene with all goals replaced."""
@@ -41,7 +41,7 @@ class Scene(Record):
 
     def obstacles(self, stamp_ns: int) -> Obstacles:
         """Return all obstacles at a stamp [ns]: the union over the sources, in which the latest source of an id counts."""
-        tables = [part.at(stamp_ns) for part in self.parts.values()]
+        tables = [part.at(stamp_ns) for part in self.sources.values()]
         if len(tables) < 2:
             return tables[0] if tables else make_obstacles()
         ids = [name for table in tables for name in table.ids]
@@ -54,13 +54,13 @@ class Scene(Record):
         A source is stale if its stamp differs from that of the hand by more than timeout_s [s], in either direction; 0: never.
         One stale source suffices, since a missing message does not mean that its obstacles are gone.
         """
-        if not self.parts:
+        if not self.sources:
             return 'no_obstacles', 'no obstacles received yet: publish an empty cloud for an empty scene'
         if self.goals is None:
             return 'no_goal', 'no goal received'
         if not len(self.goals):
             return 'no_goal', 'no goal: the last goals message was empty'
-        ages = [(stamp_ns - part.stamp_ns) / NANOSECONDS for part in self.parts.values() if part.stamp_ns is not None]
+        ages = [(stamp_ns - part.stamp_ns) / NANOSECONDS for part in self.sources.values() if part.stamp_ns is not None]
         age = max(ages, key=abs, default=0.0)
         if 0.0 < timeout_s < abs(age):
             relation = 'older' if age > 0.0 else 'newer'

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from foc_ros.core.dynamics.condensed import PositionNoise, position_variances, variance_weights
 from foc_ros.core.dynamics.noise import stack_noise
-from foc_ros.core.dynamics.plants import Horizon, states_at_goal
+from foc_ros.core.dynamics.plants import Horizon, find_states_at_goal
 from foc_ros.core.errors import SceneError
 from foc_ros.core.kernels import freeze
 from foc_ros.core.obstacles.chance_constraint import UncertainCircles, centre_trajectories, k_of_eta, size_moments
-from foc_ros.core.types import Array, Obstacles, Record
+from foc_ros.core.types import Array, Obstacles, Record, as_readonly
 
 from .contacts.hermite import compute_trajectory
 from .terms import ChanceTerms, CostTerms, InitialError, Motion, MovingCircles, ProblemTerms
@@ -111,8 +111,7 @@ class Problem(Record):
     @cached_property
     def drift(self) -> Array:
         """How far each centre moves in a step, (m, 2) [m]."""
-        drift: Array = self.obstacles.velocity * self.horizon.dt
-        return drift
+        return as_readonly(self.obstacles.velocity * self.horizon.dt)
 
     @cached_property
     def courses(self) -> Array:
@@ -200,11 +199,21 @@ class Problem(Record):
 
         Less is required where the hand is nearer now, and has a recovery time: see `clearance.required_distance`.
         """
+        known = self._known_circles.get(tau)
+        if known is not None:
+            return known
         reach: Array = np.sqrt(self.size[0] + tau)
         missing, pace = np.zeros(len(reach)), 0.0
         if self.recovery_s > 0:
             missing, pace = reach - self._distance_now, self.horizon.dt / self.recovery_s
-        return freeze(MovingCircles(self.obstacles.centre, self.drift, reach, missing, pace))
+        circles = MovingCircles(self.obstacles.centre, self.drift, as_readonly(reach), as_readonly(missing), pace)
+        self._known_circles[tau] = circles
+        return circles
+
+    @cached_property
+    def _known_circles(self) -> dict[float, MovingCircles]:
+        """The circles by tau, which are needed several times for each."""
+        return {}
 
     @cached_property
     def _distance_now(self) -> Array:
@@ -288,7 +297,7 @@ def rest_to_goal(
         noise=np.asarray(noise, dtype=float),
         obstacles=obstacles,
         eta=eta,
-        at_goal=states_at_goal(n, options.get('passing', False)),
+        at_goal=find_states_at_goal(n, options.get('passing', False)),
         terminal_weights=np.where(np.arange(n) < 2, options.get('goal_weight', 0.0), 0.0),
         stage_weights=np.zeros(n),
         recovery_s=options.get('recovery_s', 0.0),

@@ -25,7 +25,7 @@ class Start:
     control: Array | None = None
     contacts: Contacts = NO_CONTACTS
     lam: float | None = None
-    slope: float = 0.0
+    safety_factor_slope: float = 0.0
 
 
 def cold_start(guess: Array) -> Start:
@@ -49,7 +49,7 @@ def warm_start(previous: Solution, problem: Problem) -> Start:
     ]
     table = np.array(kept, dtype=float).reshape(-1, 3)
     contacts = freeze(Contacts(table[:, 0].astype(np.intp), table[:, 1].copy(), table[:, 2].copy()))
-    return Start(positions, control, contacts, previous.lam, previous.slope)
+    return Start(positions, control, contacts, previous.lam, previous.safety_factor_slope)
 
 
 @compiled
@@ -78,5 +78,5 @@ def resample_solution(
 def correct_to_goal(problem: Problem, control: Array, path: Array) -> Array:
     """Change a control (2N,) so that the mean returns to a path (N, 2) and to the goal, from where the hand really is now."""
     missing = problem.goal - problem.free[-1] - problem.horizon.last @ control
-    corrected: Array = control + problem.horizon.returning(path - problem.positions(control), missing, problem.at_goal)
+    corrected: Array = control + problem.horizon.compute_correction(path - problem.positions(control), missing, problem.at_goal)
     return corrected

@@ -22,7 +22,7 @@ POLICY = "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; sc
 """Content security policy of every page: a browser shows what the page holds and fetches nothing."""
 
 
-def own_part(name: str) -> str:
+def read_part(name: str) -> str:
     """Return the text of a file of this folder."""
     return (FOLDER / name).read_text(encoding='utf-8')
 
@@ -35,7 +35,7 @@ def load_plotly() -> str:
 
 
 _TEMPLATES = Environment(autoescape=True, undefined=StrictUndefined, loader=FileSystemLoader(FOLDER), trim_blocks=True)
-_TEMPLATES.globals.update(policy=POLICY, source=own_part, plotly=load_plotly)
+_TEMPLATES.globals.update(policy=POLICY, source=read_part, plotly=load_plotly)
 _TEMPLATES.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
 _PARTS: Any = _TEMPLATES.get_template('parts.html').module
 
@@ -45,21 +45,21 @@ def render(template: str, **values: Any) -> str:
     return _TEMPLATES.get_template(template).render(values)
 
 
-def page_of(title: str, body: str, warnings: Sequence[str] = ()) -> str:
+def render_page(title: str, body: str, warnings: Sequence[str] = ()) -> str:
     """Return a page with a title, warnings on top, and a body of HTML."""
     return render('frame.html', title=title, body=body, warnings=warnings)
 
 
-def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def render_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a table as HTML; the first cell of a row is its heading; columns may be empty."""
     return str(_PARTS.table(columns, rows))
 
 
-def picture(file: Path, caption: str) -> str:
+def render_picture(file: Path, caption: str) -> str:
     """Return a figure as HTML that contains a PNG file."""
     return str(_PARTS.picture(base64.b64encode(file.read_bytes()).decode('ascii'), caption))
 
 
-def pictures(figures: Iterable[str]) -> str:
+def render_pictures(figures: Iterable[str]) -> str:
     """Return figures as HTML, as many side by side as the screen has room for."""
     return str(_PARTS.pictures(figures))

@@ -17,7 +17,7 @@ from foc_ros.core.errors import MessageError
 from foc_ros.core.types import NANOSECONDS, Obstacles, make_obstacles
 
 from .decode_point_cloud import MAX_ROWS
-from .decode_poses import MAX_COORDINATE, check_coordinate, stamp_of
+from .decode_poses import MAX_COORDINATE, check_coordinate, decode_stamp
 from .plane import project
 
 ADD, DELETE, DELETE_ALL = 0, 2, 3
@@ -67,7 +67,7 @@ class MarkerTable:
         frame_id, newest_ns, dropped = self.frame_id, 0, Counter[str]()
         for i, marker in enumerate(message.markers):
             name, key = f'markers[{i}]', (str(marker.ns), int(marker.id))
-            stamp_ns = stamp_of(marker.header, f'{name}.header.stamp')
+            stamp_ns = decode_stamp(marker.header, f'{name}.header.stamp')
             newest_ns = max(newest_ns, stamp_ns)
             if marker.action not in (ADD, DELETE, DELETE_ALL):
                 raise MessageError(f'{name}.action', 'ADD (0), DELETE (2) or DELETEALL (3)', marker.action)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from foc_ros.core.errors import MessageError
 from foc_ros.core.types import Array, Obstacles, make_obstacles
 
-from .decode_poses import MAX_COORDINATE, stamp_of
+from .decode_poses import MAX_COORDINATE, decode_stamp
 from .plane import project
 
 REQUIRED = ('x', 'y', 'z', 'radius')
@@ -44,7 +44,7 @@ def decode_point_cloud(message: Any, plane: str) -> DecodedCloud:
     of several rows with one id the last is used. Raises MessageError if the layout does not fit the data, a field is missing or
     of the wrong type, a radius or deviation is negative, or a number is beyond MAX_COORDINATE.
     """
-    stamp_ns, frame_id = stamp_of(message.header), str(message.header.frame_id)
+    stamp_ns, frame_id = decode_stamp(message.header), str(message.header.frame_id)
     table = read_table(message)
     if not len(table):
         return DecodedCloud(make_obstacles(), stamp_ns, frame_id, {})

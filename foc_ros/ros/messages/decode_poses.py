@@ -23,7 +23,7 @@ def decode_hand_sample(message: Any, plane: str) -> HandSample:
 
     Raises MessageError for a coordinate that is not finite or beyond MAX_COORDINATE, and for a stamp of 0, which means "not set".
     """
-    stamp_ns = stamp_of(message.header)
+    stamp_ns = decode_stamp(message.header)
     if stamp_ns == 0:
         raise MessageError('header.stamp', 'a time after 0', '0 s')
     position, height = project(_decode_point(message.pose.position, 'pose.position'), plane)
@@ -43,7 +43,7 @@ def decode_goal(message: Any, plane: str) -> tuple[Array, str]:
     return project([_decode_point(message.pose.position, 'pose.position')], plane)[0], str(message.header.frame_id)
 
 
-def stamp_of(header: Any, field: str = 'header.stamp') -> int:
+def decode_stamp(header: Any, field: str = 'header.stamp') -> int:
     """Decode the stamp of a std_msgs/Header [ns]; field: its name in errors."""
     seconds, nanoseconds = int(header.stamp.sec), int(header.stamp.nanosec)
     if seconds < 0:

@@ -10,7 +10,7 @@ import numpy as np
 
 from foc_ros.core.types import Array
 
-from .types import MessageTypes, header
+from .types import MessageTypes, make_header
 
 _NAMES = ('x', 'y', 'z', 'radius', 'radius_stddev', 'id')
 _DATATYPES = {'<i4': 5, '<u4': 6, '<f4': 7}
@@ -33,22 +33,22 @@ def _no_rotation(types: MessageTypes) -> Any:
     return types.make('geometry_msgs/msg/Quaternion', w=1.0)
 
 
-def hand_pose(types: MessageTypes, stamp_ns: int, frame_id: str, position: Iterable[float]) -> Any:
+def encode_hand_pose(types: MessageTypes, stamp_ns: int, frame_id: str, position: Iterable[float]) -> Any:
     """Encode a geometry_msgs/PoseStamped."""
     return types.make(
-        'geometry_msgs/msg/PoseStamped', header=header(types, stamp_ns, frame_id), pose=encode_pose(types, position)
+        'geometry_msgs/msg/PoseStamped', header=make_header(types, stamp_ns, frame_id), pose=encode_pose(types, position)
     )
 
 
-def goal_poses(types: MessageTypes, stamp_ns: int, frame_id: str, positions: Array) -> Any:
+def encode_goals(types: MessageTypes, stamp_ns: int, frame_id: str, positions: Array) -> Any:
     """Encode goals (g, 3) as a geometry_msgs/PoseArray."""
     poses = [encode_pose(types, position) for position in positions]
-    return types.make('geometry_msgs/msg/PoseArray', header=header(types, stamp_ns, frame_id), poses=poses)
+    return types.make('geometry_msgs/msg/PoseArray', header=make_header(types, stamp_ns, frame_id), poses=poses)
 
 
-def obstacle_cloud(types: MessageTypes, stamp_ns: int, frame_id: str, rows: Sequence[tuple[float, ...]]) -> Any:
+def encode_obstacles(types: MessageTypes, stamp_ns: int, frame_id: str, rows: Sequence[tuple[float, ...]]) -> Any:
     """Encode obstacles (x, y, z, radius, radius_stddev, id) as a sensor_msgs/PointCloud2."""
-    return encode_table(types, header(types, stamp_ns, frame_id), np.array(rows, dtype=CLOUD_ROW))
+    return encode_table(types, make_header(types, stamp_ns, frame_id), np.array(rows, dtype=CLOUD_ROW))
 
 
 def encode_table(types: MessageTypes, cloud_header: Any, table: np.ndarray[Any, np.dtype[np.void]]) -> Any:

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Prediction
 
 from .plane import lift
-from .ranking import ranked
-from .types import MessageTypes, header
+from .ranking import order_candidates
+from .types import MessageTypes, make_header
 
 CYLINDER, LINE_STRIP, TEXT = 3, 4, 9
 DELETE_ALL = 3
@@ -42,7 +42,7 @@ def encode_markers(prediction: Prediction, obstacles: Obstacles, plane: str, typ
     encoder = _MarkerEncoder(prediction, plane, types)
     unsolved = [outcome for outcome in prediction.candidates if not outcome.is_solved]
     markers = [encoder.encode('', 0, 0, action=DELETE_ALL)]
-    for index, outcome in enumerate([*ranked(prediction), *unsolved]):
+    for index, outcome in enumerate([*order_candidates(prediction), *unsolved]):
         markers.extend(encoder.encode_candidate(index, outcome))
     markers.extend(encoder.encode_obstacles(obstacles))
     return types.make('visualization_msgs/msg/MarkerArray', markers=markers)
@@ -59,7 +59,7 @@ class _MarkerEncoder:
     @cached_property
     def _shared_fields(self) -> dict[str, Any]:
         return {
-            'header': header(self.types, self.prediction.stamp_ns, self.prediction.frame_id),
+            'header': make_header(self.types, self.prediction.stamp_ns, self.prediction.frame_id),
             'lifetime': self.types.make('builtin_interfaces/msg/Duration', sec=int(LIFETIME_S)),
         }
 

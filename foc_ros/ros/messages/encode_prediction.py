@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from foc_ros.core.types import NANOSECONDS, Obstacles, Prediction
 
-from .encode_inputs import encode_table, hand_pose
+from .encode_inputs import encode_hand_pose, encode_table
 from .encode_markers import encode_markers
 from .plane import lift
-from .ranking import cost_ratios, ranked
-from .types import MessageTypes, header
+from .ranking import compute_cost_ratios, order_candidates
+from .types import MessageTypes, make_header
 
 _FLOATS = ('x', 'y', 'z', 't', 'vx', 'vy', 'vz', 'xx', 'xy', 'xz', 'yy', 'yz', 'zz')
 CLOUD_ROW = np.dtype([*((name, '<f4') for name in _FLOATS), ('candidate', '<u4'), ('likelihood', '<f4')])
@@ -26,14 +26,14 @@ CLOUD_ROW = np.dtype([*((name, '<f4') for name in _FLOATS), ('candidate', '<u4')
 LIKELIHOOD_COLUMNS = ('likelihood', 'effort', 'cost_ratio', 'eta')
 
 
-def prediction_cloud(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
+def encode_prediction_cloud(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
     """Encode all solved candidates as a PointCloud2 of N + 1 rows each; no rows if nothing was solved."""
-    return encode_table(types, header(types, prediction.stamp_ns, prediction.frame_id), _build_table(prediction, plane))
+    return encode_table(types, make_header(types, prediction.stamp_ns, prediction.frame_id), _build_table(prediction, plane))
 
 
 def _build_table(prediction: Prediction, plane: str) -> NDArray[np.void]:
     """Return the rows of all solved candidates, one candidate after the other, filled column by column."""
-    outcomes = ranked(prediction)
+    outcomes = order_candidates(prediction)
     solutions = [outcome.solution for outcome in outcomes]
     lengths = [len(solution.mean) for solution in solutions]
     rows = np.zeros(sum(lengths), dtype=CLOUD_ROW)
@@ -50,13 +50,13 @@ def _build_table(prediction: Prediction, plane: str) -> NDArray[np.void]:
     return rows
 
 
-def likelihood_array(prediction: Prediction, types: MessageTypes) -> Any:
+def encode_likelihoods(prediction: Prediction, types: MessageTypes) -> Any:
     """Encode one row per solved candidate, with the columns LIKELIHOOD_COLUMNS, as a Float64MultiArray.
 
     The first dimension's label joins the labels of the candidates by ';'. effort: the remaining one [m^2/s^6].
     """
-    outcomes = ranked(prediction)
-    ratios = cost_ratios(outcomes)
+    outcomes = order_candidates(prediction)
+    ratios = compute_cost_ratios(outcomes)
     rows = [(o.likelihood, o.solution.effort, ratio, o.solution.eta) for o, ratio in zip(outcomes, ratios, strict=True)]
     labels, width = ';'.join(outcome.candidate.label for outcome in outcomes), len(LIKELIHOOD_COLUMNS)
     dimensions = [
@@ -71,24 +71,27 @@ def encode_path(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
     """Encode the most likely candidate as a nav_msgs/Path with stamps in the future; no poses if nothing was solved."""
     stamp_ns, frame_id = prediction.stamp_ns, prediction.frame_id
     poses: list[Any] = []
-    for outcome in ranked(prediction)[:1]:
+    for outcome in order_candidates(prediction)[:1]:
         points = lift(outcome.solution.path, prediction.height, plane).tolist()
         for seconds, point in zip(outcome.solution.times.tolist(), points, strict=True):
-            poses.append(hand_pose(types, stamp_ns + round(seconds * NANOSECONDS), frame_id, point))
-    return types.make('nav_msgs/msg/Path', header=header(types, stamp_ns, frame_id), poses=poses)
+            poses.append(encode_hand_pose(types, stamp_ns + round(seconds * NANOSECONDS), frame_id, point))
+    return types.make('nav_msgs/msg/Path', header=make_header(types, stamp_ns, frame_id), poses=poses)
 
 
 Encoder = Callable[[Prediction, Obstacles, str, MessageTypes], Any]
 OUTPUTS: dict[str, tuple[str, Encoder]] = {
-    'prediction': ('sensor_msgs/msg/PointCloud2', lambda prediction, _, plane, types: prediction_cloud(prediction, plane, types)),
-    'likelihoods': ('std_msgs/msg/Float64MultiArray', lambda prediction, _, __, types: likelihood_array(prediction, types)),
+    'prediction': (
+        'sensor_msgs/msg/PointCloud2',
+        lambda prediction, _, plane, types: encode_prediction_cloud(prediction, plane, types),
+    ),
+    'likelihoods': ('std_msgs/msg/Float64MultiArray', lambda prediction, _, __, types: encode_likelihoods(prediction, types)),
     'path': ('nav_msgs/msg/Path', lambda prediction, _, plane, types: encode_path(prediction, plane, types)),
     'markers': ('visualization_msgs/msg/MarkerArray', encode_markers),
 }
 """Message type and encoder of every output, by the name of its topic below the node's name."""
 
 
-def output_messages(
+def encode_outputs(
     prediction: Prediction, obstacles: Obstacles, plane: str, types: MessageTypes, wanted: Iterable[str] = OUTPUTS
 ) -> dict[str, Any]:
     """Encode the wanted outputs, by name; obstacles: those at the stamp, for the markers. Raises FocError as `ranked` does."""

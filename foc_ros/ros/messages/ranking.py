@@ -16,7 +16,7 @@ MAX_RATIO = 1e9
 
 
 @lru_cache(maxsize=1)
-def ranked(prediction: Prediction) -> tuple[PredictedCandidate, ...]:
+def order_candidates(prediction: Prediction) -> tuple[PredictedCandidate, ...]:
     """Return the solved candidates: the one called most likely (which changes only by a margin), then by likelihood.
 
     The result for the last prediction is cached, because every output needs it. Raises FocError, naming the candidate, for a
@@ -32,7 +32,7 @@ def ranked(prediction: Prediction) -> tuple[PredictedCandidate, ...]:
     return tuple(sorted(prediction.solved_candidates, key=lambda outcome: outcome.candidate.label != prediction.most_likely))
 
 
-def cost_ratios(outcomes: tuple[PredictedCandidate, ...]) -> list[float]:
+def compute_cost_ratios(outcomes: tuple[PredictedCandidate, ...]) -> list[float]:
     """Return each candidate's cost divided by the least one: 1 for the best, at most MAX_RATIO."""
     costs = [outcome.cost for outcome in outcomes]
     least = min(costs, default=0.0)

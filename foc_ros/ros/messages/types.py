@@ -124,12 +124,12 @@ def _find_converter(default: Any) -> Callable[[Any], Any]:
     return type(default) if isinstance(default, (float, int, str, list)) else lambda value: value
 
 
-def stamp(types: MessageTypes, stamp_ns: int) -> Any:
+def make_stamp(types: MessageTypes, stamp_ns: int) -> Any:
     """Return a builtin_interfaces/Time of nanoseconds; beyond its 32 bits, the seconds are the first or last possible."""
     seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
     return types.make('builtin_interfaces/msg/Time', sec=min(max(seconds, -(2**31)), 2**31 - 1), nanosec=nanoseconds)
 
 
-def header(types: MessageTypes, stamp_ns: int, frame_id: str) -> Any:
+def make_header(types: MessageTypes, stamp_ns: int, frame_id: str) -> Any:
     """Return a std_msgs/Header."""
-    return types.make('std_msgs/msg/Header', stamp=stamp(types, stamp_ns), frame_id=frame_id)
+    return types.make('std_msgs/msg/Header', stamp=make_stamp(types, stamp_ns), frame_id=frame_id)

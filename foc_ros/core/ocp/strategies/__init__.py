@@ -38,7 +38,7 @@ class StrategyResult:
         Clearance term [m^2] and weight of the variances lambda [1/s^6] that the control belongs to.
     qp_solves, iterations
         QPs solved; iterations of a loop that the strategy counts besides, None if there is none.
-    slope
+    safety_factor_slope
         dk/ds on the penalty path at the control, 0 where not known.
     minimum
         The minimum safety factor over all times, for a strategy that keeps clear between the steps too. None: it is evaluated at
@@ -57,7 +57,7 @@ class StrategyResult:
     lam: float = 0.0
     qp_solves: int = 0
     iterations: int | None = None
-    slope: float = 0.0
+    safety_factor_slope: float = 0.0
     minimum: MinimumSafetyFactor | None = None
     equivalent_weights: list[tuple[float, float]] | None = None
     aims_at_eta: bool = True

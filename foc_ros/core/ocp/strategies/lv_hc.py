@@ -78,7 +78,9 @@ def _result(follower: PathFollower, status: Status, message: str, point: PathPoi
     """Return the result that ends at a point."""
     control, contacts, minimum = point.solution
     weights = follower.path.at(point.s)
-    return StrategyResult(status, message, control, contacts, *weights, follower.qp_solves, slope=slope, minimum=minimum)
+    return StrategyResult(
+        status, message, control, contacts, *weights, follower.qp_solves, safety_factor_slope=slope, minimum=minimum
+    )
 
 
 def _search(follower: PathFollower, start: Start) -> StrategyResult:
@@ -94,14 +96,14 @@ def _search(follower: PathFollower, start: Start) -> StrategyResult:
         if first is None:
             first = follower.solve_first(start.positions, angles)
         else:
-            stride, patience = _stride_to(first, wanted, start.slope or USUAL_SLOPE, WARM_STRIDE), PATIENCE
+            stride, patience = _stride_to(first, wanted, start.safety_factor_slope or USUAL_SLOPE, WARM_STRIDE), PATIENCE
     if first is None:
         return find_best_effort(problem, start, *follower.path.at(0.0), follower.qp_solves)
     low, high = _bracket(follower, first, wanted, stride, patience)
     if high is None:
         message = f'eta {problem.eta:g} is out of reach: the largest on the path is {eta_of_k(low.k):.4g}, at s = {low.s:.3g}'
         return _result(follower, Status.ETA_UNREACHABLE, message, low)
-    point, slope = high, start.slope
+    point, slope = high, start.safety_factor_slope
     if low is not high:
         point, slope = _find_root(follower, low, high, wanted, is_warm=start.lam is not None)
     if not follower.is_verified(point):
