@@ -18,7 +18,7 @@ obstacles = [
 ]
 values = {'homotopy.max_candidates': 8, 'foc.eta': 0.8, 'foc.noise_x': 0.02, 'foc.noise_y': 0.02, 'likelihood.beta': 1.0}
 config = foc_ros.Config().with_values(values)
-candidates = foc_ros.solve_classes((0.0, 0.0), [(0.4, 0.05), (0.4, -0.05)], obstacles, config=config)
+candidates = foc_ros.solve_classes((0.0, 0.0), [(0.4, -0.05), (0.4, 0.05)], obstacles, config=config)
 for candidate in candidates:
     print(f'{candidate.label:24} {candidate.status.value:16} likelihood {candidate.likelihood:.2f}')
 

@@ -28,7 +28,7 @@ from foc_ros.reporting.plots import save_figure
 PICTURE = Path(__file__).resolve().parents[1] / 'doc' / 'images' / 'contacts.png'
 STEPS, DURATION_S = 50, 1.0
 GOAL = np.array([0.3, 0.0])
-CENTRE, RADIUS, RADIUS_STDDEV = np.array([0.12, 0.0]), 0.03, 0.003
+CENTRE, RADIUS, RADIUS_STDDEV = (0.12, 0.0), 0.03, 0.003
 NOISE, ETA = 0.15, 0.89
 ETAS = np.linspace(0.8, 0.95, 61)
 STRIDE = 0.05
