@@ -76,8 +76,8 @@ def interpolate(solution: Solution, times: Array) -> Array:
 
 def draw_circle(axes: Any, kept: float) -> None:
     """Draw the obstacle and the circle that the mean has to keep clear of."""
-    axes.add_patch(Circle(tuple(CENTRE), RADIUS, facecolor='0.75', edgecolor='0.4'))
-    axes.add_patch(Circle(tuple(CENTRE), kept, facecolor='none', edgecolor='0.4', linestyle='--'))
+    axes.add_patch(Circle((float(CENTRE[0]), float(CENTRE[1])), RADIUS, facecolor='0.75', edgecolor='0.4'))
+    axes.add_patch(Circle((float(CENTRE[0]), float(CENTRE[1])), kept, facecolor='none', edgecolor='0.4', linestyle='--'))
 
 
 def make_figure() -> Figure:

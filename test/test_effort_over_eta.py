@@ -30,9 +30,9 @@ DECREASES = {'case9-optimal': 'from eta = 0.545 on, the solver ends in another m
 
 
 def expect_failure(request: pytest.FixtureRequest, known: dict[str, str]) -> None:
-    """Mark the test as failing if its parameters are a known exception."""
+    """Mark a known exception. It may pass: rounding decides between two minima."""
     if request.node.callspec.id in known:
-        request.applymarker(pytest.mark.xfail(reason=known[request.node.callspec.id]))
+        request.applymarker(pytest.mark.xfail(reason=known[request.node.callspec.id], strict=False))
 
 
 def solve_for_etas(seed: int, strategy: str, etas: np.ndarray) -> list[Solution]:

@@ -69,7 +69,7 @@ def test_a_baseline_from_outside_is_compared(
         extended.register(name, BASELINES.get(name))
     monkeypatch.setattr('foc_ros.analysis.evaluation.baselines.BASELINES', extended)
     register_baseline('first answer', forecast_first, [0.0, 0.5])
-    with pytest.raises(InputError, match='baseline: expected a new name beside foc, foc, held out'):
+    with pytest.raises(InputError, match='baseline: expected a new name besides foc, foc, held out'):
         register_baseline('uniform', forecast_first)
     found = answer(tables, capsys)
     assert list(found['questions']['way'])[-2:] == ['straight minimum jerk', 'first answer']

@@ -149,7 +149,7 @@ def test_a_silent_hand_is_reported(ros: Graph) -> None:
     assert re.match(r'no prediction: hand_pose silent for \d+\.\d s', status.message)
 
 
-@pytest.mark.parametrize('where', ['predict', 'output_messages'])
+@pytest.mark.parametrize('where', ['predict', 'encode_outputs'])
 def test_an_internal_error_is_counted_and_reported_and_the_node_goes_on(
     ros: Graph, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:

@@ -135,7 +135,7 @@ def test_only_subscribed_outputs_are_encoded(ros: Graph, monkeypatch: pytest.Mon
     from foc_ros.ros import node
 
     asked: list[list[str]] = []
-    monkeypatch.setattr(node, 'output_messages', lambda *args: asked.append(list(args[-1])) or encode_outputs(*args))
+    monkeypatch.setattr(node, 'encode_outputs', lambda *args: asked.append(list(args[-1])) or encode_outputs(*args))
     bench = Bench(ros, outputs=['likelihoods'])
     bench.publish_scene()
     bench.move(hand_path(1))

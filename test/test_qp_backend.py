@@ -8,7 +8,7 @@ from reach_helpers import bowed, one_obstacle, reach
 
 from foc_ros.core.config import FocConfig
 from foc_ros.core.errors import InputError
-from foc_ros.core.ocp.backend import QP_BACKENDS, Answer, DenseQP, solve_named, solve_piqp
+from foc_ros.core.ocp.backend import Answer, DenseQP, solve_named, solve_piqp
 from foc_ros.core.ocp.qp import clearance_qp, effort_cost
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import cold_start
@@ -19,19 +19,9 @@ BOWED = bowed((0, 0), (0.3, 0), 50, 0.08)
 OTHERS = pytest.mark.parametrize('backend', ['daqp', 'quadprog'])
 
 
-class Settings:
-    """The settings of a strategy with a QP backend."""
-
-    def __init__(self, backend: str, **values) -> None:
-        self.qp_backend, self.settings = backend, FocConfig(**values)
-
-    def __getattr__(self, name: str):
-        return getattr(self.settings, name)
-
-
 def solved_by(backend: str, strategy: str, **values):
     problem = one_obstacle(0.85)
-    return solve_problem(problem, cold_start(BOWED), Settings(backend, strategy=strategy, **values))
+    return solve_problem(problem, cold_start(BOWED), FocConfig(qp_backend=backend, strategy=strategy, **values))
 
 
 @OTHERS

@@ -72,7 +72,7 @@ def _solve_candidate(
 
 def _check_class(candidate: Candidate, problem: Problem, solution: Solution, costs: CostModel) -> PredictedCandidate:
     """Find the homotopy class in which a solution really is, and its cost; the status says if it left the candidate's class."""
-    sides = find_path_sides(solution.path, problem.obstacles, problem.courses)
+    sides = find_path_sides(solution.path, problem.obstacles, problem.centre_trajectories)
     if solution.status is Status.SOLVED and any(sides.get(identity, side) != side for identity, side in candidate.sides):
         solution = replace(solution, status=Status.LEFT_CLASS, message='the solution moved into another homotopy class')
     return PredictedCandidate(candidate, solution, sides, costs.compute_cost(solution), 0.0)

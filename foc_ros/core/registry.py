@@ -54,8 +54,10 @@ class QPBackendRegistry(Registry):
         return super().__contains__(name) or name in _find_qpsolvers()
 
     def get(self, name: str) -> Any:
-        """Return the solver of a name, a function from `DenseQP` to `Answer`."""
-        if not super().__contains__(name) and name in self:
+        """Return the solver of a name, a function from `DenseQP` to `Answer`; raise InputError, which lists all names."""
+        if not super().__contains__(name):
+            if name not in (solvers := _find_qpsolvers()):
+                raise InputError(self.kind, f'one of {", ".join(dict.fromkeys((*self, *solvers)))}', repr(name))
             self._parts[name] = partial(import_module('foc_ros.core.ocp.backend').solve_named, backend=name)
         return super().get(name)
 

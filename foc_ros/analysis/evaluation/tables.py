@@ -74,7 +74,7 @@ def _list_facts(answer: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 def _format_setting(setting: Any) -> str:
     if isinstance(setting, Mapping):
-        return ', '.join(f'{name} {value:g}' for name, value in setting.items())
+        return ', '.join(f'{name} {_format_setting(value)}' for name, value in setting.items())
     if isinstance(setting, Sequence) and not isinstance(setting, str):
         return ', '.join(_format_setting(value) for value in setting)
     return f'{setting:.4g}' if isinstance(setting, float) else str(setting)

@@ -7,15 +7,11 @@ from __future__ import annotations
 
 import threading
 import warnings
-from collections.abc import Callable
-from functools import partial
-from typing import NamedTuple, TypeAlias, cast
+from typing import NamedTuple
 
 import numpy as np
 import piqp
 
-from foc_ros.core import registry
-from foc_ros.core.errors import InputError
 from foc_ros.core.types import Array
 
 ATTEMPTS = ((1e-10, 0.99, False), (1e-9, 0.9, False), (1e-7, 0.9, True))
@@ -45,27 +41,6 @@ class Answer(NamedTuple):
     solved: bool
     x: Array
 
-
-Solver: TypeAlias = Callable[[DenseQP], Answer]
-# the registry of the whole package, where it has one for QP backends
-QP_BACKENDS = getattr(registry, 'QP_BACKENDS', None) or registry.Registry('QP backend', {'piqp': f'{__name__}:solve_piqp'})
-
-
-def find_solver(name: str) -> Solver:
-    """Return the registered solver of a name, or else the one that qpsolvers has under it.
-
-    Raises
-    ------
-    InputError
-        If neither knows the name.
-    """
-    if name in QP_BACKENDS:
-        return cast('Solver', QP_BACKENDS.get(name))
-    from qpsolvers import available_solvers
-
-    if name not in available_solvers:
-        raise InputError('QP backend', f'one of {", ".join(dict.fromkeys((*QP_BACKENDS, *available_solvers)))}', repr(name))
-    return partial(solve_named, backend=name)
 
 
 def solve_piqp(qp: DenseQP, attempts: int = len(ATTEMPTS)) -> Answer:

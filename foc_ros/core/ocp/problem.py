@@ -93,7 +93,7 @@ class Problem(Record):
         )
         motion = Motion(self.horizon.motion, np.ascontiguousarray(self.free[:, :4].T * scale[:, None]))
         cost = CostTerms(self.weighted_variance, self.summed_variance, *self.goal_rows)
-        return freeze(ProblemTerms(motion, cost, chance, self.courses, self.extent))
+        return freeze(ProblemTerms(motion, cost, chance, self.centre_trajectories, self.extent))
 
     @cached_property
     def free(self) -> Array:
@@ -114,14 +114,14 @@ class Problem(Record):
         return as_readonly(self.obstacles.velocity * self.horizon.dt)
 
     @cached_property
-    def courses(self) -> Array:
+    def centre_trajectories(self) -> Array:
         """Mean centres of the obstacles at steps 0..N, (N + 1, m, 2) [m]."""
         return centre_trajectories(self.obstacles.centre, self.drift, self.horizon.steps)
 
     @property
     def centres(self) -> Array:
         """Mean centres of the obstacles at steps 1..N, obstacle by obstacle, (m, N, 2) [m]."""
-        return self.courses[1:].swapaxes(0, 1)
+        return self.centre_trajectories[1:].swapaxes(0, 1)
 
     @cached_property
     def first_alike(self) -> NDArray[np.intp]:

@@ -49,9 +49,8 @@ def solve_problem(problem: Problem, start: Start, settings: FocConfig, deadline:
         strategy reached, or the smallest violation. No exception is raised for that.
     """
     began = time.perf_counter()
-    backend = getattr(settings, 'qp_backend', 'piqp')
-    if backend != problem.qp_backend:
-        problem = replace(problem, qp_backend=backend)
+    if settings.qp_backend != problem.qp_backend:
+        problem = replace(problem, qp_backend=settings.qp_backend)
     try:
         result: StrategyResult = STRATEGIES.get(settings.strategy)(problem, start, settings, deadline)
     except OutOfTimeError:

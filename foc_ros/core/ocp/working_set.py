@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from foc_ros.core.kernels import Indices, Matrix, Vector, compiled
 from foc_ros.core.linear_algebra import factorise_cholesky, multiply_vector, solve_lower, solve_lower_transposed
+from foc_ros.core.registry import QP_BACKENDS
 from foc_ros.core.types import Array
 
-from .backend import DenseQP, find_solver, solve_piqp
+from .backend import DenseQP, solve_piqp
 from .qp import GoalSolution, ObstacleRows, ReachingQP, collect_rows, find_violated, schur_complement
 
 Index = NDArray[np.intp]
@@ -159,7 +160,7 @@ def solve_dual(dual: DualQP, backend: str, *, elastic: bool = False) -> Array | 
     gram, missing = dual.gram, dual.missing
     if dual.immovable > TOLERANCE and not elastic:
         return DualStatus.CONTRADICTION
-    answer = find_solver(backend)(DenseQP(gram.T, -missing, lower=np.zeros(len(missing))))
+    answer = QP_BACKENDS.get(backend)(DenseQP(gram.T, -missing, lower=np.zeros(len(missing))))
     if not answer.solved:
         # Farkas: a combination y >= 0 of the rows that changes nothing although something is missing
         ray = answer.x / max(float(answer.x.max()), 1e-300)
@@ -258,7 +259,7 @@ def solve_full(qp: ReachingQP, backend: str | None = None) -> QPSolution | None:
         qp.rows(obstacle, step) * unit,
         qp.limits.ravel(),
     )
-    scaled = solve_piqp(dense, attempts=1) if backend == 'piqp' else find_solver(backend)(dense)
+    scaled = solve_piqp(dense, attempts=1) if backend == 'piqp' else QP_BACKENDS.get(backend)(dense)
     if not scaled.solved:
         return None
     control = unit * scaled.x

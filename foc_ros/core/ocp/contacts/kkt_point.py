@@ -150,7 +150,7 @@ def find_crossings(problem: Problem, control: Array, tau: float) -> Array:
 
 def compute_class_angles(problem: Problem, control: Array) -> Array:
     """Return the angles (m,) that the mean of a control (2N,) sweeps about the centres, which define its homotopy class."""
-    return compute_swept_angles(problem.trajectory(control)[:2].T, problem.courses)
+    return compute_swept_angles(problem.trajectory(control)[:2].T, problem.centre_trajectories)
 
 
 def is_in_class(problem: Problem, control: Array, class_angles: Array) -> bool:

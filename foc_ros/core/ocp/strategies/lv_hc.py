@@ -90,7 +90,7 @@ def _search(follower: PathFollower, start: Start) -> StrategyResult:
         first = follower.solve_first(start.positions)
     else:
         positions = np.concatenate((problem.initial_mean[None, :2], start.positions))
-        angles = compute_swept_angles(positions, problem.courses)
+        angles = compute_swept_angles(positions, problem.centre_trajectories)
         control, contacts = correct_to_goal(problem, start.control, start.positions), start.contacts.merge(problem.first_alike)
         first = follower.solve_by_newton(follower.path.s_of(start.lam), control, contacts, angles)
         if first is None:
