@@ -13,20 +13,17 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import foc_ros
-from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
-from foc_ros.core.ocp.strategies import StrategyResult
-from foc_ros.core.registry import STRATEGIES
 
 LARGEST_TAU, BISECTIONS = 0.01, 25
 
 
-def solve_constant_precision(problem, start, settings, deadline) -> StrategyResult:
+def solve_constant_precision(problem, start, settings, deadline) -> foc_ros.StrategyResult:
     """Return the solution with the smallest tau that meets eta at lambda = foc.lam."""
 
-    def solve(tau: float) -> tuple[StrategyResult, bool]:
-        result = STRATEGIES.get('fixed')(problem, start, replace(settings, tau=tau), deadline)
-        eta = find_minimum_safety_factor(problem, result.control, between_steps=False).eta
-        return replace(result, aims_at_eta=True), result.status is foc_ros.Status.SOLVED and eta >= problem.eta
+    def solve(tau: float) -> tuple[foc_ros.StrategyResult, bool]:
+        result = foc_ros.get_strategy('fixed')(problem, start, replace(settings, tau=tau), deadline)
+        is_enough = foc_ros.compute_eta(problem, result.control) >= problem.eta
+        return replace(result, aims_at_eta=True), is_enough and result.status is foc_ros.Status.SOLVED
 
     low, high = 0.0, LARGEST_TAU
     best, is_enough = solve(high)
