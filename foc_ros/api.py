@@ -401,7 +401,8 @@ def plot_candidates(candidates: Sequence[PredictedCandidate], axes: Any = None) 
     problems = [each.solution.problem for each in candidates if isinstance(each.solution, Solution) and each.solution.problem]
     if not problems:
         raise InputError('candidates', 'results of foc_ros.solve_classes', repr(candidates))
-    goals = np.unique([problem.goal[:2] for problem in problems], axis=0)
+    by_number = {each.candidate.goal: problem.goal[:2] for each, problem in zip(candidates, problems, strict=True)}
+    goals = np.array([by_number[number] for number in sorted(by_number)])
     shown = Prediction(0, '', 0.0, tuple(candidates), candidates[0].label, obstacles=problems[0].obstacles, goals=goals)
     return shown.plot(axes)
 

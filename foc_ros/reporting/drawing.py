@@ -34,8 +34,6 @@ CLASS_COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9
 """Colours of Okabe and Ito, without yellow (invisible on white) and black (used for the measured hand)."""
 NO_CLASS_COLOUR = '#777777'
 """Colour of a candidate without a slot."""
-LIKELIHOOD_COLOURS = mpl.colormaps['viridis_r']
-"""Colours of a share from 0 (pale) to 1 (dark)."""
 CLASSES = 2 * len(CLASS_COLOURS)
 """Number of slots: pairs of a colour and a dash, each with its letter."""
 STDDEVS = 1.0

@@ -11,7 +11,7 @@ from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 
 from foc_ros.core.types import Array, Solution, Status
-from foc_ros.reporting.drawing import LIKELIHOOD_COLOURS, get_class_style, open_figure
+from foc_ros.reporting.drawing import get_class_style, open_figure
 
 from .page import format_table
 from .scenes import Scene, build_one_obstacle, build_random
@@ -101,7 +101,7 @@ def draw(measured: list[Solutions]) -> Figure:
     with open_figure(9.6, 4.6) as figure:
         panels = figure.subplots(1, 2, sharey=True)
         for axes, (rate, delta) in zip(panels, DELTAS.items(), strict=True):
-            drawn = axes.contourf(1e3 * taus, lams, achieved, contours, cmap=LIKELIHOOD_COLOURS, norm=BoundaryNorm(contours, 256))
+            drawn = axes.contourf(1e3 * taus, lams, achieved, contours, cmap='viridis_r', norm=BoundaryNorm(contours, 256))
             axes.contour(1e3 * taus, lams, achieved, [case.eta], colors='black', linewidths=1.6)
             _draw_steps(axes, delta, [solutions[rate, growth] for growth in GROWTHS], solutions[rate, None])
             axes.set(yscale='log', ylim=(1.0, lams[-1]), xlim=(0.0, 4.0), xlabel='τ [10⁻³ m²]')
