@@ -5,6 +5,7 @@
 
 The script does not import `foc_ros`. It implements dynamics, constraints and costs again, from the equations of `doc/model.md`.
 
+- `single_qp`: the QP linearised once, at the guess, by quadprog.
 - `converged_qp`: the reformulated problem at a given (tau, lambda). quadprog solves the full condensed QP, and the obstacle
   constraint is linearised at each solution until the mean converges.
 - `min_effort_at_eta`: the least effort subject to the un-linearised surrogate E + k sqrt(Var) <= 0 at every step, by IPOPT with
@@ -85,50 +86,68 @@ def passed_sides(path: Array, case: dict[str, Any]) -> list[int]:
     return sides
 
 
-def solve_converged_qp(case: dict[str, Any], tau: float, lam: float) -> dict[str, Any] | None:
-    """Return the solution at (tau, lambda), or None where a QP is infeasible or the linearisation does not converge."""
+def solve_linearised_qp(case: dict[str, Any], path: Array, tau: float, lam: float) -> Array | None:
+    """Return the control (2N,) that solves the QP linearised at a path (N, 2), or None where there is none."""
     steps, dt = case['steps'], case['duration_s'] / case['steps']
     positions, last = condensed_maps(steps, dt)
-    unit = 1.0 / np.abs(last).max()
-    noise = np.array(case['noise'])
+    unit, noise, zero = 1.0 / np.abs(last).max(), np.array(case['noise']), np.zeros((3, steps))
     weights = [2 * (1 + lam * noise[axis] ** 2 * (positions**2).sum(axis=0)) for axis in range(2)]
-    hessian = np.diag(np.concatenate(weights))
-    zero = np.zeros((3, steps))
     equalities = unit * np.block([[last, zero], [zero, last]])
     targets = unit * np.array([case['goal'][0], 0, 0, case['goal'][1], 0, 0])
+    rows, limits = [], []
+    for obstacle in case['obstacles']:
+        centre = np.array([obstacle['x'], obstacle['y']])
+        size = obstacle['radius'] ** 2 + obstacle['radius_stddev'] ** 2 + tau
+        for step in range(steps):
+            offset = path[step] - centre
+            scale = 1.0 / (2 * np.hypot(*offset))
+            rows.append(2 * scale * np.concatenate((offset[0] * positions[step], offset[1] * positions[step])))
+            limits.append(scale * (size - offset @ offset + 2 * offset @ path[step]))
+    try:
+        control: Array = quadprog.solve_qp(
+            np.diag(np.concatenate(weights)),
+            np.zeros(2 * steps),
+            np.vstack((equalities, np.array(rows) / positions.max())).T,
+            np.concatenate((targets, np.array(limits) / positions.max())),
+            len(targets),
+        )[0]
+    except ValueError:
+        return None
+    return control
+
+
+def describe_control(case: dict[str, Any], control: Array, tau: float, lam: float) -> dict[str, Any]:
+    """Return what is kept of a solution: its effort, the middle of its path, its largest standard deviations, its sides."""
+    path = follow_control(case, control)
+    positions, _ = condensed_maps(case['steps'], case['duration_s'] / case['steps'])
+    variances = [c**2 * positions**2 @ axis**2 for c, axis in zip(case['noise'], control.reshape(2, -1), strict=True)]
+    return {
+        'tau': tau,
+        'lam': lam,
+        'effort': float(control @ control),
+        'mid': path[case['steps'] // 2 - 1].tolist(),
+        'stddev_max': [float(np.sqrt(each.max())) for each in variances],
+        'sides': passed_sides(path, case),
+    }
+
+
+def follow_control(case: dict[str, Any], control: Array) -> Array:
+    """Return the mean positions (N, 2) of a control (2N,)."""
+    positions, _ = condensed_maps(case['steps'], case['duration_s'] / case['steps'])
+    return np.stack([positions @ axis for axis in control.reshape(2, -1)], axis=1)
+
+
+def solve_converged_qp(case: dict[str, Any], tau: float, lam: float) -> dict[str, Any] | None:
+    """Return the solution at (tau, lambda), or None where a QP is infeasible or the linearisation does not converge."""
     path = guess_path(case)
     for _ in range(MAX_LINEARISATIONS):
-        rows, limits = [], []
-        for obstacle in case['obstacles']:
-            centre = np.array([obstacle['x'], obstacle['y']])
-            size = obstacle['radius'] ** 2 + obstacle['radius_stddev'] ** 2 + tau
-            for step in range(steps):
-                offset = path[step] - centre
-                scale = 1.0 / (2 * np.hypot(*offset))
-                rows.append(2 * scale * np.concatenate((offset[0] * positions[step], offset[1] * positions[step])))
-                limits.append(scale * (size - offset @ offset + 2 * offset @ path[step]))
-        try:
-            control = quadprog.solve_qp(
-                hessian,
-                np.zeros(2 * steps),
-                np.vstack((equalities, np.array(rows) / positions.max())).T,
-                np.concatenate((targets, np.array(limits) / positions.max())),
-                len(targets),
-            )[0]
-        except ValueError:
+        control = solve_linearised_qp(case, path, tau, lam)
+        if control is None:
             return None
-        mean = np.stack((positions @ control[:steps], positions @ control[steps:]), axis=1)
+        mean = follow_control(case, control)
         move, path = float(np.abs(mean - path).max()), mean
         if move < CONVERGED_M:
-            variances = [noise[axis] ** 2 * positions**2 @ control[axis * steps : (axis + 1) * steps] ** 2 for axis in range(2)]
-            return {
-                'tau': tau,
-                'lam': lam,
-                'effort': float(control @ control),
-                'mid': path[steps // 2 - 1].tolist(),
-                'stddev_max': [float(np.sqrt(each.max())) for each in variances],
-                'sides': passed_sides(path, case),
-            }
+            return describe_control(case, control, tau, lam)
     return None
 
 
@@ -167,8 +186,7 @@ def solve_least_effort(case: dict[str, Any], eta: float) -> dict[str, Any] | Non
     if not solver.stats()['success']:
         return None
     control = unit * np.asarray(answer['x']).ravel()
-    mean = np.stack((positions @ control[:steps], positions @ control[steps:]), axis=1)
-    return {'eta': eta, 'ipopt_effort': float(control @ control), 'sides': passed_sides(mean, case)}
+    return {'eta': eta, 'ipopt_effort': float(control @ control), 'sides': passed_sides(follow_control(case, control), case)}
 
 
 def main() -> None:
@@ -181,7 +199,10 @@ def main() -> None:
         converged, least = solve_converged_qp(case, tau, lam), solve_least_effort(case, [0.8, 0.9, 0.95][len(cases) % 3])
         if converged is None or least is None or converged['sides'] != least['sides']:
             continue
-        cases.append(case | {'converged_qp': converged, 'min_effort_at_eta': least})
+        first = solve_linearised_qp(case, guess_path(case), tau, lam)
+        assert first is not None
+        single = describe_control(case, first, tau, lam)
+        cases.append(case | {'single_qp': single, 'converged_qp': converged, 'min_effort_at_eta': least})
         print(f'{len(cases)}: {len(case["obstacles"])} obstacles, effort {least["ipopt_effort"]:.1f} at eta {least["eta"]}')
     OUTPUT.write_text(json.dumps(cases, indent=1) + '\n', encoding='utf-8')
 

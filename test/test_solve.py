@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from reach_helpers import reference_cases
 
 from foc_ros.cli.main import main
 from foc_ros.core.types import Candidate, PredictedCandidate, Solution, Status
 from foc_ros.io.json_output import encode_candidate, encode_solution
 
-CASES = Path(__file__).parents[2] / 'shared' / 'reference' / 'cases.json'
 SCENE: dict[str, Any] = {
     'start': [0.0, 0.0],
     'goal': [0.3, 0.0],
@@ -40,10 +40,8 @@ def candidates(
     return json.loads(captured.out)['candidates']
 
 
-@pytest.mark.skipif(not CASES.is_file(), reason='optional data ../shared/reference is not there')
-@pytest.mark.parametrize('row', range(10))
-def test_reference_cases(tmp_path: Path, capsys: pytest.CaptureFixture[str], row: int) -> None:
-    case = json.loads(CASES.read_text('utf-8'))[row]
+@pytest.mark.parametrize('case', reference_cases())
+def test_reference_cases(tmp_path: Path, capsys: pytest.CaptureFixture[str], case: dict[str, Any]) -> None:
     expected = case['converged_qp']
     scene = {name: case[name] for name in ('start', 'goal', 'duration_s', 'steps', 'noise', 'obstacles', 'guess')}
     (answer,) = candidates(tmp_path, capsys, {**scene, 'strategy': 'fixed', 'tau': expected['tau'], 'lambda': expected['lam']})
