@@ -18,8 +18,8 @@ from PIL import Image
 
 from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS
-from foc_ros.reporting.drawing import draw_candidates, draw_hand, draw_likelihoods, draw_scene, open_figure
-from foc_ros.reporting.plots import compute_bounds
+from foc_ros.reporting.drawing import draw_candidates, draw_hand, draw_scene, open_figure
+from foc_ros.reporting.plots import compute_bounds, draw_likelihoods
 from foc_ros.reporting.snapshots import HandTrajectory, Snapshot
 from foc_ros.reporting.track_association import build_candidate_tracks
 

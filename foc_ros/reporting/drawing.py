@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from string import ascii_uppercase
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +17,6 @@ from foc_ros.core.errors import FocError
 from foc_ros.core.types import NANOSECONDS, Array, Obstacles
 
 from .snapshots import CandidateView, HandTrajectory, Snapshot
-
-if TYPE_CHECKING:
-    from .track_association import CandidateTracks
 
 try:
     import matplotlib as mpl
@@ -148,22 +145,6 @@ def draw_movement(axes: Any, positions: Array, number: int) -> None:
     tail, head = positions[len(positions) * 2 // 3], positions[len(positions) * 3 // 4]
     axes.annotate('', head, tail, arrowprops={'arrowstyle': '-|>', 'color': colour, 'linewidth': 0.0, 'mutation_scale': 16})
     draw_tag(axes, positions[len(positions) * (2 + number % 2) // 6], str(number + 1), colour)
-
-
-def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None:
-    """Draw the likelihoods of the tracks that have a slot over time [s]; a track has a gap where it has no candidate."""
-    times = (np.array([each.stamp_ns for each in tracks.snapshots]) - origin_ns) / NANOSECONDS
-    drawn = {track: values for track, values in tracks.likelihoods().items() if track in tracks.slots}
-    for rank, (track, (first, values)) in enumerate(drawn.items()):
-        colour, dash = get_class_style(tracks.slots[track])
-        axes.plot(
-            times[first : first + len(values)], values, color=colour, linestyle=dash, linewidth=1.8, marker='.', markersize=2.5
-        )
-        known = np.flatnonzero(np.isfinite(values))
-        row = known[(2 * rank + 1) * len(known) // (2 * len(drawn))]
-        draw_tag(axes, (times[first + row], values[row]), get_letter(tracks.slots[track]), colour)
-    axes.set(ylim=(-0.03, 1.03), ylabel='likelihood')
-    axes.tick_params(labelbottom=False)
 
 
 def draw_speeds(

@@ -18,10 +18,12 @@ from .drawing import (
     Bounds,
     draw_candidates,
     draw_hand,
-    draw_likelihoods,
     draw_movement,
     draw_scene,
     draw_speeds,
+    draw_tag,
+    get_class_style,
+    get_letter,
     open_figure,
 )
 from .snapshots import CandidateView, HandTrajectory, build_candidate_views
@@ -34,6 +36,22 @@ if TYPE_CHECKING:
 WIDTH_IN = 6.4
 LINE_IN = 0.2
 """Height of a line of the legend [in]."""
+
+
+def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None:
+    """Draw the likelihoods of the tracks that have a slot over time [s]; a track has a gap where it has no candidate."""
+    times = (np.array([each.stamp_ns for each in tracks.snapshots]) - origin_ns) / NANOSECONDS
+    drawn = {track: values for track, values in tracks.likelihoods().items() if track in tracks.slots}
+    for rank, (track, (first, values)) in enumerate(drawn.items()):
+        colour, dash = get_class_style(tracks.slots[track])
+        axes.plot(
+            times[first : first + len(values)], values, color=colour, linestyle=dash, linewidth=1.8, marker='.', markersize=2.5
+        )
+        known = np.flatnonzero(np.isfinite(values))
+        row = known[(2 * rank + 1) * len(known) // (2 * len(drawn))]
+        draw_tag(axes, (times[first + row], values[row]), get_letter(tracks.slots[track]), colour)
+    axes.set(ylim=(-0.03, 1.03), ylabel='likelihood')
+    axes.tick_params(labelbottom=False)
 
 
 def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
