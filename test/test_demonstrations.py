@@ -140,7 +140,7 @@ def make_document(tmp_path):
 @pytest.mark.parametrize(
     ('break_it', 'words'),
     [
-        (lambda way: way.pop('path'), r'ways\[0\]: expected frame_id, passed and path'),
+        (lambda way: way.pop('path'), r'ways\[0\]: expected exactly frame_id, passed and path'),
         (lambda way: way['path'].pop(), r'ways\[0\].path: expected 65 points'),
         (lambda way: way['path'].__setitem__(3, [0, float('nan')]), r'ways\[0\].path\[3\]: expected two numbers within 1e\+06 m'),
         (lambda way: way['path'].__setitem__(3, [0, 10**400]), r'path\[3\]'),

@@ -1,4 +1,4 @@
 """Files: bags, CSV, YAML and JSON become recordings, scenes and class libraries, and the reverse.
 
-May import `foc_ros.core`; no file is executed, and every error names the file and the reason.
+May import `foc_ros.core`. Loading a file never runs code from it, and every error names the file and the reason.
 """

@@ -64,7 +64,7 @@ def _dump_demonstration(way: Demonstration) -> dict[str, Any]:
 
 def _read_demonstration(field: str, way: object) -> Demonstration:
     if not isinstance(way, Mapping) or set(way) != {'frame_id', 'passed', 'path'}:
-        raise InputError(field, 'frame_id, passed and path', _shorten(way))
+        raise InputError(field, 'exactly frame_id, passed and path', _shorten(way))
     frame_id, passed, path = way['frame_id'], way['passed'], way['path']
     if not isinstance(frame_id, str):
         raise InputError(f'{field}.frame_id', 'a text', _shorten(frame_id))

@@ -52,8 +52,8 @@ class Freshness:
     def note_pose(self, stamp_ns: int, clock_ns: int, timeout_s: float, *, is_restart: bool) -> None:
         """Store the age of a hand pose by ROS time.
 
-        Ages count once a movement has begun with a pose that is not older or newer than the timeout: a recording that is played
-        with its own stamps, without `use_sim_time`, has none of this age.
+        Ages count once a movement has begun with a pose that is not older or newer than the timeout. If a recording is played with
+        its own stamps and without `use_sim_time`, the age of its poses means nothing, and it is not checked.
         """
         self._age_s = (clock_ns - stamp_ns) / NANOSECONDS
         if clock_ns and (is_restart or not self._is_moving):
@@ -67,7 +67,7 @@ class Freshness:
     def find_not_ready_reason(self, now_s: float, config: Config, sources: Iterable[str]) -> tuple[str, str] | None:
         """Return why the clocks allow no prediction, as (kind, text); None if they allow it.
 
-        sources: of obstacles; one that is silent is enough, because its silence does not mean that its obstacles have gone.
+        sources: the sources of obstacles. If one of them is silent, nothing is predicted: its obstacles may still be there.
         """
         limit_s = config.estimator.hand_timeout_s
         silence_s = now_s - self._received_s.get(HAND, now_s)

@@ -97,7 +97,7 @@ def compute_calibration_error(scores: Scores) -> float:
 
 
 def find_final_leads(scores: Scores) -> dict[int, float]:
-    """Return, for each recording, the progress from which on the likeliest answer was the true one to the end; 1 for never."""
+    """Return, for each recording, the progress after which the likeliest answer stays correct to the end; 1 if it never does."""
     found = {}
     for recording in np.unique(scores.recording).astype(int).tolist():
         rows = np.flatnonzero(scores.recording == recording)
