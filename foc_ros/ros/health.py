@@ -52,8 +52,8 @@ class Freshness:
     def note_pose(self, stamp_ns: int, clock_ns: int, timeout_s: float, *, is_restart: bool) -> None:
         """Store the age of a hand pose by ROS time.
 
-        Ages count once a movement has begun with a pose that is not older or newer than the timeout. If a recording is played with
-        its own stamps and without `use_sim_time`, the age of its poses means nothing, and it is not checked.
+        Ages count once a movement has begun with a pose that is not older or newer than the timeout. If a recording is played
+        with its own stamps and without `use_sim_time`, the age of its poses means nothing, and it is not checked.
         """
         self._age_s = (clock_ns - stamp_ns) / NANOSECONDS
         if clock_ns and (is_restart or not self._is_moving):
