@@ -29,8 +29,8 @@ def compute_log_likelihoods(questions: Questions, baseline: Baseline) -> Array:
 def choose_held_out(table: Array, groups: Sequence[Hashable]) -> NDArray[np.intp]:
     """Choose for each recording the setting (r,) that is best for the recordings of all other groups, the first of equal ones.
 
-    table (r, s): log-likelihoods of recordings under settings; groups: the group of each recording. Where each is its own group, this is
-    leave-one-out cross-validation. A single group has no others, and all recordings are used.
+    table (r, s): log-likelihoods of recordings under settings; groups: the group of each recording. Where each is its own group,
+    this is leave-one-out cross-validation. A single group has no others, and all recordings are used.
     """
     rows = {group: [row for row, each in enumerate(groups) if each == group] for group in groups}
     total = table.sum(axis=0)
