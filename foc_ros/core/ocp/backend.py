@@ -42,7 +42,6 @@ class Answer(NamedTuple):
     x: Array
 
 
-
 def solve_piqp(qp: DenseQP, attempts: int = len(ATTEMPTS)) -> Answer:
     """Solve by PIQP, and if it fails again with other settings, up to a number of attempts.
 
