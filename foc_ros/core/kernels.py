@@ -32,35 +32,22 @@ Indices: TypeAlias = NDArray[np.intp]
 """One axis of whole numbers, of any stride; contiguous in a NamedTuple."""
 Table: TypeAlias = NDArray[np.intp]
 """Two axes of whole numbers."""
-Points: TypeAlias = NDArray[np.complex128]
-"""One axis of points of the plane."""
-PointTable: TypeAlias = NDArray[np.complex128]
-"""Two axes of points of the plane."""
 Flags: TypeAlias = NDArray[np.bool_]
 """One axis of truth values."""
 FlagTable: TypeAlias = NDArray[np.bool_]
 """Two axes of truth values."""
-Scratch: TypeAlias = NDArray[np.float64]
-"""One axis that the kernel may write to."""
-Register: TypeAlias = NDArray[np.intp]
-"""One axis of whole numbers that the kernel may write to."""
 
 _TYPES = {
     'float': types.float64,
     'int': types.intp,
     'bool': types.boolean,
-    'complex': types.complex128,
     'Vector': types.Array(types.float64, 1, 'C', readonly=True),
     'Matrix': types.Array(types.float64, 2, 'C', readonly=True),
     'Tensor': types.Array(types.float64, 3, 'C', readonly=True),
     'Indices': types.Array(types.intp, 1, 'A', readonly=True),
     'Table': types.Array(types.intp, 2, 'C', readonly=True),
-    'Points': types.Array(types.complex128, 1, 'C', readonly=True),
-    'PointTable': types.Array(types.complex128, 2, 'C', readonly=True),
     'Flags': types.Array(types.boolean, 1, 'C', readonly=True),
     'FlagTable': types.Array(types.boolean, 2, 'C', readonly=True),
-    'Scratch': types.Array(types.float64, 1, 'C'),
-    'Register': types.Array(types.intp, 1, 'C'),
 }
 _FIELD_TYPES = _TYPES | {'Indices': types.Array(types.intp, 1, 'C', readonly=True)}
 """In a NamedTuple a type has to match exactly: numba converts arrays from writeable to read-only or to any stride, not tuples."""
@@ -97,9 +84,9 @@ def compiled(kernel: Kernel) -> Kernel:
     Parameters
     ----------
     kernel
-        A function that writes only to `Scratch` and `Register` arguments and never raises. Each parameter is annotated by a
-        number type, by an alias of this module, or by a NamedTuple class whose fields are annotated so. Numba accepts a
-        NamedTuple only if all its arrays are C-contiguous and read-only: see `freeze`.
+        A function that does not write to its arguments and never raises. Each parameter is annotated by a number type, by an
+        alias of this module, or by a NamedTuple class whose fields are annotated so. Numba accepts a NamedTuple only if all its
+        arrays are C-contiguous and read-only: see `freeze`.
     """
     return _compile_entry(kernel, REORDERED)
 

@@ -1,8 +1,8 @@
 """Small dense linear algebra for the kernels: products of rows, Cholesky factors, triangular solves.
 
-The matrices have 2 to 12 rows and up to 2N = 100 columns. At 2, 6 and 12 rows, numpy's functions inside numba take so many times
-as long: `linalg.cholesky` and `solve` 4.1, 3.7 and 6.0; A @ B.T with 6 rows of B 5.1, 2.7 and 1.7; A @ B with 6 rows of B 2.5,
-1.2 and 0.9. Numpy also raises for a matrix that is not positive definite, where a kernel has to go on.
+The matrices have 2 to 12 rows and up to 2N = 100 columns. Each docstring says how many times as long numpy's function takes
+inside a numba kernel, measured for 2, 6 and 12 rows. Numpy also raises for a matrix that is not positive definite, where a kernel
+has to go on.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from .kernels import Matrix, Vector, compiled
 
 @compiled
 def multiply_transposed(a: Matrix, b: Matrix) -> Matrix:
-    """Return a b', (m, n), for rows a (m, q) and b (n, q)."""
+    """Return a b', (m, n), for rows a (m, q) and b (n, q); a @ b.T takes 5.6, 2.9 and 1.6 times as long with 6 rows of b."""
     m, n, q = a.shape[0], b.shape[0], a.shape[1]
     product = np.empty((m, n))
     for i in range(m):
@@ -28,7 +28,7 @@ def multiply_transposed(a: Matrix, b: Matrix) -> Matrix:
 
 @compiled
 def multiply(weights: Matrix, rows: Matrix) -> Matrix:
-    """Return weights @ rows, (m, q), for weights (m, n) and rows (n, q)."""
+    """Return weights @ rows, (m, q), for weights (m, n) and rows (n, q); numpy takes 2.3, 1.9 and 1.0 times as long for n = 6."""
     m, n, q = weights.shape[0], rows.shape[0], rows.shape[1]
     total = np.zeros((m, q))
     for i in range(m):
@@ -41,7 +41,7 @@ def multiply(weights: Matrix, rows: Matrix) -> Matrix:
 
 @compiled
 def multiply_vector(matrix: Matrix, vector: Vector) -> Vector:
-    """Return matrix @ vector, (m,)."""
+    """Return matrix @ vector, (m,); numpy takes 3.2, 2.2 and 1.7 times as long."""
     m, q = matrix.shape
     product = np.empty(m)
     for i in range(m):
@@ -56,7 +56,8 @@ def multiply_vector(matrix: Matrix, vector: Vector) -> Vector:
 def factorise_cholesky(matrix: Matrix, floor: float) -> Matrix:
     """Return the lower L with L L' = matrix (n, n), every squared pivot at least the floor.
 
-    With floor 0, a matrix that is not positive definite gives a NaN.
+    With floor 0, a matrix that is not positive definite gives a NaN. `linalg.cholesky` takes 1.8, 1.6 and 0.8 times as long; with
+    both triangular solves, numpy takes 3.8, 4.0 and 5.3 times as long.
     """
     n = matrix.shape[0]
     factor = np.zeros((n, n))
@@ -76,7 +77,7 @@ def factorise_cholesky(matrix: Matrix, floor: float) -> Matrix:
 
 @compiled
 def solve_lower(factor: Matrix, right: Matrix) -> Matrix:
-    """Return L^-1 right, (n, q), for a lower L (n, n)."""
+    """Return L^-1 right, (n, q), for a lower L (n, n); `linalg.solve` takes 5.2, 5.2 and 6.7 times as long for q = n."""
     n, q = right.shape
     solved = right.copy()
     for i in range(n):
@@ -91,7 +92,7 @@ def solve_lower(factor: Matrix, right: Matrix) -> Matrix:
 
 @compiled
 def solve_lower_transposed(factor: Matrix, right: Vector) -> Vector:
-    """Return L'^-1 right, (n,), for a lower L (n, n)."""
+    """Return L'^-1 right, (n,), for a lower L (n, n); `linalg.solve` takes 6.6, 8.8 and 12 times as long."""
     n = right.shape[0]
     solved = right.copy()
     for i in range(n - 1, -1, -1):

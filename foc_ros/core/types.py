@@ -256,7 +256,7 @@ class Solution(Record):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PredictedCandidate(Record):
+class PredictedCandidate:
     """One candidate with its solution and likelihood.
 
     candidate: the homotopy class; solution: its forward optimal control; sides: side on which the mean path passes each obstacle,

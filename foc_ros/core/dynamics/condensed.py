@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled
-from foc_ros.core.types import Array
 
 from .impulse_response import apply_impulse_response
 
@@ -37,12 +36,19 @@ def largest_shift(position: Tensor, control: Vector, other: Vector) -> float:
     return float(np.abs(apply_impulse_response(position, control - other)).max())
 
 
-def variance_weights(states: Array, terminal: Array, stage: Array) -> Array:
+@compiled
+def variance_weights(states: Tensor, terminal: Vector, stage: Vector) -> Vector:
     """Return d (2N,), where d.u^2 is what a control's noise u adds to sum_i terminal_i X_i(N)^2 + stage_i sum_{t < N} X_i(t)^2.
 
     states (n, 2, N + 1): impulse responses of the states; terminal, stage (n,): weights.
     """
-    squares = (states**2).reshape(len(states), -1)
-    latest, before = (terminal @ squares).reshape(2, -1), (stage @ squares).reshape(2, -1).cumsum(axis=1)
-    weights: Array = latest[:, :0:-1] + before[:, -2::-1]
+    n, channels, times = states.shape
+    weights = np.zeros((channels, times - 1))
+    for i in range(n):
+        for channel in range(channels):
+            before = 0.0
+            for since in range(1, times):
+                square = states[i, channel, since] ** 2
+                weights[channel, -since] += terminal[i] * square + stage[i] * before
+                before += square
     return weights.ravel()

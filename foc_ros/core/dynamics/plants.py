@@ -172,7 +172,7 @@ class _Scaled(Horizon):
 
     unit: Horizon
 
-    def returning(self, path: Array, state: Array, fixed: NDArray[np.bool_]) -> Array:
+    def compute_correction(self, path: Array, state: Array, fixed: NDArray[np.bool_]) -> Array:
         return self.unit.compute_correction(path, state * self.dt**STATE_ORDER, fixed) / self.dt**3
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled, compiled_with_caller
+from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled, compiled_with_caller
 from foc_ros.core.types import Array, Obstacles
 
 CERTAIN_K = 1e6
@@ -56,6 +56,19 @@ def centre_trajectories(centre: Array, drift: Array, steps: int) -> Array:
     """Return mean centres at steps 0..N, (N + 1, n, 2) [m], from those now (n, 2) [m] and their drift per step (n, 2) [m]."""
     moved: Array = centre + np.arange(steps + 1.0)[:, None, None] * drift
     return moved
+
+
+@compiled
+def find_first_alike(circles: UncertainCircles, tolerance: float) -> Indices:
+    """Return for each circle the first whose centre, drift and root mean square radius differ by less than a tolerance, (m,)."""
+    first, reach = np.arange(len(circles.centre)), np.sqrt(circles.size_mean)
+    for i in range(len(first)):
+        for j in range(i):
+            centre, drift = circles.centre[i] - circles.centre[j], circles.drift[i] - circles.drift[j]
+            if max(np.abs(centre).max(), np.abs(drift).max(), abs(reach[i] - reach[j])) < tolerance:
+                first[i] = j
+                break
+    return first
 
 
 @compiled_with_caller

@@ -17,7 +17,7 @@ from foc_ros.core.types import Array
 
 from .contacts.hermite import basis, interpolate, interpolation_row
 from .problem import Problem
-from .terms import ChanceTerms, InitialError, Motion
+from .terms import ChanceTerms, Motion
 
 PARABOLAS = 8
 """Most parabolas fitted in the search beside one step."""
@@ -47,19 +47,20 @@ def _is_above(bound: float, mean: float, variance: float) -> bool:
 
 
 @compiled_with_caller
-def _initial_variance(error: InitialError, time: float, x: float, y: float) -> float:
+def _initial_variance(chance: ChanceTerms, time: float, x: float, y: float) -> float:
     """Return the part of the variance of x p_x + y p_y at a time that comes from the uncertain initial state."""
-    if not error.covariance.any():
+    trajectory, covariance = chance.error_trajectory, chance.initial_covariance
+    if trajectory.shape[1] == 0:
         return 0.0
-    t = min(int(time), error.trajectory.shape[1] - 2)
+    t = min(int(time), trajectory.shape[1] - 2)
     weight, total = basis(time - t, 0), 0.0
-    row = np.zeros(len(error.covariance))
+    row = np.zeros(len(covariance))
     for axis in range(2):
-        p, v, direction = error.trajectory[axis], error.trajectory[2 + axis], (x, y)[axis]
+        p, v, direction = trajectory[axis], trajectory[2 + axis], (x, y)[axis]
         row += direction * (weight[0] * p[t] + weight[1] * v[t] + weight[2] * p[t + 1] + weight[3] * v[t + 1])
     for i in range(len(row)):
         for j in range(len(row)):
-            total += row[i] * error.covariance[i, j] * row[j]
+            total += row[i] * covariance[i, j] * row[j]
     return total
 
 
@@ -75,7 +76,7 @@ def _k_at_time(motion: Motion, chance: ChanceTerms, trajectory: Matrix, control_
     variance = x * x * own[0, 0] + 2 * x * y * own[0, 1] + y * y * own[1, 1]
     for u in range(len(row)):
         variance += row[u] * row[u] * control_variance[u]
-    variance += _initial_variance(chance.error, time, x, y)
+    variance += _initial_variance(chance, time, x, y)
     return safety_factor(circles.size_mean[j] - x * x - y * y, circles.size_variance[j] + 4 * variance)
 
 

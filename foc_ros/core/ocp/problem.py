@@ -15,11 +15,17 @@ from foc_ros.core.dynamics.noise import stack_noise
 from foc_ros.core.dynamics.plants import Horizon, find_states_at_goal
 from foc_ros.core.errors import SceneError
 from foc_ros.core.kernels import freeze
-from foc_ros.core.obstacles.chance_constraint import UncertainCircles, centre_trajectories, k_of_eta, size_moments
+from foc_ros.core.obstacles.chance_constraint import (
+    UncertainCircles,
+    centre_trajectories,
+    find_first_alike,
+    k_of_eta,
+    size_moments,
+)
 from foc_ros.core.types import Array, Obstacles, Record, as_readonly
 
 from .contacts.hermite import compute_trajectory
-from .terms import ChanceTerms, CostTerms, InitialError, Motion, MovingCircles, ProblemTerms
+from .terms import ChanceTerms, CostTerms, Motion, MovingCircles, ProblemTerms
 
 BOTH = np.ones(2)
 SAME_CIRCLE = 1e-6
@@ -84,11 +90,11 @@ class Problem(Record):
         scale = np.array([1.0, 1.0, self.horizon.dt, self.horizon.dt])
         initial = self.initial_covariance
         errors = self.error_map[:, :4].swapaxes(0, 1) if initial.any() else np.zeros((4, 0, len(initial)))
-        covariance = self.free_covariance[1:]
-        free = np.stack((covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]))
+        free = np.ascontiguousarray(self.free_covariance[1:, (0, 1, 0), (0, 1, 1)].T)
         chance = ChanceTerms(
             PositionNoise(self.horizon.maps, self.noise_variance, free),
-            InitialError(np.ascontiguousarray(errors * scale[:, None, None]), initial),
+            np.ascontiguousarray(errors * scale[:, None, None]),
+            initial,
             UncertainCircles(self.obstacles.centre, self.drift, *self.size, self.obstacles.centre_covariance, self.ignored_until),
         )
         motion = Motion(self.horizon.motion, np.ascontiguousarray(self.free[:, :4].T * scale[:, None]))
@@ -126,12 +132,7 @@ class Problem(Record):
     @cached_property
     def first_alike(self) -> NDArray[np.intp]:
         """For each obstacle the row of the first one that is the same circle, (m,): of equal circles only one is in contact."""
-        rows = np.column_stack((self.obstacles.centre, self.drift, np.sqrt(self.size[0])))
-        if not len(rows):
-            return np.zeros(0, np.intp)
-        is_alike = np.abs(rows[:, None] - rows).max(axis=2) < SAME_CIRCLE * self.extent
-        first: NDArray[np.intp] = is_alike.argmax(axis=1)
-        return first
+        return find_first_alike(self.terms.chance.circles, SAME_CIRCLE * self.extent)
 
     @cached_property
     def inside_margin(self) -> NDArray[np.bool_]:
@@ -140,7 +141,7 @@ class Problem(Record):
             return np.zeros(len(self.obstacles), dtype=np.bool_)
         offset = self.initial_mean[:2] - self.obstacles.centre
         covariance = self.initial_covariance[:2, :2] + self.obstacles.centre_covariance
-        variance = self.size[1] + 4 * np.einsum('mi,mij,mj->m', offset, covariance, offset)
+        variance = self.size[1] + 4 * (offset[:, None] @ covariance @ offset[:, :, None]).ravel()
         inside: NDArray[np.bool_] = self.size[0] - (offset**2).sum(axis=1) + k_of_eta(self.eta) * np.sqrt(variance) > 0.0
         return inside
 
@@ -206,7 +207,7 @@ class Problem(Record):
         missing, pace = np.zeros(len(reach)), 0.0
         if self.recovery_s > 0:
             missing, pace = reach - self._distance_now, self.horizon.dt / self.recovery_s
-        circles = MovingCircles(self.obstacles.centre, self.drift, as_readonly(reach), as_readonly(missing), pace)
+        circles = freeze(MovingCircles(self.obstacles.centre, self.drift, reach, missing, pace))
         self._known_circles[tau] = circles
         return circles
 

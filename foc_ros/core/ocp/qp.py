@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.dynamics.impulse_response import apply_impulse_response
-from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled, freeze
+from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled, compiled_with_caller, freeze
 from foc_ros.core.linear_algebra import factorise_cholesky, multiply, multiply_transposed, multiply_vector, solve_lower
 from foc_ros.core.types import Array
 
@@ -95,6 +95,13 @@ def solve_goal(hessian: Vector, linear: Vector, goal_rows: Matrix, goal_targets:
     missing = multiply_vector(root, goal_targets - multiply_vector(goal_rows, free))
     control = free + multiply(np.expand_dims(missing, 0), factor)[0]
     return GoalSolution(control, inverse, factor)
+
+
+@compiled_with_caller
+def solve_cost(cost: CostTerms, lam: float) -> GoalSolution:
+    """Return the solution of least J_aug at a lambda, without obstacle rows."""
+    hessian = compute_hessian(cost, lam)
+    return solve_goal(hessian, np.zeros_like(hessian), cost.goal_rows, cost.goal_targets, cost.softness)
 
 
 @compiled

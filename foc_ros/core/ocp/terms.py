@@ -37,22 +37,16 @@ class MovingCircles(NamedTuple):
     pace: float
 
 
-class InitialError(NamedTuple):
-    """What is uncertain about the state at step 0.
+class ChanceTerms(NamedTuple):
+    """The chance constraint: noise of the position, uncertainty of the start, and the circles.
 
-    trajectory (4, N + 1, n): how an error of each state moves the trajectory, without steps where the covariance is zero;
-    covariance (n, n): of the state at step 0.
+    error_trajectory (4, N + 1, n): how an error of each state at step 0 moves the trajectory, without steps where there is none;
+    initial_covariance (n, n): of the state at step 0.
     """
 
-    trajectory: Tensor
-    covariance: Matrix
-
-
-class ChanceTerms(NamedTuple):
-    """The chance constraint: noise of the position, uncertainty of the start, and the circles."""
-
     noise: PositionNoise
-    error: InitialError
+    error_trajectory: Tensor
+    initial_covariance: Matrix
     circles: UncertainCircles
 
 

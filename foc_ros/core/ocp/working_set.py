@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.kernels import Indices, Matrix, Vector, compiled
+from foc_ros.core.kernels import Indices, Matrix, Vector, compiled, compiled_with_caller
 from foc_ros.core.linear_algebra import factorise_cholesky, multiply_vector, solve_lower, solve_lower_transposed
 from foc_ros.core.registry import QP_BACKENDS
 from foc_ros.core.types import Array
@@ -148,13 +148,6 @@ def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False, thoroug
     return solve_full(qp) if thorough and not elastic else None
 
 
-def solve_with_rows(goal: GoalSolution, rows: Array, limits: Array, backend: str) -> Array | Failed:
-    """Return the control (2N,) of the least cost with rows (k, 2N) u >= limits (k,)."""
-    dual = range_space(rows, limits, goal, 0.0)
-    multipliers = solve_dual(dual, backend)
-    return multipliers if isinstance(multipliers, DualStatus) else goal.control + multipliers @ dual.effects
-
-
 def solve_dual(dual: DualQP, backend: str, *, elastic: bool = False) -> Array | Failed:
     """Return the multipliers y (k,) >= 0 of least 1/2 y'Ky - m'y."""
     gram, missing = dual.gram, dual.missing
@@ -171,7 +164,7 @@ def solve_dual(dual: DualQP, backend: str, *, elastic: bool = False) -> Array | 
     return multipliers
 
 
-@compiled
+@compiled_with_caller
 def range_space(rows: Matrix, limits: Vector, goal: GoalSolution, softness: float) -> DualQP:
     """Return the dual QP of k rows (k, 2N) with limits (k,); softness is added to the diagonal of K."""
     effects, gram = schur_complement(rows, goal.inverse, goal.factor)

@@ -8,13 +8,13 @@ import numpy as np
 
 from foc_ros.core.dynamics.condensed import largest_shift
 from foc_ros.core.homotopy import compute_swept_angles, is_same_class, sweep_angles
-from foc_ros.core.kernels import Matrix, Vector, compiled, freeze
+from foc_ros.core.kernels import Matrix, Vector, compiled, compiled_with_caller, freeze
 from foc_ros.core.ocp.clearance import find_deepest, find_penetrations, required_distance
 from foc_ros.core.ocp.minimum_safety_factor import MinimumSafetyFactor, minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.ocp.qp import NO_TIMES, compute_hessian, effort_cost, solve_goal
+from foc_ros.core.ocp.qp import NO_TIMES, solve_cost
 from foc_ros.core.ocp.terms import Motion, MovingCircles, ProblemTerms
-from foc_ros.core.ocp.working_set import DualStatus, solve_with_rows
+from foc_ros.core.ocp.working_set import DualQP, DualStatus, range_space, solve_dual
 from foc_ros.core.types import Array
 
 from .active_set import CLEAR, NEWTON_TOLERANCE, update_active_contacts
@@ -72,9 +72,7 @@ def _solve_kkt_point(
     terms: ProblemTerms, circles: MovingCircles, lam: float, contacts: Contacts, near: Vector, class_angles: Vector
 ) -> tuple[bool, KktPoint]:
     """Return whether there is a point near a control (2N,), and the point; class_angles (m,): none for those of the control."""
-    cost, motion = terms.cost, terms.motion
-    hessian = compute_hessian(cost, lam)
-    goal = solve_goal(hessian, np.zeros_like(hessian), cost.goal_rows, cost.goal_targets, cost.softness)
+    motion, goal = terms.motion, solve_cost(terms.cost, lam)
     found, is_changed, control, trajectory, active = update_active_contacts(terms, circles, goal, contacts, near)
     if found and (is_changed or len(class_angles) > 0):  # with the same contacts it is in the class of the control
         wanted = class_angles
@@ -105,9 +103,8 @@ def _solve_at_fixed_times(
     terms: ProblemTerms, circles: MovingCircles, lam: float, contacts: Contacts, near: Vector
 ) -> tuple[bool, Vector, Contacts]:
     """Return what `newton_on_contacts` does for contacts that do not slide."""
-    cost, hessian = terms.cost, compute_hessian(terms.cost, lam)
-    goal = solve_goal(hessian, np.zeros_like(hessian), cost.goal_rows, cost.goal_targets, cost.softness)
     active = Contacts(contacts.obstacle.copy(), contacts.time.copy(), contacts.multiplier.copy())
+    goal = solve_cost(terms.cost, lam)
     return newton_on_contacts(terms.motion, circles, goal, active, near.copy(), False, NEWTON_TOLERANCE * terms.extent)
 
 
@@ -115,15 +112,15 @@ def is_fixed_point(problem: Problem, control: Array, contacts: Contacts, tau: fl
     """Tell whether the QP linearised at a control (2N,), with a row for each contact, has that control as its solution."""
     if not len(contacts.time):
         return True
-    rows, limits = linearise_contacts(problem.terms.motion, problem.circles(tau), control, contacts)
-    answer = solve_with_rows(effort_cost(problem, lam).goal_solution, rows, limits, problem.qp_backend)
-    if isinstance(answer, DualStatus):
+    dual, free = _reduce_contacts(problem.terms, problem.circles(tau), lam, contacts, control)
+    multipliers = solve_dual(dual, problem.qp_backend)
+    if isinstance(multipliers, DualStatus):
         return False
-    return largest_shift(problem.horizon.maps[:2], control, answer) < STAYS * problem.extent
+    return largest_shift(problem.horizon.maps[:2], control, free + multipliers @ dual.effects) < STAYS * problem.extent
 
 
-@compiled
-def linearise_contacts(motion: Motion, circles: MovingCircles, control: Vector, contacts: Contacts) -> tuple[Matrix, Vector]:
+@compiled_with_caller
+def _linearise_contacts(motion: Motion, circles: MovingCircles, control: Vector, contacts: Contacts) -> tuple[Matrix, Vector]:
     """Return rows n.S(s) (k, 2N) and limits (k,) on them [m]: the half-planes that touch the circles at the contacts."""
     k = len(contacts.time)
     rows, limits = np.empty((k, len(control))), np.empty(k)
@@ -137,6 +134,16 @@ def linearise_contacts(motion: Motion, circles: MovingCircles, control: Vector, 
         rows[i] = interpolation_row(motion.responses, s, x, y)
         limits[i] = required_distance(circles, j, s)[0] + x * (cx - free[0]) + y * (cy - free[1])
     return rows, limits
+
+
+@compiled
+def _reduce_contacts(
+    terms: ProblemTerms, circles: MovingCircles, lam: float, contacts: Contacts, control: Vector
+) -> tuple[DualQP, Vector]:
+    """Return the dual QP linearised at a control (2N,), with a row for each contact, and the control (2N,) without rows."""
+    goal = solve_cost(terms.cost, lam)
+    rows, limits = _linearise_contacts(terms.motion, circles, control, contacts)
+    return range_space(rows, limits, goal, 0.0), goal.control
 
 
 def find_crossings(problem: Problem, control: Array, tau: float) -> Array:
