@@ -55,13 +55,15 @@ class PathClass(NamedTuple):
 class ClassQuery(NamedTuple):
     """Which classes to find.
 
-    goal: row; ids (n,) of the obstacles; velocity (2,): of the hand [m/s]; max_states: number that a path search may look at.
+    goal: row; ids (n,) of the obstacles; velocity (2,): of the hand [m/s]; max_states: number that a path search may look at;
+    expected: number of classes that are likely to be asked for.
     """
 
     goal: int
     ids: tuple[str, ...]
     velocity: Array
     max_states: int
+    expected: int
 
 
 class PartialGraph(NamedTuple):
@@ -157,8 +159,9 @@ def _find_named_paths(scene: SearchScene, partial: PartialGraph, query: ClassQue
         is_complete,
         partial.max_key,
         query.max_states,
+        _count_classes(partial) if is_complete else query.max_states,
     )
-    for tied in find_shortest_paths(partial.graph, paths, notes):
+    for tied in find_shortest_paths(partial.graph, paths, query.expected, notes):
         classes = []
         for key, runs, swept in tied:
             angles = dict(zip(held, swept, strict=True))

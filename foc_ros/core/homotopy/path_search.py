@@ -25,8 +25,6 @@ COAST_S = 0.2
 """A path that leaves at an angle p to the velocity v ranks as if |v| (1 - cos p) times this longer: a hand coasts first."""
 TIE = 2e-9
 """Paths are given together if their keys differ by less [m]: they may rank alike to the nanometre."""
-FIRST_GROUPS = 2
-"""A search first looks for so many groups of paths; if more are asked for, it is repeated for twice as many."""
 
 
 class PathQuery(NamedTuple):
@@ -34,7 +32,8 @@ class PathQuery(NamedTuple):
 
     goal: row; velocity (2,): of the hand [m/s]; named (k,): the circles of the graph that signatures count; bearing_change (k,):
     direction of the goal less direction of the hand, as seen from these [rad]; is_complete: whether signatures distinguish all
-    classes (if not, paths that arrive by different runs may be of different classes); max_key [m]; max_states: number to look at.
+    classes (if not, paths that arrive by different runs may be of different classes); max_key [m]; max_states: number to look
+    at; max_paths: number of paths at which the search ends, as there are no more classes.
     """
 
     goal: int
@@ -44,6 +43,7 @@ class PathQuery(NamedTuple):
     is_complete: bool
     max_key: float
     max_states: int
+    max_paths: int
 
 
 class Arrival(NamedTuple):
@@ -74,12 +74,13 @@ class Arrivals(NamedTuple):
     is_cut: bool
 
 
-def find_shortest_paths(graph: TangentGraph, query: PathQuery, notes: Counter[str]) -> Iterator[list[Arrival]]:
+def find_shortest_paths(graph: TangentGraph, query: PathQuery, expected: int, notes: Counter[str]) -> Iterator[list[Arrival]]:
     """Yield the shortest paths to a goal, one for each signature, in the order of their keys, equally long ones together.
 
-    notes: `search_cut` is increased if states are left at the end.
+    expected: number of groups to look for at first; if more are asked for, the search is repeated. notes: `search_cut` is
+    increased if states are left at the end.
     """
-    given, most = 0, FIRST_GROUPS
+    given, most = 0, expected
     while True:
         found = find_arrivals(graph, freeze(query), most)
         runs, first = found.runs.tolist(), found.first.tolist()
@@ -126,8 +127,9 @@ def find_arrivals(graph: TangentGraph, query: PathQuery, most: int) -> Arrivals:
     The estimate for a path is its key plus the length of the shortest path from its end to the goal, whatever the signature. A
     path that winds about a named circle is not followed.
     """
-    runs, rest, k = graph.runs, graph.rest[query.goal], len(query.named)
-    goal_node, hand_runs = 2 * (len(graph.circles.radius) + query.goal) + 1, graph.first_run[-1]
+    circles, runs, k = graph.circles, graph.runs, len(query.named)
+    rest, arcs = graph.rest[query.goal], graph.arcs
+    goal_node, hand_runs = 2 * (len(circles.radius) + query.goal) + 1, graph.first_run[-1]
     # of each state: run, state before it, signature, and the state that was the last one with this run
     states, run_of, parent_of = 0, np.empty(query.max_states, np.intp), np.empty(query.max_states, np.intp)
     signatures, older = np.empty((query.max_states, k), np.intp), np.empty(query.max_states, np.intp)
@@ -141,7 +143,7 @@ def find_arrivals(graph: TangentGraph, query: PathQuery, most: int) -> Arrivals:
             heappush(frontier, (key + rest[run], entries, key, run, -1))
             entries += 1
     arrived, keys, groups, group, is_open = [0 for _ in range(0)], [0.0 for _ in range(0)], [0 for _ in range(0)], 0, False
-    while frontier and states < query.max_states and group < most:
+    while frontier and states < query.max_states and len(arrived) < query.max_paths and group < most:
         if is_open and frontier[0][0] >= keys[-1] + TIE:
             group, is_open = group + 1, False
             continue
@@ -155,13 +157,13 @@ def find_arrivals(graph: TangentGraph, query: PathQuery, most: int) -> Arrivals:
         if (np.abs(signatures[states]) > 1).any() or is_known(signatures, older, states):
             continue
         newest[place] = states
-        if runs.head[run] != goal_node:
-            for arc in range(graph.arcs.first[run], graph.arcs.first[run + 1]):
-                following, extended = graph.arcs.after[arc], key + graph.arcs.step[arc]
+        if runs.head[run] < 2 * len(circles.radius):
+            for arc in range(arcs.first[run], arcs.first[run + 1]):
+                following, extended = arcs.after[arc], key + arcs.step[arc]
                 if extended + rest[following] < query.max_key:
                     heappush(frontier, (extended + rest[following], entries, extended, following, states))
                     entries += 1
-        elif (np.abs(query.bearing_change + TURN * signatures[states]) < TURN).all():
+        elif runs.head[run] == goal_node and (np.abs(query.bearing_change + TURN * signatures[states]) < TURN).all():
             arrived.append(states)
             keys.append(key)
             groups.append(group)
@@ -176,4 +178,5 @@ def find_arrivals(graph: TangentGraph, query: PathQuery, most: int) -> Arrivals:
             state = parent_of[state]
         first[row + 1] = len(path)
     is_last = group < most
-    return Arrivals(np.array(keys), np.array(groups), swept, np.array(path), first, is_last, is_last and len(frontier) > 0)
+    is_cut = is_last and len(frontier) > 0 and len(arrived) < query.max_paths
+    return Arrivals(np.array(keys), np.array(groups), swept, np.array(path), first, is_last, is_cut)
