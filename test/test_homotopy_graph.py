@@ -61,9 +61,9 @@ def search_paths(obstacles, max_states=5000):
     """The graph of all obstacles, and the paths over it in the order of their keys."""
     scene = build_search_scene(np.zeros(2), GOAL[None], obstacles, 0.0, ())
     graph, notes = connect_hand(build_tangent_graph(obstacles.centre, scene.radius[0], GOAL[None]), np.zeros(2)), Counter()
-    named = list(range(len(obstacles)))
-    query = PathQuery(0, VELOCITY, named, scene.bearing_change[0], True, np.inf, max_states)
-    return graph, chain.from_iterable(find_shortest_paths(graph, query, notes)), notes
+    named = np.arange(len(obstacles))
+    query = PathQuery(0, VELOCITY, named, scene.bearing_change[0], True, np.inf, max_states, 1 << len(named))
+    return graph, chain.from_iterable(find_shortest_paths(graph, query, 4, notes)), notes
 
 
 @pytest.mark.parametrize(('seed', 'n', 'size'), [(0, 6, 0.03), (1, 10, 0.03), (2, 12, 0.06), (3, 30, 0.03)])

@@ -55,13 +55,15 @@ class PathClass(NamedTuple):
 class ClassQuery(NamedTuple):
     """Which classes to find.
 
-    goal: row; ids (n,) of the obstacles; velocity (2,): of the hand [m/s]; max_states: number that a path search may look at.
+    goal: row; ids (n,) of the obstacles; velocity (2,): of the hand [m/s]; max_states: number that a path search may look at;
+    expected: number of classes that are likely to be asked for.
     """
 
     goal: int
     ids: tuple[str, ...]
     velocity: Array
     max_states: int
+    expected: int
 
 
 class PartialGraph(NamedTuple):
@@ -138,7 +140,9 @@ def _build_graph(centre: bytes, radius: bytes, goals: bytes, hand: bytes) -> Tan
 
 def _count_classes(partial: PartialGraph) -> int:
     """Return the largest number of classes: two for each cluster of named circles that overlap."""
-    clusters = {cluster for row, cluster in zip(partial.rows, partial.graph.circles.cluster, strict=True) if row in partial.named}
+    clusters = {
+        cluster for row, cluster in zip(partial.rows, partial.graph.circles.cluster.tolist(), strict=True) if row in partial.named
+    }
     return 1 << len(clusters) + len(set(partial.named).difference(partial.rows))
 
 
@@ -148,9 +152,16 @@ def _find_named_paths(scene: SearchScene, partial: PartialGraph, query: ClassQue
     held = [row for row in partial.named if row in place]
     bearing_change, is_complete = scene.bearing_change[query.goal, held], len(held) == len(partial.named)
     paths = PathQuery(
-        query.goal, query.velocity, [place[row] for row in held], bearing_change, is_complete, partial.max_key, query.max_states
+        query.goal,
+        query.velocity,
+        np.array([place[row] for row in held], dtype=np.intp),
+        bearing_change,
+        is_complete,
+        partial.max_key,
+        query.max_states,
+        _count_classes(partial) if is_complete else query.max_states,
     )
-    for tied in find_shortest_paths(partial.graph, paths, notes):
+    for tied in find_shortest_paths(partial.graph, paths, query.expected, notes):
         classes = []
         for key, runs, swept in tied:
             angles = dict(zip(held, swept, strict=True))

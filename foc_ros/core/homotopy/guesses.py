@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.core.kernels import Matrix, Vector, compiled_exactly
+from foc_ros.core.kernels import Indices, Matrix, Vector, compiled_exactly
 from foc_ros.core.types import Array, as_readonly
 
 from .search_scene import SearchScene
-from .tangent_graph import TangentGraph, measure_arcs
+from .tangent_graph import Circles, Runs, TangentGraph, measure_arc
 
 SLOPE = 0.5
 """A hand in a margin leaves it by this much for each metre of its path, and enters the margin of its goal likewise."""
@@ -76,20 +76,29 @@ class TautPath(NamedTuple):
         return self.evaluate(self.length * np.linspace(0.0, 1.0, count))
 
 
+@compiled_exactly
+def lay_out_runs(circles: Circles, runs: Runs, path: Indices) -> TautPath:
+    """Lay out a path that is given by its runs (p,)."""
+    pieces, length = 2 * len(path), 0.0
+    begin, start, heading, bend = np.empty(pieces), np.empty((pieces, 2)), np.empty((pieces, 2)), np.zeros(pieces)
+    for place, run in enumerate(path):
+        straight, arc, size = 2 * place, 2 * place + 1, 0.0
+        start[straight], start[arc] = runs.start[run], runs.end[run]
+        heading[straight], heading[arc] = runs.heading[run], runs.heading[run]
+        if place + 1 < len(path):
+            circle, sense = runs.head[run] >> 1, 2 * (runs.head[run] & 1) - 1
+            bend[arc] = sense / circles.radius[circle]
+            size = circles.radius[circle] * max(measure_arc(runs.leave_angle[path[place + 1]], runs.reach_angle[run], sense), 0.0)
+        length += runs.length[run]
+        begin[straight] = length - runs.length[run]
+        length += size
+        begin[arc] = length - size
+    return TautPath(begin, start, heading, bend)
+
+
 def lay_out(graph: TangentGraph, path: Sequence[int]) -> TautPath:
     """Lay out a path that is given by its runs in a graph."""
-    runs, rows = graph.runs, list(path)
-    node = runs.head[rows[:-1]]
-    sense, radius, size, bend = (
-        2 * (node & 1) - 1,
-        graph.circles.radius[node >> 1],
-        np.zeros(2 * len(rows)),
-        np.zeros(2 * len(rows)),
-    )
-    size[::2], bend[1:-1:2] = runs.length[rows], sense / radius
-    size[1:-1:2] = radius * np.maximum(measure_arcs(runs.leave_angle[rows[1:]], runs.reach_angle[rows[:-1]], sense), 0.0)
-    start = np.stack((runs.start[rows], runs.end[rows]), axis=1).reshape(-1, 2)
-    return TautPath(np.cumsum(size) - size, start, np.repeat(runs.heading[rows], 2, axis=0), bend)
+    return lay_out_runs(graph.circles, graph.runs, np.array(path, dtype=np.intp))
 
 
 def timed(path: Array, velocity: Array, duration_s: float, steps: int) -> Array:

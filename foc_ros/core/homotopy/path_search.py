@@ -8,17 +8,15 @@ therefore the shortest one of its class.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterator
 from heapq import heappop, heappush
-from itertools import count
-from operator import add
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.core.types import Array
+from foc_ros.core.kernels import Indices, Matrix, Register, Table, Vector, compiled_exactly, freeze
 
 from .sides import TURN
 from .tangent_graph import TURN_BACK, TangentGraph
@@ -28,24 +26,24 @@ COAST_S = 0.2
 TIE = 2e-9
 """Paths are given together if their keys differ by less [m]: they may rank alike to the nanometre."""
 
-Signature = tuple[int, ...]
-
 
 class PathQuery(NamedTuple):
     """Which paths to look for.
 
     goal: row; velocity (2,): of the hand [m/s]; named (k,): the circles of the graph that signatures count; bearing_change (k,):
     direction of the goal less direction of the hand, as seen from these [rad]; is_complete: whether signatures distinguish all
-    classes (if not, paths that arrive by different runs may be of different classes); max_key [m]; max_states: number to look at.
+    classes (if not, paths that arrive by different runs may be of different classes); max_key [m]; max_states: number to look
+    at; max_paths: number of paths at which the search ends, as there are no more classes.
     """
 
     goal: int
-    velocity: Array
-    named: list[int]
-    bearing_change: Array
+    velocity: Vector
+    named: Indices
+    bearing_change: Vector
     is_complete: bool
     max_key: float
     max_states: int
+    max_paths: int
 
 
 class Arrival(NamedTuple):
@@ -59,67 +57,126 @@ class Arrival(NamedTuple):
     swept: list[float]
 
 
-def find_shortest_paths(graph: TangentGraph, query: PathQuery, notes: Counter[str]) -> Iterator[list[Arrival]]:
+class Arrivals(NamedTuple):
+    """The a paths that have reached the goal.
+
+    key (a,) [m]; group (a,): equal numbers for equally long paths; swept (a, k) [rad]; runs: of all paths, each from the goal to
+    the hand; first (a + 1,): where those of each path begin. is_last: whether there are no more paths; is_cut: whether states
+    were left at the end.
+    """
+
+    key: Vector
+    group: Indices
+    swept: Matrix
+    runs: Indices
+    first: Indices
+    is_last: bool
+    is_cut: bool
+
+
+def find_shortest_paths(graph: TangentGraph, query: PathQuery, expected: int, notes: Counter[str]) -> Iterator[list[Arrival]]:
     """Yield the shortest paths to a goal, one for each signature, in the order of their keys, equally long ones together.
 
-    The estimate for a path is its key plus the length of the shortest path from its end to the goal, whatever the signature. A
-    path that winds about a named circle is not followed. notes: `search_cut` is increased if states are left at the end.
+    expected: number of groups to look for at first; if more are asked for, the search is repeated. notes: `search_cut` is
+    increased if states are left at the end.
     """
-    rest, signatures, numbers = graph.rest[query.goal].tolist(), SignatureCounter(graph, query.named), count()
-    last = set(np.flatnonzero(graph.runs.head == 2 * (len(graph.circles.radius) + query.goal) + 1).tolist())
-    first_arc = np.searchsorted(graph.arcs.before, np.arange(len(rest) + 1)).tolist()
-    # estimate, number of the entry, key, runs, signature without the last run
-    frontier = list[tuple[float, int, float, tuple[int, ...], Signature]]()
-    for run, key in enumerate(_compute_first_keys(graph, query.velocity), graph.first_run[-1]):
-        if rest[run] < math.inf:
-            heappush(frontier, (key + rest[run], next(numbers), key, (run,), (0,) * len(query.named)))
-    known, arrived = set[tuple[int, Signature]](), list[Arrival]()
-    while frontier and len(known) < query.max_states:
-        if arrived and frontier[0][0] >= arrived[-1].key + TIE:
-            yield arrived
-            arrived = []
-        _, _, key, path, signature = heappop(frontier)
-        run, signature = path[-1], signatures.extend(signature, path)
-        state = -1 if query.is_complete and run in last else run, signature
-        if state in known or max(signature, default=0) > 1 or min(signature, default=0) < -1:
-            continue
-        known.add(state)
-        if run in last:
-            swept = (query.bearing_change + TURN * np.array(signature)).tolist()
-            if all(abs(angle) < TURN for angle in swept):
-                arrived.append(Arrival(key, path, swept))
-            continue
-        arcs = slice(first_arc[run], first_arc[run + 1])
-        for following, step in zip(graph.arcs.after[arcs].tolist(), graph.arcs.step[arcs].tolist(), strict=True):
-            if key + step + rest[following] < query.max_key:
-                heappush(frontier, (key + step + rest[following], next(numbers), key + step, (*path, following), signature))
-    if arrived:
-        yield arrived
-    notes['search_cut'] += bool(frontier)
+    given, most = 0, expected
+    while True:
+        found = find_arrivals(graph, freeze(query), most)
+        runs, first = found.runs.tolist(), found.first.tolist()
+        arrivals = zip(found.group.tolist(), found.key.tolist(), found.swept.tolist(), first, first[1:], strict=False)
+        for group, tied in groupby(arrivals, key=lambda each: each[0]):
+            if group >= given:
+                yield [Arrival(key, tuple(runs[begin:end][::-1]), swept) for _, key, swept, begin, end in tied]
+        if found.is_last:
+            notes['search_cut'] += found.is_cut
+            return
+        given, most = most, 2 * most
 
 
-def _compute_first_keys(graph: TangentGraph, velocity: Array) -> list[float]:
-    """Compute the keys of the runs from the hand [m]: their lengths and what coasting adds."""
-    first = slice(graph.first_run[-1], None)
-    coasting = COAST_S * (math.hypot(*velocity) - graph.runs.heading[first] @ velocity)
-    keys: list[float] = (graph.runs.length[first] + coasting).tolist()
-    return keys
-
-
-class SignatureCounter:
-    """Counts how often paths cross the rays of some circles of a graph."""
-
-    def __init__(self, graph: TangentGraph, circles: list[int]) -> None:
-        self._runs = graph.runs
-        self._crossings, self._holds = graph.runs.crossings[:, :, circles], graph.circles.holds[:, circles]
-
-    def extend(self, signature: Signature, path: tuple[int, ...]) -> Signature:
-        """Return the signature of a path; signature: of the path without its last run."""
-        crossed = self._crossings[path[-1], 0]
-        if len(path) > 1:
-            before, run, node = path[-2], path[-1], self._runs.head[path[-2]]
-            sense, crossed = 2 * (node & 1) - 1, crossed - self._crossings[before, 1]
+@compiled_exactly
+def extend_signature(graph: TangentGraph, named: Indices, before: int, run: int, signature: Register) -> None:
+    """Add what a path crosses on a run, and on the arc from the run before, to a signature (k,); before: -1 if there is none."""
+    runs = graph.runs
+    for k, circle in enumerate(named):
+        signature[k] += runs.crossings[run, circle]
+    if before >= 0:
+        node = runs.head[before]
+        sense = 2 * (node & 1) - 1
+        is_past_east = sense * (runs.leave_angle[run] - runs.reach_angle[before]) < -TURN_BACK
+        for k, circle in enumerate(named):
+            signature[k] -= runs.end_crossings[before, circle]
             # an arc that passes angle 0 of its circle goes round all centres that the circle holds once more
-            if sense * (self._runs.leave_angle[run] - self._runs.reach_angle[before]) < -TURN_BACK:
-                crossed = crossed + sense * self._holds[node >> 1]
-        return tuple(map(add, signature, crossed.tolist()))
+            if is_past_east and graph.circles.holds[node >> 1, circle]:
+                signature[k] += sense
+
+
+@compiled_exactly
+def is_known(signatures: Table, older: Indices, state: int) -> bool:
+    """Tell whether the signature of a state (row) is also that of an older one."""
+    other = older[state]
+    while other >= 0 and (signatures[other] != signatures[state]).any():
+        other = older[other]
+    return other >= 0
+
+
+@compiled_exactly
+def find_arrivals(graph: TangentGraph, query: PathQuery, most: int) -> Arrivals:
+    """Find the shortest paths to a goal, until there are `most` groups of equally long ones.
+
+    The estimate for a path is its key plus the length of the shortest path from its end to the goal, whatever the signature. A
+    path that winds about a named circle is not followed.
+    """
+    circles, runs, k = graph.circles, graph.runs, len(query.named)
+    rest, arcs = graph.rest[query.goal], graph.arcs
+    goal_node, hand_runs = 2 * (len(circles.radius) + query.goal) + 1, graph.first_run[-1]
+    # of each state: run, state before it, signature, and the state that was the last one with this run
+    states, run_of, parent_of = 0, np.empty(query.max_states, np.intp), np.empty(query.max_states, np.intp)
+    signatures, older = np.empty((query.max_states, k), np.intp), np.empty(query.max_states, np.intp)
+    newest = np.full(len(rest) + 1, -1)
+    # estimate, number of the entry, key, run, state before it
+    frontier, entries = [(0.0, 0, 0.0, 0, -1) for _ in range(0)], 0
+    for run in range(hand_runs, len(rest)):
+        if rest[run] < np.inf:
+            along = runs.heading[run, 0] * query.velocity[0] + runs.heading[run, 1] * query.velocity[1]
+            key = runs.length[run] + COAST_S * (np.hypot(query.velocity[0], query.velocity[1]) - along)
+            heappush(frontier, (key + rest[run], entries, key, run, -1))
+            entries += 1
+    arrived, keys, groups, group, is_open = [0 for _ in range(0)], [0.0 for _ in range(0)], [0 for _ in range(0)], 0, False
+    while frontier and states < query.max_states and len(arrived) < query.max_paths and group < most:
+        if is_open and frontier[0][0] >= keys[-1] + TIE:
+            group, is_open = group + 1, False
+            continue
+        _, _, key, run, parent = heappop(frontier)
+        place = len(rest) if query.is_complete and runs.head[run] == goal_node else run
+        run_of[states], parent_of[states], older[states] = run, parent, newest[place]
+        signatures[states], before = 0, -1
+        if parent >= 0:
+            signatures[states], before = signatures[parent], run_of[parent]
+        extend_signature(graph, query.named, before, run, signatures[states])
+        if (np.abs(signatures[states]) > 1).any() or is_known(signatures, older, states):
+            continue
+        newest[place] = states
+        if runs.head[run] < 2 * len(circles.radius):
+            for arc in range(arcs.first[run], arcs.first[run + 1]):
+                following, extended = arcs.after[arc], key + arcs.step[arc]
+                if extended + rest[following] < query.max_key:
+                    heappush(frontier, (extended + rest[following], entries, extended, following, states))
+                    entries += 1
+        elif runs.head[run] == goal_node and (np.abs(query.bearing_change + TURN * signatures[states]) < TURN).all():
+            arrived.append(states)
+            keys.append(key)
+            groups.append(group)
+            is_open = True
+        states += 1
+    swept, first, path = np.empty((len(arrived), k)), np.zeros(len(arrived) + 1, np.intp), [0 for _ in range(0)]
+    for row, arrival in enumerate(arrived):
+        swept[row] = query.bearing_change + TURN * signatures[arrival]
+        state = arrival
+        while state >= 0:
+            path.append(run_of[state])
+            state = parent_of[state]
+        first[row + 1] = len(path)
+    is_last = group < most
+    is_cut = is_last and len(frontier) > 0 and len(arrived) < query.max_paths
+    return Arrivals(np.array(keys), np.array(groups), swept, np.array(path), first, is_last, is_cut)

@@ -102,7 +102,9 @@ def search(
         goal_near=int((scene.holds_goal.any(axis=1) & ~scene.is_goal_inside).sum()),
         goal_inside=len(goals) - len(reachable),
     )
-    classes = [find_classes(scene, ClassQuery(goal, obstacles.ids, velocity, max_states), notes) for goal in reachable]
+    expected = 1 + -(-count // max(len(reachable), 1))
+    queries = [ClassQuery(goal, obstacles.ids, velocity, max_states, expected) for goal in reachable]
+    classes = [find_classes(scene, query, notes) for query in queries]
     chosen = _select_classes(classes, count, {candidate.label for candidate in previous}, notes)
     candidates = []
     for one in chosen:
