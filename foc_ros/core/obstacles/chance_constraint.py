@@ -64,8 +64,11 @@ def find_first_alike(circles: UncertainCircles, tolerance: float) -> Indices:
     first, reach = np.arange(len(circles.centre)), np.sqrt(circles.size_mean)
     for i in range(len(first)):
         for j in range(i):
-            centre, drift = circles.centre[i] - circles.centre[j], circles.drift[i] - circles.drift[j]
-            if max(np.abs(centre).max(), np.abs(drift).max(), abs(reach[i] - reach[j])) < tolerance:
+            difference = abs(reach[i] - reach[j])
+            for axis in range(2):
+                difference = max(difference, abs(circles.centre[i, axis] - circles.centre[j, axis]))
+                difference = max(difference, abs(circles.drift[i, axis] - circles.drift[j, axis]))
+            if difference < tolerance:
                 first[i] = j
                 break
     return first

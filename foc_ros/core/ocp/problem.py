@@ -142,10 +142,10 @@ class Problem(Record):
         offset = self.initial_mean[:2] - self.obstacles.centre
         covariance = self.initial_covariance[:2, :2] + self.obstacles.centre_covariance
         variance = self.size[1] + 4 * (offset[:, None] @ covariance @ offset[:, :, None]).ravel()
-        inside: NDArray[np.bool_] = self.size[0] - (offset**2).sum(axis=1) + k_of_eta(self.eta) * np.sqrt(variance) > 0.0
+        inside: NDArray[np.bool_] = self.size[0] - self._distance_now**2 + k_of_eta(self.eta) * np.sqrt(variance) > 0.0
         return inside
 
-    @cached_property
+    @property
     def ignored_until(self) -> Array:
         """Steps from now before which each obstacle does not count, because the hand is still leaving its margin, (m,)."""
         ignored: Array = self.inside_margin.astype(np.float64) * (self.recovery_s / self.horizon.dt)
@@ -161,20 +161,20 @@ class Problem(Record):
         """c^2 for every entry of the stacked control, (2N,)."""
         return stack_noise(self.noise**2, self.horizon.steps)
 
-    @cached_property
+    @property
     def summed_variance(self) -> Array:
         """(2N,): the sum over steps of the variances of x and y is this times u^2, plus the free part."""
         summed: Array = variance_weights(self.horizon.states[:2], BOTH, BOTH) * self.noise_variance
         return summed
 
-    @cached_property
+    @property
     def weighted_variance(self) -> Array:
         """(2N,): the variance terms of J_X are this times u^2, plus the free part."""
         weights = self.terminal_weights, self.stage_weights
         weighted: Array = variance_weights(self.horizon.states, *weights) * self.noise_variance
         return weighted
 
-    @cached_property
+    @property
     def goal_rows(self) -> tuple[Array, Array, Array]:
         """Rows (r, 2N), targets (r,) and softness (r,) that bring the mean to the goal.
 
@@ -207,7 +207,7 @@ class Problem(Record):
         missing, pace = np.zeros(len(reach)), 0.0
         if self.recovery_s > 0:
             missing, pace = reach - self._distance_now, self.horizon.dt / self.recovery_s
-        circles = freeze(MovingCircles(self.obstacles.centre, self.drift, reach, missing, pace))
+        circles = MovingCircles(self.obstacles.centre, self.drift, as_readonly(reach), as_readonly(missing), pace)
         self._known_circles[tau] = circles
         return circles
 

@@ -13,7 +13,7 @@ from foc_ros.core.ocp.clearance import find_deepest, find_penetrations, required
 from foc_ros.core.ocp.minimum_safety_factor import MinimumSafetyFactor, minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.qp import NO_TIMES, solve_cost
-from foc_ros.core.ocp.terms import Motion, MovingCircles, ProblemTerms
+from foc_ros.core.ocp.terms import CostTerms, Motion, MovingCircles, ProblemTerms
 from foc_ros.core.ocp.working_set import DualQP, DualStatus, range_space, solve_dual
 from foc_ros.core.types import Array
 
@@ -112,7 +112,8 @@ def is_fixed_point(problem: Problem, control: Array, contacts: Contacts, tau: fl
     """Tell whether the QP linearised at a control (2N,), with a row for each contact, has that control as its solution."""
     if not len(contacts.time):
         return True
-    dual, free = _reduce_contacts(problem.terms, problem.circles(tau), lam, contacts, control)
+    motion, cost = problem.terms.motion, problem.terms.cost
+    dual, free = _reduce_contacts(motion, cost, problem.circles(tau), lam, contacts, control)
     multipliers = solve_dual(dual, problem.qp_backend)
     if isinstance(multipliers, DualStatus):
         return False
@@ -138,11 +139,11 @@ def _linearise_contacts(motion: Motion, circles: MovingCircles, control: Vector,
 
 @compiled
 def _reduce_contacts(
-    terms: ProblemTerms, circles: MovingCircles, lam: float, contacts: Contacts, control: Vector
+    motion: Motion, cost: CostTerms, circles: MovingCircles, lam: float, contacts: Contacts, control: Vector
 ) -> tuple[DualQP, Vector]:
     """Return the dual QP linearised at a control (2N,), with a row for each contact, and the control (2N,) without rows."""
-    goal = solve_cost(terms.cost, lam)
-    rows, limits = _linearise_contacts(terms.motion, circles, control, contacts)
+    goal = solve_cost(cost, lam)
+    rows, limits = _linearise_contacts(motion, circles, control, contacts)
     return range_space(rows, limits, goal, 0.0), goal.control
 
 

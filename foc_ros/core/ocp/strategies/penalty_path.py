@@ -58,7 +58,7 @@ class PenaltyPath:
 
     def find_end(self, problem: Problem) -> float:
         """Return the largest s that is tried."""
-        variance = float(problem.summed_variance.max())
+        variance = float(problem.terms.cost.summed_variance.max())
         if not self.first_lambda * variance > 0:
             return LONGEST_PATH
         return min(max(STRIDE, math.log(LARGEST_SHARE / (self.first_lambda * variance)) / math.log(self.growth)), LONGEST_PATH)
