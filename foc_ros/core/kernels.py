@@ -36,6 +36,8 @@ Flags: TypeAlias = NDArray[np.bool_]
 """One axis of truth values."""
 FlagTable: TypeAlias = NDArray[np.bool_]
 """Two axes of truth values."""
+Register: TypeAlias = NDArray[np.intp]
+"""One axis of whole numbers that the kernel may write to."""
 
 _TYPES = {
     'float': types.float64,
@@ -48,6 +50,7 @@ _TYPES = {
     'Table': types.Array(types.intp, 2, 'C', readonly=True),
     'Flags': types.Array(types.boolean, 1, 'C', readonly=True),
     'FlagTable': types.Array(types.boolean, 2, 'C', readonly=True),
+    'Register': types.Array(types.intp, 1, 'C'),
 }
 _FIELD_TYPES = _TYPES | {'Indices': types.Array(types.intp, 1, 'C', readonly=True)}
 """In a NamedTuple a type has to match exactly: numba converts arrays from writeable to read-only or to any stride, not tuples."""
