@@ -60,3 +60,9 @@ def test_where_nothing_is_feasible_it_returns_the_best_effort():
 def test_a_name_that_is_not_registered_is_refused():
     with pytest.raises(InputError, match='lv, hc, optimal, algorithm1, fixed, margin'):
         solved(one_obstacle(), BOWED, 'nothing')
+
+
+def test_a_strategy_without_a_result_is_named():
+    STRATEGIES.register('forgetful', lambda problem, start, settings, deadline: None)
+    with pytest.raises(InputError, match='strategy forgetful: expected a StrategyResult as its result, got None'):
+        solved(one_obstacle(), BOWED, 'forgetful')

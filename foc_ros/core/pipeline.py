@@ -167,7 +167,7 @@ class Pipeline:
         self._memory = Memory(self._memory.most_likely)
 
     def _find_not_ready_reason(self) -> tuple[str, str] | None:
-        """Return why the state of the pipeline allows no prediction, as (kind, message): the only place that decides this."""
+        """Return why the pipeline cannot predict, as (kind, message), judged by stamps; the node also judges by its clocks."""
         if not self.is_engaged:
             return 'disengaged', 'disengaged'
         if self.hand_state is None:

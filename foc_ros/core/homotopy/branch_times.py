@@ -18,8 +18,8 @@ from .sides import compute_swept_angles
 class BranchTimes(Record):
     """When k paths separate.
 
-    after_s (k, k): time until two of them separate [s], infinite if they never do, as on the diagonal. path_class (k,): paths
-    with equal numbers pass all obstacles on the same sides, though they may lead to different goals.
+    after_s (k, k): time until two of them separate [s], infinite for paths that never separate, and on the diagonal. path_class
+    (k,): paths with equal numbers pass all obstacles on the same sides, though they may lead to different goals.
     """
 
     after_s: Array

@@ -12,6 +12,7 @@ from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
 from foc_ros.core.dynamics.impulse_response import apply_impulse_response
 from foc_ros.core.dynamics.noise import propagate_covariance
+from foc_ros.core.errors import InputError
 from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled
 from foc_ros.core.registry import STRATEGIES
 from foc_ros.core.types import Array, Solution, Status, as_readonly
@@ -52,9 +53,11 @@ def solve_problem(problem: Problem, start: Start, settings: FocConfig, deadline:
     if settings.qp_backend != problem.qp_backend:
         problem = replace(problem, qp_backend=settings.qp_backend)
     try:
-        result: StrategyResult = STRATEGIES.get(settings.strategy)(problem, start, settings, deadline)
+        result = STRATEGIES.get(settings.strategy)(problem, start, settings, deadline)
     except OutOfTimeError:
         result = give_up_out_of_time(problem)
+    if not isinstance(result, StrategyResult):
+        raise InputError(f'strategy {settings.strategy}', 'a StrategyResult as its result', repr(result))
     minimum = result.minimum
     if minimum is None:
         minimum = find_minimum_safety_factor(problem, result.control, between_steps=False)

@@ -40,7 +40,7 @@ class MovingCircles(NamedTuple):
 class ChanceTerms(NamedTuple):
     """The chance constraint: noise of the position, uncertainty of the start, and the circles.
 
-    error_trajectory (4, N + 1, n): how an error of each state at step 0 moves the trajectory, without steps where there is none;
+    error_trajectory (4, N + 1, n): how an error of each state at step 0 moves the trajectory; (4, 0, n) without such an error;
     initial_covariance (n, n): of the state at step 0.
     """
 

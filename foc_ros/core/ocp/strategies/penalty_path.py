@@ -35,7 +35,7 @@ LONGEST_PATH = 60.0
 LARGEST_SHARE = 1e6
 """Weight of the variances relative to the effort at which the path ends: nothing else counts then, and k has stopped growing."""
 MAX_CROSSINGS = 8
-"""How often times are added for a mean that crosses circles between the steps."""
+"""Largest number of rounds in which times are added, for a mean that crosses circles between the steps."""
 FURTHER_QPS = 16
 """Linearisations after which the QPs are given up at a point further along the path; at its beginning there may be more."""
 
@@ -137,7 +137,7 @@ class PathFollower:
     def _run_qps(
         self, s: float, guess: Array, working: WorkingSet, class_angles: Array | None, *, thorough: bool
     ) -> SqpResult | None:
-        """Converge with rows at the steps, and at more times where the mean would cross a circle between them."""
+        """Solve QPs until they converge, with rows at the steps; where the mean crosses a circle between them, add rows there."""
         problem, (tau, lam) = self.problem, self.path.at(s)
         left, between = MAX_QPS if thorough else FURTHER_QPS, NO_TIMES
 
