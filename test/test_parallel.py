@@ -55,9 +55,9 @@ def test_an_argument_that_cannot_be_loaded_is_the_failure_of_its_item() -> None:
     assert found['good'] == 4 and 'ValueError: invalid literal' in found['bad'].reason
 
 
-def test_workers_run_concurrently() -> None:
+def test_workers_run_concurrently(tmp_path: Path) -> None:
     with IsolatedProcessPool(2) as pool:
-        assert len({pid for _, pid in run(worker_tasks.worker_pid, ITEMS[:4], pool)}) == 2
+        assert len({pid for _, pid in run(worker_tasks.meet, [(str(n), str(tmp_path)) for n in range(2)], pool)}) == 2
 
 
 def test_an_exception_that_leaves_the_context_kills_the_workers() -> None:
