@@ -69,10 +69,10 @@ def test_an_exception_that_leaves_the_context_kills_the_workers() -> None:
 
 def test_workers_end_with_a_parent_that_is_killed() -> None:
     script = """if __name__ == '__main__':
-        import worker_tasks
+        import os, worker_tasks
         from foc_ros.analysis.parallel import IsolatedProcessPool
         pool = IsolatedProcessPool(1)
-        print(pool.submit(worker_tasks.worker_pid, 0).result(), flush=True)
+        print(pool.submit(os.getpid).result(), flush=True)
         pool.submit(worker_tasks.sleepy, 60.0).result()"""
     with subprocess.Popen([sys.executable, '-c', script], cwd=Path(__file__).parent, stdout=subprocess.PIPE, text=True) as parent:
         worker = int(parent.stdout.readline())
