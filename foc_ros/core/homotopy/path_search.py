@@ -117,7 +117,7 @@ def is_known(signatures: Table, older: Indices, state: int) -> bool:
     other = older[state]
     while other >= 0 and (signatures[other] != signatures[state]).any():
         other = older[other]
-    return other >= 0
+    return bool(other >= 0)
 
 
 @compiled_exactly
