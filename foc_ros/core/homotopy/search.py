@@ -21,6 +21,8 @@ from .search_scene import build_search_scene
 
 STATES, STATES_PER_CANDIDATE = 1000, 300
 """Number of states that the search for one goal may look at; a few dozen are enough for four candidates."""
+EXPECTED = 5
+"""A search for one goal looks for at most so many classes at first: more cost time and are seldom asked for."""
 REPEAT = 1.5
 """A class that passes all obstacles as a class to another goal does ranks as if it were this times as long: it adds little."""
 STAY = 0.95
@@ -102,7 +104,7 @@ def search(
         goal_near=int((scene.holds_goal.any(axis=1) & ~scene.is_goal_inside).sum()),
         goal_inside=len(goals) - len(reachable),
     )
-    expected = 1 + -(-count // max(len(reachable), 1))
+    expected = min(1 + -(-count // max(len(reachable), 1)), EXPECTED)
     queries = [ClassQuery(goal, obstacles.ids, velocity, max_states, expected) for goal in reachable]
     classes = [find_classes(scene, query, notes) for query in queries]
     chosen = _select_classes(classes, count, {candidate.label for candidate in previous}, notes)
