@@ -85,7 +85,7 @@ def test_the_messages_lead_to_predictions_and_to_refusals() -> None:
     """Otherwise the test above would test nothing."""
     seen: dict[str, int] = {'predicted': 0, 'refused': 0}
 
-    @settings(THOROUGH, max_examples=100)
+    @settings(THOROUGH, max_examples=200)
     @given(st.booleans(), st.lists(inputs(TYPES), min_size=LENGTH, max_size=LENGTH))
     def look(known: bool, messages: list[tuple[str, Any]]) -> None:
         intake = intake_of(known)
