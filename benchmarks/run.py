@@ -64,11 +64,8 @@ def build_table(rows: Iterable[Row]) -> Table:
 def build_page(rows: list[Row]) -> str:
     """Return the rows as an HTML page, with a description of what each compares."""
     compared = [(row['name'], f'{row["ours"]}, against: {row["peer"]}', row['agreement']) for row in rows if 'error' not in row]
-    body = (
-        page.render_table(HEADINGS, map(format_cells, rows))
-        + '<h2>What is compared</h2>'
-        + page.render_table(('row', 'of what', 'agreement'), compared)
-    )
+    body = page.render_table(HEADINGS, map(format_cells, rows))
+    body += page.render_table(('row', 'of what', 'agreement'), compared, 'What is compared')
     return page.render_page('Benchmark', body, [f'{row["name"]}: {row["error"]}' for row in rows if 'error' in row])
 
 

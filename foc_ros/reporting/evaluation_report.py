@@ -11,10 +11,9 @@ from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PUBLISHED, REFITTED
 from foc_ros.analysis.evaluation.metrics import TENTHS
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS
 from foc_ros.analysis.evaluation.tables import GAP_TITLE, make_tables
-from foc_ros.core.errors import InputError
 
 from .drawing import open_figure
-from .page import render_page, render_picture, render_pictures, render_table
+from .page import render_page, render_picture, render_pictures, render_table, write_page
 from .plots import save_figure
 
 PAGE = 'evaluation.html'
@@ -28,14 +27,10 @@ CAPTIONS = {
 
 def write_report(directory: Path, title: str, answer: Mapping[str, Any]) -> None:
     """Write the page; answer: as of `evaluate --json`. Raises InputError where that cannot be done."""
-    tables = ''.join(f'<h2>{heading}</h2>{render_table(columns, rows)}' for heading, columns, rows in make_tables(answer))
+    tables = ''.join(render_table(columns, rows, heading) for heading, columns, rows in make_tables(answer))
     warnings = [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     page = render_page(f'Evaluation: {title}', render_pictures(_draw_questions(answer['questions'])) + tables, warnings)
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        (directory / PAGE).write_text(page, encoding='utf-8')
-    except OSError as error:
-        raise InputError('--report', 'a folder that can be written', f'{directory}: {error.strerror}') from error
+    write_page(directory, PAGE, page)
 
 
 def _draw_questions(questions: Mapping[str, Any]) -> Iterator[str]:

@@ -8,10 +8,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from foc_ros.analysis.fitting.tables import PARAMETER_COLUMNS, SCORE_COLUMNS, format_parameters, format_scores
-from foc_ros.core.errors import InputError
 
 from .drawing import get_class_style, open_figure
-from .page import render_page, render_picture, render_pictures, render_table
+from .page import render_page, render_picture, render_pictures, render_table, write_page
 from .plots import save_figure
 
 PAGE = 'fit.html'
@@ -24,19 +23,14 @@ CAPTION = (
 def write_report(directory: Path, title: str, answer: Mapping[str, Any]) -> None:
     """Write the page; answer: as of `fit --json`. Raises InputError where that cannot be done."""
     warnings = [*answer['warnings'], *(f'{name}: {reason}' for name, reason in answer['failed'].items())]
+    commands = [('parameter file', answer['output']), *zip(('without ROS', 'with ROS'), answer['node'], strict=True)]
     body = (
         _draw_parameters(answer['parameters'])
         + render_table(PARAMETER_COLUMNS, format_parameters(answer))
-        + '<h2>Scores</h2>'
-        + render_table(SCORE_COLUMNS, format_scores(answer))
-        + '<h2>Run the node with these parameters</h2>'
-        + render_table((), [('parameter file', answer['output']), *zip(('without ROS', 'with ROS'), answer['node'], strict=True)])
+        + render_table(SCORE_COLUMNS, format_scores(answer), 'Scores')
+        + render_table((), commands, 'Run the node with these parameters')
     )
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        (directory / PAGE).write_text(render_page(f'Fit: {title}', body, warnings), encoding='utf-8')
-    except OSError as error:
-        raise InputError('--report', 'a folder that can be written', f'{directory}: {error.strerror}') from error
+    write_page(directory, PAGE, render_page(f'Fit: {title}', body, warnings))
 
 
 def _draw_parameters(parameters: Mapping[str, Any]) -> str:

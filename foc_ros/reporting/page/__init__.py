@@ -1,6 +1,6 @@
 """HTML pages from the Jinja templates of this folder. Each page is one file that needs no network.
 
-Text is escaped by the templates. HTML that a function below returns may be joined and passed to `page_of` as a body.
+Text is escaped by the templates. HTML that a function below returns may be joined and passed to `render_page` as a body.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from foc_ros.core.errors import FocError
+from foc_ros.core.errors import FocError, InputError
 
 try:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -45,14 +45,23 @@ def render(template: str, **values: Any) -> str:
     return _TEMPLATES.get_template(template).render(values)
 
 
+def write_page(directory: Path, name: str, page: str) -> None:
+    """Write a page to a folder, which is made if necessary; raise InputError if that cannot be done."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        (directory / name).write_text(page, encoding='utf-8')
+    except OSError as error:
+        raise InputError('--report', 'a folder that can be written', f'{directory}: {error.strerror}') from error
+
+
 def render_page(title: str, body: str, warnings: Sequence[str] = ()) -> str:
     """Return a page with a title, warnings on top, and a body of HTML."""
     return render('frame.html', title=title, body=body, warnings=warnings)
 
 
-def render_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table as HTML; the first cell of a row is its heading; columns may be empty."""
-    return str(_PARTS.table(columns, rows))
+def render_table(columns: Sequence[str], rows: Iterable[Sequence[str]], heading: str = '') -> str:
+    """Return a table as HTML, below a heading if one is given; the first cell of a row is its heading; columns may be empty."""
+    return str(_PARTS.table(columns, rows, heading))
 
 
 def render_picture(file: Path, caption: str) -> str:
