@@ -1,7 +1,8 @@
 """Which tests are `long` and which are `process`: the two markers by which `make check`, `test` and `test-long` choose.
 
 `LONG` lists the long tests. The mark `process` is derived from the code: a test has it if the test, a fixture of it or a helper
-in this folder starts a process, a ROS graph or a browser. Tests that do so through the package are listed in `PROCESS`. The
+in this folder starts a process, a ROS graph or a browser. Tests that do so through the package are listed in `PROCESS`,
+with others that `make check` leaves to `make test`. The
 lists consist of shell patterns for 'file::function'. `test_tiers.py` fails if a pattern matches no test.
 """
 
@@ -53,6 +54,8 @@ PROCESS = (
     'test_fit_*.py::test_a_setting_that_predicts_nothing_*',
     'test_evaluate.py::test_the_number_of_workers_does_not_matter',
     'test_paper.py::*',
+    # a dozen programs with a picture each
+    'test_examples.py::test_the_example_runs_and_makes_a_figure',
 )
 
 STARTERS = {'subprocess', 'free_domain', 'chromium', 'worker_tasks'}
