@@ -13,6 +13,7 @@
 # make fuzz        100,000 random messages
 # make soak        ten minutes of a node among faulty publishers
 # make stops       a node that is stopped 200 times
+# make hostile     a node in scenes that are hard to predict in
 # make clean       remove everything that these targets have made
 
 PYTHON ?= python3
@@ -45,7 +46,7 @@ endif
 
 TEST = ROS_PYTHON_CHECK_FIELDS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
 
-.PHONY: setup help check test test-long lint demo doc bench pages colcon fuzz soak stops clean
+.PHONY: setup help check test test-long lint demo doc bench pages colcon fuzz soak stops hostile clean
 
 setup: $(STAMP)
 ifneq ($(origin PYTHON),file)
@@ -94,6 +95,9 @@ soak: $(STAMP)
 
 stops: $(STAMP)
 	$(BIN)/python scripts/stops.py --count 100
+
+hostile: $(STAMP)
+	$(BIN)/python scripts/hostile.py
 
 # a warning of Sphinx, such as a link to a page that does not exist, is a failure
 doc: $(VENV)/.doc

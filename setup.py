@@ -54,7 +54,7 @@ setup(
         # the documentation as a web site
         'doc': ['furo>=2024.8', 'matplotlib>=3.6', 'myst-parser>=4', 'numpydoc>=1.7', 'sphinx>=8', 'sphinx-gallery>=0.17'],
         # what the benchmark compares with
-        'bench': ['casadi>=3.6', 'cvxpy>=1.4', 'daqp>=0.5', 'matplotlib>=3.6', 'scipy>=1.15'],
+        'bench': ['casadi>=3.7', 'cvxpy>=1.4', 'daqp>=0.5', 'matplotlib>=3.6', 'scipy>=1.15'],
         'test': [
             'daqp>=0.5',
             'distributed>=2024.1',

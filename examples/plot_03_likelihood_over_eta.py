@@ -22,15 +22,16 @@ etas = np.linspace(0.5, 0.95, 19)
 results = [foc_ros.solve_classes((0.0, 0.0), (0.3, 0.0), obstacles, eta=eta, strategy='optimal', config=config) for eta in etas]
 
 # %%
-# A candidate that cannot reach eta has the likelihood 0 and is left out of the plot of the efforts.
+# A candidate that needs too much effort for eta is compromised: it keeps a smaller eta, and it is less likely than the ratio of
+# the efforts says.
 
 figure, (scene, efforts, likelihoods) = plt.subplots(1, 3, figsize=(12, 3.6), width_ratios=(1.5, 1, 1), layout='constrained')
 foc_ros.plot_candidates(results[len(etas) // 2], scene)
 for label in sorted({candidate.label for result in results for candidate in result}):
     found = [{candidate.label: candidate for candidate in result}.get(label) for result in results]
-    solved = [candidate is not None and candidate.is_solved for candidate in found]
-    efforts.plot(etas, [each.effort if ok else np.nan for each, ok in zip(found, solved, strict=True)], label=label)
-    likelihoods.plot(etas, [each.likelihood if ok else 0.0 for each, ok in zip(found, solved, strict=True)], label=label)
+    known = [candidate is not None and candidate.has_likelihood for candidate in found]
+    efforts.plot(etas, [each.effort if ok else np.nan for each, ok in zip(found, known, strict=True)], label=label)
+    likelihoods.plot(etas, [each.likelihood if ok else 0.0 for each, ok in zip(found, known, strict=True)], label=label)
 efforts.set(xlabel='eta', ylabel='effort [m²/s⁶]', yscale='log')
 likelihoods.set(xlabel='eta', ylabel='likelihood', ylim=(0.0, 1.0))
 likelihoods.legend()

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from foc_ros.core import types
 from foc_ros.core.checks import check_array, check_number, check_vector
 from foc_ros.core.config import Config
+from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import InputError, SceneError
 from foc_ros.core.estimation.kalman_filter import FilterState, update
 from foc_ros.core.homotopy.demonstrations import Demonstration
@@ -22,7 +23,7 @@ from foc_ros.core.obstacles.shapes import Circle, collect_obstacles
 from foc_ros.core.ocp import monte_carlo as sampling
 from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.predictor import predict
+from foc_ros.core.predictor import predict, warm_up
 from foc_ros.core.reaching_scene import ReachingScene, build_scene_problems, check_outside, solve_scene
 from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
 from foc_ros.core.types import (
@@ -59,7 +60,7 @@ class Prediction(types.Prediction):
     """
 
     def plot(self, axes: Any = None) -> Any:
-        """Draw the solved candidates, coloured by likelihood, in their scene.
+        """Draw the candidates in their scene, the thicker the more likely; those without a likelihood are grey.
 
         Parameters
         ----------
@@ -85,19 +86,20 @@ class Predictor:
     Parameters
     ----------
     config : Config, optional
-        Parameters; the defaults if not given. `rate_hz` and the timeouts have no effect here: every update predicts.
+        Parameters; the defaults if not given. `rate_hz` and the timeouts have no effect here: every update predicts. `budget_s`
+        holds by the clock as in the node; with 0 the answers do not depend on the machine.
     library : path or sequence of demonstrations, optional
         Demonstrated paths that `foc_ros replay --learn` wrote; by default the file that `homotopy.library` names.
 
     Examples
     --------
     >>> import foc_ros
-    >>> predictor = foc_ros.Predictor()
+    >>> predictor = foc_ros.Predictor(foc_ros.Config(budget_s=0.0))
     >>> predictor.set_goals([(0.3, 0.0)])
     >>> predictor.set_obstacles([foc_ros.Circle((0.15, 0.01), radius=0.03, name='cup')])
     >>> prediction = predictor.update(t=0.0, position=(0.0, 0.0))
     >>> prediction
-    <Prediction t=0 s, 2 candidates, most likely goal0:-cup (0.55)>
+    <Prediction t=0 s, 2 candidates, most likely goal0:-cup (0.54)>
     >>> [candidate.label for candidate in prediction.candidates]
     ['goal0:-cup', 'goal0:+cup']
     """
@@ -110,6 +112,8 @@ class Predictor:
 
             source = load_library(str(source))
         self._library = tuple(source)
+        if self.config.budget_s:
+            warm_up(self.config)  # imports are no part of the time of the first update
         self._goals: types.Array | None = None
         self._obstacles = ObstacleSource(make_obstacles(), None, '')
         self._hand: FilterState | None = None
@@ -181,7 +185,8 @@ class Predictor:
         if self._obstacles.stamp_ns is None:
             self._obstacles = replace(self._obstacles, stamp_ns=stamp_ns)
         obstacles = self._obstacles.at(stamp_ns)
-        prediction, self._memory = predict(self.config, self._hand, obstacles, self._goals, self._memory, self._library)
+        deadline = Deadline(self.config.budget_s or None)
+        prediction, self._memory = predict(self.config, self._hand, obstacles, self._goals, self._memory, self._library, deadline)
         return Prediction(**vars(prediction))
 
     def reset(self) -> None:
@@ -196,7 +201,7 @@ class Solution(types.Solution):
     Attributes
     ----------
     status, message : Status, str
-        Result in words and numbers. Only `Status.SOLVED` meets the wanted eta.
+        Result in words and numbers. `Status.SOLVED` meets the wanted eta, `Status.COMPROMISED` a smaller one.
     label : str
         Name of the homotopy class, such as ``goal0:+0-1``: + passes an obstacle on the left.
     times, path, mean, covariance : ndarray of shape (N + 1,), (N + 1, 2), (N + 1, n), (N + 1, n, n)
@@ -211,8 +216,11 @@ class Solution(types.Solution):
     problem: Problem | None = None
 
     def plot(self, axes: Any = None) -> Any:
-        """Draw the solution, if it is solved, in its scene; see `Prediction.plot`."""
-        candidate = Candidate(self.label, 0, (), self.path, 0.0)
+        """Draw the solution in its scene; see `Prediction.plot`."""
+        from foc_ros.reporting.snapshots import parse_label
+
+        _, sides = parse_label(self.label, self.problem.obstacles.ids if self.problem else ())
+        candidate = Candidate(self.label, 0, tuple(sides.items()), self.path, 0.0)
         return plot_candidates([PredictedCandidate(candidate, self, {}, 0.0, 1.0)], axes)
 
 
@@ -389,7 +397,7 @@ def monte_carlo(solution: Solution, samples: int = 10_000, seed: int = 0) -> sam
 
 
 def plot_candidates(candidates: Sequence[PredictedCandidate], axes: Any = None) -> Any:
-    """Draw the solved candidates of `solve_classes`, coloured by likelihood, in their scene.
+    """Draw the candidates of `solve_classes` in their scene, the thicker the more likely; those without a likelihood are grey.
 
     Parameters
     ----------
@@ -466,7 +474,7 @@ def get_strategy(name: str) -> Callable[..., Any]:
 
 def compute_eta(problem: Problem, control: types.Array) -> float:
     """Return the eta that a stacked control (2N,) achieves: the smallest over all obstacles and steps."""
-    return find_minimum_safety_factor(problem, control, between_steps=False).eta
+    return problem.risk.find_probability(find_minimum_safety_factor(problem, control, between_steps=False).k)
 
 
 def register_plant(name: str, factory: Callable[..., Any]) -> None:

@@ -6,7 +6,7 @@ python scripts/make_accuracy_figures.py
 
 from __future__ import annotations
 
-from accuracy import algorithm1, effort_over_eta, guarantee, page, reference
+from accuracy import algorithm1, bounds, effort_over_eta, guarantee, page, reference
 
 from foc_ros.reporting.plots import save_figure
 
@@ -27,6 +27,7 @@ def main() -> None:
         'curves': effort_over_eta.format_curves(curves),
         'algorithm1': algorithm1.format_ends(ends),
         'reference': reference.format_agreement(),
+        'bounds': bounds.format_costs(bounds.measure()),
     }
     page.write_blocks(texts)
     for name, text in texts.items():

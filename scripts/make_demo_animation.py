@@ -54,7 +54,7 @@ def pictures(
             with open_figure(8.4, 4.2) as figure:
                 scene, shares = figure.subplots(1, 2, width_ratios=(1.55, 1.0))
                 draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
-                draw_candidates(scene, snapshot.candidates, tracks.slots_at(row))
+                draw_candidates(scene, snapshot.candidates, tracks.slots_at(row), snapshot.unsolved)
                 scene.get_legend().remove()
                 draw_hand(scene, hand, snapshot.stamp_ns, (start_ns, end_ns))
                 draw_likelihoods(shares, tracks.between(start_ns, snapshot.stamp_ns), start_ns)

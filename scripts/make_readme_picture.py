@@ -45,7 +45,7 @@ def picture(hand: HandTrajectory, snapshots: list[Snapshot]) -> Figure:
     with open_figure(7.6, 6.6) as figure:
         scene = figure.subplots()
         draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
-        draw_candidates(scene, snapshot.candidates, number_labels(snapshot.candidates))
+        draw_candidates(scene, snapshot.candidates, number_labels(snapshot.candidates), snapshot.unsolved)
         draw_hand(scene, hand, snapshot.stamp_ns, span)
     return figure
 

@@ -21,14 +21,15 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from foc_ros.cli.demo.environment import free_domain, private_environment
+from foc_ros.core.types import Array
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import RclpyTypes
 
@@ -54,12 +55,12 @@ def graph_environment(logs: Path) -> dict[str, str]:
 
 
 class Player:
-    """Publishes hand poses, the scene and faults to a running node.
+    """Publishes hand poses, the scene and faults to a running node; rows, goals: the scene.
 
     Attributes: sent: number of poses by kind; health: the newest diagnostics; probes_s: times of the fixed computation [s].
     """
 
-    def __init__(self) -> None:
+    def __init__(self, rows: Sequence[tuple[float, ...]] = ROWS, goals: Array = GOALS) -> None:
         import rclpy
         from diagnostic_msgs.msg import DiagnosticArray
         from geometry_msgs.msg import PoseArray, PoseStamped
@@ -87,7 +88,7 @@ class Player:
         self._parameters = self._node.create_client(SetParametersAtomically, 'foc/set_parameters_atomically')
         self._engage = self._node.create_client(SetBool, 'foc/engage')
         self._reset = self._node.create_client(Trigger, 'foc/reset')
-        self._types, self._random = RclpyTypes(), random.Random(1)
+        self._types, self._random, self._rows, self._goals = RclpyTypes(), random.Random(1), rows, goals
         self._start = self._next = time.monotonic()
         self._turn, self._stamp_ns = 0, 0
         self.probes_s: list[float] = []
@@ -95,7 +96,7 @@ class Player:
         self.predictions, self.not_finite = 0, 0
         self.health: Mapping[str, str] = {}
 
-    def __enter__(self) -> Player:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
@@ -119,9 +120,9 @@ class Player:
         """Publish the messages of one period, and process messages for the rest of it."""
         stamp_ns = max(self._node.get_clock().now().nanoseconds, self._stamp_ns + BURST_NS)
         if self._turn % 10 == 0:
-            self._publishers['obstacles'].publish(encode_obstacles(self._types, stamp_ns, FRAME, ROWS))
+            self._publishers['obstacles'].publish(encode_obstacles(self._types, stamp_ns, FRAME, self._rows))
         if self._turn % 50 == 0:
-            self._publishers['goals'].publish(encode_goals(self._types, stamp_ns, FRAME, GOALS))
+            self._publishers['goals'].publish(encode_goals(self._types, stamp_ns, FRAME, self._goals))
         self._publish_pose(stamp_ns)
         if faulty and self._turn % 20 == 7:
             self._publish_fault(self._random.choice(FAULTS), stamp_ns)

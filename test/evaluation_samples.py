@@ -22,7 +22,8 @@ def make_candidates(sides, goal=None, likelihood=None, cost_to_go=None, solved=N
     return CandidateTable(
         labels=tuple(f'class{i}' for i in range(k)),
         goal=np.zeros(k, dtype=int) if goal is None else np.array(goal),
-        is_solved=solved,
+        has_likelihood=solved,
+        safety_shortfall=np.zeros(len(solved)),
         effort_spent=0.0,
         cost_to_go=np.ones(k) if cost_to_go is None else np.array(cost_to_go, dtype=float),
         likelihood=even if likelihood is None else np.array(likelihood, dtype=float),

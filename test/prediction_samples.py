@@ -39,12 +39,14 @@ def outcome(
     solution = Solution(**(values | changes))
     side = 1 if bend > 0 else -1
     candidate = Candidate(label, 0, (('1', side),), mean[:, :2].copy(), 0.31)
-    return PredictedCandidate(candidate, solution, {'1': side}, cost, likelihood if solution.status is Status.SOLVED else 0.0)
+    return PredictedCandidate(
+        candidate, solution, {'1': side}, cost, likelihood if solution.status in (Status.SOLVED, Status.COMPROMISED) else 0.0
+    )
 
 
 def prediction(*outcomes: PredictedCandidate, stamp_ns: int = 5_000_000_000, **changes: Any) -> Prediction:
     """Return a prediction of these outcomes, the first being the most likely."""
-    solved = [each.candidate.label for each in outcomes if each.is_solved]
+    solved = [each.candidate.label for each in outcomes if each.has_likelihood]
     values = {'frame_id': 'world', 'height': 0.2, 'most_likely': solved[0] if solved else None}
     return Prediction(stamp_ns=stamp_ns, candidates=outcomes, **(values | changes))
 

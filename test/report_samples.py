@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from foc_ros.core.types import (
+    LEFT,
     NANOSECONDS,
+    RIGHT,
     Array,
     Candidate,
     HandSample,
@@ -20,6 +22,14 @@ from foc_ros.core.types import (
 START_NS = 1_000 * NANOSECONDS
 OBSTACLES = make_obstacles([[0.15, 0.0], [0.22, 0.1]], [0.03, 0.02], [0.003, 0.0], ids=('1', 'post'))
 GOALS: Array = np.array([[0.3, 0.0], [0.3, 0.12]])
+
+
+SIDES = {
+    'goal0:+1': (('1', LEFT),),
+    'goal0:-1': (('1', RIGHT),),
+    'goal1:+1-post': (('1', LEFT), ('post', RIGHT)),
+    'goal1:+1+post': (('1', LEFT), ('post', LEFT)),
+}
 
 
 def quintic(s: Array) -> Array:
@@ -48,13 +58,25 @@ def outcome(
     covariance = np.zeros((21, 6, 6))
     covariance[:, 0, 0] = (0.001 + 0.01 * s) ** 2
     covariance[:, 1, 1] = (0.001 + 0.004 * s) ** 2
-    solution = Solution(status, '', dt, mean, covariance, np.zeros((20, 2)), 100.0 * (2 - likelihood), {}, 0.0, 1.0, 0.9)
+    solution = Solution(
+        status,
+        'solved' if status is Status.SOLVED else 'out of reach',
+        dt,
+        mean,
+        covariance,
+        np.zeros((20, 2)),
+        100.0 * (2 - likelihood),
+        {},
+        0.0,
+        1.0,
+        0.9,
+    )
     return PredictedCandidate(
-        Candidate(label, goal, (), path, 0.3),
+        Candidate(label, goal, SIDES[label], path, 0.3),
         solution,
         {},
         100.0 * (2 - likelihood),
-        likelihood if solution.status is Status.SOLVED else 0.0,
+        likelihood if solution.status in (Status.SOLVED, Status.COMPROMISED) else 0.0,
     )
 
 

@@ -65,6 +65,7 @@ NOT_RUN = {
     'make fuzz': LONG,
     'make soak': LONG,
     'make stops': LONG,
+    'make hostile': LONG,
     '.ci/run': 'it runs this test',
 }
 ENDLESS = (

@@ -15,7 +15,7 @@ from foc_ros.core.dynamics.plant_models import make_plant_model
 from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
 
 CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003, name='cup')
-FAST = foc_ros.Config().with_values({'foc.steps': 20})
+FAST = foc_ros.Config().with_values({'foc.steps': 20, 'budget_s': 0.0})
 
 
 @pytest.fixture(autouse=True)
@@ -213,6 +213,9 @@ def test_predictions_and_solutions_are_drawn():
     assert len(given.lines) >= 2
     for drawn in (foc_ros.solve((0, 0), (0.3, 0), [CUP], config=FAST), prediction):
         assert drawn.plot().get_xlabel() == 'x [m]'
+    solution = foc_ros.solve((0, 0), (0.3, 0), [CUP], config=FAST)
+    words = solution.plot().get_legend().get_texts()[0].get_text()
+    assert solution.label in words and words.endswith('right of cup' if '-' in solution.label else 'left of cup')
     foc_ros.plot_candidates(foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], config=FAST))
     with pytest.raises(foc_ros.InputError, match='candidates'):
         foc_ros.plot_candidates(prediction.candidates)
@@ -239,7 +242,7 @@ def test_a_config_file_is_read_and_checked(tmp_path):
     [
         (lambda: predictor_of_one_cup(), '<Predictor with 1 goals, 1 obstacles>'),
         (lambda: predictor_of_one_cup().update(1.0, (0, 0)).obstacles, '<Obstacles: 1 circles (cup)>'),
-        (lambda: FAST, '<Config foc.steps=20>'),
+        (lambda: FAST, '<Config budget_s=0.0, foc.steps=20>'),
         (lambda: foc_ros.solve((0, 0), (0.3, 0), config=FAST), '<Solution solved, effort 1312, eta 1>'),
     ],
 )

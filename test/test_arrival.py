@@ -18,7 +18,14 @@ from foc_ros.core.predictor import predict
 from foc_ros.core.types import HandState, make_obstacles
 
 PASSING = replace_values(
-    Config(), {'duration.arrival': 'passing', 'duration.model': 'fixed', 'duration.fixed_s': 1.0, 'foc.process_noise': 0.5}
+    Config(),
+    {
+        'duration.arrival': 'passing',
+        'duration.model': 'fixed',
+        'duration.fixed_s': 1.0,
+        'foc.process_noise': 0.5,
+        'estimator.acceleration_time_s': 0.0,
+    },
 )
 FREE = make_obstacles()
 

@@ -8,9 +8,11 @@ from hypothesis import strategies as st
 from foc_ros.core.kernels import freeze
 from foc_ros.core.obstacles.chance_constraint import (
     CERTAIN_K,
+    RiskBound,
     UncertainCircles,
     centre_trajectories,
     constraint_moments,
+    count_events,
     eta_of_k,
     k_of_eta,
     safety_factor,
@@ -32,6 +34,24 @@ def test_eta_and_k_are_inverse(eta):
 
 def test_a_violated_surrogate_guarantees_nothing():
     assert eta_of_k(-3.0) == 0.0
+
+
+@given(st.floats(0.55, 0.999), st.sampled_from(['cantelli', 'gaussian']), st.integers(1, 20_000))
+def test_the_safety_factor_of_a_bound_gives_its_probability_back(eta, bound, events):
+    risk = RiskBound(bound, events)
+    assert risk.find_probability(risk.find_safety_factor(eta)) == pytest.approx(eta, abs=1e-9)
+
+
+def test_what_bounds_and_events_cost_in_standard_deviations():
+    wanted = [RiskBound(bound, events).find_safety_factor(0.9) for bound in ('cantelli', 'gaussian') for events in (1, 150)]
+    np.testing.assert_allclose(wanted, [3.0, np.sqrt(1499.0), 1.281552, 3.208707], rtol=1e-6)
+    assert RiskBound('gaussian').find_safety_factor(0.3) == 0.0, 'the mean keeps out of a circle whatever eta is'
+    assert RiskBound('cantelli', 150).find_probability(2.0) == 0.0, 'a sum of risks above one says nothing'
+
+
+def test_the_risk_of_a_path_counts_every_obstacle_at_every_step():
+    assert [count_events(risk, 3, 50) for risk in ('step', 'path')] == [1, 150]
+    assert count_events('path', 0, 50) == 1
 
 
 def test_without_variance_k_is_certain_either_way():

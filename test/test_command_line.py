@@ -11,6 +11,7 @@ import pytest
 
 from foc_ros.cli import main as command_line
 from foc_ros.core.errors import InputError
+from foc_ros.io.terminal import show_table
 
 ROOT = Path(__file__).parents[1]
 
@@ -27,6 +28,8 @@ def started(*arguments: str, **options: object) -> subprocess.CompletedProcess[s
         (['fly'], 'foc_ros: argument command: invalid choice'),
         (['convert'], 'foc_ros convert: the following arguments are required: CSV, --obstacles, --output'),
         (['replay', 'bag', '--fast'], 'foc_ros replay: unrecognized arguments: --fast'),
+        (['replay', 'bag', '--params', 'a', '--params', 'b'], 'foc_ros replay: argument --params: given twice'),
+        (['evaluate', 'x' * 300], 'foc_ros evaluate: [Errno 36] File name too long'),
         (['replay', 'no_such_bag'], 'foc_ros replay: no_such_bag: no such file or directory'),
     ],
 )
@@ -69,6 +72,8 @@ class Fake:
         (0, 0, ''),
         (3, 3, ''),
         (InputError('start', 'two\n  numbers', 'one'), 2, 'foc_ros solve: start: expected two numbers, got one\n'),
+        (InputError('topic', 'a name', '/\x1b[31mhand'), 2, 'foc_ros solve: topic: expected a name, got /\\x1b[31mhand\n'),
+        (OSError(5, 'Input/output error', 'a'), 2, "foc_ros solve: [Errno 5] Input/output error: 'a'\n"),
         (KeyboardInterrupt(), 130, ''),
     ],
 )
@@ -94,24 +99,70 @@ def test_arguments_of_node_are_passed_to_ros(monkeypatch: pytest.MonkeyPatch) ->
     assert taken == [ros]
 
 
-def test_a_closed_standard_output_gives_no_traceback() -> None:
+def test_every_text_of_a_table_is_shown_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    show_table(('[/b]', '[red]a'), [('[/b]', ':smile:'), ('[bold]b[/bold]', '\\[c]')], title='[/d]')
+    shown = capsys.readouterr().out
+    assert all(text in shown for text in ('[/b]', '[red]a', ':smile:', '[bold]b[/bold]', '\\[c]', '[/d]'))
+
+
+def test_a_name_that_standard_output_cannot_show_is_escaped() -> None:
     program = (
         'import sys\nfrom foc_ros.cli import main as command_line\n'
-        'class Loud:\n'
+        'class Named:\n'
         ' add_arguments = staticmethod(lambda parser: None)\n'
-        ' @staticmethod\n'
-        ' def run(arguments):\n'
-        '  for _ in range(100000): print("x" * 100)\n'
-        '  return 0\n'
-        'command_line.import_module = lambda name, package: Loud\n'
+        ' run = staticmethod(lambda arguments: print("b\\udcff", "\u2500") or 0)\n'
+        'command_line.import_module = lambda name, package: Named\n'
         'sys.exit(command_line.main(["solve"]))'
     )
+    environment = {**os.environ, 'PYTHONIOENCODING': 'ascii', 'PYTHONUTF8': '1'}
+    command = [sys.executable, '-c', program]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=environment, timeout=100, check=False)
+    assert (result.returncode, result.stdout, result.stderr) == (0, 'b\\udcff \\u2500\n', '')
+
+
+LOUD = """
+import sys
+from foc_ros.cli import main as command_line
+class Loud:
+    add_arguments = staticmethod(lambda parser: None)
+    @staticmethod
+    def run(arguments):
+        {}
+        return 0
+command_line.import_module = lambda name, package: Loud
+sys.exit(command_line.main(["solve"]))
+"""
+MANY_LINES, A_LINE = 'for _ in range(100000): print("x" * 100)', 'print("x")'
+A_TABLE = 'from foc_ros.io.terminal import show_table; show_table(("a", "b"), [("c", "d")] * 10000)'
+
+
+def printed_to(output: int | None, what: str) -> subprocess.CompletedProcess[str]:
+    """Run a command that prints; output: file descriptor of its standard output, which is closed without one."""
+    closing = {'preexec_fn': lambda: os.close(1)} if output is None else {'stdout': output}
+    command = [sys.executable, '-c', LOUD.format(what)]
+    return subprocess.run(command, cwd=ROOT, stderr=subprocess.PIPE, text=True, timeout=100, check=False, **closing)
+
+
+@pytest.mark.parametrize('what', [MANY_LINES, A_LINE, A_TABLE])
+def test_a_pipe_whose_reader_has_closed_it_gives_141_and_no_traceback(what: str) -> None:
     reading, writing = os.pipe()
     os.close(reading)
     try:
-        result = subprocess.run(
-            [sys.executable, '-c', program], cwd=ROOT, stdout=writing, stderr=subprocess.PIPE, text=True, timeout=100, check=False
-        )
+        result = printed_to(writing, what)
     finally:
         os.close(writing)
     assert (result.returncode, result.stderr) == (141, '')
+
+
+@pytest.mark.skipif(not Path('/dev/full').exists(), reason='only Linux has a device that is always full')
+@pytest.mark.parametrize('what', [MANY_LINES, A_LINE, A_TABLE])
+def test_a_full_standard_output_gives_2_and_one_line(what: str) -> None:
+    with Path('/dev/full').open('w') as full:
+        result = printed_to(full.fileno(), what)
+    assert (result.returncode, result.stderr) == (2, 'foc_ros solve: [Errno 28] No space left on device\n')
+
+
+@pytest.mark.parametrize('what', [A_LINE, A_TABLE])
+def test_a_closed_standard_output_changes_no_exit_code(what: str) -> None:
+    result = printed_to(None, what)
+    assert (result.returncode, result.stderr) == (0, '')

@@ -140,6 +140,8 @@ def test_an_existing_bag_stops_before_anything_is_written(tmp_path: Path, capsys
         ('obstacles', 'x_m,y_m,radius_m,radius_stddev_m\n0,0,1,-1\n', "stddev_m: expected a number in [0, 10000], got '-1'"),
         ('obstacles', 'x_m,y_m,radius_m,id\n0,0,1,1.5\n', "expected a whole number in [-2147483648, 2147483647], got '1.5'"),
         ('obstacles', 'x_m,y_m,radius_m,id\n0,0,1,3\n0,0,1,3\n', 'row 3, column id: expected another id than the rows above'),
+        ('obstacles', 'x_m,y_m,radius_m\n' + 20_001 * '0,0,1\n', 'o.csv: expected at most 20,000 rows, got more'),
+        ('goals', 'x_m,y_m\n' + 257 * '0,0\n', 'g.csv: expected at most 256 rows, got more'),
         ('goals', 'x_m\n0\n', 'g.csv: row 1: no column y_m'),
         ('goals', 'x_m,y_m\n', 'g.csv: expected at least one row, got none'),
     ],

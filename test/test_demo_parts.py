@@ -34,7 +34,7 @@ STEP_NS = 20_000_000
 
 def send_scene(recorder: Recorder) -> None:
     goals = encode_goals(TYPES, START_NS, 'world', np.array([[0.3, 0.0, 0.1], [0.3, 0.12, 0.1]]))
-    cloud = encode_obstacles(TYPES, START_NS, 'world', [(0.15, 0.0, 0.1, 0.03, 0.003, 7)])
+    cloud = encode_obstacles(TYPES, START_NS, 'world', [(0.15, 0.0, 0.1, 0.03, 0.003, 1)])
     for role, message in (('goals', goals), ('obstacles', cloud)):
         recorder.add_sent(Item(role, f'/{role}', START_NS, message, b''), 0.0)
 
@@ -71,7 +71,7 @@ def test_recorder_keeps_every_prediction_with_its_scene() -> None:
     assert [(each.label, each.likelihood) for each in snapshot.candidates] == [
         (each.label, each.likelihood) for each in expected.candidates
     ]
-    assert snapshot.obstacles.ids == ('7',)
+    assert snapshot.obstacles.ids == ('1',)
     np.testing.assert_allclose(snapshot.goals, [[0.3, 0.0], [0.3, 0.12]])
     np.testing.assert_allclose(recorder.delays, 0.005)
 
@@ -113,13 +113,13 @@ def test_without_a_terminal_a_line_is_printed_each_second() -> None:
     assert len(lines) == 3
     assert lines[0].startswith(' 0.1 of 5.0 s   hand samples 5/s, predictions 5/s, delay 5 ms')
     assert '56 % goal0:-1' in lines[0]
-    assert '34 % goal0:+1' in lines[0]
+    assert '34 % goal0:+1 (goal0: left of 1)' in lines[0]
     assert '\x1b' not in ''.join(lines)
 
 
 def test_on_a_terminal_a_table_is_shown() -> None:
     text = shown(filled(), True, np.array([0.2]))
-    for part in ('likelihood', 'effort', 'eta', 'goal0:-1', '56 %', 'goal1:+1-post', '0.90', 'x 1.15'):
+    for part in ('likelihood', 'effort', 'eta', 'goal0:-1', 'goal0: right of 1', '56 %', 'goal1:+1-post', '0.90', 'x 1.15'):
         assert part in text
     assert '█' in text
 

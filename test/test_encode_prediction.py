@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ from foc_ros.ros.messages.types import MessageTypes
 
 BAGS = message_types('rosbags')
 NAMES = ['x', 'y', 'z', 't', 'vx', 'vy', 'vz', 'xx', 'xy', 'xz', 'yy', 'yz', 'zz', 'candidate', 'likelihood']
+PAIRS = NAMES[7:13]
+NAMES += ['compromised', *(f'motor_{pair}' for pair in PAIRS)]
 
 
 def made(name: str, of: Prediction, types: MessageTypes = BAGS, plane: str = 'xy') -> Any:
@@ -45,8 +48,8 @@ def test_the_cloud_contains_every_solved_candidate(types: MessageTypes, plane: s
     assert (cloud.height, cloud.width, cloud.row_step, len(cloud.data)) == (
         1,
         2 * (STEPS + 1),
-        2 * (STEPS + 1) * 60,
-        2 * (STEPS + 1) * 60,
+        2 * (STEPS + 1) * 88,
+        2 * (STEPS + 1) * 88,
     )
     assert (cloud.header.stamp.sec, cloud.header.stamp.nanosec, cloud.header.frame_id) == (5, 0, 'world')
     for index, each in enumerate(ways.solved_candidates):
@@ -131,10 +134,13 @@ def test_markers_show_every_candidate_and_obstacle(types: MessageTypes) -> None:
     for each in markers[1:]:
         assert (each.header.stamp.sec, each.header.frame_id, each.lifetime.sec) == (5, 'world', 1)
         by_name.setdefault(each.ns, []).append(each)
-    assert sorted(by_name) == ['deviation', 'label', 'obstacle', 'obstacle_deviation', 'path']
+    assert sorted(by_name) == ['label', 'legend', 'motor_noise', 'obstacle', 'obstacle_deviation', 'path', 'total_uncertainty']
     assert all(len({each.id for each in group}) == len(group) for group in by_name.values())
-    assert [len(each.points) for each in by_name['path']] == [STEPS + 1] * 3
-    assert [each.text for each in by_name['label']] == ['goal0:+l1 70 %', 'goal0:-l1 30 %', 'goal0:+l2 infeasible']
+    assert [each.text for each in by_name['label']] == [
+        'goal0:+l1 (left of 1) 70 %',
+        'goal0:-l1 (right of 1) 30 %',
+        f'goal0:+l2 (left of 1) infeasible: as wanted; remedy: {Status.INFEASIBLE.remedy}',
+    ]
     grey = by_name['path'][2].color
     assert grey.r == grey.g == grey.b
     assert [each.scale.x for each in by_name['obstacle']] == pytest.approx([0.06, 0.04])
@@ -146,9 +152,49 @@ def rotated(quaternion: Any, vector: np.ndarray) -> np.ndarray:
     return vector + 2 * np.cross(axis, np.cross(axis, vector) + quaternion.w * vector)
 
 
+def test_few_steps_are_drawn_as_a_smooth_curve_through_them() -> None:
+    """The markers of a path with constant jerk lie on the cubic, which the positions of the steps alone do not determine."""
+    times = DT * np.arange(STEPS + 1)
+    mean = np.zeros((STEPS + 1, 6))
+    mean[:, 0], mean[:, 2] = times, 1.0
+    mean[:, 1], mean[:, 3] = times**3, 3 * times**2
+    line = next(each for each in made('markers', prediction(outcome(mean=mean))).markers if each.ns == 'path')
+    points = np.array([(each.x, each.y) for each in line.points])
+    assert len(points) > 50
+    np.testing.assert_allclose(points[:, 1], points[:, 0] ** 3, atol=1e-12)
+    np.testing.assert_allclose(points[:: (len(points) - 1) // STEPS], mean[:, :2], atol=1e-12)
+
+
+def test_a_compromised_candidate_takes_part_and_says_so() -> None:
+    ways = prediction(outcome('a', 0.7), outcome('b', 0.3, eta=0.62, status=Status.COMPROMISED))
+    table = columns(made('prediction', ways))
+    assert set(table['candidate'][table['compromised'] == 1]) == {1}
+    assert made('likelihoods', ways).layout.dim[0].label == 'a;b'
+    texts = [each.text for each in made('markers', ways).markers if each.ns == 'label']
+    assert texts[1].endswith('30 %, compromised: eta 0.620')
+
+
+@pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
+def test_motor_noise_and_total_uncertainty_are_told_apart(plane: str) -> None:
+    one = outcome()
+    wide = replace(one, solution=one.solution.with_covariance(4.0 * one.solution.covariance))
+    table = columns(made('prediction', prediction(wide), plane=plane))
+    for pair in PAIRS:
+        np.testing.assert_allclose(table[pair], 4.0 * table[f'motor_{pair}'], rtol=1e-6)
+    assert table[f'motor_{plane}'].all()
+    sizes = {}
+    for each in made('markers', prediction(wide), plane=plane).markers:
+        sizes.setdefault(each.ns, []).append((each.scale.x, each.scale.y))
+    np.testing.assert_allclose(sizes['total_uncertainty'], 2.0 * np.array(sizes['motor_noise']), rtol=1e-6)
+    assert 'legend' in sizes
+
+
 @pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
 def test_an_ellipse_has_the_axes_of_the_covariance(plane: str) -> None:
-    markers = [each for each in made('markers', three_ways(), plane=plane).markers if each.ns == 'deviation']
+    markers = [
+        each for each in made('markers', three_ways(), plane=plane).markers if each.ns in ('motor_noise', 'total_uncertainty')
+    ]
+    assert markers
     for each in markers:
         drawn = sum(
             (size / 2) ** 2 * np.outer(axis, axis)
@@ -200,7 +246,7 @@ def test_any_prediction_can_be_read_from_its_cloud(
     outcomes = [outcome(f'c{i}', p, bend, cost, status=status) for i, (p, bend, cost, status) in enumerate(rows)]
     given_prediction = prediction(*outcomes, height=height)
     table = columns(made('prediction', given_prediction, plane=plane))
-    solved = given_prediction.solved_candidates
+    solved = given_prediction.candidates_with_likelihood
     assert set(table['candidate']) == set(range(len(solved)))
     for index, each in enumerate(solved):
         rows_ = table['candidate'] == index

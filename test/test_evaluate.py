@@ -34,12 +34,12 @@ def tables(tmp_path: Path) -> Path:
     return write_tables(tmp_path / 'data', {name: reach(aside, GOAL[0]) for name, aside in ASIDE.items()}, GOAL, OBSTACLE)
 
 
-def run(data: Path, *options: str) -> int:
-    return main(['evaluate', str(data), '--params', str(data / 'parameters.yaml'), '--workers', '1', *options])
+def run(data: Path, *options: str, workers: str = '1') -> int:
+    return main(['evaluate', str(data), '--params', str(data / 'parameters.yaml'), '--workers', workers, *options])
 
 
-def answer(data: Path, capsys: pytest.CaptureFixture[str], *options: str, code: int = 0) -> dict:
-    assert run(data, '--json', *options) == code
+def answer(data: Path, capsys: pytest.CaptureFixture[str], *options: str, code: int = 0, workers: str = '1') -> dict:
+    assert run(data, '--json', *options, workers=workers) == code
     return json.loads(capsys.readouterr().out)
 
 
@@ -90,7 +90,7 @@ def test_reaches_without_obstacles_are_scored_by_goal(tmp_path: Path, capsys: py
 
 @pytest.mark.parametrize('workers', ['2'])
 def test_the_number_of_workers_does_not_matter(tables: Path, capsys: pytest.CaptureFixture[str], workers: str) -> None:
-    assert answer(tables, capsys) == answer(tables, capsys, '--workers', workers)
+    assert answer(tables, capsys) == answer(tables, capsys, workers=workers)
 
 
 def test_bags_are_scored_as_their_tables(tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -125,16 +125,16 @@ def _check_node_starts(printed: str, config: Config) -> None:
 @pytest.mark.parametrize(
     ('arguments', 'expected'),
     [
-        (['nowhere'], 'nowhere: no such file or directory'),
+        (['nowhere', '--output', 'out.yaml'], 'nowhere: no such file or directory'),
         (['.', '--output', 'nowhere/out.yaml'], '--output: expected a file in a directory that exists'),
-        (['.', '--params', 'nowhere.yaml'], 'nowhere.yaml: cannot be read'),
+        (['.', '--output', 'out.yaml', '--params', 'nowhere.yaml'], 'nowhere.yaml: cannot be read'),
     ],
 )
 def test_wrong_input_ends_in_one_line(
     arguments: list[str], expected: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(['fit', '--output', 'out.yaml', *arguments]) == 2
+    assert main(['fit', *arguments]) == 2
     error = capsys.readouterr().err
     assert expected in error and error.count('\n') == 1
     assert not (tmp_path / 'out.yaml').exists()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,9 @@ from foc_ros.core.config import Config, replace_values
 from foc_ros.core.estimation.kalman_filter import compute_transition
 from foc_ros.core.types import Array, make_obstacles
 
-CONFIG = replace_values(Config(), {'foc.steps': 15, 'homotopy.max_candidates': 2, 'rate_hz': 4.0})
+CONFIG = replace_values(
+    Config(), {'foc.steps': 15, 'homotopy.max_candidates': 2, 'rate_hz': 4.0, 'estimator.acceleration_time_s': 0.0}
+)
 GOAL = np.array([[0.3, 0.0]])
 ARRIVALS = [CONFIG, replace_values(CONFIG, {'duration.arrival': 'passing'})]
 
@@ -158,7 +161,7 @@ def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twic
 ) -> None:
     recordings = find_recordings(write_tables(tmp_path / 'data', count=4, hz=30.0))
     names = list(recordings)
-    hopeless = replace_values(CONFIG, {'foc.noise_x': 2.0, 'foc.noise_y': 2.0})
+    hopeless = replace_values(CONFIG, {'foc.noise_x': 2.0, 'foc.noise_y': 2.0, 'likelihood.shortfall': math.inf})
     with IsolatedProcessPool(1) as executor:
         replays = Replays(recordings, {}, executor)
         scores = replays.score([hopeless, CONFIG], names, 'both')

@@ -79,3 +79,32 @@ def test_a_clock_at_zero_is_not_used() -> None:
     assert pose(freshness, 10.0, 0.0) is None
     assert pose(freshness, 10.1, 10.1) is None
     assert pose(freshness, 10.2, 11.2) is not None
+
+
+@pytest.mark.parametrize(
+    ('stamp_s', 'received_s', 'words'),
+    [
+        (100.0, 9.9, None),
+        (100.0, 9.4, '0.6 s old'),
+        (99.3, 9.9, '0.8 s old'),
+    ],
+)
+def test_a_prediction_is_late_by_the_age_of_its_own_pose(stamp_s: float, received_s: float, words: str | None) -> None:
+    """The pose behind it may be fresh: what counts is when the pose was stamped and received from which it was computed."""
+    freshness = Freshness()
+    assert pose(freshness, 100.0, 100.1) is None
+    stamp_ns, clock_ns = round(stamp_s * NANOSECONDS), round(100.1 * NANOSECONDS)
+    found = freshness.find_late_reason(stamp_ns, received_s, 10.0, clock_ns, CONFIG)
+    assert (found is None) == (words is None) and (words or '') in (found or '')
+    assert freshness.find_late_reason(stamp_ns, received_s, 10.0, clock_ns, NEVER) is None
+
+
+def test_the_stamps_of_a_recording_make_no_prediction_late() -> None:
+    assert Freshness().find_late_reason(1, 9.9, 10.0, 10**18, CONFIG) is None
+
+
+def test_silent_sources_are_named() -> None:
+    freshness = build_freshness(**{CLOUD: 7.9, MARKERS: 9.0})
+    assert freshness.find_silent_sources(10.0, CONFIG, BOTH) == ['cloud']
+    assert freshness.find_silent_sources(12.0, CONFIG, BOTH) == ['cloud', 'markers']
+    assert freshness.find_silent_sources(12.0, NEVER, BOTH) == []

@@ -4,16 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reach_helpers import one_obstacle, random_scene, reach
+from reach_helpers import random_scene, reach
 
 from foc_ros.core.config import FocConfig
 from foc_ros.core.dynamics.plants import condense, discretise_damped_mass, discretise_triple_integrator
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.qp import Cost, effort_cost, half_planes
 from foc_ros.core.ocp.solve import solve_problem
-from foc_ros.core.ocp.strategies.optimal import surrogate_qp
 from foc_ros.core.ocp.warm_start import cold_start
-from foc_ros.core.ocp.working_set import WorkingSet
 from foc_ros.core.types import make_obstacles
 
 STEPS, LAMBDA = 12, 3e4
@@ -136,31 +134,3 @@ def test_half_planes_are_the_gradient_of_the_distance():
 
     for axis, step in enumerate(1e-6 * np.eye(2)):
         np.testing.assert_allclose(normals[..., axis], (distance(guess + step) - distance(guess - step)) / 2e-6, atol=1e-6)
-
-
-def test_curvature_of_the_surrogate_is_that_of_the_standard_deviation():
-    """d^2 sqrt(V) = (d^2 V / 2 - (d sqrt(V))^2) / sqrt(V): the QP takes the first part, the convex one, times the multipliers."""
-    problem, k = one_obstacle(), 2.0
-    generator = np.random.default_rng(5)
-    control, step = generator.normal(0.0, 30.0, (2, 100))
-    active, multipliers = WorkingSet(np.array([0, 0]), np.array([19, 24])), np.array([3e4, 5e3])
-    curved = surrogate_qp(problem, control, active, multipliers, k, complete=False).cost
-    plain = surrogate_qp(problem, control, WorkingSet(), np.zeros(0), k, complete=False).cost
-    offset = problem.positions(control)[None] - problem.centres
-    distance = np.hypot(offset[..., 0], offset[..., 1])
-    size = problem.size[1][:, None]
-
-    def stddev(u: np.ndarray) -> np.ndarray:
-        """Of the constraint at each step, seen from where `control` leads."""
-        xx, yy, xy = problem.position_variance(u)
-        x, y = offset[..., 0], offset[..., 1]
-        return np.sqrt(size + 4 * (x * x * xx + y * y * yy + 2 * x * y * xy))
-
-    h = 1e-3
-    forth, here, back = stddev(control + h * step), stddev(control), stddev(control - h * step)
-    slope, bend = (forth - back) / (2 * h), (forth - 2 * here + back) / h**2
-    convex = k / (2 * distance) * (bend + slope**2 / here)
-    expected = float(multipliers @ convex[active.obstacle, active.step])
-    assert step @ ((curved.hessian - plain.hessian) * step) == pytest.approx(expected, rel=1e-5)
-    # about the control: the curvature alone pulls nowhere there
-    np.testing.assert_allclose(curved.linear, (curved.hessian - plain.hessian) * control, atol=1e-9)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -21,8 +23,8 @@ def predicted(obstacles: Obstacles, goals: np.ndarray = GOAL, config: Config = C
         solution = outcome.solution
         for array in (solution.mean, solution.covariance, solution.control):
             assert np.isfinite(array).all()
-        assert outcome.is_solved or outcome.likelihood == 0.0
-    shares = [outcome.likelihood for outcome in prediction.solved_candidates]
+        assert outcome.has_likelihood or outcome.likelihood == 0.0
+    shares = [outcome.likelihood for outcome in prediction.candidates_with_likelihood]
     assert not shares or sum(shares) == pytest.approx(1.0)
     assert (prediction.most_likely is None) == (not shares)
     assert memory.most_likely == prediction.most_likely
@@ -84,7 +86,11 @@ def test_a_hand_at_its_goal_stays_there() -> None:
 
 def test_an_eta_out_of_reach_is_said_with_the_one_that_is_reached() -> None:
     config = replace_values(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0})
-    prediction = predicted(make_obstacles([[0.15, 0.0]], [0.03], 0.003), config=config)
-    assert prediction.solved_candidates == ()
+    obstacle = make_obstacles([[0.15, 0.0]], [0.03], 0.003)
+    soft = predicted(obstacle, config=config)
+    assert soft.solved_candidates == ()
+    assert {outcome.status for outcome in soft.candidates_with_likelihood} == {Status.COMPROMISED}
+    prediction = predicted(obstacle, config=replace_values(config, {'likelihood.shortfall': math.inf}))
+    assert prediction.candidates_with_likelihood == ()
     assert {outcome.solution.status for outcome in prediction.candidates} == {Status.ETA_UNREACHABLE}
     assert all('eta 0.999 is out of reach: the largest' in outcome.solution.message for outcome in prediction.candidates)

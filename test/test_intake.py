@@ -65,8 +65,32 @@ def test_markers_of_publishers_with_different_delays_are_all_used(intake: Intake
 
 def test_deleting_all_markers_is_an_empty_scene(intake: Intake) -> None:
     move(intake, 1.0)
+    show(intake, marker(TYPES))
     assert show(intake, marker(TYPES, action=3, ns='', frame_id='')) is SampleStatus.ACCEPTED
     assert seen(intake) == () and 'markers' in intake.pipeline.scene.sources
+
+
+def test_a_table_that_never_held_a_marker_is_no_source(intake: Intake) -> None:
+    move(intake, 1.0)
+    for message in ((), (marker(TYPES, action=3, ns='', frame_id=''),)):
+        assert show(intake, *message) is SampleStatus.ACCEPTED
+        assert intake.pipeline.scene.sources == {}
+    show(intake, marker(TYPES))
+    assert 'markers' in intake.pipeline.scene.sources
+
+
+def test_a_source_that_is_removed_is_as_if_it_had_never_been_received(intake: Intake) -> None:
+    move(intake, 1.0)
+    show(intake, marker(TYPES, id=1, lifetime=5.0))
+    intake.take('obstacles', cloud(TYPES, obstacle_table([(0.1, 0.2, 0.0, 0.03)])))
+    intake.remove_source('markers')
+    assert seen(intake) == ('0',)
+    move(intake, 1.1)
+    assert seen(intake) == ('0',), 'the markers do not come back with the next pose'
+    show(intake, marker(TYPES, id=2))
+    assert seen(intake) == ('0', 'a/2')
+    intake.remove_source('cloud')
+    assert seen(intake) == ('a/2',)
 
 
 def test_markers_in_another_frame_are_discarded(intake: Intake) -> None:

@@ -1,5 +1,7 @@
 """The memory between predictions: solutions by label, under changed labels, and after a deadline."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -48,14 +50,15 @@ def test_a_candidate_is_found_by_its_present_or_its_earlier_label(memory, now, b
     assert found is (None if before is None else memory.earlier.solutions[before.label])
 
 
-def reaching(x: float, memory: Memory, budget_s: float = 0.0):
+def reaching(x: float, memory: Memory):
     """Predict for a hand at (x, 0) that moves, among two obstacles of which it passes the first at x = 0.1."""
     obstacles = make_obstacles([[0.1, 0.04], [0.2, -0.01]], 0.02, 0.001)
     state = None
     for tick in range(40):
         place = np.array([x - 0.004 * (39 - tick), 0.0])
-        state = update(state, HandSample(1_000_000_000 + 10_000_000 * tick, place), CONFIG.estimator).state
-    return predict(replace_values(CONFIG, {'budget_s': budget_s}), state, obstacles, np.array([[0.3, 0.0]]), memory)
+        stamp_ns = 1_000_000_000 + round(x / 0.4 * 1e9) + 10_000_000 * tick
+        state = update(state, HandSample(stamp_ns, place), CONFIG.estimator).state
+    return predict(CONFIG, state, obstacles, np.array([[0.3, 0.0]]), memory)
 
 
 def test_when_an_obstacle_is_passed_the_candidates_keep_their_solutions():
@@ -74,17 +77,17 @@ def test_when_an_obstacle_is_passed_the_candidates_keep_their_solutions():
 def test_a_candidate_stopped_by_the_deadline_continues_from_there(monkeypatch):
     looks = []
 
-    def stop_after_a_few(_):
+    def stop_after_a_few(*_):
         looks.append(1)
         if len(looks) > 4:
             raise OutOfTimeError
 
     with monkeypatch.context() as patch:
         patch.setattr(Deadline, 'check', stop_after_a_few)
-        late, memory = reaching(0.0, Memory(), 60.0)
+        late, memory = reaching(0.0, Memory())
     assert {outcome.solution.status for outcome in late.candidates} == {Status.DEADLINE}
     assert memory.earlier.solutions, 'the first candidate had some time'
-    assert all(solution.lam > 0.0 for solution in memory.earlier.solutions.values())
+    assert all(solution.multipliers for solution in memory.earlier.solutions.values())
     after, _ = reaching(0.0, memory)
     assert set(memory.earlier.solutions) <= {outcome.candidate.label for outcome in after.solved_candidates}
 
@@ -92,7 +95,7 @@ def test_a_candidate_stopped_by_the_deadline_continues_from_there(monkeypatch):
 def test_an_unreachable_candidate_is_followed_and_restarted_at_intervals(monkeypatch):
     starts = []
     monkeypatch.setattr(outcomes, 'solve_problem', lambda *given: starts.append(given[1].lam is None) or solve_problem(*given))
-    config = replace_values(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0})
+    config = replace_values(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0, 'likelihood.shortfall': math.inf})
     memory, begun = Memory(), []
     for tick in range(2 * RETRY_AFTER + 3):
         state = HandState(10_000_000 * tick, np.zeros(6), np.zeros((6, 6)))

@@ -149,10 +149,11 @@ def test_a_silent_hand_is_reported(ros: Graph) -> None:
     assert re.match(r'no prediction: hand_pose silent for \d+\.\d s', status.message)
 
 
-@pytest.mark.parametrize('where', ['predict', 'encode_outputs'])
+@pytest.mark.parametrize('where', ['begin', 'predict', 'encode_outputs'])
 def test_an_internal_error_is_counted_and_reported_and_the_node_goes_on(
     ros: Graph, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:
+    from foc_ros.core import pipeline as computation
     from foc_ros.ros import node as module
 
     def broken(*_: Any) -> None:
@@ -163,7 +164,8 @@ def test_an_internal_error_is_counted_and_reported_and_the_node_goes_on(
     monkeypatch.setattr(bench.node, 'get_logger', lambda: log)
     bench.publish_scene()
     with monkeypatch.context() as patch:
-        patch.setattr(*((bench.node.pipeline, where) if where == 'predict' else (module, where)), broken)
+        owner = {'begin': bench.node.pipeline, 'predict': computation, 'encode_outputs': module}[where]
+        patch.setattr(owner, where, broken)
         bench.move(poses[:3])
         status = bench.health()
     assert status.level == b'\x02'

@@ -44,6 +44,8 @@ def node_process(ros: Graph, parameters: str) -> Iterator[subprocess.Popen[str]]
         reliable,
         '-p',
         'scene.timeout_s:=0.0',
+        '-p',
+        'budget_s:=0.0',
     ]
     process = subprocess.Popen(
         command, cwd=ROOT, env=ros.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from foc_ros.core import pipeline as module
 from foc_ros.core.config import Config, replace_values
+from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.errors import SceneError
 from foc_ros.core.homotopy.demonstrations import Demonstration
 from foc_ros.core.memory import Memory
@@ -34,8 +35,10 @@ class Recorder:
         goals: Array,
         memory: Memory,
         library: tuple[Demonstration, ...],
+        deadline: Deadline,
     ) -> tuple[Prediction, Memory]:
         assert library == ()
+        assert deadline is NEVER
         self.calls.append((config, hand, obstacles, goals, memory))
         label = f'call{len(self.calls)}'
         return Prediction(hand.stamp_ns, hand.frame_id, hand.height, (), label), Memory(label)
@@ -442,3 +445,56 @@ def test_the_same_messages_give_the_same_predictions() -> None:
         for a, b in zip(one.candidates, other.candidates, strict=True):
             assert (a.candidate.label, a.likelihood, a.cost) == (b.candidate.label, b.likelihood, b.cost)
             np.testing.assert_array_equal(a.solution.mean, b.solution.mean)
+
+
+EVENTS = {
+    'reset': lambda pipeline: pipeline.reset(),
+    'clutch': lambda pipeline: pipeline.set_engaged(False),
+    'parameters': lambda pipeline: pipeline.reconfigure(replace_values(CONFIG, {'foc.eta': 0.5})),
+    'restart': lambda pipeline: pipeline.add_hand_sample(hand(-10_000.0)),
+}
+
+
+@pytest.mark.parametrize('event', EVENTS)
+def test_a_prediction_that_was_begun_before_an_event_is_neither_returned_nor_remembered(recorder: Recorder, event: str) -> None:
+    pipeline, deadline = ready(), Deadline()
+    pipeline.add_hand_sample(hand(0.0))
+    task = pipeline.begin(deadline)
+    assert task is not None and not deadline.has_passed
+    EVENTS[event](pipeline)
+    assert deadline.has_passed
+    assert pipeline.finish(task, task.run) is None
+    assert pipeline.counts['predict_abandoned'] == 1
+    assert recorder.calls == []
+    pipeline.set_engaged(True)
+    pipeline.add_hand_sample(hand(100.0))
+    assert pipeline.is_due and pipeline.predict() is not None
+    assert recorder.calls[0][4] == Memory()
+
+
+def test_after_a_change_of_parameters_the_newest_sample_is_due_again(recorder: Recorder) -> None:
+    pipeline = ready()
+    pipeline.add_hand_sample(hand(0.0))
+    task = pipeline.begin(Deadline())
+    pipeline.add_hand_sample(hand(5.0))
+    assert task is not None and not pipeline.is_due
+    pipeline.reconfigure(replace_values(CONFIG, {'foc.eta': 0.5}))
+    prediction = pipeline.predict()
+    assert prediction is not None and prediction.stamp_ns == START + 5 * MS
+    assert recorder.calls[0][0].foc.eta == 0.5
+
+
+def test_samples_and_scenes_of_the_meantime_do_not_change_a_prediction_that_was_begun(recorder: Recorder) -> None:
+    pipeline = ready()
+    pipeline.add_hand_sample(hand(0.0))
+    task = pipeline.begin(Deadline())
+    assert task is not None
+    pipeline.add_hand_sample(hand(40.0, 0.01))
+    pipeline.set_obstacles('cloud', make_obstacles(), START, 'world')
+    recorder(task.config, task.hand, task.obstacles, task.goals, task.memory, (), NEVER)
+    prediction = pipeline.finish(task, lambda: (Prediction(task.hand.stamp_ns, 'world', 0.3, (), 'made'), Memory('made')))
+    assert prediction is not None and prediction.stamp_ns == START
+    assert recorder.calls[0][2].ids == ('0',)
+    assert pipeline.is_due and pipeline.predict() is not None
+    assert recorder.calls[1][4].most_likely == 'made'
+    assert recorder.calls[1][2].ids == ()

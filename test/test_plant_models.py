@@ -18,7 +18,9 @@ from foc_ros.core.registry import PLANTS
 from foc_ros.core.types import HandState, make_obstacles
 
 STEPS, MASS, DAMPING = 50, 1.5, 4.0
-MASS_CONFIG = Config().with_values({'foc.plant': 'damped_mass', 'foc.plant_mass': MASS, 'foc.plant_damping': DAMPING})
+MASS_CONFIG = Config().with_values(
+    {'foc.plant': 'damped_mass', 'foc.plant_mass': MASS, 'foc.plant_damping': DAMPING, 'estimator.acceleration_time_s': 0.0}
+)
 MOVING = HandState(
     0, np.array([0.0, 0.0, 0.1, -0.05, 1.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2), effort_spent=5.0
 )
@@ -106,7 +108,7 @@ def test_only_effort_of_jerk_is_added_to_effort_of_jerk():
 
 def test_the_durations_do_not_depend_on_the_plant():
     durations = []
-    for config in (Config(), MASS_CONFIG):
+    for config in (Config().with_values({'estimator.acceleration_time_s': 0.0}), MASS_CONFIG):
         values = config.with_values({'duration.model': 'cost_of_time'})
         solved = predict(values, MOVING, make_obstacles([[0.15, 0.01]], 0.03), GOAL, Memory())[0].solved_candidates
         durations.append({each.label: each.times[-1] for each in solved})

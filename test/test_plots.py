@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +20,7 @@ from matplotlib.patches import Circle, Ellipse
 from report_samples import START_NS, prediction, predictions, samples, scene
 
 from foc_ros.core.errors import InputError
-from foc_ros.core.types import make_obstacles
+from foc_ros.core.types import Status, make_obstacles
 from foc_ros.reporting.drawing import (
     CLASS_COLOURS,
     CLASSES,
@@ -30,14 +32,16 @@ from foc_ros.reporting.drawing import (
 )
 from foc_ros.reporting.plots import (
     compute_bounds,
+    draw_likelihoods,
     make_scene_figure,
     make_snapshot_figure,
     plot_outcomes,
     plot_prediction,
     save_figure,
 )
-from foc_ros.reporting.snapshots import build_candidate_views, build_hand_trajectory, build_snapshot
+from foc_ros.reporting.snapshots import build_candidate_views, build_hand_trajectory, build_snapshot, build_unsolved_views
 from foc_ros.reporting.track_association import build_candidate_tracks
+from foc_ros.ros.messages.ranking import find_drawn_curve
 
 ROOT = Path(__file__).resolve().parents[1]
 PNG = b'\x89PNG\r\n\x1a\n'
@@ -88,18 +92,65 @@ def test_scene_holds_every_obstacle_goal_and_candidate() -> None:
     np.testing.assert_allclose(radii, [0.02, 0.02, 0.03, 0.033])
     drawn = [line.get_xydata() for line in axes.lines]
     for each in candidates:
-        assert any(np.array_equal(line, each.path) for line in drawn)
+        assert any(np.array_equal(line, each.curve) for line in drawn)
     for goal in goals:
         assert any(np.array_equal(line, [goal]) for line in drawn)
     assert sum(type(patch) is Ellipse for patch in axes.patches) == ELLIPSES_PER_CANDIDATE * len(candidates)
 
 
-def test_unsolved_outcomes_are_not_drawn() -> None:
-    outcomes = prediction(START_NS, np.zeros(2)).candidates
-    assert [view.label for view in build_candidate_views(outcomes)] == [
-        each.candidate.label for each in outcomes if each.is_solved
-    ]
-    assert any(not each.is_solved for each in outcomes)
+def legend_of(axes: Any) -> str:
+    """Return the text of the legend without its line breaks."""
+    return ' '.join(' '.join(each.get_text().split()) for each in axes.get_legend().get_texts())
+
+
+def test_candidates_without_a_likelihood_are_grey_with_reason_and_remedy() -> None:
+    made = prediction(START_NS, np.zeros(2))
+    axes = plot_prediction(made, Figure().subplots())
+    lost = made.candidates[-1]
+    (grey,) = [line for line in axes.lines if line.get_color() == NO_CLASS_COLOUR]
+    np.testing.assert_allclose(grey.get_xydata()[[0, -1]], lost.solution.path[[0, -1]], atol=1e-12)
+    assert f'- % {lost.label} {lost.description}; {lost.reason}' in legend_of(axes)
+    assert lost.status.remedy in legend_of(axes)
+
+
+def test_a_failed_scene_shows_the_attempt_and_the_start() -> None:
+    obstacles, goals = scene()
+    made = prediction(START_NS, np.zeros(2))
+    lost, start = build_unsolved_views(made.candidates), np.array([[-0.1, 0.02]])
+    axes = make_scene_figure(obstacles, goals, (), lost, start).axes[0]
+    assert any(np.array_equal(line.get_xydata(), start) for line in axes.lines)
+    assert any(np.array_equal(line.get_xydata(), lost[0].path) for line in axes.lines)
+    assert axes.get_xlim()[0] < -0.1
+
+
+def test_both_ellipses_are_drawn_and_named_and_a_compromised_candidate_is_dotted() -> None:
+    obstacles, goals = scene()
+    made = prediction(START_NS, np.zeros(2))
+    (first, *rest), wide = made.candidates, 4.0 * made.candidates[0].solution.covariance
+    changed = replace(first, solution=replace(first.solution, status=Status.COMPROMISED).with_covariance(wide))
+    axes = make_scene_figure(obstacles, goals, build_candidate_views([changed, *rest])).axes[0]
+    ellipses = [patch for patch in axes.patches if type(patch) is Ellipse]
+    dashed = [each for each in ellipses if each.get_linestyle() == '--']
+    assert len(dashed) == ELLIPSES_PER_CANDIDATE
+    assert len(ellipses) == 4 * ELLIPSES_PER_CANDIDATE
+    np.testing.assert_allclose(max(each.width for each in dashed), 2 * 2 * 0.011)
+    text = legend_of(axes)
+    assert 'motor noise, which eta is about' in text and 'total uncertainty' in text
+    assert text.count('compromised: eta 0.900') == 1
+    assert [line.get_linestyle() for line in axes.lines if line.get_label().strip().startswith('A')] == [':']
+
+
+def test_the_share_without_a_likelihood_is_hatched() -> None:
+    made = predictions(samples())
+    lost = [replace(each, candidates=each.candidates[-1:], most_likely=None) for each in made[20:]]
+    axes = Figure().subplots()
+    draw_likelihoods(axes, build_candidate_tracks([build_snapshot(each) for each in (*made[:20], *lost)]), START_NS)
+    (hatched,) = axes.collections
+    assert hatched.get_hatch()
+    corners = hatched.get_paths()[0].vertices
+    for stamp_ns, lowest in ((made[10].stamp_ns, 0.75), (made[30].stamp_ns, 0.0)):
+        near = np.abs(corners[:, 0] - (stamp_ns - START_NS) * 1e-9) < 0.03
+        assert corners[near, 1].min() == lowest
 
 
 def test_bounds_hold_the_ellipses() -> None:
@@ -133,14 +184,14 @@ def test_a_snapshot_figure_shows_past_and_future_of_the_hand() -> None:
 @pytest.mark.parametrize('suffix', ['png', 'pdf', 'svg'])
 def test_plot_outcomes(tmp_path: Path, suffix: str) -> None:
     file = tmp_path / f'scene.{suffix}'
-    plot_outcomes(file, *scene(), prediction(START_NS, np.zeros(2)).candidates)
+    plot_outcomes(file, *scene(), prediction(START_NS, np.zeros(2)).candidates, np.zeros(2))
     start = {'png': PNG, 'pdf': b'%PDF', 'svg': b'<?xml'}[suffix]
     assert file.read_bytes().startswith(start)
 
 
 def test_plot_without_a_solution_or_an_obstacle(tmp_path: Path) -> None:
     outcomes = [each for each in prediction(START_NS, np.zeros(2)).candidates if not each.is_solved]
-    plot_outcomes(tmp_path / 'none.png', make_obstacles(), scene()[1], outcomes)
+    plot_outcomes(tmp_path / 'none.png', make_obstacles(), scene()[1], outcomes, np.zeros(2))
     assert (tmp_path / 'none.png').read_bytes().startswith(PNG)
 
 
@@ -149,7 +200,7 @@ def test_plot_without_a_solution_or_an_obstacle(tmp_path: Path) -> None:
 )
 def test_a_file_that_cannot_be_written(tmp_path: Path, name: str, expected: str) -> None:
     with pytest.raises(InputError, match=expected):
-        plot_outcomes(tmp_path / name, *scene(), prediction(START_NS, np.zeros(2)).candidates)
+        plot_outcomes(tmp_path / name, *scene(), prediction(START_NS, np.zeros(2)).candidates, np.zeros(2))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -187,5 +238,5 @@ def test_a_prediction_is_drawn_on_given_or_new_axes() -> None:
     assert plot_prediction(made, given) is given
     for axes in (given, plot_prediction(made)):
         drawn = [line.get_xydata() for line in axes.lines]
-        assert all(any(np.array_equal(line, each.solution.path) for line in drawn) for each in made.solved_candidates)
+        assert all(any(np.array_equal(line, find_drawn_curve(each)) for line in drawn) for each in made.solved_candidates)
     plt.close('all')

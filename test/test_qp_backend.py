@@ -88,3 +88,10 @@ def test_a_problem_on_which_piqp_oscillates_is_solved_with_other_settings():
     assert answer.x.min() > -1e-8
     assert gradient.min() > -1e-8
     assert abs(gradient @ answer.x) < 1e-7
+
+
+def test_a_problem_that_would_stop_all_other_threads_is_not_tried(monkeypatch):
+    monkeypatch.setattr('foc_ros.core.ocp.backend.LARGEST_WORK', 10 * 4**3)
+    easy = DenseQP(np.eye(4), np.ones(4), lower=np.zeros(4))
+    assert solve_piqp(easy).solved
+    assert not solve_piqp(easy._replace(G=np.eye(4), g=-np.ones(4))).solved

@@ -27,9 +27,9 @@ def test_round_trip(plane: str) -> None:
     assert (read.stamp_ns, read.most_likely) == (known.stamp_ns, known.most_likely)
     assert [each.label for each in read.candidates] == [each.label for each in known.candidates]
     for got, expected in zip(read.candidates, known.candidates, strict=True):
-        for name in ('likelihood', 'effort', 'cost_ratio', 'eta'):
+        for name in ('description', 'is_compromised', 'likelihood', 'effort', 'cost_ratio', 'eta'):
             assert getattr(got, name) == getattr(expected, name)
-        for name in ('times', 'path', 'speed', 'covariance'):
+        for name in ('times', 'path', 'velocity', 'speed', 'covariance', 'motor_covariance'):
             np.testing.assert_allclose(getattr(got, name), getattr(expected, name), rtol=1e-6, atol=1e-8)
 
 
@@ -38,6 +38,13 @@ def test_the_most_likely_candidate_by_hysteresis_is_first() -> None:
     read = read_snapshot(encode_prediction_cloud(made, 'xy', TYPES), encode_likelihoods(made, TYPES), 'xy', *scene())
     assert read.most_likely == read.candidates[0].label == 'goal1:+1-post'
     assert [each.label for each in read.candidates] == [each.label for each in build_snapshot(made).candidates]
+
+
+def test_a_label_with_an_unknown_obstacle_has_no_description() -> None:
+    made = prediction(START_NS, np.zeros(2))
+    messages = encode_prediction_cloud(made, 'xy', TYPES), encode_likelihoods(made, TYPES)
+    read = read_snapshot(*messages, 'xy', made.obstacles.take([1]), made.goals)
+    assert [each.description for each in read.candidates] == ['', '', '']
 
 
 def test_nothing_solved() -> None:

@@ -55,7 +55,7 @@ def test_the_readme_picture_shows_the_beginning_of_its_movement() -> None:
     shown = min(snapshots, key=lambda each: abs(each.stamp_ns - start_ns - still.AFTER_S * 1e9))
     drawn = [line.get_xydata() for line in still.picture(hand, snapshots).axes[0].lines]
     for each in shown.candidates:
-        assert any(np.array_equal(line, each.path) for line in drawn)
+        assert any(np.array_equal(line, each.curve) for line in drawn)
     # the hand's past, its future, and where it is
     assert sum(np.isin(line[:, 0], hand.positions[:, 0]).all() for line in drawn) >= 3
 

@@ -49,7 +49,8 @@ def test_a_view_across_rows_becomes_contiguous() -> None:
 def test_a_solution_with_another_covariance_is_otherwise_the_same(prediction: Prediction) -> None:
     solution = prediction.candidates[0].solution
     covariance = 2.0 * solution.covariance
-    found, expected = solution.with_covariance(covariance.copy()), replace(solution, covariance=covariance)
+    found, motor = solution.with_covariance(covariance.copy()), solution.motor_covariance
+    expected = replace(solution, covariance=covariance, motor_covariance=solution.covariance if motor is None else motor)
     assert vars(found).keys() == vars(expected).keys() == {field.name for field in fields(Solution)}
     for name, value in vars(expected).items():
         np.testing.assert_array_equal(vars(found)[name], value)

@@ -11,8 +11,10 @@ import pytest
 from bag_helpers import CONFIG, FRAME, TYPES, messages, ns, reach, write_bag, write_parameters
 
 from foc_ros.analysis.replay import Replay, replay
+from foc_ros.analysis.replay_summary import Summary, facts
 from foc_ros.cli.main import main
 from foc_ros.core.config import replace_values
+from foc_ros.core.types import Status
 from foc_ros.io.bags import BagReader
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 
@@ -57,7 +59,10 @@ def test_json_has_the_promised_names(bag: Path, capsys: pytest.CaptureFixture[st
         assert solved and sum(each['likelihood'] for each in solved) == pytest.approx(1)
         assert prediction['candidates'][0]['label'] == prediction['most_likely']
         for each in prediction['candidates']:
-            assert ' '.join(each) == 'label goal sides status effort cost eta tau lambda likelihood qp_solves mean stddev'
+            assert (
+                ' '.join(each)
+                == 'label description goal sides status effort cost eta tau lambda likelihood qp_solves mean stddev'
+            )
             assert each['goal'] == 0 and set(each['sides'].values()) <= {'left', 'right'}
             assert np.shape(each['mean']) == np.shape(each['stddev']) == (CONFIG.foc.steps + 1, 2)
         assert {each['sides']['7'] for each in solved} == {'left', 'right'}
@@ -188,3 +193,11 @@ def test_a_wrong_remap_is_said(bag: Path, capsys: pytest.CaptureFixture[str], re
     assert run(bag, '--remap', remap) == 2
     err = capsys.readouterr().err
     assert remap.split(':=')[0] in err and err.count('\n') == 1
+
+
+def test_the_summary_names_what_is_compromised_or_not_solved_with_its_remedy() -> None:
+    summary = Summary(samples=3, predictions=3, solved=2, compromised=4, seconds=[0.01])
+    shown = facts(summary.answer({'candidate_deadline': 5, 'hand_late': 1}, 1.0))
+    assert shown['candidates compromised'] == f'compromised ({Status.COMPROMISED.remedy}) 4'
+    assert shown['candidates not solved'] == f'deadline ({Status.DEADLINE.remedy}) 5'
+    assert facts(Summary().answer({}, 0.0))['candidates compromised'] == 'none'

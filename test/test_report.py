@@ -17,11 +17,12 @@ pytest.importorskip('plotly', reason='plotly is not installed')
 from report_samples import OBSTACLES, START_NS, prediction, predictions, samples
 
 from foc_ros.core.errors import InputError
-from foc_ros.core.types import HandSample, Prediction
+from foc_ros.core.types import HandSample, Prediction, Status
 from foc_ros.reporting.page import load_plotly
 from foc_ros.reporting.report import write_report
-from foc_ros.reporting.report_data import MOST_FRAMES
+from foc_ros.reporting.report_data import MOST_FRAMES, select_evenly
 from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
+from foc_ros.ros.messages.ranking import find_drawn_curve
 
 
 class Page(HTMLParser):
@@ -98,18 +99,32 @@ def test_page_holds_the_likelihoods_of_all_predictions(tmp_path: Path) -> None:
         assert shares == {each['label']: each['likelihood'] for each in numbers[row]['candidates']}
 
 
+def widen(made: Prediction) -> Prediction:
+    """Return a prediction whose total uncertainty is greater than its motor noise, as that of the predictor."""
+    wide = [each.solution.with_covariance(3.0 * each.solution.covariance) for each in made.candidates]
+    pairs = zip(made.candidates, wide, strict=True)
+    return replace(made, candidates=tuple(replace(each, solution=solution) for each, solution in pairs))
+
+
 def test_paths_on_the_page_are_those_predicted(tmp_path: Path) -> None:
     made = samples()
-    expected = predictions(made)
+    expected = [widen(each) for each in predictions(made)]
     write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in expected], {})
     data = page_data_of(tmp_path)
     for frame, known in zip(data['frames'], expected, strict=True):
         for candidate, outcome in zip(frame['candidates'], known.solved_candidates, strict=True):
             drawn = np.cumsum([candidate['x'], candidate['y']], axis=1).T * data['unit']['length']
-            np.testing.assert_allclose(drawn, outcome.solution.path, atol=0.51e-4)
-            spread = np.array(candidate['ellipses'])[-1, 2:4] * data['unit']['length']
-            wanted = np.sqrt(np.linalg.eigvalsh(outcome.solution.covariance[-1, :2, :2]))[::-1]
-            np.testing.assert_allclose(spread, wanted, atol=0.51e-4)
+            curve = find_drawn_curve(outcome)
+            np.testing.assert_allclose(drawn, curve[select_evenly(len(curve), len(drawn))], atol=0.51e-4)
+            for name, covariance in (('motor', outcome.motor_covariance), ('total', outcome.covariance)):
+                spread = np.array(candidate[name])[-1, 2:4] * data['unit']['length']
+                wanted = np.sqrt(np.linalg.eigvalsh(covariance[-1, :2, :2]))[::-1]
+                np.testing.assert_allclose(spread, wanted, atol=0.51e-4)
+        (lost,) = frame['unsolved']
+        assert data['labels'][lost['reason']].endswith(f'remedy: {Status.ETA_UNREACHABLE.remedy}')
+        drawn = np.cumsum([lost['x'], lost['y']], axis=1).T * data['unit']['length']
+        np.testing.assert_allclose(drawn[[0, -1]], known.candidates[-1].solution.path[[0, -1]], atol=0.51e-4)
+    assert data['unknown'] == [0.25] * len(expected)
 
 
 def test_a_long_recording_is_thinned_out(tmp_path: Path) -> None:

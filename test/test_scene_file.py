@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 import re
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from foc_ros.core.checks import check_number, check_vector
 from foc_ros.core.config import Config
-from foc_ros.core.errors import FocError, RecordingError, SceneError
+from foc_ros.core.errors import FocError, ParameterError, RecordingError, SceneError
+from foc_ros.io.documents import _check_keys as check_keys
 from foc_ros.io.scene_file import guess_path, load_scene, parse_scene
 
 SCENE: dict[str, Any] = {
@@ -119,6 +123,11 @@ def obstacle(count: int = 1, **fields: Any) -> dict[str, Any]:
         (obstacle(id='a;b'), r"obstacles\[0\].id: expected .*, got 'a;b'"),
         ({**SCENE, 'start': [0.1, 0.02]}, r'start: expected a point outside obstacle cup, of radius 0.03 m, got .*, 0.02 m from'),
         ({**SCENE, 'goal': [0.2, 0.1]}, 'goal: expected a point outside obstacle 1, of radius 0.02 m, got .*, 0 m from'),
+        (obstacle(id=None), r'obstacles\[0\].id: expected a whole number, or a name .*, got None'),
+        (obstacle(id='a' * 41), r"obstacles\[0\].id: expected .* of at most 40 characters, got 'aaaa"),
+        ({**SCENE, 'obstacles': 20_001 * [{}]}, 'obstacles: expected a list of at most 20000, got one of 20001'),
+        ({**without('goal'), 'goals': 257 * [[0, 0]]}, 'goals: expected a list of at most 256, got one of 257'),
+        ({**SCENE, 'guess': 10_001 * [[0, 0]]}, 'guess: expected a list of at most 10000, got one of 10001'),
         ({**SCENE, 'guess': 0.1}, 'guess: expected a mapping of fields, got 0.1'),
         ({**SCENE, 'guess': {}}, 'guess.amplitude: expected a number, got nothing'),
         ({**SCENE, 'guess': {'amplitude': 'big'}}, r"guess.amplitude: expected a number in .*, got 'big'"),
@@ -138,10 +147,14 @@ def test_a_wrong_field_is_named(scene: object, message: str) -> None:
     [
         ('s.yaml', 'start: [0, 0', 'not a YAML file'),
         ('s.yaml', 'start: [0, 0]\nstart: [1, 1]\n', 'the key start is given twice'),
-        ('s.yaml', '!!python/object/apply:os.getcwd []', 'not a YAML file: could not determine a constructor'),
+        ('s.yaml', '!!python/object/apply:os.getcwd []', 'not a YAML file: tags (!name) and aliases (*name) are not supported'),
         ('s.json', '{"start": [0, 0]', 'not a JSON file'),
         ('s.json', '{"start": [0, 0], "start": [1, 1]}', 'the key start is given twice'),
-        ('s.json', '[' * 100_000, 'not a JSON file'),
+        ('s.json', '[' * 100_000, 'expected at most 20 mappings and lists within each other'),
+        ('s.json', '[' * 21 + ']' * 21, 'expected at most 20 mappings and lists within each other'),
+        ('s.yaml', '[' * 1000, 'expected at most 20 mappings and lists within each other'),
+        ('s.yaml', 'start: &a [0, 0]\ngoal: *a', 'tags (!name) and aliases (*name) are not supported'),
+        ('s.yaml', 'start: !!timestamp 0', 'tags (!name) and aliases (*name) are not supported'),
         ('s.yaml', '\x00', 'not a YAML file'),
     ],
 )
@@ -149,6 +162,74 @@ def test_a_file_that_cannot_be_parsed_is_refused(tmp_path: Path, name: str, text
     (tmp_path / name).write_text(text, 'utf-8')
     with pytest.raises(RecordingError, match=f'^{re.escape(str(tmp_path / name))}: .*{re.escape(message)}|{re.escape(message)}'):
         load_scene(tmp_path / name)
+
+
+@pytest.mark.parametrize('name', ['s.json', 's.yaml'])
+@pytest.mark.parametrize('number', ['9' * 25, '-' + '9' * 400, '9' * 5000, '1e400', '-1.0e+400'])
+@pytest.mark.parametrize('field', ['steps', 'max_candidates', 'duration_s', 'start_stddev', 'eta'])
+def test_a_number_beyond_all_floats_is_refused_with_field_value_and_bound(
+    tmp_path: Path, name: str, number: str, field: str
+) -> None:
+    (tmp_path / name).write_text(f'{{"start": [0, 0], "goal": [1, 0], "{field}": {number}}}', 'utf-8')
+    with pytest.raises(
+        SceneError, match=rf"^{field}: expected a .*number in \[.*\].*, got '?-?(9999|1e400|1.0e\+400|inf)"
+    ) as caught:
+        load_scene(tmp_path / name)
+    assert len(str(caught.value)) < 300
+
+
+@pytest.mark.parametrize('digits', [30, 400, 5000])
+def test_whole_numbers_of_any_size_are_refused_where_python_passes_them(digits: int) -> None:
+    value = 10**digits
+    with pytest.raises(
+        ParameterError, match=r'^foc.steps: expected a number in \[5, 400\], got (1000|a whole number of 16610 bits)'
+    ):
+        Config().with_values({'foc.steps': value})
+    with pytest.raises(SceneError, match=r'^radius: expected a number in \[0, 1\], got (1000|a whole number of 16610 bits)'):
+        check_number('radius', value, 0.0, 1.0)
+    with pytest.raises(SceneError, match=r'^start: expected (finite )?numbers'):
+        check_vector('start', [value, 0.0], 2)
+
+
+def test_repeated_keys_are_found_with_one_look_at_each_key() -> None:
+    class Key:
+        compared = 0
+
+        def __init__(self, name: int) -> None:
+            self.name = name
+
+        def __hash__(self) -> int:
+            return hash(self.name)
+
+        def __eq__(self, other: object) -> bool:
+            Key.compared += 1
+            return isinstance(other, Key) and self.name == other.name
+
+    names: list[Any] = [Key(each) for each in (*range(3000), 2999)]
+    with pytest.raises(ValueError, match='given twice'):
+        check_keys(names)
+    assert Key.compared < 10
+
+
+@pytest.mark.parametrize(
+    'make',
+    [
+        lambda n: '{' + ','.join(f'"k{i}": 1' for i in range(n // 10)) + '}',
+        lambda n: f'{{"start": [0, 0], "goal": [1, 0], "steps": "{"9" * n}"}}',
+    ],
+)
+def test_the_time_grows_with_the_size_of_a_file_and_not_with_its_square(tmp_path: Path, make: Callable[[int], str]) -> None:
+    def measure(size: int) -> float:
+        (tmp_path / 's.json').write_text(make(size), 'utf-8')
+        times = []
+        for _ in range(3):
+            began = time.process_time()
+            with pytest.raises(SceneError):
+                load_scene(tmp_path / 's.json')
+            times.append(time.process_time() - began)
+        return min(times)
+
+    assert measure(480_000) < 32 * measure(30_000)  # 16 times the size: a square would be 256 times
 
 
 def test_a_missing_file_and_a_binary_file_are_refused(tmp_path: Path) -> None:

@@ -11,12 +11,10 @@ from reach_helpers import solved
 from varied_reaches import varied_reach
 
 from foc_ros.core.kernels import freeze
-from foc_ros.core.obstacles.chance_constraint import k_of_eta
 from foc_ros.core.ocp.contacts.hermite import interpolate, interpolation_row
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.qp import ObstacleRows, ReachingQP, clearance_qp, effort_cost
-from foc_ros.core.ocp.strategies.optimal import surrogate_qp
-from foc_ros.core.ocp.working_set import WorkingSet, solve_full
+from foc_ros.core.ocp.working_set import solve_full
 from foc_ros.core.types import Solution, Status
 
 SCENES = 300
@@ -45,22 +43,14 @@ def slow_path(problem: Problem, solution: Solution, strategy: str) -> np.ndarray
     """Return the mean (N, 2) of the full QP at a solution."""
     if strategy in ('lv', 'hc'):
         qp = clearance_qp_with_contacts(problem, solution)
-    elif strategy == 'fixed' or not solution.multipliers:
-        qp = clearance_qp(problem, effort_cost(problem, solution.lam), solution.path[1:], solution.tau)
     else:
-        row = {identity: index for index, identity in enumerate(problem.obstacles.ids)}
-        active = WorkingSet(
-            np.array([row[identity] for identity, _, _ in solution.multipliers], dtype=np.intp),
-            np.array([step - 1 for _, step, _ in solution.multipliers], dtype=np.intp),
-        )
-        multipliers = np.array([value for _, _, value in solution.multipliers])
-        qp = surrogate_qp(problem, solution.control.T.ravel(), active, multipliers, k_of_eta(problem.eta))
+        qp = clearance_qp(problem, effort_cost(problem, solution.lam), solution.path[1:], solution.tau)
     answer = solve_full(qp)
     assert answer is not None
     return problem.positions(answer.control)
 
 
-@pytest.mark.parametrize('strategy', ['fixed', 'lv', 'hc', 'optimal'])
+@pytest.mark.parametrize('strategy', ['fixed', 'lv', 'hc'])
 def test_full_qps_stay_where_the_fast_path_ends(strategy):
     compared, apart = 0, {}
     for seed in range(SCENES):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from report_samples import START_NS, prediction, predictions, samples
 
-from foc_ros.core.types import HandSample
+from foc_ros.core.types import HandSample, Status, describe_class
 from foc_ros.reporting.snapshots import HandTrajectory, build_hand_trajectory, build_snapshot
 
 
@@ -14,12 +16,44 @@ def test_a_snapshot_holds_the_numbers_of_its_prediction() -> None:
     made = prediction(START_NS, np.zeros(2), 0.6)
     snapshot = build_snapshot(made)
     assert [each.label for each in snapshot.candidates] == ['goal0:+1', 'goal0:-1', 'goal1:+1-post']
-    assert snapshot.unsolved == (('goal1:+1+post', 'eta_unreachable'),)
+    (lost,) = snapshot.unsolved
+    assert (lost.label, lost.status) == ('goal1:+1+post', 'eta_unreachable')
+    assert lost.reason == f'eta unreachable: out of reach; remedy: {Status.ETA_UNREACHABLE.remedy}'
     best = snapshot.candidates[0]
     np.testing.assert_array_equal(best.path, made.candidates[0].solution.path)
     np.testing.assert_allclose(best.covariance[-1], np.diag([0.011**2, 0.005**2]))
     assert best.cost_ratio == 1.0
     assert snapshot.candidates[1].cost_ratio == pytest.approx(made.candidates[1].cost / made.candidates[0].cost)
+
+
+def test_classes_are_named_in_words_with_the_goal_where_there_are_several() -> None:
+    made = prediction(START_NS, np.zeros(2))
+    assert [each.description for each in build_snapshot(made).candidates] == [
+        'goal0: left of 1', 'goal0: right of 1', 'goal1: left of 1, right of post',
+    ]  # fmt: skip
+    one = build_snapshot(replace(made, goals=made.goals[:1]))
+    assert [each.description for each in (*one.candidates[:1], *one.unsolved)] == ['left of 1', 'left of 1, left of post']
+    assert describe_class(()) == 'direct'
+
+
+def test_the_share_without_a_likelihood_counts_what_is_not_known() -> None:
+    made = prediction(START_NS, np.zeros(2))
+    assert build_snapshot(made).unknown_share == 1 / 4
+    lost = made.candidates[-1]
+    shut = replace(lost, solution=replace(lost.solution, status=Status.INFEASIBLE))
+    assert build_snapshot(replace(made, candidates=(*made.candidates[:-1], shut))).unknown_share == 0.0
+    assert build_snapshot(replace(made, candidates=(shut,), most_likely=None)).unknown_share == 1.0
+
+
+def test_the_motor_noise_is_kept_beside_the_total_uncertainty() -> None:
+    made = prediction(START_NS, np.zeros(2))
+    first = made.candidates[0]
+    assert not build_snapshot(made).candidates[0].is_widened
+    wide = replace(first, solution=first.solution.with_covariance(2.0 * first.solution.covariance))
+    view = build_snapshot(replace(made, candidates=(wide, *made.candidates[1:]))).candidates[0]
+    assert view.is_widened
+    np.testing.assert_array_equal(view.covariance, 2.0 * view.motor_covariance)
+    np.testing.assert_array_equal(wide.motor_covariance, first.solution.covariance)
 
 
 def test_speed_is_that_of_the_velocity() -> None:

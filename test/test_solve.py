@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -54,9 +55,8 @@ def test_reference_cases(tmp_path: Path, capsys: pytest.CaptureFixture[str], cas
 
 def test_json_has_the_promised_names(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = candidates(tmp_path, capsys, SCENE, '--monte-carlo', '500')
-    promised = (
-        'label goal sides status effort cost eta tau lambda likelihood qp_solves solve_ms mean velocity stddev mc_step mc_path'
-    )
+    promised = 'label description goal sides status effort cost eta tau lambda likelihood qp_solves solve_ms'
+    promised += ' mean velocity stddev mc_step mc_path'
     assert len(found) == 2
     for each in found:
         assert set(promised.split()) <= set(each)
@@ -114,11 +114,19 @@ def test_the_table_and_the_picture(tmp_path: Path, capsys: pytest.CaptureFixture
     assert solve(tmp_path, SCENE, '--plot', str(tmp_path / 'ways.png')) == 0
     assert (tmp_path / 'ways.png').read_bytes().startswith(b'\x89PNG')
     out = capsys.readouterr().out
-    assert 'goal0:-0' in out and 'solved' in out and 'likelihood' in out
+    assert 'goal0:-0' in out and 'goal0: right of 0' in out and 'solved' in out and 'likelihood' in out
+
+
+def test_the_terminal_gives_reason_and_remedy_of_what_is_not_solved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert solve(tmp_path, {**SCENE, 'noise': [0.8, 0.8], 'eta': 0.99}) == 0
+    shown = {line.partition(' ')[0]: line for line in capsys.readouterr().out.splitlines() if 'remedy' in line}
+    assert shown
+    for line in shown.values():
+        assert line.startswith('goal0:') and any(line.endswith(f'remedy: {status.remedy}') for status in Status)
 
 
 def test_nothing_solved_is_exit_3_with_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    noisy = {**SCENE, 'noise': [0.5, 0.5], 'eta': 0.99, 'duration_s': 0.3}
+    noisy = {**SCENE, 'noise': [0.5, 0.5], 'eta': 0.99, 'duration_s': 0.3, 'shortfall': math.inf}
     found = candidates(tmp_path, capsys, noisy, code=3)
     assert found and all(each['status'] != 'solved' and each['likelihood'] == 0 for each in found)
     assert solve(tmp_path, noisy) == 3
@@ -161,8 +169,23 @@ def test_json_describes_the_whole_solution(tmp_path: Path, capsys: pytest.Captur
         assert min(abs(each['eta_at']['step'] - row['step']) for row in each['rows']) < 0.5
 
 
+def test_a_compromised_candidate_is_an_answer(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = candidates(tmp_path, capsys, {**SCENE, 'eta': 0.999, 'noise': [0.6, 0.6]}, code=0)
+    assert {each['status'] for each in found} == {'compromised'}
+    assert sum(each['likelihood'] for each in found) == pytest.approx(1.0)
+    assert all(0 < each['eta'] < 0.999 and each['eta_reachable'] is None for each in found)
+
+
+def test_bound_and_risk_of_a_scene_say_what_eta_means(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    efforts = [
+        candidates(tmp_path, capsys, {**SCENE, 'noise': [0.05, 0.05], 'bound': bound, 'risk': risk})[0]['effort']
+        for bound, risk in (('gaussian', 'step'), ('cantelli', 'step'), ('gaussian', 'path'))
+    ]
+    assert efforts[0] < efforts[1] and efforts[0] < efforts[2]
+
+
 def test_json_of_an_unsolved_candidate_holds_what_was_reached(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    far = candidates(tmp_path, capsys, {**SCENE, 'eta': 0.999, 'noise': [0.6, 0.6]}, code=3)
+    far = candidates(tmp_path, capsys, {**SCENE, 'eta': 0.999, 'noise': [0.6, 0.6], 'shortfall': math.inf}, code=3)
     assert {each['status'] for each in far} == {'eta_unreachable'}
     assert all(0 < each['eta_reachable'] == each['eta'] < 0.999 for each in far)
     walls = [{'x': 0.15, 'y': y, 'radius': 0.03} for y in (-0.02, 0.02)]

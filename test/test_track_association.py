@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from foc_ros.core.types import make_obstacles
-from foc_ros.reporting.snapshots import CandidateView, Snapshot
-from foc_ros.reporting.track_association import assign_slots, associate_tracks, parse_label
+from foc_ros.core.types import LEFT, RIGHT, make_obstacles
+from foc_ros.reporting.snapshots import CandidateView, Snapshot, parse_label
+from foc_ros.reporting.track_association import assign_slots, associate_tracks
 
 IDS = ('1', '12', 'post-2', '+')
 STEP_NS = 20_000_000
@@ -15,11 +15,8 @@ STEP_NS = 20_000_000
 
 def snapshot(number: int, *labels: str, goals: tuple[tuple[float, float], ...] = ((1.0, 0.0), (1.0, 1.0))) -> Snapshot:
     obstacles = make_obstacles([[0.1 * i, 0.0] for i in range(len(IDS))], 0.01, ids=IDS)
-    empty = np.zeros(0)
-    candidates = tuple(
-        CandidateView(label, 1.0 / len(labels), 1.0, 1.0, 0.9, empty, np.zeros((0, 2)), empty, np.zeros((0, 2, 2)))
-        for label in labels
-    )
+    empty = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros((0, 2, 2))
+    candidates = tuple(CandidateView(label, '', False, 1.0 / len(labels), 1.0, 1.0, 0.9, np.zeros(0), *empty) for label in labels)
     return Snapshot(number * STEP_NS, obstacles, np.array(goals), candidates, labels[0] if labels else None)
 
 
@@ -27,15 +24,15 @@ def snapshot(number: int, *labels: str, goals: tuple[tuple[float, float], ...] =
     ('label', 'goal', 'sides'),
     [
         ('goal0:', 'goal0', {}),
-        ('goal1:+1-12', 'goal1', {'1': '+', '12': '-'}),
-        ('goal0:+12-1', 'goal0', {'12': '+', '1': '-'}),
-        ('goal0:-post-2+1', 'goal0', {'post-2': '-', '1': '+'}),
-        ('goal0:++-1', 'goal0', {'+': '+', '1': '-'}),
+        ('goal1:+1-12', 'goal1', {'1': LEFT, '12': RIGHT}),
+        ('goal0:+12-1', 'goal0', {'12': LEFT, '1': RIGHT}),
+        ('goal0:-post-2+1', 'goal0', {'post-2': RIGHT, '1': LEFT}),
+        ('goal0:++-1', 'goal0', {'+': LEFT, '1': RIGHT}),
     ],
 )
-def test_a_label_is_split_into_goal_and_sides(label: str, goal: str, sides: dict[str, str]) -> None:
+def test_a_label_is_split_into_goal_and_sides(label: str, goal: str, sides: dict[str, int]) -> None:
     assert parse_label(label, IDS) == (goal, sides)
-    assert goal + ':' + ''.join(side + name for name, side in sides.items()) == label
+    assert goal + ':' + ''.join(('+' if side == LEFT else '-') + name for name, side in sides.items()) == label
 
 
 def test_the_same_label_continues_its_track() -> None:

@@ -13,6 +13,8 @@ from measurement import Result
 ROWS = {
     'cold_vs_naive_piqp': 'one_class.measure_against_piqp',
     'cold_vs_ipopt': 'one_class.measure_against_ipopt',
+    'cold_vs_fatrop': 'one_class.measure_against_fatrop',
+    'warm_vs_fatrop': 'one_class.measure_warm_against_fatrop',
     'warm_vs_cold': 'one_class.measure_warm_start',
     'tick_4x8': 'ticks.measure_4_classes',
     'tick_8x16': 'ticks.measure_8_classes',

@@ -94,11 +94,62 @@ def measure_against_ipopt(is_quick: bool) -> Result:
     return Result(*timings, GAIN, agreement, repetitions, at_least(60.0), details)
 
 
+def measure_against_fatrop(is_quick: bool) -> Result:
+    """Compare strategy `optimal` with Fatrop on the un-linearised problem, both from the guess."""
+    from peers.fatrop import Fatrop, build_fastest_fatrop
+
+    repetitions, problem = (2 if is_quick else 15), build_problem()
+    start = Fatrop(problem).build_start(GUESS[1:])
+    peer = build_fastest_fatrop(problem, start, problem.initial_mean)
+    timings = _time(
+        ('optimal, from the guess', lambda: _solve_cold(OPTIMAL)),
+        ('Fatrop on the un-linearised problem, built beforehand', lambda: peer.solve(start)),
+        repetitions,
+    )
+    converged, effort, _ = peer.solve(start)
+    agreement = _compare_efforts(_solve_cold(OPTIMAL), effort if converged else np.inf)
+    return Result(*timings, GAIN, agreement, repetitions, at_least(15.0), {'fatrop_iterations': peer.iterations})
+
+
+def measure_warm_against_fatrop(is_quick: bool) -> Result:
+    """Compare the next tick at 100 Hz of strategy `optimal` with Fatrop, each from its own solution of 10 ms ago."""
+    from peers.fatrop import Fatrop, build_fastest_fatrop
+
+    repetitions, problem, moved = (2 if is_quick else 15), build_problem(), _move_hand()
+    cold = Fatrop(problem)
+    last, before = cold.solve(cold.build_start(GUESS[1:]))[2], _solve_cold(OPTIMAL, problem)
+    peer = build_fastest_fatrop(problem, last, moved.initial_mean)
+
+    def solve_warm() -> Solution:
+        now = replace(moved)
+        return solve_problem(now, warm_start(before, now), OPTIMAL)
+
+    timings = _time(
+        ('optimal, from the solution of 10 ms ago', solve_warm),
+        ('Fatrop, from the solution of 10 ms ago, built beforehand', lambda: peer.solve(last, moved.initial_mean)),
+        repetitions,
+    )
+    converged, effort, _ = peer.solve(last, moved.initial_mean)
+    agreement = _compare_efforts(solve_warm(), effort if converged else np.inf)
+    return Result(*timings, GAIN, agreement, repetitions, at_least(10.0), {'fatrop_iterations': peer.iterations})
+
+
+def _compare_efforts(ours: Solution, effort: float) -> Agreement:
+    """Compare the effort of a solution with that of Fatrop, infinite where it did not converge."""
+    excess = ours.effort / effort - 1
+    holds = ours.status is Status.SOLVED and abs(excess) < 0.02
+    return Agreement(holds, f'effort differs by {100 * excess:+.4f} % from that of Fatrop (2 % allowed)')
+
+
+def _move_hand() -> Problem:
+    """Return the problem of the next tick at 100 Hz, at which the hand has begun to move."""
+    return build_problem(initial_mean=np.array([1e-4, 1e-4, 0.01, 0.004, 0.0, 0.0]))
+
+
 def measure_warm_start(is_quick: bool) -> Result:
     """Compare the next tick at 100 Hz, warm-started, with the same tick from the guess."""
     repetitions = 4 if is_quick else 40
-    before = _solve_cold(LV)
-    moved = build_problem(initial_mean=np.concatenate((before.mean[0, :2] + 1e-4, [0.01, 0.004], np.zeros(2))))
+    before, moved = _solve_cold(LV), _move_hand()
 
     def solve_warm() -> Solution:
         problem = replace(moved)

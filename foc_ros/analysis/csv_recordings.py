@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from heapq import merge
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ from foc_ros.core.errors import RecordingError
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.bags import TYPESTORE, BagWriter
 from foc_ros.io.csv_tables import Row, read_rows
+from foc_ros.ros.messages.decode_point_cloud import MAX_ROWS
+from foc_ros.ros.messages.decode_poses import MAX_GOALS
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import RosbagsTypes
 
@@ -60,7 +63,10 @@ def parse_movement(name: str, table: Iterable[Row]) -> Movement:
 
 
 def read_obstacles(file: Path) -> list[tuple[float, ...]]:
-    """Return obstacles as rows x, y, z, radius, radius_stddev, id, possibly none; ids default to the position in the table."""
+    """Return obstacles as rows x, y, z, radius, radius_stddev, id, possibly none; ids default to the position in the table.
+
+    There are at most as many as a message may contain.
+    """
     found: dict[int, tuple[float, ...]] = {}
     for number, row in enumerate(read_rows(file, ('x_m', 'y_m', 'radius_m'))):
         identity = row.read_integer('id', -(2**31), 2**31 - 1, default=number)
@@ -68,12 +74,16 @@ def read_obstacles(file: Path) -> list[tuple[float, ...]]:
             raise row.make_error('id', 'another id than the rows above')
         radius, stddev = row.read_number('radius_m', 0.0), row.read_number('radius_stddev_m', 0.0, default=0.0)
         found[identity] = (*_parse_position(row), radius, stddev, identity)
+        _check_length(file, len(found), MAX_ROWS)
     return list(found.values())
 
 
 def read_goals(file: Path) -> Array:
-    """Return goals (g, 3) [m], at least one."""
-    goals = [_parse_position(row) for row in read_rows(file, ('x_m', 'y_m'))]
+    """Return goals (g, 3) [m], at least one and at most as many as a message may contain."""
+    goals = []
+    for row in read_rows(file, ('x_m', 'y_m')):
+        goals.append(_parse_position(row))
+        _check_length(file, len(goals), MAX_GOALS)
     _check_not_empty(file, goals)
     return np.array(goals)
 
@@ -85,21 +95,32 @@ def write_movement(bag: Path, movement: Movement, obstacles: list[tuple[float, .
             writer.write(topic, message, stamp_ns)
 
 
-def recorded_messages(movement: Movement, obstacles: list[tuple[float, ...]], goals: Array | None) -> list[tuple[int, str, Any]]:
-    """Return the messages of a bag as (stamp [ns], topic, message), in the order of their stamps."""
+def recorded_messages(
+    movement: Movement, obstacles: list[tuple[float, ...]], goals: Array | None
+) -> Iterator[tuple[int, str, Any]]:
+    """Yield the messages of a bag as (stamp [ns], topic, message), in the order of their stamps."""
     types = RosbagsTypes(TYPESTORE)
-    found: list[tuple[int, str, Any]] = []
-    for stamp_ns in range(movement.stamps_ns[0] - SCENE_LEAD_NS, movement.stamps_ns[-1] + 1, SCENE_PERIOD_NS):
-        found.append((stamp_ns, '/obstacles', encode_obstacles(types, stamp_ns, FRAME, obstacles)))
-        if goals is not None:
-            found.append((stamp_ns, '/goals', encode_goals(types, stamp_ns, FRAME, goals)))
-    for stamp_ns, position in zip(movement.stamps_ns, movement.positions, strict=True):
-        found.append((stamp_ns, '/hand_pose', encode_hand_pose(types, stamp_ns, FRAME, position)))
-    return sorted(found, key=lambda each: each[0])
+
+    def list_scenes() -> Iterator[tuple[int, str, Any]]:
+        for stamp_ns in range(movement.stamps_ns[0] - SCENE_LEAD_NS, movement.stamps_ns[-1] + 1, SCENE_PERIOD_NS):
+            yield stamp_ns, '/obstacles', encode_obstacles(types, stamp_ns, FRAME, obstacles)
+            if goals is not None:
+                yield stamp_ns, '/goals', encode_goals(types, stamp_ns, FRAME, goals)
+
+    poses = (
+        (stamp_ns, '/hand_pose', encode_hand_pose(types, stamp_ns, FRAME, position))
+        for stamp_ns, position in zip(movement.stamps_ns, movement.positions, strict=True)
+    )
+    return merge(list_scenes(), poses, key=lambda each: each[0])
 
 
 def _parse_position(row: Row) -> tuple[float, float, float]:
     return row.read_number('x_m'), row.read_number('y_m'), row.read_number('z_m', default=0.0)
+
+
+def _check_length(file: Path, length: int, most: int) -> None:
+    if length > most:
+        raise RecordingError(f'{file}: expected at most {most:,} rows, got more')
 
 
 def _check_not_empty(file: Path, found: Any) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from foc_ros.core.types import Status
 from foc_ros.io.topics import HAND
 
 from .replay import Step
@@ -21,12 +22,14 @@ FAILED = 'candidate_'
 class Summary:
     """Counts over the steps of one replay.
 
-    samples: hand poses read; predictions; solved: predictions with a solved candidate; seconds: wall time of each prediction.
+    samples: hand poses read; predictions; solved: predictions with a candidate that has a likelihood; compromised: candidates;
+    seconds: wall time of each prediction.
     """
 
     samples: int = 0
     predictions: int = 0
     solved: int = 0
+    compromised: int = 0
     seconds: list[float] = field(default_factory=list)
 
     def add(self, step: Step) -> None:
@@ -34,7 +37,8 @@ class Summary:
         self.samples += step.item.role == HAND
         if step.prediction is not None:
             self.predictions += 1
-            self.solved += bool(step.prediction.solved_candidates)
+            self.solved += bool(step.prediction.candidates_with_likelihood)
+            self.compromised += sum(not each.is_solved for each in step.prediction.candidates_with_likelihood)
             self.seconds.append(step.prediction.solve_s)
 
     def answer(self, counts: Mapping[str, int], duration_s: float) -> dict[str, Any]:
@@ -49,6 +53,7 @@ class Summary:
             'predictions': self.predictions,
             'solved': self.solved,
             'refused': {name: count for name, count in sorted(counts.items()) if not name.startswith(FAILED)},
+            'compromised': self.compromised,
             'failures': dict(sorted(failures.items())),
             'prediction_ms': {'p50': p50, 'p99': p99},
             'duration_s': duration_s,
@@ -63,10 +68,16 @@ def facts(answer: Mapping[str, Any]) -> dict[str, str]:
         'hand poses': str(answer['samples']),
         'predictions': f'{answer["predictions"]}, {answer["solved"]} with a solved candidate',
         'rejected': _list_counts(answer['refused']),
-        'candidates not solved': _list_counts(answer['failures']),
+        'candidates compromised': _list_failures({Status.COMPROMISED.value: answer['compromised']}),
+        'candidates not solved': _list_failures(answer['failures']),
         **({'demonstrations learned': str(answer['learned'])} if 'learned' in answer else {}),
         'time per prediction': '-' if times['p50'] is None else f'{times["p50"]:.1f} ms median, {times["p99"]:.1f} ms p99',
     }
+
+
+def _list_failures(counts: Mapping[str, int]) -> str:
+    """Return counts by status, each with its remedy."""
+    return _list_counts({f'{name} ({Status(name).remedy})': count for name, count in counts.items() if count})
 
 
 def _list_counts(counts: Mapping[str, int]) -> str:

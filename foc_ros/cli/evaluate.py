@@ -14,6 +14,7 @@ from foc_ros.analysis.evaluation.tables import make_tables
 from foc_ros.analysis.parallel import add_worker_arguments, collect, open_executor
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.core.errors import InputError
+from foc_ros.io.outputs import check_replaceable
 from foc_ros.io.terminal import show_table
 from foc_ros.ros.parameters import load_optional_config
 
@@ -33,6 +34,10 @@ def run(arguments: argparse.Namespace) -> int:
     config = load_optional_config(arguments.params)
     if arguments.report is not None and arguments.report.is_file():
         raise InputError('--report', 'a folder', arguments.report)
+    if arguments.report is not None:
+        from foc_ros.reporting.evaluation_report import PAGE, write_report
+
+        check_replaceable('--report', arguments.report / PAGE)
     found = find_recordings(arguments.data)
     with open_executor(arguments) as executor:
         recordings, failed = collect(partial(observe, config=config), list(found.items()), executor, 'replay')
@@ -47,8 +52,6 @@ def run(arguments: argparse.Namespace) -> int:
         print(f'foc_ros evaluate: {name}: the label differs from the recorded path: {words}', file=sys.stderr)
     answer |= {'failed': failed, 'labels_not_taken': mismatches}
     if arguments.report is not None:
-        from foc_ros.reporting.evaluation_report import write_report
-
         write_report(arguments.report, arguments.data.resolve().name, answer)
     if arguments.json:
         print(json.dumps(answer, allow_nan=False))

@@ -15,6 +15,7 @@ from foc_ros.analysis.parallel import add_worker_arguments, open_executor
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.core.config import Config, flatten
 from foc_ros.core.errors import InputError
+from foc_ros.io.outputs import check_replaceable
 from foc_ros.io.terminal import show_table
 from foc_ros.ros.parameters import dump_parameter_file, load_optional_config
 
@@ -38,6 +39,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError('--output', 'a file in a directory that exists', output)
     if arguments.report is not None and arguments.report.is_file():
         raise InputError('--report', 'a folder', arguments.report)
+    if arguments.report is not None:
+        from foc_ros.reporting.fit_report import PAGE, write_report
+
+        check_replaceable('--report', arguments.report / PAGE)
     recordings = find_recordings(arguments.data)
     with open_executor(arguments) as executor:
         fit = fit_parameters(recordings, config, executor)
@@ -47,8 +52,6 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError('--output', 'a file that can be written', f'{output}: {error.strerror}') from error
     answer = make_answer(fit, config, output)
     if arguments.report is not None:
-        from foc_ros.reporting.fit_report import write_report
-
         write_report(arguments.report, arguments.data.resolve().name, answer)
     if arguments.json:
         print(json.dumps(answer, allow_nan=False))

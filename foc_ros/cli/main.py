@@ -1,7 +1,8 @@
 """The program `foc_ros` and its commands. A command's module is imported only when the command is run.
 
 Exit codes: 0 done; 2 the input is wrong, and one line on standard error names field, value and bound; 3 no candidate could be
-solved; 130 after an interrupt and 141 if the reader of standard output has closed it, both as in a shell.
+solved; 130 after an interrupt and 141 if the reader of standard output has closed it, both as in a shell. If standard output
+cannot be written, for example because its disk is full, the code is 2.
 """
 
 from __future__ import annotations
@@ -11,9 +12,13 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from typing import NoReturn
+from io import TextIOWrapper
+from pathlib import Path
+from typing import Any, NoReturn
 
 from foc_ros.core.errors import FocError
+
+from .interrupts import INTERRUPTED, handle_interrupts
 
 COMMANDS = {
     'demo': 'play the packaged recording to the node and show its predictions',
@@ -28,8 +33,25 @@ COMMANDS = {
 """Purpose of each command. The module of that name defines `add_arguments(parser)` and `run(arguments) -> exit code`."""
 
 
+class _StoreOnce(argparse.Action):
+    """Stores the value of an option; argparse itself uses the last one of an option that is given twice."""
+
+    def __call__(
+        self, _parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: object, _option: str | None = None
+    ) -> None:
+        given = vars(namespace).setdefault('given', set())
+        if self.dest in given:
+            raise argparse.ArgumentError(self, 'given twice')
+        given.add(self.dest)
+        setattr(namespace, self.dest, values)
+
+
 class _Parser(argparse.ArgumentParser):
-    """A parser that reports an error in one line."""
+    """A parser that reports an error in one line and refuses an option that is given twice."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.register('action', None, _StoreOnce)
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f'{self.prog}: {" ".join(message.split())}\n')
@@ -37,31 +59,56 @@ class _Parser(argparse.ArgumentParser):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return the exit code; arguments: those of the process by default, without its name."""
+    if sys.stdout is None:  # the process was started with its standard output closed
+        sys.stdout = Path(os.devnull).open('w', encoding='utf-8')  # noqa: SIM115  it stays open until the process ends
     given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        with handle_interrupts():
+            code = _parse_and_run(given)
+            sys.stdout.flush()
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except OSError as error:
+        _discard_lost_output()
+        if isinstance(error, BrokenPipeError):
+            return 141
+        print(f'{" ".join(["foc_ros", *given[:1]])}: {_format_line(error)}', file=sys.stderr)
+        return 2
+    return code
+
+
+def _discard_lost_output() -> None:
+    """Discard what standard output does not take: the interpreter would write it again at exit and print an error."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _parse_and_run(given: list[str]) -> int:
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors='backslashreplace')  # a name of a file or topic may have characters that it cannot show
     parser = _Parser(prog='foc_ros', description='Predict where the hand of an operator is going among obstacles.')
     commands = parser.add_subparsers(dest='command', required=True)
     for name, purpose in COMMANDS.items():
         command = commands.add_parser(name, help=purpose, description=f'{purpose[0].upper()}{purpose[1:]}.')
         if given[:1] == [name]:
             import_module(f'.{name}', __package__).add_arguments(command)
-    parsed, rest = parser.parse_known_args(given)
-    if rest and parsed.command != 'node':
-        commands.choices[parsed.command].error(f'unrecognized arguments: {" ".join(rest)}')
-    parsed.rest = rest
-    return _run(parsed)
-
-
-def _run(parsed: argparse.Namespace) -> int:
     try:
-        code = int(import_module(f'.{parsed.command}', __package__).run(parsed))
-        sys.stdout.flush()
+        parsed, rest = parser.parse_known_args(given)
+        if rest and parsed.command != 'node':
+            commands.choices[parsed.command].error(f'unrecognized arguments: {" ".join(rest)}')
+    except SystemExit as leaving:  # after --help, or wrong arguments
+        return int(leaving.code or 0)
+    parsed.rest = rest
+    try:
+        return int(import_module(f'.{parsed.command}', __package__).run(parsed))
     except FocError as error:
-        print(f'foc_ros {parsed.command}: {" ".join(str(error).split())}', file=sys.stderr)
+        print(f'foc_ros {parsed.command}: {_format_line(error)}', file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        return 130
-    except BrokenPipeError:
-        # Otherwise the interpreter flushes into the closed pipe at exit and prints an error.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 141
-    return code
+
+
+def _format_line(error: Exception) -> str:
+    """Return the message in one line; a character from a file that would control the terminal is escaped."""
+    line = ' '.join(str(error).split())
+    return ''.join(each if each.isprintable() else ascii(each)[1:-1] for each in line)

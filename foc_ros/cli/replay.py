@@ -49,8 +49,9 @@ def run(arguments: argparse.Namespace) -> int:
     consumers: list[Consumer] = [summary.add]
     report = learner = None
     if arguments.report is not None:
-        from foc_ros.reporting.report import ReportCollector  # reports a missing library before the work, not after it
+        from foc_ros.reporting.report import ReportCollector, check_report  # what is wrong is said before the work
 
+        check_report(arguments.report)
         report = ReportCollector()
         consumers.append(report.add)
     if arguments.learn is not None:

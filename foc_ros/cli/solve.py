@@ -15,12 +15,14 @@ from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.reaching_scene import build_scene_problems, solve_scene
 from foc_ros.core.types import PredictedCandidate
 from foc_ros.io.json_output import encode_candidate, encode_solution
+from foc_ros.io.outputs import check_replaceable
 from foc_ros.io.scene_file import load_scene
 from foc_ros.io.terminal import show_table
 
 MOST_SAMPLES = 10_000_000
 COLUMNS = {
     'label': '{}',
+    'description': '{}',
     'status': '{}',
     'likelihood': '{:.3f}',
     'effort': '{:.6g}',
@@ -42,7 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--json', action='store_true', help='print one JSON object')
     words = 'estimate the probability of avoidance from N noisy movements'
     parser.add_argument('--monte-carlo', type=int, metavar='N', help=words)
-    parser.add_argument('--plot', type=Path, metavar='FILE', help='draw the solved candidates (PNG, PDF or SVG)')
+    parser.add_argument(
+        '--plot', type=Path, metavar='FILE', help='draw the candidates (PNG, PDF or SVG); a picture that foc_ros drew is replaced'
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -50,6 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
     samples = arguments.monte_carlo
     if samples is not None and not 1 <= samples <= MOST_SAMPLES:
         raise InputError('--monte-carlo', f'a number in [1, {MOST_SAMPLES}]', samples)
+    if arguments.plot is not None:
+        check_replaceable('--plot', arguments.plot)
     scene = load_scene(arguments.scene)
     problems = build_scene_problems(scene)
     candidates = solve_scene(scene, problems)
@@ -57,14 +63,16 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.plot is not None:
         from foc_ros.reporting.plots import plot_outcomes
 
-        plot_outcomes(arguments.plot, scene.obstacles, scene.goals, candidates)
+        plot_outcomes(arguments.plot, scene.obstacles, scene.goals, candidates, scene.hand.mean[:2])
     if arguments.json:
         print(json.dumps({'candidates': encoded}, allow_nan=False))
     else:
         _show(encoded)
-    if any(each.is_solved for each in candidates):
+    if any(each.has_likelihood for each in candidates):
+        if not arguments.json:
+            print(*(f'{each.label}: {each.reason}\n' for each in candidates if not each.is_solved), sep='', end='')
         return 0
-    reasons = '; '.join(f'{each.candidate.label}: {each.solution.message}' for each in candidates)
+    reasons = '; '.join(f'{each.label}: {each.reason}' for each in candidates)
     reason = f'no candidate could be solved: {reasons}' if reasons else 'no path was found between the start and any goal'
     print(f'foc_ros solve: {reason}', file=sys.stderr)
     return 3

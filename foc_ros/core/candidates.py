@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -20,12 +21,30 @@ from .types import Candidate, Obstacles, PredictedCandidate, Solution, Status
 EFFORT_ONLY = CostModel()
 
 
+class ProblemTable(Protocol):
+    """The problems of candidates by row: a list, or what builds each when it is asked for."""
+
+    def __getitem__(self, row: int, /) -> Problem:
+        """Return the problem of the candidate in a row."""
+
+
 @dataclass(frozen=True)
 class EarlierSolutions:
-    """Results of earlier predictions by label: solutions to start from, and likelihoods, which give the order of solving."""
+    """Results of earlier predictions by label: solutions to start from, and what gives the order of solving.
+
+    likelihoods; turns: stamps [ns] at which each class had its last turn.
+    """
 
     solutions: Mapping[str, Solution] = field(default_factory=dict)
     likelihoods: Mapping[str, float] = field(default_factory=dict)
+    turns: Mapping[str, int] = field(default_factory=dict)
+
+    def sort_by_turn(self, candidates: Sequence[Candidate]) -> list[int]:
+        """Return the rows of candidates: the one that was most likely, then those whose last turn is the longest time ago."""
+        labels, rows = [each.label for each in candidates], range(len(candidates))
+        most_likely = max(rows, key=lambda row: (self.likelihoods.get(labels[row], 0.0), -row), default=0)
+        has_likelihood = any(self.likelihoods.get(label, 0.0) > 0.0 for label in labels)
+        return sorted(rows, key=lambda row: (not has_likelihood or row != most_likely, self.turns.get(labels[row], -1)))
 
 
 NOTHING = EarlierSolutions()
@@ -33,47 +52,58 @@ NOTHING = EarlierSolutions()
 
 def solve_candidates(
     candidates: Sequence[Candidate],
-    problems: Sequence[Problem],
+    problems: ProblemTable,
     settings: FocConfig,
     costs: CostModel = EFFORT_ONLY,
     earlier: EarlierSolutions = NOTHING,
     deadline: Deadline = NEVER,
 ) -> list[PredictedCandidate]:
-    """Solve every candidate, those that were most likely before first; return them in their own order, with likelihoods 0.
+    """Solve the candidates in turn; return those for which there was time in their own order, with likelihoods 0.
 
     problems: one for each candidate; costs: parts of the cost besides the effort to go; earlier: results of the prediction
-    before, to start from. Candidates that are not solved before the deadline get the status DEADLINE.
+    before, to start from. The first one is begun whatever the time. One that the deadline stops gets the status DEADLINE.
     """
-    solved = {}
-    for row in sorted(range(len(candidates)), key=lambda row: -earlier.likelihoods.get(candidates[row].label, 0.0)):
+    solved: dict[int, PredictedCandidate] = {}
+    for row in earlier.sort_by_turn(candidates):
+        if solved and not deadline.allows():
+            break
         previous = earlier.solutions.get(candidates[row].label)
         solved[row] = _solve_candidate(candidates[row], problems[row], settings, costs, previous, deadline)
-    return [solved[row] for row in range(len(candidates))]
+    return [solved[row] for row in sorted(solved)]
 
 
 def _solve_candidate(
     candidate: Candidate, problem: Problem, settings: FocConfig, costs: CostModel, previous: Solution | None, deadline: Deadline
 ) -> PredictedCandidate:
-    """Solve from the previous solution; if the status changes, also from the candidate's own guess.
+    """Solve from the previous solution; where a likelihood comes or goes, also from the candidate's own guess.
 
-    A candidate that was unreachable and is solved now may have come from far beyond the least effort: the cheaper result counts.
+    A candidate that was unreachable and is solved now may have come from far beyond the least effort: the result with the smaller
+    loss counts.
     """
     warm = None
     if previous is not None:
         solution = solve_problem(problem, warm_start(previous, problem), settings, deadline)
         warm = _check_class(candidate, problem, solution, costs)
         # a solution that continues one stopped by the deadline has skipped nothing
-        is_continued = previous.status is Status.DEADLINE and warm.is_solved
+        is_continued = warm.has_likelihood and (previous.status is Status.DEADLINE or previous.status.has_likelihood)
         if warm.status in (previous.status, Status.DEADLINE) or is_continued:
             return warm
     cold = _check_class(candidate, problem, solve_problem(problem, cold_start(candidate.guess), settings, deadline), costs)
-    return warm if warm is not None and warm.is_solved and not (cold.is_solved and cold.cost < warm.cost) else cold
+    if warm is None or not warm.has_likelihood:
+        return cold
+    return cold if cold.has_likelihood and _compute_loss(cold, problem) < _compute_loss(warm, problem) else warm
+
+
+def _compute_loss(candidate: PredictedCandidate, problem: Problem) -> float:
+    solution, wanted = candidate.solution, problem.wanted_k
+    k = wanted if candidate.is_solved else solution.safety_factor
+    return problem.preference.compute_loss(solution.effort, k, wanted)
 
 
 def _check_class(candidate: Candidate, problem: Problem, solution: Solution, costs: CostModel) -> PredictedCandidate:
     """Find the homotopy class in which a solution really is, and its cost; the status says if it left the candidate's class."""
     sides = find_path_sides(solution.path, problem.obstacles, problem.centre_trajectories)
-    if solution.status is Status.SOLVED and any(sides.get(identity, side) != side for identity, side in candidate.sides):
+    if solution.status.has_likelihood and any(sides.get(identity, side) != side for identity, side in candidate.sides):
         solution = replace(solution, status=Status.LEFT_CLASS, message='the solution moved into another homotopy class')
     return PredictedCandidate(candidate, solution, sides, costs.compute_cost(solution), 0.0)
 
@@ -82,7 +112,7 @@ def drop_duplicates(candidates: Sequence[PredictedCandidate]) -> list[PredictedC
     """Drop candidates that moved into a class that another candidate solved, so that no class is counted twice."""
     if all(each.status is not Status.LEFT_CLASS for each in candidates):
         return list(candidates)
-    solved = {_identify_class(each) for each in candidates if each.is_solved}
+    solved = {_identify_class(each) for each in candidates if each.has_likelihood}
     return [each for each in candidates if each.status is not Status.LEFT_CLASS or _identify_class(each) not in solved]
 
 
@@ -93,12 +123,12 @@ def _identify_class(candidate: PredictedCandidate) -> tuple[int, frozenset[tuple
 def rank_candidates(
     candidates: Sequence[PredictedCandidate], likelihood: LikelihoodConfig, obstacles: Obstacles
 ) -> list[PredictedCandidate]:
-    """Return the distinct candidates with their likelihoods: solved ones, most likely first, then the others, at 0."""
+    """Return the distinct candidates: solved and compromised ones, most likely first, then the others, with likelihood 0."""
     candidates = drop_duplicates(candidates)
-    solved = [each for each in candidates if each.is_solved]
-    branch_times = compute_branch_times(solved, obstacles) if likelihood.lookahead_s > 0.0 else None
-    likelihoods = compute_likelihoods(np.array([each.cost for each in solved]), likelihood, branch_times).tolist()
-    pairs = zip(solved, likelihoods, strict=True)
-    ranked = [PredictedCandidate(each.candidate, each.solution, each.sides, each.cost, share) for each, share in pairs]
+    taken = [each for each in candidates if each.has_likelihood]
+    branch_times = compute_branch_times(taken, obstacles) if likelihood.lookahead_s > 0.0 else None
+    costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))
+    pairs = zip(taken, compute_likelihoods(costs, likelihood, branch_times, shortfalls).tolist(), strict=True)
+    ranked = [replace(each, likelihood=share) for each, share in pairs]
     ranked.sort(key=lambda each: (-each.likelihood, each.label))
-    return ranked + [each for each in candidates if not each.is_solved]
+    return ranked + [each for each in candidates if not each.has_likelihood]

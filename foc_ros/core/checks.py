@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -20,6 +18,8 @@ def check_array(field: str, value: ArrayLike, shape: tuple[int | None, ...]) -> 
     expected = f'finite numbers of shape ({sizes}{"," if len(shape) == 1 else ""})'
     try:
         array = np.array(value, dtype=float)
+    except OverflowError as error:
+        raise SceneError(field, expected, 'a whole number beyond all floats') from error
     except (TypeError, ValueError) as error:
         raise SceneError(field, expected, repr(value)) from error
     if array.ndim != len(shape) or any(size not in (None, found) for size, found in zip(shape, array.shape, strict=True)):
@@ -38,6 +38,6 @@ def check_number(field: str, value: object, low: float = -FARTHEST, high: float 
     """Return a finite number within bounds; raise SceneError otherwise."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise SceneError(field, f'a number in [{low:g}, {high:g}]', repr(value))
-    if not (math.isfinite(value) and low <= value <= high):
+    if not low <= value <= high:
         raise SceneError(field, f'a number in [{low:g}, {high:g}]', value)
     return float(value)

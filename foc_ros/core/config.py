@@ -17,6 +17,8 @@ from .registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registr
 PLANES = ('xy', 'xz', 'yz')
 DURATION_MODELS = ('fixed', 'fitts', 'cost_of_time')
 ARRIVALS = ('rest', 'passing')
+BOUNDS = ('cantelli', 'gaussian')
+RISKS = ('step', 'path')
 MOST_CANDIDATES = 64
 """Largest number of homotopy classes that are solved in one prediction."""
 WIDENS = 'widens the predicted covariance, not the chance constraint'
@@ -47,8 +49,14 @@ class FocConfig:
     """The forward optimal control."""
 
     steps: int = _p(50, 'number of control steps N of the horizon', '', 5, 400)
-    eta: float = _p(0.9, 'wanted probability of avoiding each obstacle at each step', '', 0.0, 0.999)
-    strategy: str = _p('lv', 'how the solver trades clearance against precision', choices=STRATEGIES)
+    eta: float = _p(0.9, 'wanted probability of avoidance, of what `foc.risk` names', '', 0.0, 0.999)
+    bound: str = _p(
+        'cantelli',
+        'what turns eta into standard deviations: it holds for any distribution, or for a Gaussian one',
+        choices=BOUNDS,
+    )
+    risk: str = _p('step', 'what eta is about: each obstacle at each step, or all obstacles along the whole path', choices=RISKS)
+    strategy: str = _p('optimal', 'how the solver trades clearance against precision', choices=STRATEGIES)
     plant: str = _p('triple_integrator', 'dynamic model of the hand that the control moves', choices=PLANTS)
     plant_mass: float = _p(1.0, 'mass of the plant damped_mass', 'kg', 1e-3, 1e3)
     plant_damping: float = _p(2.0, 'viscous damping of the plant damped_mass', 'N s/m', 0.0, 1e4)
@@ -100,7 +108,7 @@ class EstimatorConfig:
     jerk_density: float = _p(5.0, 'root of the spectral density of the jerk that the filter expects', 'm/s^2.5', 1e-6, 1e6)
     onset_speed: float = _p(0.05, 'speed above which a movement begins; it ends below half of this speed', 'm/s', 1e-4, 10.0)
     acceleration_time_s: float = _p(
-        0.0, 'decay time of an acceleration: predictions start at the speed that it leads to; 0: no decay', 's', 0.0, 10.0
+        0.02, 'decay time of an acceleration: predictions start at the speed that it leads to; 0: no decay', 's', 0.0, 10.0
     )
     gap_s: float = _p(0.5, 'gap between samples after which the filter restarts', 's', 0.001, 60.0)
     hand_timeout_s: float = _p(0.5, 'timeout after which a missing or stale hand pose stops prediction; 0: never', 's', 0.0, 1e6)
@@ -123,10 +131,21 @@ class LikelihoodConfig:
 
     rule: str = _p('cost_ratio', 'rule that gives the weight of a class from its cost', choices=LIKELIHOOD_RULES)
     beta: float = _p(0.5, 'exponent of the cost ratio', '', 0.0, 100.0)
+    shortfall: float = _p(
+        3.0,
+        'log-likelihood that a class loses per standard deviation below the wanted eta; .inf: left out',
+        '',
+        0.0,
+        math.inf,
+    )
     spent_share: float = _p(1.0, f'fraction of the effort since onset that every cost contains, for {JERK_ONLY}', '', 0.0, 1.0)
     lookahead_s: float = _p(
         0.0, 'mean look-ahead of the operator: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
     )
+    hold_s: float = _p(
+        0.2, 'longest time for which a class keeps its last answer if there is no time for a new one or it fails', 's', 0.0, 10.0
+    )
+    smoothing_s: float = _p(0.1, 'time constant of the filter of the likelihoods; 0: none', 's', 0.0, 10.0)
     margin: float = _p(0.05, 'lead in likelihood that another class needs to become the most likely one', '', 0.0, 1.0)
 
 
@@ -160,7 +179,7 @@ class Config:
 
     rate_hz: float = _p(50.0, 'predictions per second of message time', 'Hz', 0.1, 1000.0)
     budget_s: float = _p(
-        0.0, 'time limit of one prediction, after which unsolved classes are reported as out of time; 0: none', 's', 0.0, 60.0
+        0.01, 'time limit of a live prediction, whose best answer by then counts; replays have none; 0: none', 's', 0.0, 60.0
     )
     plane: str = _p('xy', 'task plane of the working frame', choices=PLANES, read_only=True)
     frame_id: str = _p('', 'working frame; empty: the frame of the first hand pose', read_only=True)
@@ -243,7 +262,9 @@ def _check_value(parameter: Parameter, value: object) -> float | int | str:
         if not isinstance(value, str) or (bound.choices and value not in bound.choices):
             raise ParameterError(name, f'one of {", ".join(bound.choices)}' if bound.choices else 'a text', repr(value))
         return value
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+    if isinstance(value, int) and value.bit_length() > 64:  # it may be too large for a float
+        raise ParameterError(name, f'a number{_describe_range(bound)}', value)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not (math.isfinite(value) or value == bound.high):
         raise ParameterError(name, f'a finite number{_describe_range(bound)}', repr(value))
     if isinstance(parameter.default, int) and value != int(value):
         raise ParameterError(name, f'a whole number{_describe_range(bound)}', repr(value))

@@ -1,12 +1,35 @@
-"""The time by which a solve has to end. It is checked before every QP."""
+"""The time by which a prediction has to end. It is checked before every QP, every graph and every path search."""
 
 from __future__ import annotations
 
+import math
 import time
+from dataclasses import dataclass
 
 
 class OutOfTimeError(Exception):
     """The deadline has passed. This exception stays inside the numeric core, which turns it into a status."""
+
+
+@dataclass
+class StepTimes:
+    """Times between two checks of a deadline, or of the deadlines taken from it.
+
+    Attributes
+    ----------
+    longest_s
+        The longest of them so far [s].
+    checked_at
+        The moment of the last check, by `time.perf_counter()` [s]; infinite before the first one.
+    """
+
+    longest_s: float = 0.0
+    checked_at: float = math.inf
+
+    def add(self) -> None:
+        """Add the time since the last check."""
+        now = time.perf_counter()
+        self.longest_s, self.checked_at = max(self.longest_s, now - self.checked_at), now
 
 
 class Deadline:
@@ -18,15 +41,46 @@ class Deadline:
         Time allowed [s]; None for no limit.
     began
         When that time began, by `time.perf_counter()` [s]; None for now.
+    whole
+        A deadline that holds as well.
     """
 
-    def __init__(self, seconds: float | None = None, began: float | None = None) -> None:
+    def __init__(self, seconds: float | None = None, began: float | None = None, whole: Deadline | None = None) -> None:
         self.at = None if seconds is None else (time.perf_counter() if began is None else began) + seconds
+        self._whole = whole
+        self.step_times: StepTimes = StepTimes() if whole is None else whole.step_times
 
-    def check(self) -> None:
-        """Raise OutOfTimeError if the deadline has passed."""
-        if self.at is not None and time.perf_counter() > self.at:
+    @property
+    def left_s(self) -> float:
+        """Time that is left [s], negative after the deadline."""
+        left_s = math.inf if self.at is None else self.at - time.perf_counter()
+        return left_s if self._whole is None else min(left_s, self._whole.left_s)
+
+    @property
+    def has_passed(self) -> bool:
+        """Whether the deadline has passed."""
+        return self.left_s < 0.0
+
+    def cancel(self) -> None:
+        """Let the time end now, also for a computation in another thread, and for the deadlines taken from this one."""
+        self.at = -math.inf
+
+    def allows(self, seconds: float = 0.0) -> bool:
+        """Tell whether there is time for a step of so many seconds, and for one half as long as the longest so far."""
+        return self.left_s >= max(seconds, self.step_times.longest_s / 2.0)
+
+    def check(self, seconds: float = 0.0) -> None:
+        """Raise OutOfTimeError if the deadline does not allow the next step, which takes some seconds if that is known.
+
+        The steps so far are the times between two checks, also of deadlines taken from the same one.
+        """
+        self.step_times.add()
+        if not self.allows(seconds):
             raise OutOfTimeError
+
+    def take_share(self, share: float, reserve_s: float = 0.0) -> Deadline:
+        """Return an earlier deadline, at a share of the time that is left, less a reserve [s]."""
+        return Deadline(None if self.at is None else share * self.left_s - reserve_s, whole=self)
 
 
 NEVER = Deadline()

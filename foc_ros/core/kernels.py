@@ -107,6 +107,11 @@ def compiled_with_caller(kernel: Kernel) -> Kernel:
     return cast('Kernel', njit(fastmath=REORDERED, error_model='numpy', forceinline=True)(kernel))
 
 
+def compiled_separately(kernel: Kernel) -> Kernel:
+    """Compile an inner kernel for the types of its calls, not inlined: a large one takes long to compile in each caller."""
+    return cast('Kernel', njit(fastmath=REORDERED, error_model='numpy')(kernel))
+
+
 def freeze(group: Group) -> Group:
     """Make the arrays of a NamedTuple read-only, those of NamedTuples in it too, and return it for an entry kernel."""
     for each in group:
@@ -121,11 +126,11 @@ def _compile_entry(kernel: Kernel, freedom: set[str]) -> Kernel:
     scope = kernel.__globals__
     signature = tuple(_find_type(each, scope, _TYPES) for name, each in kernel.__annotations__.items() if name != 'return')
     try:
-        return cast('Kernel', njit(signature, cache=True, fastmath=freedom, error_model='numpy')(kernel))
+        return cast('Kernel', njit(signature, cache=True, nogil=True, fastmath=freedom, error_model='numpy')(kernel))
     except RuntimeError as error:  # no directory to keep machine code in: compile in every process
         if 'cannot cache' not in str(error):
             raise
-        return cast('Kernel', njit(signature, fastmath=freedom, error_model='numpy')(kernel))
+        return cast('Kernel', njit(signature, nogil=True, fastmath=freedom, error_model='numpy')(kernel))
 
 
 def _find_type(annotation: object, scope: dict[str, Any], known: dict[str, types.Type]) -> types.Type:

@@ -3,7 +3,8 @@
     p_i / p_j = (J_j / J_i)^beta,  so  p_i = J_i^-beta / sum_j J_j^-beta,
 
 which, unlike the usual exponential of cost differences, does not change with the unit of effort or the scale of the scene. This
-is the rule `cost_ratio`; `likelihood.rule` can name another one, which maps costs to logarithms of weights.
+is the rule `cost_ratio`; `likelihood.rule` can name another one, which maps costs to logarithms of weights. A class whose safety
+factor k is below the wanted one has a smaller weight, by the factor exp(-likelihood.shortfall (k_wanted - k)).
 
 J_i is the cost that `CostModel` assembles: the effort to go through class i, the price of its duration, and a part of the effort
 since movement onset, which all classes share.
@@ -34,10 +35,8 @@ from .estimation.duration import get_time_price
 from .homotopy.branch_times import BranchTimes
 from .kernels import Vector, compiled
 from .registry import LIKELIHOOD_RULES
+from .safety_preference import COST_FLOOR, SafetyPreference
 from .types import Array, Solution
-
-COST_FLOOR = 1e-9
-"""Smallest cost that is distinguished from zero [m^2/s^5]: the effort of a reach of 1 um in 1 s, 720 D^2 / T^5 = 7e-10."""
 
 
 class CostModel(NamedTuple):
@@ -48,7 +47,11 @@ class CostModel(NamedTuple):
 
     def compute_cost(self, solution: Solution) -> float:
         """Return the cost J_i [m^2/s^5] of a class: an integral of squared jerk, so that classes of other durations compare."""
-        return self.shared + solution.effort * solution.dt + self.time_price * (solution.dt * len(solution.control))
+        return solution.effort * solution.dt + self.compute_fixed_cost(solution.dt * len(solution.control))
+
+    def compute_fixed_cost(self, duration_s: float) -> float:
+        """Return the part of the cost [m^2/s^5] that is not effort to go, for a class with a duration [s]."""
+        return self.shared + self.time_price * duration_s
 
 
 def make_cost_model(effort_spent: float, config: Config) -> CostModel:
@@ -58,22 +61,33 @@ def make_cost_model(effort_spent: float, config: Config) -> CostModel:
     return CostModel(compute_shared_cost(effort_spent, config.likelihood), get_time_price(config.duration))
 
 
+def make_preference(effort_spent: float, duration_s: float, config: Config) -> SafetyPreference:
+    """Return how a class with a duration [s] weighs effort and safety, for an effort since onset [m^2/s^5]."""
+    fixed_cost, likelihood = make_cost_model(effort_spent, config).compute_fixed_cost(duration_s), config.likelihood
+    return SafetyPreference(likelihood.beta, likelihood.shortfall, fixed_cost, duration_s / config.foc.steps)
+
+
 def compute_shared_cost(effort_spent: float, config: LikelihoodConfig) -> float:
     """Return the part of the cost [m^2/s^5] that all classes share, for an effort since onset [m^2/s^5]."""
     return config.spent_share * effort_spent
 
 
-def compute_likelihoods(costs: Array, config: LikelihoodConfig, branch_times: BranchTimes | None = None) -> Array:
+def compute_likelihoods(
+    costs: Array, config: LikelihoodConfig, branch_times: BranchTimes | None = None, shortfalls: Array | None = None
+) -> Array:
     """Return the likelihoods (k,) of classes by the rule that `likelihood.rule` names; they sum to one.
 
     costs (k,) >= 0 [m^2/s^5], of which those below `COST_FLOOR` count as `COST_FLOOR`; branch_times: of these classes, for a
-    look-ahead only. Logarithms keep numbers in range. Raises InputError for a cost that is negative or not finite.
+    look-ahead only; shortfalls (k,) >= 0: of their safety factors, zero if not given. Logarithms keep numbers in range. Raises
+    InputError for a cost that is negative or not finite.
     """
     values = np.ascontiguousarray(costs, dtype=float)
     for row, value in enumerate(values.tolist()):
         if not 0.0 <= value < math.inf:
             raise InputError(f'costs[{row}]', 'a finite number >= 0', value)
     logs = LIKELIHOOD_RULES.get(config.rule)(values, config)
+    if shortfalls is not None and shortfalls.any():
+        logs = logs - config.shortfall * shortfalls
     if config.lookahead_s > 0.0 and branch_times is not None and len(logs):
         logs = _weigh_by_lookahead(logs - logs.max(), branch_times, config.lookahead_s)
     return normalise_logs(np.ascontiguousarray(logs, dtype=float))

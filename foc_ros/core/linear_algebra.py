@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kernels import Matrix, Vector, compiled
+from .kernels import Matrix, Vector, compiled, compiled_separately
 
 
 @compiled
@@ -100,3 +100,40 @@ def solve_lower_transposed(factor: Matrix, right: Vector) -> Vector:
             solved[i] -= factor[j, i] * solved[j]
         solved[i] /= factor[i, i]
     return solved
+
+
+@compiled_separately
+def solve_by_elimination(matrix: Matrix, right: Vector) -> tuple[float, Vector]:
+    """Solve a system (n, n) by Gaussian elimination in place; return the sign of the determinant and the solution (n,).
+
+    Rows are first divided by their largest entry. The sign is 0 if the matrix is singular.
+    """
+    n, sign = len(right), 1.0
+    for i in range(n):
+        largest = np.abs(matrix[i]).max()
+        if not 0.0 < largest < np.inf:
+            return 0.0, right
+        matrix[i] /= largest
+        right[i] /= largest
+    for i in range(n):
+        pivot = i
+        for j in range(i + 1, n):
+            if abs(matrix[j, i]) > abs(matrix[pivot, i]):
+                pivot = j
+        if matrix[pivot, i] == 0.0:
+            return 0.0, right
+        sign = -sign if (matrix[pivot, i] < 0.0) != (pivot != i) else sign
+        for j in range(i, n):
+            matrix[i, j], matrix[pivot, j] = matrix[pivot, j], matrix[i, j]
+        right[i], right[pivot] = right[pivot], right[i]
+        for j in range(i + 1, n):
+            factor = matrix[j, i] / matrix[i, i]
+            if factor != 0.0:
+                for column in range(i + 1, n):
+                    matrix[j, column] -= factor * matrix[i, column]
+                right[j] -= factor * right[i]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            right[i] -= matrix[i, j] * right[j]
+        right[i] /= matrix[i, i]
+    return sign, right

@@ -1,30 +1,37 @@
-"""The memory of the predictor: followed candidates, their solutions to start from, and when they were last solved."""
+"""The memory of the predictor: followed candidates, their solutions to start from, and whose turn it is."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from .candidates import NOTHING, EarlierSolutions
-from .types import NANOSECONDS, Candidate, PredictedCandidate, Prediction, Solution, Status
+from .continuity import NO_PAST, Past, is_renamed
+from .types import Candidate, PredictedCandidate, Solution, Status
 
 RETRY_AFTER = 10
 """Predictions after which a candidate that is unreachable, or left its class, is solved again from its own guess."""
+
+
+LATE_AFTER = 2
+"""Turns for which the time was too short, after which a candidate is solved from its own guess: its solution leads nowhere."""
 
 
 @dataclass(frozen=True)
 class Memory:
     """What one prediction passes to the next, by label.
 
-    most_likely: label; candidates: the homotopy classes followed; earlier: their solutions and likelihoods; solved_ns: stamp at
-    which each was last solved; followed: for how many predictions in a row each has been followed without being solved.
+    most_likely: label; candidates: the homotopy classes followed; earlier: their solutions, likelihoods and turns; followed: for
+    how many predictions in a row each has been followed without being solved; past: what continuity needs; next_goal: row of the
+    goal at which the search begins.
     """
 
     most_likely: str | None = None
     candidates: tuple[Candidate, ...] = ()
     earlier: EarlierSolutions = NOTHING
-    solved_ns: Mapping[str, int] = field(default_factory=dict)
     followed: Mapping[str, int] = field(default_factory=dict)
+    past: Past = NO_PAST
+    next_goal: int = 0
 
     def find_earlier(self, candidates: Sequence[Candidate]) -> EarlierSolutions:
         """Return the earlier results of candidates under their present labels, also if their labels have changed.
@@ -35,55 +42,55 @@ class Memory:
         """
         if all(candidate.label in self.earlier.solutions for candidate in candidates):
             return self.earlier
-        solutions, likelihoods = dict(self.earlier.solutions), dict(self.earlier.likelihoods)
+        solutions, likelihoods, turns = (dict(each) for each in vars(self.earlier).values())
         before = [each for each in self.candidates if each.label in solutions]
         before.sort(key=lambda each: (-likelihoods.get(each.label, 0.0), each.label))
         for candidate in candidates:
             if candidate.label not in solutions:
-                same = next((each for each in before if _is_renamed(each, candidate)), None)
+                same = next((each for each in before if is_renamed(each, candidate)), None)
                 if same is not None:
                     solutions[candidate.label] = solutions[same.label]
                     likelihoods[candidate.label] = likelihoods.get(same.label, 0.0)
-        return EarlierSolutions(solutions, likelihoods)
+                    turns[candidate.label] = turns.get(same.label, -1)
+        return EarlierSolutions(solutions, likelihoods, turns)
 
-    def after(self, prediction: Prediction, candidates: tuple[Candidate, ...], solved: Sequence[PredictedCandidate]) -> Memory:
-        """Return the memory after a prediction.
+    def remember(
+        self,
+        candidates: Sequence[Candidate],
+        solved: Sequence[PredictedCandidate],
+        earlier: EarlierSolutions,
+        likelihoods: Mapping[str, float],
+        stamp_ns: int,
+    ) -> tuple[EarlierSolutions, dict[str, int]]:
+        """Return what is earlier to the next prediction, and for how long candidates have been followed without being solved.
 
-        A candidate that was not solved in time keeps its earlier solution, or the one at which it was stopped. One that is
-        unreachable, or left its class, is only followed there, which is cheap, and solved from its own guess again after
-        `RETRY_AFTER` predictions.
+        solved: the candidates for which there was time; earlier: what `find_earlier` returned. A candidate that was not solved in
+        time keeps its earlier solution, or the one at which it was stopped. One that is unreachable, or left its class, is only
+        followed there, which is cheap, and solved from its own guess again after `RETRY_AFTER` predictions.
         """
-        last = self.earlier.solutions
+        results = {each.label: each for each in solved}
         solutions: dict[str, Solution] = {}
         followed: dict[str, int] = {}
-        for each in solved:
-            label, status = each.label, each.status
-            if status is Status.DEADLINE and label in last:
-                solutions[label] = last[label]
-            elif status is Status.SOLVED or _was_stopped(each.solution):
-                solutions[label] = each.solution
-            elif status in (Status.ETA_UNREACHABLE, Status.LEFT_CLASS) and self.followed.get(label, 0) < RETRY_AFTER:
-                solutions[label], followed[label] = each.solution, self.followed.get(label, 0) + 1
-        likelihoods = {each.label: each.likelihood for each in prediction.candidates}
-        solved_ns = {each.label: self.solved_ns[each.label] for each in candidates if each.label in self.solved_ns}
-        solved_ns |= {each.label: prediction.stamp_ns for each in prediction.solved_candidates}
-        return Memory(prediction.most_likely, candidates, EarlierSolutions(solutions, likelihoods), solved_ns, followed)
-
-    def add_age(self, candidate: PredictedCandidate, stamp_ns: int) -> PredictedCandidate:
-        """Add to the message of a candidate that was not solved in time when it was last solved."""
-        if candidate.status is not Status.DEADLINE:
-            return candidate
-        solved_ns = self.solved_ns.get(candidate.label)
-        age = 'never solved yet' if solved_ns is None else f'last solved {(stamp_ns - solved_ns) / NANOSECONDS:.3g} s ago'
-        return replace(candidate, solution=replace(candidate.solution, message=f'{candidate.solution.message}; {age}'))
-
-
-def _is_renamed(before: Candidate, now: Candidate) -> bool:
-    """Return whether the label of one class to a goal is that of the other with obstacles left out."""
-    one, other = set(before.sides), set(now.sides)
-    return before.goal == now.goal and (one <= other or other <= one)
+        for label in [each.label for each in candidates]:
+            result, last = results.get(label), earlier.solutions.get(label)
+            is_stopped = result is not None and _was_stopped(result.solution)
+            if result is None or (result.status is Status.DEADLINE and not (is_stopped and _is_unfinished(last))):
+                turns_late = self.followed.get(label, 0) + (result is not None)
+                if last is not None and (result is None or turns_late < LATE_AFTER):
+                    solutions[label], followed[label] = last, turns_late
+            elif result.has_likelihood or is_stopped:
+                solutions[label] = result.solution
+            elif result.status in (Status.ETA_UNREACHABLE, Status.LEFT_CLASS) and self.followed.get(label, 0) < RETRY_AFTER:
+                solutions[label], followed[label] = result.solution, self.followed.get(label, 0) + 1
+        turns = {each.label: stamp_ns if each.label in results else earlier.turns.get(each.label, -1) for each in candidates}
+        return EarlierSolutions(solutions, likelihoods, turns), followed
 
 
 def _was_stopped(solution: Solution) -> bool:
-    """Return whether the deadline stopped a solution on the penalty path, not before it."""
-    return solution.status is Status.DEADLINE and solution.lam > 0.0
+    """Return whether the deadline stopped a solution that the next prediction can continue from."""
+    return solution.status is Status.DEADLINE and (solution.lam > 0.0 or bool(solution.multipliers))
+
+
+def _is_unfinished(solution: Solution | None) -> bool:
+    """Return whether there is no earlier solution, or one that the deadline stopped as well."""
+    return solution is None or solution.status is Status.DEADLINE

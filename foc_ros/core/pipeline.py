@@ -5,9 +5,11 @@ The pipeline uses the stamps of messages only and reads no clock, so that equal 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from .config import Config
+from .deadline import NEVER, Deadline
 from .errors import FocError
 from .estimation.kalman_filter import FilterState, update
 from .homotopy.demonstrations import Demonstration
@@ -15,9 +17,26 @@ from .memory import Memory
 from .obstacles.scene import ObstacleSource, Scene
 from .predictor import predict
 from .rejections import Rejections
-from .types import NANOSECONDS, Array, HandSample, Obstacles, Prediction, SampleStatus
+from .types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction, SampleStatus
 
-__all__ = ['Pipeline', 'SampleStatus']
+__all__ = ['Pipeline', 'PredictionTask', 'SampleStatus']
+
+
+@dataclass(frozen=True, eq=False)
+class PredictionTask:
+    """One prediction that is to be made: all arguments of `predict`, none of which changes, and its deadline."""
+
+    config: Config
+    hand: HandState
+    obstacles: Obstacles
+    goals: Array
+    memory: Memory
+    library: Sequence[Demonstration]
+    deadline: Deadline
+
+    def run(self) -> tuple[Prediction, Memory]:
+        """Compute the prediction and the memory for the next one; this may happen in another thread."""
+        return predict(self.config, self.hand, self.obstacles, self.goals, self.memory, self.library, self.deadline)
 
 
 class Pipeline:
@@ -40,6 +59,7 @@ class Pipeline:
         self._is_new = False
         self._was_tried = False
         self._predicted_ns: int | None = None
+        self._task: PredictionTask | None = None
 
     @property
     def counts(self) -> dict[str, int]:
@@ -111,8 +131,17 @@ class Pipeline:
         self.scene = self.scene.with_goals(goals, frame_id)
         return SampleStatus.ACCEPTED
 
-    def predict(self) -> Prediction | None:
+    def predict(self, deadline: Deadline = NEVER) -> Prediction | None:
         """Predict from the newest hand sample; if that is impossible, count it, explain it in `last_refusal`, return None."""
+        task = self.begin(deadline)
+        return None if task is None else self.finish(task, task.run)
+
+    def begin(self, deadline: Deadline) -> PredictionTask | None:
+        """Return the prediction from the newest hand sample as a task for `finish`; None, with a count, if it is impossible.
+
+        deadline: not shared with other tasks, because it ends when the task is abandoned. A task that is begun before the end of
+        the last one replaces it.
+        """
         self._was_tried = True
         reason = self._find_not_ready_reason()
         if reason is None and not self.is_due:
@@ -124,17 +153,29 @@ class Pipeline:
         assert self.scene.goals is not None
         self._is_new, self._predicted_ns = False, self.hand_state.stamp_ns
         obstacles = self.scene.obstacles(self.hand_state.stamp_ns)
+        self._task = PredictionTask(
+            self.config, self.hand_state, obstacles, self.scene.goals, self._memory, self._library, deadline
+        )
+        return self._task
+
+    def finish(self, task: PredictionTask, compute: Callable[[], tuple[Prediction, Memory]]) -> Prediction | None:
+        """Return the prediction of a task, and remember it; None, with a count, if it failed or was abandoned meanwhile.
+
+        compute: `task.run`, or a function that returns or raises what it returned or raised in another thread.
+        """
+        if task is not self._task:
+            self._rejections.count('predict_abandoned')
+            return None
+        self._task = None
         try:
-            prediction, self._memory = predict(
-                self.config, self.hand_state, obstacles, self.scene.goals, self._memory, self._library
-            )
+            prediction, self._memory = compute()
         except FocError as error:
             self._rejections.reject('predict_failed', str(error))
             return None
         for candidate in prediction.candidates:
-            if not candidate.is_solved:
+            if not candidate.has_likelihood:
                 self._rejections.count(f'candidate_{candidate.status.value}')
-        if not prediction.solved_candidates:
+        if not prediction.candidates_with_likelihood:
             self._rejections.count('predict_nothing_solved')
         return prediction
 
@@ -150,13 +191,20 @@ class Pipeline:
             self._is_new = False
         self.is_engaged = on
 
+    def remove_source(self, source: str) -> None:
+        """Forget the obstacles of one source, as if none of its messages had been received."""
+        self.scene = self.scene.without_source(source)
+
     def reset(self) -> None:
         """Forget the movement; keep the scene, the working frame and the counts."""
         self.hand_state, self._is_new = None, False
         self._forget_predictions()
 
     def reconfigure(self, config: Config) -> None:
-        """Replace the parameters. Movement and scene are kept unless the plane or the working frame changes."""
+        """Replace the parameters. Movement and scene are kept unless the plane or the working frame changes.
+
+        A prediction that is being computed is abandoned, and the newest hand sample is due instead.
+        """
         if config.plane != self.config.plane:
             self.reset()
             self.scene = Scene()
@@ -164,6 +212,9 @@ class Pipeline:
             self.reset()
             self._fix_frame(config.frame_id)
         self.config = config
+        if self._task is not None:
+            self._abandon_task()
+            self._is_new, self._predicted_ns = True, None
         self._memory = Memory(self._memory.most_likely)
 
     def _find_not_ready_reason(self) -> tuple[str, str] | None:
@@ -175,7 +226,14 @@ class Pipeline:
         return self.scene.not_ready_reason(self.hand_state.stamp_ns, self.config.scene.timeout_s)
 
     def _forget_predictions(self) -> None:
+        self._abandon_task()
         self._memory, self._predicted_ns = Memory(), None
+
+    def _abandon_task(self) -> None:
+        """Make sure that a prediction that is being computed is neither returned nor remembered, and end it soon."""
+        if self._task is not None:
+            self._task.deadline.cancel()
+            self._task = None
 
     def _fix_frame(self, frame_id: str) -> None:
         """Fix the working frame and drop what was received in another one."""

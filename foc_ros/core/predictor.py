@@ -10,22 +10,35 @@ import numpy as np
 
 from .candidates import rank_candidates, solve_candidates
 from .config import REFERENCE_STEP_S, Config
-from .deadline import Deadline
+from .continuity import Past, keep_answers, make_continuous, smooth_paths
+from .deadline import NEVER, Deadline
 from .dynamics.noise import scale_noise
 from .dynamics.plant_models import make_plant_model
 from .dynamics.predictive_covariance import compute_predictive_covariance, timing_covariances
-from .estimation.duration import choose_candidate_durations, estimate_times_to_go, is_passing
-from .homotopy import search
+from .estimation.duration import choose_candidate_durations, estimate_times_to_go, is_passing, limit_change
+from .homotopy import Turn, search
 from .homotopy.demonstrations import Demonstration, GuessTiming, recall_demonstrations
-from .likelihood import make_cost_model, select_most_likely
+from .likelihood import make_cost_model, make_preference, select_most_likely
 from .memory import Memory
+from .obstacles.chance_constraint import RiskBound, count_events
 from .obstacles.culling import cull_obstacles
 from .ocp.problem import Problem, rest_to_goal
 from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Prediction, make_obstacles
 
+SEARCH_SHARE, SOLVE_SHARE = 0.3, 0.9
+"""Parts of the time left that the search and then the solves may take before they begin no further step."""
+RESERVE_S = 5e-5
+"""Time besides that for each candidate, to keep, rank and smooth it [s]."""
+
 
 def predict(
-    config: Config, hand: HandState, obstacles: Obstacles, goals: Array, memory: Memory, library: Sequence[Demonstration] = ()
+    config: Config,
+    hand: HandState,
+    obstacles: Obstacles,
+    goals: Array,
+    memory: Memory,
+    library: Sequence[Demonstration] = (),
+    deadline: Deadline = NEVER,
 ) -> tuple[Prediction, Memory]:
     """Predict where a hand goes.
 
@@ -43,63 +56,88 @@ def predict(
         What the previous prediction returned, or an empty `Memory`.
     library
         Demonstrated paths, which become candidates where they fit the scene.
+    deadline
+        When the prediction has to be ready. Classes for which there is no time keep their last answer (`continuity`), and have
+        their turn later.
 
     Returns
     -------
     Prediction, Memory
-        The prediction, and the memory for the next one. Equal arguments give equal results, wall times apart.
+        The prediction, and the memory for the next one. Without a deadline, equal arguments give equal results, wall times apart.
     """
-    began = time.perf_counter()
+    began, past = time.perf_counter(), memory.past.keep_goals(goals)
     hand = _simplify_start(hand, config.estimator.acceleration_time_s)
-    durations = estimate_times_to_go(hand, goals, config.duration)
+    durations = _find_durations(hand, goals, past, config)
     given, obstacles = obstacles, cull_obstacles(obstacles, hand.mean[:2], goals, max(durations), config.scene.max_obstacles)
-    found = search(hand.mean, goals, obstacles, config.homotopy, durations, config.foc.steps, memory.candidates)
-    scene = hand, goals, obstacles, config.homotopy, GuessTiming(durations, config.foc.steps)
+    timing, turn = GuessTiming(durations, config.foc.steps), Turn(deadline.take_share(SEARCH_SHARE), memory.next_goal)
+    found = search(hand.mean, goals, obstacles, config.homotopy, *timing, memory.candidates, turn)
+    scene = hand, goals, obstacles, config.homotopy, timing
     candidates = recall_demonstrations(library, *scene, found.candidates, memory.candidates)
-    problems = build_problems(config, hand, obstacles, goals, candidates, durations)
+    problems = Problems(config, hand, obstacles, goals, candidates, durations)
     costs, earlier = make_cost_model(hand.effort_spent, config), memory.find_earlier(candidates)
-    deadline = Deadline(config.budget_s or None, began)
-    solved = solve_candidates(candidates, list(problems.values()), config.foc, costs, earlier, deadline)
-    ranked = rank_candidates([memory.add_age(each, hand.stamp_ns) for each in solved], config.likelihood, obstacles)
-    predicted = _widen_covariances(ranked, problems, hand, config)
-    likelihoods = {each.label: each.likelihood for each in predicted if each.is_solved}
-    best = select_most_likely(likelihoods, memory.most_likely, config.likelihood.margin)
-    counts = {'merged': len(candidates) - len(ranked), 'culled': len(given) - len(obstacles)}
-    counts['recalled'] = len(candidates) - len(found.candidates)
+    until = deadline.take_share(SOLVE_SHARE, RESERVE_S * len(candidates))
+    solved = solve_candidates(candidates, problems, config.foc, costs, earlier, until)
+    widened = _widen_covariances(solved, problems, hand, config)
+    kept = keep_answers(candidates, widened, past, hand.stamp_ns, config.likelihood.hold_s, costs)
+    ranked = rank_candidates(kept, config.likelihood, obstacles)
+    smooth = smooth_paths(ranked, past, hand.stamp_ns, config.likelihood.smoothing_s)
+    predicted = make_continuous(smooth, past, hand.stamp_ns, config.likelihood)
+    likelihoods = {each.label: each.likelihood for each in predicted if each.has_likelihood}
+    shares = {each.candidate: each.likelihood for each in predicted if each.has_likelihood}
+    best = select_most_likely(likelihoods, past.find_renamed(memory.most_likely, shares), config.likelihood.margin)
+    counts = {'merged': len(kept) - len(ranked), 'culled': len(given) - len(obstacles)}
+    counts |= {'recalled': len(candidates) - len(found.candidates), 'kept': sum(each.age_s > 0.0 for each in predicted)}
+    counts['waiting'] = len(candidates) - len({each.label for each in candidates} & {each.label for each in kept})
     notes = dict(found.notes) | {name: count for name, count in counts.items() if count}
-    prediction = Prediction(
-        hand.stamp_ns,
-        hand.frame_id,
-        hand.height,
-        tuple(predicted),
-        best,
-        notes,
-        time.perf_counter() - began,
-        given,
-        goals,
-    )
-    return prediction, memory.after(prediction, candidates, solved)
+    hand_at = hand.stamp_ns, hand.frame_id, hand.height
+    prediction = Prediction(*hand_at, tuple(predicted), best, notes, time.perf_counter() - began, given, goals)
+    earlier, followed = memory.remember(candidates, solved, earlier, likelihoods, hand.stamp_ns)
+    present = past.follow(prediction, durations, config.likelihood.hold_s)
+    return prediction, Memory(best, candidates, earlier, followed, present, found.next_goal)
 
 
 def warm_up(config: Config) -> None:
-    """Predict once for a made-up scene, so that the first real prediction finds the cached matrices and the loaded kernels."""
+    """Predict twice in a made-up scene, so that the first real predictions find the cached matrices and the loaded kernels."""
     obstacles, goals = make_obstacles([[0.15, 0.0]], 0.02, 0.001), np.array([[0.3, 0.0]])
-    predict(config, HandState(0, np.zeros(6), np.zeros((6, 6))), obstacles, goals, Memory())
+    hand, memory = HandState(0, np.zeros(6), np.zeros((6, 6))), Memory()
+    for _ in range(2):  # the second one begins at a solution
+        _, memory = predict(config, hand, obstacles, goals, memory)
 
 
-def build_problems(
-    config: Config,
-    hand: HandState,
-    obstacles: Obstacles,
-    goals: Array,
-    candidates: Sequence[Candidate],
-    goal_times: Sequence[float],
-) -> dict[str, Problem]:
-    """Return the problem of each candidate by its label; candidates with the same goal and duration share a problem."""
-    times = choose_candidate_durations(hand, candidates, goal_times, config.duration)
-    kinds = [(candidate.goal, duration_s) for candidate, duration_s in zip(candidates, times, strict=True)]
-    built = {kind: build_problem(config, hand, obstacles, goals[kind[0]], kind[1]) for kind in dict.fromkeys(kinds)}
-    return {candidate.label: built[kind] for candidate, kind in zip(candidates, kinds, strict=True)}
+def _find_durations(hand: HandState, goals: Array, past: Past, config: Config) -> list[float]:
+    """Return the time to go [s] to each goal, which for a goal that was there before changes only gradually."""
+    durations, elapsed_s = estimate_times_to_go(hand, goals, config.duration), past.measure_time(hand.stamp_ns)
+    return [limit_change(each, past.durations_s.get(goal, each), elapsed_s) for goal, each in enumerate(durations)]
+
+
+class Problems:
+    """The problem of each candidate, built when it is first asked for; candidates with the same goal and duration share one."""
+
+    def __init__(
+        self,
+        config: Config,
+        hand: HandState,
+        obstacles: Obstacles,
+        goals: Array,
+        candidates: Sequence[Candidate],
+        goal_times: Sequence[float],
+    ) -> None:
+        self._scene = config, hand, obstacles
+        times = choose_candidate_durations(hand, candidates, goal_times, config.duration)
+        self._kinds = [(each.goal, duration_s) for each, duration_s in zip(candidates, times, strict=True)]
+        self._goals, self._rows = goals, {each.label: row for row, each in enumerate(candidates)}
+        self._built: dict[tuple[int, float], Problem] = {}
+
+    def __getitem__(self, row: int) -> Problem:
+        """Return the problem of the candidate in a row."""
+        goal, duration_s = kind = self._kinds[row]
+        if kind not in self._built:
+            self._built[kind] = build_problem(*self._scene, self._goals[goal], duration_s)
+        return self._built[kind]
+
+    def find(self, label: str) -> Problem:
+        """Return the problem of the candidate with a label."""
+        return self[self._rows[label]]
 
 
 def build_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: Array, duration_s: float) -> Problem:
@@ -116,6 +154,8 @@ def build_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: A
         goal_weight=foc.goal_weight,
         recovery_s=foc.recovery_s,
         passing=is_passing(config.duration),
+        risk=RiskBound(foc.bound, count_events(foc.risk, len(obstacles), foc.steps)),
+        preference=make_preference(hand.effort_spent, duration_s, config),
     )
 
 
@@ -138,19 +178,17 @@ def _simplify_start(hand: HandState, acceleration_time_s: float) -> HandState:
 
 
 def _widen_covariances(
-    candidates: Sequence[PredictedCandidate], problems: dict[str, Problem], hand: HandState, config: Config
+    candidates: Sequence[PredictedCandidate], problems: Problems, hand: HandState, config: Config
 ) -> list[PredictedCandidate]:
     """Add the predictive covariance, and that of the timing, to the covariance that motor noise causes."""
-    plant = make_plant_model(config.foc)
-    shared = {
-        problem: compute_predictive_covariance(hand, problem.horizon.dt, config.foc.steps, config)
-        for problem in dict.fromkeys(problems.values())
-    }
+    plant, shared = make_plant_model(config.foc), dict[float, Array]()
     widened = []
     for each in candidates:
-        covariance = each.solution.covariance + shared[problems[each.label]]
+        dt = problems.find(each.label).horizon.dt
+        if dt not in shared:
+            shared[dt] = compute_predictive_covariance(hand, dt, config.foc.steps, config)
+        covariance = each.solution.covariance + shared[dt]
         for added in timing_covariances(each.solution, hand.onset_ns is None, config.duration, plant):
             covariance += added
-        solution = each.solution.with_covariance(covariance)
-        widened.append(PredictedCandidate(each.candidate, solution, each.sides, each.cost, each.likelihood))
+        widened.append(replace(each, solution=each.solution.with_covariance(covariance)))
     return widened

@@ -79,8 +79,7 @@ def _make_guessed_candidate(guess: Array, obstacles: Obstacles) -> Candidate:
 
 def check_outside(field: str, point: Array, obstacles: Obstacles) -> None:
     """Raise SceneError, which names the field, if a point (2,) [m] lies inside the mean radius of an obstacle."""
-    for name, centre, radius in zip(obstacles.ids, obstacles.centre, obstacles.radius, strict=True):
-        distance = float(np.hypot(*(point - centre)))
-        if distance < radius:
-            found = f'{point.tolist()}, {distance:.4g} m from its centre'
-            raise SceneError(field, f'a point outside obstacle {name}, of radius {radius:g} m', found)
+    distances = np.hypot(*(obstacles.centre - point).T)
+    for row in np.flatnonzero(distances < obstacles.radius)[:1]:
+        found = f'{point.tolist()}, {distances[row]:.4g} m from its centre'
+        raise SceneError(field, f'a point outside obstacle {obstacles.ids[row]}, of radius {obstacles.radius[row]:g} m', found)

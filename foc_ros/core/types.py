@@ -5,6 +5,7 @@ message -> HandSample -> HandState -> Candidates -> Solutions -> Prediction -> m
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import Enum, StrEnum
 
@@ -158,6 +159,12 @@ def make_obstacles(
     )
 
 
+def describe_class(sides: Iterable[tuple[str, int]], goal: str = '') -> str:
+    """Return a homotopy class in words, such as `left of l1, right of l2`; goal: its name, which comes first if it is given."""
+    words = ', '.join(f'{"left" if side == LEFT else "right"} of {name}' for name, side in sides) or 'direct'
+    return f'{goal}: {words}' if goal else words
+
+
 @dataclass(frozen=True, eq=False)
 class Candidate(Record):
     """A homotopy class towards one goal that is followed, with a timed guess of a path inside it.
@@ -172,21 +179,49 @@ class Candidate(Record):
     guess: Array
     length: float
 
+    @property
+    def description(self) -> str:
+        """The homotopy class in words, such as `goal0: left of l1, right of l2`."""
+        return describe_class(self.sides, f'goal{self.goal}')
+
 
 class Status(Enum):
-    """Result of the forward optimal control of a candidate. Only a solved candidate takes part in the likelihood.
+    """Result of the forward optimal control of a candidate. Solved and compromised candidates take part in the likelihood.
 
-    SOLVED: the solution meets the wanted eta. ETA_UNREACHABLE: it meets a smaller eta only. INFEASIBLE: no path of the class
-    meets the goal and the constraints. ITERATION_LIMIT: the solver did not converge. DEADLINE: the time limit came first.
+    SOLVED: the solution meets the wanted eta. COMPROMISED: it meets a smaller eta only, which makes it less likely.
+    ETA_UNREACHABLE: the same, where less than the wanted eta is not allowed. INFEASIBLE: no path of the class meets the goal and
+    the constraints. ITERATION_LIMIT: the solver did not converge. DEADLINE: the time limit came first.
     LEFT_CLASS: the solution lies in another homotopy class.
     """
 
     SOLVED = 'solved'
+    COMPROMISED = 'compromised'
     ETA_UNREACHABLE = 'eta_unreachable'
     INFEASIBLE = 'infeasible'
     ITERATION_LIMIT = 'iteration_limit'
     DEADLINE = 'deadline'
     LEFT_CLASS = 'left_class'
+
+    @property
+    def has_likelihood(self) -> bool:
+        """Whether a candidate that ended so takes part in the likelihood."""
+        return self in (Status.SOLVED, Status.COMPROMISED)
+
+    @property
+    def remedy(self) -> str:
+        """What helps against this result, in words; empty for a solved candidate."""
+        return _REMEDIES[self.value]
+
+
+_REMEDIES = {
+    'solved': '',
+    'compromised': 'allow more time or a smaller eta',
+    'eta_unreachable': 'allow more time, a smaller eta, or a finite likelihood.shortfall',
+    'infeasible': 'none for this class, whose gap is closed; check the radii of its obstacles if people pass here',
+    'iteration_limit': 'choose another foc.strategy',
+    'deadline': 'allow a longer budget_s or fewer homotopy.max_candidates',
+    'left_class': 'choose another foc.strategy',
+}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -201,14 +236,17 @@ class Solution(Record):
     J_aug by name [m^2/s^6]; tau [m^2] and lam (lambda [1/s^6]): the parameters of the final QP; both are 0 for `optimal`, which
     has a pair for each constraint.
 
-    eta: achieved, the smallest over obstacles and steps, and with `lv` and `hc` also between the steps; eta_at: (obstacle id,
-    step) where, with fractions of a step. eta_reachable: the largest eta that was found if the wanted one is unreachable.
+    eta: achieved, the smallest over obstacles and steps, and with `lv`, `hc` and `optimal` also between the steps; eta_at:
+    (obstacle id, step) where, with fractions of a step. eta_reachable: the largest eta found if the wanted one is unreachable.
+    safety_factor: k that belongs to eta; safety_shortfall: by how much it is below the wanted one, 0 where solved.
+    motor_covariance (N + 1, n, n): what motor noise alone causes, which eta is about; None where `covariance` is that.
     violation: by how much the mean comes nearer to a centre than sqrt(E[R^2] + tau) [m], 0 where it does not; violation_at:
     (obstacle id, step) where.
 
-    multipliers: (obstacle id, step, value) of the active constraints, with `lv` and `hc` at fractions of a step; the value is the
-    growth of J_aug for each metre more of required distance [m/s^6]; held: the equivalent weights tau [m^2] and lambda [1/s^6] of
-    each active constraint. slope: derivative dk/ds of the safety factor along the penalty path of `lv` and `hc`, 0 where unknown.
+    multipliers: (obstacle id, step, value) of the active constraints, with `lv`, `hc` and `optimal` at fractions of a step; the
+    value is the growth of J_aug for each metre more of required distance [m/s^6]; equivalent_weights: tau [m^2] and lambda
+    [1/s^6] of each active constraint. safety_factor_slope: derivative dk/ds along the penalty path of `lv` and `hc`, 0 where
+    unknown.
     qp_solves: number of QPs solved; iterations: of `algorithm1`, None for the others; solve_s: wall time [s].
     """
 
@@ -225,6 +263,8 @@ class Solution(Record):
     eta: float
     eta_at: tuple[str, float] | None = None
     eta_reachable: float | None = None
+    safety_factor: float = 0.0
+    safety_shortfall: float = 0.0
     violation: float = 0.0
     violation_at: tuple[str, float] | None = None
     multipliers: tuple[tuple[str, float, float], ...] = ()
@@ -233,15 +273,17 @@ class Solution(Record):
     qp_solves: int = 0
     iterations: int | None = None
     solve_s: float = 0.0
+    motor_covariance: Array | None = None
 
     def __repr__(self) -> str:
         """Say the status, the effort and the eta achieved."""
         return f'<Solution {self.status.value}, effort {self.effort:.4g}, eta {self.eta:.4g}>'
 
     def with_covariance(self, covariance: Array) -> Solution:
-        """Return the solution with another covariance (N + 1, n, n), a new array; ten times as fast as `dataclasses.replace`."""
+        """Return the solution with another total covariance (N + 1, n, n), a new array; faster than `dataclasses.replace`."""
         other = object.__new__(type(self))
-        vars(other).update(vars(self), covariance=as_readonly(covariance))
+        motor = self.covariance if self.motor_covariance is None else self.motor_covariance
+        vars(other).update(vars(self), covariance=as_readonly(covariance), motor_covariance=motor)
         return other
 
     @property
@@ -261,7 +303,8 @@ class PredictedCandidate:
 
     candidate: the homotopy class; solution: its forward optimal control; sides: side on which the mean path passes each obstacle,
     by id. cost: effort to go, time cost, and the share of the effort since onset that all classes have in common [m^2/s^5];
-    likelihood in [0, 1]: 0 unless solved.
+    likelihood in [0, 1]: 0 unless solved or compromised. age_s: 0, or how long ago the solution was found, of which this is the
+    rest, if there was no time for a new one or it failed [s].
     """
 
     candidate: Candidate
@@ -269,6 +312,7 @@ class PredictedCandidate:
     sides: dict[str, int]
     cost: float
     likelihood: float
+    age_s: float = 0.0
 
     def __repr__(self) -> str:
         """Say label, status and likelihood."""
@@ -276,8 +320,13 @@ class PredictedCandidate:
 
     @property
     def is_solved(self) -> bool:
-        """Whether this candidate takes part in the likelihood."""
+        """Whether the solution meets the wanted eta."""
         return self.solution.status is Status.SOLVED
+
+    @property
+    def has_likelihood(self) -> bool:
+        """Whether this candidate takes part in the likelihood: it is solved or compromised."""
+        return self.status.has_likelihood
 
     @property
     def label(self) -> str:
@@ -285,9 +334,20 @@ class PredictedCandidate:
         return self.candidate.label
 
     @property
+    def description(self) -> str:
+        """The homotopy class in words, such as `goal0: left of l1, right of l2`."""
+        return self.candidate.description
+
+    @property
     def status(self) -> Status:
         """Result of the forward optimal control."""
         return self.solution.status
+
+    @property
+    def reason(self) -> str:
+        """Status, message, and what helps, in words; only the status if the candidate is solved."""
+        parts = (self.status.value.replace('_', ' '), self.solution.message, self.status.remedy)
+        return parts[0] if self.is_solved else ': '.join(parts[:2]) + f'; remedy: {parts[2]}'
 
     @property
     def mean(self) -> Array:
@@ -296,8 +356,14 @@ class PredictedCandidate:
 
     @property
     def covariance(self) -> Array:
-        """Covariance of the state at steps 0..N, (N + 1, n, n)."""
+        """Covariance of the state at steps 0..N, (N + 1, n, n): the total uncertainty."""
         return self.solution.covariance
+
+    @property
+    def motor_covariance(self) -> Array:
+        """The part of the covariance that motor noise causes, (N + 1, n, n): eta is about this one."""
+        motor = self.solution.motor_covariance
+        return self.solution.covariance if motor is None else motor
 
     @property
     def times(self) -> Array:
@@ -319,10 +385,10 @@ class PredictedCandidate:
 class Prediction(Record):
     """The prediction that belongs to one hand sample.
 
-    candidates: solved ones first, most likely first; then those that could not be solved, with their status.
-    most_likely: label after hysteresis, None where nothing was solved. notes: facts for diagnostics (relaxed margins, merged
-    classes, culled obstacles), as counts by name. solve_s: wall time of the whole prediction [s]. obstacles: all that were given,
-    at the stamp of the hand; goals (g, 2) [m].
+    candidates: solved and compromised ones, most likely first; then those without a likelihood, with their status.
+    most_likely: label after hysteresis, None where no candidate has a likelihood. notes: facts for diagnostics (relaxed margins,
+    merged classes, culled obstacles), as counts by name. solve_s: wall time of the whole prediction [s]. obstacles: all that were
+    given, at the stamp of the hand; goals (g, 2) [m].
     """
 
     stamp_ns: int
@@ -351,3 +417,8 @@ class Prediction(Record):
     def solved_candidates(self) -> tuple[PredictedCandidate, ...]:
         """The candidates that meet the wanted eta, most likely first."""
         return tuple(each for each in self.candidates if each.is_solved)
+
+    @property
+    def candidates_with_likelihood(self) -> tuple[PredictedCandidate, ...]:
+        """The candidates that take part in the likelihood, most likely first: solved and compromised ones."""
+        return tuple(each for each in self.candidates if each.has_likelihood)

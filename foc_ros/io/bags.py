@@ -1,7 +1,7 @@
 """ROS 2 bags, read and written without ROS.
 
-The messages read are counted against the number that the bag states, so that none is lost unnoticed, and every fault of the file
-is raised as one :class:`RecordingError` with its name and the reason.
+The messages read are counted against the number that the bag states, and its bytes are compared with its checksums, so that none
+is lost or changed unnoticed. Every fault of the file is raised as one :class:`RecordingError` with its name and the reason.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from rosbags.typesys import Stores, get_typestore
 from foc_ros.core.errors import RecordingError
 
 from . import topics
+from .checksums import add_checksums, check_checksums
 
 TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 """Message definitions for written bags, and for bags without definitions (sqlite3 before ROS 2 Iron)."""
@@ -54,6 +55,9 @@ class BagReader:
     def __enter__(self) -> BagReader:
         with _named_errors(self.path):
             _refuse_unreadable(self.path)
+            for file in [self.path] if self.path.is_file() else self.path.glob('*.mcap'):
+                if file.suffix == '.mcap':
+                    check_checksums(file)
             self._reader = AnyReader([self.path], default_typestore=TYPESTORE)
             self._reader.open()
             try:
@@ -101,7 +105,7 @@ class BagReader:
 
 
 class BagWriter:
-    """A new bag, within a context manager: a directory with metadata.yaml and one .mcap file, rosbag2 version 9.
+    """A new bag, within a context manager: a directory with metadata.yaml and one .mcap file with checksums, rosbag2 version 9.
 
     An existing path is refused, and an unfinished bag is removed. Raises RecordingError.
     """
@@ -123,6 +127,8 @@ class BagWriter:
         try:
             with self._named_errors():
                 self._writer.__exit__(kind, error, trace)
+                if kind is None:
+                    add_checksums(self.path / f'{self.path.name}.mcap')
                 is_finished = kind is None
         finally:
             if not is_finished:

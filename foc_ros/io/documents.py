@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Hashable, Iterable
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,25 @@ from foc_ros.core.errors import RecordingError
 
 MAX_BYTES = 5_000_000
 """Size beyond that of any scene or parameter file; the YAML parser takes half a minute for it."""
+MAX_DEPTH = 20
+"""Mappings and lists within each other; the deepest file, a parameter file with quality of service, needs six."""
+MAX_DIGITS = 400
+"""Digits of a whole number. One with more remains a text, because Python refuses to convert it; no field accepts either."""
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """Safe YAML; PyYAML itself uses the last value of a key that is given twice."""
+    """Safe YAML without tags, and without aliases, which can stand for any amount of data.
+
+    PyYAML itself uses the last value of a key that is given twice, and fails in many ways where a value does not fit its tag.
+    """
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """Return the next node; see :class:`yaml.SafeLoader`."""
+        event = self.peek_event()  # type: ignore[no-untyped-call]
+        if isinstance(event, yaml.AliasEvent) or getattr(event, 'tag', None) is not None:
+            words = 'tags (!name) and aliases (*name) are not supported'
+            raise yaml.composer.ComposerError(None, None, words, event.start_mark)
+        return super().compose_node(parent, index)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         """Return the mapping; see :class:`yaml.SafeLoader`."""
@@ -25,6 +41,13 @@ class _StrictLoader(yaml.SafeLoader):
         except ValueError as error:
             raise yaml.constructor.ConstructorError(None, None, str(error), node.start_mark) from error
         return super().construct_mapping(node, deep)
+
+    def construct_yaml_int(self, node: yaml.ScalarNode) -> Any:
+        """Return the number; see :data:`MAX_DIGITS`."""
+        return super().construct_yaml_int(node) if len(node.value) <= MAX_DIGITS else node.value
+
+
+_StrictLoader.add_constructor('tag:yaml.org,2002:int', _StrictLoader.construct_yaml_int)
 
 
 def read_document(file: Path) -> Any:
@@ -36,11 +59,29 @@ def read_document(file: Path) -> Any:
         if len(held) > MAX_BYTES:
             raise RecordingError(f'{file}: expected at most {MAX_BYTES:,} bytes, got more')
         text = held.decode('utf-8')
-        return json.loads(text, object_pairs_hook=_build_mapping) if is_json else yaml.load(text, _StrictLoader)  # noqa: S506
+        document = _parse_json(text) if is_json else yaml.load(text, _StrictLoader)  # noqa: S506
+        _check_depth(document)
+        return document
     except OSError as error:
         raise RecordingError(f'{file}: cannot be read: {error.strerror}') from error
-    except (ValueError, RecursionError, yaml.YAMLError) as error:
+    except RecursionError as error:
+        raise RecordingError(f'{file}: expected at most {MAX_DEPTH} mappings and lists within each other, got more') from error
+    except (ValueError, yaml.YAMLError) as error:
         raise RecordingError(f'{file}: not a {"JSON" if is_json else "YAML"} file: {error}') from error
+
+
+def _parse_json(text: str) -> Any:
+    return json.loads(text, object_pairs_hook=_build_mapping, parse_int=_parse_integer, parse_float=_parse_float)
+
+
+def _parse_integer(text: str) -> int | str:
+    return int(text) if len(text) <= MAX_DIGITS else text
+
+
+def _parse_float(text: str) -> float | str:
+    """Return the number; one beyond all floats, such as 1e400, remains a text, so that a message shows what was given."""
+    value = float(text)
+    return value if math.isfinite(value) else text
 
 
 def _build_mapping(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -54,3 +95,11 @@ def _check_keys(names: Iterable[str]) -> None:
         if name in seen:
             raise ValueError(f'the key {name} is given twice')
         seen.add(name)
+
+
+def _check_depth(value: object, left: int = MAX_DEPTH) -> None:
+    if isinstance(value, (dict, list)):
+        if not left:
+            raise RecursionError
+        for each in value.values() if isinstance(value, dict) else value:
+            _check_depth(each, left - 1)

@@ -29,7 +29,8 @@ def encode_candidate(candidate: PredictedCandidate) -> dict[str, Any]:
     solution = candidate.solution
     variances = np.diagonal(solution.covariance[:, :2, :2], axis1=1, axis2=2)
     return {
-        'label': candidate.candidate.label,
+        'label': candidate.label,
+        'description': candidate.description,
         'goal': candidate.candidate.goal,
         'sides': {name: 'left' if side == LEFT else 'right' for name, side in candidate.sides.items()},
         'status': solution.status.value,

@@ -1,12 +1,14 @@
 """A scene file (YAML or JSON) as one reaching problem, checked field by field.
 
 Fields: start, goal or goals [m]; start_velocity [m/s], start_acceleration [m/s^2], start_stddev [m] (default 0); duration_s;
-steps; noise [c_x, c_y] per step; eta; strategy, with tau and lambda if it is `fixed`; plant, plant_mass, plant_damping;
-obstacles: x, y, radius, radius_stddev, id; guess; max_candidates. A missing field has the default of its parameter.
+steps; noise [c_x, c_y] per step; eta, bound, risk, shortfall; strategy, with tau and lambda if it is `fixed`; plant, plant_mass,
+plant_damping; obstacles: x, y, radius, radius_stddev, id; guess; max_candidates.
+A missing field has the default of its parameter.
 """
 
 from __future__ import annotations
 
+import math
 import re
 import reprlib
 from collections.abc import Mapping
@@ -24,11 +26,17 @@ from .documents import read_document
 
 FARTHEST = 1e4
 """Bound of every length, velocity and acceleration of a scene, in SI units."""
+MOST_OBSTACLES, MOST_GOALS, MOST_POINTS = 20_000, 256, 10_000
+"""Bounds on the rows of a scene, those of the node's messages, and on the points of a guess."""
+_ID = re.compile(r'-?\d{1,40}|[A-Za-z_][\w.]{0,39}')
 
 PARAMETERS = {
     'duration_s': 'duration.fixed_s',
     'steps': 'foc.steps',
     'eta': 'foc.eta',
+    'bound': 'foc.bound',
+    'risk': 'foc.risk',
+    'shortfall': 'likelihood.shortfall',
     'strategy': 'foc.strategy',
     'tau': 'foc.tau',
     'lambda': 'foc.lam',
@@ -42,7 +50,7 @@ PARAMETERS = {
 STATE_FIELDS = ('start', 'start_velocity', 'start_acceleration', 'start_stddev')
 FIELDS = (*STATE_FIELDS, 'goal', 'goals', 'noise', 'obstacles', 'guess', *PARAMETERS)
 OBSTACLE_FIELDS = ('x', 'y', 'radius', 'radius_stddev', 'id')
-_NUMERAL = re.compile(r'[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+')
+_NUMERAL = re.compile(r'[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+')
 
 
 def load_scene(file: Path | str) -> ReachingScene:
@@ -120,22 +128,24 @@ def _read_goals(scene: Mapping[str, Any]) -> Array:
         raise SceneError('goal', 'either goal or goals', 'both' if 'goal' in scene else 'neither')
     if 'goal' in scene:
         return np.array([_read_point('goal', scene['goal'])])
-    if not _read_list('goals', scene['goals']):
+    goals = _read_rows('goals', scene['goals'], MOST_GOALS)
+    if not goals:
         raise SceneError('goals', 'at least one point', '[]')
-    return np.array([_read_point(f'goals[{row}]', goal) for row, goal in enumerate(scene['goals'])])
+    return np.array([_read_point(f'goals[{row}]', goal) for row, goal in enumerate(goals)])
 
 
 def _read_obstacles(given: object) -> Obstacles:
     rows: dict[str, list[float]] = {}
-    for place, each in enumerate(_read_list('obstacles', given)):
+    for place, each in enumerate(_read_rows('obstacles', given, MOST_OBSTACLES)):
         field = f'obstacles[{place}]'
         obstacle = _read_mapping(field, each, OBSTACLE_FIELDS)
         for name in ('x', 'y', 'radius'):
             if name not in obstacle:
                 raise SceneError(f'{field}.{name}', 'a number', 'nothing')
         identity = obstacle.get('id', place)
-        if isinstance(identity, bool) or not re.fullmatch(r'-?\d+|[A-Za-z_][\w.]*', str(identity)):
-            raise SceneError(f'{field}.id', 'a whole number or a name of letters, digits, _ and .', reprlib.repr(identity))
+        if type(identity) not in (int, str) or not _ID.fullmatch(str(identity)):
+            expected = 'a whole number, or a name of letters, digits, _ and ., of at most 40 characters'
+            raise SceneError(f'{field}.id', expected, reprlib.repr(identity))
         if str(identity) in rows:
             raise SceneError(f'{field}.id', 'another id than the obstacles before it', reprlib.repr(identity))
         lowest = {'x': -FARTHEST, 'y': -FARTHEST, 'radius': 0.0, 'radius_stddev': 0.0}
@@ -148,7 +158,8 @@ def _read_guess(given: object, start: Array, goals: Array, steps: int) -> Array:
     if len(goals) > 1:
         raise SceneError('guess', 'one goal, which it leads to', f'{len(goals)} goals')
     if isinstance(given, list):
-        points = np.array([_read_point(f'guess[{row}]', point) for row, point in enumerate(given)]).reshape(-1, 2)
+        rows = _read_rows('guess', given, MOST_POINTS)
+        points = np.array([_read_point(f'guess[{row}]', point) for row, point in enumerate(rows)]).reshape(-1, 2)
         return guess_path(start, goals[0], steps, via=points)
     mapping = _read_mapping('guess', given, ('amplitude', 'kind'))
     if 'amplitude' not in mapping:
@@ -165,9 +176,17 @@ def _read_mapping(field: str, value: object, known: tuple[str, ...]) -> Mapping[
     return value
 
 
-def _read_list(field: str, value: object, length: int | None = None) -> list[Any]:
-    if not isinstance(value, list) or length not in (None, len(value)):
-        raise SceneError(field, 'a list' if length is None else f'a list of {length} numbers', reprlib.repr(value))
+def _read_list(field: str, value: object, length: int) -> list[Any]:
+    if not isinstance(value, list) or len(value) != length:
+        raise SceneError(field, f'a list of {length} numbers', reprlib.repr(value))
+    return value
+
+
+def _read_rows(field: str, value: object, most: int) -> list[Any]:
+    if not isinstance(value, list):
+        raise SceneError(field, 'a list', reprlib.repr(value))
+    if len(value) > most:
+        raise SceneError(field, f'a list of at most {most}', f'one of {len(value)}')
     return value
 
 
@@ -183,5 +202,6 @@ def _read_number(field: str, value: object, low: float = -FARTHEST) -> float:
 
 
 def _convert_numeral(value: object) -> object:
-    """Convert a text such as '1e6' to a number: YAML 1.1 does not take it for one."""
-    return float(value) if isinstance(value, str) and _NUMERAL.fullmatch(value) else value
+    """Convert a text such as '1e6' to a number: YAML 1.1 does not take it for one; 1e400 is none."""
+    is_numeral = isinstance(value, str) and _NUMERAL.fullmatch(value) is not None
+    return float(value) if is_numeral and math.isfinite(float(value)) else value  # type: ignore[arg-type]

@@ -7,13 +7,20 @@ from typing import TypeVar
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import Progress
 from rich.table import Table
 
 T = TypeVar('T')
 MAX_COLUMNS = 400
 """Width up to which no table is cut off [characters]; a table takes no more than it needs."""
+
+
+class _Console(Console):
+    """A console that leaves a closed pipe to the program; rich itself exits with code 1."""
+
+    def on_broken_pipe(self) -> None:
+        """Raise the error that is being handled."""
+        raise  # noqa: PLE0704
 
 
 def show_progress(items: Iterable[T], words: str, total: int) -> Iterator[T]:
@@ -27,10 +34,10 @@ def show_progress(items: Iterable[T], words: str, total: int) -> Iterator[T]:
 
 
 def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:
-    """Print a table on standard output, as wide as it needs to be."""
-    table = Table(title=None if title is None else escape(title), title_justify='left', box=SIMPLE_HEAD, pad_edge=False)
+    """Print a table on standard output, as wide as it needs to be; its texts are shown as they are, without rich's markup."""
+    table = Table(title=title, title_justify='left', box=SIMPLE_HEAD, pad_edge=False)
     for column in columns:
         table.add_column(column, no_wrap=True)
     for row in rows:
         table.add_row(*row)
-    Console(width=MAX_COLUMNS).print(table)
+    _Console(width=MAX_COLUMNS, markup=False, emoji=False).print(table)

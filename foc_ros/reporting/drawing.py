@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from string import ascii_uppercase
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -16,13 +17,13 @@ import numpy as np
 from foc_ros.core.errors import FocError
 from foc_ros.core.types import NANOSECONDS, Array, Obstacles
 
-from .snapshots import CandidateView, HandTrajectory, Snapshot
+from .snapshots import CandidateView, HandTrajectory, Snapshot, UnsolvedView
 
 try:
     import matplotlib as mpl
     from matplotlib.colors import to_rgba
     from matplotlib.figure import Figure
-    from matplotlib.patches import Circle, Ellipse
+    from matplotlib.patches import Circle, Ellipse, Patch
     from matplotlib.rcsetup import cycler
 except ImportError as error:
     raise FocError("pictures need matplotlib: install python3-matplotlib, or pip install 'foc_ros[report]'") from error
@@ -30,14 +31,37 @@ except ImportError as error:
 CLASS_COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')
 """Colours of Okabe and Ito, without yellow (invisible on white) and black (used for the measured hand)."""
 NO_CLASS_COLOUR = '#777777'
-"""Colour of a candidate without a slot."""
+"""Colour of a candidate without a slot or without a likelihood."""
+HATCH = '////'
+"""Pattern of the share of the candidates of which no likelihood is known."""
 CLASSES = 2 * len(CLASS_COLOURS)
 """Number of slots: pairs of a colour and a dash, each with its letter."""
 STDDEVS = 1.0
 """Size of ellipses and rings in standard deviations."""
 ELLIPSES_PER_CANDIDATE = 8
+LEGEND_COLUMNS = 56
+"""Width of a line of the legend [characters]."""
+LONGEST_WORDS = 60
+"""Number of characters in the words of a class beyond which the legend has its label only."""
 NAMED_OBSTACLES = 30
 """The obstacles of larger scenes are drawn without their ids."""
+
+ELLIPSE_HANDLES = [
+    Patch(
+        facecolor='0.85',
+        edgecolor='0.4',
+        linewidth=0.6,
+        label='ellipse: motor noise, which eta is about\n(one standard deviation)',
+    ),
+    Patch(
+        fill=False,
+        edgecolor='0.4',
+        linewidth=0.6,
+        linestyle='--',
+        label='dashed ellipse: total uncertainty\n(one standard deviation)',
+    ),
+]
+"""The two ellipses in the legend."""
 
 STYLE = {
     'font.size': 10,
@@ -71,10 +95,10 @@ def get_letter(slot: int | None) -> str:
     return ' ' if slot is None else ascii_uppercase[slot]
 
 
-def get_candidate_style(slot: int | None, likelihood: float) -> dict[str, Any]:
-    """Return the line style of a candidate: colour and dash of its slot, the thicker the more likely."""
+def get_candidate_style(slot: int | None, likelihood: float, is_compromised: bool = False) -> dict[str, Any]:
+    """Return the line style of a candidate: colour and dash of its slot, dotted if compromised, the thicker the more likely."""
     colour, dash = (NO_CLASS_COLOUR, '-') if slot is None else get_class_style(slot)
-    return {'color': colour, 'linestyle': dash, 'linewidth': 1.2 + 3.0 * likelihood}
+    return {'color': colour, 'linestyle': ':' if is_compromised else dash, 'linewidth': 1.2 + 3.0 * likelihood}
 
 
 def compute_ellipse_axes(covariance: Array) -> tuple[Array, Array, Array]:
@@ -110,24 +134,50 @@ def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, na
     axes.set_aspect('equal')
 
 
-def draw_candidates(axes: Any, candidates: Sequence[CandidateView], slots: Mapping[str, int]) -> None:
+def draw_candidates(
+    axes: Any, candidates: Sequence[CandidateView], slots: Mapping[str, int], unsolved: Sequence[UnsolvedView] = ()
+) -> None:
     """Draw candidates, the most likely on top, with ellipses of the position's standard deviation, and a legend below the axes.
 
-    slots: by label; a candidate without a slot has no letter.
+    slots: by label; a candidate without a slot has no letter. unsolved: those without a likelihood, which are grey.
     """
+    for lost in unsolved:
+        axes.plot(*lost.path.T, color=NO_CLASS_COLOUR, linewidth=1.0, alpha=0.6, zorder=2, label=describe_in_legend(lost))
     for rank, each in reversed(list(enumerate(candidates))):
-        style, letter = get_candidate_style(slots.get(each.label), each.likelihood), get_letter(slots.get(each.label))
-        for row in np.unique(np.linspace(0, len(each.path) - 1, ELLIPSES_PER_CANDIDATE).astype(int)):
-            ellipse = make_stddev_ellipse(each.path[row], each.covariance[row])
-            ellipse.set(facecolor=to_rgba(style['color'], 0.1), edgecolor=to_rgba(style['color'], 0.5), linewidth=0.6, zorder=2)
-            axes.add_patch(ellipse)
-        axes.plot(*each.path.T, zorder=3, label=f'{letter}  {100 * each.likelihood:3.0f} %  {each.label}', **style)
+        letter = get_letter(slots.get(each.label))
+        style = get_candidate_style(slots.get(each.label), each.likelihood, each.is_compromised)
+        _draw_ellipses(axes, each, style['color'])
+        axes.plot(*each.curve.T, zorder=3, label=describe_in_legend(each, letter), **style)
         row = int((0.45 + 0.12 * (rank % 3)) * (len(each.path) - 1))
         draw_tag(axes, each.path[row], letter, style['color'])
-    lines, labels = axes.get_legend_handles_labels()
     look = {'loc': 'upper left', 'frameon': False, 'borderaxespad': 4.5, 'prop': {'family': 'monospace', 'size': 8}}
     title = None if candidates else 'no candidate could be solved'
-    axes.legend(lines[::-1], labels[::-1], title=title, bbox_to_anchor=(0.0, 0.0), **look)
+    handles = [each for each in axes.lines if not each.get_label().startswith('_')][::-1]
+    kinds = len(candidates) and 1 + any(each.is_widened for each in candidates)
+    axes.legend(handles=handles + ELLIPSE_HANDLES[:kinds], title=title, bbox_to_anchor=(0.0, 0.0), **look)
+
+
+def _draw_ellipses(axes: Any, candidate: CandidateView, colour: str) -> None:
+    """Draw the ellipses along one path: filled for motor noise, dashed for the total uncertainty."""
+    filled = {'facecolor': to_rgba(colour, 0.15), 'edgecolor': to_rgba(colour, 0.6)}
+    dashed = {'fill': False, 'edgecolor': to_rgba(colour, 0.5), 'linestyle': '--'}
+    for row in np.unique(np.linspace(0, len(candidate.path) - 1, ELLIPSES_PER_CANDIDATE).astype(int)):
+        for covariance, look in ((candidate.motor_covariance, filled), (candidate.covariance, dashed))[
+            : 1 + candidate.is_widened
+        ]:
+            ellipse = make_stddev_ellipse(candidate.path[row], covariance[row])
+            ellipse.set(linewidth=0.6, zorder=2, **look)
+            axes.add_patch(ellipse)
+
+
+def describe_in_legend(view: CandidateView | UnsolvedView, letter: str = ' ') -> str:
+    """Return the lines of the legend that describe a candidate."""
+    # the words of a class with many obstacles would leave no room for the plot
+    name = f'{view.label}  {view.description}' if len(view.description) <= LONGEST_WORDS else view.label
+    if isinstance(view, UnsolvedView):
+        return fill(f'{letter}    - %  {name}; {view.reason}', LEGEND_COLUMNS, subsequent_indent='          ')
+    words = f'; compromised: eta {view.eta:.3f}' if view.is_compromised else ''
+    return fill(f'{letter}  {100 * view.likelihood:3.0f} %  {name}{words}', LEGEND_COLUMNS, subsequent_indent='          ')
 
 
 def draw_hand(axes: Any, hand: HandTrajectory, now_ns: int, span: tuple[int, int]) -> None:
@@ -153,7 +203,9 @@ def draw_speeds(
     """Draw predicted speeds and the measured speed within a span [ns], which is dotted after the stamp of the snapshot."""
     now_s = (snapshot.stamp_ns - origin_ns) / NANOSECONDS
     for each in reversed(snapshot.candidates):
-        axes.plot(now_s + each.times, each.speed, **get_candidate_style(slots.get(each.label), each.likelihood))
+        axes.plot(
+            now_s + each.times, each.speed, **get_candidate_style(slots.get(each.label), each.likelihood, each.is_compromised)
+        )
     times = hand.seconds_after(origin_ns)
     for rows, dash, width in ((hand.between(*span), ':', 1.6), (hand.between(span[0], snapshot.stamp_ns), '-', 2.0)):
         axes.plot(times[rows], hand.speed[rows], color='black', linewidth=width, linestyle=dash)

@@ -10,12 +10,16 @@ import numpy as np
 
 from foc_ros.core.errors import InputError
 from foc_ros.core.types import NANOSECONDS, Array, Obstacles, PredictedCandidate, Prediction
+from foc_ros.io.outputs import MARK
 
 from .drawing import (
     CLASSES,
+    ELLIPSE_HANDLES,
+    HATCH,
     STDDEVS,
     STYLE,
     Bounds,
+    describe_in_legend,
     draw_candidates,
     draw_hand,
     draw_movement,
@@ -26,20 +30,30 @@ from .drawing import (
     get_letter,
     open_figure,
 )
-from .snapshots import CandidateView, HandTrajectory, build_candidate_views
+from .snapshots import CandidateView, HandTrajectory, UnsolvedView, build_candidate_views, build_unsolved_views
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .track_association import CandidateTracks
 
+METADATA: dict[str, dict[str, str | None]] = {
+    '.png': {'Software': MARK},
+    '.pdf': {'Creator': MARK, 'CreationDate': None},
+    '.svg': {'Creator': MARK, 'Date': None},
+}
+"""What a picture says of itself, by its format; without its date it is the same file each time."""
 WIDTH_IN = 6.4
+NOWHERE: Array = np.zeros((0, 2))
 LINE_IN = 0.2
 """Height of a line of the legend [in]."""
 
 
 def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None:
-    """Draw the likelihoods of the tracks that have a slot over time [s]; a track has a gap where it has no candidate."""
+    """Draw the likelihoods of the tracks that have a slot over time [s].
+
+    A track has a gap where it has no candidate. The share of the candidates of which no likelihood is known is hatched.
+    """
     times = (np.array([each.stamp_ns for each in tracks.snapshots]) - origin_ns) / NANOSECONDS
     drawn = {track: values for track, values in tracks.likelihoods().items() if track in tracks.slots}
     for rank, (track, (first, values)) in enumerate(drawn.items()):
@@ -50,6 +64,11 @@ def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None
         known = np.flatnonzero(np.isfinite(values))
         row = known[(2 * rank + 1) * len(known) // (2 * len(drawn))]
         draw_tag(axes, (times[first + row], values[row]), get_letter(tracks.slots[track]), colour)
+    unknown = np.array([each.unknown_share for each in tracks.snapshots])
+    if unknown.any():
+        look = {'facecolor': 'none', 'edgecolor': '0.6', 'hatch': HATCH, 'linewidth': 0.0, 'step': 'mid'}
+        axes.fill_between(times, 1.0 - unknown, 1.0, label='share of candidates without a likelihood', **look)
+        axes.legend(loc='lower left', fontsize=7)
     axes.set(ylim=(-0.03, 1.03), ylabel='likelihood')
     axes.tick_params(labelbottom=False)
 
@@ -60,7 +79,8 @@ def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
     Parameters
     ----------
     prediction : Prediction
-        Its solved candidates are drawn, the thicker the more likely, with ellipses of one standard deviation of the position.
+        Its candidates are drawn, the thicker the more likely, with ellipses of one standard deviation of the position: filled for
+        motor noise, dashed for the total uncertainty. Those without a likelihood are grey, and the legend gives the reason.
     axes : matplotlib.axes.Axes, optional
         Where to draw; axes of a new pyplot figure by default.
 
@@ -71,32 +91,60 @@ def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
     """
     import matplotlib.pyplot as plt
 
-    candidates = build_candidate_views(prediction.solved_candidates)
-    bounds = compute_bounds(prediction.obstacles, prediction.goals, candidates)
+    goals = len(prediction.goals)
+    views = build_candidate_views(prediction.candidates, goals), build_unsolved_views(prediction.candidates, goals)
+    starts = np.array([each.candidate.guess[0] for each in prediction.candidates[:1]]).reshape(-1, 2)
+    bounds = _compute_scene_bounds(prediction.obstacles, prediction.goals, *views, starts)
     with plt.rc_context(STYLE):
         if axes is None:
-            axes = plt.figure(figsize=(WIDTH_IN, _get_height(bounds, candidates)), layout='constrained').subplots()
-        draw_scene(axes, prediction.obstacles, prediction.goals, bounds)
-        draw_candidates(axes, candidates, number_labels(candidates))
+            axes = plt.figure(figsize=(WIDTH_IN, _get_height(bounds, *views)), layout='constrained').subplots()
+        _draw_views(axes, prediction.obstacles, prediction.goals, *views, starts, bounds)
     return axes
 
 
-def plot_outcomes(file: Path | str, obstacles: Obstacles, goals: Array, outcomes: Sequence[PredictedCandidate]) -> None:
-    """Write a picture of solved candidates in their scene, in the format of the file's suffix.
+def plot_outcomes(
+    file: Path | str, obstacles: Obstacles, goals: Array, outcomes: Sequence[PredictedCandidate], start: Array
+) -> None:
+    """Write a picture of candidates in their scene, in the format of the file's suffix.
 
-    goals (g, 2) [m]. Raises InputError if the suffix is not that of a picture format or the file cannot be written.
+    goals (g, 2), start (2,) [m]. Raises InputError if the suffix is not that of a picture format or the file cannot be written.
     """
-    save_figure(make_scene_figure(obstacles, goals, build_candidate_views(outcomes)), file)
+    views = build_candidate_views(outcomes, len(goals)), build_unsolved_views(outcomes, len(goals))
+    save_figure(make_scene_figure(obstacles, goals, *views, start[None]), file)
 
 
-def make_scene_figure(obstacles: Obstacles, goals: Array, candidates: Sequence[CandidateView]) -> Figure:
-    """Return a figure of one scene with the candidates in it and a legend."""
-    bounds = compute_bounds(obstacles, goals, candidates)
-    with open_figure(WIDTH_IN, _get_height(bounds, candidates)) as figure:
-        axes = figure.subplots()
-        draw_scene(axes, obstacles, goals, bounds)
-        draw_candidates(axes, candidates, number_labels(candidates))
+def make_scene_figure(
+    obstacles: Obstacles,
+    goals: Array,
+    candidates: Sequence[CandidateView],
+    unsolved: Sequence[UnsolvedView] = (),
+    starts: Array = NOWHERE,
+) -> Figure:
+    """Return a figure of one scene with the candidates in it and a legend; starts (s, 2) [m]: positions of the hand."""
+    bounds = _compute_scene_bounds(obstacles, goals, candidates, unsolved, starts)
+    with open_figure(WIDTH_IN, _get_height(bounds, candidates, unsolved)) as figure:
+        _draw_views(figure.subplots(), obstacles, goals, candidates, unsolved, starts, bounds)
     return figure
+
+
+def _draw_views(
+    axes: Any,
+    obstacles: Obstacles,
+    goals: Array,
+    candidates: Sequence[CandidateView],
+    unsolved: Sequence[UnsolvedView],
+    starts: Array,
+    bounds: Bounds,
+) -> None:
+    draw_scene(axes, obstacles, goals, bounds)
+    draw_candidates(axes, candidates, number_labels(candidates), unsolved)
+    axes.plot(*starts.T, marker='o', markersize=6, linestyle='', color='black', zorder=6)
+
+
+def _compute_scene_bounds(
+    obstacles: Obstacles, goals: Array, candidates: Sequence[CandidateView], unsolved: Sequence[UnsolvedView], starts: Array
+) -> Bounds:
+    return compute_bounds(obstacles, goals, candidates, *(each.path for each in unsolved), starts)
 
 
 def make_recording_figure(
@@ -122,11 +170,11 @@ def make_snapshot_figure(
     snapshot, slots = tracks.snapshots[row], tracks.slots_at(row)
     origin_ns = int(hand.stamps_ns[0])
     now_s, begin_s, end_s = ((stamp - origin_ns) / NANOSECONDS for stamp in (snapshot.stamp_ns, *span))
-    heights = [_get_height(bounds, snapshot.candidates), 2.1, 1.9]
+    heights = [_get_height(bounds, snapshot.candidates, snapshot.unsolved), 2.1, 1.9]
     with open_figure(WIDTH_IN, sum(heights)) as figure:
         scene, likelihoods, speeds = figure.subplots(3, 1, height_ratios=heights)
         draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
-        draw_candidates(scene, snapshot.candidates, slots)
+        draw_candidates(scene, snapshot.candidates, slots, snapshot.unsolved)
         draw_hand(scene, hand, snapshot.stamp_ns, span)
         draw_likelihoods(likelihoods, tracks.between(*span), origin_ns)
         draw_speeds(speeds, hand, snapshot, slots, span, origin_ns)
@@ -159,19 +207,19 @@ def compute_bounds(
 
 
 def save_figure(figure: Figure, file: Path | str) -> None:
-    """Write a figure in the format of the file's suffix; raises InputError if that is not possible."""
-    known = figure.canvas.get_supported_filetypes()
-    if Path(file).suffix.lower().removeprefix('.') not in known:
-        raise InputError('picture file', f'a name that ends in {", ".join("." + each for each in sorted(known))}', str(file))
+    """Write a figure as PNG, PDF or SVG, by the file's suffix; raises InputError if that is not possible."""
+    suffix = Path(file).suffix.lower()
+    if suffix not in METADATA:
+        raise InputError('picture file', f'a name that ends in {", ".join(METADATA)}', str(file))
     try:
-        # A PDF without its date is the same file each time.
-        metadata = {'CreationDate': None} if Path(file).suffix.lower() == '.pdf' else None
-        figure.savefig(file, bbox_inches='tight', pad_inches=0.08, metadata=metadata)
+        figure.savefig(file, bbox_inches='tight', pad_inches=0.08, metadata=METADATA[suffix])
     except OSError as error:
         raise InputError('picture file', 'a file that can be written', f'{file}: {error.strerror or error}') from error
 
 
-def _get_height(bounds: Bounds, candidates: Sequence[CandidateView] = ()) -> float:
+def _get_height(bounds: Bounds, candidates: Sequence[CandidateView] = (), unsolved: Sequence[UnsolvedView] = ()) -> float:
     """Return the height [in] of a scene with equal axes, its axis labels and a legend of candidates."""
     height = 0.9 * WIDTH_IN * (bounds[3] - bounds[2]) / (bounds[1] - bounds[0])
-    return float(np.clip(height, 2.0, 7.0)) + 0.6 + LINE_IN * len(candidates)
+    texts = [describe_in_legend(each) for each in candidates] + [describe_in_legend(each) for each in unsolved]
+    lines = sum(1 + text.count('\n') for text in texts) + (len(ELLIPSE_HANDLES) if candidates else 0)
+    return float(np.clip(height, 2.0, 7.0)) + 0.6 + LINE_IN * lines

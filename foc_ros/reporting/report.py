@@ -13,7 +13,8 @@ import numpy as np
 
 from foc_ros.analysis.replay import Step
 from foc_ros.core.errors import FocError, InputError
-from foc_ros.core.types import NANOSECONDS, HandSample
+from foc_ros.core.types import NANOSECONDS, HandSample, Status
+from foc_ros.io.outputs import MARK, check_replaceable
 
 from .page import render
 from .plots import make_recording_figure, make_snapshot_figure, save_figure
@@ -31,6 +32,7 @@ FRACTION = 0.3
 """Fraction of its duration at which each of several movements is pictured."""
 ONSET_SPEED = 0.05
 """Speed [m/s] above which the hand counts as moving."""
+FILES, OVERVIEW = ('index.html', 'predictions.json'), 'overview.png'
 Span = tuple[int, int]
 """Start and end of a movement [ns]."""
 
@@ -54,14 +56,22 @@ class ReportCollector:
         write_report(directory, title, build_hand_trajectory(self.samples), self.snapshots, summary)
 
 
+def check_report(directory: Path) -> None:
+    """Raise InputError if a report would overwrite a file that is no part of an earlier report."""
+    check_replaceable(
+        '--report', *(directory / name for name in FILES), directory / OVERVIEW, *directory.glob('moment_[0-9][0-9].png')
+    )
+
+
 def write_report(
     directory: Path, title: str, hand: HandTrajectory, snapshots: Sequence[Snapshot], summary: Mapping[str, str]
 ) -> list[Path]:
-    """Write index.html, predictions.json and pictures into a directory, replacing files of those names; return the files.
+    """Write index.html, predictions.json and pictures into a directory, replacing those of an earlier report; return the files.
 
     hand: the measured movement; snapshots: the predictions in order of their stamps; summary: facts for a table of the page.
-    Raises InputError if the directory cannot be written or the hand has no sample.
+    Raises InputError if the directory cannot be written or contains other files of those names, or if the hand has no sample.
     """
+    check_report(directory)
     if not len(hand.stamps_ns):
         raise InputError('report', 'a recording with a hand pose', 'none')
     spans = hand.find_movements(ONSET_SPEED) or [(int(hand.stamps_ns[0]), int(hand.stamps_ns[-1]))]
@@ -70,13 +80,14 @@ def write_report(
     data = PageData(hand, tracks).build(spans, compute_recording_bounds(hand, snapshots))
     html = render('report.html', title=title, warnings=warnings, facts=facts, data=data)
     numbers = {
+        'generator': MARK,
         'title': title,
         'summary': facts,
         'warnings': warnings,
         'hand_samples': len(hand.stamps_ns),
         'predictions': [_encode_snapshot(each, int(hand.stamps_ns[0])) for each in snapshots],
     }
-    page_file, numbers_file = directory / 'index.html', directory / 'predictions.json'
+    page_file, numbers_file = (directory / name for name in FILES)
     try:
         directory.mkdir(parents=True, exist_ok=True)
         pictures = _write_pictures(directory, hand, tracks, spans)
@@ -94,7 +105,7 @@ def _write_pictures(directory: Path, hand: HandTrajectory, tracks: CandidateTrac
         return []
     bounds = compute_recording_bounds(hand, solved)
     goals = np.unique(np.concatenate([each.goals for each in solved]), axis=0)
-    figures = {'overview.png': make_recording_figure(hand, solved[0].obstacles, goals, spans, bounds)}
+    figures = {OVERVIEW: make_recording_figure(hand, solved[0].obstacles, goals, spans, bounds)}
     for count, (row, span) in enumerate(_select_rows(tracks.snapshots, spans).items()):
         figures[f'moment_{count + 1:02d}.png'] = make_snapshot_figure(hand, tracks, row, span, bounds)
     for name, figure in figures.items():
@@ -128,11 +139,15 @@ def _collect_facts(snapshots: Sequence[Snapshot]) -> dict[str, str]:
 
 def _collect_warnings(snapshots: Sequence[Snapshot]) -> list[str]:
     empty = sum(not each.candidates for each in snapshots)
-    statuses = Counter(status for each in snapshots for _, status in each.unsolved)
+    statuses = Counter(lost.status for each in snapshots for lost in each.unsolved)
+    compromised = sum(view.is_compromised for each in snapshots for view in each.candidates)
+    if compromised:
+        statuses[Status.COMPROMISED.value] = compromised
     warnings = [] if snapshots else ['There is no prediction.']
     warnings += [f'In {empty} of {len(snapshots)} predictions no candidate could be solved.'] if empty else []
     return warnings + [
-        f'{count} candidate{"s" if count > 1 else ""} ended with status {status}.' for status, count in sorted(statuses.items())
+        f'{count} candidate{"s" if count > 1 else ""} ended with status {status}. Remedy: {Status(status).remedy}.'
+        for status, count in sorted(statuses.items())
     ]
 
 
@@ -144,10 +159,12 @@ def _encode_snapshot(snapshot: Snapshot, origin_ns: int) -> dict[str, Any]:
         'candidates': [
             {
                 'label': each.label,
+                'description': each.description,
+                'compromised': each.is_compromised,
                 **{name: round_number(getattr(each, name)) for name in ('likelihood', 'effort', 'cost_ratio', 'eta')},
                 'end': [round_number(value) for value in each.path[-1]],
             }
             for each in snapshot.candidates
         ],
-        'unsolved': dict(snapshot.unsolved),
+        'unsolved': {each.label: each.status for each in snapshot.unsolved},
     }

@@ -16,7 +16,7 @@ from foc_ros.core.types import NANOSECONDS, Array, make_obstacles
 
 from .drawing import CLASS_COLOURS, ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, STDDEVS, Bounds, compute_ellipse_axes
 from .plots import compute_bounds
-from .snapshots import CandidateView, HandTrajectory, Snapshot
+from .snapshots import CandidateView, HandTrajectory, Snapshot, UnsolvedView
 from .track_association import CandidateTracks
 
 LENGTH, SPEED, TIME = 1e-4, 1e-3, 1e-3
@@ -24,7 +24,7 @@ LENGTH, SPEED, TIME = 1e-4, 1e-3, 1e-3
 MOST_FRAMES = 500
 """The slider stops at no more than this many predictions, evenly spread; likelihoods are drawn for all."""
 MOST_HAND_SAMPLES = 4000
-PATH_POINTS = 26
+PATH_POINTS, UNSOLVED_POINTS = 26, 13
 DRAWN_PERCENTILES = (0.5, 99.5)
 """Percentiles of the paths' coordinates that fit into the scene: a single outlying prediction does not change its scale."""
 Rows = dict[str, int]
@@ -42,8 +42,8 @@ class PageData:
     def build(self, spans: list[tuple[int, int]], bounds: Bounds) -> dict[str, Any]:
         """Return everything that the page draws; spans: start and end [ns] of the movements.
 
-        times [s] after the first hand sample and solve_ms of every prediction; tracks: for each its slot, the row of its
-        first prediction and its likelihoods from there on; frames: the predictions at which the slider stops.
+        times [s] after the first hand sample, solve_ms and unknown share of every prediction; tracks: for each its slot, the row
+        of its first prediction and its likelihoods from there on; frames: the predictions at which the slider stops.
         """
         snapshots = self._tracks.snapshots
         frames = [self._encode_frame(row) for row in select_evenly(len(snapshots), MOST_FRAMES).tolist()]
@@ -58,6 +58,7 @@ class PageData:
                 {'slot': self._tracks.slots.get(track), 'first': first, 'share': [round_number(value) for value in values]}
                 for track, (first, values) in self._tracks.likelihoods().items()
             ],
+            'unknown': [round(each.unknown_share, 3) for each in snapshots],
             'movements': [[self._seconds(stamp) for stamp in span] for span in spans],
             'hand': self._encode_hand(),
             'scenes': [json.loads(scene) for scene in self._scenes],
@@ -76,11 +77,20 @@ class PageData:
             'scene': _row_of(json.dumps(scene), self._scenes),
             'goals': _row_of(json.dumps([_quantise(goal, LENGTH) for goal in snapshot.goals]), self._goals),
             'candidates': [
-                {'track': tracks[each.label], 'label': _row_of(each.label, self._labels), **_encode_candidate(each)}
+                {
+                    'track': tracks[each.label],
+                    'label': _row_of(each.label, self._labels),
+                    'description': _row_of(each.description, self._labels),
+                    **_encode_candidate(each),
+                }
                 for each in snapshot.candidates
             ],
-            'unsolved': [[_row_of(text, self._labels) for text in pair] for pair in snapshot.unsolved],
+            'unsolved': [self._encode_unsolved(each) for each in snapshot.unsolved],
         }
+
+    def _encode_unsolved(self, view: UnsolvedView) -> dict[str, Any]:
+        texts = {name: _row_of(getattr(view, name), self._labels) for name in ('label', 'description', 'reason')}
+        return {**texts, **_encode_points(view.path, UNSOLVED_POINTS)}
 
     def _encode_hand(self) -> dict[str, Any]:
         rows = select_evenly(len(self._hand.stamps_ns), MOST_HAND_SAMPLES)
@@ -117,20 +127,34 @@ def select_evenly(count: int, most: int) -> np.ndarray[tuple[int], np.dtype[np.i
 
 
 def _encode_candidate(candidate: CandidateView) -> dict[str, Any]:
-    """Return one candidate; ellipses: x, y, greater and smaller standard deviation, angle of the greater [degrees]."""
+    """Return one candidate.
+
+    t and v: at some of the steps; motor: ellipses of the motor noise; total: of the total uncertainty, none if that is the same.
+    """
     points = select_evenly(len(candidate.path), PATH_POINTS)
     marks = select_evenly(len(candidate.path), ELLIPSES_PER_CANDIDATE + 1)[1:]
-    greater, smaller, angle = compute_ellipse_axes(candidate.covariance[marks])
-    lengths = np.column_stack([candidate.path[marks], STDDEVS * greater, STDDEVS * smaller])
     return {
         'ratio': round_number(candidate.cost_ratio),
         'eta': round_number(candidate.eta),
-        'x': _quantise_differences(candidate.path[points, 0], LENGTH),
-        'y': _quantise_differences(candidate.path[points, 1], LENGTH),
+        'compromised': candidate.is_compromised,
+        **_encode_points(candidate.curve, PATH_POINTS),
         't': _quantise_differences(candidate.times[points], TIME),
         'v': _quantise_differences(candidate.speed[points], SPEED),
-        'ellipses': [[*_quantise(each, LENGTH), round(degrees)] for each, degrees in zip(lengths, angle.tolist(), strict=True)],
+        'motor': _encode_ellipses(candidate.path[marks], candidate.motor_covariance[marks]),
+        'total': _encode_ellipses(candidate.path[marks], candidate.covariance[marks]) if candidate.is_widened else [],
     }
+
+
+def _encode_ellipses(centres: Array, covariance: Array) -> list[list[int]]:
+    """Return ellipses: x, y, greater and smaller standard deviation, angle of the greater [degrees]."""
+    greater, smaller, angle = compute_ellipse_axes(covariance)
+    lengths = np.column_stack([centres, STDDEVS * greater, STDDEVS * smaller])
+    return [[*_quantise(each, LENGTH), round(degrees)] for each, degrees in zip(lengths, angle.tolist(), strict=True)]
+
+
+def _encode_points(path: Array, most: int) -> dict[str, list[int]]:
+    points = path[select_evenly(len(path), most)]
+    return {'x': _quantise_differences(points[:, 0], LENGTH), 'y': _quantise_differences(points[:, 1], LENGTH)}
 
 
 def _row_of(text: str, rows: Rows) -> int:

@@ -2,45 +2,97 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from foc_ros.core.errors import MessageError
-from foc_ros.core.types import NANOSECONDS, Array, HandSample, Obstacles, PredictedCandidate, Prediction, Record
+from foc_ros.core.ocp.contacts.smooth_path import compute_curve
+from foc_ros.core.types import (
+    LEFT,
+    NANOSECONDS,
+    RIGHT,
+    Array,
+    HandSample,
+    Obstacles,
+    PredictedCandidate,
+    Prediction,
+    Record,
+    Status,
+    describe_class,
+)
 from foc_ros.ros.messages.decode_poses import decode_stamp
 from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS
 from foc_ros.ros.messages.plane import project
-from foc_ros.ros.messages.ranking import compute_cost_ratios, order_candidates
+from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate, find_drawn_curve, order_candidates
+
+Sides = dict[str, int]
+"""Side (LEFT or RIGHT) of each obstacle by its id."""
 
 
 @dataclass(frozen=True, eq=False)
 class CandidateView(Record):
-    """One solved candidate.
+    """One candidate with a likelihood.
 
-    times (m,): seconds after the stamp of the snapshot; path (m, 2) [m]; speed (m,) [m/s]; covariance (m, 2, 2) of the
-    position [m^2]; effort [m^2/s^6]; cost_ratio: cost over the least cost; eta: achieved probability of avoidance.
+    description: its class in words, with the goal where there are several; is_compromised: whether eta is below the wanted one;
+    times (m,): seconds after the stamp of the snapshot; path (m, 2) [m]; velocity (m, 2) [m/s]; covariance and motor_covariance
+    (m, 2, 2) of the position [m^2]: the total, and the part that motor noise causes, which eta is about; effort [m^2/s^6];
+    cost_ratio: cost over the least cost; eta: achieved probability of avoidance.
     """
 
     label: str
+    description: str
+    is_compromised: bool
     likelihood: float
     effort: float
     cost_ratio: float
     eta: float
     times: Array
     path: Array
-    speed: Array
+    velocity: Array
     covariance: Array
+    motor_covariance: Array
+
+    @property
+    def speed(self) -> Array:
+        """Speed (m,) [m/s]."""
+        speed: Array = np.linalg.norm(self.velocity, axis=1)
+        return speed
+
+    @property
+    def is_widened(self) -> bool:
+        """Whether the covariance holds more than the motor noise."""
+        return not np.array_equal(self.covariance, self.motor_covariance)
+
+    @property
+    def curve(self) -> Array:
+        """The path as a smooth curve (l, 2) [m], l >= m."""
+        return compute_curve(self.path, self.velocity, float(self.times[1] - self.times[0]) if len(self.times) > 1 else 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class UnsolvedView(Record):
+    """One candidate without a likelihood.
+
+    status: in one word; reason: status, message and remedy in words; path (m, 2) [m]: where the attempt ended, or the guess.
+    """
+
+    label: str
+    description: str
+    status: str
+    reason: str
+    path: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Snapshot(Record):
     """One prediction and its scene.
 
-    candidates: the solved ones, most likely first; most_likely: label, None if no candidate was solved; unsolved: (label, status)
-    of the other candidates; solve_s: wall time [s], None if it is unknown.
+    candidates: those with a likelihood, most likely first; most_likely: label, None if no candidate has one; unsolved: the other
+    candidates; solve_s: wall time [s], None if it is unknown.
     """
 
     stamp_ns: int
@@ -48,8 +100,14 @@ class Snapshot(Record):
     goals: Array
     candidates: tuple[CandidateView, ...]
     most_likely: str | None
-    unsolved: tuple[tuple[str, str], ...] = ()
+    unsolved: tuple[UnsolvedView, ...] = ()
     solve_s: float | None = None
+
+    @property
+    def unknown_share(self) -> float:
+        """Share of the candidates of which no likelihood is known, 1 if none is; a class without any path is known to be out."""
+        unknown = sum(each.status != Status.INFEASIBLE.value for each in self.unsolved)
+        return unknown / (unknown + len(self.candidates)) if self.candidates else 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,23 +170,49 @@ def build_hand_trajectory(samples: Sequence[HandSample]) -> HandTrajectory:
     return HandTrajectory(stamps[is_newest], positions[is_newest])
 
 
-def build_candidate_views(candidates: Sequence[PredictedCandidate]) -> tuple[CandidateView, ...]:
-    """Return views of the solved candidates, in their order."""
-    solved = tuple(each for each in candidates if each.is_solved)
-    return tuple(_build_candidate_view(each, ratio) for each, ratio in zip(solved, compute_cost_ratios(solved), strict=True))
+def build_candidate_views(candidates: Sequence[PredictedCandidate], goals: int = 1) -> tuple[CandidateView, ...]:
+    """Return views of the candidates with a likelihood, in their order; goals: number of goals in the scene."""
+    shown = tuple(each for each in candidates if each.has_likelihood)
+    return tuple(_build_candidate_view(each, ratio, goals) for each, ratio in zip(shown, compute_cost_ratios(shown), strict=True))
 
 
-def _build_candidate_view(candidate: PredictedCandidate, cost_ratio: float) -> CandidateView:
-    label, likelihood, solution = candidate.candidate.label, candidate.likelihood, candidate.solution
-    speed, covariance = np.linalg.norm(solution.mean[:, 2:4], axis=1), solution.covariance[:, :2, :2]
-    values = label, likelihood, solution.effort, cost_ratio, solution.eta
-    return CandidateView(*values, solution.times, solution.path, speed, covariance)
+def _build_candidate_view(candidate: PredictedCandidate, cost_ratio: float, goals: int) -> CandidateView:
+    solution = candidate.solution
+    numbers = candidate.likelihood, solution.effort, cost_ratio, solution.eta
+    arrays = solution.path, solution.mean[:, 2:4], solution.covariance[:, :2, :2], candidate.motor_covariance[:, :2, :2]
+    return CandidateView(
+        candidate.label, describe_candidate(candidate, goals), not candidate.is_solved, *numbers, solution.times, *arrays
+    )
+
+
+def build_unsolved_views(candidates: Sequence[PredictedCandidate], goals: int = 1) -> tuple[UnsolvedView, ...]:
+    """Return views of the candidates without a likelihood, in their order; goals: number of goals in the scene."""
+    return tuple(
+        UnsolvedView(each.label, describe_candidate(each, goals), each.status.value, each.reason, find_drawn_curve(each))
+        for each in candidates
+        if not each.has_likelihood
+    )
+
+
+def parse_label(label: str, ids: Collection[str]) -> tuple[str, Sides]:
+    """Split a label into its goal and the sides it names; ids: of the obstacles of the scene, which may contain signs."""
+    goal, _, rest = label.partition(':')
+    names = '|'.join(re.escape(name) for name in sorted(ids, key=len, reverse=True))
+    found = re.findall(rf'([+-])({names})(?=[+-]|$)', rest) if names else []
+    return goal, {name: LEFT if sign == '+' else RIGHT for sign, name in found}
+
+
+def _describe_label(label: str, ids: Collection[str], goals: int) -> str:
+    """Return the class of a label in words, with its goal if there are several goals; empty if it names an unknown obstacle."""
+    goal, sides = parse_label(label, ids)
+    is_read = len(label) == len(goal) + 1 + sum(1 + len(name) for name in sides)
+    return describe_class(sides.items(), goal if goals > 1 else '') if is_read else ''
 
 
 def build_snapshot(prediction: Prediction) -> Snapshot:
     """Return the snapshot of a prediction; raises FocError if the prediction holds a number that is not finite."""
-    unsolved = tuple((each.candidate.label, each.solution.status.value) for each in prediction.candidates if not each.is_solved)
-    candidates = build_candidate_views(order_candidates(prediction))
+    unsolved = build_unsolved_views(prediction.candidates, len(prediction.goals))
+    candidates = build_candidate_views(order_candidates(prediction), len(prediction.goals))
     scene = prediction.obstacles, prediction.goals
     return Snapshot(prediction.stamp_ns, *scene, candidates, prediction.most_likely, unsolved, prediction.solve_s)
 
@@ -150,24 +234,27 @@ def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles
         raise MessageError('likelihoods', 'those of the prediction', 'those of another prediction')
     rows, columns = _read_cloud(cloud), _read_likelihoods(likelihoods)
     labels = likelihoods.layout.dim[0].label.split(';') if len(columns) else []
-    candidates = tuple(
-        _read_candidate(label, values, rows[rows['candidate'] == number], plane)
-        for number, (label, values) in enumerate(zip(labels, columns, strict=True))
-    )
-    return Snapshot(decode_stamp(cloud.header), obstacles, goals, candidates, candidates[0].label if candidates else None)
+    candidates = []
+    for number, (label, values) in enumerate(zip(labels, columns, strict=True)):
+        name = label, _describe_label(label, obstacles.ids, len(goals))
+        candidates.append(_read_candidate(name, values, rows[rows['candidate'] == number], plane))
+    return Snapshot(decode_stamp(cloud.header), obstacles, goals, tuple(candidates), candidates[0].label if candidates else None)
 
 
-def _read_candidate(label: str, values: Array, rows: Any, plane: str) -> CandidateView:
-    def stack(names: str) -> Array:
-        return np.stack([rows[name].astype(float) for name in names.split()], axis=-1)
+def _read_candidate(name: tuple[str, str], values: Array, rows: Any, plane: str) -> CandidateView:
+    def stack(names: Sequence[str]) -> Array:
+        return np.stack([rows[name].astype(float) for name in names], axis=-1)
 
-    path, _ = project(stack('x y z'), plane)
-    velocity, _ = project(stack('vx vy vz'), plane)
-    half, _ = project(stack('xx xy xz xy yy yz xz yz zz').reshape(-1, 3, 3), plane)
-    covariance, _ = project(half.swapaxes(1, 2), plane)
+    path, _ = project(stack('xyz'), plane)
+    velocity, _ = project(stack(('vx', 'vy', 'vz')), plane)
+    covariances = []
+    for prefix in ('', 'motor_'):
+        pairs = [prefix + pair for pair in ('xx', 'xy', 'xz', 'xy', 'yy', 'yz', 'xz', 'yz', 'zz')]
+        half, _ = project(stack(pairs).reshape(-1, 3, 3), plane)
+        covariances.append(project(half.swapaxes(1, 2), plane)[0])
     likelihood, effort, cost_ratio, eta = values.tolist()
-    speed = np.linalg.norm(velocity, axis=1)
-    return CandidateView(label, likelihood, effort, cost_ratio, eta, rows['t'].astype(float), path, speed, covariance)
+    head = *name, bool(rows['compromised'].any()), likelihood, effort, cost_ratio, eta
+    return CandidateView(*head, rows['t'].astype(float), path, velocity, covariances[0], covariances[1])
 
 
 def _read_cloud(cloud: Any) -> Any:

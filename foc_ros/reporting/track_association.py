@@ -6,8 +6,7 @@ A label names only the obstacles that matter. It changes when an obstacle is lef
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,12 +14,10 @@ import numpy as np
 from foc_ros.core.types import Array
 
 from .drawing import CLASS_COLOURS, CLASSES
-from .snapshots import Snapshot
+from .snapshots import Snapshot, parse_label
 
 LONGEST_GAP_NS = 300_000_000
 """A track continues after a gap of up to this length, in which its candidate was not solved."""
-Sides = dict[str, str]
-"""Side ('+' left, '-' right) of each obstacle by its id."""
 
 
 @dataclass(frozen=True)
@@ -60,14 +57,6 @@ def build_candidate_tracks(snapshots: Sequence[Snapshot]) -> CandidateTracks:
     """Associate the candidates of successive snapshots and give the tracks their letters and colours."""
     tracks = associate_tracks(snapshots)
     return CandidateTracks(snapshots, tracks, assign_slots(snapshots, tracks))
-
-
-def parse_label(label: str, ids: Collection[str]) -> tuple[str, Sides]:
-    """Split a label into its goal and the sides it names; ids: of the obstacles of the scene, which may contain signs."""
-    goal, _, rest = label.partition(':')
-    names = '|'.join(re.escape(name) for name in sorted(ids, key=len, reverse=True))
-    found = re.findall(rf'([+-])({names})(?=[+-]|$)', rest) if names else []
-    return goal, {name: side for side, name in found}
 
 
 def associate_tracks(snapshots: Sequence[Snapshot]) -> list[dict[str, int]]:

@@ -28,7 +28,11 @@ OK, WARN, ERROR = 0, 1, 2
 """Levels of diagnostic_msgs/DiagnosticStatus."""
 HARMLESS = ('candidate_', 'hand_disengaged', 'hand_duplicate', 'predict_', 'predictions')
 """Prefixes of the counts that are no fault by themselves; the reason why no prediction is made is reported as text."""
-FAULTS = ('predict_failed', 'predict_nothing_solved')
+FAULTS = ('predict_failed', 'predict_nothing_solved', 'predict_too_late')
+OVER_BUDGET_S = 0.002
+"""Time beyond `budget_s` after which a prediction is counted as over budget [s]."""
+BUSY_S = 0.5
+"""Time that a prediction is computed after which the node is reported as busy [s]."""
 REPORTED_NOTES = ('goal_inside', 'hand_inside', 'no_way')
 """Notes of an incomplete prediction, each counted as `scene_` and its name."""
 
@@ -48,6 +52,10 @@ class Freshness:
     def note_received(self, role: str, now_s: float) -> None:
         """Store the time at which a message was accepted."""
         self._received_s[role] = now_s
+
+    def received_s(self, role: str, now_s: float) -> float:
+        """Return when a message of a topic was accepted last; now_s if none was."""
+        return self._received_s.get(role, now_s)
 
     def note_pose(self, stamp_ns: int, clock_ns: int, timeout_s: float, *, is_restart: bool) -> None:
         """Store the age of a hand pose by ROS time.
@@ -70,18 +78,34 @@ class Freshness:
         sources: the sources of obstacles. If one of them is silent, nothing is predicted: its obstacles may still be there.
         """
         limit_s = config.estimator.hand_timeout_s
-        silence_s = now_s - self._received_s.get(HAND, now_s)
+        silence_s = now_s - self.received_s(HAND, now_s)
         if 0.0 < limit_s < silence_s:
             return 'hand_silent', f'hand_pose silent for {silence_s:.1f} s (estimator.hand_timeout_s is {limit_s:g})'
         if self._has_ros_time and 0.0 < limit_s < abs(self._age_s):
             age = f'{abs(self._age_s):.3g} s {"older" if self._age_s > 0.0 else "newer"}'
             return 'hand_stale', f'the hand pose is {age} than the time of the node (estimator.hand_timeout_s is {limit_s:g})'
-        limit_s = config.scene.timeout_s
-        for role in (SOURCE_TOPICS[source] for source in sources):
-            silence_s = now_s - self._received_s.get(role, now_s)
-            if 0.0 < limit_s < silence_s:
-                return 'obstacles_silent', f'{role} silent for {silence_s:.1f} s (scene.timeout_s is {limit_s:g})'
+        for source in self.find_silent_sources(now_s, config, sources):
+            role, limit_s = SOURCE_TOPICS[source], config.scene.timeout_s
+            silence_s = now_s - self._received_s[role]
+            return 'obstacles_silent', f'{role} silent for {silence_s:.1f} s (scene.timeout_s is {limit_s:g})'
         return None
+
+    def find_silent_sources(self, now_s: float, config: Config, sources: Iterable[str]) -> list[str]:
+        """Return the sources of obstacles that have been silent for more than `scene.timeout_s`."""
+        limit_s = config.scene.timeout_s
+        return [each for each in sources if 0.0 < limit_s < now_s - self.received_s(SOURCE_TOPICS[each], now_s)]
+
+    def find_late_reason(self, stamp_ns: int, received_s: float, now_s: float, clock_ns: int, config: Config) -> str | None:
+        """Return why a prediction is not published now that it is computed, None if it is.
+
+        stamp_ns, received_s: stamp of its hand pose [ns], and when that arrived; clock_ns: ROS time.
+        """
+        age_s, limit_s = now_s - received_s, config.estimator.hand_timeout_s
+        if self._has_ros_time:
+            age_s = max(age_s, (clock_ns - stamp_ns) / NANOSECONDS)
+        if not 0.0 < limit_s < age_s:
+            return None
+        return f'the last prediction took until its hand pose was {age_s:.3g} s old (estimator.hand_timeout_s is {limit_s:g})'
 
 
 class Health(NamedTuple):
@@ -108,7 +132,7 @@ class Monitor:
         self._prediction: Prediction | None = None
         self._predicted_s: float | None = None
         self._counts: Counter[str] = Counter()
-        self._error = ''
+        self._error, self._late = '', ''
         self._solve_ms: deque[float] = deque(maxlen=WINDOW)
         self._cycle_ms: deque[float] = deque(maxlen=WINDOW)
         self._counts_before: Counter[str] = Counter()
@@ -120,13 +144,22 @@ class Monitor:
         entry.received, entry.refused, entry.last_s = entry.received + 1, entry.refused + (not is_taken), now_s
         return entry.refused, entry.received
 
+    def note_computed(self, prediction: Prediction, budget_s: float) -> None:
+        """Store how long a prediction was computed; budget_s: the time that it had, 0 for no limit."""
+        self._solve_ms.append(1e3 * prediction.solve_s)
+        self._counts['predict_over_budget'] += 0.0 < budget_s < prediction.solve_s - OVER_BUDGET_S
+
     def note_prediction(self, prediction: Prediction, start_s: float, now_s: float) -> None:
         """Count a prediction that was computed and published between two times."""
         self._prediction, self._predicted_s = prediction, now_s
         self._counts['predictions'] += 1
         self._counts.update(f'scene_{name}' for name in REPORTED_NOTES if prediction.notes.get(name))
-        self._solve_ms.append(1e3 * prediction.solve_s)
         self._cycle_ms.append(1e3 * (now_s - start_s))
+
+    def note_late(self, reason: str) -> None:
+        """Count a prediction that was too old when it had been computed."""
+        self._counts['predict_too_late'] += 1
+        self._late = reason
 
     def note_withheld(self, kind: str) -> None:
         """Count a prediction that was due and not made."""
@@ -137,8 +170,12 @@ class Monitor:
         self._counts['internal_errors'] += 1
         self._error = f'{type(error).__name__}: {error}'
 
-    def report(self, now_s: float, intake: Intake, state: str, not_ready_reason: str | None) -> Health:
-        """Return the health since the last call; state: of the managed node; not_ready_reason: text, None if ready."""
+    def report(self, now_s: float, intake: Intake, state: str, not_ready_reason: str | None, busy_s: float = 0.0) -> Health:
+        """Return the health since the last call.
+
+        state: of the managed node; not_ready_reason: text, None if ready; busy_s: for how long the present prediction has been
+        computed, 0 if there is none [s].
+        """
         pipeline, seconds = intake.pipeline, max(now_s - self._reported_s, 1e-3)
         totals = Counter(intake.counts) + self._counts
         recent = totals - self._counts_before
@@ -162,9 +199,14 @@ class Monitor:
         self._counts_before, self._reported_s = totals, now_s
         for entry in self._inputs.values():
             entry.received_before = entry.received
-        return Health(*self._judge(pipeline, recent, state, not_ready_reason), values)
+        reasons = [] if not_ready_reason is None else [f'no prediction: {not_ready_reason}']
+        if busy_s > BUSY_S:
+            reasons.append(f'busy: a prediction has been computed for {busy_s:.1f} s')
+        if recent['predict_too_late']:
+            reasons.append(f'busy: {self._late}')
+        return Health(*self._judge(pipeline, recent, state, reasons), values)
 
-    def _judge(self, pipeline: Pipeline, recent: Counter[str], state: str, not_ready_reason: str | None) -> tuple[int, str]:
+    def _judge(self, pipeline: Pipeline, recent: Counter[str], state: str, reasons: list[str]) -> tuple[int, str]:
         if recent['internal_errors']:
             return ERROR, f'{recent["internal_errors"]} internal errors, the last: {self._error}'
         if state != 'active':
@@ -172,8 +214,7 @@ class Monitor:
         if not pipeline.is_engaged:
             return OK, 'disengaged'
         faults = {name: count for name, count in recent.items() if name in FAULTS or not name.startswith(HARMLESS)}
-        parts = [] if not_ready_reason is None else [f'no prediction: {not_ready_reason}']
-        parts += [f'{name} {count}' for name, count in sorted(faults.items())]
+        parts = reasons + [f'{name} {count}' for name, count in sorted(faults.items())]
         return (WARN, '; '.join(parts)) if parts else (OK, 'predicting')
 
     def _describe_inputs(self, now_s: float, seconds: float) -> dict[str, str]:
@@ -195,9 +236,12 @@ def _describe_prediction(prediction: Prediction | None) -> dict[str, str]:
 
 def _describe_candidate(outcome: PredictedCandidate) -> str:
     solution = outcome.solution
-    if not outcome.is_solved:
+    if not outcome.has_likelihood:
         return f'{solution.status.value}: {solution.message}'
-    return f'{solution.status.value}, likelihood {outcome.likelihood:.3f}, eta {solution.eta:.3f}, effort {solution.effort:.4g}'
+    age = f', answer of {outcome.age_s:.3g} s ago' if outcome.age_s else ''
+    return (
+        f'{solution.status.value}, likelihood {outcome.likelihood:.3f}, eta {solution.eta:.3f}, effort {solution.effort:.4g}{age}'
+    )
 
 
 def _describe_percentiles(milliseconds: Iterable[float]) -> str:

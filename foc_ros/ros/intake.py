@@ -58,6 +58,12 @@ class Intake:
             self.last_refusal = self.pipeline.last_refusal
         return status
 
+    def remove_source(self, source: str) -> None:
+        """Forget the obstacles of one source, 'cloud' or 'markers', as if none of its messages had been received."""
+        self.pipeline.remove_source(source)
+        if source == 'markers':
+            self._markers, self._markers_ns, self._markers_unchanged = MarkerTable(), 0, (-math.inf, math.inf)
+
     def _take_hand(self, message: Any) -> SampleStatus:
         self.sample = decode_hand_sample(message, self.pipeline.config.plane)
         status = self.pipeline.add_hand_sample(self.sample)
@@ -82,14 +88,17 @@ class Intake:
         """Pass the existing markers to the pipeline.
 
         Several publishers with different delays may add to the table, so a stamp a little behind the newest one does not make the
-        table late. A table without markers is valid in every frame.
+        table late. A table without markers is valid in every frame. One that has never held any is no source: many programs send
+        a DELETEALL once at their start, and no markers after it.
         """
         behind_ns = self._markers_ns - markers.stamp_ns
         is_slightly_behind = markers.stamp_ns and 0 < behind_ns <= self.pipeline.config.estimator.gap_s * NANOSECONDS
         stamp_ns = self._markers_ns if is_slightly_behind else markers.stamp_ns
         frame_id = markers.frame_id if markers.markers else self.pipeline.frame_id or markers.frame_id
         now_ns = self._now_ns()
-        status = self.pipeline.set_obstacles('markers', markers.obstacles(now_ns), stamp_ns, frame_id)
+        status = SampleStatus.ACCEPTED
+        if markers.markers or 'markers' in self.pipeline.scene.sources:
+            status = self.pipeline.set_obstacles('markers', markers.obstacles(now_ns), stamp_ns, frame_id)
         if status.is_taken:
             self._markers, self._markers_ns, self._markers_unchanged = markers, stamp_ns, markers.find_unchanged_interval(now_ns)
         return status

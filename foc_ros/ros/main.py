@@ -3,30 +3,42 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import sys
 from collections.abc import Sequence
 from types import FrameType
 
 from foc_ros.core.errors import FocError
+from foc_ros.core.registry import import_all
 
 SPIN_S = 0.1
 """Longest time between two checks of the stop flag [s]."""
+END_S = 0.5
+"""Time after which a prediction that is still being computed does not delay the end of the process [s]."""
 
 
 class StopSignals:
-    """Sets :attr:`is_requested` on SIGINT and SIGTERM, until the end of the process.
+    """Ends the process on SIGINT and SIGTERM: at once while it imports, and by :attr:`is_requested` after :meth:`defer`.
 
     rclpy's own handlers shut the context down during a callback, and some of the stops then end with an error. This flag ends
-    the loop between two callbacks.
+    the loop between two callbacks. Before there is a context, nothing has to be closed, and an exception would be lost in some
+    parts of an import.
     """
 
     def __init__(self) -> None:
         self.is_requested = False
+        self._is_deferred = False
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._request)
 
+    def defer(self) -> None:
+        """Let the signals set the flag from now on."""
+        self._is_deferred = True
+
     def _request(self, _number: int, _frame: FrameType | None) -> None:
+        if not self._is_deferred:
+            os._exit(0)
         self.is_requested = True
 
 
@@ -43,6 +55,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     from .node import FocNode
 
+    import_all()  # compiles the kernels on a new machine
+    stop.defer()
     given = ['foc_node', *(sys.argv[1:] if arguments is None else arguments)]
     context = rclpy.Context()
     try:
@@ -69,6 +83,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     executor.shutdown()
     node.destroy_node()
     context.try_shutdown()
+    if node.is_busy_after(END_S):
+        os._exit(0)  # otherwise the interpreter waits for the computation
     return 0
 
 

@@ -1,7 +1,12 @@
 """The ROS 2 node: a prediction for every hand pose that is due, and diagnostics once a second.
 
 The pipeline holds the model and the memory and is driven by message stamps, so the node gives the same answers as a replay of
-the same messages. The node adds the clocks: it makes no prediction from an input that has fallen silent.
+the same messages, apart from candidates for which `budget_s` left no time. The node adds the clocks: it makes no prediction from
+an input that has fallen silent, and publishes none that has become too old.
+
+A prediction is computed in another thread, and everything else happens in that of the executor. What is received or asked for
+meanwhile is done at once: after a reset, a release of the clutch, a change of parameters or of the state of the managed node,
+nothing that was computed before is published.
 
 It is a managed node. Once configured it subscribes and keeps the scene; it predicts only while it is active, from the first hand
 pose after its activation. With `autostart`, the default, it is active at once.
@@ -23,6 +28,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from std_srvs.srv import SetBool, Trigger
 
 from foc_ros.core.config import Config
+from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import FocError
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predictor import warm_up
@@ -30,13 +36,14 @@ from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import CLOUD, GOAL, GOALS, HAND, MARKERS
 
 from .endpoints import INPUTS, create_publishers, create_subscriptions, take_queued
-from .health import Freshness, Monitor, encode_diagnostics
+from .health import SOURCE_TOPICS, Freshness, Monitor, encode_diagnostics
 from .intake import Intake
 from .lifecycle import answer_refused_transitions
 from .messages.encode_prediction import encode_outputs
 from .messages.types import RclpyTypes
 from .node_parameters import LiveParameters, declare_autostart, declare_parameters
 from .transforms import Transforms
+from .worker import Computation, Worker
 
 THROTTLE_S = 5.0
 """Shortest time between two log lines of one kind [s]."""
@@ -47,6 +54,8 @@ SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FA
 
 class FocNode(LifecycleNode):
     """Node `foc`. Raises ParameterError if it is started with a wrong parameter, FocError if it cannot start."""
+
+    pipeline: Pipeline
 
     def __init__(self, **options: Any) -> None:
         super().__init__('foc', automatically_declare_parameters_from_overrides=True, **options)
@@ -60,6 +69,7 @@ class FocNode(LifecycleNode):
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
         self._transforms = Transforms(self)
+        self._worker = Worker(self, self._finish)
         self._create_pipeline()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_service(SetBool, '~/engage', self._engage)
@@ -112,7 +122,23 @@ class FocNode(LifecycleNode):
         text = ''.join(traceback.format_exception(error))
         self.get_logger().error(f'internal error: {text}', throttle_duration_sec=THROTTLE_S)
 
+    def destroy_node(self) -> None:
+        """Destroy the node; a prediction that is being computed ends at the next check of its deadline."""
+        self._worker.stop()
+        super().destroy_node()
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a prediction is being computed."""
+        return self._worker.present is not None
+
+    def is_busy_after(self, seconds: float) -> bool:
+        """Return whether a prediction is still being computed after so many seconds."""
+        return self._worker.is_busy_after(seconds)
+
     def _create_pipeline(self) -> None:
+        if hasattr(self, 'pipeline'):
+            self.pipeline.reset()  # ends a prediction that is being computed
         self.pipeline = Pipeline(self._live_parameters.config, self._library)
         self.intake, self._freshness, self._monitor = Intake(self.pipeline), Freshness(), Monitor(monotonic())
 
@@ -166,30 +192,63 @@ class FocNode(LifecycleNode):
         return self._freshness.find_not_ready_reason(monotonic(), self.pipeline.config, self.pipeline.scene.sources)
 
     def _predict(self) -> None:
+        """Begin a prediction; if one is being computed, its end begins the next."""
+        if self.is_busy:
+            return
         start_s = monotonic()
         clock_reason = self._find_clock_reason()
         if clock_reason is not None:
             self._monitor.note_withheld(clock_reason[0])
             return
         try:
-            prediction = self.pipeline.predict()
-            if prediction is None:
-                return
-            obstacles = self.pipeline.scene.obstacles(prediction.stamp_ns)
-            wanted = [name for name, publisher in self._outputs.items() if publisher.get_subscription_count()]
-            messages = encode_outputs(prediction, obstacles, self.pipeline.config.plane, self._types, wanted)
+            task = self.pipeline.begin(Deadline(self.pipeline.config.budget_s or None))
         except Exception as error:
-            self.report(error)
-            self.pipeline.reset()
+            self._recover(error)
+            return
+        if task is not None:
+            self._worker.start(task, self._freshness.received_s(HAND, start_s), start_s)
+
+    def _finish(self) -> None:
+        """Publish a prediction that was computed, unless it is too old or not wanted any more, and begin the next."""
+        ended = self._worker.take()
+        if ended is None:
+            return
+        try:
+            self._publish_prediction(ended)
+        except Exception as error:
+            self._recover(error)
+        if self.pipeline.is_due:
+            self._predict()
+
+    def _publish_prediction(self, ended: Computation) -> None:
+        prediction = self.pipeline.finish(ended.task, ended.result.result)
+        if prediction is None:
+            return
+        config = ended.task.config
+        self._monitor.note_computed(prediction, config.budget_s)
+        wanted = [name for name, publisher in self._outputs.items() if publisher.get_subscription_count()]
+        messages = encode_outputs(prediction, ended.task.obstacles, config.plane, self._types, wanted)
+        now_s, clock_ns = monotonic(), self.get_clock().now().nanoseconds
+        reason = self._freshness.find_late_reason(prediction.stamp_ns, ended.received_s, now_s, clock_ns, config)
+        if reason is not None:
+            self._monitor.note_late(reason)
             return
         for name, message in messages.items():
             self._publish(self._outputs[name], message)
-        self._monitor.note_prediction(prediction, start_s, monotonic())
+        self._monitor.note_prediction(prediction, ended.start_s, monotonic())
+
+    def _recover(self, error: Exception) -> None:
+        self.report(error)
+        self.pipeline.reset()
 
     def _publish_health(self) -> None:
-        clock_reason = self._find_clock_reason()
+        if HAND in self._inputs:
+            for message in take_queued(self._inputs[HAND]):  # a hand whose poses wait here is not silent
+                self._receive(HAND, message)
+        clock_reason, present = self._find_clock_reason(), self._worker.present
         not_ready_reason = self.pipeline.not_ready_reason() or (clock_reason and clock_reason[1])
-        health = self._monitor.report(monotonic(), self.intake, self._state, not_ready_reason)
+        busy_s = monotonic() - present.start_s if present is not None else 0.0
+        health = self._monitor.report(monotonic(), self.intake, self._state, not_ready_reason, busy_s)
         name, stamp_ns = self.get_fully_qualified_name(), self.get_clock().now().nanoseconds
         self._publish(self._diagnostics, encode_diagnostics(health, name, stamp_ns, self._types))
 
@@ -205,7 +264,12 @@ class FocNode(LifecycleNode):
         return response
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        silent = self._freshness.find_silent_sources(monotonic(), self.pipeline.config, self.pipeline.scene.sources)
+        for source in silent:
+            self.intake.remove_source(source)
         self.pipeline.reset()
         self._freshness.forget_clock()
-        response.success, response.message = True, 'the movement is forgotten, the scene is kept'
+        removed = ' and '.join(SOURCE_TOPICS[source] for source in silent)
+        without = f' without the obstacles of {removed}, which fell silent' if silent else ''
+        response.success, response.message = True, f'the movement is forgotten, the scene is kept{without}'
         return response

@@ -6,6 +6,7 @@ Parameters that are set together are checked together, and all of them are appli
 from __future__ import annotations
 
 from collections.abc import Callable
+from difflib import get_close_matches
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
@@ -22,14 +23,16 @@ def declare_parameters(node: Any, config: Config) -> Config:
     """Declare every parameter on a node and return the configuration with which it starts.
 
     config: the defaults. The node must be created with `automatically_declare_parameters_from_overrides`: the values that it was
-    started with are checked together, and unknown names are logged as warnings. Raises ParameterError.
+    started with are checked together. Raises ParameterError, also for a name that is unknown.
     """
     given = {name: parameter.value for name, parameter in node.get_parameters_by_prefix('').items()}
     for name in given:
         if name in KNOWN:
             node.undeclare_parameter(name)
         elif name.split('.')[0] not in NODE_ONLY:
-            node.get_logger().warning(f'parameter {name} is unknown and has no effect')
+            similar = get_close_matches(name, (*KNOWN, *NODE_ONLY), 1)
+            hint = f', perhaps {similar[0]}' if similar else ''
+            raise ParameterError(name, f'a known parameter{hint}', repr(given[name]))
     config = replace_values(config, {name: value for name, value in given.items() if name in KNOWN})
     values = flatten(config)
     rows = [(name, values[name], _build_descriptor(parameter)) for name, parameter in KNOWN.items()]

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -45,7 +46,11 @@ def load_parameter_file(path: Path | str) -> Config:
         if key in NODE_KEYS:
             if not isinstance(section, Mapping) or not isinstance(section.get('ros__parameters'), Mapping):
                 raise ParameterError(f'{path}: {key}', 'ros__parameters with parameters below it', repr(section)[:_WIDTH])
-            values.update(_flatten_group(section['ros__parameters']))
+            given = list(_flatten_group(section['ros__parameters']))
+            names = Counter(name for name, _ in given)
+            if len(names) < len(given):
+                raise ParameterError(names.most_common(1)[0][0], f'one value in section {key}', 'two, nested and dotted')
+            values.update(given)
     return replace_values(Config(), values)
 
 
@@ -56,8 +61,6 @@ def _flatten_group(group: Mapping[Any, object], prefix: str = '') -> Iterator[tu
         if name.split('.')[0] in NODE_ONLY:
             continue
         if name in KNOWN:
-            if isinstance(value, int) and abs(value) >= 2**63:
-                raise ParameterError(name, 'a number of 64 bits', f'one of {len(str(value))} digits')
             yield name, value
         elif not any(known.startswith(f'{name}.') for known in KNOWN):
             raise ParameterError(name, 'a known parameter', repr(value)[:_WIDTH])

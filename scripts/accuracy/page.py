@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+import yaml
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / 'doc' / 'accuracy.md'
 IMAGES = ROOT / 'doc' / 'images'
@@ -15,6 +17,19 @@ def format_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a Markdown table."""
     lines = [head, ['---'] * len(head), *rows]
     return '\n'.join('| ' + ' | '.join(cells) + ' |' for cells in lines)
+
+
+def print_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print a Markdown table, each row as soon as it is there."""
+    print(format_table(head, ()), flush=True)
+    for row in rows:
+        print(format_table(row, ()).partition('\n')[0], flush=True)
+
+
+def parse_setting(text: str) -> tuple[str, object]:
+    """Return the name and the value of a text NAME=VALUE of the command line."""
+    name, _, value = text.partition('=')
+    return name, yaml.safe_load(value)
 
 
 def find_blocks(page: str) -> dict[str, str]:

@@ -105,7 +105,7 @@ def make_power_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig
 def make_boltzmann_rates(recordings: Sequence[ObservedRecording], _: LikelihoodConfig) -> tuple[float, ...]:
     """Return the inverse temperatures [s^5/m^2] that are tried."""
     tables = [each.candidates for recording in recordings for each in recording.observations]
-    effort = float(np.median([table.cost_to_go[table.is_solved].min() for table in tables]))
+    effort = float(np.median([table.cost_to_go[table.has_likelihood].min() for table in tables]))
     return tuple(rate / effort for rate in RATES)
 
 

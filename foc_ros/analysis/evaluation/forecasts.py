@@ -69,20 +69,21 @@ class Forecast(Record):
 
 def published_shares(observation: Observation, _: None = None) -> Array:
     """Return the shares (k,) of the candidates by the likelihoods that the node publishes."""
-    return _add_unsolved(observation, observation.candidates.likelihood[observation.candidates.is_solved])
+    return _add_unsolved(observation, observation.candidates.likelihood[observation.candidates.has_likelihood])
 
 
 def power_rule_shares(observation: Observation, config: LikelihoodConfig) -> Array:
     """Return the shares (k,) that the node would publish with other parameters of the likelihood."""
     candidates = observation.candidates
-    solved = np.flatnonzero(candidates.is_solved)
+    solved = np.flatnonzero(candidates.has_likelihood)
     costs = compute_shared_cost(candidates.effort_spent, config) + candidates.cost_to_go[solved]
-    return _add_unsolved(observation, compute_likelihoods(costs, config, candidates.branch_times.take(solved)))
+    branch_times, shortfalls = candidates.branch_times.take(solved), candidates.safety_shortfall[solved]
+    return _add_unsolved(observation, compute_likelihoods(costs, config, branch_times, shortfalls))
 
 
 def boltzmann_shares(observation: Observation, inverse_temperature: float) -> Array:
     """Return the maximum-entropy rule exp(-b J), (k,); b: inverse temperature [s^5/m^2]. Effort spent is the same for all."""
-    cost = observation.candidates.cost_to_go[observation.candidates.is_solved]
+    cost = observation.candidates.cost_to_go[observation.candidates.has_likelihood]
     weights = np.exp(-inverse_temperature * (cost - cost.min()))
     return _add_unsolved(observation, weights / weights.sum())
 
@@ -91,5 +92,5 @@ def _add_unsolved(observation: Observation, solved: Array) -> Array:
     """Return shares (k,) of all candidates from those of the solved ones, which sum to 1."""
     count = len(observation.candidates)
     shares = np.full(count, 1.0 / count)
-    shares[observation.candidates.is_solved] = solved * (len(solved) / count)
+    shares[observation.candidates.has_likelihood] = solved * (len(solved) / count)
     return shares

@@ -38,19 +38,21 @@ from .ground_truth import (
 class CandidateTable(Record):
     """The k candidates of one prediction, about n obstacles.
 
-    labels; goal (k,): row of the goals; is_solved (k,); effort_spent [m^2/s^5]: since onset, the same for all; cost_to_go (k,)
-    [m^2/s^5]: effort to go and what its time costs; likelihood (k,): as published, 0 unless solved; length (k,) [m]: of the
-    shortest path in its class; time_price [m^2/s^6]; time_s (k,): time to the goal; is_named (k, n): whether the obstacle is in
-    the label; sides (k, n): LEFT or RIGHT, on which the candidate passes each obstacle; mean (k, h, 2) [m] and covariance
-    (k, h, 2, 2) [m^2]: of the position at `TIMES_S`; duration_sensitivity (k, h, 2) [m]: by how much the position lags behind for
-    each share of the time to go that the movement takes longer; branch_times: when the candidates part.
+    labels; goal (k,): row of the goals; has_likelihood (k,): whether each takes part; effort_spent [m^2/s^5]: since onset, the
+    same for all; cost_to_go (k,) [m^2/s^5]: effort to go and what its time costs; safety_shortfall (k,): by how much the safety
+    factor is below the wanted one; likelihood (k,): as published; length (k,) [m]: of the shortest path in its class; time_price
+    [m^2/s^6]; time_s (k,): time to the goal; is_named (k, n): whether the obstacle is in the label; sides (k, n): LEFT or RIGHT,
+    on which the candidate passes each obstacle; mean (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2]: of the position at
+    `TIMES_S`; duration_sensitivity (k, h, 2) [m]: by how much the position lags behind for each share of the time to go that the
+    movement takes longer; branch_times: when the candidates part.
     """
 
     labels: tuple[str, ...]
     goal: NDArray[np.int64]
-    is_solved: Bools
+    has_likelihood: Bools
     effort_spent: float
     cost_to_go: Array
+    safety_shortfall: Array
     likelihood: Array
     length: Array
     time_price: float
@@ -110,7 +112,7 @@ def observe(recording: Recording, config: Config) -> ObservedRecording:
         if step.sample is not None:
             stamps.append(step.sample.stamp_ns)
             positions.append(step.sample.position)
-        if step.prediction is not None and step.prediction.solved_candidates:
+        if step.prediction is not None and step.prediction.candidates_with_likelihood:
             assert replayed.pipeline.hand_state is not None
             made.append((step, replayed.pipeline.hand_state))
     if not made:
@@ -119,13 +121,14 @@ def observe(recording: Recording, config: Config) -> ObservedRecording:
     goals = made[-1][0].scene.goals
     assert goals is not None
     path = RecordedPath(np.array(stamps), np.array(positions), goals)
-    found = [_make_observation(step, hand, path, config.duration) for step, hand in made if hand.stamp_ns <= path.end_ns]
+    found = [make_observation(step, hand, path, config.duration) for step, hand in made if hand.stamp_ns <= path.end_ns]
     if not found:
         raise RecordingError(f'{recording.name}: nothing was predicted before its goal was reached')
     return ObservedRecording(recording.name, tuple(found))
 
 
-def _make_observation(step: Step, hand: HandState, path: RecordedPath, duration: DurationConfig) -> Observation:
+def make_observation(step: Step, hand: HandState, path: RecordedPath, duration: DurationConfig) -> Observation:
+    """Return one prediction, with the hand that it was made from, beside what came: path is the whole path of the hand."""
     prediction, goals = step.prediction, step.scene.goals
     assert prediction is not None and goals is not None
     obstacles = step.scene.obstacles(prediction.stamp_ns)
@@ -156,9 +159,10 @@ def _tabulate_candidates(
     return CandidateTable(
         labels=tuple(each.candidate.label for each in predicted),
         goal=np.array([each.candidate.goal for each in predicted]),
-        is_solved=np.array([each.is_solved for each in predicted]),
+        has_likelihood=np.array([each.has_likelihood for each in predicted]),
         effort_spent=effort_spent,
         cost_to_go=np.array([each.effort * each.dt + price * each.times[-1] for each in solutions]),
+        safety_shortfall=np.array([each.safety_shortfall for each in solutions]),
         likelihood=np.array([each.likelihood for each in predicted]),
         length=np.array([each.candidate.length for each in predicted]),
         time_price=price,
@@ -178,6 +182,6 @@ def _find_predicted_sides(predicted: PredictedCandidate, obstacles: Obstacles) -
     """Return the sides (n,) of a candidate: those of its solved path, or those in its label where it could not be solved."""
     solution = predicted.solution
     centres = centre_trajectories(obstacles.centre, solution.dt * obstacles.velocity, len(solution.mean) - 1)
-    named = {} if predicted.is_solved else dict(predicted.candidate.sides)
+    named = {} if predicted.has_likelihood else dict(predicted.candidate.sides)
     sides = find_sides(solution.path, centres)
     return np.array([named.get(identity, side) for identity, side in zip(obstacles.ids, sides, strict=True)], dtype=np.int8)

@@ -11,6 +11,7 @@ import numpy as np
 from rich.bar import Bar
 from rich.console import Console
 from rich.live import Live
+from rich.markup import escape
 from rich.table import Table
 
 from foc_ros.core.config import Config
@@ -19,7 +20,7 @@ from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
 from foc_ros.io.bags import Item
-from foc_ros.reporting.snapshots import Snapshot, is_same_prediction, read_snapshot
+from foc_ros.reporting.snapshots import CandidateView, Snapshot, is_same_prediction, read_snapshot
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.decode_poses import decode_stamp
 
@@ -123,24 +124,30 @@ def show_live(
         if live is not None:
             live.update(_make_table(snapshot, heading), refresh=True)
             return
-        shares = '   '.join(f'{100 * each.likelihood:.0f} % {each.label}' for each in snapshot.candidates)
+        shares = '   '.join(_describe(each) for each in snapshot.candidates)
         console.print(f'{heading}   {shares or "no solved candidate"}', highlight=False, soft_wrap=True, markup=False)
 
     with live or nullcontext():
         yield update
 
 
+def _describe(candidate: CandidateView) -> str:
+    return f'{100 * candidate.likelihood:.0f} % {candidate.label}' + f' ({candidate.description})' * bool(candidate.description)
+
+
 def _make_table(snapshot: Snapshot, title: str) -> Table:
     table = Table(title=title, title_justify='left', caption_justify='left', expand=False)
-    table.caption = '+ passes the obstacle on the left, - on the right'
-    table.add_column('candidate', width=24, no_wrap=True)
-    table.add_column('likelihood', width=30)
-    for name, width in (('', 5), ('effort', 8), ('cost', 7), ('eta', 5)):
+    table.caption = '* compromised: eta is below the wanted one'
+    table.add_column('candidate', width=20, no_wrap=True)
+    table.add_column('passes', width=26, no_wrap=True)
+    table.add_column('likelihood', width=12)
+    for name, width in (('', 5), ('effort', 8), ('cost', 7), ('eta', 6)):
         table.add_column(name, justify='right', width=width)
     for each in snapshot.candidates[:ROWS]:
         bar = Bar(1.0, 0.0, each.likelihood, color='bright_blue')
         share, ratio = f'{100 * each.likelihood:.0f} %', f'x {each.cost_ratio:.3g}'
-        table.add_row(each.label, bar, share, f'{each.effort:.3g}', ratio, f'{each.eta:.2f}')
+        eta = f'{each.eta:.2f}' + '*' * each.is_compromised
+        table.add_row(escape(each.label), escape(each.description), bar, share, f'{each.effort:.3g}', ratio, eta)
     for row in range(len(snapshot.candidates), ROWS):
         table.add_row('' if row else 'no solved candidate')
     return table

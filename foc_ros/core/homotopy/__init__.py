@@ -5,12 +5,13 @@ May import `foc_ros.core.dynamics`, `obstacles`, `estimation` and the ground mod
 """
 
 from .guesses import timed
-from .search import Search, search
+from .search import Search, Turn, search
 from .search_scene import named_obstacles
 from .sides import compute_swept_angles, find_path_sides, is_same_class, sweep_angles
 
 __all__ = [
     'Search',
+    'Turn',
     'compute_swept_angles',
     'find_path_sides',
     'is_same_class',

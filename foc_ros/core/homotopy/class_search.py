@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.core.kernels import Indices
+from foc_ros.core.deadline import NEVER, Deadline
+from foc_ros.core.kernels import Indices, Vector
 from foc_ros.core.types import LEFT, RIGHT, Array
 
 from .guesses import TautPath, lay_out
@@ -27,6 +28,8 @@ FEW, MOST = 16, 64
 """So many circles are always in the graph together; a graph grows up to the larger number."""
 CLOSE = 1.02
 """Excess of the circles that the graph of a crowd begins with: the best paths through a crowd are nearly straight."""
+GROWTH = 4.0
+"""A larger graph takes at least this times as long to build; it is not begun if there is less time left."""
 FINENESS = 257
 """Number of points at which a path is compared with circles that are not in its graph."""
 NANO = 1e9
@@ -56,7 +59,7 @@ class ClassQuery(NamedTuple):
     """Which classes to find.
 
     goal: row; ids (n,) of the obstacles; velocity (2,): of the hand [m/s]; max_states: number that a path search may look at;
-    expected: number of classes that are likely to be asked for.
+    expected: number of classes that are likely to be asked for; deadline: after it no graph grows, and no path search begins.
     """
 
     goal: int
@@ -64,17 +67,19 @@ class ClassQuery(NamedTuple):
     velocity: Array
     max_states: int
     expected: int
+    deadline: Deadline = NEVER
 
 
 class PartialGraph(NamedTuple):
     """The tangent graph of some of the obstacles.
 
-    rows: obstacles in the graph; others: those that are not; named: rows of the obstacles that the names to the goal contain, in
-    their order; limit: length of a path that may touch one of the others [m]; max_key: bound on the paths to find [m], finite if
-    there will be a larger graph beyond.
+    goal: row of the goal in the graph; rows: obstacles in the graph; others: those that are not; named: rows of the obstacles
+    that the names to the goal contain, in their order; limit: length of a path that may touch one of the others [m]; max_key:
+    bound on the paths to find [m], finite if there will be a larger graph beyond.
     """
 
     graph: TangentGraph
+    goal: int
     rows: list[int]
     others: Indices
     named: list[int]
@@ -87,48 +92,69 @@ def name_course(sides: Sequence[tuple[str, int]]) -> str:
     return ''.join([('+' if side == LEFT else '-') + identity for identity, side in sides])
 
 
-def find_classes(scene: SearchScene, query: ClassQuery, notes: Counter[str]) -> Iterator[PathClass]:
-    """Yield each class to a goal once, in the order of their rank; notes: counts of what is decided, see `search.Search`."""
+def find_classes(scene: SearchScene, query: ClassQuery, notes: Counter[str], is_due: bool = False) -> Iterator[PathClass]:
+    """Yield each class to a goal once, in the order of their rank.
+
+    notes: counts of what is decided, see `search.Search`; is_due: whether to look for the first class whatever the time.
+    """
     named = sorted(np.flatnonzero(scene.is_named[query.goal]).tolist(), key=query.ids.__getitem__)
-    nearest: list[int] = np.argsort(scene.excess, kind='stable').tolist()
-    rows, given = _choose_circles(scene, named, nearest), set[str]()
+    # a graph for all goals costs less than one for each, but is too large a step between two looks at the clock
+    is_shared = query.deadline.at is None
+    excess = scene.excess.min(axis=0) if is_shared else scene.excess[query.goal]
+    nearest: list[int] = np.argsort(excess, kind='stable').tolist()
+    rows, given = _choose_circles(excess if is_shared else None, named, nearest), set[str]()
     while True:
-        partial = _build_partial_graph(scene, query.goal, sorted(rows), named)
+        together = len(scene.goals) if is_shared else max(1, MOST // max(len(rows), 1))
+        before_s = query.deadline.left_s
+        partial = _build_partial_graph(scene, excess, query.goal, sorted(rows), named, together)
+        built_s = before_s - query.deadline.left_s
         most = _count_classes(partial)
         for found in _find_named_paths(scene, partial, query, notes):
             if found.course in given:
                 continue
             met = _find_met(scene, found, partial.others) if found.key >= partial.limit else []
-            if met and len(rows) < MOST:
+            is_late = query.deadline.left_s < built_s and (bool(given) or not is_due)
+            if met and len(rows) < MOST and not is_late:
                 rows = [*rows, *met]
                 break
             given.add(found.course)
-            if met:
-                notes['left_out'] += 1
-            else:
+            notes['left_out'] += bool(met)
+            if is_late or not met:
                 yield found
             if len(given) == most:
                 return
         else:
             if math.isinf(partial.max_key):
                 return
+            if query.deadline.left_s < GROWTH * built_s and (given or not is_due):
+                notes['search_late'] += 1
+                return
             rows = nearest[: min(2 * len(rows), MOST)]
 
 
-def _choose_circles(scene: SearchScene, named: list[int], nearest: list[int]) -> list[int]:
-    """Return the rows to begin with: all of a few obstacles, the named ones of many if they are few, or the close ones."""
-    rows, close = {*named, *nearest[: FEW // 2]}, int((scene.excess < CLOSE).sum())
+def _choose_circles(excess: Vector | None, named: list[int], nearest: list[int]) -> list[int]:
+    """Return the rows to begin with: all of a few obstacles, the named ones of many if they are few, or the close ones.
+
+    excess: None for a small first step, where time is limited.
+    """
+    rows, close = {*named, *nearest[: FEW // 2]}, 0 if excess is None else int((excess < CLOSE).sum())
     return list(rows) if len(rows) <= FEW < len(nearest) else nearest[: min(max(close, FEW), MOST)]
 
 
-def _build_partial_graph(scene: SearchScene, goal: int, rows: list[int], named: list[int]) -> PartialGraph:
-    """Build the graph of some obstacles for one goal; a graph without all named ones is one to grow, up to MOST."""
-    arrays = scene.centre[rows], scene.radius[goal, rows], scene.goals, scene.hand
+def _build_partial_graph(
+    scene: SearchScene, excess: Vector, goal: int, rows: list[int], named: list[int], together: int
+) -> PartialGraph:
+    """Build the graph of some obstacles for one goal; a graph without all named ones is one to grow, up to MOST.
+
+    excess (n,): see `SearchScene`; together: number of goals that share a graph.
+    """
+    first = goal // together * together
+    arrays = scene.centre[rows], scene.radius[goal, rows], scene.goals[first : first + together], scene.hand
     graph = _build_graph(*[array.tobytes() for array in arrays])
     others = np.delete(np.arange(len(scene.centre)), rows)
-    limit = float(scene.excess[others].min(initial=np.inf)) * math.dist(scene.goals[goal], scene.hand)
+    limit = float(excess[others].min(initial=np.inf)) * math.dist(scene.goals[goal], scene.hand)
     is_enough = len(rows) >= MOST or set(rows).issuperset(named)
-    return PartialGraph(graph, rows, others, named, limit, np.inf if is_enough else limit)
+    return PartialGraph(graph, goal - first, rows, others, named, limit, np.inf if is_enough else limit)
 
 
 @lru_cache(maxsize=4)
@@ -152,7 +178,7 @@ def _find_named_paths(scene: SearchScene, partial: PartialGraph, query: ClassQue
     held = [row for row in partial.named if row in place]
     bearing_change, is_complete = scene.bearing_change[query.goal, held], len(held) == len(partial.named)
     paths = PathQuery(
-        query.goal,
+        partial.goal,
         query.velocity,
         np.array([place[row] for row in held], dtype=np.intp),
         bearing_change,
@@ -161,7 +187,7 @@ def _find_named_paths(scene: SearchScene, partial: PartialGraph, query: ClassQue
         query.max_states,
         _count_classes(partial) if is_complete else query.max_states,
     )
-    for tied in find_shortest_paths(partial.graph, paths, query.expected, notes):
+    for tied in find_shortest_paths(partial.graph, paths, query.expected, notes, query.deadline):
         classes = []
         for key, runs, swept in tied:
             angles = dict(zip(held, swept, strict=True))

@@ -40,7 +40,7 @@ class SearchScene(NamedTuple):
     way to each goal [m], smaller if they would hold the hand (holds_hand (n,)) or the goal (holds_goal (g, n)).
     is_goal_inside (g,): whether an obstacle, without the clearance, holds the goal. is_named (g, n): whether the names of the
     paths to a goal contain an obstacle. bearing_change (g, n): direction of the goal less direction of the hand, as seen from
-    each centre [rad]. excess (n,): least length of a path to any goal that touches a circle, as a multiple of the straight line.
+    each centre [rad]. excess (g, n): least length of a path to a goal that touches a circle, as a multiple of the straight line.
     """
 
     hand: Vector
@@ -53,7 +53,7 @@ class SearchScene(NamedTuple):
     is_goal_inside: Flags
     is_named: FlagTable
     bearing_change: Matrix
-    excess: Vector
+    excess: Matrix
 
 
 def build_search_scene(
@@ -119,7 +119,7 @@ def measure_scene(hand: Vector, goals: Matrix, centre: Matrix, radius: Vector, w
     (g, n), goals = slack.shape, goals.copy()
     on_way, holds_hand, holds_goal = np.empty((g, n)), np.empty(n, np.bool_), np.empty((g, n), np.bool_)
     is_inside, is_named, bearing_change = np.zeros(g, np.bool_), np.empty((g, n), np.bool_), np.empty((g, n))
-    excess = np.full(n, np.inf)
+    excess = np.empty((g, n))
     for k in range(n):
         holds_hand[k] = np.hypot(hand[0] - centre[k, 0], hand[1] - centre[k, 1]) <= wanted[k]
     for goal in range(g):
@@ -140,7 +140,7 @@ def measure_scene(hand: Vector, goals: Matrix, centre: Matrix, radius: Vector, w
             is_named[goal, k] = is_in_names(hand_x, hand_y, goal_x, goal_y, circle, straight, slack[goal, k])
             # a negative zero counts as zero, as it does in `count_crossing`
             bearing_change[goal, k] = np.arctan2(goal_y + 0.0, goal_x + 0.0) - np.arctan2(hand_y + 0.0, hand_x + 0.0)
-            excess[k] = min(excess[k], max(hand_distance + goal_distance - 2.0 * circle, straight) / straight)
+            excess[goal, k] = max(hand_distance + goal_distance - 2.0 * circle, straight) / straight
     return SearchScene(hand, goals, centre, wanted, on_way, holds_hand, holds_goal, is_inside, is_named, bearing_change, excess)
 
 

@@ -3,12 +3,15 @@
 C = R^2 - |p - o|^2 <= 0 with R ~ N(mu_R, sigma_R^2), and p - o Gaussian. Linearised at a guess p*, with d = p* - mean(o):
 E[C] = mu_R^2 + sigma_R^2 - |d|^2 - 2 d.(mean(p) - p*),  Var[C] = 4 mu_R^2 sigma_R^2 + 2 sigma_R^4 + 4 d' P d,
 P the covariance of p - o. Cantelli: E[C] + k sqrt(Var[C]) <= 0 gives Pr(C <= 0) >= k^2 / (1 + k^2) (paper, equations 8-15). The
-safety factor k of a movement is -E[C] / sqrt(Var[C]), linearised at its own mean.
+safety factor k of a movement is -E[C] / sqrt(Var[C]), linearised at its own mean. Where C is Gaussian, Pr(C <= 0) = Phi(k). By
+Boole's inequality n events, each with a probability of failure of at most 1 - p, all succeed with at least 1 - n (1 - p).
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +47,39 @@ def k_of_eta(eta: float) -> float:
 def eta_of_k(k: float) -> float:
     """Return eta = k^2 / (1 + k^2); 0 for k <= 0, where the surrogate guarantees nothing."""
     return k * k / (1.0 + k * k) if k > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class RiskBound:
+    """What a safety factor k guarantees.
+
+    bound: `cantelli`, for any distribution, or `gaussian`; events: number of pairs of an obstacle and a step that eta covers
+    together, 1 where it covers each of them alone.
+    """
+
+    bound: str = 'cantelli'
+    events: int = 1
+
+    def find_safety_factor(self, eta: float) -> float:
+        """Return the smallest k >= 0 that guarantees eta, for eta in [0, 1)."""
+        share = 1.0 - (1.0 - eta) / self.events
+        if self.bound == 'cantelli':
+            return k_of_eta(share)
+        return max(NormalDist().inv_cdf(share), 0.0) if share > 0.0 else 0.0
+
+    def find_probability(self, k: float) -> float:
+        """Return the eta that k guarantees."""
+        share = eta_of_k(k) if self.bound == 'cantelli' else NormalDist().cdf(k)
+        return max(1.0 - self.events * (1.0 - share), 0.0)
+
+
+CANTELLI = RiskBound()
+"""The bound of the paper, for each obstacle at each step."""
+
+
+def count_events(risk: str, obstacles: int, steps: int) -> int:
+    """Return the number of events that eta covers together, for a value of `foc.risk` and numbers of obstacles and steps."""
+    return max(obstacles * steps, 1) if risk == 'path' else 1
 
 
 def size_moments(obstacles: Obstacles) -> tuple[Array, Array]:

@@ -32,8 +32,11 @@ class Scene(Record):
 
     def with_source(self, name: str, source: ObstacleSource) -> Scene:
         """Return the scene with the obstacles of one source replaced; this source is now the latest."""
-        parts = {other: part for other, part in self.sources.items() if other != name}
-        return replace(self, sources=parts | {name: source})
+        return replace(self, sources=self.without_source(name).sources | {name: source})
+
+    def without_source(self, name: str) -> Scene:
+        """Return the scene without the obstacles of one source."""
+        return replace(self, sources={other: part for other, part in self.sources.items() if other != name})
 
     def with_goals(self, goals: Array, frame_id: str) -> Scene:
         """Return the scene with all goals replaced."""

@@ -1,4 +1,4 @@
-"""The minimum safety factor k of a control, over all obstacles and times, and the eta that it guarantees.
+"""The minimum safety factor k of a control, over all obstacles and times.
 
 Where the control keeps clear between the steps too, the minimum is sought there as well. It then changes smoothly with the
 control, where the minimum over the steps alone has kinks as it passes from one step to the next.
@@ -12,7 +12,7 @@ import numpy as np
 
 from foc_ros.core.dynamics.condensed import position_variances
 from foc_ros.core.kernels import Matrix, Vector, compiled, compiled_with_caller
-from foc_ros.core.obstacles.chance_constraint import CERTAIN_K, constraint_moments, eta_of_k, safety_factor
+from foc_ros.core.obstacles.chance_constraint import CERTAIN_K, constraint_moments, safety_factor
 from foc_ros.core.types import Array
 
 from .contacts.hermite import basis, interpolate, interpolation_row
@@ -33,11 +33,6 @@ class MinimumSafetyFactor(NamedTuple):
     k: float
     obstacle: int
     time: float
-
-    @property
-    def eta(self) -> float:
-        """The probability of avoidance that holds for every obstacle at every time evaluated."""
-        return eta_of_k(self.k)
 
 
 @compiled_with_caller

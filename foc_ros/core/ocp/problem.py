@@ -16,12 +16,14 @@ from foc_ros.core.dynamics.plants import Horizon, find_states_at_goal
 from foc_ros.core.errors import SceneError
 from foc_ros.core.kernels import freeze
 from foc_ros.core.obstacles.chance_constraint import (
+    CANTELLI,
+    RiskBound,
     UncertainCircles,
     centre_trajectories,
     find_first_alike,
-    k_of_eta,
     size_moments,
 )
+from foc_ros.core.safety_preference import HARD, SafetyPreference
 from foc_ros.core.types import Array, Obstacles, Record, as_readonly
 
 from .contacts.hermite import compute_trajectory
@@ -53,7 +55,7 @@ class Problem(Record):
     obstacles
         The circles now.
     eta
-        Wanted probability of avoidance, for each obstacle and step.
+        Wanted probability of avoidance, of the events that `risk` counts.
     at_goal
         (n,) bool: the states that the mean reaches exactly at the goal.
     terminal_weights, stage_weights
@@ -62,6 +64,10 @@ class Problem(Record):
         Time in which a hand that is inside a margin has to leave it [s].
     qp_backend
         Name of the solver of quadratic programmes.
+    risk
+        What a safety factor guarantees.
+    preference
+        How effort and safety are weighed where the wanted eta is dear.
     """
 
     horizon: Horizon
@@ -77,6 +83,13 @@ class Problem(Record):
     stage_weights: Array
     recovery_s: float = 0.0
     qp_backend: str = 'piqp'
+    risk: RiskBound = CANTELLI
+    preference: SafetyPreference = HARD
+
+    @cached_property
+    def wanted_k(self) -> float:
+        """The safety factor that guarantees the wanted eta."""
+        return self.risk.find_safety_factor(self.eta)
 
     @cached_property
     def extent(self) -> float:
@@ -142,7 +155,7 @@ class Problem(Record):
         offset = self.initial_mean[:2] - self.obstacles.centre
         covariance = self.initial_covariance[:2, :2] + self.obstacles.centre_covariance
         variance = self.size[1] + 4 * (offset[:, None] @ covariance @ offset[:, :, None]).ravel()
-        inside: NDArray[np.bool_] = self.size[0] - self._distance_now**2 + k_of_eta(self.eta) * np.sqrt(variance) > 0.0
+        inside: NDArray[np.bool_] = self.size[0] - self._distance_now**2 + self.wanted_k * np.sqrt(variance) > 0.0
         return inside
 
     @property
@@ -239,7 +252,7 @@ class ProblemOptions(TypedDict, total=False):
     """What may differ from the default problem of `rest_to_goal`.
 
     goal_weight: weight w of the position variance at the end; passing: whether the hand passes the goal at any constant velocity
-    instead of resting there; recovery_s, initial_covariance and error_map: as in `Problem`.
+    instead of resting there; recovery_s, initial_covariance, error_map, risk and preference: as in `Problem`.
     """
 
     goal_weight: float
@@ -247,6 +260,8 @@ class ProblemOptions(TypedDict, total=False):
     recovery_s: float
     initial_covariance: Array
     error_map: Array
+    risk: RiskBound
+    preference: SafetyPreference
 
 
 def rest_to_goal(
@@ -273,7 +288,7 @@ def rest_to_goal(
     noise
         c of each channel for one step, (2,).
     eta
-        Wanted probability of avoidance, for each obstacle and step.
+        Wanted probability of avoidance.
     **options
         See :class:`ProblemOptions`.
 
@@ -302,4 +317,6 @@ def rest_to_goal(
         terminal_weights=np.where(np.arange(n) < 2, options.get('goal_weight', 0.0), 0.0),
         stage_weights=np.zeros(n),
         recovery_s=options.get('recovery_s', 0.0),
+        risk=options.get('risk', CANTELLI),
+        preference=options.get('preference', HARD),
     )

@@ -55,16 +55,18 @@ def solve_problem(problem: Problem, start: Start, settings: FocConfig, deadline:
         problem = replace(problem, qp_backend=settings.qp_backend)
     try:
         result = strategy(problem, start, settings, deadline)
-    except OutOfTimeError:
-        result = give_up_out_of_time(problem)
+    except OutOfTimeError as error:
+        result = give_up_out_of_time(problem, error)
     if not isinstance(result, StrategyResult):
         raise InputError(f'strategy {settings.strategy}', 'a StrategyResult as its result', repr(result))
     minimum = result.minimum
     if minimum is None:
         minimum = find_minimum_safety_factor(problem, result.control, between_steps=False)
-    if result.status is Status.SOLVED and result.aims_at_eta and minimum.eta < problem.eta - ETA_TOLERANCE:
-        message = f'the solution achieves eta {minimum.eta:.6g} only'
-        result = replace(result, status=Status.ITERATION_LIMIT, message=message)
+    eta = problem.risk.find_probability(minimum.k)
+    if result.status is Status.SOLVED and result.aims_at_eta and eta < problem.eta - ETA_TOLERANCE:
+        result = replace(result, status=Status.ITERATION_LIMIT, message=f'the solution achieves eta {eta:.6g} only')
+    if result.status is Status.ETA_UNREACHABLE and not problem.preference.is_hard:
+        result = replace(result, status=Status.COMPROMISED)
     return _evaluate(problem, result, minimum, began)
 
 
@@ -74,7 +76,7 @@ def _evaluate(problem: Problem, result: StrategyResult, minimum: MinimumSafetyFa
     mean = problem.free + apply_impulse_response(horizon.states, control).T
     covariance = propagate_covariance(horizon, problem.free_covariance, problem.noise_variance, control)
     violation, violated = compute_violation(problem, mean, result.tau)
-    weights = result.equivalent_weights
+    weights, eta = result.equivalent_weights, problem.risk.find_probability(minimum.k)
     names = [problem.obstacles.ids[row] for row in contacts.obstacle.tolist()]
     return Solution(
         status=result.status,
@@ -87,9 +89,11 @@ def _evaluate(problem: Problem, result: StrategyResult, minimum: MinimumSafetyFa
         costs=compute_cost_terms(problem, control, mean, covariance, result.lam),
         tau=result.tau,
         lam=result.lam,
-        eta=minimum.eta,
+        eta=eta,
         eta_at=_name(problem.obstacles.ids, (minimum.obstacle, minimum.time)) if len(problem.obstacles) else None,
-        eta_reachable=minimum.eta if result.status is Status.ETA_UNREACHABLE else None,
+        eta_reachable=eta if result.status is Status.ETA_UNREACHABLE else None,
+        safety_factor=minimum.k,
+        safety_shortfall=0.0 if result.status is Status.SOLVED else max(problem.wanted_k - minimum.k, 0.0),
         violation=violation,
         violation_at=_name(problem.obstacles.ids, violated),
         multipliers=tuple(zip(names, contacts.time.tolist(), contacts.multiplier.tolist(), strict=True)),

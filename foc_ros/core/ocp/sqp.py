@@ -13,7 +13,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from foc_ros.core.deadline import NEVER, Deadline
+from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
 from foc_ros.core.kernels import freeze
 from foc_ros.core.types import Array
 
@@ -33,6 +33,15 @@ PATIENCE = 6
 """Moves in the same direction before the sequence is extrapolated."""
 LARGEST_STRETCH = 15.0
 """Most moves by which the next linearisation is extrapolated."""
+
+
+class StoppedError(OutOfTimeError):
+    """The deadline stopped a sequence at the control (2N,) and the contacts of its last QP, from which it may continue."""
+
+    def __init__(self, control: Array, contacts: Contacts) -> None:
+        super().__init__()
+        self.control, self.contacts = control, contacts
+
 
 Jump: TypeAlias = Callable[[Array, Contacts], KktPoint | None]
 
@@ -106,16 +115,21 @@ def converge(
     Raises
     ------
     OutOfTimeError
-        Past the deadline.
+        Past the deadline; a `StoppedError` after the first QP.
     """
     times = np.concatenate((np.arange(1.0, problem.horizon.steps + 1.0), options.between))
     cost = effort_cost(problem, lam)
     solves, creep = 0, _Creep()
+    reached: tuple[Array, Contacts] | None = None
     previous: tuple[bytes, bytes] | None = None
     for count in range(1, options.max_qps + 1):
-        deadline.check()
         qp = clearance_qp(problem, cost, guess, tau, between=options.between)
-        solution = solve(qp, working, thorough=options.thorough)
+        try:
+            solution = solve(qp, working, deadline, thorough=options.thorough)
+        except OutOfTimeError:
+            if reached is None:
+                raise
+            raise StoppedError(*reached) from None
         if solution is None:
             return None
         solves += solution.solves
@@ -123,6 +137,7 @@ def converge(
         positions = problem.positions(control)
         move = float(np.abs(positions - guess).max()) / problem.extent
         contacts = freeze(Contacts(working.obstacle, times[working.step], solution.multipliers))
+        reached = control, contacts
         if move < STAYS or count == options.max_qps:
             return SqpResult(control, positions, working, contacts, solves, count, stays=move < STAYS)
         point = options.jump(control, contacts) if options.jump is not None else None

@@ -14,12 +14,13 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.kernels import Indices, Matrix, Vector, compiled, compiled_with_caller
 from foc_ros.core.linear_algebra import factorise_cholesky, multiply_vector, solve_lower, solve_lower_transposed
 from foc_ros.core.registry import QP_BACKENDS
 from foc_ros.core.types import Array
 
-from .backend import DenseQP, solve_piqp
+from .backend import DenseQP, estimate_time, solve_piqp
 from .qp import GoalSolution, ObstacleRows, ReachingQP, collect_rows, find_violated, schur_complement
 
 Index = NDArray[np.intp]
@@ -107,7 +108,9 @@ class DualQP(NamedTuple):
     immovable: float
 
 
-def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False, thorough: bool = True) -> QPSolution | None:
+def solve(
+    qp: ReachingQP, working: WorkingSet, deadline: Deadline = NEVER, *, elastic: bool = False, thorough: bool = True
+) -> QPSolution | None:
     """Solve a QP by its working set.
 
     Parameters
@@ -116,6 +119,8 @@ def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False, thoroug
         The QP, which names its solver.
     working
         Rows to begin with, for instance those of the last solution.
+    deadline
+        Checked before each round, which is not begun if it is likely to last longer.
     elastic
         Whether rows that contradict each other share the violation (least squares, each weighted by the effect of its control;
         the first `MOST_ELASTIC` of many), so that there always is a solution.
@@ -126,10 +131,16 @@ def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False, thoroug
     -------
     QPSolution | None
         None where no control meets every row.
+
+    Raises
+    ------
+    OutOfTimeError
+        Past the deadline.
     """
     goal = qp.cost.goal_solution
     control, multipliers = goal.control, np.zeros(0)
     for solves in range(1, MAX_ROUNDS + 1):
+        deadline.check(estimate_time(len(working)))
         if len(working):
             dual = reduce_to_range_space(qp.obstacle_rows, *working.rows, goal, ELASTICITY if elastic else 0.0)
             found = solve_dual(dual, qp.backend, elastic=elastic)
@@ -145,7 +156,10 @@ def solve(qp: ReachingQP, working: WorkingSet, *, elastic: bool = False, thoroug
             return QPSolution(control, working.only(active), multipliers[active], solves)
         kept = working if elastic else working.only(multipliers > 0)
         working = kept.unite(obstacle, step, qp.limits.shape[1])
-    return solve_full(qp) if thorough and not elastic else None
+    if elastic or not thorough:
+        return None
+    deadline.check(estimate_time(len(goal.control), qp.limits.size))
+    return solve_full(qp)
 
 
 def solve_dual(dual: DualQP, backend: str, *, elastic: bool = False) -> Array | Failed:

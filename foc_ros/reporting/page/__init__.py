@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from foc_ros.core.errors import FocError, InputError
+from foc_ros.io.outputs import MARK, check_replaceable
 
 try:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -35,7 +36,7 @@ def load_plotly() -> str:
 
 
 _TEMPLATES = Environment(autoescape=True, undefined=StrictUndefined, loader=FileSystemLoader(FOLDER), trim_blocks=True)
-_TEMPLATES.globals.update(policy=POLICY, source=read_part, plotly=load_plotly)
+_TEMPLATES.globals.update(policy=POLICY, mark=MARK, source=read_part, plotly=load_plotly)
 _TEMPLATES.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
 _PARTS: Any = _TEMPLATES.get_template('parts.html').module
 
@@ -46,7 +47,11 @@ def render(template: str, **values: Any) -> str:
 
 
 def write_page(directory: Path, name: str, page: str) -> None:
-    """Write a page to a folder, which is made if necessary; raise InputError if that cannot be done."""
+    """Write a page to a folder, which is made if necessary; raise InputError if that cannot be done.
+
+    A page that foc_ros has made is replaced; another file of that name is not.
+    """
+    check_replaceable('--report', directory / name)
     try:
         directory.mkdir(parents=True, exist_ok=True)
         (directory / name).write_text(page, encoding='utf-8')

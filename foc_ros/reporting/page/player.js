@@ -8,6 +8,7 @@ const goals = data.goals.map((places) => places.map(([x, y]) => [LENGTH * x, LEN
 const scenes = data.scenes.map((rows) => rows.map(([name, ...disc]) => [name, ...disc.map((value) => LENGTH * value)]));
 const frameTimes = data.frames.map((frame) => data.times[frame.at]);
 const mostCandidates = Math.max(...data.frames.map((frame) => frame.candidates.length));
+const mostUnsolved = Math.max(...data.frames.map((frame) => frame.unsolved.length));
 const slotOf = (track) => data.tracks[track].slot;
 const letterOf = (track) => (slotOf(track) === null ? '' : String.fromCharCode(65 + slotOf(track)));
 // Above this number of points, the likelihoods are drawn without marks.
@@ -39,31 +40,45 @@ function outlines(ellipses, points = 36) {
 const alpha = (colour, share) => colour + Math.round(255 * share).toString(16).padStart(2, '0');
 const faded = (track) => state.focus !== null && state.focus !== track;
 
+// A compromised candidate, whose eta is below the wanted one, is dotted.
+const lineOf = (candidate) => (candidate.compromised ? 'dot' : dashOf(slotOf(candidate.track)));
+const discsOf = (ellipses) => ellipses.map(([cx, cy, a, b, angle]) => [LENGTH * cx, LENGTH * cy, LENGTH * a, LENGTH * b, (Math.PI * angle) / 180]);
+
 function candidateTraces(frame, candidate) {
   const colour = colourOf(slotOf(candidate.track));
   const share = shareOf(candidate.track, frame.at);
   const weight = faded(candidate.track) ? 0.15 : 1;
   const [x, y] = [sums(candidate.x, LENGTH), sums(candidate.y, LENGTH)];
-  const discs = candidate.ellipses.map(([cx, cy, a, b, angle]) => [LENGTH * cx, LENGTH * cy, LENGTH * a, LENGTH * b, (Math.PI * angle) / 180]);
   const solid = colour.startsWith('#') && colour.length === 7;
-  const spread = {
-    ...outlines(discs), fill: 'toself', fillcolor: solid ? alpha(colour, weight * (0.02 + 0.1 * share)) : 'rgba(0,0,0,0)',
-    line: { color: colour, width: 1 }, opacity: weight * (0.25 + 0.6 * share), meta: { spread: candidate.track },
+  const motor = {
+    ...outlines(discsOf(candidate.motor)), fill: 'toself', fillcolor: solid ? alpha(colour, weight * (0.04 + 0.16 * share)) : 'rgba(0,0,0,0)',
+    line: { color: colour, width: 1 }, opacity: weight * (0.25 + 0.6 * share), meta: { motor: candidate.track },
+  };
+  const total = {
+    ...outlines(discsOf(candidate.total)), line: { color: colour, width: 1, dash: 'dash' }, opacity: weight * (0.25 + 0.6 * share),
+    meta: { total: candidate.track },
   };
   const middle = Math.floor(x.length * (0.45 + 0.12 * (candidate.track % 3)));
   const path = {
-    x, y, type: 'scatter', mode: 'lines', line: { color: colour, dash: dashOf(slotOf(candidate.track)), width: 1.5 + 4 * share },
-    opacity: weight, hoverinfo: 'text', text: plain(`${letterOf(candidate.track)} ${percent(share)} ${data.labels[candidate.label]}`), meta: { candidate: candidate.track },
+    x, y, type: 'scatter', mode: 'lines', line: { color: colour, dash: lineOf(candidate), width: 1.5 + 4 * share, shape: 'spline' },
+    opacity: weight, hoverinfo: 'text', meta: { candidate: candidate.track },
+    text: plain(`${letterOf(candidate.track)} ${percent(share)} ${data.labels[candidate.label]} ${data.labels[candidate.description]}`),
   };
   const tag = {
     x: [x[middle]], y: [y[middle]], type: 'scatter', mode: 'markers+text', text: letterOf(candidate.track), textfont: { size: 11, color: ink('--ink') },
     marker: { size: 17, color: ink('--page'), line: { color: colour, width: 2 } }, opacity: weight, hoverinfo: 'skip',
   };
-  return { spread, path, tag };
+  return { motor, total, path, tag };
 }
 
+// Returns the grey path of a candidate without a likelihood.
+const unsolvedTrace = (lost) => ({
+  x: sums(lost.x, LENGTH), y: sums(lost.y, LENGTH), type: 'scatter', mode: 'lines', line: { color: ink('--soft'), width: 1.2, shape: 'spline' },
+  opacity: 0.6, hoverinfo: 'text', text: plain(`${data.labels[lost.label]}: ${data.labels[lost.reason]}`), meta: { unsolved: lost.label },
+});
+
 const nothing = { x: [], y: [], type: 'scatter', mode: 'lines', hoverinfo: 'skip' };
-const filled = (list) => [...list, ...Array(mostCandidates - list.length).fill(nothing)];
+const filled = (list, most = mostCandidates) => [...list, ...Array(most - list.length).fill(nothing)];
 
 function sceneTraces(frame) {
   const scene = scenes[frame.scene];
@@ -79,7 +94,9 @@ function sceneTraces(frame) {
   return [
     { ...outlines(disc(1)), fill: 'toself', fillcolor: ink('--ring'), line: { color: ink('--disc'), width: 1 } },
     { ...outlines(disc(0)), fill: 'toself', fillcolor: ink('--disc'), line: { color: ink('--soft'), width: 1 } },
-    ...filled(drawn.map((each) => each.spread)),
+    ...filled(frame.unsolved.map(unsolvedTrace), mostUnsolved),
+    ...filled(drawn.map((each) => each.motor)),
+    ...filled(drawn.map((each) => each.total)),
     ...filled(drawn.map((each) => each.path)),
     part(begin, middle, { width: 3 }),
     part(Math.max(begin, middle - 1), end, { width: 2, dash: 'dot' }),
@@ -134,6 +151,19 @@ function letters(tracks) {
   };
 }
 
+// Returns the two traces between which the share of the candidates without a likelihood is hatched, down from 1.
+function unknownTraces() {
+  const [from, to] = [first(data.times, span()[0]), first(data.times, span()[1] + 1e-9)];
+  const edge = { x: data.times.slice(from, to), type: 'scatter', mode: 'lines', line: { width: 0, shape: 'hvh' }, hoverinfo: 'skip' };
+  return [
+    { ...edge, y: edge.x.map(() => 1) },
+    {
+      ...edge, y: data.unknown.slice(from, to).map((share) => 1 - share), fill: 'tonexty', fillcolor: 'rgba(0,0,0,0)',
+      fillpattern: { shape: '/', size: 7, solidity: 0.15, fgcolor: ink('--soft') }, meta: { unknown: true },
+    },
+  ];
+}
+
 function drawLikelihoods() {
   const tracks = visibleTracks();
   const marks = tracks.reduce((sum, { share }) => sum + share.length, 0) <= MOST_MARKS;
@@ -142,7 +172,7 @@ function drawLikelihoods() {
     line: { color: colourOf(slotOf(number)), dash: dashOf(slotOf(number)), width: 2 }, opacity: faded(number) ? 0.15 : 1,
     text: share.map((value) => `${letterOf(number)} ${percent(value)}`), meta: { track: number },
   }));
-  Plotly.react(byId('likelihoods'), [...traces, letters(tracks)], layoutOf({
+  Plotly.react(byId('likelihoods'), [...traces, letters(tracks), ...unknownTraces()], layoutOf({
     height: 210, xaxis: timeAxis(''), yaxis: { range: [-0.03, 1.03], title: { text: 'likelihood', standoff: 4 } }, shapes: [now()], hovermode: 'closest',
   }), CONFIG);
 }
@@ -154,7 +184,7 @@ function drawSpeeds() {
   const predicted = filled([...frame.candidates].reverse().map((candidate) => ({
     x: sums(candidate.t, TIME).map((t) => t + data.times[frame.at]), y: sums(candidate.v, SPEED), type: 'scatter', mode: 'lines', hoverinfo: 'text',
     text: plain(`${letterOf(candidate.track)} ${data.labels[candidate.label]}`), opacity: faded(candidate.track) ? 0.15 : 1,
-    line: { color: colourOf(slotOf(candidate.track)), dash: dashOf(slotOf(candidate.track)), width: 1.2 + 2.5 * shareOf(candidate.track, frame.at) },
+    line: { color: colourOf(slotOf(candidate.track)), dash: lineOf(candidate), width: 1.2 + 2.5 * shareOf(candidate.track, frame.at) },
   })));
   Plotly.react(byId('speeds'), [
     ...predicted,
@@ -208,14 +238,15 @@ function fillTable() {
     bar.append(filling);
     cell(row, '').append(bar);
     cell(row, data.labels[candidate.label]);
+    cell(row, data.labels[candidate.description]);
     cell(row, candidate.ratio === null ? '' : candidate.ratio.toFixed(2), 'number');
-    cell(row, candidate.eta === null ? '' : candidate.eta.toFixed(3), 'number');
+    cell(row, candidate.eta === null ? '' : `${candidate.eta.toFixed(3)}${candidate.compromised ? ' *' : ''}`, 'number');
   }
-  for (const [label, status] of frame.unsolved) {
+  for (const lost of frame.unsolved) {
     const row = body.insertRow();
     cell(row, '✕');
-    const text = cell(row, `${data.labels[label]}: ${data.labels[status].replace(/_/g, ' ')}`);
-    text.colSpan = 5;
+    const text = cell(row, `${data.labels[lost.label]} (${data.labels[lost.description]}): ${data.labels[lost.reason]}`);
+    text.colSpan = 6;
   }
 }
 

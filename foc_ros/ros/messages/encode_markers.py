@@ -1,5 +1,8 @@
 """Encoding of a prediction as a MarkerArray: paths, ellipses and labels of all candidates, and the uncertain obstacles.
 
+Each candidate has two ellipses of one standard deviation at a place: an inner one of the motor noise, which eta is about, and an
+outer one of the total uncertainty. The names of their namespaces and a legend say so.
+
 Every array first deletes the markers of the one before, and all markers expire after LIFETIME_S, so that the drawing of a
 prediction that is not renewed disappears.
 """
@@ -18,7 +21,7 @@ from numpy.typing import NDArray
 from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Prediction
 
 from .plane import lift
-from .ranking import order_candidates
+from .ranking import describe_candidate, find_drawn_curve, order_candidates
 from .types import MessageTypes, make_header
 
 CYLINDER, LINE_STRIP, TEXT = 3, 4, 9
@@ -29,6 +32,13 @@ ELLIPSES = 6
 MAX_DRAWN = 128
 """Number of obstacles drawn, the nearest to the hand: thousands of markers would take longer than the prediction."""
 THICKNESS, TEXT_HEIGHT = 0.002, 0.012
+MOTOR, TOTAL = 'motor_noise', 'total_uncertainty'
+"""Namespaces of the two ellipses."""
+ELLIPSE_STYLES = {MOTOR: (0.3, 2 * THICKNESS), TOTAL: (0.12, THICKNESS)}
+"""Opacity as a share of that of the path, and thickness [m]: the inner ellipse stands out of the outer one."""
+LEGEND = 'ellipses of one standard deviation; inner: motor noise, which eta is about; outer: total uncertainty'
+LEGEND_BELOW_M = 0.05
+"""Distance of the legend from the hand, along the second axis of the plane."""
 
 Colour = tuple[float, float, float, float]
 GREY: Colour = (0.55, 0.55, 0.55, 0.5)
@@ -38,12 +48,13 @@ UNLIKELY, LIKELY = np.array([0.25, 0.45, 0.85]), np.array([0.95, 0.6, 0.05])
 
 
 def encode_markers(prediction: Prediction, obstacles: Obstacles, plane: str, types: MessageTypes) -> Any:
-    """Encode the MarkerArray; unsolved candidates are grey and labelled with their status; obstacles: those at the stamp."""
+    """Encode the MarkerArray; unsolved candidates are grey and labelled with the reason; obstacles: those at the stamp."""
     encoder = _MarkerEncoder(prediction, plane, types)
-    unsolved = [outcome for outcome in prediction.candidates if not outcome.is_solved]
+    unsolved = [outcome for outcome in prediction.candidates if not outcome.has_likelihood]
     markers = [encoder.encode('', 0, 0, action=DELETE_ALL)]
     for index, outcome in enumerate([*order_candidates(prediction), *unsolved]):
         markers.extend(encoder.encode_candidate(index, outcome))
+    markers.extend(encoder.encode_legend())
     markers.extend(encoder.encode_obstacles(obstacles))
     return types.make('visualization_msgs/msg/MarkerArray', markers=markers)
 
@@ -64,29 +75,37 @@ class _MarkerEncoder:
         }
 
     def encode_candidate(self, index: int, outcome: PredictedCandidate) -> Iterator[Any]:
-        solution, likelihood = outcome.solution, outcome.likelihood
-        line = solution.path if np.isfinite(solution.path).all() and len(solution.path) else outcome.candidate.guess
-        if outcome.is_solved:
+        likelihood = outcome.likelihood
+        if outcome.has_likelihood:
             red, green, blue = UNLIKELY + likelihood * (LIKELY - UNLIKELY)
             colour, text = (red, green, blue, 0.4 + 0.6 * likelihood), f'{100 * likelihood:.0f} %'
-            yield from self._encode_ellipses(index, outcome, colour)
+            text += '' if outcome.is_solved else f', compromised: eta {outcome.eta:.3f}'
+            for name, covariance in ((MOTOR, outcome.motor_covariance), (TOTAL, outcome.covariance)):
+                yield from self._encode_ellipses(name, index, outcome.solution.path, covariance, colour)
         else:
-            colour, text = GREY, solution.status.value
-        points = self._lift(line)
+            colour, text = GREY, outcome.reason
+        points = self._lift(find_drawn_curve(outcome))
         width = 0.002 + 0.004 * likelihood
         yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=[self._encode_point(*p) for p in points])
-        label = f'{outcome.candidate.label} {text}'
+        label = f'{outcome.label} ({describe_candidate(outcome, len(self.prediction.goals))}) {text}'
         yield self.encode('label', index, TEXT, colour, (0, 0, TEXT_HEIGHT), points[len(points) // 2], text=label)
 
-    def _encode_ellipses(self, index: int, outcome: PredictedCandidate, colour: Colour) -> Iterator[Any]:
+    def _encode_ellipses(self, name: str, index: int, path: Array, covariance: Array, colour: Colour) -> Iterator[Any]:
         """Yield ellipses of one standard deviation about the mean, spread over the path."""
-        steps = _spread_steps(len(outcome.solution.mean))
-        variances, axes = np.linalg.eigh(outcome.solution.covariance[steps, :2, :2])
+        steps = _spread_steps(len(path))
+        variances, axes = np.linalg.eigh(covariance[steps, :2, :2])
         diameters = (2.0 * np.sqrt(np.maximum(variances, 0.0))).tolist()
         angles = np.arctan2(axes[:, 1, 0], axes[:, 0, 0]).tolist()
-        faint = (*colour[:3], 0.3 * colour[3])
-        for i, centre in enumerate(self._lift(outcome.solution.path[steps])):
-            yield self.encode('deviation', 1000 * index + i, CYLINDER, faint, (*diameters[i], THICKNESS), centre, angles[i])
+        opacity, thickness = ELLIPSE_STYLES[name]
+        faint = (*colour[:3], opacity * colour[3])
+        for i, centre in enumerate(self._lift(path[steps])):
+            yield self.encode(name, 1000 * index + i, CYLINDER, faint, (*diameters[i], thickness), centre, angles[i])
+
+    def encode_legend(self) -> Iterator[Any]:
+        """Yield the legend of the ellipses, below the hand, if any are drawn."""
+        for outcome in self.prediction.candidates_with_likelihood[:1]:
+            (place,) = self._lift(outcome.solution.path[:1] - [0.0, LEGEND_BELOW_M])
+            yield self.encode('legend', 0, TEXT, GREY, (0, 0, TEXT_HEIGHT), place, text=LEGEND)
 
     def encode_obstacles(self, obstacles: Obstacles) -> Iterator[Any]:
         near = self._find_nearest(obstacles)

@@ -1,7 +1,7 @@
 """Encoding of a prediction: a cloud with the whole answer, a table of likelihoods, the most likely path, and markers.
 
-The cloud, the table and the path hold solved candidates only. A candidate's index is its rank, so the most likely one has index
-0. All messages carry the stamp and the frame of the hand sample.
+The cloud, the table and the path hold the candidates with a likelihood only: solved and compromised ones. A candidate's index is
+its rank, so the most likely one has index 0. All messages carry the stamp and the frame of the hand sample.
 """
 
 from __future__ import annotations
@@ -20,19 +20,29 @@ from .plane import lift
 from .ranking import compute_cost_ratios, order_candidates
 from .types import MessageTypes, make_header
 
-_FLOATS = ('x', 'y', 'z', 't', 'vx', 'vy', 'vz', 'xx', 'xy', 'xz', 'yy', 'yz', 'zz')
-CLOUD_ROW = np.dtype([*((name, '<f4') for name in _FLOATS), ('candidate', '<u4'), ('likelihood', '<f4')])
-"""One time sample of one candidate [m, s, m/s, m^2]."""
+_PAIRS = ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')
+_MOTOR = 'motor_'
+_FLOATS = ('x', 'y', 'z', 't', 'vx', 'vy', 'vz', *_PAIRS)
+CLOUD_ROW = np.dtype(
+    [
+        *((name, '<f4') for name in _FLOATS),
+        ('candidate', '<u4'),
+        ('likelihood', '<f4'),
+        ('compromised', '<u4'),
+        *((_MOTOR + pair, '<f4') for pair in _PAIRS),
+    ]
+)
+"""One time sample of one candidate [m, s, m/s, m^2]; compromised: 1 if eta is below the wanted one."""
 LIKELIHOOD_COLUMNS = ('likelihood', 'effort', 'cost_ratio', 'eta')
 
 
 def encode_prediction_cloud(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
-    """Encode all solved candidates as a PointCloud2 of N + 1 rows each; no rows if nothing was solved."""
+    """Encode all candidates with a likelihood as a PointCloud2 of N + 1 rows each; no rows if there are none."""
     return encode_table(types, make_header(types, prediction.stamp_ns, prediction.frame_id), _build_table(prediction, plane))
 
 
 def _build_table(prediction: Prediction, plane: str) -> NDArray[np.void]:
-    """Return the rows of all solved candidates, one candidate after the other, filled column by column."""
+    """Return the rows of all candidates with a likelihood, one candidate after the other, filled column by column."""
     outcomes = order_candidates(prediction)
     solutions = [outcome.solution for outcome in outcomes]
     lengths = [len(solution.mean) for solution in solutions]
@@ -40,18 +50,22 @@ def _build_table(prediction: Prediction, plane: str) -> NDArray[np.void]:
     if not len(rows):
         return rows
     mean = np.concatenate([solution.mean for solution in solutions])
-    covariance = np.concatenate([solution.covariance[:, :2, :2] for solution in solutions])
     for place, axis in enumerate(plane):
-        rows[axis], rows['v' + axis], rows[axis + axis] = mean[:, place], mean[:, 2 + place], covariance[:, place, place]
-    rows[plane], rows[next(axis for axis in 'xyz' if axis not in plane)] = covariance[:, 0, 1], prediction.height
+        rows[axis], rows['v' + axis] = mean[:, place], mean[:, 2 + place]
+    rows[next(axis for axis in 'xyz' if axis not in plane)] = prediction.height
+    for prefix, name in (('', 'covariance'), (_MOTOR, 'motor_covariance')):
+        covariance = np.concatenate([getattr(outcome, name)[:, :2, :2] for outcome in outcomes])
+        rows[prefix + 2 * plane[0]], rows[prefix + 2 * plane[1]] = covariance[:, 0, 0], covariance[:, 1, 1]
+        rows[prefix + plane] = covariance[:, 0, 1]
     rows['t'] = np.concatenate([solution.times for solution in solutions])
     rows['candidate'] = np.repeat(np.arange(len(outcomes)), lengths)
     rows['likelihood'] = np.repeat([outcome.likelihood for outcome in outcomes], lengths)
+    rows['compromised'] = np.repeat([not outcome.is_solved for outcome in outcomes], lengths)
     return rows
 
 
 def encode_likelihoods(prediction: Prediction, types: MessageTypes) -> Any:
-    """Encode one row per solved candidate, with the columns LIKELIHOOD_COLUMNS, as a Float64MultiArray.
+    """Encode one row per candidate with a likelihood, with the columns LIKELIHOOD_COLUMNS, as a Float64MultiArray.
 
     The first dimension's label joins the labels of the candidates by ';'. effort: the remaining one [m^2/s^6].
     """

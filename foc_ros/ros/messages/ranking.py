@@ -1,4 +1,4 @@
-"""The order of the candidates in every output, and their cost ratios."""
+"""The order of the candidates in every output, their cost ratios, their names in words, and their curves."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from functools import lru_cache
 import numpy as np
 
 from foc_ros.core.errors import FocError
-from foc_ros.core.types import PredictedCandidate, Prediction
+from foc_ros.core.ocp.contacts.smooth_path import compute_curve
+from foc_ros.core.types import Array, PredictedCandidate, Prediction, describe_class
 
 MAX_NUMBER = 1e30
 """Largest number that is published; a larger one is an error of the solver, or infinite as a float32."""
@@ -17,19 +18,21 @@ MAX_RATIO = 1e9
 
 @lru_cache(maxsize=1)
 def order_candidates(prediction: Prediction) -> tuple[PredictedCandidate, ...]:
-    """Return the solved candidates: the one called most likely (which changes only by a margin), then by likelihood.
+    """Return the candidates with a likelihood: the one called most likely (which changes only by a margin), then by likelihood.
 
     The result for the last prediction is cached, because every output needs it. Raises FocError, naming the candidate, for a
     number that is not finite or beyond MAX_NUMBER: no such number is published.
     """
-    for outcome in prediction.solved_candidates:
+    for outcome in prediction.candidates_with_likelihood:
         solution = outcome.solution
         arrays = solution.mean, solution.covariance
         numbers = solution.effort, solution.eta, outcome.cost, outcome.likelihood
         # the maximum of an array with a NaN is NaN, and no comparison with NaN is true
         if not all(largest <= MAX_NUMBER for largest in (*(np.abs(each).max() for each in arrays), *map(abs, numbers))):
             raise FocError(f'candidate {outcome.candidate.label}: the solution holds a number that is not finite')
-    return tuple(sorted(prediction.solved_candidates, key=lambda outcome: outcome.candidate.label != prediction.most_likely))
+    return tuple(
+        sorted(prediction.candidates_with_likelihood, key=lambda outcome: outcome.candidate.label != prediction.most_likely)
+    )
 
 
 def compute_cost_ratios(outcomes: tuple[PredictedCandidate, ...]) -> list[float]:
@@ -37,3 +40,16 @@ def compute_cost_ratios(outcomes: tuple[PredictedCandidate, ...]) -> list[float]
     costs = [outcome.cost for outcome in outcomes]
     least = min(costs, default=0.0)
     return [1.0 if cost <= least else min(cost / least, MAX_RATIO) if least > 0.0 else MAX_RATIO for cost in costs]
+
+
+def describe_candidate(outcome: PredictedCandidate, goals: int) -> str:
+    """Return the class of a candidate in words, with its goal if there are several goals."""
+    return outcome.description if goals > 1 else describe_class(outcome.candidate.sides)
+
+
+def find_drawn_curve(outcome: PredictedCandidate) -> Array:
+    """Return the mean path of a candidate as a smooth curve (m, 2) [m]; where there is none, the guess of the search."""
+    solution = outcome.solution
+    if not len(solution.mean) or not np.isfinite(solution.mean).all():
+        return outcome.candidate.guess
+    return compute_curve(solution.path, solution.mean[:, 2:4], solution.dt)

@@ -6,17 +6,17 @@ built-in ones: ``foc_ros.core.registry.STRATEGIES.register('mine', solve_mine)``
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
 from foc_ros.core.config import FocConfig
-from foc_ros.core.deadline import Deadline
+from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
 from foc_ros.core.ocp.contacts.contacts import NO_CONTACTS, Contacts
 from foc_ros.core.ocp.minimum_safety_factor import MinimumSafetyFactor
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.qp import clearance_qp, effort_cost
+from foc_ros.core.ocp.sqp import StoppedError
 from foc_ros.core.ocp.warm_start import Start
 from foc_ros.core.ocp.working_set import WorkingSet, solve
 from foc_ros.core.types import Array, Status
@@ -74,21 +74,27 @@ class Strategy(Protocol):
         """Return the result for a problem, from a start, with the parameters of the settings."""
 
 
-def find_best_effort(problem: Problem, start: Start, tau: float = 0.0, lam: float = 0.0, qp_solves: int = 0) -> StrategyResult:
+def find_best_effort(
+    problem: Problem, start: Start, tau: float = 0.0, lam: float = 0.0, qp_solves: int = 0, deadline: Deadline = NEVER
+) -> StrategyResult:
     """Let rows that contradict each other at the start share the violation: what the hand can do where no control meets them all.
 
-    qp_solves: QPs that were solved before.
+    qp_solves: QPs that were solved before. Where the deadline leaves no time for that, the path ignores the obstacles.
     """
-    elastic = solve(clearance_qp(problem, effort_cost(problem, lam), start.positions, tau), WorkingSet(), elastic=True)
-    control, contacts = np.zeros(2 * problem.horizon.steps), NO_CONTACTS
-    if elastic is not None:
-        control, contacts = elastic.control, Contacts.at_steps(elastic.active, elastic.multipliers)
-        qp_solves += elastic.solves
-    message = 'no path between the obstacles in this homotopy class meets the goal: the path shown violates them least'
+    cost, contacts, shown = effort_cost(problem, lam), NO_CONTACTS, 'ignores them'
+    control = cost.goal_solution.control
+    with suppress(OutOfTimeError):
+        elastic = solve(clearance_qp(problem, cost, start.positions, tau), WorkingSet(), deadline, elastic=True)
+        if elastic is not None:
+            control, contacts = elastic.control, Contacts.at_steps(elastic.active, elastic.multipliers)
+            qp_solves, shown = qp_solves + elastic.solves, 'violates them least'
+    message = f'no path between the obstacles in this homotopy class meets the goal: the path shown {shown}'
     return StrategyResult(Status.INFEASIBLE, message, control, contacts, tau, lam, qp_solves)
 
 
-def give_up_out_of_time(problem: Problem) -> StrategyResult:
-    """Return the movement that ignores all obstacles, for a strategy that ran out of time before it found any."""
+def give_up_out_of_time(problem: Problem, error: OutOfTimeError) -> StrategyResult:
+    """Return the last of a sequence that was stopped; if there is none, the movement that ignores all obstacles."""
+    if isinstance(error, StoppedError):
+        return StrategyResult(Status.DEADLINE, 'out of time', error.control, error.contacts)
     message = 'out of time: the movement shown ignores all obstacles'
     return StrategyResult(Status.DEADLINE, message, effort_cost(problem, 0.0).goal_solution.control)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline
-from foc_ros.core.obstacles.chance_constraint import k_of_eta
 from foc_ros.core.ocp.contacts.contacts import Contacts
 from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
@@ -27,7 +26,7 @@ LARGEST_LAMBDA = 1e150
 
 def solve_algorithm1(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline = NEVER) -> StrategyResult:
     """Run the loop from the positions of a start; its parameters are delta [m^2], Delta, and xi [m^2/s^6] on the effort."""
-    tau, lam, wanted, guess = 0.0, 1.0, k_of_eta(problem.eta), start.positions
+    tau, lam, wanted, guess = 0.0, 1.0, problem.wanted_k, start.positions
     last: QPSolution | None = None
     solves = 0
 

@@ -1,4 +1,4 @@
-"""Strategies `lv` and `hc`: the smallest s on a penalty path that meets the surrogate.
+"""Strategies `lv` and `hc`: the smallest s on a penalty path that meets the surrogate, or one before it where that is too dear.
 
 tau = delta s, lambda = lambda0 growth^s: a small delta slows the hand down (low velocity, `lv`), a large one leads it past at a
 distance (high clearance, `hc`). The paper steps along the path in whole s (algorithm 1); here s is continuous, so that the effort
@@ -16,13 +16,13 @@ import numpy as np
 from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
 from foc_ros.core.homotopy import compute_swept_angles
-from foc_ros.core.obstacles.chance_constraint import eta_of_k, k_of_eta
 from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.warm_start import Start, correct_to_goal
 from foc_ros.core.types import Status
 
 from . import StrategyResult, find_best_effort, give_up_out_of_time
+from .least_loss import compute_loss, find_least_loss
 from .penalty_path import STRIDE, PathFollower, PathPoint, PenaltyPath
 
 WARM_STRIDE = 0.5
@@ -56,19 +56,21 @@ def solve_hc(problem: Problem, start: Start, settings: FocConfig, deadline: Dead
 
 
 def follow_path(problem: Problem, start: Start, path: PenaltyPath, deadline: Deadline = NEVER) -> StrategyResult:
-    """Find the smallest s whose solution meets the surrogate.
+    """Find the smallest s whose solution meets the surrogate, or the s with the least loss where that is smaller.
 
     A warm start follows the earlier solution: it searches around the s of that, and from the beginning of the path where there is
     nothing. It uses Newton steps alone, and ends where they fail.
     """
-    follower = PathFollower(problem, path, deadline, newton_only=start.lam is not None)
+    follower = PathFollower(problem, path, deadline, newton_only=start.lam is not None and problem.preference.is_hard)
     try:
         result = _search(follower, start)
-    except OutOfTimeError:
+    except OutOfTimeError as error:
         best = follower.best
-        result = give_up_out_of_time(problem)
+        result = give_up_out_of_time(problem, error)
         if best is not None:
-            result = _result(follower, Status.DEADLINE, f'out of time, with eta {eta_of_k(best.k):.4g} found', best)
+            result = _result(
+                follower, Status.DEADLINE, f'out of time, with eta {problem.risk.find_probability(best.k):.4g} found', best
+            )
     if result.minimum is None:
         result = replace(result, minimum=find_minimum_safety_factor(problem, result.control, between_steps=True))
     return result
@@ -84,7 +86,7 @@ def _result(follower: PathFollower, status: Status, message: str, point: PathPoi
 
 
 def _search(follower: PathFollower, start: Start) -> StrategyResult:
-    problem, wanted = follower.problem, k_of_eta(follower.problem.eta)
+    problem, wanted = follower.problem, follower.problem.wanted_k
     stride, patience = STRIDE, math.inf
     if start.control is None or start.lam is None:
         first = follower.solve_first(start.positions)
@@ -98,14 +100,22 @@ def _search(follower: PathFollower, start: Start) -> StrategyResult:
         else:
             stride, patience = _stride_to(first, wanted, start.safety_factor_slope or USUAL_SLOPE, WARM_STRIDE), PATIENCE
     if first is None:
-        return find_best_effort(problem, start, *follower.path.at(0.0), follower.qp_solves)
+        return find_best_effort(problem, start, *follower.path.at(0.0), follower.qp_solves, follower.deadline)
     low, high = _bracket(follower, first, wanted, stride, patience)
-    if high is None:
-        message = f'eta {problem.eta:g} is out of reach: the largest on the path is {eta_of_k(low.k):.4g}, at s = {low.s:.3g}'
-        return _result(follower, Status.ETA_UNREACHABLE, message, low)
     point, slope = high, start.safety_factor_slope
-    if low is not high:
+    if high is not None and low is not high:
         point, slope = _find_root(follower, low, high, wanted, is_warm=start.lam is not None)
+    if not problem.preference.is_hard:
+        least = find_least_loss(follower, point)
+        if least.k < wanted:
+            kept = problem.risk.find_probability(least.k)
+            message = f'eta {problem.eta:g} is out of reach or not worth its effort: {kept:.4g} is kept, at s = {least.s:.3g}'
+            return _result(follower, Status.ETA_UNREACHABLE, message, least)
+        point = least
+    if point is None:
+        largest = problem.risk.find_probability(low.k)
+        message = f'eta {problem.eta:g} is out of reach: the largest on the path is {largest:.4g}, at s = {low.s:.3g}'
+        return _result(follower, Status.ETA_UNREACHABLE, message, low)
     if not follower.is_verified(point):
         return _result(follower, Status.ITERATION_LIMIT, 'the QP linearised at the solution has another one', point)
     return _result(follower, Status.SOLVED, 'solved', point, slope)
@@ -117,7 +127,8 @@ def _bracket(
     """Return the last point below the wanted k and the first at or above it, or any point and one after it that is close enough.
 
     Both are the same where the first is close enough, or where the beginning of the path meets the wanted k. Where that is out of
-    reach, the best point is returned, and None.
+    reach, the best point is returned, and None; also as soon as the effort, which does not fall along the path, alone is a larger
+    loss than that of a point before.
     """
     if _is_close(first, wanted):
         return first, first
@@ -130,14 +141,15 @@ def _bracket(
                 return point, high
             high = point
         return high, high
-    low, best, since = first, first, 0
+    low, best, since, least = first, first, 0, compute_loss(follower, first)
     for point in _follow(follower, first, wanted, stride):
         if point.k >= wanted:
             return low, point
         since = 0 if point.k > best.k else since + (point.s - low.s >= WARM_STRIDE)
         low = point
         best = max(best, point, key=lambda p: p.k)
-        if since == patience:
+        least = min(least, compute_loss(follower, point))
+        if since == patience or follower.problem.preference.compute_effort_loss(point.effort) >= least:
             break
     return best, None
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -77,9 +77,14 @@ class PathPoint:
         """The minimum safety factor."""
         return self.solution.minimum.k
 
+    @cached_property
+    def effort(self) -> float:
+        """Control effort [m^2/s^6]."""
+        return float(self.solution.control @ self.solution.control)
+
 
 class PathFollower:
-    """Solves points on a path, each from a neighbour, remembers the one with the largest k, and counts QPs.
+    """Solves points on a path, each from a neighbour, remembers them and the one with the largest k, and counts QPs.
 
     newton_only: whether a neighbour's solution is followed by Newton steps alone, without QPs where these fail.
     """
@@ -89,6 +94,8 @@ class PathFollower:
         self.newton_only = newton_only
         self.qp_solves = 0
         self.best: PathPoint | None = None
+        self.points: list[PathPoint] = []
+        self.class_angles: Array | None = None
 
     def solve_first(self, guess: Array, class_angles: Array | None = None) -> PathPoint | None:
         """Solve at the beginning of the path, from a guess (N, 2), in a homotopy class if its angles (m,) are given."""
@@ -99,11 +106,11 @@ class PathFollower:
         self.deadline.check()
         control, contacts, _ = neighbour.solution
         merged = contacts.merge(self.problem.first_alike) if neighbour.has_rows else contacts
-        point = self.solve_by_newton(s, control, merged)
+        point = self.solve_by_newton(s, control, merged, self.class_angles)
         if point is not None or self.newton_only:
             return point
         guess, (working, _) = self.problem.positions(control), merged.rows(self.problem.horizon.steps)
-        return self._solve_by_qps(s, guess, working, compute_class_angles(self.problem, control), thorough=False)
+        return self._solve_by_qps(s, guess, working, self.class_angles, thorough=False)
 
     def solve_by_newton(
         self, s: float, control: Array, contacts: Contacts, class_angles: Array | None = None
@@ -160,6 +167,9 @@ class PathFollower:
         return None
 
     def _remember(self, point: PathPoint) -> PathPoint:
-        """Return the point, and remember it if its k is the largest so far."""
+        """Return the point, and remember it; the first one defines the homotopy class of all."""
+        if self.class_angles is None:
+            self.class_angles = compute_class_angles(self.problem, point.solution.control)
+        self.points.append(point)
         self.best = point if self.best is None or point.k > self.best.k else self.best
         return point

@@ -1,0 +1,26 @@
+"""The mean path as a smooth curve, for pictures: the cubics through positions and velocities of the steps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from foc_ros.core.types import Array
+
+from .hermite import interpolate
+
+LEAST_POINTS = 50
+"""Number of points from which a curve looks smooth."""
+
+
+def compute_curve(path: Array, velocity: Array, dt: float) -> Array:
+    """Return points (m, 2) [m] on the mean path, m > LEAST_POINTS: the positions of the steps and, where needed, some between.
+
+    path, velocity (N + 1, 2) [m, m/s]: at steps dt [s] apart. Equal parts of a step lie between two points. A path of more steps,
+    or of one point, is returned as it is.
+    """
+    steps = len(path) - 1
+    parts = -(-LEAST_POINTS // max(steps, 1))
+    if steps < 1 or parts == 1:
+        return path
+    trajectory = np.ascontiguousarray(np.concatenate([path, dt * velocity], axis=1).T)
+    return np.array([interpolate(trajectory, time, 0) for time in np.arange(parts * steps + 1) / parts])

@@ -1,0 +1,206 @@
+"""The margin by which a movement meets the surrogate of the chance constraint, at any time, with its derivatives.
+
+At a time s, d is the mean position relative to a mean centre, h_q the effect of the control u_q on it, r_q = d.h_q, and P its
+covariance. With Var = Var[R^2] + 4 d'Pd, the margin
+
+    g(u, s, k) = (|d|^2 - E[R^2] - k sqrt(Var)) / (2 |d_0|)   [m]
+
+is at least zero where the safety factor is at least k; d_0 is the d at which derivatives are taken, and counts as constant. From
+
+    dVar/du_q = 8 c_q^2 u_q r_q^2 + 8 (P d).h_q,
+    d2Var/du2 = diag(8 c^2 r^2) + W'S + S'W + 8 S'P S,   S_q = h_q,   W_q = 16 c_q^2 u_q r_q h_q,
+
+the Hessian of g is a diagonal and a matrix of rank five, in the rows S (2), W (2) and dVar/du. Before the time at which a circle
+begins to count, because the hand is still leaving its margin, the mean alone has to keep the required distance: k is zero there.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from foc_ros.core.dynamics.condensed import position_variances
+from foc_ros.core.kernels import Indices, Matrix, Vector, compiled_separately, compiled_with_caller
+from foc_ros.core.ocp.clearance import required_distance
+from foc_ros.core.ocp.terms import ChanceTerms, MovingCircles, ProblemTerms
+
+from .hermite import basis, contact_rows, interpolate
+
+SMALLEST_VARIANCE = 1e-24
+"""Least Var[C] [m^4]: its root has no derivative at zero."""
+SMALLEST_DISTANCE = 1e-9
+"""Least distance from a centre by which a margin is divided [m]."""
+PARABOLAS = 8
+"""Most parabolas fitted in the search for the least margin beside one step."""
+VERTEX_TOLERANCE = 1e-3
+"""Distance in steps from the lowest time so far at which the next vertex is not evaluated any more."""
+APART = 2.0
+"""Least distance in steps between two shortfalls: a contact at the deeper one mends its neighbours too."""
+
+
+class Margin(NamedTuple):
+    """The margin of a circle at a time, and what its derivatives consist of.
+
+    value [m]; k: the safety factor that counts; stddev: sqrt(Var) [m^2]; scale: 1 / (2 |d_0|) [1/m]; x, y: d [m]; covariance
+    (2, 2): P [m^2]; position (3, 2N): S in the rows 0 and 2; variance_row and row (2N,): derivatives of Var and g by the control.
+    """
+
+    value: float
+    k: float
+    stddev: float
+    scale: float
+    x: float
+    y: float
+    covariance: Matrix
+    position: Matrix
+    variance_row: Vector
+    row: Vector
+
+
+@compiled_separately
+def initial_covariance_at(chance: ChanceTerms, time: float) -> Matrix:
+    """Return the part of the position covariance at a time that comes from the uncertain initial state, (2, 2) [m^2]."""
+    errors, covariance = chance.error_trajectory, np.zeros((2, 2))
+    if errors.shape[1] == 0:
+        return covariance
+    t = min(int(time), errors.shape[1] - 2)
+    weight, n = basis(time - t, 0), len(chance.initial_covariance)
+    rows = np.empty((2, n))
+    for axis in range(2):
+        p, v = errors[axis], errors[2 + axis]
+        for i in range(n):
+            rows[axis, i] = weight[0] * p[t, i] + weight[1] * v[t, i] + weight[2] * p[t + 1, i] + weight[3] * v[t + 1, i]
+    for a in range(2):
+        for b in range(2):
+            for i in range(n):
+                for j in range(n):
+                    covariance[a, b] += rows[a, i] * chance.initial_covariance[i, j] * rows[b, j]
+    return covariance
+
+
+@compiled_with_caller
+def relative_position(trajectory: Matrix, circles: MovingCircles, j: int, time: float) -> tuple[float, float]:
+    """Return the position of a trajectory (4, N + 1) relative to centre j at any time [m]."""
+    at = interpolate(trajectory, time, 0)
+    x = at[0] - circles.centre[j, 0] - time * circles.drift[j, 0]
+    return x, at[1] - circles.centre[j, 1] - time * circles.drift[j, 1]
+
+
+@compiled_separately
+def evaluate_margin(
+    terms: ProblemTerms, circles: MovingCircles, trajectory: Matrix, control: Vector, j: int, time: float, k: float, scale: float
+) -> Margin:
+    """Return the margin of a control (2N,) for circle j at any time; scale [1/m], 0 for that of the position itself."""
+    chance, n = terms.chance, len(control)
+    noise, covariance = chance.noise.noise_variance, initial_covariance_at(chance, time) + chance.circles.centre_covariance[j]
+    x, y = relative_position(trajectory, circles, j, time)
+    position = contact_rows(terms.motion.responses, time, 1.0, 0.0, 0.0)
+    for q in range(n):
+        variance, a, b = noise[q] * control[q] * control[q], position[0, q], position[2, q]
+        covariance[0, 0] += variance * a * a
+        covariance[0, 1] += variance * a * b
+        covariance[1, 1] += variance * b * b
+    covariance[1, 0] = covariance[0, 1]
+    pull_x, pull_y = covariance[0, 0] * x + covariance[0, 1] * y, covariance[1, 0] * x + covariance[1, 1] * y
+    stddev = np.sqrt(max(chance.circles.size_variance[j] + 4.0 * (x * pull_x + y * pull_y), SMALLEST_VARIANCE))
+    counted = k if time >= chance.circles.ignored_until[j] else 0.0
+    if scale == 0.0:
+        scale = 0.5 / max(np.hypot(x, y), SMALLEST_DISTANCE)
+    value = (x * x + y * y - required_distance(circles, j, time)[0] ** 2 - counted * stddev) * scale
+    variance_row, row = np.empty(n), np.empty(n)
+    for q in range(n):
+        along = x * position[0, q] + y * position[2, q]
+        variance_row[q] = 8.0 * (noise[q] * control[q] * along * along + pull_x * position[0, q] + pull_y * position[2, q])
+        row[q] = (2.0 * along - counted * variance_row[q] / (2.0 * stddev)) * scale
+    return Margin(value, counted, stddev, scale, x, y, covariance, position, variance_row, row)
+
+
+@compiled_separately
+def margins_at_steps(
+    terms: ProblemTerms, circles: MovingCircles, trajectory: Matrix, covariance: Matrix, j: int, k: float
+) -> Vector:
+    """Return the margins of circle j at steps 0..N, (N + 1,), that at step 0 infinite; covariance (3, N): xx, yy, xy [m^2]."""
+    chance, steps = terms.chance.circles, covariance.shape[1]
+    own, margin = chance.centre_covariance[j], np.full(steps + 1, np.inf)
+    for t in range(1, steps + 1):
+        x = trajectory[0, t] - circles.centre[j, 0] - t * circles.drift[j, 0]
+        y = trajectory[1, t] - circles.centre[j, 1] - t * circles.drift[j, 1]
+        xx, yy, xy = covariance[0, t - 1] + own[0, 0], covariance[1, t - 1] + own[1, 1], covariance[2, t - 1] + own[0, 1]
+        variance = max(chance.size_variance[j] + 4.0 * (x * x * xx + y * y * yy + 2.0 * x * y * xy), SMALLEST_VARIANCE)
+        counted = k if t >= chance.ignored_until[j] else 0.0
+        distance, reach = max(np.hypot(x, y), SMALLEST_DISTANCE), required_distance(circles, j, float(t))[0]
+        margin[t] = (distance * distance - reach * reach - counted * np.sqrt(variance)) / (2.0 * distance)
+    return margin
+
+
+@compiled_separately
+def find_least_margin(
+    terms: ProblemTerms, circles: MovingCircles, trajectory: Matrix, control: Vector, j: int, k: float, margin: Vector, t: int
+) -> tuple[float, float]:
+    """Return the time near step t at which the margin of circle j is least, and that margin, by parabolas through three times."""
+    a, b, c = t - 1.0, float(t), t + 1.0
+    before, least, after = margin[t - 1], margin[t], margin[t + 1]
+    for _ in range(PARABOLAS):
+        bend = (b - a) * (least - after) - (b - c) * (least - before)
+        if bend == 0.0:
+            break
+        time = b - 0.5 * ((b - a) ** 2 * (least - after) - (b - c) ** 2 * (least - before)) / bend
+        if not a < time < c or abs(time - b) < VERTEX_TOLERANCE:
+            break
+        value = evaluate_margin(terms, circles, trajectory, control, j, time, k, 0.0).value
+        if value <= least:
+            if time < b:
+                c, after = b, least
+            else:
+                a, before = b, least
+            b, least = time, value
+        elif time < b:
+            a, before = time, value
+        else:
+            c, after = time, value
+    return b, least
+
+
+@compiled_separately
+def find_shortfalls(
+    terms: ProblemTerms,
+    circles: MovingCircles,
+    first_alike: Indices,
+    trajectory: Matrix,
+    control: Vector,
+    k: float,
+    tolerance: float,
+) -> Matrix:
+    """Return where margins are least in time and below minus a tolerance [m], deepest first, (q, 2): row of the circle, time.
+
+    Only times from step 1 on are searched. Of equal circles the first alone counts (`Problem.first_alike`), and of shortfalls
+    nearer than `APART` in time the deepest.
+    """
+    m, steps = len(circles.reach), trajectory.shape[1] - 1
+    covariance = position_variances(terms.chance.noise, control)
+    depth, places, count = np.empty(m * (steps + 1)), np.empty((m * (steps + 1), 2)), 0
+    for j in range(m):
+        if first_alike[j] != j:
+            continue
+        margin = margins_at_steps(terms, circles, trajectory, covariance, j, k)
+        for t in range(1, steps + 1):
+            here = margin[t]
+            if margin[t - 1] < here or (t < steps and margin[t + 1] <= here):
+                continue
+            time, least = float(t), here
+            # between two steps a margin hardly falls by more than it rises to the step after
+            if 1 < t < steps and here < max(margin[t - 1], margin[t + 1]) - here:
+                time, least = find_least_margin(terms, circles, trajectory, control, j, k, margin, t)
+            if least < -tolerance:
+                depth[count], places[count, 0], places[count, 1] = least, j, time
+                count += 1
+    found, kept = np.empty((count, 2)), 0
+    for i in np.argsort(depth[:count]):
+        is_apart = True
+        for other in range(kept):
+            is_apart = is_apart and abs(found[other, 1] - places[i, 1]) >= APART
+        if is_apart:
+            found[kept] = places[i]
+            kept += 1
+    return found[:kept].copy()

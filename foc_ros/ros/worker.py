@@ -1,0 +1,79 @@
+"""The thread in which predictions are computed, so that the node answers services and publishes diagnostics meanwhile.
+
+The kernels run without Python's global lock. A running computation cannot be stopped from another thread. If its result is no
+longer wanted, its deadline is cancelled, it ends when it next checks its deadline, and the result is ignored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.exceptions import InvalidHandle
+from rclpy.node import Node
+
+from foc_ros.core.memory import Memory
+from foc_ros.core.pipeline import PredictionTask
+from foc_ros.core.types import Prediction
+
+
+@dataclass(frozen=True)
+class Computation:
+    """A task that is being computed.
+
+    received_s: time at which the hand pose of the task arrived; start_s: time at which the computation began, both by the steady
+    clock [s]. result: the prediction and the memory for the next one, as soon as they are available.
+    """
+
+    task: PredictionTask
+    received_s: float
+    start_s: float
+    result: Future[tuple[Prediction, Memory]]
+
+
+class Worker:
+    """A thread that computes one task at a time.
+
+    present: the computation whose result has not been taken yet, or None.
+
+    Parameters
+    ----------
+    node
+        The node in whose executor `notify` is called.
+    notify
+        Called after the end of each computation. It has to call `take`.
+    """
+
+    def __init__(self, node: Node, notify: Callable[[], None]) -> None:
+        self.present: Computation | None = None
+        self._ended: Any = node.create_guard_condition(notify)
+        self._threads = ThreadPoolExecutor(1, 'prediction')
+
+    def start(self, task: PredictionTask, received_s: float, start_s: float) -> None:
+        """Begin to compute a task. The result of the task before must have been taken."""
+        self.present = Computation(task, received_s, start_s, self._threads.submit(task.run))
+        self.present.result.add_done_callback(self._notify)
+
+    def take(self) -> Computation | None:
+        """Return the present computation and forget it, if it has ended; otherwise return None."""
+        if self.present is None or not self.present.result.done():
+            return None
+        ended, self.present = self.present, None
+        return ended
+
+    def is_busy_after(self, seconds: float) -> bool:
+        """Wait for the present computation for at most so many seconds; return whether it has not ended then."""
+        return self.present is not None and bool(wait([self.present.result], seconds).not_done)
+
+    def stop(self) -> None:
+        """Accept no more tasks, and let the present one end when it next checks its deadline."""
+        if self.present is not None:
+            self.present.task.deadline.cancel()
+        self._threads.shutdown(wait=False, cancel_futures=True)
+
+    def _notify(self, _: object) -> None:
+        with suppress(InvalidHandle):  # the node was destroyed meanwhile
+            self._ended.trigger()
