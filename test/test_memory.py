@@ -15,7 +15,7 @@ from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import LEFT, RIGHT, Candidate, HandSample, HandState, Status, make_obstacles
 
-CONFIG = replace_values(Config(), {'foc.steps': 20})
+CONFIG = replace_values(Config(), {'foc.steps': 20, 'likelihood.smoothing_s': 0.0})
 
 
 def way(sides: dict[str, int], goal: int = 0) -> Candidate:
