@@ -1,6 +1,6 @@
 """Random reaches of every kind that the chance constraint knows: noise, eta, moving and uncertain circles, an uncertain start."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -44,7 +44,7 @@ def _varied(obstacles: Obstacles, generator: np.random.Generator) -> Obstacles:
     n, moving, uncertain = len(obstacles), generator.random() < 1 / 3, generator.random() < 1 / 3
     covariance = [_covariance(generator, np.full(2, CENTRE_STDDEV)) * uncertain for _ in range(n)]
     velocity = generator.uniform(-FASTEST, FASTEST, (n, 2)) * moving
-    return Obstacles(obstacles.ids, obstacles.centre, obstacles.radius, obstacles.radius_stddev, velocity, np.array(covariance))
+    return replace(obstacles, velocity=velocity, centre_covariance=np.array(covariance))
 
 
 def _covariance(generator: np.random.Generator, stddev: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ message -> HandSample -> HandState -> Candidates -> Solutions -> Prediction -> m
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, StrEnum
 
@@ -98,10 +98,11 @@ class HandState(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Obstacles(Record):
-    """Circles in the task plane, as a table of n rows.
+    """Rounded convex polygons in the task plane, as a table of n rows; a circle is a polygon with one vertex, at its centre.
 
-    ids: name of each, used in labels; centre (n, 2) [m]; radius (n,) mean [m]; radius_stddev (n,) [m];
-    velocity (n, 2) [m/s]; centre_covariance (n, 2, 2) [m^2].
+    ids: name of each, used in labels; centre (n, 2): a point inside [m]; radius (n,): mean distance of the boundary from the
+    polygon [m]; radius_stddev (n,) [m]; velocity (n, 2) [m/s]; centre_covariance (n, 2, 2) [m^2]; vertices (n, V, 2): of the
+    polygons, anticlockwise, relative to the centre [m]; corners (n,): number of vertices of each, rows beyond are not used.
     """
 
     ids: tuple[str, ...]
@@ -110,6 +111,8 @@ class Obstacles(Record):
     radius_stddev: Array
     velocity: Array
     centre_covariance: Array
+    vertices: Array
+    corners: NDArray[np.intp]
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -117,7 +120,7 @@ class Obstacles(Record):
     def __repr__(self) -> str:
         """Count the obstacles and name the first few."""
         names = ', '.join(self.ids[:SHOWN_NAMES]) + (', ...' if len(self) > SHOWN_NAMES else '')
-        return f'<Obstacles: {len(self)} circles{names and f" ({names})"}>'
+        return f'<Obstacles: {len(self)}{names and f" ({names})"}>'
 
     def take(self, rows: NDArray[np.intp] | list[int]) -> Obstacles:
         """Return the obstacles of the given rows, in that order."""
@@ -129,7 +132,19 @@ class Obstacles(Record):
             self.radius_stddev[index],
             self.velocity[index],
             self.centre_covariance[index],
+            self.vertices[index],
+            self.corners[index],
         )
+
+    @property
+    def extent(self) -> Array:
+        """Largest distance of the boundary of each obstacle from its centre, (n,) [m]."""
+        farthest: Array = np.hypot(self.vertices[..., 0], self.vertices[..., 1]).max(axis=1, initial=0.0) + self.radius
+        return farthest
+
+    def grow(self, radius: float) -> Obstacles:
+        """Return the obstacles with a radius [m] added to those of all, such as that of the hand."""
+        return replace(self, radius=self.radius + radius) if radius else self
 
     def after(self, seconds: float) -> Obstacles:
         """Return the obstacles at a time `seconds` [s] later, each moved on at its velocity."""
@@ -145,10 +160,18 @@ def make_obstacles(
     ids: tuple[str, ...] | None = None,
     velocity: ArrayLike = 0.0,
     centre_covariance: ArrayLike = 0.0,
+    polygons: Sequence[Array] | None = None,
 ) -> Obstacles:
-    """Build `Obstacles` from array-likes; scalars hold for every row, and ids default to the numbers of the rows."""
+    """Build `Obstacles` from array-likes; scalars hold for every row, and ids default to the numbers of the rows.
+
+    polygons: vertices of each (v, 2), anticlockwise, relative to the centre [m]; circles if not given.
+    """
     centres = np.asarray(centre, dtype=float).reshape(-1, 2)
     n = len(centres)
+    corners = np.ones(n, dtype=np.intp) if polygons is None else np.array([len(each) for each in polygons], dtype=np.intp)
+    vertices = np.zeros((n, corners.max(initial=1), 2))
+    for row, each in enumerate(polygons or ()):
+        vertices[row, : len(each)] = each
     return Obstacles(
         tuple(str(i) for i in range(n)) if ids is None else tuple(ids),
         centres,
@@ -156,6 +179,8 @@ def make_obstacles(
         np.full(n, radius_stddev, dtype=float),
         np.full((n, 2), velocity, dtype=float),
         np.full((n, 2, 2), centre_covariance, dtype=float),
+        vertices,
+        corners,
     )
 
 

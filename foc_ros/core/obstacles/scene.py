@@ -72,6 +72,8 @@ class Scene(Record):
 
 
 def _concatenate(tables: list[Obstacles], ids: list[str]) -> Obstacles:
+    most = max(table.vertices.shape[1] for table in tables)
+    vertices = [np.pad(table.vertices, ((0, 0), (0, most - table.vertices.shape[1]), (0, 0))) for table in tables]
     return Obstacles(
         tuple(ids),
         np.concatenate([table.centre for table in tables]),
@@ -79,4 +81,6 @@ def _concatenate(tables: list[Obstacles], ids: list[str]) -> Obstacles:
         np.concatenate([table.radius_stddev for table in tables]),
         np.concatenate([table.velocity for table in tables]),
         np.concatenate([table.centre_covariance for table in tables]),
+        np.concatenate(vertices),
+        np.concatenate([table.corners for table in tables]),
     )

@@ -4,17 +4,85 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import ConvexHull, QhullError
 
-from foc_ros.core.checks import check_number, check_vector
+from foc_ros.core.checks import check_array, check_number, check_vector
 from foc_ros.core.errors import SceneError
-from foc_ros.core.types import Obstacles, make_obstacles
+from foc_ros.core.types import Array, Obstacles, make_obstacles
+
+MOST_VERTICES = 16
+"""Most vertices of a convex hull that a user gives."""
+FLAT = 1e-9
+"""Size [m] from which a box or a hull extends in a direction."""
+
+
+def make_box_polygon(size: ArrayLike, yaw: float) -> Array:
+    """Return the vertices (v, 2) [m] of a box of full lengths (2,) [m] at an angle [rad], anticlockwise, from its centre.
+
+    A box that has no size along one of its axes has two vertices, and one without any size has one.
+    """
+    half_x, half_y = (np.asarray(size, dtype=float) / 2.0).tolist()
+    corners = np.array([[half_x, half_y], [-half_x, half_y], [-half_x, -half_y], [half_x, -half_y]])
+    if 2.0 * half_y < FLAT:
+        corners = np.array([[half_x, 0.0], [-half_x, 0.0]])
+    if 2.0 * half_x < FLAT:
+        corners = np.array([[0.0, half_y], [0.0, -half_y]]) if 2.0 * half_y >= FLAT else np.zeros((1, 2))
+    turned: Array = corners @ np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+    return turned
+
+
+def make_hull_polygon(points: Array) -> tuple[Array, Array]:
+    """Return the mean of the corners of the convex hull of points (q, 2) [m], and these (v, 2), anticlockwise, from there [m]."""
+    try:
+        corners = points[ConvexHull(points).vertices]
+    except (QhullError, ValueError):  # fewer than three points, or all on one line
+        along = points - points.mean(axis=0)
+        direction = along[np.hypot(along[:, 0], along[:, 1]).argmax()]
+        ends = np.array([points[(along @ direction).argmin()], points[(along @ direction).argmax()]])
+        corners = ends if np.hypot(*(ends[1] - ends[0])) >= FLAT else ends[:1]
+    centre: Array = corners.mean(axis=0)
+    return centre, corners - centre
+
+
+class Shape:
+    """What the shapes have in common: an uncertain radius, a velocity, a name, an uncertain centre."""
+
+    kind: ClassVar[str] = 'shape'
+    centre: ArrayLike
+    radius: float
+    radius_stddev: float
+    velocity: ArrayLike
+    name: str
+    centre_stddev: float
+
+    @property
+    def polygon(self) -> Array:
+        """Vertices of the polygon whose surroundings the obstacle is, (v, 2), anticlockwise, relative to the centre [m]."""
+        return np.zeros((1, 2))
+
+    def _check(self, *vectors: str) -> None:
+        for field in ('velocity', *vectors):
+            vector = check_vector(f'obstacle.{field}', getattr(self, field), 2)
+            object.__setattr__(self, field, tuple(vector.tolist()))
+        for field in ('radius', 'radius_stddev', 'centre_stddev'):
+            object.__setattr__(self, field, check_number(f'obstacle.{field}', getattr(self, field), low=0.0))
+        if not isinstance(self.name, str):
+            raise SceneError('obstacle.name', 'a text', repr(self.name))
+        if self.radius == 0.0 and len(self.polygon) == 1:
+            raise SceneError('obstacle.radius', f'a number > 0 m for a {self.kind} without any size', self.radius)
+
+    def __repr__(self) -> str:
+        """Say kind, name, centre and radius."""
+        x, y = np.asarray(self.centre).tolist()
+        return f'<{type(self).__name__} {self.name + " " if self.name else ""}at ({x:g}, {y:g}) m, radius {self.radius:g} m>'
 
 
 @dataclass(frozen=True, repr=False)
-class Circle:
+class Circle(Shape):
     """A circular obstacle in the task plane.
 
     Parameters
@@ -22,7 +90,7 @@ class Circle:
     centre : array_like of shape (2,)
         Position of the centre [m].
     radius : float
-        Mean radius [m], larger than 0. It includes the radius of the hand.
+        Mean radius [m], larger than 0.
     radius_stddev : float
         Standard deviation of the radius [m].
     velocity : array_like of shape (2,)
@@ -44,6 +112,7 @@ class Circle:
     <Circle cup at (0.15, 0.01) m, radius 0.03 m>
     """
 
+    kind = 'circle'
     centre: ArrayLike
     radius: float
     radius_stddev: float = 0.0
@@ -52,42 +121,207 @@ class Circle:
     centre_stddev: float = 0.0
 
     def __post_init__(self) -> None:
-        for field in ('centre', 'velocity'):
-            vector = check_vector(f'obstacle.{field}', getattr(self, field), 2)
-            object.__setattr__(self, field, tuple(vector.tolist()))
-        for field in ('radius', 'radius_stddev', 'centre_stddev'):
-            object.__setattr__(self, field, check_number(f'obstacle.{field}', getattr(self, field), low=0.0))
-        if self.radius == 0.0:
-            raise SceneError('obstacle.radius', 'a number > 0 m', self.radius)
-        if not isinstance(self.name, str):
-            raise SceneError('obstacle.name', 'a text', repr(self.name))
+        self._check('centre')
+
+
+@dataclass(frozen=True, repr=False)
+class Box(Shape):
+    """A rectangular obstacle in the task plane, with corners that are sharp or rounded; a wall is a long thin box.
+
+    Parameters
+    ----------
+    centre : array_like of shape (2,)
+        Position of the centre [m].
+    size : array_like of shape (2,)
+        Full lengths along its own axes [m]. One length 0 makes a capsule.
+    yaw : float
+        Angle from the x axis of the plane to the first axis of the box [rad].
+    radius : float
+        Mean distance by which the box extends beyond its size on all sides, with round corners [m].
+    radius_stddev : float
+        Standard deviation of that distance [m].
+    velocity : array_like of shape (2,)
+        Velocity of the centre [m/s], taken as constant over the horizon. The box does not turn.
+    name : str
+        Name used in labels such as ``goal0:+post``; by default the number of the obstacle in its list.
+    centre_stddev : float
+        Standard deviation of the centre along each axis [m].
+
+    Raises
+    ------
+    SceneError
+        For a wrong shape, a number that is not finite, a negative size, or no size and no radius.
+
+    Examples
+    --------
+    >>> import foc_ros
+    >>> foc_ros.Box((0.15, 0.01), size=(0.1, 0.04), yaw=0.3, name='tray')
+    <Box tray at (0.15, 0.01) m, size 0.1 x 0.04 m, radius 0 m>
+    """
+
+    kind = 'box'
+    centre: ArrayLike
+    size: ArrayLike
+    yaw: float = 0.0
+    radius: float = 0.0
+    radius_stddev: float = 0.0
+    velocity: ArrayLike = (0.0, 0.0)
+    name: str = ''
+    centre_stddev: float = 0.0
+
+    def __post_init__(self) -> None:
+        size = check_vector('obstacle.size', self.size, 2)
+        if size.min() < 0.0:
+            raise SceneError('obstacle.size', 'two numbers >= 0 m', size.tolist())
+        object.__setattr__(self, 'size', tuple(size.tolist()))
+        object.__setattr__(self, 'yaw', check_number('obstacle.yaw', self.yaw))
+        self._check('centre')
+
+    @property
+    def polygon(self) -> Array:
+        """Vertices of the polygon, (v, 2), anticlockwise, relative to the centre [m]."""
+        return make_box_polygon(self.size, self.yaw)
 
     def __repr__(self) -> str:
-        """Say name, centre and radius."""
-        x, y = np.asarray(self.centre).tolist()
-        return f'<Circle {self.name + " " if self.name else ""}at ({x:g}, {y:g}) m, radius {self.radius:g} m>'
+        """Say name, centre, size and radius."""
+        length, width = np.asarray(self.size).tolist()
+        return super().__repr__().replace(', radius', f', size {length:g} x {width:g} m, radius')
 
 
-def collect_obstacles(shapes: Iterable[Circle] | Obstacles) -> Obstacles:
+@dataclass(frozen=True, repr=False)
+class Capsule(Shape):
+    """All points within a radius of a line, such as a tool or an arm.
+
+    Parameters
+    ----------
+    start, end : array_like of shape (2,)
+        Ends of the line [m].
+    radius : float
+        Mean radius [m], larger than 0 if the two ends are the same.
+    radius_stddev : float
+        Standard deviation of the radius [m].
+    velocity : array_like of shape (2,)
+        Velocity [m/s], taken as constant over the horizon. The capsule does not turn.
+    name : str
+        Name used in labels such as ``goal0:+post``; by default the number of the obstacle in its list.
+    centre_stddev : float
+        Standard deviation of the centre along each axis [m].
+
+    Raises
+    ------
+    SceneError
+        For a wrong shape, a number that is not finite, a negative radius or standard deviation, or no size and no radius.
+
+    Examples
+    --------
+    >>> import foc_ros
+    >>> foc_ros.Capsule((0.1, 0.0), (0.2, 0.05), radius=0.01, name='tool')
+    <Capsule tool at (0.15, 0.025) m, radius 0.01 m>
+    """
+
+    kind = 'capsule'
+    start: ArrayLike
+    end: ArrayLike
+    radius: float
+    radius_stddev: float = 0.0
+    velocity: ArrayLike = (0.0, 0.0)
+    name: str = ''
+    centre_stddev: float = 0.0
+
+    def __post_init__(self) -> None:
+        self._check('start', 'end')
+
+    @property
+    def centre(self) -> ArrayLike:  # type: ignore[override]
+        """Middle of the line, (2,) [m]."""
+        return make_hull_polygon(np.array([self.start, self.end]))[0]
+
+    @property
+    def polygon(self) -> Array:
+        """Vertices of the polygon, (v, 2), anticlockwise, relative to the centre [m]."""
+        return make_hull_polygon(np.array([self.start, self.end]))[1]
+
+
+@dataclass(frozen=True, repr=False)
+class Hull(Shape):
+    """The convex hull of some points, with corners that are sharp or rounded.
+
+    Parameters
+    ----------
+    points : array_like of shape (q, 2)
+        Points [m] whose hull has 16 corners at most.
+    radius : float
+        Mean distance by which the obstacle extends beyond the hull [m], larger than 0 if all points are the same.
+    radius_stddev : float
+        Standard deviation of that distance [m].
+    velocity : array_like of shape (2,)
+        Velocity [m/s], taken as constant over the horizon. The hull does not turn.
+    name : str
+        Name used in labels such as ``goal0:+post``; by default the number of the obstacle in its list.
+    centre_stddev : float
+        Standard deviation of the centre along each axis [m].
+
+    Raises
+    ------
+    SceneError
+        For a wrong shape, a number that is not finite, too many corners, or no size and no radius.
+
+    Examples
+    --------
+    >>> import foc_ros
+    >>> foc_ros.Hull([(0.1, 0.0), (0.2, 0.0), (0.15, 0.06)], name='wedge')
+    <Hull wedge at (0.15, 0.02) m, radius 0 m>
+    """
+
+    kind = 'hull'
+    points: ArrayLike
+    radius: float = 0.0
+    radius_stddev: float = 0.0
+    velocity: ArrayLike = (0.0, 0.0)
+    name: str = ''
+    centre_stddev: float = 0.0
+
+    def __post_init__(self) -> None:
+        points = check_array('obstacle.points', self.points, (None, 2))
+        if not len(points):
+            raise SceneError('obstacle.points', 'one point at least', 'none')
+        object.__setattr__(self, 'points', tuple(map(tuple, points.tolist())))
+        if len(self.polygon) > MOST_VERTICES:
+            raise SceneError('obstacle.points', f'a hull of at most {MOST_VERTICES} corners', len(self.polygon))
+        self._check()
+
+    @property
+    def centre(self) -> ArrayLike:  # type: ignore[override]
+        """Mean of the corners, (2,) [m]."""
+        return make_hull_polygon(np.array(self.points))[0]
+
+    @property
+    def polygon(self) -> Array:
+        """Vertices of the polygon, (v, 2), anticlockwise, relative to the centre [m]."""
+        return make_hull_polygon(np.array(self.points))[1]
+
+
+def collect_obstacles(shapes: Iterable[Shape] | Obstacles) -> Obstacles:
     """Return the table of some shapes, or a table as it is.
 
     Raises SceneError, which names the place in the list, for anything else or a name that occurs twice.
     """
     if isinstance(shapes, Obstacles):
         return shapes
-    circles = list(shapes)
-    for row, each in enumerate(circles):
-        if not isinstance(each, Circle):
-            raise SceneError(f'obstacles[{row}]', 'a Circle', repr(each))
-    names = tuple(each.name or str(row) for row, each in enumerate(circles))
+    given = list(shapes)
+    for row, each in enumerate(given):
+        if not isinstance(each, Shape):
+            raise SceneError(f'obstacles[{row}]', 'a Circle, Box, Capsule or Hull', repr(each))
+    names = tuple(each.name or str(row) for row, each in enumerate(given))
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise SceneError('obstacles', 'a different name for each obstacle', f'{twice!r} twice')
     return make_obstacles(
-        np.array([each.centre for each in circles], dtype=float),
-        [each.radius for each in circles],
-        [each.radius_stddev for each in circles],
+        np.array([each.centre for each in given], dtype=float),
+        [each.radius for each in given],
+        [each.radius_stddev for each in given],
         names,
-        np.array([each.velocity for each in circles], dtype=float).reshape(-1, 2),
-        np.array([each.centre_stddev**2 * np.eye(2) for each in circles]).reshape(-1, 2, 2),
+        np.array([each.velocity for each in given], dtype=float).reshape(-1, 2),
+        np.array([each.centre_stddev**2 * np.eye(2) for each in given]).reshape(-1, 2, 2),
+        [each.polygon for each in given],
     )
