@@ -74,7 +74,7 @@ def find_least_share(problem: Problem, solution: Solution) -> float:
 
 def _find_least_factor(problem: Problem, solution: Solution, step: int, share: float) -> float:
     """Return the smallest safety factor at a share of one step, from the state at its beginning and the control within it."""
-    circles, dt, u = problem.terms.chance.circles, share * solution.dt, solution.control[step]
+    circles, dt, u = problem.terms.chance.obstacles, share * solution.dt, solution.control[step]
     one, axes = np.array([[1.0, dt, dt**2 / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]]), np.eye(2)
     forward, push = np.kron(one, axes), np.kron(np.array([[dt**3 / 6], [dt**2 / 2], [dt]]), axes)
     position = (forward @ solution.mean[step] + push @ u)[:2]

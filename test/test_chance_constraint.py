@@ -9,7 +9,7 @@ from foc_ros.core.kernels import freeze
 from foc_ros.core.obstacles.chance_constraint import (
     CERTAIN_K,
     RiskBound,
-    UncertainCircles,
+    UncertainObstacles,
     centre_trajectories,
     constraint_moments,
     count_events,
@@ -18,13 +18,15 @@ from foc_ros.core.obstacles.chance_constraint import (
     safety_factor,
     size_moments,
 )
+from foc_ros.core.obstacles.rounded_polygon import tabulate_polygons
 from foc_ros.core.types import Obstacles, make_obstacles
 
 
-def uncertain_circles(obstacles: Obstacles, ignored_until: float = 0.0) -> UncertainCircles:
+def uncertain_obstacles(obstacles: Obstacles, ignored_until: float = 0.0) -> UncertainObstacles:
     n = len(obstacles)
     drift, ignored = np.zeros((n, 2)), np.full(n, ignored_until)
-    return freeze(UncertainCircles(obstacles.centre, drift, *size_moments(obstacles), obstacles.centre_covariance, ignored))
+    size, polygons = size_moments(obstacles), tabulate_polygons(obstacles)
+    return freeze(UncertainObstacles(obstacles.centre, drift, *size, obstacles.centre_covariance, ignored, polygons))
 
 
 @given(st.floats(0.0, 0.999))
@@ -66,7 +68,7 @@ def test_moments_are_those_of_samples_for_correlated_axes_and_uncertain_centres(
     obstacle = make_obstacles([[0.1, 0.05]], [0.03], [0.004], centre_covariance=centre_covariance)
     mean = np.array([0.16, 0.02])
     d = mean - obstacle.centre[0]
-    E, V = constraint_moments(mean[None], covariance[[0, 1, 0], [0, 1, 1]].reshape(3, 1), uncertain_circles(obstacle))
+    E, V = constraint_moments(mean[None], covariance[[0, 1, 0], [0, 1, 1]].reshape(3, 1), uncertain_obstacles(obstacle))
     E, V = E[0, 0], V[0, 0]
     position = generator.multivariate_normal(mean, covariance, samples)
     centre = generator.multivariate_normal(obstacle.centre[0], centre_covariance, samples)
@@ -78,7 +80,7 @@ def test_moments_are_those_of_samples_for_correlated_axes_and_uncertain_centres(
 
 
 def test_a_circle_does_not_count_before_the_hand_has_left_its_margin():
-    circles = uncertain_circles(make_obstacles([[0.0, 0.0]], [0.03], [0.002]), ignored_until=2.5)
+    circles = uncertain_obstacles(make_obstacles([[0.0, 0.0]], [0.03], [0.002]), ignored_until=2.5)
     mean, _ = constraint_moments(np.zeros((4, 2)), np.zeros((3, 4)), circles)
     np.testing.assert_array_equal(np.isneginf(mean), [[True, True, False, False]])
 

@@ -1,6 +1,7 @@
-"""The chance constraint of a circle: moments of its linearised form, and the surrogate that implies it.
+"""The chance constraint of an obstacle: moments of its linearised form, and the surrogate that implies it.
 
-C = R^2 - |p - o|^2 <= 0 with R ~ N(mu_R, sigma_R^2), and p - o Gaussian. Linearised at a guess p*, with d = p* - mean(o):
+C = R^2 - |p - q|^2 <= 0 with R ~ N(mu_R, sigma_R^2) and p - o Gaussian, where q(p) is the point of the polygon with the centre o
+that is nearest to p: that centre itself, for an obstacle. Linearised at a guess p*, with d = p* - q(p*) and mean(o):
 E[C] = mu_R^2 + sigma_R^2 - |d|^2 - 2 d.(mean(p) - p*),  Var[C] = 4 mu_R^2 sigma_R^2 + 2 sigma_R^4 + 4 d' P d,
 P the covariance of p - o. Cantelli: E[C] + k sqrt(Var[C]) <= 0 gives Pr(C <= 0) >= k^2 / (1 + k^2) (paper, equations 8-15). The
 safety factor k of a movement is -E[C] / sqrt(Var[C]), linearised at its own mean. Where C is Gaussian, Pr(C <= 0) = Phi(k). By
@@ -19,16 +20,18 @@ import numpy as np
 from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled, compiled_with_caller
 from foc_ros.core.types import Array, Obstacles
 
+from .rounded_polygon import Polygons, find_offset
+
 CERTAIN_K = 1e6
 """Safety factor reported where the variance is zero: eta then differs from 1 by 1e-12."""
 
 
-class UncertainCircles(NamedTuple):
-    """m circles whose centres and radii are Gaussian.
+class UncertainObstacles(NamedTuple):
+    """m rounded polygons whose centres and radii are Gaussian.
 
     centre (m, 2): mean centres at step 0 [m]; drift (m, 2): how far they move in a step [m]; size_mean, size_variance (m,):
-    E[R^2] [m^2] and Var[R^2] [m^4]; centre_covariance (m, 2, 2) [m^2]; ignored_until (m,): steps from now before which a circle
-    does not count, because the hand is still leaving its margin.
+    E[R^2] [m^2] and Var[R^2] [m^4]; centre_covariance (m, 2, 2) [m^2]; ignored_until (m,): steps from now before which an
+    obstacle does not count, because the hand is still leaving its margin; polygons: around the centres.
     """
 
     centre: Matrix
@@ -37,6 +40,7 @@ class UncertainCircles(NamedTuple):
     size_variance: Vector
     centre_covariance: Tensor
     ignored_until: Vector
+    polygons: Polygons
 
 
 def k_of_eta(eta: float) -> float:
@@ -95,16 +99,22 @@ def centre_trajectories(centre: Array, drift: Array, steps: int) -> Array:
 
 
 @compiled
-def find_first_alike(circles: UncertainCircles, tolerance: float) -> Indices:
-    """Return for each circle the first whose centre, drift and root mean square radius differ by less than a tolerance, (m,)."""
-    first, reach = np.arange(len(circles.centre)), np.sqrt(circles.size_mean)
+def find_first_alike(obstacles: UncertainObstacles, tolerance: float) -> Indices:
+    """Return for each obstacle the first one of the same shape, (m,).
+
+    Their centres, drifts, root mean square radii and vertices differ by less than a tolerance.
+    """
+    first, reach, polygons = np.arange(len(obstacles.centre)), np.sqrt(obstacles.size_mean), obstacles.polygons
     for i in range(len(first)):
         for j in range(i):
             difference = abs(reach[i] - reach[j])
             for axis in range(2):
-                difference = max(difference, abs(circles.centre[i, axis] - circles.centre[j, axis]))
-                difference = max(difference, abs(circles.drift[i, axis] - circles.drift[j, axis]))
-            if difference < tolerance:
+                difference = max(difference, abs(obstacles.centre[i, axis] - obstacles.centre[j, axis]))
+                difference = max(difference, abs(obstacles.drift[i, axis] - obstacles.drift[j, axis]))
+                for corner in range(polygons.corners[i]):
+                    apart = polygons.vertices[i, corner, axis] - polygons.vertices[j, corner, axis]
+                    difference = max(difference, abs(apart))
+            if difference < tolerance and polygons.corners[i] == polygons.corners[j]:
                 first[i] = j
                 break
     return first
@@ -112,26 +122,30 @@ def find_first_alike(circles: UncertainCircles, tolerance: float) -> Indices:
 
 @compiled_with_caller
 def safety_factor(mean: float, variance: float) -> float:
-    """Return k = -E / sqrt(Var) of one circle at one time; +-CERTAIN_K where the variance is zero."""
+    """Return k = -E / sqrt(Var) of one obstacle at one time; +-CERTAIN_K where the variance is zero."""
     if variance > 0:
         return float(min(max(-mean / np.sqrt(variance), -CERTAIN_K), CERTAIN_K))
     return CERTAIN_K if mean <= 0 else -CERTAIN_K
 
 
 @compiled
-def constraint_moments(positions: Matrix, covariance: Matrix, circles: UncertainCircles) -> tuple[Matrix, Matrix]:
-    """Return E[C] [m^2] and Var[C] [m^4] of m circles at steps 1..N, (m, N) each, linearised at mean positions.
+def constraint_moments(positions: Matrix, covariance: Matrix, obstacles: UncertainObstacles) -> tuple[Matrix, Matrix]:
+    """Return E[C] [m^2] and Var[C] [m^4] of m obstacles at steps 1..N, (m, N) each, linearised at mean positions.
 
-    positions (N, 2) [m]; covariance (3, N): rows xx, yy, xy [m^2]. E[C] is minus infinity where a circle does not count.
+    positions (N, 2) [m]; covariance (3, N): rows xx, yy, xy [m^2]. E[C] is minus infinity where an obstacle does not count.
     """
-    m, steps = len(circles.centre), len(positions)
+    m, steps = len(obstacles.centre), len(positions)
     mean, variance = np.empty((m, steps)), np.empty((m, steps))
     for j in range(m):
-        own = circles.centre_covariance[j]
+        own = obstacles.centre_covariance[j]
         for t in range(steps):
-            x = positions[t, 0] - (circles.centre[j, 0] + (t + 1) * circles.drift[j, 0])
-            y = positions[t, 1] - (circles.centre[j, 1] + (t + 1) * circles.drift[j, 1])
+            x = positions[t, 0] - (obstacles.centre[j, 0] + (t + 1) * obstacles.drift[j, 0])
+            y = positions[t, 1] - (obstacles.centre[j, 1] + (t + 1) * obstacles.drift[j, 1])
             xx, yy, xy = covariance[0, t] + own[0, 0], covariance[1, t] + own[1, 1], covariance[2, t] + own[0, 1]
-            mean[j, t] = circles.size_mean[j] - x * x - y * y if t + 1.0 >= circles.ignored_until[j] else -np.inf
-            variance[j, t] = circles.size_variance[j] + 4 * (x * x * xx + y * y * yy + 2 * x * y * xy)
+            offset = find_offset(obstacles.polygons, j, x, y)
+            x, y = offset.x, offset.y
+            mean[j, t] = (
+                obstacles.size_mean[j] - offset.side * (x * x + y * y) if t + 1.0 >= obstacles.ignored_until[j] else -np.inf
+            )
+            variance[j, t] = obstacles.size_variance[j] + 4 * (x * x * xx + y * y * yy + 2 * x * y * xy)
     return mean, variance

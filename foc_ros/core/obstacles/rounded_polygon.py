@@ -36,14 +36,14 @@ class Polygons(NamedTuple):
 class Offset(NamedTuple):
     """The position of a point relative to a polygon.
 
-    x, y: d, from the nearest point of the polygon [m]; side: 1.0 outside, -1.0 inside the polygon; is_flat: whether the nearest
-    point is on an edge.
+    x, y: d, from the nearest point of the polygon [m]; side: 1.0 outside, -1.0 inside the polygon; is_on_edge: whether the
+    nearest point is on an edge.
     """
 
     x: float
     y: float
     side: float
-    is_flat: bool
+    is_on_edge: bool
 
 
 @compiled_with_caller
@@ -61,7 +61,7 @@ def find_support(polygons: Polygons, j: int, x: float, y: float) -> int:
 def _find_offset_from_edges(polygons: Polygons, j: int, x: float, y: float) -> Offset:
     """Return what `find_offset` does for a polygon with two vertices or more."""
     corners, nearest, is_inside = polygons.corners[j], np.inf, polygons.corners[j] > 2
-    offset_x, offset_y, is_flat = 0.0, 0.0, False
+    offset_x, offset_y, is_on_edge = 0.0, 0.0, False
     for k in range(corners if corners > 2 else 1):
         after = (k + 1) % corners
         from_x, from_y = x - polygons.vertices[j, k, 0], y - polygons.vertices[j, k, 1]
@@ -74,8 +74,8 @@ def _find_offset_from_edges(polygons: Polygons, j: int, x: float, y: float) -> O
         to_x, to_y = from_x - share * edge_x, from_y - share * edge_y
         square = to_x * to_x + to_y * to_y
         if square < nearest:
-            nearest, offset_x, offset_y, is_flat = square, to_x, to_y, is_between
-    return Offset(offset_x, offset_y, -1.0 if is_inside else 1.0, is_flat)
+            nearest, offset_x, offset_y, is_on_edge = square, to_x, to_y, is_between
+    return Offset(offset_x, offset_y, -1.0 if is_inside else 1.0, is_on_edge)
 
 
 @compiled_with_caller
@@ -91,6 +91,36 @@ def find_normal(offset: Offset, smallest: float) -> tuple[float, float, float]:
     """Return the signed distance [m], its size at least a smallest one, and the outward normal (x, y)."""
     distance = max(np.hypot(offset.x, offset.y), smallest) * offset.side
     return distance, offset.x / distance, offset.y / distance
+
+
+@compiled_with_caller
+def measure_extent(polygons: Polygons, j: int) -> float:
+    """Return the largest distance of a vertex of polygon j from its centre [m]."""
+    square = 0.0
+    for k in range(polygons.corners[j]):
+        square = max(square, polygons.vertices[j, k, 0] ** 2 + polygons.vertices[j, k, 1] ** 2)
+    return float(np.sqrt(square))
+
+
+@compiled
+def measure_half_widths(polygons: Polygons) -> Vector:
+    """Return half of the least width of each polygon, (m,) [m]; 0 for circles and capsules."""
+    widths = np.zeros(len(polygons.corners))
+    for j in range(len(widths)):
+        corners, least = polygons.corners[j], np.inf
+        for k in range(corners if corners > 2 else 0):
+            after, width = (k + 1) % corners, 0.0
+            edge_x = polygons.vertices[j, after, 0] - polygons.vertices[j, k, 0]
+            edge_y = polygons.vertices[j, after, 1] - polygons.vertices[j, k, 1]
+            for other in range(corners):
+                x, y = (
+                    polygons.vertices[j, other, 0] - polygons.vertices[j, k, 0],
+                    polygons.vertices[j, other, 1] - polygons.vertices[j, k, 1],
+                )
+                width = max(width, (edge_x * y - edge_y * x) / np.hypot(edge_x, edge_y))
+            least = min(least, width)
+        widths[j] = least / 2.0 if corners > 2 else 0.0
+    return widths
 
 
 @compiled

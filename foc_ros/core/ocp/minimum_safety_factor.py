@@ -13,6 +13,7 @@ import numpy as np
 from foc_ros.core.dynamics.condensed import position_variances
 from foc_ros.core.kernels import Matrix, Vector, compiled, compiled_with_caller
 from foc_ros.core.obstacles.chance_constraint import CERTAIN_K, constraint_moments, safety_factor
+from foc_ros.core.obstacles.rounded_polygon import find_offset
 from foc_ros.core.types import Array
 
 from .contacts.hermite import basis, interpolate, interpolation_row
@@ -37,7 +38,7 @@ class MinimumSafetyFactor(NamedTuple):
 
 @compiled_with_caller
 def _is_above(bound: float, mean: float, variance: float) -> bool:
-    """Tell whether `safety_factor` is certainly above a bound, without the square root: most circles are far away."""
+    """Tell whether `safety_factor` is certainly above a bound, without the square root: most obstacles are far away."""
     return mean < 0.0 and (bound <= 0.0 or mean * mean > bound * bound * variance)
 
 
@@ -61,18 +62,20 @@ def _initial_variance(chance: ChanceTerms, time: float, x: float, y: float) -> f
 
 @compiled_with_caller
 def _k_at_time(motion: Motion, chance: ChanceTerms, trajectory: Matrix, control_variance: Vector, j: int, time: float) -> float:
-    """Return the safety factor for circle j at any time; control_variance (2N,): c^2 u^2."""
-    circles = chance.circles
-    at, own = interpolate(trajectory, time, 0), circles.centre_covariance[j]
-    x = at[0] - (circles.centre[j, 0] + time * circles.drift[j, 0])
-    y = at[1] - (circles.centre[j, 1] + time * circles.drift[j, 1])
+    """Return the safety factor for obstacle j at any time; control_variance (2N,): c^2 u^2."""
+    obstacles = chance.obstacles
+    at, own = interpolate(trajectory, time, 0), obstacles.centre_covariance[j]
+    x = at[0] - (obstacles.centre[j, 0] + time * obstacles.drift[j, 0])
+    y = at[1] - (obstacles.centre[j, 1] + time * obstacles.drift[j, 1])
+    offset = find_offset(obstacles.polygons, j, x, y)
+    x, y = offset.x, offset.y
     # the variance of the squared distance along d is that of d.p, so that one row serves both axes
     row = interpolation_row(motion.responses, time, x, y)
     variance = x * x * own[0, 0] + 2 * x * y * own[0, 1] + y * y * own[1, 1]
     for u in range(len(row)):
         variance += row[u] * row[u] * control_variance[u]
     variance += _initial_variance(chance, time, x, y)
-    return safety_factor(circles.size_mean[j] - x * x - y * y, circles.size_variance[j] + 4 * variance)
+    return safety_factor(obstacles.size_mean[j] - offset.side * (x * x + y * y), obstacles.size_variance[j] + 4 * variance)
 
 
 @compiled
@@ -84,7 +87,7 @@ def minimum_safety_factor(
     Beside each step whose k is smaller than its neighbours', the minimum is sought at the vertex of the parabola through three
     times, closer and closer.
     """
-    mean, variance = constraint_moments(trajectory[:2, 1:].T.copy(), position_variances(chance.noise, control), chance.circles)
+    mean, variance = constraint_moments(trajectory[:2, 1:].T.copy(), position_variances(chance.noise, control), chance.obstacles)
     m, steps = mean.shape
     least, row, moment = np.inf, 0, 1.0
     for j in range(m):

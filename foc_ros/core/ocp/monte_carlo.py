@@ -1,12 +1,13 @@
-"""Monte Carlo check of a solution: noisy roll-outs against the true circles."""
+"""Monte Carlo check of a solution: noisy roll-outs against the true obstacles."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from foc_ros.core.dynamics.noise import stack_noise
+from foc_ros.core.obstacles.rounded_polygon import measure_offsets
 from foc_ros.core.types import Array
 
 from .problem import Problem
@@ -54,7 +55,7 @@ def monte_carlo(problem: Problem, control: Array, samples: int, seed: int = 0) -
 
 
 def _clear(problem: Problem, control: Array, samples: int, generator: np.random.Generator) -> Array:
-    """Whether each roll-out is outside each circle at each step, (samples, m, N) bool."""
+    """Whether each roll-out is outside each obstacle at each step, (samples, m, N) bool."""
     steps, obstacles = problem.horizon.steps, problem.obstacles
     noise = stack_noise(problem.noise, steps) * np.abs(control) * generator.standard_normal((samples, 2 * steps))
     positions = problem.positions(control) + np.einsum('atu,su->sta', problem.horizon.position, noise)
@@ -62,8 +63,11 @@ def _clear(problem: Problem, control: Array, samples: int, generator: np.random.
     positions += np.einsum('tij,sj->sti', problem.error_map[1:, :2], errors)
     radius = obstacles.radius + obstacles.radius_stddev * generator.standard_normal((samples, len(obstacles)))
     drift = _gaussian(obstacles.centre_covariance, samples, generator)
-    offset = positions[:, None] - problem.centres[None] - drift[:, :, None]
-    clear: Array = (offset**2).sum(axis=-1) >= (radius**2)[:, :, None]
+    clear: Array = np.empty((samples, len(obstacles), steps), dtype=np.bool_)
+    for row in range(len(obstacles)):
+        still = replace(obstacles.take([row]), centre=np.zeros((1, 2)))
+        _, distance = measure_offsets(positions - problem.centres[row] - drift[:, row, None], still)
+        clear[:, row] = distance.reshape(samples, steps) >= np.abs(radius[:, row, None])
     return clear
 
 

@@ -18,20 +18,21 @@ from foc_ros.core.kernels import freeze
 from foc_ros.core.obstacles.chance_constraint import (
     CANTELLI,
     RiskBound,
-    UncertainCircles,
+    UncertainObstacles,
     centre_trajectories,
     find_first_alike,
     size_moments,
 )
+from foc_ros.core.obstacles.rounded_polygon import Polygons, measure_offsets, tabulate_polygons
 from foc_ros.core.safety_preference import HARD, SafetyPreference
 from foc_ros.core.types import Array, Obstacles, Record, as_readonly
 
 from .contacts.hermite import compute_trajectory
-from .terms import ChanceTerms, CostTerms, Motion, MovingCircles, ProblemTerms
+from .terms import ChanceTerms, CostTerms, Motion, MovingObstacles, ProblemTerms
 
 BOTH = np.ones(2)
-SAME_CIRCLE = 1e-6
-"""Difference between two circles, relative to the scene, below which they count as the same."""
+SAME_SHAPE = 1e-6
+"""Difference between two obstacles, relative to the scene, below which they count as the same."""
 SMALLEST_EXTENT = 1e-6
 """Least size of a scene [m]."""
 
@@ -53,7 +54,7 @@ class Problem(Record):
     noise
         c of each channel for one step, (2,).
     obstacles
-        The circles now.
+        The obstacles now.
     eta
         Wanted probability of avoidance, of the events that `risk` counts.
     at_goal
@@ -108,7 +109,14 @@ class Problem(Record):
             PositionNoise(self.horizon.maps, self.noise_variance, free),
             np.ascontiguousarray(errors * scale[:, None, None]),
             initial,
-            UncertainCircles(self.obstacles.centre, self.drift, *self.size, self.obstacles.centre_covariance, self.ignored_until),
+            UncertainObstacles(
+                self.obstacles.centre,
+                self.drift,
+                *self.size,
+                self.obstacles.centre_covariance,
+                self.ignored_until,
+                self.polygons,
+            ),
         )
         motion = Motion(self.horizon.motion, np.ascontiguousarray(self.free[:, :4].T * scale[:, None]))
         cost = CostTerms(self.weighted_variance, self.summed_variance, *self.goal_rows)
@@ -144,18 +152,18 @@ class Problem(Record):
 
     @cached_property
     def first_alike(self) -> NDArray[np.intp]:
-        """For each obstacle the row of the first one that is the same circle, (m,): of equal circles only one is in contact."""
-        return find_first_alike(self.terms.chance.circles, SAME_CIRCLE * self.extent)
+        """For each obstacle the row of the first one that is the same shape, (m,): of equal ones only one is in contact."""
+        return find_first_alike(self.terms.chance.obstacles, SAME_SHAPE * self.extent)
 
     @cached_property
     def inside_margin(self) -> NDArray[np.bool_]:
         """Whether the hand is now inside the margin of each obstacle, (m,); never without a recovery time."""
         if self.recovery_s <= 0 or not len(self.obstacles):
             return np.zeros(len(self.obstacles), dtype=np.bool_)
-        offset = self.initial_mean[:2] - self.obstacles.centre
+        offset, distance = self._offset_now
         covariance = self.initial_covariance[:2, :2] + self.obstacles.centre_covariance
         variance = self.size[1] + 4 * (offset[:, None] @ covariance @ offset[:, :, None]).ravel()
-        inside: NDArray[np.bool_] = self.size[0] - self._distance_now**2 + self.wanted_k * np.sqrt(variance) > 0.0
+        inside: NDArray[np.bool_] = self.size[0] - distance * np.abs(distance) + self.wanted_k * np.sqrt(variance) > 0.0
         return inside
 
     @property
@@ -208,32 +216,39 @@ class Problem(Record):
             np.concatenate((softness, np.tile(0.5 / self.stage_weights[stage], steps - 1))),
         )
 
-    def circles(self, tau: float) -> MovingCircles:
-        """Return the circles with the distance to keep from them, sqrt(E[R^2] + tau), for tau [m^2].
+    def obstacles_with_reach(self, tau: float) -> MovingObstacles:
+        """Return the obstacles with the distance to keep from their polygons, sqrt(E[R^2] + tau), for tau [m^2].
 
         Less is required where the hand is nearer now, and has a recovery time: see `clearance.required_distance`.
         """
-        known = self._known_circles.get(tau)
+        known = self._known_reach.get(tau)
         if known is not None:
             return known
         reach: Array = np.sqrt(self.size[0] + tau)
         missing, pace = np.zeros(len(reach)), 0.0
         if self.recovery_s > 0:
-            missing, pace = reach - self._distance_now, self.horizon.dt / self.recovery_s
-        circles = MovingCircles(self.obstacles.centre, self.drift, as_readonly(reach), as_readonly(missing), pace)
-        self._known_circles[tau] = circles
-        return circles
+            missing, pace = reach - self._offset_now[1], self.horizon.dt / self.recovery_s
+        obstacles = MovingObstacles(
+            self.obstacles.centre, self.drift, as_readonly(reach), as_readonly(missing), pace, self.polygons
+        )
+        self._known_reach[tau] = obstacles
+        return obstacles
 
     @cached_property
-    def _known_circles(self) -> dict[float, MovingCircles]:
-        """The circles by tau, which are needed several times for each."""
+    def _known_reach(self) -> dict[float, MovingObstacles]:
+        """The obstacles by tau, which are needed several times for each."""
         return {}
 
     @cached_property
-    def _distance_now(self) -> Array:
-        """Distance of the hand from each centre now, (m,) [m]."""
-        offset = self.initial_mean[:2] - self.obstacles.centre
-        return np.hypot(offset[:, 0], offset[:, 1])
+    def _offset_now(self) -> tuple[Array, Array]:
+        """The hand relative to the nearest point of each polygon now, (m, 2) [m], and its signed distance, (m,) [m]."""
+        offset, distance = measure_offsets(self.initial_mean[:2], self.obstacles)
+        return offset[0], distance[0]
+
+    @cached_property
+    def polygons(self) -> Polygons:
+        """The polygons of the obstacles, as kernels take them."""
+        return tabulate_polygons(self.obstacles)
 
     def trajectory(self, control: Array) -> Array:
         """Return the mean x, y, vx, vy of a stacked control (2N,) at steps 0..N, (4, N + 1), velocities per step [m]."""
@@ -284,7 +299,7 @@ def rest_to_goal(
     goal_position
         (2,) [m].
     obstacles
-        The circles now.
+        The obstacles now.
     noise
         c of each channel for one step, (2,).
     eta

@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 from foc_ros.core.dynamics.impulse_response import apply_impulse_response
 from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled, compiled_with_caller, freeze
 from foc_ros.core.linear_algebra import factorise_cholesky, multiply, multiply_transposed, multiply_vector, solve_lower
+from foc_ros.core.obstacles.rounded_polygon import find_normal, find_offset
 from foc_ros.core.types import Array
 
 from .clearance import required_distance
 from .contacts.hermite import interpolation_rows
 from .problem import Problem
-from .terms import CostTerms, MovingCircles
+from .terms import CostTerms, MovingObstacles
 
 SMALLEST_PIVOT = 1e-14
 """Least squared pivot of the goal rows' Schur complement, scaled to a unit diagonal."""
@@ -171,7 +172,7 @@ def evaluate_rows(responses: Tensor, further: Tensor, weights: Matrix, coefficie
 def find_violated(
     rows: ObstacleRows, control: Vector, known_obstacle: Indices, known_step: Indices, tolerance: float
 ) -> tuple[Indices, Indices]:
-    """Return the worst row of every stretch of steps at which a control (2N,) violates a circle's, as obstacle and step index.
+    """Return the worst row of every stretch of steps at which a control (2N,) violates an obstacle's, as obstacle and step index.
 
     Rows that are known, given by obstacle and step index (k,), count as met.
     """
@@ -235,42 +236,45 @@ def clearance_qp(
         further, free = interpolation_rows(problem.terms.motion, between)
         path = np.concatenate((problem.initial_mean[None, :2], guess))
         positions = np.stack([np.interp(between, np.arange(steps + 1.0), axis) for axis in path.T], axis=1)
-        more_normals, more_limits = linearise_clearance(positions, free, between, problem.circles(tau), False)
+        more_normals, more_limits = linearise_clearance(positions, free, between, problem.obstacles_with_reach(tau), False)
         normals, limits = np.concatenate((normals, more_normals), axis=1), np.concatenate((limits, more_limits), axis=1)
     rows = ObstacleRows(problem.horizon.maps[:2], further, np.ones((2, 2 * steps)), normals, limits)
     return ReachingQP(cost, freeze(rows), problem.qp_backend)
 
 
 def half_planes(problem: Problem, guess: Array, tau: float, *, literal: bool = False) -> tuple[Array, Array]:
-    """Linearise |p - o|^2 >= E[R^2] + tau at a guess (N, 2): unit normals (m, N, 2) and limits (m, N) on normal . (S u) [m].
+    """Linearise |p - q|^2 >= E[R^2] + tau at a guess (N, 2): unit normals (m, N, 2) and limits (m, N) on normal . (S u) [m].
 
-    literal: the paper's E[C] + tau <= 0 divided by 2 |d|; its plane lies (reach^2 + d^2) / (2 d) from the centre, d = |guess -
-    centre|. Otherwise the plane with the same normal that touches the circle: the two agree at a solution, where the constraint
-    is active, and the touching one cuts off less elsewhere, so that a far obstacle is never in the way. Both stay outside the
-    circle.
+    q is the point of the polygon that is nearest to the guess; inside a polygon distances count as negative.
+
+    literal: the paper's E[C] + tau <= 0 divided by 2 |d|; its plane lies (reach^2 + d^2) / (2 d) from q, d = |guess - q|.
+    Otherwise the plane with the same normal that touches the rounded polygon: the two agree at a solution, where the constraint
+    is active, and the touching one cuts off less elsewhere, so that a far obstacle is never in the way. Both stay outside
+    the obstacle.
     """
     motion, times = problem.terms.motion, np.arange(1.0, problem.horizon.steps + 1.0)
     free = np.ascontiguousarray(motion.free[:2, 1:].T)
-    return linearise_clearance(np.ascontiguousarray(guess, dtype=float), free, times, problem.circles(tau), literal)
+    return linearise_clearance(np.ascontiguousarray(guess, dtype=float), free, times, problem.obstacles_with_reach(tau), literal)
 
 
 @compiled
 def linearise_clearance(
-    guess: Matrix, free: Matrix, times: Vector, circles: MovingCircles, literal: bool
+    guess: Matrix, free: Matrix, times: Vector, obstacles: MovingObstacles, literal: bool
 ) -> tuple[Tensor, Matrix]:
     """Return normals (m, q, 2) and limits (m, q) of `half_planes` at times (q,), for a guess (q, 2) and free positions (q, 2)."""
-    m, q = len(circles.reach), len(times)
+    m, q = len(obstacles.reach), len(times)
     normals, limits = np.empty((m, q, 2)), np.empty((m, q))
     for j in range(m):
         for t in range(q):
-            cx = circles.centre[j, 0] + times[t] * circles.drift[j, 0]
-            cy = circles.centre[j, 1] + times[t] * circles.drift[j, 1]
-            x, y = guess[t, 0] - cx, guess[t, 1] - cy
-            distance = np.hypot(x, y)
+            cx = obstacles.centre[j, 0] + times[t] * obstacles.drift[j, 0]
+            cy = obstacles.centre[j, 1] + times[t] * obstacles.drift[j, 1]
+            offset = find_offset(obstacles.polygons, j, guess[t, 0] - cx, guess[t, 1] - cy)
+            nearest_x, nearest_y = guess[t, 0] - offset.x, guess[t, 1] - offset.y
+            distance, x, y = find_normal(offset, 0.0)
             if distance == 0.0:  # a guess on a centre has no normal: pass on the left of the y axis
-                y, distance = 1.0, 1.0
-            reach = required_distance(circles, j, times[t])[0]
-            normals[j, t, 0], normals[j, t, 1] = x / distance, y / distance
-            limits[j, t] = normals[j, t, 0] * (cx - free[t, 0]) + normals[j, t, 1] * (cy - free[t, 1])
-            limits[j, t] += (reach * reach + distance * distance) / (2.0 * distance) if literal else reach
+                x, y, distance = 0.0, 1.0, 1.0
+            reach = required_distance(obstacles, j, times[t])[0]
+            normals[j, t, 0], normals[j, t, 1] = x, y
+            limits[j, t] = x * (nearest_x - free[t, 0]) + y * (nearest_y - free[t, 1])
+            limits[j, t] += (reach * reach + distance * distance) / (2.0 * distance) if literal and distance > 0.0 else reach
     return normals, limits

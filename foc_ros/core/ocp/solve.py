@@ -148,7 +148,7 @@ def sum_errors(mean: Matrix, covariance: Tensor, goal: Vector, terminal: Vector,
 def compute_violation(problem: Problem, mean: Array, tau: float) -> tuple[float, tuple[int, int] | None]:
     """Return by how much a mean (N + 1, n) comes nearer than required [m], and where: row of the obstacle and step 1..N.
 
-    0 and None where it never does. What is required is `Problem.circles`.
+    0 and None where it never does. What is required is `Problem.obstacles`.
     """
-    missing, row, step = find_deepest(np.ascontiguousarray(mean[1:, :2]), problem.circles(tau))
+    missing, row, step = find_deepest(np.ascontiguousarray(mean[1:, :2]), problem.obstacles_with_reach(tau))
     return (missing, (row, step)) if missing > NO_VIOLATION else (0.0, None)

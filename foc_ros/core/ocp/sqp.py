@@ -1,8 +1,8 @@
 """Sequential quadratic programming: linearise at a guess, solve, linearise at the solution, until it stays.
 
-Every half-plane lies outside its circle, wherever it is linearised, so that every solution is feasible. Between QPs a few Newton
-steps on the contacts jump to where the sequence would creep, if that lowers the cost too; where they fail, the next linearisation
-is extrapolated further and further.
+Every half-plane lies outside its obstacle, wherever it is linearised, so that every solution is feasible. Between QPs a few
+Newton steps on the contacts jump to where the sequence would creep, if that lowers the cost too; where they fail, the next
+linearisation is extrapolated further and further.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The data of a problem as kernels take them: NamedTuples of frozen arrays, built once for each problem.
 
 Arrays follow the conventions of the package: stacked controls have 2N entries, the first channel at steps 0..N-1, then the
-second; trajectories have rows x, y, vx, vy at steps 0..N, with velocities in metres per step; m is the number of circles.
+second; trajectories have rows x, y, vx, vy at steps 0..N, with velocities in metres per step; m is the number of obstacles.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 from foc_ros.core.dynamics.condensed import PositionNoise
 from foc_ros.core.kernels import Matrix, Tensor, Vector
-from foc_ros.core.obstacles.chance_constraint import UncertainCircles
+from foc_ros.core.obstacles.chance_constraint import UncertainObstacles
+from foc_ros.core.obstacles.rounded_polygon import Polygons
 
 
 class Motion(NamedTuple):
@@ -23,11 +24,12 @@ class Motion(NamedTuple):
     free: Matrix
 
 
-class MovingCircles(NamedTuple):
-    """m circles and the distance that the mean has to keep from their centres.
+class MovingObstacles(NamedTuple):
+    """m rounded polygons and the distance that the mean has to keep from the polygons.
 
     centre (m, 2): at step 0 [m]; drift (m, 2): per step [m]; reach (m,): distance to keep [m]; missing (m,): by how much the hand
-    is nearer than that at step 0 [m]; pace: one over the number of steps in which what is missing has to fall to zero.
+    is nearer than that at step 0 [m]; pace: one over the number of steps in which what is missing has to fall to zero;
+    polygons: around the centres.
     """
 
     centre: Matrix
@@ -35,10 +37,11 @@ class MovingCircles(NamedTuple):
     reach: Vector
     missing: Vector
     pace: float
+    polygons: Polygons
 
 
 class ChanceTerms(NamedTuple):
-    """The chance constraint: noise of the position, uncertainty of the start, and the circles.
+    """The chance constraint: noise of the position, uncertainty of the start, and the obstacles.
 
     error_trajectory (4, N + 1, n): how an error of each state at step 0 moves the trajectory; (4, 0, n) without such an error;
     initial_covariance (n, n): of the state at step 0.
@@ -47,7 +50,7 @@ class ChanceTerms(NamedTuple):
     noise: PositionNoise
     error_trajectory: Tensor
     initial_covariance: Matrix
-    circles: UncertainCircles
+    obstacles: UncertainObstacles
 
 
 class CostTerms(NamedTuple):

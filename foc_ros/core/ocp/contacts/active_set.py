@@ -7,7 +7,7 @@ import numpy as np
 from foc_ros.core.kernels import Matrix, Vector, compiled_with_caller
 from foc_ros.core.ocp.clearance import find_penetrations
 from foc_ros.core.ocp.qp import GoalSolution
-from foc_ros.core.ocp.terms import MovingCircles, ProblemTerms
+from foc_ros.core.ocp.terms import MovingObstacles, ProblemTerms
 
 from .contacts import Contacts
 from .hermite import compute_trajectory
@@ -17,7 +17,7 @@ NEWTON_TOLERANCE = 1e-5
 """Largest move of a contact, relative to the scene, at which the Newton iteration ends. Quadratic convergence leaves about
 1e-9."""
 CLEAR = 3e-8
-"""Depth in a circle that counts as rounding, relative to the scene."""
+"""Depth in an obstacle that counts as rounding, relative to the scene."""
 MAX_CHANGES = 8
 """How often contacts may be released or added."""
 NEW_MULTIPLIER = 1e-6
@@ -26,11 +26,11 @@ NEW_MULTIPLIER = 1e-6
 
 @compiled_with_caller
 def update_active_contacts(
-    terms: ProblemTerms, circles: MovingCircles, goal: GoalSolution, contacts: Contacts, near: Vector
+    terms: ProblemTerms, obstacles: MovingObstacles, goal: GoalSolution, contacts: Contacts, near: Vector
 ) -> tuple[bool, bool, Vector, Matrix, Contacts]:
-    """Find the least cost near a control (2N,) that keeps clear of every circle at every time, from contacts to begin with.
+    """Find the least cost near a control (2N,) that keeps clear of every obstacle at every time, from contacts to begin with.
 
-    Contacts slide; those with a negative multiplier are released, and a circle that is penetrated becomes a new one. Returns
+    Contacts slide; those with a negative multiplier are released, and an obstacle that is penetrated becomes a new one. Returns
     whether there is a solution, whether it has other contacts, so that it may be in another homotopy class, the control, its
     trajectory and its contacts.
     """
@@ -41,7 +41,7 @@ def update_active_contacts(
         if len(multiplier):
             active = Contacts(obstacle, time, multiplier)
             found, control, active = newton_on_contacts(
-                motion, circles, goal, active, control, True, NEWTON_TOLERANCE * terms.extent
+                motion, obstacles, goal, active, control, True, NEWTON_TOLERANCE * terms.extent
             )
             if not found:
                 break
@@ -53,7 +53,7 @@ def update_active_contacts(
             obstacle, time, multiplier = obstacle[pushing], time[pushing], multiplier[pushing]
             continue
         trajectory = compute_trajectory(motion, control)
-        new = find_penetrations(trajectory, circles, CLEAR * terms.extent)
+        new = find_penetrations(trajectory, obstacles, CLEAR * terms.extent)
         if len(new) == 0:
             return True, count > 0, control, trajectory, Contacts(obstacle, time, multiplier)
         slight = NEW_MULTIPLIER * (multiplier.max() if len(multiplier) else 1.0)

@@ -1,4 +1,4 @@
-"""Contacts of the mean with circles, as data."""
+"""Contacts of the mean with obstacles, as data."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from foc_ros.core.ocp.working_set import WorkingSet
 from foc_ros.core.types import Array
 
 MERGE_DISTANCE = 1.5
-"""Distance in steps up to which neighbouring contacts with one circle become one: rows at steps straddle a contact."""
+"""Distance in steps up to which neighbouring contacts with one obstacle become one: rows at steps straddle a contact."""
 
 
 class Contacts(NamedTuple):
     """k contacts, with frozen arrays.
 
-    obstacle (k,): row of the circle; time (k,): in steps from now, fractions allowed; multiplier (k,): how much the cost grows
+    obstacle (k,): row of the obstacle; time (k,): in steps from now, fractions allowed; multiplier (k,): how much the cost grows
     with each metre more of distance to keep [m/s^6].
     """
 
@@ -48,25 +48,25 @@ NO_CONTACTS = freeze(Contacts(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(
 
 @compiled
 def merge_contacts(contacts: Contacts, first_alike: Indices) -> Contacts:
-    """Return contacts in order, with neighbours on the same circle as one: at the centre of their multipliers, with their sum.
+    """Return contacts in order, with neighbours on the same obstacle as one: at the centre of their multipliers, with their sum.
 
-    first_alike (m,): for each circle the first that is the same. Multipliers that are not known, as after a full QP, count as 1.
+    first_alike (m,): for each obstacle the first that is the same. Unknown multipliers, as after a full QP, count as 1.
     """
     k, count = len(contacts.time), 0
-    circle, time, weight = np.empty(k, np.intp), np.empty(k), np.empty(k)
+    obstacle, time, weight = np.empty(k, np.intp), np.empty(k), np.empty(k)
     for i in range(k):
         j, place, multiplier = first_alike[contacts.obstacle[i]], i, contacts.multiplier[i]
-        while place > 0 and (circle[place - 1] > j or (circle[place - 1] == j and time[place - 1] > contacts.time[i])):
-            circle[place], time[place], weight[place] = circle[place - 1], time[place - 1], weight[place - 1]
+        while place > 0 and (obstacle[place - 1] > j or (obstacle[place - 1] == j and time[place - 1] > contacts.time[i])):
+            obstacle[place], time[place], weight[place] = obstacle[place - 1], time[place - 1], weight[place - 1]
             place -= 1
-        circle[place], time[place] = j, contacts.time[i]
+        obstacle[place], time[place] = j, contacts.time[i]
         weight[place] = multiplier if np.isfinite(multiplier) and multiplier > 0.0 else 1.0
     total, moment, last = np.zeros(k), np.zeros(k), -np.inf
     for i in range(k):
-        if i == 0 or circle[i] != circle[count - 1] or time[i] - last > MERGE_DISTANCE:
-            circle[count] = circle[i]
+        if i == 0 or obstacle[i] != obstacle[count - 1] or time[i] - last > MERGE_DISTANCE:
+            obstacle[count] = obstacle[i]
             count += 1
         last = time[i]
         total[count - 1] += weight[i]
         moment[count - 1] += weight[i] * time[i]
-    return Contacts(circle[:count].copy(), moment[:count] / total[:count], total[:count].copy())
+    return Contacts(obstacle[:count].copy(), moment[:count] / total[:count], total[:count].copy())

@@ -1,6 +1,6 @@
-"""Newton iteration on the optimality conditions of a mean that is in contact with circles.
+"""Newton iteration on the optimality conditions of a mean that is in contact with obstacles.
 
-The mean behaves like a loaded beam. Let a contact at time s have distance d from the centre and multiplier y along its normal
+The mean behaves like a loaded beam. Let a contact at time s have distance d from the polygon and multiplier y along its normal
 n. A multiplier f along its tangent t turns the normal by f d / y. As the mean passes with velocity v and acceleration a, its
 distance falls and rises again with curvature b = n.a + (t.v)^2 / d, so that a multiplier m on the rate of the distance moves the
 contact by m / y in time. With the rows
@@ -10,8 +10,9 @@ S(s) the effect of the control on the position, and C the Schur complement M P M
     C_rh y + (C_rr + b / y_last) m + C_rg f = what r misses,
     C_gh y + C_gr m + (C_gg - d / y_last) f = what g misses.
 The solution is a minimum if the first two blocks are positive definite, and d / y_last less the Schur complement of C_gg is so
-too: with a larger multiplier the mean would slip round the circle. A contact that is held at its time has no multiplier m, and is
-less stable: the mean may slip past it.
+too: with a larger multiplier the mean would slip round the obstacle. A contact that is held at its time has no multiplier m, and
+is less stable: the mean may slip past it. Where the nearest point of the polygon lies on an edge, the normal does not turn, and
+the d of these equations is infinite.
 """
 
 from __future__ import annotations
@@ -27,9 +28,10 @@ from foc_ros.core.linear_algebra import (
     solve_lower,
     solve_lower_transposed,
 )
-from foc_ros.core.ocp.clearance import required_distance
+from foc_ros.core.obstacles.rounded_polygon import find_normal, find_offset
+from foc_ros.core.ocp.clearance import SMALLEST_DISTANCE, required_distance
 from foc_ros.core.ocp.qp import GoalSolution, schur_complement
-from foc_ros.core.ocp.terms import Motion, MovingCircles
+from foc_ros.core.ocp.terms import Motion, MovingObstacles
 
 from .contacts import Contacts
 from .hermite import contact_rows, interpolate, trajectory_around
@@ -47,6 +49,8 @@ SMALLEST_CURVATURE = 1e-2
 """Least curvature of the distance over time at a contact while steps are made, as a share of that of a straight pass."""
 STANDSTILL_CURVATURE = 1e-30
 """The same of a mean that stands still."""
+LARGEST_RADIUS = 1e6
+"""Radius with which the boundary counts as bent where the contact is on an edge [m]."""
 REGULARISATION = 1e-13
 """Softness of a contact relative to its own effect: two contacts with the same row then share the multiplier."""
 
@@ -115,7 +119,7 @@ def newton_step(schur: Matrix, missing: Matrix, curvature: Vector, distance: Vec
 @compiled_with_caller
 def newton_on_contacts(
     motion: Motion,
-    circles: MovingCircles,
+    obstacles: MovingObstacles,
     goal: GoalSolution,
     contacts: Contacts,
     near: Vector,
@@ -138,25 +142,26 @@ def newton_on_contacts(
         is_flat = False
         for i in range(k):
             j, s = contacts.obstacle[i], time[i]
-            required, growth, acceleration = required_distance(circles, j, s)
+            required, growth, acceleration = required_distance(obstacles, j, s)
             t = min(int(s), steps - 1)
             around = trajectory_around(motion, control, t)
             at, velocity, bend = interpolate(around, s - t, 0), interpolate(around, s - t, 1), interpolate(around, s - t, 2)
-            dx, dy = circles.drift[j, 0], circles.drift[j, 1]
-            x, y = at[0] - circles.centre[j, 0] - s * dx, at[1] - circles.centre[j, 1] - s * dy
-            distance[i] = np.hypot(x, y)
-            x, y = x / distance[i], y / distance[i]
+            dx, dy = obstacles.drift[j, 0], obstacles.drift[j, 1]
+            x, y = at[0] - obstacles.centre[j, 0] - s * dx, at[1] - obstacles.centre[j, 1] - s * dy
+            offset = find_offset(obstacles.polygons, j, x, y)
+            apart, x, y = find_normal(offset, SMALLEST_DISTANCE)
+            distance[i], turn = (LARGEST_RADIUS, 0.0) if offset.is_on_edge else (apart, 1.0 / apart)
             normal[i, 0], normal[i, 1] = x, y
             vx, vy = velocity[0] - dx, velocity[1] - dy
             passing[i], rate = x * vy - y * vx, x * vx + y * vy - growth
             is_at_end = (s <= 1.0 and rate > 0.0) or (s >= steps and rate < 0.0)
             slides[i] = 1 if may_slide and not is_at_end else 0
-            straight = passing[i] ** 2 / distance[i]
-            curvature[i] = x * bend[0] + y * bend[1] + straight - acceleration
-            if slides[i] == 1 and curvature[i] < SMALLEST_CURVATURE * straight + STANDSTILL_CURVATURE:
-                curvature[i], is_flat = SMALLEST_CURVATURE * straight + STANDSTILL_CURVATURE, True
-            rows[i::k] = contact_rows(motion.responses, s, x, y, passing[i] / distance[i])
-            missing[i, 0], missing[k + i, 0], missing[2 * k + i, 0] = required - distance[i], -rate, 0.0
+            curvature[i] = x * bend[0] + y * bend[1] + passing[i] ** 2 * turn - acceleration
+            least = SMALLEST_CURVATURE * passing[i] ** 2 / max(abs(apart), SMALLEST_DISTANCE) + STANDSTILL_CURVATURE
+            if slides[i] == 1 and curvature[i] < least:
+                curvature[i], is_flat = least, True
+            rows[i::k] = contact_rows(motion.responses, s, x, y, passing[i] * turn)
+            missing[i, 0], missing[k + i, 0], missing[2 * k + i, 0] = required - apart, -rate, 0.0
         if count == 0:
             first[:] = normal
         missing += multiply_transposed(rows, np.expand_dims(control - goal.control, 0))
@@ -180,7 +185,7 @@ def newton_on_contacts(
                 time[i] = min(max(time[i] + slide, 1.0), steps)
                 move = max(move, abs(slide * passing[i]))
         if move < tolerance:
-            is_turned = False  # a contact went round to the other side of its circle: another homotopy class
+            is_turned = False  # a contact went round to the other side of its obstacle: another homotopy class
             for i in range(k):
                 is_turned = is_turned or normal[i, 0] * first[i, 0] + normal[i, 1] * first[i, 1] < 0.0
             return not is_flat and not is_turned, control, Contacts(contacts.obstacle.copy(), time, multiplier)

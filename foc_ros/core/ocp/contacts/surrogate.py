@@ -1,17 +1,19 @@
 """The margin by which a movement meets the surrogate of the chance constraint, at any time, with its derivatives.
 
-At a time s, d is the mean position relative to a mean centre, h_q the effect of the control u_q on it, r_q = d.h_q, and P its
-covariance. With Var = Var[R^2] + 4 d'Pd, the margin
+At a time s, d is the mean position relative to the nearest point of the polygon, h_q the effect of the control u_q on d,
+r_q = d.h_q, and P the covariance. Where that point is a vertex, h_q is the effect on the position; where it is on an edge, only
+what of this is along the normal. With Var = Var[R^2] + 4 d'Pd, the margin
 
     g(u, s, k) = (|d|^2 - E[R^2] - k sqrt(Var)) / (2 |d_0|)   [m]
 
-is at least zero where the safety factor is at least k; d_0 is the d at which derivatives are taken, and counts as constant. From
+is at least zero where the safety factor is at least k; d_0 is the d at which derivatives are taken, and counts as constant.
+Inside a polygon |d|^2 counts as negative. From
 
     dVar/du_q = 8 c_q^2 u_q r_q^2 + 8 (P d).h_q,
     d2Var/du2 = diag(8 c^2 r^2) + W'S + S'W + 8 S'P S,   S_q = h_q,   W_q = 16 c_q^2 u_q r_q h_q,
 
-the Hessian of g is a diagonal and a matrix of rank five, in the rows S (2), W (2) and dVar/du. Before the time at which a circle
-begins to count, because the hand is still leaving its margin, the mean alone has to keep the required distance: k is zero there.
+the Hessian of g is a diagonal and a matrix of rank five, in the rows S (2), W (2) and dVar/du. Before the time at which an
+obstacle begins to count, because the hand is still leaving its margin, k is zero: the mean alone keeps the required distance.
 """
 
 from __future__ import annotations
@@ -22,8 +24,9 @@ import numpy as np
 
 from foc_ros.core.dynamics.condensed import position_variances
 from foc_ros.core.kernels import Indices, Matrix, Vector, compiled_separately, compiled_with_caller
+from foc_ros.core.obstacles.rounded_polygon import Offset, find_normal, find_offset
 from foc_ros.core.ocp.clearance import required_distance
-from foc_ros.core.ocp.terms import ChanceTerms, MovingCircles, ProblemTerms
+from foc_ros.core.ocp.terms import ChanceTerms, MovingObstacles, ProblemTerms
 
 from .hermite import basis, contact_rows, interpolate
 
@@ -40,10 +43,11 @@ APART = 2.0
 
 
 class Margin(NamedTuple):
-    """The margin of a circle at a time, and what its derivatives consist of.
+    """The margin of an obstacle at a time, and what its derivatives consist of.
 
-    value [m]; k: the safety factor that counts; stddev: sqrt(Var) [m^2]; scale: 1 / (2 |d_0|) [1/m]; x, y: d [m]; covariance
-    (2, 2): P [m^2]; position (3, 2N): S in the rows 0 and 2; variance_row and row (2N,): derivatives of Var and g by the control.
+    value [m]; k: the safety factor that counts; stddev: sqrt(Var) [m^2]; scale: 1 / (2 |d_0|) [1/m]; x, y: d [m]; side: as
+    in `Offset`; covariance (2, 2): P [m^2]; position (3, 2N): S in the rows 0 and 2; variance_row and row (2N,): derivatives of
+    Var and g by the control.
     """
 
     value: float
@@ -52,6 +56,7 @@ class Margin(NamedTuple):
     scale: float
     x: float
     y: float
+    side: float
     covariance: Matrix
     position: Matrix
     variance_row: Vector
@@ -80,21 +85,38 @@ def initial_covariance_at(chance: ChanceTerms, time: float) -> Matrix:
 
 
 @compiled_with_caller
-def relative_position(trajectory: Matrix, circles: MovingCircles, j: int, time: float) -> tuple[float, float]:
+def relative_position(trajectory: Matrix, obstacles: MovingObstacles, j: int, time: float) -> tuple[float, float]:
     """Return the position of a trajectory (4, N + 1) relative to centre j at any time [m]."""
     at = interpolate(trajectory, time, 0)
-    x = at[0] - circles.centre[j, 0] - time * circles.drift[j, 0]
-    return x, at[1] - circles.centre[j, 1] - time * circles.drift[j, 1]
+    x = at[0] - obstacles.centre[j, 0] - time * obstacles.drift[j, 0]
+    return x, at[1] - obstacles.centre[j, 1] - time * obstacles.drift[j, 1]
+
+
+@compiled_separately
+def project_on_normal(position: Matrix, offset: Offset) -> None:
+    """Keep of the effects of the control on the position, in the rows 0 and 2, what is along the normal."""
+    _, x, y = find_normal(offset, SMALLEST_DISTANCE)
+    for q in range(position.shape[1]):
+        along = x * position[0, q] + y * position[2, q]
+        position[0, q], position[2, q] = along * x, along * y
 
 
 @compiled_separately
 def evaluate_margin(
-    terms: ProblemTerms, circles: MovingCircles, trajectory: Matrix, control: Vector, j: int, time: float, k: float, scale: float
+    terms: ProblemTerms,
+    obstacles: MovingObstacles,
+    trajectory: Matrix,
+    control: Vector,
+    j: int,
+    time: float,
+    k: float,
+    scale: float,
 ) -> Margin:
-    """Return the margin of a control (2N,) for circle j at any time; scale [1/m], 0 for that of the position itself."""
+    """Return the margin of a control (2N,) for obstacle j at any time; scale [1/m], 0 for that of the position itself."""
     chance, n = terms.chance, len(control)
-    noise, covariance = chance.noise.noise_variance, initial_covariance_at(chance, time) + chance.circles.centre_covariance[j]
-    x, y = relative_position(trajectory, circles, j, time)
+    noise, covariance = chance.noise.noise_variance, initial_covariance_at(chance, time) + chance.obstacles.centre_covariance[j]
+    offset = find_offset(obstacles.polygons, j, *relative_position(trajectory, obstacles, j, time))
+    x, y = offset.x, offset.y
     position = contact_rows(terms.motion.responses, time, 1.0, 0.0, 0.0)
     for q in range(n):
         variance, a, b = noise[q] * control[q] * control[q], position[0, q], position[2, q]
@@ -102,43 +124,47 @@ def evaluate_margin(
         covariance[0, 1] += variance * a * b
         covariance[1, 1] += variance * b * b
     covariance[1, 0] = covariance[0, 1]
+    if offset.is_on_edge:
+        project_on_normal(position, offset)
     pull_x, pull_y = covariance[0, 0] * x + covariance[0, 1] * y, covariance[1, 0] * x + covariance[1, 1] * y
-    stddev = np.sqrt(max(chance.circles.size_variance[j] + 4.0 * (x * pull_x + y * pull_y), SMALLEST_VARIANCE))
-    counted = k if time >= chance.circles.ignored_until[j] else 0.0
+    stddev = np.sqrt(max(chance.obstacles.size_variance[j] + 4.0 * (x * pull_x + y * pull_y), SMALLEST_VARIANCE))
+    counted = k if time >= chance.obstacles.ignored_until[j] else 0.0
     if scale == 0.0:
         scale = 0.5 / max(np.hypot(x, y), SMALLEST_DISTANCE)
-    value = (x * x + y * y - required_distance(circles, j, time)[0] ** 2 - counted * stddev) * scale
+    value = (offset.side * (x * x + y * y) - required_distance(obstacles, j, time)[0] ** 2 - counted * stddev) * scale
     variance_row, row = np.empty(n), np.empty(n)
     for q in range(n):
         along = x * position[0, q] + y * position[2, q]
         variance_row[q] = 8.0 * (noise[q] * control[q] * along * along + pull_x * position[0, q] + pull_y * position[2, q])
-        row[q] = (2.0 * along - counted * variance_row[q] / (2.0 * stddev)) * scale
-    return Margin(value, counted, stddev, scale, x, y, covariance, position, variance_row, row)
+        row[q] = (2.0 * offset.side * along - counted * variance_row[q] / (2.0 * stddev)) * scale
+    return Margin(value, counted, stddev, scale, x, y, offset.side, covariance, position, variance_row, row)
 
 
 @compiled_separately
 def margins_at_steps(
-    terms: ProblemTerms, circles: MovingCircles, trajectory: Matrix, covariance: Matrix, j: int, k: float
+    terms: ProblemTerms, obstacles: MovingObstacles, trajectory: Matrix, covariance: Matrix, j: int, k: float
 ) -> Vector:
-    """Return the margins of circle j at steps 0..N, (N + 1,), that at step 0 infinite; covariance (3, N): xx, yy, xy [m^2]."""
-    chance, steps = terms.chance.circles, covariance.shape[1]
+    """Return the margins of obstacle j at steps 0..N, (N + 1,), that at step 0 infinite; covariance (3, N): xx, yy, xy [m^2]."""
+    chance, steps = terms.chance.obstacles, covariance.shape[1]
     own, margin = chance.centre_covariance[j], np.full(steps + 1, np.inf)
     for t in range(1, steps + 1):
-        x = trajectory[0, t] - circles.centre[j, 0] - t * circles.drift[j, 0]
-        y = trajectory[1, t] - circles.centre[j, 1] - t * circles.drift[j, 1]
+        x = trajectory[0, t] - obstacles.centre[j, 0] - t * obstacles.drift[j, 0]
+        y = trajectory[1, t] - obstacles.centre[j, 1] - t * obstacles.drift[j, 1]
+        offset = find_offset(obstacles.polygons, j, x, y)
+        x, y = offset.x, offset.y
         xx, yy, xy = covariance[0, t - 1] + own[0, 0], covariance[1, t - 1] + own[1, 1], covariance[2, t - 1] + own[0, 1]
         variance = max(chance.size_variance[j] + 4.0 * (x * x * xx + y * y * yy + 2.0 * x * y * xy), SMALLEST_VARIANCE)
         counted = k if t >= chance.ignored_until[j] else 0.0
-        distance, reach = max(np.hypot(x, y), SMALLEST_DISTANCE), required_distance(circles, j, float(t))[0]
-        margin[t] = (distance * distance - reach * reach - counted * np.sqrt(variance)) / (2.0 * distance)
+        distance, reach = max(np.hypot(x, y), SMALLEST_DISTANCE), required_distance(obstacles, j, float(t))[0]
+        margin[t] = (offset.side * distance * distance - reach * reach - counted * np.sqrt(variance)) / (2.0 * distance)
     return margin
 
 
 @compiled_separately
 def find_least_margin(
-    terms: ProblemTerms, circles: MovingCircles, trajectory: Matrix, control: Vector, j: int, k: float, margin: Vector, t: int
+    terms: ProblemTerms, obstacles: MovingObstacles, trajectory: Matrix, control: Vector, j: int, k: float, margin: Vector, t: int
 ) -> tuple[float, float]:
-    """Return the time near step t at which the margin of circle j is least, and that margin, by parabolas through three times."""
+    """Return the time near step t of the least margin of obstacle j, and that margin, by parabolas through three times."""
     a, b, c = t - 1.0, float(t), t + 1.0
     before, least, after = margin[t - 1], margin[t], margin[t + 1]
     for _ in range(PARABOLAS):
@@ -148,7 +174,7 @@ def find_least_margin(
         time = b - 0.5 * ((b - a) ** 2 * (least - after) - (b - c) ** 2 * (least - before)) / bend
         if not a < time < c or abs(time - b) < VERTEX_TOLERANCE:
             break
-        value = evaluate_margin(terms, circles, trajectory, control, j, time, k, 0.0).value
+        value = evaluate_margin(terms, obstacles, trajectory, control, j, time, k, 0.0).value
         if value <= least:
             if time < b:
                 c, after = b, least
@@ -165,25 +191,25 @@ def find_least_margin(
 @compiled_separately
 def find_shortfalls(
     terms: ProblemTerms,
-    circles: MovingCircles,
+    obstacles: MovingObstacles,
     first_alike: Indices,
     trajectory: Matrix,
     control: Vector,
     k: float,
     tolerance: float,
 ) -> Matrix:
-    """Return where margins are least in time and below minus a tolerance [m], deepest first, (q, 2): row of the circle, time.
+    """Return where margins are least in time and below minus a tolerance [m], deepest first, (q, 2): row of the obstacle, time.
 
-    Only times from step 1 on are searched. Of equal circles the first alone counts (`Problem.first_alike`), and of shortfalls
+    Only times from step 1 on are searched. Of equal obstacles the first alone counts (`Problem.first_alike`), and of shortfalls
     nearer than `APART` in time the deepest.
     """
-    m, steps = len(circles.reach), trajectory.shape[1] - 1
+    m, steps = len(obstacles.reach), trajectory.shape[1] - 1
     covariance = position_variances(terms.chance.noise, control)
     depth, places, count = np.empty(m * (steps + 1)), np.empty((m * (steps + 1), 2)), 0
     for j in range(m):
         if first_alike[j] != j:
             continue
-        margin = margins_at_steps(terms, circles, trajectory, covariance, j, k)
+        margin = margins_at_steps(terms, obstacles, trajectory, covariance, j, k)
         for t in range(1, steps + 1):
             here = margin[t]
             if margin[t - 1] < here or (t < steps and margin[t + 1] <= here):
@@ -191,7 +217,7 @@ def find_shortfalls(
             time, least = float(t), here
             # between two steps a margin hardly falls by more than it rises to the step after
             if 1 < t < steps and here < max(margin[t - 1], margin[t + 1]) - here:
-                time, least = find_least_margin(terms, circles, trajectory, control, j, k, margin, t)
+                time, least = find_least_margin(terms, obstacles, trajectory, control, j, k, margin, t)
             if least < -tolerance:
                 depth[count], places[count, 0], places[count, 1] = least, j, time
                 count += 1

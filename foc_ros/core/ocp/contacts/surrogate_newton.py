@@ -23,7 +23,7 @@ import numpy as np
 
 from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled_separately
 from foc_ros.core.linear_algebra import multiply_transposed, multiply_vector, solve_by_elimination
-from foc_ros.core.ocp.terms import CostTerms, MovingCircles, ProblemTerms
+from foc_ros.core.ocp.terms import CostTerms, MovingObstacles, ProblemTerms
 
 from .contacts import Contacts
 from .hermite import compute_trajectory, interpolate
@@ -102,7 +102,7 @@ def linearise_curvature(terms: ProblemTerms, control: Vector, at: Margin, multip
         into.diagonal[q] += 8.0 * pull * noise[q] * along * along
     for a in range(2):
         for b in range(2):
-            block[a, b] = 8.0 * pull * at.covariance[a, b] - (2.0 * multiplier * at.scale if a == b else 0.0)
+            block[a, b] = 8.0 * pull * at.covariance[a, b] - (2.0 * multiplier * at.scale * at.side if a == b else 0.0)
         block[a, 2 + a], block[2 + a, a] = pull, pull
     block[4, 4] = -0.5 * pull / at.stddev**2
 
@@ -110,7 +110,7 @@ def linearise_curvature(terms: ProblemTerms, control: Vector, at: Margin, multip
 @compiled_separately
 def linearise_contact(
     terms: ProblemTerms,
-    circles: MovingCircles,
+    obstacles: MovingObstacles,
     trajectory: Matrix,
     control: Vector,
     contacts: Contacts,
@@ -121,22 +121,22 @@ def linearise_contact(
     """Write all that belongs to contact i."""
     m, steps = len(contacts.time), trajectory.shape[1] - 1
     j, s = contacts.obstacle[i], contacts.time[i]
-    at = evaluate_margin(terms, circles, trajectory, control, j, s, k, 0.0)
+    at = evaluate_margin(terms, obstacles, trajectory, control, j, s, k, 0.0)
     earlier, later = max(s - TIME_STEP, 1.0), min(s + TIME_STEP, float(steps))
-    before = evaluate_margin(terms, circles, trajectory, control, j, earlier, k, at.scale)
-    after = evaluate_margin(terms, circles, trajectory, control, j, later, k, at.scale)
+    before = evaluate_margin(terms, obstacles, trajectory, control, j, earlier, k, at.scale)
+    after = evaluate_margin(terms, obstacles, trajectory, control, j, later, k, at.scale)
     span, velocity = later - earlier, interpolate(trajectory, s, 1)
-    into.speed[i] = np.hypot(velocity[0] - circles.drift[j, 0], velocity[1] - circles.drift[j, 1])
+    into.speed[i] = np.hypot(velocity[0] - obstacles.drift[j, 0], velocity[1] - obstacles.drift[j, 1])
     into.value[i], into.slope[i] = at.value, (after.value - before.value) / span
     bend = STANDSTILL_CURVATURE + SMALLEST_CURVATURE * 2.0 * at.scale * into.speed[i] ** 2
     if earlier < s < later:
         change = (after.value - at.value) / (later - s) - (at.value - before.value) / (s - earlier)
         bend = max(bend, 2.0 * change / span)
     into.bend[i] = bend
-    begin = max(terms.chance.circles.ignored_until[j], 1.0)
+    begin = max(terms.chance.obstacles.ignored_until[j], 1.0)
     is_at_begin = s <= 1.0 or s == begin
     into.slides[i] = 0.0 if (is_at_begin and into.slope[i] > 0.0) or (s >= steps and into.slope[i] < 0.0) else 1.0
-    is_counted = 1.0 if s >= terms.chance.circles.ignored_until[j] else 0.0
+    is_counted = 1.0 if s >= terms.chance.obstacles.ignored_until[j] else 0.0
     into.by_k[i] = -is_counted * at.stddev * at.scale
     into.slope_by_k[i] = -is_counted * (after.stddev - before.stddev) / span * at.scale
     into.offset[i, 0], into.offset[i, 1] = at.x, at.y
@@ -150,7 +150,7 @@ def linearise_contact(
 
 @compiled_separately
 def linearise_conditions(
-    terms: ProblemTerms, circles: MovingCircles, control: Vector, contacts: Contacts, k: float
+    terms: ProblemTerms, obstacles: MovingObstacles, control: Vector, contacts: Contacts, k: float
 ) -> Linearisation:
     """Linearise the conditions at a control (2N,), contacts and k."""
     m, n, r, cost = len(contacts.time), len(control), len(terms.cost.softness), terms.cost
@@ -172,7 +172,7 @@ def linearise_conditions(
         np.empty((m, 2)),
     )
     for i in range(m):
-        linearise_contact(terms, circles, trajectory, control, contacts, k, i, made)
+        linearise_contact(terms, obstacles, trajectory, control, contacts, k, i, made)
     rows[RANK * m] = gradient
     for e in range(r):
         rows[len(rows) - r + e] = cost.goal_rows[e]
@@ -227,7 +227,7 @@ def assemble_system(
 @compiled_separately
 def newton_on_surrogate(
     terms: ProblemTerms,
-    circles: MovingCircles,
+    obstacles: MovingObstacles,
     contacts: Contacts,
     near: Vector,
     k: float,
@@ -244,7 +244,7 @@ def newton_on_surrogate(
     control, time, multiplier, first = near.copy(), contacts.time.copy(), contacts.multiplier.copy(), np.empty((m, 2))
     y, sigma = RANK * m + 1, (RANK + 1) * m + 1
     for count in range(MAX_STEPS):
-        made = linearise_conditions(terms, circles, control, Contacts(contacts.obstacle, time, multiplier), k)
+        made = linearise_conditions(terms, obstacles, control, Contacts(contacts.obstacle, time, multiplier), k)
         if count == 0:
             first[:] = made.offset
         matrix, right, influence, alone = assemble_system(made, terms.cost, multiplier, control, preference)
@@ -258,7 +258,7 @@ def newton_on_surrogate(
         for i in range(m):
             shift = multiply_vector(made.rows[RANK * i : RANK * i + 2], change)
             slide = min(max(found[sigma + i] / max(multiplier[i], weight), -LONGEST_SLIDE), LONGEST_SLIDE)
-            begin = max(terms.chance.circles.ignored_until[contacts.obstacle[i]], 1.0)
+            begin = max(terms.chance.obstacles.ignored_until[contacts.obstacle[i]], 1.0)
             time[i] = min(max(time[i] + slide, begin if time[i] >= begin else 1.0), steps)
             move = max(move, np.hypot(shift[0], shift[1]), abs(slide) * made.speed[i], abs(made.value[i]) / FAR_OFF)
         multiplier[:] = found[y : y + m]
@@ -267,7 +267,7 @@ def newton_on_surrogate(
             pulling[multiplier.argmin()] = multiplier.min()
             return True, near.copy(), Contacts(contacts.obstacle.copy(), contacts.time.copy(), pulling), k
         if move < tolerance:
-            is_turned = False  # a contact went round to the other side of its circle: another homotopy class
+            is_turned = False  # a contact went round to the other side of its obstacle: another homotopy class
             for i in range(m):
                 is_turned = is_turned or made.offset[i, 0] * first[i, 0] + made.offset[i, 1] * first[i, 1] < 0.0
             # of a minimum, the determinant has the sign of the goal rows; that of a saddle with one falling direction, the other

@@ -9,7 +9,7 @@ import numpy as np
 from foc_ros.core.homotopy import is_same_class, sweep_angles
 from foc_ros.core.kernels import Indices, Vector, compiled, compiled_separately, freeze
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.ocp.terms import MovingCircles, ProblemTerms
+from foc_ros.core.ocp.terms import MovingObstacles, ProblemTerms
 from foc_ros.core.types import Array
 
 from .contacts import Contacts
@@ -51,7 +51,7 @@ class SurrogatePoint(NamedTuple):
 @compiled_separately
 def update_active_contacts(
     terms: ProblemTerms,
-    circles: MovingCircles,
+    obstacles: MovingObstacles,
     first_alike: Indices,
     contacts: Contacts,
     near: Vector,
@@ -68,7 +68,7 @@ def update_active_contacts(
         if len(time) > MOST_CONTACTS:
             break
         found, control, active, k = newton_on_surrogate(
-            terms, circles, Contacts(obstacle, time, multiplier), control, k, preference, NEWTON_TOLERANCE * terms.extent
+            terms, obstacles, Contacts(obstacle, time, multiplier), control, k, preference, NEWTON_TOLERANCE * terms.extent
         )
         if not found:
             break
@@ -78,7 +78,7 @@ def update_active_contacts(
             obstacle, time, multiplier = obstacle[pushing], time[pushing], multiplier[pushing]
             continue
         trajectory = compute_trajectory(terms.motion, control)
-        new = find_shortfalls(terms, circles, first_alike, trajectory, control, k, CLEAR * terms.extent)
+        new = find_shortfalls(terms, obstacles, first_alike, trajectory, control, k, CLEAR * terms.extent)
         if len(new) == 0:
             return True, control, Contacts(obstacle, time, multiplier), k
         slight = NEW_MULTIPLIER * multiplier.max() if len(multiplier) else 1.0
@@ -90,7 +90,7 @@ def update_active_contacts(
 @compiled
 def _solve_surrogate_point(
     terms: ProblemTerms,
-    circles: MovingCircles,
+    obstacles: MovingObstacles,
     first_alike: Indices,
     contacts: Contacts,
     near: Vector,
@@ -100,16 +100,16 @@ def _solve_surrogate_point(
 ) -> tuple[bool, SurrogatePoint]:
     """Return whether there is a point near a control (2N,) in the class of the angles (m,), and the point."""
     start = Contacts(contacts.obstacle.copy(), contacts.time.copy(), contacts.multiplier.copy())
-    found, control, active, k = update_active_contacts(terms, circles, first_alike, start, near.copy(), k, preference)
+    found, control, active, k = update_active_contacts(terms, obstacles, first_alike, start, near.copy(), k, preference)
     count, rate, effort = len(active.time), 0.0, 0.0
     distance, stddev = np.empty(count), np.empty(count)
     if found:
         trajectory, effort = compute_trajectory(terms.motion, control), float(control @ control)
         found = is_same_class(sweep_angles(trajectory[:2].T.copy(), terms.centre_trajectories), class_angles)
         for i in range(count):
-            at = evaluate_margin(terms, circles, trajectory, control, active.obstacle[i], active.time[i], k, 0.0)
+            at = evaluate_margin(terms, obstacles, trajectory, control, active.obstacle[i], active.time[i], k, 0.0)
             distance[i], stddev[i] = np.hypot(at.x, at.y), at.stddev
-            if active.time[i] >= terms.chance.circles.ignored_until[active.obstacle[i]]:
+            if active.time[i] >= terms.chance.obstacles.ignored_until[active.obstacle[i]]:
                 rate += active.multiplier[i] * at.stddev * at.scale
     return found, SurrogatePoint(control, active, k, rate, effort, distance, stddev)
 
@@ -139,7 +139,7 @@ def solve_surrogate_point(
     """
     found, point = _solve_surrogate_point(
         problem.terms,
-        problem.circles(SPARE * problem.extent**2),
+        problem.obstacles_with_reach(SPARE * problem.extent**2),
         problem.first_alike,
         contacts,
         np.ascontiguousarray(near, dtype=float),

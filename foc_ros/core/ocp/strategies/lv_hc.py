@@ -79,7 +79,7 @@ def follow_path(problem: Problem, start: Start, path: PenaltyPath, deadline: Dea
 def _result(follower: PathFollower, status: Status, message: str, point: PathPoint, slope: float = 0.0) -> StrategyResult:
     """Return the result that ends at a point."""
     control, contacts, minimum = point.solution
-    weights = follower.path.at(point.s)
+    weights = follower.weights_at(point.s)
     return StrategyResult(
         status, message, control, contacts, *weights, follower.qp_solves, safety_factor_slope=slope, minimum=minimum
     )
@@ -100,7 +100,7 @@ def _search(follower: PathFollower, start: Start) -> StrategyResult:
         else:
             stride, patience = _stride_to(first, wanted, start.safety_factor_slope or USUAL_SLOPE, WARM_STRIDE), PATIENCE
     if first is None:
-        return find_best_effort(problem, start, *follower.path.at(0.0), follower.qp_solves, follower.deadline)
+        return find_best_effort(problem, start, *follower.weights_at(0.0), follower.qp_solves, follower.deadline)
     low, high = _bracket(follower, first, wanted, stride, patience)
     point, slope = high, start.safety_factor_slope
     if high is not None and low is not high:

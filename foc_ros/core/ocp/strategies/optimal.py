@@ -1,7 +1,7 @@
 """Strategy `optimal`: the least effort at a safety factor k, between the steps too, and the k that is worth its effort.
 
 For each k there is a least effort E(k), found by Newton steps on the surrogate itself (`contacts.surrogate_newton`) from the
-solution at another k. It begins at the k of the least effort that keeps the mean out of the circles, and rises with k. A class
+solution at another k. It begins at the k of the least effort that keeps the mean out of the obstacles, and rises with k. A class
 keeps the wanted k where that is worth its effort, else the k at which
 
     d ln J / dk = shortfall / beta,   J = fixed_cost + dt E,
@@ -14,6 +14,7 @@ k counts alone, and a class whose k ends below it is out of reach.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -30,13 +31,15 @@ from foc_ros.core.ocp.warm_start import Start, correct_to_goal
 from foc_ros.core.types import Array, Status
 
 from . import StrategyResult, find_best_effort
-from .penalty_path import PathFollower, PenaltyPath
+from .penalty_path import PathFollower, PathPoint, PenaltyPath
 
-LEAST_EFFORT = PenaltyPath(delta=0.0, growth=2.0, first_lambda=0.0)
-"""The path at whose beginning only the effort counts, and the mean just touches the circles."""
+LEAST_EFFORT = PenaltyPath(delta=1.0, growth=2.0, first_lambda=0.0)
+"""The path on which only the effort counts, and s is tau: at its beginning the mean just touches the obstacles."""
+ROUNDINGS = (1.0, 0.25, 0.05)
+"""Parts of the clearance for the wanted k with which Newton steps begin where they do not lead on from the least effort."""
 CLOSE = 5e-6
 """Relative excess over the wanted k that is aimed at."""
-FALLBACKS = (1.0, 0.75, 0.5, 0.25)
+FALLBACKS = (1.0, 0.75, 0.5, 0.35, 0.25)
 """Shares of the earlier k that are tried where Newton steps do not lead to the one that is wanted: k rises again from there."""
 EVEN = 1e-4
 """Relative difference of the slope from the one that is worth it at which both are the same."""
@@ -131,34 +134,57 @@ class _Search:
         point = self.weigh(control, contacts, before) if before < problem.wanted_k else None
         if point is None or point.k > self.wanted:
             point = self.solve(control, contacts, self.wanted)
-        for share in FALLBACKS if point is None else ():
-            point = self.solve(control, contacts, share * before)
-            if point is not None:
-                break
-        if point is not None and self.slope(point) > self.rate * (1.0 + CLOSE):
-            point = self.weigh(point.control, point.contacts, point.k) or point
+        if point is None:
+            point = self.solve_below(control, contacts, before)
+        point = None if point is None else self.lower_k(point)
         if point is None or not 0.0 <= point.k <= self.wanted:
             return False
         self.best = point
         return True
 
     def begin(self, start: Start) -> bool:
-        """Find the least effort that keeps the mean out of the circles; tell whether there is a path."""
+        """Find the least effort that keeps the mean out of the obstacles, and a k near it; tell whether there is a path.
+
+        Where Newton steps on the surrogate do not lead on from the least effort, as at a sharp corner, they begin at the solution
+        that keeps the distance of the wanted k, or a part of it.
+        """
         problem = self.problem
         follower = PathFollower(problem, LEAST_EFFORT, self.deadline, newton_only=False)
         first = follower.solve_first(start.positions, self.angles if len(self.angles) else None)
+        if first is not None and not len(self.angles):
+            self.angles = compute_class_angles(problem, first.solution.control)
+        for at in self.approach(follower, first) if first is not None else ():
+            control, contacts, minimum = at.solution
+            contacts = contacts.merge(problem.first_alike) if at.has_rows else contacts
+            if at is first:
+                unknown = np.full(len(contacts.time), np.nan)
+                self.best = SurrogatePoint(control, contacts, minimum.k, 0.0, float(control @ control), unknown, unknown)
+            found = self.solve_below(control, contacts, min(max(minimum.k, 0.0), self.wanted))
+            if found is not None:
+                self.best = self.lower_k(found)
+                break
         self.qp_solves += follower.qp_solves
-        if first is None:
-            return False
-        control, contacts, minimum = first.solution
-        contacts = contacts.merge(problem.first_alike) if first.has_rows else contacts
-        if not len(self.angles):
-            self.angles = compute_class_angles(problem, control)
-        unknown = np.full(len(contacts.time), np.nan)
-        least = SurrogatePoint(control, contacts, minimum.k, 0.0, float(control @ control), unknown, unknown)
-        self.best = least
-        self.best = self.solve(control, contacts, min(max(minimum.k, 0.0), self.wanted)) or least
-        return self.best.k > -NARROW  # below zero the mean itself passes through a circle
+        return self.best is not None and self.best.k > -NARROW  # below zero the mean itself passes through an obstacle
+
+    def approach(self, follower: PathFollower, first: PathPoint) -> Iterator[PathPoint]:
+        """Yield points near which one may be on the surrogate: the first, then those that keep a part of the distance.
+
+        With noise of the variance s^2, E[C] + k sqrt(Var[C]) = 0 at the distance d = k s + sqrt(k^2 s^2 + E[R^2]), so that k takes
+        the clearance term tau = d^2 - E[R^2] = 2 k s d.
+        """
+        yield first
+        variance = float(self.problem.position_variance(first.solution.control)[:2].sum(axis=0).max())
+        margin, square = self.wanted * math.sqrt(variance), float(self.problem.size[0].max(initial=0.0))
+        for share in ROUNDINGS:
+            point = follower.solve_beside(share * 2.0 * margin * (margin + math.sqrt(margin**2 + square)), first)
+            if point is not None:
+                yield point
+
+    def lower_k(self, point: SurrogatePoint) -> SurrogatePoint:
+        """Return a point with the k that is worth its effort, if a point has a larger one."""
+        if self.slope(point) <= self.rate * (1.0 + CLOSE):
+            return point
+        return self.weigh(point.control, point.contacts, point.k) or point
 
     def raise_k(self) -> None:
         """Raise k to the wanted one, or to the one that is worth its effort: between a point below it and a k above it."""
@@ -191,6 +217,14 @@ class _Search:
         """Find the point at a k near another one."""
         self.deadline.check()
         return solve_surrogate_point(self.problem, near, contacts, k, self.angles)
+
+    def solve_below(self, near: Array, contacts: Contacts, k: float) -> SurrogatePoint | None:
+        """Find the point at a k near another one, or at a part of it where Newton steps do not lead there."""
+        for share in FALLBACKS if k > 0.0 else (1.0,):
+            point = self.solve(near, contacts, share * k)
+            if point is not None:
+                return point
+        return None
 
     def weigh(self, near: Array, contacts: Contacts, k: float) -> SurrogatePoint | None:
         """Find the point whose k is worth its effort near another one; None without contacts, which leave nothing to weigh."""

@@ -1,6 +1,6 @@
 """Points on the penalty path that `lv` and `hc` follow: pairs (tau, lambda), each solved from the solution of a neighbour.
 
-The clearance is kept between the steps too, by contacts that slide along circles: see `contacts`.
+The clearance is kept between the steps too, by contacts that slide along obstacles: see `contacts`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ LONGEST_PATH = 60.0
 LARGEST_SHARE = 1e6
 """Weight of the variances relative to the effort at which the path ends: nothing else counts then, and k has stopped growing."""
 MAX_CROSSINGS = 8
-"""Largest number of rounds in which times are added, for a mean that crosses circles between the steps."""
+"""Largest number of rounds in which times are added, for a mean that crosses obstacles between the steps."""
+SHARPEST = 3e-3
+"""Least distance that the mean keeps from a polygon, relative to the scene: at a corner itself the boundary has no normal."""
 FURTHER_QPS = 16
 """Linearisations after which the QPs are given up at a point further along the path; at its beginning there may be more."""
 
@@ -66,7 +68,7 @@ class PenaltyPath:
 
 @dataclass(frozen=True, eq=False)
 class PathPoint:
-    """A solution at s. has_rows: its contacts are rows of QPs, so that it may be slightly inside a circle between two steps."""
+    """A solution at s. has_rows: its contacts are rows of QPs, so that it may be a little inside an obstacle between steps."""
 
     s: float
     solution: KktPoint
@@ -95,7 +97,14 @@ class PathFollower:
         self.qp_solves = 0
         self.best: PathPoint | None = None
         self.points: list[PathPoint] = []
+        smallest = float(problem.size[0].min(initial=math.inf))
+        self.least_tau = max((SHARPEST * problem.extent) ** 2 - smallest, 0.0)
         self.class_angles: Array | None = None
+
+    def weights_at(self, s: float) -> tuple[float, float]:
+        """Return (tau, lambda) at s, with the least tau that gives sharp corners a normal."""
+        tau, lam = self.path.at(s)
+        return max(tau, self.least_tau), lam
 
     def solve_first(self, guess: Array, class_angles: Array | None = None) -> PathPoint | None:
         """Solve at the beginning of the path, from a guess (N, 2), in a homotopy class if its angles (m,) are given."""
@@ -116,13 +125,13 @@ class PathFollower:
         self, s: float, control: Array, contacts: Contacts, class_angles: Array | None = None
     ) -> PathPoint | None:
         """Solve at s from a control (2N,) by Newton steps, in its class or that of given angles (m,)."""
-        found = solve_kkt_point(self.problem, control, contacts, *self.path.at(s), class_angles)
+        found = solve_kkt_point(self.problem, control, contacts, *self.weights_at(s), class_angles)
         return None if found is None else self._remember(PathPoint(s, found))
 
     def is_verified(self, point: PathPoint) -> bool:
         """Tell whether the QP linearised at a point has the same solution."""
         self.qp_solves += 1
-        return is_fixed_point(self.problem, point.solution.control, point.solution.contacts, *self.path.at(point.s))
+        return is_fixed_point(self.problem, point.solution.control, point.solution.contacts, *self.weights_at(point.s))
 
     def _solve_by_qps(
         self, s: float, guess: Array, working: WorkingSet, class_angles: Array | None, *, thorough: bool
@@ -144,8 +153,8 @@ class PathFollower:
     def _run_qps(
         self, s: float, guess: Array, working: WorkingSet, class_angles: Array | None, *, thorough: bool
     ) -> SqpResult | None:
-        """Solve QPs until they converge, with rows at the steps; where the mean crosses a circle between them, add rows there."""
-        problem, (tau, lam) = self.problem, self.path.at(s)
+        """Solve QPs until they converge, with rows at the steps; where the mean crosses one between them, add rows there."""
+        problem, (tau, lam) = self.problem, self.weights_at(s)
         left, between = MAX_QPS if thorough else FURTHER_QPS, NO_TIMES
 
         def jump(control: Array, contacts: Contacts) -> KktPoint | None:
