@@ -45,9 +45,9 @@ APART = 2.0
 class Margin(NamedTuple):
     """The margin of an obstacle at a time, and what its derivatives consist of.
 
-    value [m]; k: the safety factor that counts; stddev: sqrt(Var) [m^2]; scale: 1 / (2 |d_0|) [1/m]; x, y: d [m]; side: as
-    in `Offset`; covariance (2, 2): P [m^2]; position (3, 2N): S in the rows 0 and 2; variance_row and row (2N,): derivatives of
-    Var and g by the control.
+    value [m]; k: the safety factor that counts; stddev: sqrt(Var) [m^2]; scale: 1 / (2 |d_0|) [1/m]; x, y: d [m]; side and
+    is_on_edge: as in `Offset`; covariance (2, 2): P [m^2]; position (3, 2N): S in the rows 0 and 2; variance_row and row
+    (2N,): derivatives of Var and g by the control.
     """
 
     value: float
@@ -57,6 +57,7 @@ class Margin(NamedTuple):
     x: float
     y: float
     side: float
+    is_on_edge: bool
     covariance: Matrix
     position: Matrix
     variance_row: Vector
@@ -137,7 +138,7 @@ def evaluate_margin(
         along = x * position[0, q] + y * position[2, q]
         variance_row[q] = 8.0 * (noise[q] * control[q] * along * along + pull_x * position[0, q] + pull_y * position[2, q])
         row[q] = (2.0 * offset.side * along - counted * variance_row[q] / (2.0 * stddev)) * scale
-    return Margin(value, counted, stddev, scale, x, y, offset.side, covariance, position, variance_row, row)
+    return Margin(value, counted, stddev, scale, x, y, offset.side, offset.is_on_edge, covariance, position, variance_row, row)
 
 
 @compiled_separately

@@ -12,7 +12,7 @@ and k is either given, or such that more safety would cost more than it is worth
 where the left side is the derivative of the least effort by k. Each step solves the conditions linearised at the last point. The
 Hessian of the Lagrangian is a diagonal D and the low-rank matrix U'C U, with five rows of U for each contact, and one that makes
 J in the last condition follow u. With z = C U p for the step p of the control, D is eliminated, and a small system of z, y, the
-moves of the contacts sigma = y ds, the step of k and nu remains.
+moves of the contacts sigma = y ds, the step of k and nu remains. A contact where the margin has a kink (`corners`) is held there.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from foc_ros.core.linear_algebra import multiply_transposed, multiply_vector, so
 from foc_ros.core.ocp.terms import CostTerms, MovingObstacles, ProblemTerms
 
 from .contacts import Contacts
+from .corners import TIME_STEP, Corner, find_kink
 from .hermite import compute_trajectory, interpolate
 from .surrogate import Margin, evaluate_margin
 
@@ -42,16 +43,14 @@ SMALLEST_CURVATURE = 1e-2
 """Least curvature of a margin over time while steps are made, as a share of that of a straight pass."""
 STANDSTILL_CURVATURE = 1e-12
 """The same of a mean that stands still [m]."""
-TIME_STEP = 1e-3
-"""Difference in time, in steps, by which derivatives by time are taken."""
 FAR_OFF = 10.0
 """Margin at a contact, relative to the tolerance of moves, at which the iteration goes on although nothing moves."""
 K_SCALE = 1e-2
 """A change of k by one counts as a move by so much of the scene."""
 SMALLEST_COST = 1e-9
 """Least J [m^2/s^5]."""
-RANK = 5
-"""Rows of U for each contact."""
+RANK, RANK_AT_CORNERS = 5, 7
+"""Rows of U for each contact; the same where contacts may be held at corners."""
 
 
 class Preference(NamedTuple):
@@ -91,7 +90,11 @@ class Linearisation(NamedTuple):
 @compiled_separately
 def linearise_curvature(terms: ProblemTerms, control: Vector, at: Margin, multiplier: float, i: int, into: Linearisation) -> None:
     """Write what the second derivatives of the margin of contact i add to the Hessian: rows of U, its block of C, and D."""
-    noise, pull, first = terms.chance.noise.noise_variance, multiplier * at.scale * at.k / (2.0 * at.stddev), RANK * i
+    noise, pull, first = (
+        terms.chance.noise.noise_variance,
+        multiplier * at.scale * at.k / (2.0 * at.stddev),
+        into.blocks.shape[1] * i,
+    )
     rows, block = into.rows, into.blocks[i]
     for q in range(len(control)):
         sx, sy = at.position[0, q], at.position[2, q]
@@ -108,6 +111,46 @@ def linearise_curvature(terms: ProblemTerms, control: Vector, at: Margin, multip
 
 
 @compiled_separately
+def hold_at_corner(
+    terms: ProblemTerms,
+    control: Vector,
+    contacts: Contacts,
+    i: int,
+    corner: Corner,
+    side: tuple[Margin, Margin, Margin],
+    into: Linearisation,
+) -> None:
+    """Write what belongs to contact i where its margin has a kink: at the time s(u) at which the mean is over a corner.
+
+    side: margins at that time, and one and two steps of time from it on the side of the vertex. For the direction e of the edge,
+    c(u, s) = e.(p - corner) is zero, so that ds/du = -c_u / c_s, and the margin G(u) = g(u, s(u)) of the contact has
+
+        G_u = g_u + g_s s_u,   G_uu = g_uu + a s_u' + s_u a',   a = g_us + g_ss s_u / 2 - (g_s / c_s) (c_us + c_ss s_u / 2).
+    """
+    at, near, far = side
+    h, multiplier = corner.step, contacts.multiplier[i]
+    slope = (4.0 * near.value - 3.0 * at.value - far.value) / (2.0 * h)
+    bend, growth = (at.value - 2.0 * near.value + far.value) / h**2, (near.stddev - at.stddev) / h
+    m, contacts.time[i] = len(contacts.time), corner.time
+    into.speed[i], into.value[i], into.slope[i], into.bend[i], into.slides[i] = abs(corner.speed), at.value, 0.0, 1.0, 0.0
+    into.by_k[i], into.slope_by_k[i] = -at.stddev * at.scale, 0.0
+    into.offset[i, 0], into.offset[i, 1] = at.x, at.y
+    linearise_curvature(terms, control, near, multiplier, i, into)
+    rank = into.blocks.shape[1]
+    into.blocks[i, 5, 6] = into.blocks[i, 6, 5] = -multiplier
+    first, by_k, low = rank * m + 1, len(into.rows) - 1 - len(terms.cost.softness), rank * i
+    for q in range(len(control)):
+        along = corner.x * near.position[0, q] + corner.y * near.position[2, q]
+        along_far = corner.x * far.position[0, q] + corner.y * far.position[2, q]
+        shift = -(2.0 * along - along_far) / corner.speed
+        turn = (along_far - along) / h + 0.5 * corner.growth * shift
+        into.rows[low + 5, q] = shift
+        into.rows[low + 6, q] = (far.row[q] - near.row[q]) / h + 0.5 * bend * shift - slope / corner.speed * turn
+        into.rows[first + i, q] = 2.0 * near.row[q] - far.row[q] + slope * shift
+        into.rows[by_k, q] += multiplier * (near.variance_row[q] / (2.0 * near.stddev) + growth * shift) * at.scale
+
+
+@compiled_separately
 def linearise_contact(
     terms: ProblemTerms,
     obstacles: MovingObstacles,
@@ -121,6 +164,11 @@ def linearise_contact(
     """Write all that belongs to contact i."""
     m, steps = len(contacts.time), trajectory.shape[1] - 1
     j, s = contacts.obstacle[i], contacts.time[i]
+    if obstacles.polygons.corners[j] > 1:
+        corner, side = find_kink(terms, obstacles, trajectory, control, j, s, k)
+        if corner.time < np.inf:
+            hold_at_corner(terms, control, contacts, i, corner, side, into)
+            return
     at = evaluate_margin(terms, obstacles, trajectory, control, j, s, k, 0.0)
     earlier, later = max(s - TIME_STEP, 1.0), min(s + TIME_STEP, float(steps))
     before = evaluate_margin(terms, obstacles, trajectory, control, j, earlier, k, at.scale)
@@ -141,7 +189,7 @@ def linearise_contact(
     into.slope_by_k[i] = -is_counted * (after.stddev - before.stddev) / span * at.scale
     into.offset[i, 0], into.offset[i, 1] = at.x, at.y
     linearise_curvature(terms, control, at, contacts.multiplier[i], i, into)
-    first, by_k = RANK * m + 1, len(into.rows) - 1 - len(terms.cost.softness)
+    first, by_k = into.blocks.shape[1] * m + 1, len(into.rows) - 1 - len(terms.cost.softness)
     for q in range(len(control)):
         into.rows[first + i, q] = at.row[q]
         into.rows[first + m + i, q] = (after.row[q] - before.row[q]) / span
@@ -154,12 +202,15 @@ def linearise_conditions(
 ) -> Linearisation:
     """Linearise the conditions at a control (2N,), contacts and k."""
     m, n, r, cost = len(contacts.time), len(control), len(terms.cost.softness), terms.cost
-    trajectory, rows = compute_trajectory(terms.motion, control), np.zeros(((RANK + 2) * m + 2 + r, n))
+    trajectory, rank = compute_trajectory(terms.motion, control), RANK
+    for i in range(m):
+        rank = RANK_AT_CORNERS if obstacles.polygons.corners[contacts.obstacle[i]] > 1 else rank
+    rows = np.zeros(((rank + 2) * m + 2 + r, n))
     diagonal = 2.0 * (1.0 + cost.weighted_variance)
     gradient = diagonal * control
     made = Linearisation(
         rows,
-        np.zeros((m, RANK, RANK)),
+        np.zeros((m, rank, rank)),
         diagonal,
         gradient,
         np.empty(m),
@@ -173,7 +224,7 @@ def linearise_conditions(
     )
     for i in range(m):
         linearise_contact(terms, obstacles, trajectory, control, contacts, k, i, made)
-    rows[RANK * m] = gradient
+    rows[rank * m] = gradient
     for e in range(r):
         rows[len(rows) - r + e] = cost.goal_rows[e]
     return made
@@ -188,7 +239,8 @@ def assemble_system(
     Unknowns in order: z (5m + 1), y (m), sigma (m), step of k, nu (r).
     """
     m, r, size = len(multiplier), len(cost.softness), len(made.rows)
-    y, sigma, by_k, goal = RANK * m + 1, (RANK + 1) * m + 1, size - 1 - r, size - r
+    rank = made.blocks.shape[1]
+    y, sigma, by_k, goal = rank * m + 1, (rank + 1) * m + 1, size - 1 - r, size - r
     alone = -made.gradient / made.diagonal
     influence = -made.rows / made.diagonal
     influence[y:by_k] *= -1.0
@@ -197,9 +249,9 @@ def assemble_system(
     for i in range(m):
         weight = max(weight, SMALLEST_MULTIPLIER * multiplier[i])
     for i in range(m):
-        first = RANK * i
-        moved, wanted = -made.blocks[i] @ matrix[first : first + RANK], -made.blocks[i] @ right[first : first + RANK]
-        matrix[first : first + RANK], right[first : first + RANK] = moved, wanted
+        first = rank * i
+        moved, wanted = -made.blocks[i] @ matrix[first : first + rank], -made.blocks[i] @ right[first : first + rank]
+        matrix[first : first + rank], right[first : first + rank] = moved, wanted
         matrix[y + i, by_k] += made.by_k[i]
         right[y + i] -= made.value[i]
         matrix[sigma + i, sigma + i] += made.bend[i] / max(multiplier[i], weight)
@@ -242,12 +294,13 @@ def newton_on_surrogate(
     """
     m, r, steps, last = len(contacts.time), len(terms.cost.softness), terms.motion.responses.shape[2] - 1.0, np.inf
     control, time, multiplier, first = near.copy(), contacts.time.copy(), contacts.multiplier.copy(), np.empty((m, 2))
-    y, sigma = RANK * m + 1, (RANK + 1) * m + 1
     for count in range(MAX_STEPS):
         made = linearise_conditions(terms, obstacles, control, Contacts(contacts.obstacle, time, multiplier), k)
         if count == 0:
             first[:] = made.offset
         matrix, right, influence, alone = assemble_system(made, terms.cost, multiplier, control, preference)
+        rank = made.blocks.shape[1]
+        y, sigma = rank * m + 1, (rank + 1) * m + 1
         parity, found = solve_by_elimination(matrix, right)
         if parity == 0.0:
             break
@@ -256,7 +309,7 @@ def newton_on_surrogate(
         k, move = k + found[len(found) - 1 - r], K_SCALE * terms.extent * abs(found[len(found) - 1 - r])
         weight = SMALLEST_MULTIPLIER * multiplier.max() if m > 0 else 0.0
         for i in range(m):
-            shift = multiply_vector(made.rows[RANK * i : RANK * i + 2], change)
+            shift = multiply_vector(made.rows[rank * i : rank * i + 2], change)
             slide = min(max(found[sigma + i] / max(multiplier[i], weight), -LONGEST_SLIDE), LONGEST_SLIDE)
             begin = max(terms.chance.obstacles.ignored_until[contacts.obstacle[i]], 1.0)
             time[i] = min(max(time[i] + slide, begin if time[i] >= begin else 1.0), steps)

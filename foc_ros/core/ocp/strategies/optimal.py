@@ -167,10 +167,10 @@ class _Search:
         return self.best is not None and self.best.k > -NARROW  # below zero the mean itself passes through an obstacle
 
     def approach(self, follower: PathFollower, first: PathPoint) -> Iterator[PathPoint]:
-        """Yield points near which one may be on the surrogate: the first, then those that keep a part of the distance.
+        """Yield points near which there may be a solution: the first, then those that keep a part of the distance.
 
-        With noise of the variance s^2, E[C] + k sqrt(Var[C]) = 0 at the distance d = k s + sqrt(k^2 s^2 + E[R^2]), so that k takes
-        the clearance term tau = d^2 - E[R^2] = 2 k s d.
+        With noise of the variance s^2, E[C] + k sqrt(Var[C]) = 0 at the distance d = k s + sqrt(k^2 s^2 + E[R^2]), so that k
+        takes the clearance term tau = d^2 - E[R^2] = 2 k s d.
         """
         yield first
         variance = float(self.problem.position_variance(first.solution.control)[:2].sum(axis=0).max())
