@@ -100,9 +100,9 @@ class _Search:
 
     def run(self, start: Start) -> Status:
         """Leave the best point in `best`; return how the search ended."""
-        if not self.follow_in_time(start) and not self.begin(start):
-            return Status.INFEASIBLE
-        if not (self.is_hard and start.safety_factor < self.problem.wanted_k and start.control is not None):
+        if not self.follow_in_time(start):
+            return self.judge() if self.begin(start) else Status.INFEASIBLE
+        if not (self.is_hard and start.safety_factor < self.problem.wanted_k):
             self.raise_k()
         return self.judge()
 
@@ -143,12 +143,12 @@ class _Search:
         return True
 
     def begin(self, start: Start) -> bool:
-        """Find the least effort that keeps the mean out of the obstacles, and a k near it; tell whether there is a path.
+        """Find the least effort that keeps the mean out of the obstacles, and raise k; tell whether there is a path.
 
         Where Newton steps on the surrogate do not lead on from the least effort, as at a sharp corner, they begin at the solution
         that keeps the distance of the wanted k, or a part of it.
         """
-        problem = self.problem
+        problem, tried = self.problem, list[SurrogatePoint]()
         follower = PathFollower(problem, LEAST_EFFORT, self.deadline, newton_only=False)
         first = follower.solve_first(start.positions, self.angles if len(self.angles) else None)
         if first is not None and not len(self.angles):
@@ -162,9 +162,17 @@ class _Search:
             found = self.solve_below(control, contacts, min(max(minimum.k, 0.0), self.wanted))
             if found is not None:
                 self.best = self.lower_k(found)
-                break
+                self.raise_k()
+                tried.append(self.best)
+                if not self.is_cheap(self.best):
+                    break
         self.qp_solves += follower.qp_solves
+        self.best = max(tried, key=lambda point: point.k, default=self.best)
         return self.best is not None and self.best.k > -NARROW  # below zero the mean itself passes through an obstacle
+
+    def is_cheap(self, point: SurrogatePoint) -> bool:
+        """Tell whether a larger k would be worth its effort at a point."""
+        return point.k < self.wanted and self.slope(point) < self.rate * (1.0 - EVEN)
 
     def approach(self, follower: PathFollower, first: PathPoint) -> Iterator[PathPoint]:
         """Yield points near which there may be a solution: the first, then those that keep a part of the distance.
@@ -192,7 +200,7 @@ class _Search:
         low, high = self.best, math.inf  # the k of a point that costs too much
         stride = self.wanted - low.k
         shortest = min(NARROW, stride / 4.0) / 2.0
-        while low.k < self.wanted and self.slope(low) < self.rate * (1.0 - EVEN) and stride > shortest:
+        while self.is_cheap(low) and stride > shortest:
             point = self.solve(low.control, low.contacts, min(low.k + stride, self.wanted))
             if point is None:
                 stride /= 2
