@@ -7,14 +7,16 @@ import pytest
 
 from foc_ros.analysis.evaluation.ground_truth import RecordedPath, find_direction, find_rows, find_rows_ahead, locate_rows
 from foc_ros.analysis.goal_reached import find_reached_goal
+from foc_ros.core.types import make_obstacles
 
 DIRECTION = np.array([1.0, 0.0])
 
 
 def test_obstacles_that_overlap_along_the_direction_stand_in_one_row() -> None:
     centre = np.array([[3.0, 0.0], [1.0, 1.0], [1.15, -1.0], [2.0, 0.0]])
-    assert find_rows(centre, np.full(4, 0.1), DIRECTION).tolist() == [2, 0, 0, 1]
-    assert find_rows(np.zeros((0, 2)), np.zeros(0), DIRECTION).shape == (0,)
+    ends = np.zeros(2), np.array([[4.0, 0.0]])
+    assert find_rows(make_obstacles(centre, 0.1), DIRECTION, *ends).tolist() == [2, 0, 0, 1]
+    assert find_rows(make_obstacles(), DIRECTION, *ends).shape == (0,)
 
 
 def test_a_row_stands_at_the_middle_of_its_obstacles() -> None:

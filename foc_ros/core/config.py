@@ -158,6 +158,7 @@ class SceneConfig:
     )
     max_obstacles: int = _p(64, 'number of obstacles to consider: those farthest from the paths are left out', '', 1, 4096)
     marker_radius_stddev: float = _p(0.0, 'standard deviation of the radius of obstacles from markers', 'm', 0.0, 1.0)
+    hand_radius: float = _p(0.0, 'added to the radius of every obstacle: hands and tools are not points', 'm', 0.0, 1.0)
 
 
 @dataclass(frozen=True)

@@ -172,7 +172,7 @@ class FocNode(LifecycleNode):
             self._predict()
 
     def _take(self, role: str, message: Any) -> bool:
-        transformed = self._transforms.transform(role, message, self.pipeline.frame_id)
+        transformed = self._transforms.transform(role, message, self.pipeline.frame_id, self.pipeline.config.plane)
         status, now_s = self.intake.take(role, transformed), monotonic()
         is_taken = status is not None and status.is_taken
         refused, received = self._monitor.note_message(role, now_s, is_taken=is_taken)
