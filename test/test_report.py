@@ -140,6 +140,18 @@ def test_a_long_recording_is_thinned_out(tmp_path: Path) -> None:
     assert size - len(load_plotly()) < 700 * len(data['frames']) * 3
 
 
+def test_the_vertices_of_a_box_are_behind_the_numbers_of_a_circle(tmp_path: Path) -> None:
+    made = samples()
+    boxes = collect_obstacles(
+        [Circle((0.15, 0.0), 0.03, 0.003, name='1'), Box((0.22, 0.1), (0.1, 0.02), radius_stddev=0.001, name='post')]
+    )
+    snapshots = [build_snapshot(replace(each, obstacles=boxes)) for each in predictions(made)]
+    write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {})
+    (scene,) = page_data_of(tmp_path)['scenes']
+    corners = [500, 100, -500, 100, -500, -100, 500, -100]
+    assert scene == [['1', 1500, 0, 300, 30], ['post', 2200, 1000, 0, 10, *corners]]
+
+
 def page_data_of(directory: Path) -> dict[str, Any]:
     text = (directory / 'index.html').read_text(encoding='utf-8')
     return json.loads(text.partition('id="report-data">')[2].partition('</script>')[0])

@@ -148,7 +148,7 @@ def recorded_messages(movement: Movement, scene: RecordedScene) -> Iterator[tupl
 
     def list_scenes() -> Iterator[tuple[int, str, Any]]:
         for stamp_ns in range(movement.stamps_ns[0] - SCENE_LEAD_NS, movement.stamps_ns[-1] + 1, SCENE_PERIOD_NS):
-            if scene.boxes:
+            if boxes:
                 yield stamp_ns, '/obstacle_markers', encode_boxes(types, stamp_ns, FRAME, boxes)
             else:
                 yield stamp_ns, '/obstacles', encode_obstacles(types, stamp_ns, FRAME, scene.obstacles)

@@ -124,7 +124,7 @@ def _find_side_mismatches(file: Path, recordings: Sequence[ObservedRecording]) -
             for full, is_ahead in zip(names, first.truth.is_ahead, strict=True)
             if is_ahead and full.endswith(name) and taken[full] != side
         ]
-        if others or not labelled:
+        if others or recording.name not in labels:
             found[recording.name] = '; '.join(others) or 'no label'
     return found
 

@@ -163,19 +163,14 @@ def _find_walls_beside(obstacles: Obstacles, walls: NDArray[np.intp], member: in
 
 def _find_extents(obstacles: Obstacles, direction: Array) -> tuple[Array, Array]:
     """Return the ends (n,) of the obstacles along a unit vector (2,) [m]."""
-    along = obstacles.vertices @ direction
-    is_used = np.arange(along.shape[1]) < obstacles.corners[:, None]
-    position = obstacles.centre @ direction
-    low = position + np.where(is_used, along, np.inf).min(axis=1, initial=np.inf) - obstacles.radius
-    return low, position + np.where(is_used, along, -np.inf).max(axis=1, initial=-np.inf) + obstacles.radius
+    along, position = obstacles.vertices @ direction, obstacles.centre @ direction
+    return position + along.min(axis=1) - obstacles.radius, position + along.max(axis=1) + obstacles.radius
 
 
 def _measure_distances(obstacles: Obstacles) -> Array:
     """Return the distances (n, n) [m] between obstacles; two convex polygons that are apart are nearest at a vertex of one."""
     corners = obstacles.centre[:, None] + obstacles.vertices
-    is_used = np.arange(corners.shape[1]) < obstacles.corners[:, None]
-    from_corner = measure_offsets(corners.reshape(-1, 2), obstacles)[1].reshape(*is_used.shape, len(obstacles))
-    nearest = np.where(is_used[..., None], from_corner, np.inf).min(axis=1, initial=np.inf)
+    nearest = measure_offsets(corners, obstacles)[1].reshape(*corners.shape[:2], len(obstacles)).min(axis=1)
     distance: Array = np.minimum(nearest, nearest.T) - obstacles.radius[:, None] - obstacles.radius
     return distance
 
