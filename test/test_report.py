@@ -17,6 +17,7 @@ pytest.importorskip('plotly', reason='plotly is not installed')
 from report_samples import OBSTACLES, START_NS, prediction, predictions, samples
 
 from foc_ros.core.errors import InputError
+from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
 from foc_ros.core.types import HandSample, Prediction, Status
 from foc_ros.reporting.page import load_plotly
 from foc_ros.reporting.report import write_report
