@@ -14,7 +14,7 @@ from rclpy.time import Time
 
 from foc_ros.core.errors import MessageError
 from foc_ros.core.types import Array
-from foc_ros.io.topics import CLOUD, GOALS, MARKERS
+from foc_ros.io.topics import CLOUD, DETECTIONS, GOALS, MARKERS
 
 from .messages.decode_markers import ADD
 from .messages.decode_point_cloud import read_table
@@ -64,7 +64,9 @@ class Transforms:
             transformed = _transform_cloud(message, rotation, shift, plane)
         else:
             transformed = deepcopy(message)
-            for pose in transformed.poses if role == GOALS else [transformed.pose]:
+            for each in transformed.detections if role == DETECTIONS else []:
+                each.header.frame_id = frame_id
+            for pose in _list_poses(role, transformed):
                 point = pose.position
                 point.x, point.y, point.z = (rotation @ _read_xyz(point) + shift).tolist()
                 _turn(pose.orientation, found.rotation)
@@ -75,6 +77,12 @@ class Transforms:
 
 def _read_xyz(vector: Any) -> Array:
     return np.array([vector.x, vector.y, vector.z], dtype=float)
+
+
+def _list_poses(role: str, message: Any) -> list[Any]:
+    if role == DETECTIONS:
+        return [each.bbox.center for each in message.detections]
+    return list(message.poses) if role == GOALS else [message.pose]
 
 
 def _turn(orientation: Any, rotation: Any) -> None:

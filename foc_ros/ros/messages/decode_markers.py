@@ -18,6 +18,7 @@ import numpy as np
 from foc_ros.core.errors import MessageError
 from foc_ros.core.types import NANOSECONDS, Array, Obstacles, make_obstacles
 
+from .decode_objects import encode_name
 from .decode_point_cloud import MAX_ROWS
 from .decode_poses import MAX_COORDINATE, check_coordinate, decode_stamp
 from .plane import compute_rotation, project, project_box
@@ -101,7 +102,7 @@ class MarkerTable:
             [marker.centre for marker in held.values()],
             [marker.radius for marker in held.values()],
             [marker.radius_stddev for marker in held.values()] or 0.0,
-            tuple(_encode_identity(key) for key in held),
+            tuple(encode_name(key[0], str(key[1])) for key in held),
             polygons=[marker.polygon for marker in held.values()],
         )
 
@@ -113,11 +114,6 @@ class MarkerTable:
 
     def _find_existing(self, now_ns: int) -> dict[Key, MarkerObstacle]:
         return {key: marker for key, marker in self.markers.items() if marker.exists(now_ns)}
-
-
-def _encode_identity(key: Key) -> str:
-    """Return ns/id without ';', which separates the labels of candidates."""
-    return f'{key[0].replace("%", "%25").replace(";", "%3B")}/{key[1]}'
 
 
 def _find_reason_to_drop(marker: Any) -> str | None:
