@@ -171,9 +171,11 @@ def test_a_bag_with_them_is_replayed_by_its_own_definitions(tmp_path: Path, topi
     assert {each.label for each in predictions[0].candidates} == {f'goal0:+{name}', f'goal0:-{name}'}
 
 
-def test_both_inputs_are_transformed() -> None:
+def test_both_inputs_are_transformed(monkeypatch: pytest.MonkeyPatch) -> None:
     ros_helpers.require_ros()
     from foc_ros.ros.transforms import Transforms
+
+    monkeypatch.setattr('foc_ros.ros.transforms.Time', SimpleNamespace(from_msg=lambda stamp: stamp))
 
     transforms: Any = Transforms.__new__(Transforms)
     found = SimpleNamespace(translation=SimpleNamespace(x=1.0, y=0.0, z=0.0), rotation=SimpleNamespace(x=0.0, y=0.0, **QUARTER))
