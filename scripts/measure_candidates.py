@@ -91,7 +91,7 @@ def measure(data: DataSet, config: Config) -> Measured:
                 takes_part = sum(each.has_likelihood for each in candidates)
                 counts.append((len(candidates), takes_part, sum(each.is_solved for each in candidates)))
                 if candidates and hand.stamp_ns <= path.end_ns:
-                    observation = make_observation(step, hand, path, config.duration)
+                    observation = make_observation(step, hand, path, config)
                     question = ask(PATH_CLASS, observation, data.asked or frozenset(observation.ids))
                     asked += [(observation, question)] if question is not None else []
     return Measured(np.array(counts, dtype=float), np.array(seconds), asked)

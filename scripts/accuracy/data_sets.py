@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from foc_ros.analysis.csv_recordings import read_movement_rows
+from foc_ros.analysis.csv_recordings import RecordedScene, read_movement_rows
 from foc_ros.analysis.recordings import RECORDINGS, Recording, TableRecording, find_recordings
 from foc_ros.io.csv_tables import Row, read_rows
 
@@ -61,7 +61,7 @@ def _make_recording(name: str, rows: list[Row], scene: list[Row]) -> TableRecord
     boxes = [row for row in scene if row.cells['object'].startswith('Obstacle')]
     circles = [circle for number, row in enumerate(boxes) for circle in chain_circles(_read_box(row), number)]
     goals = [[row.read_number('x_m'), row.read_number('y_m'), 0.0] for row in scene if row.cells['object'] == 'Target']
-    return TableRecording(name, tuple(rows), tuple(circles), np.array(goals))
+    return TableRecording(name, tuple(rows), RecordedScene(tuple(circles), np.array(goals)))
 
 
 def _read_box(row: Row) -> tuple[float, float, float, float]:
