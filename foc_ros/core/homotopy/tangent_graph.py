@@ -194,9 +194,7 @@ def _add_points(outlines: Outlines, points: Array) -> Outlines:
     """Return the outlines, followed by points as circles of radius 0."""
     dots = _make_points(len(points), outlines.polygons.vertices.shape[1])
     polygons = Polygons._make([np.concatenate(pair) for pair in zip(outlines.polygons, dots, strict=True)])
-    return _make_outlines(
-        np.concatenate((outlines.centre, points)), np.append(outlines.radius, np.zeros(len(points))), polygons
-    )
+    return _make_outlines(np.concatenate((outlines.centre, points)), np.append(outlines.radius, np.zeros(len(points))), polygons)
 
 
 def _list_pairs(nodes: Indices, ends: Indices) -> tuple[Indices, Indices]:

@@ -255,7 +255,10 @@ def measure_way_round(
 
     begin, end: outside, from the centre [m]; sense: 1 to pass it anticlockwise.
     """
-    first, last = find_touch(polygons, j, radius, begin[0], begin[1], sense), find_touch(polygons, j, radius, end[0], end[1], -sense)
+    first, last = (
+        find_touch(polygons, j, radius, begin[0], begin[1], sense),
+        find_touch(polygons, j, radius, end[0], end[1], -sense),
+    )
     arc, _ = measure_arc(
         polygons,
         boundaries,
