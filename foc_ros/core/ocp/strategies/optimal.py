@@ -45,6 +45,8 @@ EVEN = 1e-4
 """Relative difference of the slope from the one that is worth it at which both are the same."""
 FOLLOW_SHARE = 0.5
 """Part of the time left that an earlier solution may take; then the search begins again."""
+NEARLY = 0.3
+"""Part of the slope that is worth it from which Newton steps are tried that have k as an unknown."""
 NARROW = 0.02
 """Bracket in k at which the search ends."""
 
@@ -59,6 +61,10 @@ def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadli
             raise
         status = Status.DEADLINE
     point = search.best
+    if status is Status.ITERATION_LIMIT:
+        assert start.control is not None
+        message = 'the earlier solution does not lead to one now'
+        return StrategyResult(status, message, correct_to_goal(problem, start.control, start.positions), aims_at_eta=False)
     if point is None or status is Status.INFEASIBLE:
         return find_best_effort(problem, start, qp_solves=search.qp_solves, deadline=deadline)
     minimum, found = find_minimum_safety_factor(problem, point.control, between_steps=True), problem.risk
@@ -101,6 +107,8 @@ class _Search:
     def run(self, start: Start) -> Status:
         """Leave the best point in `best`; return how the search ended."""
         if not self.follow_in_time(start):
+            if start.control is not None and not start.is_unfinished:
+                return Status.ITERATION_LIMIT
             return self.judge() if self.begin(start) else Status.INFEASIBLE
         if not (self.is_hard and start.safety_factor < self.problem.wanted_k):
             self.raise_k()
@@ -207,10 +215,10 @@ class _Search:
                 continue
             if self.slope(point) <= self.rate:
                 low = self.best = point
-                stride *= 2
             else:
                 high = point.k
-            worth = self.weigh(point.control, point.contacts, point.k) if low.k < self.wanted else None
+            is_near = low.k < self.wanted and self.slope(point) > NEARLY * self.rate
+            worth = self.weigh(point.control, point.contacts, point.k) if is_near else None
             if worth is not None and low.k <= worth.k <= min(high, self.wanted):
                 self.best = worth
                 return
