@@ -1,5 +1,7 @@
 """Homotopy classes among boxes, capsules, hulls and circles: brute force, equal shapes, invariances, walls, hands inside."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from homotopy_scenes import CLEARANCE, GOAL, find
@@ -174,7 +176,7 @@ def test_a_bar_through_a_circle_covers_it_in_two_places():
 
 def test_a_chain_of_capsules_that_share_their_ends_is_one_obstacle():
     corners = np.array([[0.1, 0.1], [0.18, 0.02], [0.16, -0.1], [0.25, -0.12]])
-    obstacles = collect_obstacles([Capsule(a, b, radius=0.01) for a, b in zip(corners, corners[1:], strict=False)])
+    obstacles = collect_obstacles([Capsule(a, b, radius=0.01) for a, b in pairwise(corners)])
     expected = shortest_by_pattern(obstacles)
     assert [one.length for one in find(obstacles).candidates] == pytest.approx(sorted(expected.values()), **EXACT)
 
@@ -213,7 +215,7 @@ def test_a_goal_in_a_box_has_no_candidates_and_one_in_its_margin_has():
     box = make_box(0.04, 0.04, 0.3)
     inside = find(make_obstacles([GOAL + 0.01], 0.0, polygons=[box]))
     assert inside.candidates == () and inside.notes == {'goal_inside': 1}
-    obstacles = make_obstacles([GOAL + [0.0, 0.025]], 0.0, polygons=[make_box(0.04, 0.04, 0.0)])
+    obstacles = make_obstacles([GOAL + np.array([0.0, 0.025])], 0.0, polygons=[make_box(0.04, 0.04, 0.0)])
     near = find(obstacles, clearance=0.01)
     assert near.notes == {'goal_near': 1} and near.candidates
     assert all(measure_clear(one.guess, obstacles, 0.0) > 0.0 for one in near.candidates)

@@ -164,9 +164,9 @@ def is_in_names(polygons: Polygons, boundaries: Boundaries, k: int, trip: Trip) 
 def measure_distance(polygons: Polygons, k: int, scale: float, x: float, y: float) -> float:
     """Return the signed distance [m] of a point from a polygon of another size; x, y: from its centre [m]."""
     if scale == 0.0:
-        return np.hypot(x, y)
+        return float(np.hypot(x, y))
     offset = find_offset(polygons, k, x / scale, y / scale)
-    return np.hypot(offset.x, offset.y) * offset.side * scale
+    return float(np.hypot(offset.x, offset.y) * offset.side * scale)
 
 
 @compiled_exactly

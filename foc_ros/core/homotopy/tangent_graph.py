@@ -283,7 +283,7 @@ def find_tangent_between(outlines: Outlines, tail: int, head: int, start: int) -
 def count_starts(outlines: Outlines, tail: int, head: int) -> int:
     """Return the number of starts of `find_tangent_between`."""
     corners = outlines.polygons.corners
-    return corners[head >> 1] + (corners[tail >> 1] if corners[tail >> 1] > 1 else 0)
+    return int(corners[head >> 1] + (corners[tail >> 1] if corners[tail >> 1] > 1 else 0))
 
 
 @compiled_exactly

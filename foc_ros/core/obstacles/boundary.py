@@ -220,7 +220,7 @@ def find_exit(
     place = find_place(boundaries, j, vertex, normal_x, normal_y)
     from_x, from_y = x - offset.x - polygons.vertices[j, vertex, 0], y - offset.y - polygons.vertices[j, vertex, 1]
     length = radius * place.angle + boundaries.edge[j, vertex] + from_y * normal_x - from_x * normal_y
-    return length % (radius * TURN + boundaries.edge[j, polygons.corners[j]])
+    return float(length % (radius * TURN + boundaries.edge[j, polygons.corners[j]]))
 
 
 @compiled_separately
