@@ -9,7 +9,7 @@ from homotopy_shapes import HAND, make_box, random_shapes, shortest_by_pattern, 
 
 from foc_ros.core.homotopy import find_path_sides
 from foc_ros.core.obstacles.rounded_polygon import measure_offsets
-from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, collect_obstacles
+from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, collect_obstacles, make_box_polygon
 from foc_ros.core.types import make_obstacles
 
 BEST = 16
@@ -22,9 +22,8 @@ def make_scene(seed):
     return random_shapes(rng, int(rng.integers(1, 6)), may_overlap=seed % 3 == 0)
 
 
-def compare(seed):
-    obstacles = make_scene(seed)
-    found, every = find(obstacles, k=BEST), shortest_by_pattern(obstacles)
+def compare(obstacles, seed, clearance=CLEARANCE):
+    found, every = find(obstacles, k=BEST, clearance=clearance), shortest_by_pattern(obstacles, clearance=clearance)
     named = [row for row, name in enumerate(obstacles.ids) if any(name == each for each, _ in found.candidates[0].sides)]
     expected = {}
     for pattern, length in every.items():
@@ -41,13 +40,32 @@ def compare(seed):
 @pytest.mark.parametrize('batch', range(3))
 def test_brute_force_finds_no_class_that_the_search_misses(batch):
     for seed in range(20 * batch, 20 * (batch + 1)):
-        compare(seed)
+        compare(make_scene(seed), seed)
 
 
 @pytest.mark.parametrize('batch', range(22))
 def test_brute_force_finds_none_in_many_more_scenes(batch):
     for seed in range(60 + 20 * batch, 60 + 20 * (batch + 1)):
-        compare(seed)
+        compare(make_scene(seed), seed)
+
+
+def make_aligned_scene(seed):
+    """Upright boxes and capsules on a grid of a centimetre, so that edges lie on one line and shapes share corners."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 6))
+    while True:
+        centre = 0.01 * np.column_stack([rng.integers(5, 31, n), rng.integers(-6, 7, n)])
+        polygons = [make_box_polygon(size, 0.0) for size in 0.02 * rng.integers(0, 5, (n, 2))]
+        radius = [0.01 if len(polygon) < 3 else rng.choice([0.0, 0.006]) for polygon in polygons]
+        obstacles = make_obstacles(centre, radius, polygons=polygons)
+        if measure_clear(np.array([HAND, GOAL]), obstacles, 0.006) > 0.0:
+            return obstacles
+
+
+@pytest.mark.parametrize('batch', range(2))
+def test_brute_force_finds_no_class_that_the_search_misses_where_edges_lie_on_one_line(batch):
+    for seed in range(30 * batch, 30 * (batch + 1)):
+        compare(make_aligned_scene(seed), seed, 0.0041)
 
 
 def summarise(found):

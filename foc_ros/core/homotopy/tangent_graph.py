@@ -344,25 +344,18 @@ def find_cuts(outlines: Outlines, overlaps: FlagTable) -> tuple[Vector, Indices]
             both_x, both_y = near.x + share * (near.other_x - near.x), near.y + share * (near.other_y - near.y)
             for start in range(starts):
                 run = find_tangent_between(outlines, 2 * i + 1, 2 * j + 1, start)
-                if run.length > 0.0:
-                    row[count], row[count + 1] = i, j
-                    place[count] = find_exit(
-                        outlines.polygons,
-                        outlines.boundaries,
-                        i,
-                        outlines.radius[i],
-                        (both_x, both_y),
-                        (x + run.head_x, y + run.head_y),
-                    )
-                    place[count + 1] = find_exit(
-                        outlines.polygons,
-                        outlines.boundaries,
-                        j,
-                        outlines.radius[j],
-                        (both_x - x, both_y - y),
-                        (run.tail_x - x, run.tail_y - y),
-                    )
-                    count += 2
+                if run.length <= 0.0:
+                    continue
+                for own, inside, outside in (
+                    (i, (both_x, both_y), (x + run.head_x, y + run.head_y)),
+                    (j, (both_x - x, both_y - y), (run.tail_x - x, run.tail_y - y)),
+                ):
+                    offset, radius = find_offset(outlines.polygons, own, outside[0], outside[1]), outlines.radius[own]
+                    # where edges lie on one line, a tangent may end on the boundary of both
+                    if np.hypot(offset.x, offset.y) * offset.side > radius + GRAZE:
+                        row[count] = own
+                        place[count] = find_exit(outlines.polygons, outlines.boundaries, own, radius, inside, outside)
+                        count += 1
     first_cut = np.zeros(n + 1, np.intp)
     for each in row[:count]:
         first_cut[each + 1 :] += 1
