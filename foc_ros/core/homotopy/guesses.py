@@ -13,7 +13,7 @@ from foc_ros.core.types import Array, as_readonly
 
 from .search_scene import SearchScene
 from .sides import TURN
-from .tangent_graph import Runs, Shapes, TangentGraph, measure_arc_between
+from .tangent_graph import Outlines, Runs, TangentGraph, measure_arc_between
 
 SLOPE = 0.5
 """A hand in a margin leaves it by this much for each metre of its path, and enters the margin of its goal likewise."""
@@ -79,9 +79,9 @@ class TautPath(NamedTuple):
 
 
 @compiled_exactly
-def lay_out_runs(shapes: Shapes, runs: Runs, path: Indices) -> TautPath:
+def lay_out_runs(outlines: Outlines, runs: Runs, path: Indices) -> TautPath:
     """Lay out a path that is given by its runs (p,): an arc along a shape has a piece about each vertex and along each edge."""
-    outlines, boundaries = shapes.outlines, shapes.outlines.boundaries
+    boundaries = outlines.boundaries
     most, piece, length = len(path) * (2 * outlines.polygons.vertices.shape[1] + 4), 0, 0.0
     begin, start, heading, bend = np.empty(most), np.empty((most, 2)), np.empty((most, 2)), np.zeros(most)
     for place, run in enumerate(path):
@@ -97,7 +97,7 @@ def lay_out_runs(shapes: Shapes, runs: Runs, path: Indices) -> TautPath:
                 runs.reach_vertex[run],
                 runs.reach_angle[run],
             )
-            _, is_past_beginning = measure_arc_between(shapes, runs, run, following)
+            _, is_past_beginning = measure_arc_between(outlines, runs, run, following)
             while corners > 1 and (vertex != runs.leave_vertex[following] or is_past_beginning):
                 after = (vertex + sense) % corners
                 # an edge has the number of the vertex at its end, anticlockwise
@@ -129,7 +129,7 @@ def lay_out_runs(shapes: Shapes, runs: Runs, path: Indices) -> TautPath:
 
 def lay_out(graph: TangentGraph, path: Sequence[int]) -> TautPath:
     """Lay out a path that is given by its runs in a graph."""
-    return lay_out_runs(graph.shapes, graph.runs, np.array(path, dtype=np.intp))
+    return lay_out_runs(graph.outlines, graph.runs, np.array(path, dtype=np.intp))
 
 
 def timed(path: Array, velocity: Array, duration_s: float, steps: int) -> Array:

@@ -121,7 +121,7 @@ def extend_signature(graph: TangentGraph, named: Indices, before: int, run: int,
     if before >= 0:
         node = runs.head[before]
         sense = 2 * (node & 1) - 1
-        _, is_past_beginning = measure_arc_between(graph.shapes, runs, before, run)
+        _, is_past_beginning = measure_arc_between(graph.outlines, runs, before, run)
         for k, shape in enumerate(named):
             signature[k] -= runs.end_crossings[before, shape]
             # an arc that passes the beginning of the boundary goes round all centres that the shape holds once more

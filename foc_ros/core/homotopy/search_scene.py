@@ -10,7 +10,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.core.kernels import Flags, FlagTable, Indices, Matrix, Table, Vector, compiled_exactly, freeze
+from foc_ros.core.kernels import (
+    Flags,
+    FlagTable,
+    Indices,
+    Matrix,
+    Table,
+    Vector,
+    compiled_exactly,
+    compiled_separately,
+    compiled_with_caller,
+    freeze,
+)
 from foc_ros.core.obstacles.boundary import (
     Boundaries,
     find_approach,
@@ -95,10 +106,9 @@ def build_search_scene(
     sides = _tabulate_sides(obstacles.ids, previous)
     centre, radius = np.ascontiguousarray(obstacles.centre, dtype=float), np.ascontiguousarray(obstacles.radius, dtype=float)
     polygons = tabulate_polygons(obstacles)
-    boundaries = freeze(tabulate_boundaries(polygons))
     wanted = keep_gaps_open(centre, np.maximum(radius + clearance, MIN_SIZE), polygons, float(clearance), sides)
     slack, goals = _compute_slack(len(goals), previous, sides), np.ascontiguousarray(goals, dtype=float)
-    return measure_scene(np.ascontiguousarray(hand, dtype=float), goals, centre, radius, wanted, polygons, boundaries, slack)
+    return measure_scene(np.ascontiguousarray(hand, dtype=float), goals, centre, radius, wanted, polygons, slack)
 
 
 def named_obstacles(
@@ -126,7 +136,7 @@ def keep_gaps_open(centre: Matrix, radius: Vector, polygons: Polygons, clearance
     return reduced
 
 
-@compiled_exactly
+@compiled_separately
 def is_in_names(polygons: Polygons, boundaries: Boundaries, k: int, trip: Trip) -> bool:
     """Tell whether the names to a goal contain an obstacle; a kernel, as NumPy takes 70 us for the scene and this takes 3 us.
 
@@ -146,19 +156,17 @@ def is_in_names(polygons: Polygons, boundaries: Boundaries, k: int, trip: Trip) 
         return True
     reach = FAR_SIDE * trip.straight - trip.slack
     hand, goal = (trip.hand_x, trip.hand_y), (trip.goal_x, trip.goal_y)
-    for sense in (-1, 1):
-        if measure_way_round(polygons, boundaries, k, trip.radius, hand, goal, sense) <= reach:
-            return True
-    return False
+    clockwise = measure_way_round(polygons, boundaries, k, trip.radius, hand, goal, -1)
+    return bool(min(clockwise, measure_way_round(polygons, boundaries, k, trip.radius, hand, goal, 1)) <= reach)
 
 
-@compiled_exactly
+@compiled_with_caller
 def measure_distance(polygons: Polygons, k: int, scale: float, x: float, y: float) -> float:
     """Return the signed distance [m] of a point from a polygon of another size; x, y: from its centre [m]."""
     if scale == 0.0:
-        return np.hypot(x, y)
+        return float(np.hypot(x, y))
     offset = find_offset(polygons, k, x / scale, y / scale)
-    return np.hypot(offset.x, offset.y) * offset.side * scale
+    return float(np.hypot(offset.x, offset.y) * offset.side * scale)
 
 
 @compiled_exactly
@@ -169,11 +177,10 @@ def measure_scene(
     radius: Vector,
     wanted: Vector,
     polygons: Polygons,
-    boundaries: Boundaries,
     slack: Matrix,
 ) -> SearchScene:
     """Measure the scene; radius (n,): without the clearance [m]; wanted (n,): with it; slack (g, n) [m]: see `ENTER`."""
-    (g, n), goals = slack.shape, goals.copy()
+    (g, n), goals, boundaries = slack.shape, goals.copy(), tabulate_boundaries(polygons)
     on_way, scale, hand_distance, hand_scale = np.empty((g, n)), np.empty((g, n)), np.empty(n), np.ones(n)
     holds_hand, holds_goal, excess = np.empty(n, np.bool_), np.empty((g, n), np.bool_), np.empty((g, n))
     is_inside, is_named, bearing_change = np.zeros(g, np.bool_), np.zeros((g, n), np.bool_), np.empty((g, n))

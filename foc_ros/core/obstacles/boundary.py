@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.core.kernels import Matrix, Tensor, compiled, compiled_exactly, compiled_separately, compiled_with_caller
+from foc_ros.core.kernels import Matrix, Tensor, compiled, compiled_exactly, compiled_exactly_with_caller, compiled_separately
 
 from .rounded_polygon import TURN, Polygons, find_offset, find_support
 
@@ -42,7 +42,7 @@ class Place(NamedTuple):
 
 
 class Approach(NamedTuple):
-    """Where two polygons are nearest to each other: distance, 0 if they meet, a point of each, from the centre of the first [m]."""
+    """Where two polygons are nearest: distance, 0 if they meet, and a point of each, from the centre of the first [m]."""
 
     distance: float
     x: float
@@ -82,7 +82,7 @@ def tabulate_boundaries(polygons: Polygons) -> Boundaries:
     return Boundaries(normal, angle, edge)
 
 
-@compiled_with_caller
+@compiled_exactly_with_caller
 def find_place(boundaries: Boundaries, j: int, vertex: int, x: float, y: float) -> Place:
     """Return the place about a vertex where the normal has a direction; one beyond the arc counts as its nearest end."""
     along, aside = boundaries.normal[j, vertex, 0], boundaries.normal[j, vertex, 1]
@@ -93,7 +93,7 @@ def find_place(boundaries: Boundaries, j: int, vertex: int, x: float, y: float) 
     return Place(vertex, begin + angle)
 
 
-@compiled_with_caller
+@compiled_exactly_with_caller
 def measure_arc(
     polygons: Polygons, boundaries: Boundaries, j: int, radius: float, begin: Place, end: Place, sense: int
 ) -> tuple[float, bool]:
@@ -220,7 +220,7 @@ def find_exit(
     place = find_place(boundaries, j, vertex, normal_x, normal_y)
     from_x, from_y = x - offset.x - polygons.vertices[j, vertex, 0], y - offset.y - polygons.vertices[j, vertex, 1]
     length = radius * place.angle + boundaries.edge[j, vertex] + from_y * normal_x - from_x * normal_y
-    return length % (radius * TURN + boundaries.edge[j, polygons.corners[j]])
+    return float(length % (radius * TURN + boundaries.edge[j, polygons.corners[j]]))
 
 
 @compiled_separately
@@ -273,7 +273,7 @@ def measure_way_round(
 
 @compiled_separately
 def find_outer_scale(polygons: Polygons, j: int, x: float, y: float) -> float:
-    """Return the largest size, as a multiple, at which polygon j does not hold a point that it holds at size 1; 0 if it always does.
+    """Return the size, as a multiple, up to which polygon j does not hold a point that it holds at size 1; 0 for its centre.
 
     x, y: from the centre [m]. The size is found by bisection.
     """

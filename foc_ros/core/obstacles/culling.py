@@ -12,9 +12,9 @@ from .rounded_polygon import measure_offsets
 def cull_obstacles(obstacles: Obstacles, hand: Array, goals: Array, duration_s: float, most: int) -> Obstacles:
     """Return the `most` obstacles at most, in their order, that a path to a goal can touch with the smallest detour.
 
-    hand (2,), goals (g, 2) [m], g >= 1. The detour over an obstacle is d(hand) + d(goal) - 2 r - |hand - goal|, for the goal
-    where it is smallest, with distances d from the polygon. A moving obstacle may come nearer by its speed times duration_s [s],
-    at both ends. Of equal ones the first rows are kept.
+    hand (2,), goals (g, 2) [m], g >= 1. The detour over an obstacle is d(hand) + d(goal) - 2 r - |hand - goal|, with distances d
+    from its polygon, for the goal where it is smallest. A moving obstacle may come nearer by its speed times duration_s [s], at
+    both ends. Of equal ones the first rows are kept.
     """
     if len(obstacles) <= most:
         return obstacles
