@@ -75,6 +75,11 @@ class RecordedScene:
     goals: Array | None = None
     boxes: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
+    def find_boxes(self, positions: Array) -> dict[str, tuple[float, ...]]:
+        """Return the boxes at the median height of a hand at positions (n, 3) [m]: a ceiling or a table top is no obstacle."""
+        height = float(np.median(positions[:, 2]))
+        return {name: box for name, box in self.boxes.items() if abs(box[2] - height) < box[5] / 2.0}
+
 
 @dataclass(frozen=True)
 class SceneTables:
@@ -138,13 +143,8 @@ def write_movement(bag: Path, movement: Movement, scene: RecordedScene) -> None:
 
 
 def recorded_messages(movement: Movement, scene: RecordedScene) -> Iterator[tuple[int, str, Any]]:
-    """Yield the messages of a bag as (stamp [ns], topic, message), in the order of their stamps.
-
-    Of named boxes, those are obstacles that stand at the median height of the hand; a ceiling or a table top is none.
-    """
-    types = RosbagsTypes(TYPESTORE)
-    height = float(np.median(movement.positions[:, 2]))
-    boxes = {name: box for name, box in scene.boxes.items() if abs(box[2] - height) < box[5] / 2.0}
+    """Yield the messages of a bag as (stamp [ns], topic, message), in the order of their stamps."""
+    types, boxes = RosbagsTypes(TYPESTORE), scene.find_boxes(movement.positions)
 
     def list_scenes() -> Iterator[tuple[int, str, Any]]:
         for stamp_ns in range(movement.stamps_ns[0] - SCENE_LEAD_NS, movement.stamps_ns[-1] + 1, SCENE_PERIOD_NS):

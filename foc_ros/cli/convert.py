@@ -31,10 +31,8 @@ def run(arguments: argparse.Namespace) -> int:
             raise RecordingError(f'{bag}: exists already and is not overwritten; choose another --output')
     for bag, movement in show_progress(bags.items(), 'convert', len(bags)):
         write_movement(bag, movement, scenes[movement.name])
-    hands, obstacles = (
-        sum(len(each.stamps_ns) for each in movements),
-        [len(each.obstacles or each.boxes) for each in scenes.values()],
-    )
+    hands = sum(len(each.stamps_ns) for each in movements)
+    obstacles = [len(scenes[each.name].find_boxes(each.positions) or scenes[each.name].obstacles) for each in movements]
     count = ' to '.join(str(each) for each in sorted({min(obstacles), max(obstacles)}))
     print(f'{len(bags)} bags with {hands} hand poses and {count} obstacles written to {arguments.output}')
     return 0
