@@ -68,27 +68,39 @@ def solve_candidates(
         if solved and not deadline.allows():
             break
         previous = earlier.solutions.get(candidates[row].label)
-        solved[row] = _solve_candidate(candidates[row], problems[row], settings, costs, previous, deadline)
+        given = candidates[row], problems[row], settings, costs, previous, deadline
+        solved[row] = _solve_candidate(*given, is_followed=earlier is not NOTHING)
     return [solved[row] for row in sorted(solved)]
 
 
 def _solve_candidate(
-    candidate: Candidate, problem: Problem, settings: FocConfig, costs: CostModel, previous: Solution | None, deadline: Deadline
+    candidate: Candidate,
+    problem: Problem,
+    settings: FocConfig,
+    costs: CostModel,
+    previous: Solution | None,
+    deadline: Deadline,
+    *,
+    is_followed: bool,
 ) -> PredictedCandidate:
     """Solve from the previous solution; where a likelihood comes or goes, also from the candidate's own guess.
+
+    is_followed: whether the next prediction goes on from the result.
 
     A candidate that was unreachable and is solved now may have come from far beyond the least effort: the result with the smaller
     loss counts.
     """
     warm = None
     if previous is not None:
-        solution = solve_problem(problem, warm_start(previous, problem), settings, deadline)
+        start = replace(warm_start(previous, problem), is_followed=is_followed)
+        solution = solve_problem(problem, start, settings, deadline)
         warm = _check_class(candidate, problem, solution, costs)
         # a solution that continues one stopped by the deadline has skipped nothing
         is_continued = warm.has_likelihood and (previous.status is Status.DEADLINE or previous.status.has_likelihood)
         if warm.status in (previous.status, Status.DEADLINE) or is_continued:
             return warm
-    cold = _check_class(candidate, problem, solve_problem(problem, cold_start(candidate.guess), settings, deadline), costs)
+    start = replace(cold_start(candidate.guess), is_followed=is_followed)
+    cold = _check_class(candidate, problem, solve_problem(problem, start, settings, deadline), costs)
     if warm is None or not warm.has_likelihood:
         return cold
     return cold if cold.has_likelihood and _compute_loss(cold, problem) < _compute_loss(warm, problem) else warm

@@ -19,7 +19,8 @@ class Start:
 
     positions (N, 2): at steps 1..N, to linearise at [m]. A start from an earlier solution also has its stacked control (2N,), its
     contacts, safety factor, lambda, and slope dk/ds (0 where not known). lam is None for a cold start, which has none of these.
-    is_unfinished: whether the deadline stopped the earlier solution.
+    is_unfinished: whether the deadline stopped the earlier solution. is_followed: whether the next prediction goes on from
+    the result, so that a long search may end in that one.
     """
 
     positions: Array
@@ -29,6 +30,7 @@ class Start:
     lam: float | None = None
     safety_factor_slope: float = 0.0
     is_unfinished: bool = False
+    is_followed: bool = False
 
 
 def cold_start(guess: Array) -> Start:

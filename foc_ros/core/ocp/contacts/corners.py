@@ -16,6 +16,9 @@ from foc_ros.core.ocp.terms import MovingObstacles
 
 from .hermite import interpolate
 
+REFINEMENTS = 3
+"""Newton steps to the time of a corner: from a tenth of a step, two are usual."""
+
 
 class Corner(NamedTuple):
     """A time at which the nearest point of a polygon is the end of an edge, infinite if there is none near.
@@ -32,29 +35,48 @@ class Corner(NamedTuple):
     step: float
 
 
+NO_CORNER = Corner(np.inf, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
 @compiled_separately
 def find_corner(obstacles: MovingObstacles | UncertainObstacles, trajectory: Matrix, j: int, s: float, reach: float) -> Corner:
     """Find the time nearest to s at which the nearest point of polygon j passes from an edge to a vertex, or back.
 
-    reach: how far from s it may be, in steps. The mean counts as straight in between.
+    reach: how far from s it may be, in steps. The time is that of a straight mean first, and then found by Newton's method.
     """
-    polygons, corners, found = obstacles.polygons, obstacles.polygons.corners[j], Corner(np.inf, 0.0, 0.0, 0.0, 0.0, 0.0)
-    at, velocity, bend = interpolate(trajectory, s, 0), interpolate(trajectory, s, 1), interpolate(trajectory, s, 2)
+    polygons, corners, nearest = obstacles.polygons, obstacles.polygons.corners[j], reach
+    found, vertex = NO_CORNER, 0
+    at, velocity = interpolate(trajectory, s, 0), interpolate(trajectory, s, 1)
+    at_x, at_y = (
+        at[0] - obstacles.centre[j, 0] - s * obstacles.drift[j, 0],
+        at[1] - obstacles.centre[j, 1] - s * obstacles.drift[j, 1],
+    )
     for k in range(corners if corners > 1 else 0):
         after = (k + 1) % corners
-        x, y = (
-            polygons.vertices[j, after, 0] - polygons.vertices[j, k, 0],
-            polygons.vertices[j, after, 1] - polygons.vertices[j, k, 1],
-        )
+        x = polygons.vertices[j, after, 0] - polygons.vertices[j, k, 0]
+        y = polygons.vertices[j, after, 1] - polygons.vertices[j, k, 1]
         length = np.hypot(x, y)
         x, y = x / length, y / length
+        speed = x * (velocity[0] - obstacles.drift[j, 0]) + y * (velocity[1] - obstacles.drift[j, 1])
         for end in (k, after):
-            corner_x = obstacles.centre[j, 0] + s * obstacles.drift[j, 0] + polygons.vertices[j, end, 0]
-            corner_y = obstacles.centre[j, 1] + s * obstacles.drift[j, 1] + polygons.vertices[j, end, 1]
-            apart_x, apart_y = at[0] - corner_x, at[1] - corner_y
-            speed = x * (velocity[0] - obstacles.drift[j, 0]) + y * (velocity[1] - obstacles.drift[j, 1])
-            time = s - (x * apart_x + y * apart_y) / speed if speed != 0.0 else np.inf
+            apart_x, apart_y = at_x - polygons.vertices[j, end, 0], at_y - polygons.vertices[j, end, 1]
+            shift = -(x * apart_x + y * apart_y) / speed if speed != 0.0 else np.inf
             is_outside = y * apart_x - x * apart_y > 0.0 or corners == 2
-            if is_outside and abs(time - s) < min(abs(found.time - s), reach):
-                found = Corner(time, x, y, speed, x * bend[0] + y * bend[1], 0.0)
-    return found
+            if is_outside and abs(shift) < nearest:
+                nearest, vertex, found = abs(shift), end, Corner(s + shift, x, y, speed, 0.0, 0.0)
+    if not 0.0 <= found.time <= trajectory.shape[1] - 1.0:
+        return NO_CORNER
+    time, x, y, speed = found.time, found.x, found.y, found.speed
+    for _ in range(REFINEMENTS):
+        at, velocity = interpolate(trajectory, time, 0), interpolate(trajectory, time, 1)
+        at_x, at_y = (
+            at[0] - obstacles.centre[j, 0] - time * obstacles.drift[j, 0],
+            at[1] - obstacles.centre[j, 1] - time * obstacles.drift[j, 1],
+        )
+        along = x * (at_x - polygons.vertices[j, vertex, 0]) + y * (at_y - polygons.vertices[j, vertex, 1])
+        speed = x * (velocity[0] - obstacles.drift[j, 0]) + y * (velocity[1] - obstacles.drift[j, 1])
+        time = time - along / speed if speed != 0.0 else np.inf
+        if not max(s - reach, 0.0) <= time <= min(s + reach, trajectory.shape[1] - 1.0):
+            return NO_CORNER
+    bend = interpolate(trajectory, time, 2)
+    return Corner(time, x, y, speed, x * bend[0] + y * bend[1], 0.0)

@@ -28,7 +28,7 @@ from foc_ros.core.obstacles.rounded_polygon import Offset, find_normal, find_off
 from foc_ros.core.ocp.clearance import required_distance
 from foc_ros.core.ocp.terms import ChanceTerms, MovingObstacles, ProblemTerms
 
-from .corners import Corner, find_corner
+from .corners import NO_CORNER, Corner, find_corner
 from .hermite import basis, contact_rows, interpolate
 
 SMALLEST_VARIANCE = 1e-24
@@ -203,15 +203,14 @@ def find_kink(
     Returns the corner, with an infinite time if there is none, and the margins that `hold_at_corner` needs.
     """
     corner = find_corner(obstacles, trajectory, j, s, CORNER_REACH)
-    none = Corner(np.inf, 0.0, 0.0, 0.0, 0.0, 0.0)
     at = evaluate_margin(terms, obstacles, trajectory, control, j, s, k, 0.0)
     if not max(terms.chance.obstacles.ignored_until[j], 1.0) < corner.time < trajectory.shape[1] - 1.0:
-        return none, (at, at, at)
+        return NO_CORNER, (at, at, at)
     at = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time, k, 0.0)
     before = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time - TIME_STEP, k, at.scale)
     after = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time + TIME_STEP, k, at.scale)
     if not before.value > at.value < after.value or before.is_on_edge == after.is_on_edge:
-        return none, (at, at, at)
+        return NO_CORNER, (at, at, at)
     step, near = (TIME_STEP, after) if before.is_on_edge else (-TIME_STEP, before)
     far = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time + 2.0 * step, k, at.scale)
     return Corner(corner.time, corner.x, corner.y, corner.speed, corner.growth, step), (at, near, far)

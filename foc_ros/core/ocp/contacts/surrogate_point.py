@@ -24,6 +24,8 @@ CLEAR = 1e-8
 """Shortfall of a margin that counts as rounding, relative to the scene."""
 SPARE = 1e-8
 """Clearance term, relative to the square of the scene, that outweighs this rounding."""
+SAME_TIME = 1e-6
+"""Difference in time, in steps, up to which two shortfalls are the same."""
 MAX_CHANGES = 10
 """How often contacts may be released or added."""
 NEW_MULTIPLIER = 1e-6
@@ -63,6 +65,7 @@ def update_active_contacts(
     """
     control, obstacle = near.copy(), contacts.obstacle.copy()
     time, multiplier = contacts.time.copy(), contacts.multiplier.copy()
+    added = np.full(2, np.nan)
     for _ in range(MAX_CHANGES + 1):
         if len(time) > MOST_CONTACTS:
             break
@@ -80,6 +83,9 @@ def update_active_contacts(
         new = find_shortfalls(terms, obstacles, first_alike, trajectory, control, k, CLEAR * terms.extent)
         if len(new) == 0:
             return True, control, Contacts(obstacle, time, multiplier), k
+        if new[0, 0] == added[0] and abs(new[0, 1] - added[1]) < SAME_TIME:
+            break  # the deepest shortfall was added before, and released
+        added[:] = new[0]
         slight = NEW_MULTIPLIER * multiplier.max() if len(multiplier) else 1.0
         obstacle = np.concatenate((obstacle, new[:, 0].astype(np.intp)))
         time, multiplier = np.concatenate((time, new[:, 1])), np.concatenate((multiplier, np.full(len(new), slight)))

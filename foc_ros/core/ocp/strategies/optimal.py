@@ -39,7 +39,7 @@ ROUNDINGS = (1.0, 0.25, 0.05)
 """Parts of the clearance for the wanted k with which Newton steps begin where they do not lead on from the least effort."""
 CLOSE = 5e-6
 """Relative excess over the wanted k that is aimed at."""
-FALLBACKS = (1.0, 0.75, 0.5, 0.35, 0.25)
+FALLBACKS = (1.0, 0.6, 0.3, 0.0)
 """Shares of the earlier k that are tried where Newton steps do not lead to the one that is wanted: k rises again from there."""
 EVEN = 1e-4
 """Relative difference of the slope from the one that is worth it at which both are the same."""
@@ -47,6 +47,8 @@ FOLLOW_SHARE = 0.5
 """Part of the time left that an earlier solution may take; then the search begins again."""
 NEARLY = 0.3
 """Part of the slope that is worth it from which Newton steps are tried that have k as an unknown."""
+MOST_TRIES, WARM_STRIDE = 4, 0.3
+"""Values of k that are tried where the next prediction goes on from the result; the first stride in k of that."""
 NARROW = 0.02
 """Bracket in k at which the search ends."""
 
@@ -98,6 +100,7 @@ class _Search:
         self.problem, self.deadline, self.qp_solves = problem, deadline, 0
         self.best: SurrogatePoint | None = None
         self.wanted = problem.wanted_k * (1.0 + CLOSE)
+        self.most_tries: float = math.inf
         wish = problem.preference
         self.is_hard = math.isinf(wish.shortfall)
         rate = wish.shortfall / wish.beta if wish.beta > 0.0 else math.inf
@@ -106,12 +109,13 @@ class _Search:
 
     def run(self, start: Start) -> Status:
         """Leave the best point in `best`; return how the search ended."""
+        self.most_tries = MOST_TRIES if start.is_followed and not self.is_hard else math.inf
         if not self.follow_in_time(start):
             if start.control is not None and not start.is_unfinished:
                 return Status.ITERATION_LIMIT
             return self.judge() if self.begin(start) else Status.INFEASIBLE
         if not (self.is_hard and start.safety_factor < self.problem.wanted_k):
-            self.raise_k()
+            self.raise_k(WARM_STRIDE)
         return self.judge()
 
     def judge(self) -> Status:
@@ -141,8 +145,6 @@ class _Search:
         before = min(start.safety_factor, self.wanted)
         point = self.weigh(control, contacts, before) if before < problem.wanted_k else None
         if point is None or point.k > self.wanted:
-            point = self.solve(control, contacts, self.wanted)
-        if point is None:
             point = self.solve_below(control, contacts, before)
         point = None if point is None else self.lower_k(point)
         if point is None or not 0.0 <= point.k <= self.wanted:
@@ -170,9 +172,9 @@ class _Search:
             found = self.solve_below(control, contacts, min(max(minimum.k, 0.0), self.wanted))
             if found is not None:
                 self.best = self.lower_k(found)
-                self.raise_k()
+                is_stuck = self.raise_k()
                 tried.append(self.best)
-                if not self.is_cheap(self.best):
+                if not is_stuck:
                     break
         self.qp_solves += follower.qp_solves
         self.best = max(tried, key=lambda point: point.k, default=self.best)
@@ -202,13 +204,17 @@ class _Search:
             return point
         return self.weigh(point.control, point.contacts, point.k) or point
 
-    def raise_k(self) -> None:
-        """Raise k to the wanted one, or to the one that is worth its effort: between a point below it and a k above it."""
+    def raise_k(self, stride: float = math.inf) -> bool:
+        """Raise k to the wanted one, or to the one that is worth its effort; tell whether no larger k could be reached.
+
+        stride: the longest in k to begin with.
+        """
         assert self.best is not None
         low, high = self.best, math.inf  # the k of a point that costs too much
-        stride = self.wanted - low.k
+        stride, tries = min(self.wanted - low.k, stride), 0
         shortest = min(NARROW, stride / 4.0) / 2.0
-        while self.is_cheap(low) and stride > shortest:
+        while self.is_cheap(low) and stride > shortest and tries < self.most_tries:
+            tries += 1
             point = self.solve(low.control, low.contacts, min(low.k + stride, self.wanted))
             if point is None:
                 stride /= 2
@@ -221,8 +227,9 @@ class _Search:
             worth = self.weigh(point.control, point.contacts, point.k) if is_near else None
             if worth is not None and low.k <= worth.k <= min(high, self.wanted):
                 self.best = worth
-                return
+                return False
             stride = min(stride, (high - low.k) / 2)
+        return self.is_cheap(low) and stride <= shortest
 
     def slope(self, point: SurrogatePoint) -> float:
         """Return d ln J / dk at a point."""
