@@ -21,7 +21,10 @@ if TYPE_CHECKING:
     from foc_ros.core.errors import ParameterError as ParameterError
     from foc_ros.core.errors import RecordingError as RecordingError
     from foc_ros.core.errors import SceneError as SceneError
+    from foc_ros.core.obstacles.shapes import Box as Box
+    from foc_ros.core.obstacles.shapes import Capsule as Capsule
     from foc_ros.core.obstacles.shapes import Circle as Circle
+    from foc_ros.core.obstacles.shapes import Hull as Hull
     from foc_ros.core.ocp.monte_carlo import MonteCarlo as MonteCarlo
     from foc_ros.core.ocp.strategies import StrategyResult as StrategyResult
     from foc_ros.core.types import Candidate as Candidate
@@ -40,7 +43,7 @@ _MODULES = {
     'core.dynamics.plant_models': 'PlantModel',
     'core.dynamics.plants': 'Plant',
     'core.errors': 'FocError InputError MessageError ParameterError RecordingError SceneError',
-    'core.obstacles.shapes': 'Circle',
+    'core.obstacles.shapes': 'Box Capsule Circle Hull',
     'core.ocp.monte_carlo': 'MonteCarlo',
     'core.ocp.strategies': 'StrategyResult',
     'core.types': 'Candidate HandState Obstacles PredictedCandidate Status',

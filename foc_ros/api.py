@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from foc_ros.core.estimation.kalman_filter import FilterState, update
 from foc_ros.core.homotopy.demonstrations import Demonstration
 from foc_ros.core.memory import Memory
 from foc_ros.core.obstacles.scene import ObstacleSource
-from foc_ros.core.obstacles.shapes import Circle, collect_obstacles
+from foc_ros.core.obstacles.shapes import Shape, collect_obstacles
 from foc_ros.core.ocp import monte_carlo as sampling
 from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
@@ -137,12 +137,12 @@ class Predictor:
             raise SceneError('goals', 'at least one position', 'none')
         self._goals = points
 
-    def set_obstacles(self, obstacles: Iterable[Circle] | Obstacles) -> None:
+    def set_obstacles(self, obstacles: Iterable[Shape] | Obstacles) -> None:
         """Replace the obstacles. Their positions hold at the next update; from then on each moves on at its velocity.
 
         Parameters
         ----------
-        obstacles : iterable of Circle, or Obstacles
+        obstacles : iterable of Circle, Box, Capsule and Hull, or Obstacles
             The obstacles, none for a free scene. `SceneError` is raised if a name occurs twice.
         """
         self._obstacles = ObstacleSource(collect_obstacles(obstacles), None, '')
@@ -210,16 +210,19 @@ class Solution(types.Solution):
         Jerk [m/s^3] for the triple integrator, force [N] for the damped mass; the sum of its squares.
     eta, problem : float, Problem
         Probability of avoidance that the solution achieves for each obstacle and step, and the problem that was solved.
+    obstacles : Obstacles
+        The obstacles as they were given; those of the problem are larger by `scene.hand_radius`.
     """
 
     label: str = ''
     problem: Problem | None = None
+    obstacles: Obstacles = field(default_factory=make_obstacles)
 
     def plot(self, axes: Any = None) -> Any:
         """Draw the solution in its scene; see `Prediction.plot`."""
         from foc_ros.reporting.snapshots import parse_label
 
-        _, sides = parse_label(self.label, self.problem.obstacles.ids if self.problem else ())
+        _, sides = parse_label(self.label, self.obstacles.ids)
         candidate = Candidate(self.label, 0, tuple(sides.items()), self.path, 0.0)
         return plot_candidates([PredictedCandidate(candidate, self, {}, 0.0, 1.0)], axes)
 
@@ -227,7 +230,7 @@ class Solution(types.Solution):
 def solve(
     start: ArrayLike,
     goal: ArrayLike,
-    obstacles: Iterable[Circle] | Obstacles = (),
+    obstacles: Iterable[Shape] | Obstacles = (),
     eta: float | None = None,
     strategy: str | None = None,
     duration_s: float = 1.0,
@@ -242,7 +245,7 @@ def solve(
         Position of a hand at rest [m], or its state x, y, vx, vy, ax, ay [m, m/s, m/s^2].
     goal : array_like of shape (2,)
         Position at which the hand comes to rest [m].
-    obstacles : iterable of Circle, or Obstacles
+    obstacles : iterable of Circle, Box, Capsule and Hull, or Obstacles
         The obstacles.
     eta : float, optional
         Wanted probability of avoiding each obstacle at each step; by default `foc.eta` of the config.
@@ -293,7 +296,7 @@ def solve(
 def solve_classes(
     start: ArrayLike,
     goal: ArrayLike,
-    obstacles: Iterable[Circle] | Obstacles = (),
+    obstacles: Iterable[Shape] | Obstacles = (),
     eta: float | None = None,
     strategy: str | None = None,
     duration_s: float = 1.0,
@@ -326,7 +329,7 @@ def solve_classes(
     return _solve(_build_scene(start, goals, obstacles, _fix_parameters(config, eta, strategy, duration_s)))
 
 
-def _build_scene(start: ArrayLike, goals: types.Array, obstacles: Iterable[Circle] | Obstacles, config: Config) -> ReachingScene:
+def _build_scene(start: ArrayLike, goals: types.Array, obstacles: Iterable[Shape] | Obstacles, config: Config) -> ReachingScene:
     expected = 'a position (2,) or a state (6,) x, y, vx, vy, ax, ay'
     size = np.shape(np.asarray(start, dtype=object))
     if size not in ((2,), (6,)):
@@ -334,7 +337,7 @@ def _build_scene(start: ArrayLike, goals: types.Array, obstacles: Iterable[Circl
     state, table = np.zeros(6), collect_obstacles(obstacles)
     state[: size[0]] = check_vector('start', start, size[0])
     for name, point in (('start', state[:2]), *(('goal', goal) for goal in goals)):
-        check_outside(name, point, table)
+        check_outside(name, point, table.grow(config.scene.hand_radius))
     return ReachingScene(HandState(0, state, np.zeros((6, 6))), goals, table, None, None, config)
 
 
@@ -352,8 +355,9 @@ def _check_config(config: Config | None) -> Config:
 def _solve(scene: ReachingScene) -> tuple[PredictedCandidate, ...]:
     problems = build_scene_problems(scene)
     return tuple(
-        replace(each, solution=Solution(**vars(each.solution), label=each.label, problem=problems[each.candidate.goal]))
+        replace(each, solution=Solution(**vars(each.solution), label=each.label, problem=problem, obstacles=scene.obstacles))
         for each in solve_scene(scene, problems)
+        for problem in (problems[each.candidate.goal],)
     )
 
 
@@ -406,12 +410,13 @@ def plot_candidates(candidates: Sequence[PredictedCandidate], axes: Any = None) 
     axes : matplotlib.axes.Axes, optional
         Axes to draw on; new ones by default. They are returned.
     """
-    problems = [each.solution.problem for each in candidates if isinstance(each.solution, Solution) and each.solution.problem]
+    solutions = [each.solution for each in candidates if isinstance(each.solution, Solution)]
+    problems = [each.problem for each in solutions if each.problem]
     if not problems:
         raise InputError('candidates', 'results of foc_ros.solve_classes', repr(candidates))
     by_number = {each.candidate.goal: problem.goal[:2] for each, problem in zip(candidates, problems, strict=True)}
     goals = np.array([by_number[number] for number in sorted(by_number)])
-    shown = Prediction(0, '', 0.0, tuple(candidates), candidates[0].label, obstacles=problems[0].obstacles, goals=goals)
+    shown = Prediction(0, '', 0.0, tuple(candidates), candidates[0].label, obstacles=solutions[0].obstacles, goals=goals)
     return shown.plot(axes)
 
 

@@ -4,7 +4,7 @@
     python scripts/measure_candidates.py [DATA ...] [--set NAME=VALUE ...] [--every N]
 
 DATA: bags, or folders as `foc_ros evaluate` reads them; by default the packaged recording, and D3IL and HLP where they are beside
-the checkout. The boxes of a table scenes.csv become chains of circles. `--set rate_hz=10` predicts ten times a second.
+the checkout. `--set rate_hz=10` predicts ten times a second.
 """
 
 from __future__ import annotations
@@ -91,8 +91,8 @@ def measure(data: DataSet, config: Config) -> Measured:
                 takes_part = sum(each.has_likelihood for each in candidates)
                 counts.append((len(candidates), takes_part, sum(each.is_solved for each in candidates)))
                 if candidates and hand.stamp_ns <= path.end_ns:
-                    observation = make_observation(step, hand, path, config.duration)
-                    question = ask(PATH_CLASS, observation, data.asked or frozenset(observation.ids))
+                    observation = make_observation(step, hand, path, config)
+                    question = ask(PATH_CLASS, observation, frozenset(observation.ids))
                     asked += [(observation, question)] if question is not None else []
     return Measured(np.array(counts, dtype=float), np.array(seconds), asked)
 

@@ -18,8 +18,9 @@ settings.register_profile('seeded', derandomize=True, deadline=None)
 settings.load_profile('seeded')
 
 REQUIRE_ROS = os.environ.get('FOC_ROS_REQUIRE_ROS') == '1'
-# Tests that may be skipped even then: they need data that is not part of the sources, or a browser that is not required.
-ALLOWED = ('Skipped: optional data', 'Skipped: optional browser')
+# Tests that may be skipped even then: they need data that is not part of the sources, a browser that is not required, or
+# message packages that the node does without.
+ALLOWED = ('Skipped: optional data', 'Skipped: optional browser', 'Skipped: optional message package')
 
 
 @pytest.hookimpl(tryfirst=True)

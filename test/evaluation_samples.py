@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.ground_truth import TIMES_S, GroundTruth
+from foc_ros.analysis.evaluation.ground_truth import TIMES_S, GroundTruth, find_open_gaps
 from foc_ros.analysis.evaluation.observations import CandidateTable, Observation, ObservedRecording
 from foc_ros.core.homotopy.branch_times import BranchTimes
-from foc_ros.core.types import LEFT, RIGHT
+from foc_ros.core.types import LEFT, RIGHT, make_obstacles
 
 H = len(TIMES_S)
 
@@ -70,6 +70,7 @@ def observation(
         ids=tuple(str(i) for i in range(len(centre))),
         centre=centre,
         row=np.array(row, dtype=int),
+        gaps=find_open_gaps(make_obstacles(centre, 0.01), np.array(row, dtype=int), np.array([1.0, 0.0]), 0.0),
         direction=np.array([1.0, 0.0]),
         goals=np.array(goals, dtype=float),
         candidates=candidates,

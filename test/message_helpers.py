@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,12 +29,13 @@ both_kinds = pytest.mark.parametrize('types', ['rclpy', 'rosbags'], indirect=Tru
 """Runs a test with the fixture `types` of conftest once for each library."""
 
 
-def pose(types: MessageTypes, position: Sequence[float]) -> Any:
+def pose(types: MessageTypes, position: Sequence[float], turned: Mapping[str, float] = {'w': 1.0}) -> Any:
+    """Return a pose; turned: its quaternion by axis."""
     point = dict(zip('xyz', position, strict=True))
     return types.make(
         'geometry_msgs/msg/Pose',
         position=types.make('geometry_msgs/msg/Point', **point),
-        orientation=types.make('geometry_msgs/msg/Quaternion', w=1.0),
+        orientation=types.make('geometry_msgs/msg/Quaternion', **{'w': 0.0} | dict(turned)),
     )
 
 
@@ -75,14 +76,15 @@ def obstacle_table(rows: Sequence[tuple[float, ...]], dtype: Any = None) -> np.n
 def marker(
     types: MessageTypes, position: Sequence[float] = (0, 0, 0), scale: Sequence[float] = (0.1, 0.1, 0.1), **changes: Any
 ) -> Any:
-    """Return a sphere that is added; changes: ns, id, type, action, lifetime [s], stamp_ns, frame_id."""
+    """Return a sphere that is added; changes: ns, id, type, action, lifetime [s], stamp_ns, frame_id, turned."""
     head = make_header(types, changes.pop('stamp_ns', SECOND), changes.pop('frame_id', 'world'))
     seconds, nanoseconds = divmod(round(changes.pop('lifetime', 0) * SECOND), SECOND)
+    turned = changes.pop('turned', {'w': 1.0})
     values = {'ns': 'a', 'id': 0, 'type': 2, 'action': 0} | changes
     return types.make(
         'visualization_msgs/msg/Marker',
         header=head,
-        pose=pose(types, position),
+        pose=pose(types, position, turned),
         scale=types.make('geometry_msgs/msg/Vector3', **dict(zip('xyz', scale, strict=True))),
         lifetime=types.make('builtin_interfaces/msg/Duration', sec=seconds, nanosec=nanoseconds),
         **values,

@@ -52,6 +52,9 @@ NOT_RUN = {
     'export ROS_SECURITY_KEYSTORE=$PWD/keystore ROS_SECURITY_ENABLE=true ROS_SECURITY_STRATEGY=Enforce': ROS,
     'ros2 run foc_ros foc_node --ros-args --enclave /foc': ROS,
     # measuring
+    '.venv/bin/python scripts/measure_candidates.py': f'{LONG}; test_measure_predictions.py measures a part',
+    '.venv/bin/python scripts/measure_flicker.py': f'{LONG}; test_measure_predictions.py measures a part',
+    '.venv/bin/python scripts/measure_clutter.py': f'{LONG}; test_measure_clutter.py measures a part',
     '.venv/bin/python scripts/make_accuracy_figures.py': f'{LONG}; test_accuracy_page.py checks the page',
     'foc_ros paper --output paper_output': 'takes half a minute; test_paper.py runs the studies on a coarser grid',
     # CONTRIBUTING

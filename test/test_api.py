@@ -241,7 +241,7 @@ def test_a_config_file_is_read_and_checked(tmp_path):
     ('part', 'text'),
     [
         (lambda: predictor_of_one_cup(), '<Predictor with 1 goals, 1 obstacles>'),
-        (lambda: predictor_of_one_cup().update(1.0, (0, 0)).obstacles, '<Obstacles: 1 circles (cup)>'),
+        (lambda: predictor_of_one_cup().update(1.0, (0, 0)).obstacles, '<Obstacles: 1 (cup)>'),
         (lambda: FAST, '<Config budget_s=0.0, foc.steps=20>'),
         (lambda: foc_ros.solve((0, 0), (0.3, 0), config=FAST), '<Solution solved, effort 1312, eta 1>'),
     ],

@@ -26,7 +26,7 @@ def started(*arguments: str, **options: object) -> subprocess.CompletedProcess[s
     [
         ([], 'foc_ros: the following arguments are required: command'),
         (['fly'], 'foc_ros: argument command: invalid choice'),
-        (['convert'], 'foc_ros convert: the following arguments are required: CSV, --obstacles, --output'),
+        (['convert'], 'foc_ros convert: the following arguments are required: CSV, --output'),
         (['replay', 'bag', '--fast'], 'foc_ros replay: unrecognized arguments: --fast'),
         (['replay', 'bag', '--params', 'a', '--params', 'b'], 'foc_ros replay: argument --params: given twice'),
         (['evaluate', 'x' * 300], 'foc_ros evaluate: [Errno 36] File name too long'),

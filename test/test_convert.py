@@ -10,6 +10,7 @@ import pytest
 from foc_ros.cli.main import main
 from foc_ros.core.errors import RecordingError
 from foc_ros.io.bags import BagReader
+from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud
 
 RECORDINGS = 'recording,t_s,x_m,y_m\na,0.0,0.1,0.2\na,0.5,0.3,0.4\na,1.2,0.5,0.6\nb,3.25,-1,2e-3\n'
 OBSTACLES = 'name,x_m,y_m,radius_m\nleft,0.5,-0.1,0.03\nright,0.425,0.08,0.025\n'
@@ -85,6 +86,45 @@ def test_optional_columns(tmp_path: Path) -> None:
     assert np.allclose(table(items['obstacles']).tolist(), expected)
 
 
+def test_boxes_and_circles_share_a_table(tmp_path: Path) -> None:
+    obstacles = 'x_m,y_m,radius_m,size_x_m,size_y_m,yaw_rad\n0.5,-0.1,0,0.2,0.1,0.3\n0.6,0.1,0.02,0,0,0\n'
+    assert convert(tmp_path, obstacles=obstacles) == 0
+    with BagReader(tmp_path / 'bags' / 'a') as reader:
+        message = next(item.message for item in reader if item.role == 'obstacles')
+    assert np.allclose(table(message).tolist(), [(0.5, -0.1, 0, 0, 0, 0, 0.2, 0.1, 0.3), (0.6, 0.1, 0, 0.02, 0, 1, 0, 0, 0)])
+    assert decode_point_cloud(message, 'xy').obstacles.corners.tolist() == [4, 1]
+
+
+def test_boxes_need_no_radius(tmp_path: Path) -> None:
+    assert convert(tmp_path, obstacles='x_m,y_m,size_x_m,size_y_m\n0.5,-0.1,0.2,0.1\n') == 0
+
+
+def test_each_recording_has_its_own_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    obstacles = 'recording,x_m,y_m,radius_m\na,0.5,-0.1,0.03\nb,0.1,0,0.01\na,0.6,0,0.02\n'
+    assert convert(tmp_path, obstacles=obstacles, goals='recording,x_m,y_m\nb,1,0\na,2,0\na,3,0\n') == 0
+    assert '2 bags with 4 hand poses and 1 to 2 obstacles written' in capsys.readouterr().out
+    for name, radii, goals in (('a', [0.03, 0.02], [2, 3]), ('b', [0.01], [1])):
+        with BagReader(tmp_path / 'bags' / name) as reader:
+            items = {item.role: item.message for item in reader}
+        rows = table(items['obstacles'])
+        assert np.allclose(rows['radius'], radii) and rows['id'].tolist() == [*range(len(radii))]
+        assert [pose.position.x for pose in items['goals'].poses] == goals
+
+
+def test_a_folder_of_tables_is_converted(tmp_path: Path) -> None:
+    for name, text in (('recordings', RECORDINGS), ('obstacles', OBSTACLES), ('goals', GOALS)):
+        (tmp_path / f'{name}.csv').write_text(text, 'utf-8')
+    assert main(['convert', str(tmp_path), '--output', str(tmp_path / 'bags')]) == 0
+    with BagReader(tmp_path / 'bags' / 'a') as reader:
+        assert {item.role for item in reader} == {'hand_pose', 'obstacles', 'goals'}
+
+
+def test_a_table_needs_obstacles_beside_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / 'r.csv').write_text(RECORDINGS, 'utf-8')
+    assert main(['convert', str(tmp_path / 'r.csv'), '--output', str(tmp_path / 'bags')]) == 2
+    assert '--obstacles: expected a table of obstacles, which may be without rows, got nothing' in capsys.readouterr().err
+
+
 def test_without_goals_the_bag_has_none(tmp_path: Path) -> None:
     assert convert(tmp_path, goals=None) == 0
     with pytest.raises(RecordingError, match='no topic for goals'), BagReader(tmp_path / 'bags' / 'a'):
@@ -136,6 +176,12 @@ def test_an_existing_bag_stops_before_anything_is_written(tmp_path: Path, capsys
         ('rows', 'a b,0,0,0\na_b,0,0,0', "recordings 'a b' and 'a_b' would both be written to a_b"),
         ('rows', '"a,0,0,0', 'r.csv: not a CSV table'),
         ('obstacles', 'x_m,y_m\n0,0\n', 'o.csv: row 1: no column radius_m'),
+        ('obstacles', 'x_m,y_m,size_x_m\n0,0,1\n', 'o.csv: row 1: no column radius_m; it has x_m, y_m, size_x_m'),
+        ('obstacles', 'x_m,y_m,size_x_m,size_y_m\n0,0,1,-1\n', "size_y_m: expected a number in [0, 10000], got '-1'"),
+        ('obstacles', 'x_m,y_m,size_x_m,size_y_m\n0,0,0,0\n', "row 2, column size_x_m: expected a size or a radius > 0, got '0'"),
+        ('obstacles', 'x_m,y_m,size_x_m,size_y_m,yaw_rad\n0,0,1,1,nan\n', "yaw_rad: expected a number in [-10000, 10000]"),
+        ('obstacles', 'recording,x_m,y_m,radius_m\n,0,0,1\n', "row 2, column recording: expected a name, got ''"),
+        ('goals', 'recording,x_m,y_m\nb,0,0\n', "recording 'a': the table of goals has no row for it"),
         ('obstacles', 'x_m,y_m,radius_m\n0,0,-0.1\n', "radius_m: expected a number in [0, 10000], got '-0.1'"),
         ('obstacles', 'x_m,y_m,radius_m,radius_stddev_m\n0,0,1,-1\n', "stddev_m: expected a number in [0, 10000], got '-1'"),
         ('obstacles', 'x_m,y_m,radius_m,id\n0,0,1,1.5\n', "expected a whole number in [-2147483648, 2147483647], got '1.5'"),

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import math
 import re
+from itertools import product
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from message_helpers import SECOND, both_kinds, marker, marker_array, message_types
+from scipy.spatial.transform import Rotation
 
 from foc_ros.core.errors import MessageError
+from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.obstacles.shapes import make_box_polygon
 from foc_ros.ros.messages import decode_markers
 from foc_ros.ros.messages.decode_markers import MarkerTable
+from foc_ros.ros.messages.plane import project
 from foc_ros.ros.messages.types import MessageTypes
 
 BAGS = message_types('rosbags')
@@ -42,6 +47,42 @@ def test_spheres_and_cylinders_become_circles(types: MessageTypes) -> None:
     np.testing.assert_array_equal(obstacles.radius, [0.2, 0.1])
     np.testing.assert_array_equal(obstacles.radius_stddev, [0.01, 0.01])
     assert not obstacles.velocity.any()
+
+
+def turn(axis: str, angle: float) -> dict[str, float]:
+    return {axis: math.sin(angle / 2), 'w': math.cos(angle / 2)}
+
+
+@both_kinds
+def test_a_cube_is_the_hull_of_its_projected_corners(types: MessageTypes) -> None:
+    flat = marker(types, (1, 2, 3), (0.4, 0.2, 0.1), id=1, type=1)
+    turned = marker(types, (4, 5, 6), (0.4, 0.2, 0.1), id=2, type=1, turned=turn('z', 0.5))
+    tilted = marker(types, (7, 8, 9), (0.4, 0.2, 0.1), id=3, type=1, turned=turn('y', 0.5))
+    unset = marker(types, (0, 0, 0), (0.4, 0.2, 0.1), id=4, type=1, turned={})
+    obstacles = after(marker_array(types, flat, turned, tilted, unset, marker(types, id=5))).obstacles(SECOND)
+    np.testing.assert_allclose(obstacles.centre, [[1, 2], [4, 5], [7, 8], [0, 0], [0, 0]], atol=1e-12)
+    assert obstacles.corners.tolist() == [4, 4, 4, 4, 1] and obstacles.radius.tolist() == [0, 0, 0, 0, 0.05]
+    size = 0.4 * math.cos(0.5) + 0.1 * math.sin(0.5), 0.2
+    for row, box in enumerate([((0.4, 0.2), 0.0), ((0.4, 0.2), 0.5), (size, 0.0), ((0.4, 0.2), 0.0)]):
+        distance = measure_offsets(obstacles.centre[row] + make_box_polygon(*box), obstacles)[1][:, row]
+        np.testing.assert_allclose(distance, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
+def test_a_tilted_cube_covers_its_projected_points_and_no_more(plane: str) -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        quaternion, size, centre = rng.normal(size=4), rng.uniform(0.05, 0.4, 3), rng.normal(size=3)
+        cube = marker(BAGS, centre, size, type=1, turned=dict(zip('xyzw', quaternion, strict=True)))
+        table = MarkerTable().with_message(marker_array(BAGS, cube), SECOND, plane, 0.0).obstacles(SECOND)
+        assert 4 <= table.corners[0] <= 6
+        rotation = Rotation.from_quat(quaternion).as_matrix()
+        inside = project(centre + rng.uniform(-0.5, 0.5, (500, 3)) * size @ rotation.T, plane)[0]
+        assert measure_offsets(inside, table)[1].max() < 1e-12
+        signs = np.array([*product((-0.5, 0.5), repeat=3)])
+        corners = project(centre + signs * size @ rotation.T, plane)[0]
+        polygon = table.centre[0] + table.vertices[0, : table.corners[0]]
+        assert np.abs(polygon[:, None] - corners).max(axis=2).min(axis=1).max() < 1e-12
 
 
 def test_no_markers_are_an_empty_scene() -> None:
@@ -99,10 +140,16 @@ def test_a_marker_that_is_not_finite_does_not_replace_the_old_one(types: Message
     assert scene.dropped == {'not_finite': 1}
 
 
+def test_a_cube_whose_orientation_is_not_finite_is_dropped_and_a_sphere_needs_none() -> None:
+    bad = [marker(BAGS, id=kind, type=kind, turned={'w': math.nan}) for kind in (1, 2)]
+    scene = after(marker_array(BAGS, *bad))
+    assert ids(scene) == ('a/2',) and scene.dropped == {'not_finite': 1}
+
+
 def test_another_type_replaces_an_obstacle_and_is_counted() -> None:
-    scene = after(marker_array(BAGS, marker(BAGS, id=1), marker(BAGS, id=2)), marker_array(BAGS, marker(BAGS, id=1, type=1)))
+    scene = after(marker_array(BAGS, marker(BAGS, id=1), marker(BAGS, id=2)), marker_array(BAGS, marker(BAGS, id=1, type=0)))
     assert ids(scene) == ('a/2',)
-    assert scene.dropped == {'not_a_circle': 1}
+    assert scene.dropped == {'not_a_shape': 1}
 
 
 @both_kinds
@@ -113,6 +160,8 @@ def test_another_type_replaces_an_obstacle_and_is_counted() -> None:
         ({'scale': (0.1, -0.1, 0.1)}, 'markers[1].scale.y: expected a size in [0, 10000] m, got -0.1'),
         ({'scale': (2e4, 0.1, 0.1)}, 'markers[1].scale.x: expected a size in [0, 10000] m, got 20000'),
         ({'position': (0, 0, 2e4)}, 'markers[1].pose.position.z: expected a coordinate within 10000 m of the origin, got 20000'),
+        ({'type': 1, 'scale': (0.1, -0.1, 0.1)}, 'markers[1].scale.y: expected a size in [0, 10000] m, got -0.1'),
+        ({'type': 1, 'scale': (0, 0, 1)}, 'markers[1].scale: expected a size > 0 m along an axis of the plane, got 0 x 0 x 1'),
         ({'lifetime': -1}, 'markers[1].lifetime: expected at least 0 s (0: no end), got -1 s'),
         ({'stamp_ns': -SECOND}, 'markers[1].header.stamp.sec: expected at least 0, got -1'),
         ({'frame_id': 'base'}, "markers[1].header.frame_id: expected 'world', as the other markers, got 'base'"),

@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 from message_helpers import SECOND, both_kinds, cloud, message_types, obstacle_table
 
 from foc_ros.core.errors import MessageError
+from foc_ros.core.obstacles.shapes import Box, make_box_polygon
 from foc_ros.ros.messages.decode_point_cloud import MAX_ROWS, decode_point_cloud
+from foc_ros.ros.messages.encode_inputs import encode_obstacles
 from foc_ros.ros.messages.types import MessageTypes
 
 BAGS = message_types('rosbags')
@@ -139,6 +141,64 @@ def test_a_scene_with_a_number_out_of_bounds_is_refused(column: str, value: floa
         decode_point_cloud(cloud(BAGS, table), 'xy')
 
 
+BOX = [(name, '<f4') for name in ('x', 'y', 'z', 'radius', 'size_x', 'size_y', 'yaw')]
+
+
+@both_kinds
+def test_rows_with_a_size_are_boxes_capsules_and_circles(types: MessageTypes) -> None:
+    rows = [(1, 2, 0, 0, 0.5, 0.25, 0), (3, 4, 0, 0.125, 0.5, 0, 0), (5, 6, 0, 0.125, 0, 0.5, 0), (7, 8, 0, 0.125, 0, 0, 1)]
+    obstacles = decode_point_cloud(cloud(types, obstacle_table(rows, BOX)), 'xy').obstacles
+    assert obstacles.corners.tolist() == [4, 2, 2, 1]
+    np.testing.assert_array_equal(obstacles.centre, [[1, 2], [3, 4], [5, 6], [7, 8]])
+    np.testing.assert_array_equal(obstacles.vertices[0], [[0.25, 0.125], [-0.25, 0.125], [-0.25, -0.125], [0.25, -0.125]])
+    np.testing.assert_array_equal(obstacles.vertices[1, :2], [[0.25, 0], [-0.25, 0]])
+    np.testing.assert_allclose(obstacles.vertices[2, :2], [[0, 0.25], [0, -0.25]], atol=1e-17)
+    np.testing.assert_array_equal(obstacles.radius, [0, 0.125, 0.125, 0.125])
+
+
+@given(st.lists(st.tuples(st.floats(0, 10), st.floats(0, 10), st.floats(-7, 7)), min_size=1, max_size=6))
+def test_boxes_of_a_cloud_are_those_of_the_public_interface(rows: list[tuple[float, float, float]]) -> None:
+    table = obstacle_table([(0, 0, 0, 1, *row) for row in rows], [(name, '<f8') for name, _ in BOX])
+    obstacles = decode_point_cloud(cloud(BAGS, table), 'xy').obstacles
+    for row, (size_x, size_y, yaw) in enumerate(rows):
+        polygon = Box((0, 0), (size_x, size_y), yaw, radius=1.0).polygon
+        assert obstacles.corners[row] == len(polygon)
+        np.testing.assert_array_equal(obstacles.vertices[row, : len(polygon)], polygon)
+
+
+@pytest.mark.parametrize(
+    ('row', 'words'),
+    [
+        ((0, 0, 0, 0, -0.5, 1, 0), 'size_x[1]: expected a number in [0, 10000] m, got -0.5'),
+        ((0, 0, 0, 0, 1, 2e4, 0), 'size_y[1]: expected a number in [0, 10000] m, got 20000'),
+        ((0, 0, 0, 0, 1, 1, -2e4), 'yaw[1]: expected a number in [-10000, 10000] rad, got -20000'),
+        ((0, 0, 0, 0, 0, 0, 1), 'radius[1]: expected a number > 0 m where size_x and size_y are 0, got 0'),
+    ],
+)
+def test_a_box_out_of_bounds_is_refused(row: tuple[float, ...], words: str) -> None:
+    with pytest.raises(MessageError, match=re.escape(words)):
+        decode_point_cloud(cloud(BAGS, obstacle_table([(0, 0, 0, 1, 0, 0, 0), row], BOX)), 'xy')
+
+
+@pytest.mark.parametrize('column', ['size_x', 'size_y', 'yaw'])
+def test_a_box_that_is_not_finite_is_dropped_and_counted(column: str) -> None:
+    table = obstacle_table([(0, 0, 0, 1, 1, 1, 0)] * 2, BOX)
+    table[column][0] = math.nan
+    scene = decode_point_cloud(cloud(BAGS, table), 'xy')
+    assert (scene.obstacles.ids, scene.dropped) == (('1',), {'not_finite': 1})
+
+
+@pytest.mark.parametrize('size', [(), (0.0, 0.0, 0.0), (0.25, 0.5, 0.75)])
+def test_encoded_obstacles_are_decoded(size: tuple[float, ...]) -> None:
+    message = encode_obstacles(BAGS, SECOND, 'world', [(1.0, 2.0, 3.0, 0.5, 0.125, 7, *size), (4.0, 5.0, 6.0, 1.0, 0.0, 8)])
+    assert ('size_x' in [field.name for field in message.fields]) == any(size)
+    obstacles = decode_point_cloud(message, 'xy').obstacles
+    assert obstacles.ids == ('7', '8') and obstacles.corners.tolist() == [4 if any(size) else 1, 1]
+    np.testing.assert_array_equal(obstacles.centre, [[1, 2], [4, 5]])
+    polygon = make_box_polygon(size[:2] or (0, 0), size[2] if size else 0)
+    np.testing.assert_allclose(obstacles.vertices[0, : len(polygon)], polygon)
+
+
 @pytest.mark.parametrize('missing', ['x', 'y', 'z', 'radius'])
 def test_a_missing_field_is_named(missing: str) -> None:
     names = [name for name in ('x', 'y', 'z', 'radius') if name != missing]
@@ -219,7 +279,7 @@ def test_every_table_in_bounds_is_decoded_as_it_was_encoded(table: list[tuple[fl
 
 fields = st.lists(
     st.tuples(
-        st.sampled_from(['x', 'y', 'z', 'radius', 'radius_stddev', 'id', 'vx', 'rgb']),
+        st.sampled_from(['x', 'y', 'z', 'radius', 'radius_stddev', 'id', 'vx', 'size_x', 'yaw', 'rgb']),
         st.integers(0, 24),
         st.integers(0, 9),
         st.integers(0, 2),

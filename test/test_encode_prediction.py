@@ -13,9 +13,11 @@ from message_helpers import STORE, both_kinds, message_types
 from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction, three_ways
 
 from foc_ros.core.errors import FocError
+from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
 from foc_ros.core.types import PredictedCandidate, Prediction, Status, make_obstacles
 from foc_ros.ros.messages.encode_prediction import OUTPUTS, encode_outputs
-from foc_ros.ros.messages.plane import lift
+from foc_ros.ros.messages.plane import lift, project
 from foc_ros.ros.messages.ranking import MAX_RATIO
 from foc_ros.ros.messages.types import MessageTypes
 
@@ -212,6 +214,23 @@ def test_a_candidate_without_a_path_shows_its_guess() -> None:
     markers = made('markers', prediction(lost)).markers
     line = next(each for each in markers if each.ns == 'path')
     np.testing.assert_allclose([(p.x, p.y) for p in line.points], lost.candidate.guess)
+
+
+@both_kinds
+@pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
+def test_a_box_is_drawn_as_triangles_that_cover_it(types: MessageTypes, plane: str) -> None:
+    shapes = collect_obstacles([Box((0.1, 0.0), (0.1, 0.04), 0.5, radius_stddev=0.01), Circle((0.2, 0.1), 0.02)])
+    markers = encode_outputs(three_ways(), shapes, plane, types, ['markers'])['markers'].markers
+    for name, radius in (('obstacle', 0.0), ('obstacle_deviation', 0.01)):
+        box, disc = (each for each in markers if each.ns == name)
+        assert (box.type, disc.type, box.id, disc.id) == (11, 3, 0, 1)
+        assert (box.scale.x, box.scale.y, box.scale.z, box.pose.orientation.w) == (1.0, 1.0, 1.0, 1.0)
+        places, heights = project([(each.x, each.y, each.z) for each in box.points], plane)
+        assert len(places) % 3 == 0 and set(heights) == {three_ways().height}
+        np.testing.assert_allclose(measure_offsets(places, shapes)[1][:, 0].max(), radius, atol=1e-12)
+        first, second = places[1::3] - places[::3], places[2::3] - places[::3]
+        area = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]).sum() / 2.0
+        assert area == pytest.approx(0.1 * 0.04 + 2 * 0.14 * radius + np.pi * radius**2, rel=1e-2)
 
 
 def test_the_nearest_of_many_obstacles_are_drawn() -> None:

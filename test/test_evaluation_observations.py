@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from evaluation_samples import reach, write_tables
 
-from foc_ros.analysis.csv_recordings import EPOCH_NS, read_goals, read_movements, read_obstacles, write_movement
+from foc_ros.analysis.csv_recordings import EPOCH_NS, read_movements, read_scenes, write_movement
 from foc_ros.analysis.evaluation.forecasts import power_rule_shares
 from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
@@ -58,12 +58,8 @@ def test_other_parameters_on_observations_give_the_likelihoods_of_a_replay_with_
 
 def test_a_bag_is_observed_as_replay_predicts_it(data: Path, tmp_path: Path) -> None:
     bag = tmp_path / 'one'
-    write_movement(
-        bag,
-        read_movements(data / 'recordings.csv')[0],
-        read_obstacles(data / 'obstacles.csv'),
-        read_goals(data / 'goals.csv'),
-    )
+    scenes = read_scenes(data / 'obstacles.csv', data / 'goals.csv')
+    write_movement(bag, read_movements(data / 'recordings.csv')[0], scenes.find('one'))
     recording = observe(BagRecording('one', bag), PLAIN)
     with BagReader(bag) as reader:
         predictions = [step.prediction for step in Replay(PLAIN).steps(reader) if step.prediction is not None]

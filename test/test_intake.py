@@ -149,10 +149,10 @@ def test_a_message_that_cannot_be_decoded_changes_nothing_and_is_counted(
 def test_dropped_rows_are_counted(intake: Intake) -> None:
     rows = obstacle_table([(0.1, 0.2, 0.0, 0.03), (float('nan'), 0, 0, 0.1)])
     assert intake.take('obstacles', cloud(TYPES, rows)) is SampleStatus.ACCEPTED
-    show(intake, marker(TYPES, type=1), marker(TYPES, (float('inf'), 0, 0), id=3))
+    show(intake, marker(TYPES, type=0), marker(TYPES, (float('inf'), 0, 0), id=3))
     assert intake.counts == {
         'obstacles_dropped_not_finite': 1,
-        'obstacle_markers_dropped_not_a_circle': 1,
+        'obstacle_markers_dropped_not_a_shape': 1,
         'obstacle_markers_dropped_not_finite': 1,
     }
 

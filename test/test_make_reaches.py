@@ -25,7 +25,7 @@ def test_every_reach_begins_at_rest_and_ends_near_its_goal(kind: str, noise_m: f
     assert len(recordings) == script.COUNT
     for number, recording in enumerate(recordings.values()):
         path = np.array([[row.read_number('x_m'), row.read_number('y_m')] for row in recording.rows])
-        assert find_reached_goal(path, recording.goals[:, :2])[0] == number % len(recording.goals)
+        assert find_reached_goal(path, recording.scene.goals[:, :2])[0] == number % len(recording.scene.goals)
         assert np.ptp(path[:4], axis=0).max() < 10.0 * noise_m
-        distance = np.hypot(*(path[-20:].mean(axis=0) - recording.goals[number % len(recording.goals), :2]))
+        distance = np.hypot(*(path[-20:].mean(axis=0) - recording.scene.goals[number % len(recording.scene.goals), :2]))
         assert noise_m / 10.0 < distance < largest_m

@@ -16,6 +16,7 @@ import yaml
 
 import foc_ros
 from foc_ros.cli.main import COMMANDS
+from foc_ros.io.topics import OPTIONAL, TYPES
 
 ROOT = Path(__file__).parents[1]
 SKIPPED = shutil.ignore_patterns('.*', '__pycache__', 'build', 'dist', 'install', 'log', '*_output', '*.egg-info')
@@ -66,7 +67,8 @@ def test_package_xml_names_every_message_package(package_xml: ET.Element) -> Non
     for file in (ROOT / 'foc_ros').rglob('*.py'):
         used |= set(re.findall(r"""(?:from |import |['"])(\w+_msgs|std_srvs|rcl_interfaces)[./]""", file.read_text('utf-8')))
     assert {'sensor_msgs', 'geometry_msgs', 'std_srvs'} <= used
-    assert used - {'builtin_interfaces'} <= keys
+    optional = {TYPES[role].partition('/')[0] for role in OPTIONAL}
+    assert used - {'builtin_interfaces'} - optional <= keys
 
 
 def test_own_rosdep_rules_are_used(package_xml: ET.Element) -> None:

@@ -16,10 +16,13 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 from matplotlib import pyplot as plt
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Ellipse
+from matplotlib.patches import Circle, Ellipse, Polygon
 from report_samples import START_NS, prediction, predictions, samples, scene
 
 from foc_ros.core.errors import InputError
+from foc_ros.core.obstacles import shapes
+from foc_ros.core.obstacles.outline import trace_obstacle
+from foc_ros.core.obstacles.rounded_polygon import measure_offsets
 from foc_ros.core.types import Status, make_obstacles
 from foc_ros.reporting.drawing import (
     CLASS_COLOURS,
@@ -44,6 +47,7 @@ from foc_ros.reporting.track_association import build_candidate_tracks
 from foc_ros.ros.messages.ranking import find_drawn_curve
 
 ROOT = Path(__file__).resolve().parents[1]
+WALL = shapes.Box((0.1, 0.0), (0.6, 0.02), 0.3, radius_stddev=0.01)
 PNG = b'\x89PNG\r\n\x1a\n'
 
 
@@ -96,6 +100,17 @@ def test_scene_holds_every_obstacle_goal_and_candidate() -> None:
     for goal in goals:
         assert any(np.array_equal(line, [goal]) for line in drawn)
     assert sum(type(patch) is Ellipse for patch in axes.patches) == ELLIPSES_PER_CANDIDATE * len(candidates)
+
+
+def test_boxes_are_drawn_with_their_outlines_and_fit_into_the_picture() -> None:
+    obstacles, goals = shapes.collect_obstacles([WALL, shapes.Circle((0.2, 0.1), 0.02)]), scene()[1]
+    axes = make_scene_figure(obstacles, goals, ()).axes[0]
+    ring, box = (patch.get_xy() for patch in axes.patches if isinstance(patch, Polygon))
+    np.testing.assert_allclose(box, trace_obstacle(obstacles, 0))
+    np.testing.assert_allclose(measure_offsets(ring, obstacles)[1][:, 0], 0.01)
+    assert sum(isinstance(patch, Circle) for patch in axes.patches) == 2
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    assert left < ring[:, 0].min() and ring[:, 0].max() < right and bottom < ring[:, 1].min() and ring[:, 1].max() < top
 
 
 def legend_of(axes: Any) -> str:

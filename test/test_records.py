@@ -1,5 +1,6 @@
 """Records have read-only arrays: copies, unless the array is read-only already."""
 
+import pickle
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -44,6 +45,11 @@ def test_a_read_only_array_is_not_copied() -> None:
 def test_a_view_across_rows_becomes_contiguous() -> None:
     kept = Kept(as_readonly(np.arange(6.0).reshape(3, 2))[:, 0])
     assert kept.array.flags.c_contiguous and kept.array.tolist() == [0.0, 2.0, 4.0]
+
+
+def test_a_record_from_another_process_is_read_only() -> None:
+    kept = pickle.loads(pickle.dumps(make_obstacles([[0.15, 0.0]], 0.02)))
+    assert not any(value.flags.writeable for value in vars(kept).values() if isinstance(value, np.ndarray))
 
 
 def test_a_solution_with_another_covariance_is_otherwise_the_same(prediction: Prediction) -> None:

@@ -17,6 +17,7 @@ pytest.importorskip('plotly', reason='plotly is not installed')
 from report_samples import OBSTACLES, START_NS, prediction, predictions, samples
 
 from foc_ros.core.errors import InputError
+from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
 from foc_ros.core.types import HandSample, Prediction, Status
 from foc_ros.reporting.page import load_plotly
 from foc_ros.reporting.report import write_report
@@ -138,6 +139,18 @@ def test_a_long_recording_is_thinned_out(tmp_path: Path) -> None:
     assert len(data['scenes']) == len(data['goals']) == 1
     size = (tmp_path / 'index.html').stat().st_size
     assert size - len(load_plotly()) < 700 * len(data['frames']) * 3
+
+
+def test_the_vertices_of_a_box_are_behind_the_numbers_of_a_circle(tmp_path: Path) -> None:
+    made = samples()
+    boxes = collect_obstacles(
+        [Circle((0.15, 0.0), 0.03, 0.003, name='1'), Box((0.22, 0.1), (0.1, 0.02), radius_stddev=0.001, name='post')]
+    )
+    snapshots = [build_snapshot(replace(each, obstacles=boxes)) for each in predictions(made)]
+    write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {})
+    (scene,) = page_data_of(tmp_path)['scenes']
+    corners = [500, 100, -500, 100, -500, -100, 500, -100]
+    assert scene == [['1', 1500, 0, 300, 30], ['post', 2200, 1000, 0, 10, *corners]]
 
 
 def page_data_of(directory: Path) -> dict[str, Any]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
@@ -15,10 +17,14 @@ pytest.importorskip('plotly', reason='plotly is not installed')
 from browser_helpers import check_report, chromium, screenshot, show
 from report_samples import predictions, samples
 
+from foc_ros.core.obstacles.outline import find_limits
+from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, collect_obstacles
 from foc_ros.reporting.report import write_report
 from foc_ros.reporting.report_data import MOST_FRAMES
 from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
 
+WALL = Box((0.2, 0.1), (0.4, 0.02), 0.3, radius=0.01, radius_stddev=0.005)
 HOSTILE = '</script><img src=x onerror=alert(1)><b>&amp;'
 
 
@@ -43,6 +49,26 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_page_shows_the_numbers(browser: Any, report: Path) -> None:
     check_report(browser, report)
+
+
+def test_the_page_draws_outlines_of_boxes_and_circles(browser: Any, tmp_path: Path) -> None:
+    made = samples()
+    shapes = collect_obstacles([Circle((0.15, 0.0), 0.03, 0.003), WALL, Capsule((0.0, 0.1), (0.1, 0.2), radius=0.02)])
+    snapshots = [build_snapshot(replace(each, obstacles=shapes)) for each in predictions(made)]
+    write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {})
+    assert show(browser, tmp_path / 'index.html') == []
+    for trace, growth in ((0, 1.0), (1, 0.0)):
+        drawn = browser.execute_script(f'return [0, 1].map((axis) => document.getElementById("scene").data[{trace}]["xy"[axis]])')
+        points = np.array(drawn, dtype=float).T
+        outlines = np.split(points, np.flatnonzero(np.isnan(points[:, 0])))[:-1]
+        assert len(outlines) == len(shapes)
+        for row, outline in enumerate(outlines):
+            outline = outline[~np.isnan(outline[:, 0])]
+            np.testing.assert_array_equal(outline[0], outline[-1])
+            radius = shapes.radius[row] + growth * shapes.radius_stddev[row]
+            np.testing.assert_allclose(measure_offsets(outline, shapes)[1][:, row], radius, atol=1.5e-4)
+            low, high = find_limits(shapes, growth * shapes.radius_stddev)
+            np.testing.assert_allclose([outline.min(axis=0), outline.max(axis=0)], [low[row], high[row]], atol=5e-4)
 
 
 def test_hostile_text_is_escaped(browser: Any, report: Path) -> None:

@@ -15,6 +15,7 @@ import pytest
 from foc_ros.core.checks import check_number, check_vector
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, ParameterError, RecordingError, SceneError
+from foc_ros.core.obstacles.shapes import Box, Circle, Hull, collect_obstacles
 from foc_ros.io.documents import _check_keys as check_keys
 from foc_ros.io.scene_file import guess_path, load_scene, parse_scene
 
@@ -61,6 +62,37 @@ def test_a_missing_field_has_the_default_of_its_parameter() -> None:
     assert scene.goals.tolist() == [[0.3, 0.0], [0.3, 0.1]]
 
 
+def test_boxes_capsules_and_hulls_are_read() -> None:
+    corners = [[0.1, 1.0], [0.3, 1.0], [0.2, 1.2]]
+    given = [
+        {'x': 1, 'y': 2, 'size': [0.4, 0.2], 'yaw': 0.5, 'id': 'tray'},
+        {'x': 3, 'y': 4, 'size': [0, 0.2], 'radius': 0.01, 'radius_stddev': 0.002},
+        {'points': [*corners, [0.2, 1.1]], 'radius': 0.01},
+        {'x': 5, 'y': 6, 'radius': 0.02},
+    ]
+    obstacles = parse_scene({**SCENE, 'obstacles': given}).obstacles
+    expected = collect_obstacles(
+        [
+            Box((1, 2), (0.4, 0.2), 0.5, name='tray'),
+            Box((3, 4), (0, 0.2), radius=0.01, radius_stddev=0.002),
+            Hull(corners, radius=0.01),
+            Circle((5, 6), radius=0.02),
+        ]
+    )
+    for name, values in vars(expected).items():
+        np.testing.assert_array_equal(getattr(obstacles, name), values, err_msg=name)
+
+
+def test_the_hand_has_a_radius() -> None:
+    scene = {**without('tau', 'lambda'), 'strategy': 'optimal', 'hand_radius': 0.01}
+    assert parse_scene(scene).config.scene.hand_radius == 0.01
+    assert parse_scene(scene).obstacles.radius.tolist() == [0.03, 0.02]
+    with pytest.raises(
+        SceneError, match=r'^start: expected a point outside obstacle cup, of radius 0\.04 m, got .*, 0\.035 m from'
+    ):
+        parse_scene({**scene, 'start': [0.1, 0.035]})
+
+
 @pytest.mark.parametrize('name', ['scene.yaml', 'scene.yml', 'scene.json', 'scene'])
 def test_yaml_and_json_give_the_same_scene(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text(json.dumps(SCENE, indent='\t' if name.endswith('json') else None), 'utf-8')
@@ -74,6 +106,9 @@ def test_yaml_texts_of_numbers_are_numbers(tmp_path: Path) -> None:
     )
     scene = load_scene(tmp_path / 's.yaml')
     assert scene.goals[0, 0] == 0.3 and scene.config.foc.lam == 2e6 and scene.obstacles.radius.tolist() == [0.01]
+
+
+ROUND = [[2 + np.cos(turn), 2 + np.sin(turn)] for turn in np.linspace(0, 2 * np.pi, 18)[:17]]
 
 
 def without(*names: str) -> dict[str, Any]:
@@ -118,6 +153,18 @@ def obstacle(count: int = 1, **fields: Any) -> dict[str, Any]:
         ({**SCENE, 'obstacles': {'x': 1}}, "obstacles: expected a list, got {'x': 1}"),
         ({**SCENE, 'obstacles': [{'x': 1, 'y': 1}]}, r'obstacles\[0\].radius: expected a number, got nothing'),
         (obstacle(radius=-1), r'obstacles\[0\].radius: expected a number in \[0, 10000\], got -1'),
+        (obstacle(size=[0.1, -1]), r'obstacles\[0\].size: expected a number in \[0, 10000\], got -1'),
+        (obstacle(size=0.1), r'obstacles\[0\].size: expected a list of 2 numbers, got 0.1'),
+        (obstacle(size=[0, 0], radius=0), r'obstacles\[0\].radius: expected a number > 0 m for a box without any size, got 0'),
+        (obstacle(size=[1, 1], yaw=float('nan')), r'obstacles\[0\].yaw: expected a number in \[-10000, 10000\], got nan'),
+        (obstacle(yaw=1), r'obstacles\[0\].yaw: expected to be given with a size, and without points, got 1'),
+        (obstacle(points=[[0, 0]]), r'obstacles\[0\].x: expected to be given with a size, and without points, got 1'),
+        ({**SCENE, 'obstacles': [{'points': []}]}, r'obstacles\[0\].points: expected finite numbers of shape \(n, 2\), got \[\]'),
+        ({**SCENE, 'obstacles': [{'points': [[1, 1], [2]]}]}, r'obstacles\[0\].points\[1\]: expected a list of 2 numbers'),
+        ({**SCENE, 'obstacles': [{'points': ROUND}]}, r'obstacles\[0\].points: expected a hull of at most 16 corners, got 17'),
+        ({**SCENE, 'obstacles': [{'size': [1, 1], 'y': 1}]}, r'obstacles\[0\].x: expected a number, got nothing'),
+        ({**SCENE, 'obstacles': [{'x': 0, 'y': 0.1, 'size': [1, 0.1]}]}, 'start: expected a point outside obstacle 0'),
+        ({**SCENE, 'hand_radius': -1}, r'hand_radius: expected a number in \[0, 1\] m, got -1'),
         (obstacle(r=1), r"obstacles\[0\]: expected only the fields x, .*, got 'r'"),
         (obstacle(2, id=3), r'obstacles\[1\].id: expected another id .*, got 3'),
         (obstacle(id='a;b'), r"obstacles\[0\].id: expected .*, got 'a;b'"),

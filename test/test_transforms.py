@@ -16,6 +16,9 @@ from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table,
 from node_helpers import GOALS, ROWS, TYPES, Bench, figures, hand_path  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
+from foc_ros.core.obstacles.rounded_polygon import measure_offsets  # noqa: E402
+from foc_ros.core.obstacles.shapes import make_box_polygon  # noqa: E402
+
 QUARTER = {'x': 0.0, 'y': 0.0, 'z': np.sqrt(0.5), 'w': np.sqrt(0.5)}
 
 
@@ -75,6 +78,40 @@ def test_every_input_is_transformed_into_the_working_frame(ros: Graph) -> None:
     assert bench.node.intake.sample.height == 0.25
     assert ('world', 'camera', stamp_ns) in bench.node._transforms._buffer.asked
     assert {message.header.frame_id for message in bench.wait_for('prediction', 2)} == {'world'}
+
+
+BOX = [(name, '<f8') for name in ('x', 'y', 'z', 'radius', 'size_x', 'size_y', 'yaw')]
+
+
+@pytest.mark.usefixtures('tf2')
+def test_boxes_are_turned(ros: Graph) -> None:
+    bench = Bench(ros)
+    bench.publish_scene()
+    bench.move(hand_path(1))
+    bench.deliver('obstacles', cloud(TYPES, obstacle_table([(0.2, 0.3, 0.4, 0.0, 0.2, 0.1, 0.3)], BOX), 10 * SECOND, 'camera'))
+    turned = {'z': np.sin(0.15), 'w': np.cos(0.15)}
+    cube = marker(TYPES, (0.1, 0.0, 0.0), (0.2, 0.1, 0.05), type=1, frame_id='camera', turned=turned)
+    bench.deliver('obstacle_markers', marker_array(TYPES, cube))
+    obstacles = bench.node.pipeline.scene.obstacles(10 * SECOND)
+    np.testing.assert_allclose(obstacles.centre, [[0.7, 0.2], [1.0, 0.1]], atol=1e-12)
+    expected = make_box_polygon((0.2, 0.1), 0.3 + np.pi / 2)
+    for row in range(2):
+        np.testing.assert_allclose(measure_offsets(obstacles.centre[row] + expected, obstacles)[1][:, row], 0.0, atol=1e-12)
+
+
+@pytest.mark.usefixtures('tf2')
+@pytest.mark.parametrize(
+    ('columns', 'plane', 'words'),
+    [
+        (BOX[:-1], 'xy', 'fields: expected a field yaw, because the transform turns the boxes'),
+        (BOX, 'xz', 'fields[size_x]: expected boxes that the transform leaves in the task plane, got a tilt of 1'),
+    ],
+)
+def test_boxes_that_cannot_be_turned_are_refused(ros: Graph, columns: list[Any], plane: str, words: str) -> None:
+    message = cloud(TYPES, obstacle_table([(0.2, 0.3, 0.4, 0.0, 0.2, 0.1, 0.3)[: len(columns)]], columns), 10 * SECOND, 'camera')
+    transforms = Bench(ros).node._transforms
+    assert transforms.transform('obstacles', message, 'world', plane) is message
+    assert words in transforms.last_error
 
 
 @pytest.mark.usefixtures('tf2')

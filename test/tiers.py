@@ -26,6 +26,7 @@ LONG = (
     'test_effort_over_eta.py::test_no_strategy_needs_less_effort_than_optimal_in_the_same_class',
     'test_flicker.py::test_*symmetric_obstacle*',
     'test_guarantee.py::*',
+    'test_homotopy_shapes.py::test_brute_force_finds_none_in_many_more_scenes',
     'test_slow_path.py::*',
     # all steps of a fit, of the paper's studies and of long reports
     'test_fit.py::test_strategy_fixed_has_its_tau_and_lambda_fitted',

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from heapq import merge
 from pathlib import Path
 from typing import Any
@@ -16,10 +16,11 @@ from foc_ros.io.bags import TYPESTORE, BagWriter
 from foc_ros.io.csv_tables import Row, read_rows
 from foc_ros.ros.messages.decode_point_cloud import MAX_ROWS
 from foc_ros.ros.messages.decode_poses import MAX_GOALS
-from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
+from foc_ros.ros.messages.encode_inputs import encode_boxes, encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import RosbagsTypes
 
 FRAME = 'world'
+SIZES = ('size_x_m', 'size_y_m')
 EPOCH_NS = NANOSECONDS
 """Stamp of t_s = 0. It is not 0, which means `not set` in a message."""
 LATEST_S, LONGEST_S = 2e9, 86400.0
@@ -62,56 +63,110 @@ def parse_movement(name: str, table: Iterable[Row]) -> Movement:
     return Movement(name, tuple(EPOCH_NS + round(each[0] * NANOSECONDS) for each in samples), np.array(samples)[:, 1:])
 
 
-def read_obstacles(file: Path) -> list[tuple[float, ...]]:
-    """Return obstacles as rows x, y, z, radius, radius_stddev, id, possibly none; ids default to the position in the table.
+@dataclass(frozen=True)
+class RecordedScene:
+    """What a recording took place in.
 
-    There are at most as many as a message may contain.
+    obstacles: rows of `encode_obstacles`; goals (g, 3) [m], None where they are unknown; boxes: by name, instead of the rows,
+    x, y, z of the centre and the full lengths along these axes [m].
     """
-    found: dict[int, tuple[float, ...]] = {}
-    for number, row in enumerate(read_rows(file, ('x_m', 'y_m', 'radius_m'))):
-        identity = row.read_integer('id', -(2**31), 2**31 - 1, default=number)
-        if identity in found:
+
+    obstacles: tuple[tuple[float, ...], ...] = ()
+    goals: Array | None = None
+    boxes: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+    def find_boxes(self, positions: Array) -> dict[str, tuple[float, ...]]:
+        """Return the boxes at the median height of a hand at positions (n, 3) [m]: a ceiling or a table top is no obstacle."""
+        height = float(np.median(positions[:, 2]))
+        return {name: box for name, box in self.boxes.items() if abs(box[2] - height) < box[5] / 2.0}
+
+
+@dataclass(frozen=True)
+class SceneTables:
+    """Rows of obstacles and of goals by recording; those of the empty name hold for every recording."""
+
+    obstacles: Mapping[str, tuple[tuple[float, ...], ...]]
+    goals: Mapping[str, Array] | None
+
+    def find(self, name: str) -> RecordedScene:
+        """Return the scene of a recording; raises RecordingError where a table of goals has none for it."""
+        rows = self.obstacles.get('', self.obstacles.get(name, ()))
+        if self.goals is None:
+            return RecordedScene(rows)
+        goals = self.goals.get('', self.goals.get(name))
+        if goals is None:
+            raise RecordingError(f'recording {name!r}: the table of goals has no row for it')
+        return RecordedScene(rows, goals)
+
+
+def read_scenes(obstacles: Path | None, goals: Path | None) -> SceneTables:
+    """Read the tables of obstacles and of goals; a column `recording` gives each recording its own rows."""
+    return SceneTables({} if obstacles is None else read_obstacles(obstacles), None if goals is None else read_goals(goals))
+
+
+def read_obstacles(file: Path) -> dict[str, tuple[tuple[float, ...], ...]]:
+    """Return obstacles by recording as rows x, y, z, radius, radius_stddev, id, size_x, size_y, yaw, possibly none.
+
+    Ids default to the position in the rows of the recording. There are at most as many as a message may contain.
+    """
+    found: dict[str, dict[int, tuple[float, ...]]] = {}
+    for row in read_rows(file, ('x_m', 'y_m', 'radius_m'), {'radius_m': SIZES}):
+        rows = found.setdefault(_read_recording(row), {})
+        identity = row.read_integer('id', -(2**31), 2**31 - 1, default=len(rows))
+        if identity in rows:
             raise row.make_error('id', 'another id than the rows above')
-        radius, stddev = row.read_number('radius_m', 0.0), row.read_number('radius_stddev_m', 0.0, default=0.0)
-        found[identity] = (*_parse_position(row), radius, stddev, identity)
-        _check_length(file, len(found), MAX_ROWS)
-    return list(found.values())
+        radius, stddev = (row.read_number(name, 0.0, default=0.0) for name in ('radius_m', 'radius_stddev_m'))
+        size = [row.read_number(name, 0.0, default=0.0) for name in SIZES]
+        if SIZES[0] in row.cells and not any((radius, *size)):
+            raise row.make_error(SIZES[0], 'a size or a radius > 0')
+        rows[identity] = (*_parse_position(row), radius, stddev, identity, *size, row.read_number('yaw_rad', default=0.0))
+        _check_length(file, len(rows), MAX_ROWS)
+    return {name: tuple(rows.values()) for name, rows in found.items()}
 
 
-def read_goals(file: Path) -> Array:
-    """Return goals (g, 3) [m], at least one and at most as many as a message may contain."""
-    goals = []
+def read_goals(file: Path) -> dict[str, Array]:
+    """Return goals (g, 3) [m] by recording, at least one and at most as many as a message may contain."""
+    found: dict[str, list[tuple[float, ...]]] = {}
     for row in read_rows(file, ('x_m', 'y_m')):
+        goals = found.setdefault(_read_recording(row), [])
         goals.append(_parse_position(row))
         _check_length(file, len(goals), MAX_GOALS)
-    _check_not_empty(file, goals)
-    return np.array(goals)
+    _check_not_empty(file, found)
+    return {name: np.array(goals) for name, goals in found.items()}
 
 
-def write_movement(bag: Path, movement: Movement, obstacles: list[tuple[float, ...]], goals: Array | None) -> None:
-    """Write one bag with /hand_pose, /obstacles and, where there are any, /goals, in the order of their stamps."""
+def write_movement(bag: Path, movement: Movement, scene: RecordedScene) -> None:
+    """Write one bag with hand poses, obstacles and, where there are any, goals, in the order of their stamps."""
     with BagWriter(bag) as writer:
-        for stamp_ns, topic, message in recorded_messages(movement, obstacles, goals):
+        for stamp_ns, topic, message in recorded_messages(movement, scene):
             writer.write(topic, message, stamp_ns)
 
 
-def recorded_messages(
-    movement: Movement, obstacles: list[tuple[float, ...]], goals: Array | None
-) -> Iterator[tuple[int, str, Any]]:
+def recorded_messages(movement: Movement, scene: RecordedScene) -> Iterator[tuple[int, str, Any]]:
     """Yield the messages of a bag as (stamp [ns], topic, message), in the order of their stamps."""
-    types = RosbagsTypes(TYPESTORE)
+    types, boxes = RosbagsTypes(TYPESTORE), scene.find_boxes(movement.positions)
 
     def list_scenes() -> Iterator[tuple[int, str, Any]]:
         for stamp_ns in range(movement.stamps_ns[0] - SCENE_LEAD_NS, movement.stamps_ns[-1] + 1, SCENE_PERIOD_NS):
-            yield stamp_ns, '/obstacles', encode_obstacles(types, stamp_ns, FRAME, obstacles)
-            if goals is not None:
-                yield stamp_ns, '/goals', encode_goals(types, stamp_ns, FRAME, goals)
+            if boxes:
+                yield stamp_ns, '/obstacle_markers', encode_boxes(types, stamp_ns, FRAME, boxes)
+            else:
+                yield stamp_ns, '/obstacles', encode_obstacles(types, stamp_ns, FRAME, scene.obstacles)
+            if scene.goals is not None:
+                yield stamp_ns, '/goals', encode_goals(types, stamp_ns, FRAME, scene.goals)
 
     poses = (
         (stamp_ns, '/hand_pose', encode_hand_pose(types, stamp_ns, FRAME, position))
         for stamp_ns, position in zip(movement.stamps_ns, movement.positions, strict=True)
     )
     return merge(list_scenes(), poses, key=lambda each: each[0])
+
+
+def _read_recording(row: Row) -> str:
+    """Return the recording of a row, an empty text if the table does not have the column."""
+    if row.cells.get('recording') == '':
+        raise row.make_error('recording', 'a name')
+    return row.cells.get('recording', '')
 
 
 def _parse_position(row: Row) -> tuple[float, float, float]:

@@ -7,13 +7,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from foc_ros.core.errors import RecordingError
-from foc_ros.core.types import Array
 from foc_ros.io.bags import BagReader, Item
 from foc_ros.io.csv_tables import Row
 
-from .csv_recordings import parse_movement, read_goals, read_movement_rows, read_obstacles, recorded_messages
+from .box_scenes import BoxScenes
+from .csv_recordings import (
+    Movement,
+    RecordedScene,
+    SceneTables,
+    parse_movement,
+    read_movement_rows,
+    read_scenes,
+    recorded_messages,
+)
 
 RECORDINGS, OBSTACLES, GOALS, LABELS = 'recordings.csv', 'obstacles.csv', 'goals.csv', 'labels.csv'
+SCENES, TRIALS = 'scenes.csv', 'trials.csv'
 BAG_SUFFIXES = ('.mcap', '.db3')
 
 
@@ -36,13 +45,15 @@ class TableRecording:
 
     name: str
     rows: tuple[Row, ...]
-    obstacles: tuple[tuple[float, ...], ...]
-    goals: Array
+    scene: RecordedScene
+
+    def read_movement(self) -> Movement:
+        """Return the movement of the hand; raises RecordingError."""
+        return parse_movement(self.name, self.rows)
 
     def items(self) -> Iterator[Item]:
         """Yield the messages that `convert` would write; raises RecordingError."""
-        movement = parse_movement(self.name, self.rows)
-        for stamp_ns, topic, message in recorded_messages(movement, list(self.obstacles), self.goals):
+        for stamp_ns, topic, message in recorded_messages(self.read_movement(), self.scene):
             yield Item(topic.removeprefix('/'), topic, stamp_ns, message, b'')
 
 
@@ -52,14 +63,11 @@ Recording = BagRecording | TableRecording
 def find_recordings(data: Path) -> dict[str, Recording]:
     """Return the recordings of a folder by name.
 
-    data: a folder with recordings.csv, goals.csv and, where there are obstacles, obstacles.csv; a folder of bags; or a bag.
-    Raises RecordingError where it is none of these.
+    data: a folder with recordings.csv, and either goals.csv and, where there are obstacles, obstacles.csv, or scenes.csv with the
+    boxes of each recording; a folder of bags; or a bag. Raises RecordingError where it is none of these.
     """
     if (data / RECORDINGS).exists():
-        obstacles = tuple(read_obstacles(data / OBSTACLES)) if (data / OBSTACLES).exists() else ()
-        goals = read_goals(data / GOALS)
-        tables = read_movement_rows(data / RECORDINGS)
-        return {name: TableRecording(name, tuple(rows), obstacles, goals) for name, rows in tables.items()}
+        return dict(read_tables(data))
     if data.is_file() or (data / 'metadata.yaml').exists():
         bags = [data.resolve()]
     elif data.is_dir():
@@ -67,8 +75,22 @@ def find_recordings(data: Path) -> dict[str, Recording]:
     else:
         raise RecordingError(f'{data}: no such file or directory')
     if not bags:
-        raise RecordingError(f'{data}: expected bags, or {RECORDINGS} with {GOALS}, got neither')
+        raise RecordingError(f'{data}: expected bags, or {RECORDINGS} with {GOALS} or {SCENES}, got neither')
     return {path.name: BagRecording(path.name, path) for path in bags}
+
+
+def read_tables(data: Path) -> dict[str, TableRecording]:
+    """Return the recordings of a folder of tables by name."""
+    scenes = _read_scenes(data)
+    return {
+        name: TableRecording(name, tuple(rows), scenes.find(name)) for name, rows in read_movement_rows(data / RECORDINGS).items()
+    }
+
+
+def _read_scenes(data: Path) -> SceneTables | BoxScenes:
+    if (data / SCENES).exists():
+        return BoxScenes(data / SCENES)
+    return read_scenes(data / OBSTACLES if (data / OBSTACLES).exists() else None, data / GOALS)
 
 
 def _may_be_bag(path: Path) -> bool:

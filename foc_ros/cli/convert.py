@@ -6,34 +6,47 @@ import argparse
 import re
 from pathlib import Path
 
-from foc_ros.analysis.csv_recordings import Movement, read_goals, read_movements, read_obstacles, write_movement
-from foc_ros.core.errors import RecordingError
+from foc_ros.analysis.csv_recordings import Movement, RecordedScene, read_movements, read_scenes, write_movement
+from foc_ros.analysis.recordings import read_tables
+from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.io.terminal import show_progress
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument('csv', type=Path, metavar='CSV', help='recordings: columns recording, t_s, x_m, y_m[, z_m]')
-    words = 'columns x_m, y_m, radius_m[, radius_stddev_m, id, z_m]'
-    parser.add_argument('--obstacles', type=Path, metavar='CSV', required=True, help=words)
-    parser.add_argument('--goals', type=Path, metavar='CSV', help='columns x_m, y_m[, z_m]')
+    words = 'recordings: columns recording, t_s, x_m, y_m[, z_m]; or a folder of all tables, as evaluate takes it'
+    parser.add_argument('csv', type=Path, metavar='CSV', help=words)
+    words = 'columns x_m, y_m, radius_m[, radius_stddev_m, id, z_m, recording], for boxes size_x_m, size_y_m[, yaw_rad]'
+    parser.add_argument('--obstacles', type=Path, metavar='CSV', help=words)
+    parser.add_argument('--goals', type=Path, metavar='CSV', help='columns x_m, y_m[, z_m, recording]')
     parser.add_argument('--output', type=Path, metavar='DIR', required=True, help='directory for the bags, one per recording')
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Convert the tables; all are checked before the first bag is written."""
-    movements = read_movements(arguments.csv)
-    obstacles = read_obstacles(arguments.obstacles)
-    goals = None if arguments.goals is None else read_goals(arguments.goals)
+    scenes, movements = _read(arguments)
     bags = {arguments.output / name: movement for name, movement in _name_bags(movements).items()}
     for bag in bags:
         if bag.exists():
             raise RecordingError(f'{bag}: exists already and is not overwritten; choose another --output')
     for bag, movement in show_progress(bags.items(), 'convert', len(bags)):
-        write_movement(bag, movement, obstacles, goals)
-    count = sum(len(movement.stamps_ns) for movement in movements)
-    print(f'{len(bags)} bags with {count} hand poses and {len(obstacles)} obstacles written to {arguments.output}')
+        write_movement(bag, movement, scenes[movement.name])
+    hands = sum(len(each.stamps_ns) for each in movements)
+    obstacles = [len(scenes[each.name].find_boxes(each.positions) or scenes[each.name].obstacles) for each in movements]
+    count = ' to '.join(str(each) for each in sorted({min(obstacles), max(obstacles)}))
+    print(f'{len(bags)} bags with {hands} hand poses and {count} obstacles written to {arguments.output}')
     return 0
+
+
+def _read(arguments: argparse.Namespace) -> tuple[dict[str, RecordedScene], list[Movement]]:
+    """Return the scene of each recording by its name, and all movements."""
+    if arguments.obstacles is None and arguments.csv.is_dir():
+        tables = read_tables(arguments.csv)
+        return {name: each.scene for name, each in tables.items()}, [each.read_movement() for each in tables.values()]
+    if arguments.obstacles is None:
+        raise InputError('--obstacles', 'a table of obstacles, which may be without rows', 'nothing')
+    movements, tables_of_scenes = read_movements(arguments.csv), read_scenes(arguments.obstacles, arguments.goals)
+    return {each.name: tables_of_scenes.find(each.name) for each in movements}, movements
 
 
 def _name_bags(movements: list[Movement]) -> dict[str, Movement]:

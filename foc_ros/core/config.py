@@ -157,7 +157,10 @@ class SceneConfig:
         2.0, 'age of obstacles, by stamp and in the node by arrival, after which prediction stops; 0: never', 's', 0.0, 1e6
     )
     max_obstacles: int = _p(64, 'number of obstacles to consider: those farthest from the paths are left out', '', 1, 4096)
-    marker_radius_stddev: float = _p(0.0, 'standard deviation of the radius of obstacles from markers', 'm', 0.0, 1.0)
+    marker_radius_stddev: float = _p(
+        0.0, 'standard deviation of the radius of obstacles from markers, collision objects and detections', 'm', 0.0, 1.0
+    )
+    hand_radius: float = _p(0.0, 'added to the radius of every obstacle: hands and tools are not points', 'm', 0.0, 1.0)
 
 
 @dataclass(frozen=True)

@@ -66,8 +66,8 @@ class Deadline:
         self.at = -math.inf
 
     def allows(self, seconds: float = 0.0) -> bool:
-        """Tell whether there is time for a step of so many seconds, and for one half as long as the longest so far."""
-        return self.left_s >= max(seconds, self.step_times.longest_s / 2.0)
+        """Tell whether there is time for a step of so many seconds, and for one as long as the longest so far."""
+        return self.left_s >= max(seconds, self.step_times.longest_s)
 
     def check(self, seconds: float = 0.0) -> None:
         """Raise OutOfTimeError if the deadline does not allow the next step, which takes some seconds if that is known.

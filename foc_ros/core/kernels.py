@@ -107,6 +107,11 @@ def compiled_with_caller(kernel: Kernel) -> Kernel:
     return cast('Kernel', njit(fastmath=REORDERED, error_model='numpy', forceinline=True)(kernel))
 
 
+def compiled_exactly_with_caller(kernel: Kernel) -> Kernel:
+    """Compile an inner kernel like `compiled_with_caller`, in which each product and sum is rounded as written."""
+    return cast('Kernel', njit(error_model='numpy', forceinline=True)(kernel))
+
+
 def compiled_separately(kernel: Kernel) -> Kernel:
     """Compile an inner kernel for the types of its calls, not inlined: a large one takes long to compile in each caller."""
     return cast('Kernel', njit(fastmath=REORDERED, error_model='numpy')(kernel))

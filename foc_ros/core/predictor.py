@@ -49,7 +49,7 @@ def predict(
     hand
         Estimated state of the hand.
     obstacles
-        Obstacles at the stamp of the hand.
+        Obstacles at the stamp of the hand. The hand keeps `scene.hand_radius` away from them; the prediction holds them as given.
     goals
         Goals (g, 2) [m], g >= 1.
     memory
@@ -68,7 +68,8 @@ def predict(
     began, past = time.perf_counter(), memory.past.keep_goals(goals)
     hand = _simplify_start(hand, config.estimator.acceleration_time_s)
     durations = _find_durations(hand, goals, past, config)
-    given, obstacles = obstacles, cull_obstacles(obstacles, hand.mean[:2], goals, max(durations), config.scene.max_obstacles)
+    given, grown = obstacles, obstacles.grow(config.scene.hand_radius)
+    obstacles = cull_obstacles(grown, hand.mean[:2], goals, max(durations), config.scene.max_obstacles)
     timing, turn = GuessTiming(durations, config.foc.steps), Turn(deadline.take_share(SEARCH_SHARE), memory.next_goal)
     found = search(hand.mean, goals, obstacles, config.homotopy, *timing, memory.candidates, turn)
     scene = hand, goals, obstacles, config.homotopy, timing

@@ -13,6 +13,7 @@ from .dynamics.plant_models import make_plant_model
 from .errors import SceneError
 from .estimation.duration import is_passing
 from .homotopy import find_path_sides, search
+from .obstacles.rounded_polygon import measure_offsets
 from .ocp.problem import Problem
 from .predictor import build_problem
 from .types import LEFT, Array, Candidate, HandState, Obstacles, PredictedCandidate, Record
@@ -35,6 +36,11 @@ class ReachingScene(Record):
     config: Config
 
     @property
+    def avoided(self) -> Obstacles:
+        """The obstacles that the centre of the hand has to avoid: those of the scene, larger by the radius of the hand."""
+        return self.obstacles.grow(self.config.scene.hand_radius)
+
+    @property
     def duration_s(self) -> float:
         """Duration of the movement [s]."""
         return self.config.duration.fixed_s
@@ -43,7 +49,7 @@ class ReachingScene(Record):
 def build_scene_problems(scene: ReachingScene) -> list[Problem]:
     """Return the problem of every goal. An uncertain start is as uncertain to the operator, so it counts in the constraint."""
     config = scene.config
-    problems = [build_problem(config, scene.hand, scene.obstacles, goal, scene.duration_s) for goal in scene.goals]
+    problems = [build_problem(config, scene.hand, scene.avoided, goal, scene.duration_s) for goal in scene.goals]
     if scene.noise is not None:
         problems = [replace(problem, noise=scene.noise) for problem in problems]
     if not scene.hand.covariance.any():
@@ -59,16 +65,14 @@ def solve_scene(scene: ReachingScene, problems: Sequence[Problem]) -> list[Predi
 
     problems: of every goal, from `build_scene_problems`.
     """
-    config = scene.config
+    config, avoided = scene.config, scene.avoided
     if scene.guess is not None:
-        candidates: tuple[Candidate, ...] = (_make_guessed_candidate(scene.guess, scene.obstacles),)
+        candidates: tuple[Candidate, ...] = (_make_guessed_candidate(scene.guess, avoided),)
     else:
         durations = [scene.duration_s] * len(scene.goals)
-        candidates = search(
-            scene.hand.mean, scene.goals, scene.obstacles, config.homotopy, durations, config.foc.steps
-        ).candidates
+        candidates = search(scene.hand.mean, scene.goals, avoided, config.homotopy, durations, config.foc.steps).candidates
     solved = solve_candidates(candidates, [problems[each.goal] for each in candidates], config.foc)
-    return rank_candidates(solved, config.likelihood, scene.obstacles)
+    return rank_candidates(solved, config.likelihood, avoided)
 
 
 def _make_guessed_candidate(guess: Array, obstacles: Obstacles) -> Candidate:
@@ -78,8 +82,8 @@ def _make_guessed_candidate(guess: Array, obstacles: Obstacles) -> Candidate:
 
 
 def check_outside(field: str, point: Array, obstacles: Obstacles) -> None:
-    """Raise SceneError, which names the field, if a point (2,) [m] lies inside the mean radius of an obstacle."""
-    distances = np.hypot(*(obstacles.centre - point).T)
+    """Raise SceneError, which names the field, if a point (2,) [m] lies inside the mean boundary of an obstacle."""
+    distances = measure_offsets(point, obstacles)[1][0]
     for row in np.flatnonzero(distances < obstacles.radius)[:1]:
-        found = f'{point.tolist()}, {distances[row]:.4g} m from its centre'
+        found = f'{point.tolist()}, {distances[row]:.4g} m from its polygon'
         raise SceneError(field, f'a point outside obstacle {obstacles.ids[row]}, of radius {obstacles.radius[row]:g} m', found)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, StrEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +36,11 @@ class Record:
         for name, value in values.items():
             if isinstance(value, np.ndarray) and ((flags := value.flags).writeable or not flags.c_contiguous):
                 values[name] = as_readonly(value.copy())
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore a record from another process, where its arrays have become writeable."""
+        vars(self).update(state)
+        Record.__post_init__(self)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from foc_ros.core.errors import RecordingError
 
@@ -48,8 +49,12 @@ class Row:
         return RecordingError(f'{self.file}: row {self.line}, column {column}: expected {expected}, got {self.cells[column]!r}')
 
 
-def read_rows(file: Path, needed: tuple[str, ...]) -> Iterator[Row]:
+def read_rows(
+    file: Path, needed: tuple[str, ...], instead: Mapping[str, tuple[str, ...]] = MappingProxyType({})
+) -> Iterator[Row]:
     """Yield the rows of a CSV file with a header; empty lines are skipped, and columns beside the needed ones are allowed.
+
+    instead: columns that together replace a needed one.
 
     Raises RecordingError for a file that cannot be read, lacks a needed column or names one twice, and for a row with more or
     fewer cells than the header.
@@ -59,7 +64,7 @@ def read_rows(file: Path, needed: tuple[str, ...]) -> Iterator[Row]:
             if file.stat().st_size > MAX_BYTES:
                 raise RecordingError(f'{file}: expected at most {MAX_BYTES:,} bytes, got {file.stat().st_size:,}')
             reader = csv.reader(stream, strict=True)
-            header = _read_header(file, next(reader, []), needed)
+            header = _read_header(file, next(reader, []), needed, instead)
             for cells in reader:
                 if any(cell.strip() for cell in cells):
                     if len(cells) != len(header):
@@ -73,11 +78,11 @@ def read_rows(file: Path, needed: tuple[str, ...]) -> Iterator[Row]:
         raise RecordingError(f'{file}: not a CSV table: {error}') from error
 
 
-def _read_header(file: Path, cells: list[str], needed: tuple[str, ...]) -> list[str]:
+def _read_header(file: Path, cells: list[str], needed: tuple[str, ...], instead: Mapping[str, tuple[str, ...]]) -> list[str]:
     header = [name.strip() for name in cells]
     if not header:
         raise RecordingError(f'{file}: the file is empty: expected columns {", ".join(needed)}')
-    missing = [name for name in needed if name not in header]
+    missing = [name for name in needed if not any(set(kind) <= set(header) for kind in ((name,), instead.get(name, (name,))))]
     if missing:
         raise RecordingError(f'{file}: row 1: no column {", ".join(missing)}; it has {", ".join(header)}')
     if len(set(header)) < len(header):

@@ -1,8 +1,9 @@
 """A scene file (YAML or JSON) as one reaching problem, checked field by field.
 
 Fields: start, goal or goals [m]; start_velocity [m/s], start_acceleration [m/s^2], start_stddev [m] (default 0); duration_s;
-steps; noise [c_x, c_y] per step; eta, bound, risk, shortfall; strategy, with tau and lambda if it is `fixed`; plant, plant_mass,
-plant_damping; obstacles: x, y, radius, radius_stddev, id; guess; max_candidates.
+steps; noise [c_x, c_y] per step; eta, bound, risk, shortfall; strategy, with tau and lambda if it is `fixed`; hand_radius; plant,
+plant_mass, plant_damping; obstacles: x, y, radius, radius_stddev, id, of boxes size and yaw, of hulls points instead of x, y;
+guess; max_candidates.
 A missing field has the default of its parameter.
 """
 
@@ -19,6 +20,7 @@ import numpy as np
 
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import ParameterError, SceneError
+from foc_ros.core.obstacles.shapes import Box, Hull, Shape
 from foc_ros.core.reaching_scene import ReachingScene, check_outside
 from foc_ros.core.types import Array, HandState, Obstacles, make_obstacles
 
@@ -44,12 +46,13 @@ PARAMETERS = {
     'plant_mass': 'foc.plant_mass',
     'plant_damping': 'foc.plant_damping',
     'max_candidates': 'homotopy.max_candidates',
+    'hand_radius': 'scene.hand_radius',
 }
 """Fields that are parameters, with their bounds."""
 
 STATE_FIELDS = ('start', 'start_velocity', 'start_acceleration', 'start_stddev')
 FIELDS = (*STATE_FIELDS, 'goal', 'goals', 'noise', 'obstacles', 'guess', *PARAMETERS)
-OBSTACLE_FIELDS = ('x', 'y', 'radius', 'radius_stddev', 'id')
+OBSTACLE_FIELDS = ('x', 'y', 'radius', 'radius_stddev', 'id', 'size', 'yaw', 'points')
 _NUMERAL = re.compile(r'[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+')
 
 
@@ -63,10 +66,10 @@ def parse_scene(document: object) -> ReachingScene:
     scene = _read_mapping('scene', document, FIELDS)
     config = _read_config(scene)
     obstacles = _read_obstacles(scene.get('obstacles', []))
-    hand, goals = _read_hand(scene), _read_goals(scene)
-    check_outside('start', hand.mean[:2], obstacles)
+    hand, goals, avoided = _read_hand(scene), _read_goals(scene), obstacles.grow(config.scene.hand_radius)
+    check_outside('start', hand.mean[:2], avoided)
     for goal in goals:
-        check_outside('goal' if 'goal' in scene else 'goals', goal, obstacles)
+        check_outside('goal' if 'goal' in scene else 'goals', goal, avoided)
     noise = np.array([config.foc.noise_x, config.foc.noise_y])
     guess = _read_guess(scene['guess'], hand.mean[:2], goals, config.foc.steps) if 'guess' in scene else None
     return ReachingScene(hand, goals, obstacles, noise, guess, config)
@@ -135,23 +138,45 @@ def _read_goals(scene: Mapping[str, Any]) -> Array:
 
 
 def _read_obstacles(given: object) -> Obstacles:
-    rows: dict[str, list[float]] = {}
+    rows: dict[str, tuple[Array, Array, float, float]] = {}
     for place, each in enumerate(_read_rows('obstacles', given, MOST_OBSTACLES)):
         field = f'obstacles[{place}]'
         obstacle = _read_mapping(field, each, OBSTACLE_FIELDS)
-        for name in ('x', 'y', 'radius'):
-            if name not in obstacle:
-                raise SceneError(f'{field}.{name}', 'a number', 'nothing')
         identity = obstacle.get('id', place)
         if type(identity) not in (int, str) or not _ID.fullmatch(str(identity)):
             expected = 'a whole number, or a name of letters, digits, _ and ., of at most 40 characters'
             raise SceneError(f'{field}.id', expected, reprlib.repr(identity))
         if str(identity) in rows:
             raise SceneError(f'{field}.id', 'another id than the obstacles before it', reprlib.repr(identity))
-        lowest = {'x': -FARTHEST, 'y': -FARTHEST, 'radius': 0.0, 'radius_stddev': 0.0}
-        rows[str(identity)] = [_read_number(f'{field}.{name}', obstacle.get(name, 0.0), low) for name, low in lowest.items()]
-    table = np.array(list(rows.values())).reshape(-1, 4)
-    return make_obstacles(table[:, :2], table[:, 2], table[:, 3], tuple(rows))
+        radius, stddev = (_read_number(f'{field}.{name}', obstacle.get(name, 0.0), 0.0) for name in ('radius', 'radius_stddev'))
+        rows[str(identity)] = (*_read_polygon(field, obstacle, radius), radius, stddev)
+    centres, polygons, radii, stddevs = zip(*rows.values(), strict=True) if rows else ((), (), (), 0.0)
+    return make_obstacles(centres, radii, stddevs, tuple(rows), polygons=polygons)
+
+
+def _read_polygon(field: str, obstacle: Mapping[str, Any], radius: float) -> tuple[Array, Array]:
+    """Return centre and polygon, as `Obstacles` has them: a hull where there are points, a box where there is a size."""
+    kind = next((name for name in ('points', 'size') if name in obstacle), 'radius')
+    needed, unused = {'points': ((), 'xy'), 'size': ('xy', ''), 'radius': (('x', 'y', 'radius'), ('yaw',))}[kind]
+    for name in needed:
+        if name not in obstacle:
+            raise SceneError(f'{field}.{name}', 'a number', 'nothing')
+    for name in (*unused, *(('size', 'yaw') if kind == 'points' else ())):
+        if name in obstacle:
+            raise SceneError(f'{field}.{name}', 'to be given with a size, and without points', reprlib.repr(obstacle[name]))
+    try:
+        if kind == 'points':
+            rows = _read_rows(f'{field}.points', obstacle['points'], MOST_POINTS)
+            shape: Shape = Hull([_read_point(f'{field}.points[{row}]', point) for row, point in enumerate(rows)], radius)
+            return np.array(shape.centre), shape.polygon
+        centre = np.array([_read_number(f'{field}.{axis}', obstacle[axis]) for axis in 'xy'])
+        if kind == 'radius':
+            return centre, np.zeros((1, 2))
+        size = [_read_number(f'{field}.size', each, 0.0) for each in _read_list(f'{field}.size', obstacle['size'], 2)]
+        shape = Box(centre, size, _read_number(f'{field}.yaw', obstacle.get('yaw', 0.0)), radius)
+        return centre, shape.polygon
+    except SceneError as error:
+        raise SceneError(error.field.replace('obstacle.', f'{field}.', 1), error.expected, error.got) from error
 
 
 def _read_guess(given: object, start: Array, goals: Array, steps: int) -> Array:

@@ -7,19 +7,25 @@ from collections.abc import Mapping
 from foc_ros.core.errors import RecordingError
 
 HAND, CLOUD, MARKERS, GOALS, GOAL = 'hand_pose', 'obstacles', 'obstacle_markers', 'goals', 'goal_pose'
+COLLISION, DETECTIONS = 'collision_objects', 'detections'
 TYPES = {
     HAND: 'geometry_msgs/msg/PoseStamped',
     CLOUD: 'sensor_msgs/msg/PointCloud2',
     MARKERS: 'visualization_msgs/msg/MarkerArray',
+    COLLISION: 'moveit_msgs/msg/CollisionObject',
+    DETECTIONS: 'vision_msgs/msg/Detection3DArray',
     GOALS: 'geometry_msgs/msg/PoseArray',
     GOAL: 'geometry_msgs/msg/PoseStamped',
 }
 """Message type of every input, by the name of the node's subscription, which is called its role."""
 
+OPTIONAL = (COLLISION, DETECTIONS)
+"""Inputs whose message packages may be missing: the node then does without them."""
+
 NAMES = {role: (role,) for role in TYPES} | {HAND: ('hand_pose', 'measured_cp')}
 """Last parts of the topic names of a role, the preferred one first (`measured_cp`: CRTK's measured Cartesian pose)."""
 
-REQUIRED = ((HAND,), (CLOUD, MARKERS), (GOALS, GOAL))
+REQUIRED = ((HAND,), (CLOUD, MARKERS, COLLISION, DETECTIONS), (GOALS, GOAL))
 """Roles that a recording must contain for a prediction: one of each row."""
 
 OUTPUTS = ('prediction', 'likelihoods', 'path', 'markers')

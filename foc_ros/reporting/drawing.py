@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.errors import FocError
+from foc_ros.core.obstacles.outline import trace_obstacle
 from foc_ros.core.types import NANOSECONDS, Array, Obstacles
 
 from .snapshots import CandidateView, HandTrajectory, Snapshot, UnsolvedView
@@ -23,7 +24,7 @@ try:
     import matplotlib as mpl
     from matplotlib.colors import to_rgba
     from matplotlib.figure import Figure
-    from matplotlib.patches import Circle, Ellipse, Patch
+    from matplotlib.patches import Circle, Ellipse, Patch, Polygon
     from matplotlib.rcsetup import cycler
 except ImportError as error:
     raise FocError("pictures need matplotlib: install python3-matplotlib, or pip install 'foc_ros[report]'") from error
@@ -114,16 +115,23 @@ def make_stddev_ellipse(centre: Array, covariance: Array, stddevs: float = STDDE
     return Ellipse(tuple(centre), 2.0 * stddevs * float(greater), 2.0 * stddevs * float(smaller), angle=float(angle))
 
 
+def make_obstacle_patch(obstacles: Obstacles, row: int, growth: float, **look: Any) -> Patch:
+    """Return the shape of one obstacle, larger by a growth [m]; look: of the patch."""
+    if obstacles.corners[row] == 1:  # matplotlib's circle is smooth at any magnification
+        return Circle(obstacles.centre[row], obstacles.radius[row] + growth, **look)
+    return Polygon(trace_obstacle(obstacles, row, growth), **look)
+
+
 def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, named: bool = True) -> None:
     """Draw obstacles and goals.
 
-    An obstacle is a disc of its mean radius in a pale ring as wide as the standard deviation of the radius. named: whether the
+    An obstacle has its mean radius, in a pale ring as wide as the standard deviation of the radius. named: whether the
     goals (g, 2) are numbered, as in the labels of candidates.
     """
-    rows = zip(obstacles.ids, obstacles.centre, obstacles.radius, obstacles.radius_stddev, strict=True)
-    for name, centre, radius, stddev in rows:
-        axes.add_patch(Circle(centre, radius + STDDEVS * stddev, facecolor='0.88', edgecolor='0.7', linewidth=0.6))
-        axes.add_patch(Circle(centre, radius, facecolor='0.65', edgecolor='0.35', linewidth=0.8))
+    for row, (name, centre) in enumerate(zip(obstacles.ids, obstacles.centre, strict=True)):
+        ring = STDDEVS * float(obstacles.radius_stddev[row])
+        axes.add_patch(make_obstacle_patch(obstacles, row, ring, facecolor='0.88', edgecolor='0.7', linewidth=0.6))
+        axes.add_patch(make_obstacle_patch(obstacles, row, 0.0, facecolor='0.65', edgecolor='0.35', linewidth=0.8))
         if len(obstacles) <= NAMED_OBSTACLES:
             axes.text(*centre, name, ha='center', va='center', fontsize=8)
     for number, goal in enumerate(goals):

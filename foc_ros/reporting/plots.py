@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from foc_ros.core.errors import InputError
+from foc_ros.core.obstacles.outline import find_limits
 from foc_ros.core.types import NANOSECONDS, Array, Obstacles, PredictedCandidate, Prediction
 from foc_ros.io.outputs import MARK
 
@@ -197,10 +198,10 @@ def compute_bounds(
 
     margin: as a share of the greater side.
     """
-    reach = (obstacles.radius + STDDEVS * obstacles.radius_stddev)[:, None]
+    shapes = find_limits(obstacles, STDDEVS * obstacles.radius_stddev)
     spread = [(each.path, STDDEVS * np.sqrt(np.diagonal(each.covariance, axis1=1, axis2=2))) for each in candidates]
-    edges = [centre + sign * width for centre, width in [(obstacles.centre, reach), *spread] for sign in (-1.0, 1.0)]
-    enclosed = np.concatenate([*edges, np.reshape(goals, (-1, 2)), *points])
+    edges = [centre + sign * width for centre, width in spread for sign in (-1.0, 1.0)]
+    enclosed = np.concatenate([*shapes, *edges, np.reshape(goals, (-1, 2)), *points])
     low, high = (enclosed.min(axis=0), enclosed.max(axis=0)) if len(enclosed) else (np.zeros(2), np.ones(2))
     added = margin * max(*(high - low), 0.05)
     return float(low[0] - added), float(high[0] + added), float(low[1] - added), float(high[1] + added)

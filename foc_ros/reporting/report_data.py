@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.types import NANOSECONDS, Array, make_obstacles
+from foc_ros.core.obstacles.outline import find_limits
+from foc_ros.core.types import NANOSECONDS, Array, Obstacles, make_obstacles
 
 from .drawing import CLASS_COLOURS, ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, STDDEVS, Bounds, compute_ellipse_axes
 from .plots import compute_bounds
@@ -69,9 +70,7 @@ class PageData:
 
     def _encode_frame(self, row: int) -> dict[str, Any]:
         snapshot, tracks = self._tracks.snapshots[row], self._tracks.tracks[row]
-        obstacles = snapshot.obstacles
-        discs = np.column_stack([obstacles.centre, obstacles.radius, STDDEVS * obstacles.radius_stddev])
-        scene = [[name, *_quantise(disc, LENGTH)] for name, disc in zip(obstacles.ids, discs, strict=True)]
+        scene = _encode_obstacles(snapshot.obstacles)
         return {
             'at': row,
             'scene': _row_of(json.dumps(scene), self._scenes),
@@ -109,8 +108,7 @@ def compute_recording_bounds(hand: HandTrajectory, snapshots: Sequence[Snapshot]
     """Return limits of x and y [m] around the hand, all obstacles and goals, and all but outlying paths."""
     points = [hand.positions]
     for each in snapshots:
-        reach = (each.obstacles.radius + STDDEVS * each.obstacles.radius_stddev)[:, None]
-        points += [each.goals, each.obstacles.centre - reach, each.obstacles.centre + reach]
+        points += [each.goals, *find_limits(each.obstacles, STDDEVS * each.obstacles.radius_stddev)]
     paths = [candidate.path for each in snapshots for candidate in each.candidates]
     points += [np.percentile(np.concatenate(paths), DRAWN_PERCENTILES, axis=0)] if paths else []
     return compute_bounds(make_obstacles(), np.zeros((0, 2)), (), *points, margin=0.06)
@@ -124,6 +122,16 @@ def round_number(value: float) -> float | None:
 def select_evenly(count: int, most: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
     """Return at most so many rows of `count`, evenly spread, the first and the last among them."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.intp))
+
+
+def _encode_obstacles(obstacles: Obstacles) -> list[list[str | int]]:
+    """Return obstacles: name, centre, radius and its standard deviation, then two vertices or more, relative to the centre."""
+    rows = np.column_stack([obstacles.centre, obstacles.radius, STDDEVS * obstacles.radius_stddev])
+    polygons = [obstacles.vertices[row, : corners if corners > 1 else 0] for row, corners in enumerate(obstacles.corners)]
+    return [
+        [name, *_quantise(row, LENGTH), *_quantise(polygon.ravel(), LENGTH)]
+        for name, row, polygon in zip(obstacles.ids, rows, polygons, strict=True)
+    ]
 
 
 def _encode_candidate(candidate: CandidateView) -> dict[str, Any]:

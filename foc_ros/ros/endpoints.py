@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from importlib.util import find_spec
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSPolicyKind, QoSProfile, QoSReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from foc_ros.io.topics import CLOUD, GOAL, GOALS, HAND, MARKERS, TYPES
+from foc_ros.io.topics import CLOUD, COLLISION, DETECTIONS, GOAL, GOALS, HAND, MARKERS, OPTIONAL, TYPES
 
 from .messages.encode_prediction import OUTPUTS
 from .messages.types import find_message_class
 
-INPUTS = (GOALS, GOAL, CLOUD, MARKERS, HAND)
+INPUTS = (GOALS, GOAL, CLOUD, MARKERS, COLLISION, DETECTIONS, HAND)
 """Input topics in the order in which the executor takes their messages: the scene before the hand."""
 HAND_DEPTH = 200
 """Length of the queue of hand poses: 0.2 s at 1 kHz, during which a prediction may be computed."""
@@ -30,16 +31,25 @@ def create_subscriptions(node: Node, receive: Callable[[str, Any], None]) -> dic
 
     Hand poses are received as best-effort sensor data, the scene reliably. A scene that was published once, before the start of
     the node, is received with `qos_overrides./obstacles.subscription.durability: transient_local`, but then not from volatile
-    publishers.
+    publishers. Inputs of `find_missing_packages` have none.
     """
     subscriptions = {}
+    missing = find_missing_packages()
     for role in INPUTS:
+        if role in missing:
+            continue
         reliability = QoSReliabilityPolicy.BEST_EFFORT if role == HAND else QoSReliabilityPolicy.RELIABLE
         qos = _build_qos(reliability, HAND_DEPTH if role == HAND else SCENE_DEPTH)
         subscriptions[role] = node.create_subscription(
             find_message_class(TYPES[role]), role, partial(receive, role), qos, qos_overriding_options=OVERRIDABLE
         )
     return subscriptions
+
+
+def find_missing_packages() -> dict[str, str]:
+    """Return the package of messages that is not installed, by the optional input that needs it."""
+    packages = {role: TYPES[role].partition('/')[0] for role in OPTIONAL}
+    return {role: package for role, package in packages.items() if find_spec(package) is None}
 
 
 def create_publishers(node: Node) -> dict[str, Any]:

@@ -15,12 +15,12 @@ import numpy as np
 from foc_ros.core.config import Config
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, PredictedCandidate, Prediction
-from foc_ros.io.topics import CLOUD, HAND, MARKERS
+from foc_ros.io.topics import CLOUD, COLLISION, DETECTIONS, HAND, MARKERS
 
 from .intake import Intake
 from .messages.types import MessageTypes, make_header
 
-SOURCE_TOPICS = {'cloud': CLOUD, 'markers': MARKERS}
+SOURCE_TOPICS = {'cloud': CLOUD, 'markers': MARKERS, COLLISION: COLLISION, DETECTIONS: DETECTIONS}
 """Topic of every source of obstacles in the scene."""
 WINDOW = 1000
 """Number of predictions over which the percentiles are computed."""

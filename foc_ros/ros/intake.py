@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from foc_ros.core.errors import MessageError
@@ -13,6 +14,7 @@ from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
 
 from .messages.decode_markers import MarkerTable
+from .messages.decode_objects import CollisionTable, decode_detections
 from .messages.decode_point_cloud import decode_point_cloud
 from .messages.decode_poses import decode_goal, decode_goals, decode_hand_sample
 
@@ -31,11 +33,14 @@ class Intake:
         self._markers = MarkerTable()
         self._markers_ns = 0
         self._markers_unchanged = (-math.inf, math.inf)
+        self._collisions = CollisionTable()
         self._counts: Counter[str] = Counter()
         self._handlers: dict[str, Callable[[Any], SampleStatus]] = {
             topics.HAND: self._take_hand,
             topics.CLOUD: self._take_cloud,
             topics.MARKERS: self._take_markers,
+            topics.COLLISION: self._take_collision_object,
+            topics.DETECTIONS: self._take_detections,
             topics.GOALS: lambda message: pipeline.set_goals(*decode_goals(message, pipeline.config.plane)),
             topics.GOAL: lambda message: pipeline.set_goals(*decode_goal(message, pipeline.config.plane)),
         }
@@ -59,8 +64,10 @@ class Intake:
         return status
 
     def remove_source(self, source: str) -> None:
-        """Forget the obstacles of one source, 'cloud' or 'markers', as if none of its messages had been received."""
+        """Forget the obstacles of one source, such as 'cloud' or 'markers', as if none of its messages had been received."""
         self.pipeline.remove_source(source)
+        if source == topics.COLLISION:
+            self._collisions = CollisionTable()
         if source == 'markers':
             self._markers, self._markers_ns, self._markers_unchanged = MarkerTable(), 0, (-math.inf, math.inf)
 
@@ -77,6 +84,28 @@ class Intake:
         status = self.pipeline.set_obstacles('cloud', cloud.obstacles, cloud.stamp_ns, cloud.frame_id)
         return self._count_dropped(topics.CLOUD, cloud.dropped, status)
 
+    def _take_detections(self, message: Any) -> SampleStatus:
+        config = self.pipeline.config
+        found = decode_detections(message, config.plane, config.scene.marker_radius_stddev)
+        status = self.pipeline.set_obstacles(topics.DETECTIONS, found.obstacles, found.stamp_ns, found.frame_id)
+        return self._count_dropped(topics.DETECTIONS, found.dropped, status)
+
+    def _take_collision_object(self, message: Any) -> SampleStatus:
+        config = self.pipeline.config
+        before = self._collisions if self.pipeline.frame_id in (None, self._collisions.frame_id) else CollisionTable()
+        table = before.with_message(message)
+        table = replace(table, stamp_ns=self._ignore_small_steps_back(before.stamp_ns, table.stamp_ns))
+        obstacles = table.obstacles(config.plane, config.scene.marker_radius_stddev)
+        status = self.pipeline.set_obstacles(topics.COLLISION, obstacles, table.stamp_ns, table.frame_id)
+        if status.is_taken:
+            self._collisions = table
+        return self._count_dropped(topics.COLLISION, table.dropped, status)
+
+    def _ignore_small_steps_back(self, newest_ns: int, stamp_ns: int) -> int:
+        """Return a stamp, or the newest one if that is at most `estimator.gap_s` after it."""
+        is_slightly_behind = stamp_ns and 0 < newest_ns - stamp_ns <= self.pipeline.config.estimator.gap_s * NANOSECONDS
+        return newest_ns if is_slightly_behind else stamp_ns
+
     def _take_markers(self, message: Any) -> SampleStatus:
         config = self.pipeline.config
         # markers received before the working frame was known are discarded if they are in another frame
@@ -91,9 +120,7 @@ class Intake:
         table late. A table without markers is valid in every frame. One that has never held any is no source: many programs send
         a DELETEALL once at their start, and no markers after it.
         """
-        behind_ns = self._markers_ns - markers.stamp_ns
-        is_slightly_behind = markers.stamp_ns and 0 < behind_ns <= self.pipeline.config.estimator.gap_s * NANOSECONDS
-        stamp_ns = self._markers_ns if is_slightly_behind else markers.stamp_ns
+        stamp_ns = self._ignore_small_steps_back(self._markers_ns, markers.stamp_ns)
         frame_id = markers.frame_id if markers.markers else self.pipeline.frame_id or markers.frame_id
         now_ns = self._now_ns()
         status = SampleStatus.ACCEPTED

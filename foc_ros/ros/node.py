@@ -33,9 +33,9 @@ from foc_ros.core.errors import FocError
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predictor import warm_up
 from foc_ros.io.class_library import load_library
-from foc_ros.io.topics import CLOUD, GOAL, GOALS, HAND, MARKERS
+from foc_ros.io.topics import CLOUD, DETECTIONS, GOAL, GOALS, HAND, MARKERS
 
-from .endpoints import INPUTS, create_publishers, create_subscriptions, take_queued
+from .endpoints import INPUTS, create_publishers, create_subscriptions, find_missing_packages, take_queued
 from .health import SOURCE_TOPICS, Freshness, Monitor, encode_diagnostics
 from .intake import Intake
 from .lifecycle import answer_refused_transitions
@@ -47,7 +47,7 @@ from .worker import Computation, Worker
 
 THROTTLE_S = 5.0
 """Shortest time between two log lines of one kind [s]."""
-COMPLETE = (GOALS, GOAL, CLOUD)
+COMPLETE = (GOALS, GOAL, CLOUD, DETECTIONS)
 """Inputs of which each message replaces the one before: of several in the queue, the newest that is accepted is used."""
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
@@ -172,7 +172,7 @@ class FocNode(LifecycleNode):
             self._predict()
 
     def _take(self, role: str, message: Any) -> bool:
-        transformed = self._transforms.transform(role, message, self.pipeline.frame_id)
+        transformed = self._transforms.transform(role, message, self.pipeline.frame_id, self.pipeline.config.plane)
         status, now_s = self.intake.take(role, transformed), monotonic()
         is_taken = status is not None and status.is_taken
         refused, received = self._monitor.note_message(role, now_s, is_taken=is_taken)
@@ -245,12 +245,20 @@ class FocNode(LifecycleNode):
         if HAND in self._inputs:
             for message in take_queued(self._inputs[HAND]):  # a hand whose poses wait here is not silent
                 self._receive(HAND, message)
+        self._report_missing_packages()
         clock_reason, present = self._find_clock_reason(), self._worker.present
         not_ready_reason = self.pipeline.not_ready_reason() or (clock_reason and clock_reason[1])
         busy_s = monotonic() - present.start_s if present is not None else 0.0
         health = self._monitor.report(monotonic(), self.intake, self._state, not_ready_reason, busy_s)
         name, stamp_ns = self.get_fully_qualified_name(), self.get_clock().now().nanoseconds
         self._publish(self._diagnostics, encode_diagnostics(health, name, stamp_ns, self._types))
+
+    def _report_missing_packages(self) -> None:
+        """Log which optional inputs are published that cannot be received."""
+        for role, package in find_missing_packages().items():
+            if self._inputs and self.count_publishers(role):
+                text = f'{role} is published, but cannot be received: the package {package} is not installed'
+                self._loggers[role].error(text, throttle_duration_sec=THROTTLE_S)
 
     def _publish(self, publisher: Any, message: Any) -> None:
         if self.context.ok():

@@ -12,11 +12,16 @@ from typing import Any
 import numpy as np
 from rclpy.time import Time
 
+from foc_ros.core.errors import MessageError
 from foc_ros.core.types import Array
-from foc_ros.io.topics import CLOUD, GOALS, MARKERS
+from foc_ros.io.topics import CLOUD, DETECTIONS, GOALS, MARKERS
 
 from .messages.decode_markers import ADD
 from .messages.decode_point_cloud import read_table
+from .messages.plane import compute_rotation, lift, project
+
+MOST_TILT = 1e-3
+"""Sine of the largest angle between the task plane and the sizes of boxes after a transform."""
 
 
 class Transforms:
@@ -32,33 +37,39 @@ class Transforms:
         self._buffer = tf2_ros.Buffer()
         self._listener = tf2_ros.TransformListener(self._buffer, node)
 
-    def transform(self, role: str, message: Any, frame_id: str | None) -> Any:
-        """Return a message in the working frame; unchanged if that frame or the transform is unknown."""
+    def transform(self, role: str, message: Any, frame_id: str | None, plane: str) -> Any:
+        """Return a message in the working frame; unchanged if that frame or the transform is unknown.
+
+        plane: in which the sizes of the boxes of a cloud are.
+        """
         if self._buffer is None or frame_id is None:
             return message
         try:
             if role == MARKERS:
                 # markers that delete others have no position and often no frame
-                parts = [self._transform(each, frame_id) if each.action == ADD else each for each in message.markers]
+                parts = [self._transform(each, frame_id, plane) if each.action == ADD else each for each in message.markers]
                 return message if parts == message.markers else type(message)(markers=parts)
-            return self._transform(message, frame_id, role)
+            return self._transform(message, frame_id, plane, role)
         except Exception as error:  # tf2 has many kinds of errors, and the message is not checked yet
             self.last_error = f'no transform to {frame_id}: {" ".join(str(error).split())}'
             return message
 
-    def _transform(self, message: Any, frame_id: str, role: str = '') -> Any:
+    def _transform(self, message: Any, frame_id: str, plane: str, role: str = '') -> Any:
         if message.header.frame_id == frame_id:
             return message
         stamp = Time.from_msg(message.header.stamp)
         found = self._buffer.lookup_transform(frame_id, message.header.frame_id, stamp).transform
-        rotation, shift = _compute_rotation(found.rotation), _read_xyz(found.translation)
+        rotation, shift = compute_rotation(found.rotation), _read_xyz(found.translation)
         if role == CLOUD:
-            transformed = _transform_cloud(message, rotation, shift)
+            transformed = _transform_cloud(message, rotation, shift, plane)
         else:
             transformed = deepcopy(message)
-            for pose in transformed.poses if role == GOALS else [transformed.pose]:
+            for each in transformed.detections if role == DETECTIONS else []:
+                each.header.frame_id = frame_id
+            for pose in _list_poses(role, transformed):
                 point = pose.position
                 point.x, point.y, point.z = (rotation @ _read_xyz(point) + shift).tolist()
+                _turn(pose.orientation, found.rotation)
         transformed.header = deepcopy(message.header)
         transformed.header.frame_id = frame_id
         return transformed
@@ -68,17 +79,31 @@ def _read_xyz(vector: Any) -> Array:
     return np.array([vector.x, vector.y, vector.z], dtype=float)
 
 
-def _compute_rotation(quaternion: Any) -> Array:
-    """Return the matrix (3, 3) of a quaternion of any length."""
-    x, y, z, w = np.array([quaternion.x, quaternion.y, quaternion.z, quaternion.w], dtype=float)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    rotation: Array = np.eye(3) + 2.0 * (w * cross + cross @ cross) / (x * x + y * y + z * z + w * w)
-    return rotation
+def _list_poses(role: str, message: Any) -> list[Any]:
+    if role == DETECTIONS:
+        return [each.bbox.center for each in message.detections]
+    return list(message.poses) if role == GOALS else [message.pose]
 
 
-def _transform_cloud(message: Any, rotation: Array, shift: Array) -> Any:
-    """Return a cloud with x, y, z transformed and vx, vy, vz rotated."""
+def _turn(orientation: Any, rotation: Any) -> None:
+    """Rotate an orientation in place; one that was never set, all 0, is no rotation. Both are quaternions."""
+    vector, scalar = _read_xyz(orientation), float(orientation.w)
+    if not vector.any() and not scalar:
+        scalar = 1.0
+    by, real = _read_xyz(rotation), float(rotation.w)
+    orientation.x, orientation.y, orientation.z = (real * vector + scalar * by + np.cross(by, vector)).tolist()
+    orientation.w = float(real * scalar - by @ vector)
+
+
+def _transform_cloud(message: Any, rotation: Array, shift: Array, plane: str) -> Any:
+    """Return a cloud with x, y, z transformed, vx, vy, vz rotated and yaw turned.
+
+    Raises MessageError for boxes that would not lie in the plane any more, or whose yaw has no field.
+    """
     rows = read_table(message).copy()
+    if {'size_x', 'size_y'} & set(rows.dtype.names or ()):
+        with np.errstate(invalid='ignore'):
+            rows['yaw'] = _turn_boxes(rows, rotation, plane)
     for names, offset in ((('x', 'y', 'z'), shift), (('vx', 'vy', 'vz'), np.zeros(3))):
         if not set(names) <= set(rows.dtype.names or ()):
             continue
@@ -89,3 +114,16 @@ def _transform_cloud(message: Any, rotation: Array, shift: Array) -> Any:
     made = copy(message)
     made.height, made.width, made.data = 1, len(rows), rows.tobytes()
     return made
+
+
+def _turn_boxes(rows: Any, rotation: Array, plane: str) -> Array:
+    """Return the yaw (n,) [rad] of boxes after a rotation, which has to leave them in the plane."""
+    tilt = float(np.abs(project((rotation @ lift(np.eye(2), 0.0, plane).T).T, plane)[1]).max())
+    if tilt > MOST_TILT:
+        raise MessageError('fields[size_x]', 'boxes that the transform leaves in the task plane', f'a tilt of {tilt:.3g}')
+    if 'yaw' not in rows.dtype.names:
+        raise MessageError('fields', 'a field yaw, because the transform turns the boxes', ', '.join(rows.dtype.names))
+    yaw = rows['yaw'].astype(float)
+    first = project(lift(np.column_stack([np.cos(yaw), np.sin(yaw)]), 0.0, plane) @ rotation.T, plane)[0]
+    turned: Array = np.arctan2(first[:, 1], first[:, 0])
+    return turned

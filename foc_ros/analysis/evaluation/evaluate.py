@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from foc_ros.analysis.parallel import collect_all
-from foc_ros.analysis.recordings import LABELS
+from foc_ros.analysis.recordings import LABELS, TRIALS
 from foc_ros.core.config import Config, flatten
 from foc_ros.core.types import LEFT, Array
 from foc_ros.io.csv_tables import read_rows
@@ -89,9 +89,11 @@ def _make_plain(setting: Any) -> Any:
 def find_label_mismatches(data: Path, recordings: Sequence[ObservedRecording]) -> dict[str, str]:
     """Return both texts for each recording whose label is not the path class that was taken; none where there are no labels.
 
-    The columns of labels.csv after the first are the gaps taken, row by row, counted from low x. Raises RecordingError for a
-    table that cannot be read.
+    The columns of labels.csv after the first are the gaps taken, row by row, counted from low x. The column `sides` of trials.csv
+    has the side of each box by the end of its name. Raises RecordingError for a table that cannot be read.
     """
+    if (data / TRIALS).exists():
+        return _find_side_mismatches(data / TRIALS, recordings)
     if not (data / LABELS).exists():
         return {}
     labels = {row.cells['recording']: row.cells for row in read_rows(data / LABELS, ('recording',))}
@@ -105,6 +107,25 @@ def find_label_mismatches(data: Path, recordings: Sequence[ObservedRecording]) -
         taken = [str(gap) for gap in find_gaps(recording.observations[0])]
         if labelled != taken:
             found[recording.name] = f'label {" ".join(labelled)}, path {" ".join(taken)}'
+    return found
+
+
+def _find_side_mismatches(file: Path, recordings: Sequence[ObservedRecording]) -> dict[str, str]:
+    labels = {row.cells['recording']: row.cells['sides'] for row in read_rows(file, ('recording', 'sides'))}
+    found = {}
+    for recording in recordings:
+        first = recording.observations[0]
+        names = [identity.rpartition('/')[0] for identity in first.ids]
+        taken = {name: 'left' if side == LEFT else 'right' for name, side in zip(names, first.truth.sides, strict=True)}
+        labelled = [each.rpartition('=') for each in labels.get(recording.name, '').split()]
+        others = [
+            f'{name} label {side}, path {taken[full]}'
+            for name, _, side in labelled
+            for full, is_ahead in zip(names, first.truth.is_ahead, strict=True)
+            if is_ahead and full.endswith(name) and taken[full] != side
+        ]
+        if others or recording.name not in labels:
+            found[recording.name] = '; '.join(others) or 'no label'
     return found
 
 

@@ -2,7 +2,9 @@
 
 Obstacles whose extents along the direction of movement overlap stand in one row, which the hand passes through one of its gaps;
 an obstacle by itself is a row with two gaps. In a row of m obstacles a path that does not turn back takes one of m + 1 gaps, so
-that rows of m_1, m_2, ... obstacles leave (m_1 + 1)(m_2 + 1)... homotopy classes.
+that rows of m_1, m_2, ... obstacles leave (m_1 + 1)(m_2 + 1)... homotopy classes. A gap that is too narrow for the hand is none.
+
+A wall, along which the hand moves from the start to the goals, is in no row: it bounds the outer gaps of the rows.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from numpy.typing import NDArray
 
 from foc_ros.analysis.goal_reached import find_reached_goal
 from foc_ros.core.homotopy import compute_swept_angles
+from foc_ros.core.obstacles.rounded_polygon import measure_offsets
 from foc_ros.core.types import LEFT, NANOSECONDS, RIGHT, Array, Obstacles, Record
 
 TIMES_S = tuple(0.125 * step for step in range(1, 9))
@@ -26,6 +29,8 @@ RESOLUTION = 0.02
 Bools = NDArray[np.bool_]
 Sides = NDArray[np.int8]
 Rows = NDArray[np.int64]
+WALL = -1
+"""The row of an obstacle that is in none."""
 
 
 class RecordedPath:
@@ -80,7 +85,7 @@ def find_ground_truth(
     row_position, position = locate_rows(obstacles.centre @ direction, row), path.positions @ direction
     return GroundTruth(
         sides=find_sides(path.positions[now:], centres),
-        is_ahead=find_rows_ahead(row_position, position[now:])[row],
+        is_ahead=np.append(find_rows_ahead(row_position, position[now:]), False)[row],
         goal=path.goal if np.array_equal(goals, path.goals) else None,
         positions=path.interpolate(stamp_ns, np.array(TIMES_S)),
         progress=float(path.progress[now]),
@@ -95,17 +100,79 @@ def find_direction(start: Array, goals: Array) -> Array:
     return offset / length if length > 0.0 else np.array([1.0, 0.0])
 
 
-def find_rows(centre: Array, radius: Array, direction: Array) -> Rows:
-    """Return the row (n,) of each obstacle, counted along a unit vector (2,); centre (n, 2), radius (n,) [m]."""
-    position = centre @ direction
-    row = np.zeros(len(position), dtype=np.int64)
+def find_rows(obstacles: Obstacles, direction: Array, start: Array, goals: Array) -> Rows:
+    """Return the row (n,) of each obstacle, counted along a unit vector (2,), or WALL; start (2,), goals (g, 2) [m]."""
+    low, high = _find_extents(obstacles, direction)
+    row = np.full(len(obstacles), WALL, dtype=np.int64)
     number, end = -1, -np.inf
-    for each in np.argsort(position - radius, kind='stable'):
-        if position[each] - radius[each] > end:
+    is_wall = find_walls(obstacles, np.vstack([start, goals]))
+    for each in np.argsort(low, kind='stable'):
+        if is_wall[each]:
+            continue
+        if low[each] > end:
             number += 1
-        end = max(end, position[each] + radius[each])
+        end = max(end, high[each])
         row[each] = number
     return row
+
+
+def find_walls(obstacles: Obstacles, points: Array) -> Bools:
+    """Tell which obstacles (n,) have an edge beside which all points (q, 2) [m] lie: outside of it, and between its ends."""
+    is_wall = np.zeros(len(obstacles), dtype=bool)
+    for j in range(len(obstacles)):
+        corners = obstacles.centre[j] + obstacles.vertices[j, : obstacles.corners[j]]
+        edges = np.roll(corners, -1, axis=0) - corners
+        offset = points[:, None] - corners
+        along = (offset * edges).sum(axis=2)
+        is_outside = edges[:, 0] * offset[..., 1] - edges[:, 1] * offset[..., 0] < 0.0
+        is_beside = is_outside & (along > 0.0) & (along < (edges**2).sum(axis=1))
+        is_wall[j] = is_beside.all(axis=0).any()
+    return is_wall
+
+
+def find_open_gaps(obstacles: Obstacles, row: Rows, direction: Array, hand_radius: float) -> tuple[Sides, ...]:
+    """Return for each row the sides (k, n) on which a path through one of its k open gaps passes its obstacles, 0 for all others.
+
+    A gap is open if it is wider than the hand, hand_radius [m]; the outer gaps of a row are those between it and the walls.
+    """
+    left = np.array([-direction[1], direction[0]])
+    distance = _measure_distances(obstacles)
+    walls = np.flatnonzero(row == WALL)
+    found = []
+    for number in range(int(row.max(initial=WALL)) + 1):
+        members = np.flatnonzero(row == number)
+        members = members[np.argsort(obstacles.centre[members] @ left, kind='stable')]
+        inner = distance[members[:-1], members[1:]]
+        ends = [
+            _find_walls_beside(obstacles, walls, member, side * left) for member, side in ((members[0], -1), (members[-1], 1))
+        ]
+        outer = [distance[member, beside].min(initial=np.inf) for member, beside in zip(members[[0, -1]], ends, strict=True)]
+        is_open = np.array([outer[0], *inner, outer[1]]) > 2.0 * hand_radius
+        sides = np.zeros((len(members) + 1, len(obstacles)), dtype=np.int8)
+        sides[:, members] = np.where(np.arange(len(members)) < np.arange(len(members) + 1)[:, None], LEFT, RIGHT)
+        found.append(sides[is_open])
+    return tuple(found)
+
+
+def _find_walls_beside(obstacles: Obstacles, walls: NDArray[np.intp], member: int, outwards: Array) -> NDArray[np.intp]:
+    """Return those walls whose nearest point is beside an obstacle, where a unit vector (2,) points, rather than ahead of it."""
+    towards = -measure_offsets(obstacles.centre[member], obstacles.take(walls))[0][0]
+    is_beside: Bools = towards @ outwards >= np.abs(towards @ [outwards[1], -outwards[0]])
+    return walls[is_beside]
+
+
+def _find_extents(obstacles: Obstacles, direction: Array) -> tuple[Array, Array]:
+    """Return the ends (n,) of the obstacles along a unit vector (2,) [m]."""
+    along, position = obstacles.vertices @ direction, obstacles.centre @ direction
+    return position + along.min(axis=1) - obstacles.radius, position + along.max(axis=1) + obstacles.radius
+
+
+def _measure_distances(obstacles: Obstacles) -> Array:
+    """Return the distances (n, n) [m] between obstacles; two convex polygons that are apart are nearest at a vertex of one."""
+    corners = obstacles.centre[:, None] + obstacles.vertices
+    nearest = measure_offsets(corners, obstacles)[1].reshape(*corners.shape[:2], len(obstacles)).min(axis=1)
+    distance: Array = np.minimum(nearest, nearest.T) - obstacles.radius[:, None] - obstacles.radius
+    return distance
 
 
 def locate_rows(position: Array, row: Rows) -> Array:

@@ -29,6 +29,7 @@ from .ground_truth import (
     Sides,
     find_direction,
     find_ground_truth,
+    find_open_gaps,
     find_rows,
     find_sides,
 )
@@ -72,8 +73,9 @@ class CandidateTable(Record):
 class Observation(Record):
     """One prediction at stamp_ns, from a hand with mean hand (6,), movement_age_s after the onset of its movement (0 at rest).
 
-    ids, centre (n, 2) [m]: of the obstacles at that stamp; row (n,): the row of each obstacle, 0 first; direction (2,): the unit
-    vector along which rows are ordered; goals (g, 2) [m]; candidates; most_likely: the leading label after hysteresis; truth.
+    ids, centre (n, 2) [m]: of the obstacles at that stamp; row (n,): the row of each obstacle, 0 first, -1 for a wall; gaps: for
+    each row the sides (k, n) on which paths through its open gaps pass its obstacles; direction (2,): the unit vector along which
+    rows are ordered; goals (g, 2) [m]; candidates; most_likely: the leading label after hysteresis; truth.
     """
 
     stamp_ns: int
@@ -82,6 +84,7 @@ class Observation(Record):
     ids: tuple[str, ...]
     centre: Array
     row: Rows
+    gaps: tuple[Sides, ...]
     direction: Array
     goals: Array
     candidates: CandidateTable
@@ -121,19 +124,19 @@ def observe(recording: Recording, config: Config) -> ObservedRecording:
     goals = made[-1][0].scene.goals
     assert goals is not None
     path = RecordedPath(np.array(stamps), np.array(positions), goals)
-    found = [make_observation(step, hand, path, config.duration) for step, hand in made if hand.stamp_ns <= path.end_ns]
+    found = [make_observation(step, hand, path, config) for step, hand in made if hand.stamp_ns <= path.end_ns]
     if not found:
         raise RecordingError(f'{recording.name}: nothing was predicted before its goal was reached')
     return ObservedRecording(recording.name, tuple(found))
 
 
-def make_observation(step: Step, hand: HandState, path: RecordedPath, duration: DurationConfig) -> Observation:
+def make_observation(step: Step, hand: HandState, path: RecordedPath, config: Config) -> Observation:
     """Return one prediction, with the hand that it was made from, beside what came: path is the whole path of the hand."""
     prediction, goals = step.prediction, step.scene.goals
     assert prediction is not None and goals is not None
     obstacles = step.scene.obstacles(prediction.stamp_ns)
     direction = find_direction(path.positions[0], goals)
-    row = find_rows(obstacles.centre, obstacles.radius, direction)
+    row = find_rows(obstacles, direction, path.positions[0], goals)
     return Observation(
         stamp_ns=prediction.stamp_ns,
         hand=hand.mean,
@@ -141,9 +144,10 @@ def make_observation(step: Step, hand: HandState, path: RecordedPath, duration: 
         ids=obstacles.ids,
         centre=obstacles.centre,
         row=row,
+        gaps=find_open_gaps(obstacles, row, direction, config.scene.hand_radius),
         direction=direction,
         goals=goals,
-        candidates=_tabulate_candidates(prediction, obstacles, hand.effort_spent, duration),
+        candidates=_tabulate_candidates(prediction, obstacles, hand.effort_spent, config.duration),
         most_likely=prediction.most_likely,
         truth=find_ground_truth(prediction.stamp_ns, path, obstacles, row, direction, goals),
     )

@@ -4,21 +4,22 @@
 - `gap`: the same for the next row of obstacles only.
 - `goal`: which goal will it reach?
 
-A question is put only where at least two answers are possible: rows of m_1, m_2, ... obstacles have (m_1 + 1)(m_2 + 1)... and g
-goals have g. Candidates may also weave through a row; such an answer can be given, but a uniform guess does not count it.
+A question is put only where at least two answers are possible: rows of m_1, m_2, ... obstacles have (m_1 + 1)(m_2 + 1)... unless
+a gap is too narrow for the hand, and g goals have g. Candidates may also weave through a row; such an answer can be given, but a
+uniform guess does not count it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.types import LEFT, Record
+from foc_ros.core.types import Record
 
+from .ground_truth import Sides
 from .observations import Observation, ObservedRecording
 
 PATH_CLASS, GAP, GOAL = 'way', 'gap', 'goal'
@@ -81,11 +82,14 @@ def ask(name: str, observation: Observation, relevant: frozenset[str]) -> Questi
         ahead = ahead[observation.row[ahead] == observation.row[ahead].min()]
     if not len(ahead):
         return None
-    _, members = np.unique(observation.row[ahead], return_counts=True)
+    through = [np.unique(gaps[:, members], axis=0) for gaps, members in _split_by_row(observation, ahead)]
+    possible = int(np.prod([len(each) for each in through]))
+    if possible < 2:
+        return None
     given = [tuple(each) for each in observation.candidates.sides[:, ahead].tolist()]
     answers, indices = _index_answers([*given, tuple(observation.truth.sides[ahead].tolist())])
     is_possible = np.array([_leads_through_one_gap_each(answer, observation, ahead) for answer in answers])
-    return Question(name, ahead, int(np.prod(members + 1)), answers, indices[:-1], is_possible, int(indices[-1]))
+    return Question(name, ahead, possible, answers, indices[:-1], is_possible, int(indices[-1]))
 
 
 def _ask_goal(observation: Observation) -> Question | None:
@@ -102,12 +106,14 @@ def _index_answers(given: Iterable[Answer]) -> tuple[tuple[Answer, ...], NDArray
     return tuple(indices), np.array(order, dtype=np.intp)
 
 
+def _split_by_row(observation: Observation, ahead: NDArray[np.intp]) -> Iterator[tuple[Sides, NDArray[np.intp]]]:
+    """Yield for each row ahead the sides of its open gaps, and its obstacles among those ahead."""
+    for number in np.unique(observation.row[ahead]):
+        yield observation.gaps[number], ahead[observation.row[ahead] == number]
+
+
 def _leads_through_one_gap_each(answer: Answer, observation: Observation, ahead: NDArray[np.intp]) -> bool:
-    """Tell whether sides lead through one gap of each row: left of its rightmost obstacles, right of all the others."""
-    offset = observation.centre[ahead] @ observation.left
-    for row in np.unique(observation.row[ahead]):
-        members = np.flatnonzero(observation.row[ahead] == row)
-        is_left = [answer[member] == LEFT for member in members[np.argsort(offset[members], kind='stable')]]
-        if any(later and not earlier for earlier, later in pairwise(is_left)):
-            return False
-    return True
+    """Tell whether sides lead through one open gap of each row."""
+    sides = np.zeros(len(observation.ids), dtype=np.int8)
+    sides[ahead] = answer
+    return all((gaps[:, members] == sides[members]).all(axis=1).any() for gaps, members in _split_by_row(observation, ahead))

@@ -101,7 +101,7 @@ def make_reach(hand: RecordedHand, config: Config) -> Reach:
         build_triple_integrator_horizon(dt, steps),
         np.concatenate([_estimate_start(times, hand.positions), np.zeros(4)]),
         hand.goals[goal],
-        hand.obstacles,
+        hand.obstacles.grow(config.scene.hand_radius),
         scale_noise(np.array([config.foc.noise_x, config.foc.noise_y]), REFERENCE_STEP_S, dt),
         config.foc.eta,
         passing=is_passing(config.duration),

@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.ground_truth import find_direction, find_rows, locate_rows
+from foc_ros.analysis.evaluation.ground_truth import find_direction, find_open_gaps, find_rows, locate_rows
 from foc_ros.core.config import ARRIVALS, Config, flatten, replace_values
 
 from .duration_fit import CONSTANTS, fit_other_models
@@ -50,7 +50,7 @@ def make_movement_settings(hands: Sequence[RecordedHand], config: Config) -> lis
 
 def fit_max_candidates(hands: Sequence[RecordedHand], config: Config) -> tuple[Estimates, list[str]]:
     """Return the number of candidates that has room for every goal and path class, never less than the given one."""
-    classes, goals = max(count_classes(each) for each in hands), max(len(each.goals) for each in hands)
+    classes, goals = max(count_classes(each, config.scene.hand_radius) for each in hands), max(len(each.goals) for each in hands)
     given = config.homotopy.max_candidates
     count = int(clip_to_bounds(CANDIDATES, max(given, min(classes, MAX_CLASSES), goals)))
     warnings = [f'{CANDIDATES}: a recording has {classes} homotopy classes, {count} are followed'] if classes > count else []
@@ -59,14 +59,15 @@ def fit_max_candidates(hands: Sequence[RecordedHand], config: Config) -> tuple[E
     return {CANDIDATES: Estimate(CANDIDATES, count, count, count, 'classes and goals in the recordings')}, warnings
 
 
-def count_classes(hand: RecordedHand) -> int:
-    """Return how many path classes lead through the rows of obstacles between the start and the farthest goal."""
+def count_classes(hand: RecordedHand, hand_radius: float = 0.0) -> int:
+    """Return how many path classes lead a hand of a radius [m] through the rows between the start and the farthest goal."""
     start, obstacles = hand.positions[0], hand.obstacles
     direction = find_direction(start, hand.goals)
-    row = find_rows(obstacles.centre, obstacles.radius, direction)
+    row = find_rows(obstacles, direction, start, hand.goals)
     position = locate_rows(obstacles.centre @ direction, row)
     is_between = (position > start @ direction) & (position < (hand.goals @ direction).max())
-    return int(np.prod(np.bincount(row, minlength=len(position))[is_between] + 1.0))
+    open_gaps = [len(each) for each in find_open_gaps(obstacles, row, direction, hand_radius)]
+    return int(np.prod(np.array(open_gaps, dtype=float)[is_between]))
 
 
 def _scale(config: Config, powers: Mapping[str, float], factor: float) -> Config:

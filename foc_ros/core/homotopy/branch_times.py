@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.obstacles.chance_constraint import centre_trajectories
+from foc_ros.core.obstacles.rounded_polygon import measure_offsets
 from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Record
 
 from .sides import compute_swept_angles
@@ -42,7 +43,8 @@ def compute_branch_times(outcomes: Sequence[PredictedCandidate], obstacles: Obst
     for solution in [outcome.solution for outcome in outcomes]:
         centre = centre_trajectories(obstacles.centre, solution.dt * obstacles.velocity, len(solution.mean) - 1)
         angles.append(compute_swept_angles(solution.path, centre))
-        times.append(solution.times[((solution.path[:, None] - centre) ** 2).sum(axis=2).argmin(axis=0)])
+        _, distance = measure_offsets(solution.path, obstacles, centre)
+        times.append(solution.times[distance.argmin(axis=0)])
     swept, passing_s = np.array(angles), np.array(times)
     is_opposite = np.abs(swept[:, None] - swept) > np.pi
     after_s = np.where(is_opposite, np.minimum(passing_s[:, None], passing_s), np.inf).min(axis=2, initial=np.inf)

@@ -16,6 +16,7 @@ import numpy as np
 
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.kernels import Indices, Vector
+from foc_ros.core.obstacles.rounded_polygon import Polygons, find_offsets
 from foc_ros.core.types import LEFT, RIGHT, Array
 
 from .guesses import TautPath, lay_out
@@ -25,13 +26,13 @@ from .sides import compute_swept_angles
 from .tangent_graph import GRAZE, TangentGraph, build_tangent_graph, connect_hand
 
 FEW, MOST = 16, 64
-"""So many circles are always in the graph together; a graph grows up to the larger number."""
+"""So many shapes are always in the graph together; a graph grows up to the larger number."""
 CLOSE = 1.02
-"""Excess of the circles that the graph of a crowd begins with: the best paths through a crowd are nearly straight."""
+"""Excess of the shapes that the graph of a crowd begins with: the best paths through a crowd are nearly straight."""
 GROWTH = 4.0
 """A larger graph takes at least this times as long to build; it is not begun if there is less time left."""
 FINENESS = 257
-"""Number of points at which a path is compared with circles that are not in its graph."""
+"""Number of points at which a path is compared with shapes that are not in its graph."""
 NANO = 1e9
 
 
@@ -102,7 +103,7 @@ def find_classes(scene: SearchScene, query: ClassQuery, notes: Counter[str], is_
     is_shared = query.deadline.at is None
     excess = scene.excess.min(axis=0) if is_shared else scene.excess[query.goal]
     nearest: list[int] = np.argsort(excess, kind='stable').tolist()
-    rows, given = _choose_circles(excess if is_shared else None, named, nearest), set[str]()
+    rows, given = _choose_shapes(excess if is_shared else None, named, nearest), set[str]()
     while True:
         together = len(scene.goals) if is_shared else max(1, MOST // max(len(rows), 1))
         before_s = query.deadline.left_s
@@ -132,7 +133,7 @@ def find_classes(scene: SearchScene, query: ClassQuery, notes: Counter[str], is_
             rows = nearest[: min(2 * len(rows), MOST)]
 
 
-def _choose_circles(excess: Vector | None, named: list[int], nearest: list[int]) -> list[int]:
+def _choose_shapes(excess: Vector | None, named: list[int], nearest: list[int]) -> list[int]:
     """Return the rows to begin with: all of a few obstacles, the named ones of many if they are few, or the close ones.
 
     excess: None for a small first step, where time is limited.
@@ -149,8 +150,9 @@ def _build_partial_graph(
     excess (n,): see `SearchScene`; together: number of goals that share a graph.
     """
     first = goal // together * together
-    arrays = scene.centre[rows], scene.radius[goal, rows], scene.goals[first : first + together], scene.hand
-    graph = _build_graph(*[array.tobytes() for array in arrays])
+    shapes = scene.centre[rows], scene.radius[goal, rows], *scene.take_polygons(goal, rows)
+    points = scene.goals[first : first + together], scene.hand
+    graph = _build_graph(*[array.tobytes() for array in (*shapes, *points)])
     others = np.delete(np.arange(len(scene.centre)), rows)
     limit = float(excess[others].min(initial=np.inf)) * math.dist(scene.goals[goal], scene.hand)
     is_enough = len(rows) >= MOST or set(rows).issuperset(named)
@@ -158,22 +160,24 @@ def _build_partial_graph(
 
 
 @lru_cache(maxsize=4)
-def _build_graph(centre: bytes, radius: bytes, goals: bytes, hand: bytes) -> TangentGraph:
-    """Build the graph of some circles with a hand; kept for the other goals of the same search."""
+def _build_graph(centre: bytes, radius: bytes, vertices: bytes, corners: bytes, goals: bytes, hand: bytes) -> TangentGraph:
+    """Build the graph of some shapes with a hand; kept for the other goals of the same search."""
     points = np.frombuffer(centre).reshape(-1, 2), np.frombuffer(radius), np.frombuffer(goals).reshape(-1, 2)
-    return connect_hand(build_tangent_graph(*points), np.frombuffer(hand))
+    n = len(points[1])
+    polygons = Polygons(np.frombuffer(vertices).reshape(n, -1 if n else 1, 2), np.frombuffer(corners, dtype=np.intp))
+    return connect_hand(build_tangent_graph(*points, polygons), np.frombuffer(hand))
 
 
 def _count_classes(partial: PartialGraph) -> int:
-    """Return the largest number of classes: two for each cluster of named circles that overlap."""
+    """Return the largest number of classes: two for each cluster of named shapes that overlap."""
     clusters = {
-        cluster for row, cluster in zip(partial.rows, partial.graph.circles.cluster.tolist(), strict=True) if row in partial.named
+        cluster for row, cluster in zip(partial.rows, partial.graph.shapes.cluster.tolist(), strict=True) if row in partial.named
     }
     return 1 << len(clusters) + len(set(partial.named).difference(partial.rows))
 
 
 def _find_named_paths(scene: SearchScene, partial: PartialGraph, query: ClassQuery, notes: Counter[str]) -> Iterator[PathClass]:
-    """Yield the classes of the paths over a graph, by their rank. A class may come again if the graph lacks named circles."""
+    """Yield the classes of the paths over a graph, by their rank. A class may come again if the graph lacks named shapes."""
     place = {row: place for place, row in enumerate(partial.rows)}
     held = [row for row in partial.named if row in place]
     bearing_change, is_complete = scene.bearing_change[query.goal, held], len(held) == len(partial.named)
@@ -203,7 +207,8 @@ def _find_named_paths(scene: SearchScene, partial: PartialGraph, query: ClassQue
 
 def _find_met(scene: SearchScene, found: PathClass, others: Indices) -> list[int]:
     """Return those of other obstacles (rows) that a path meets."""
-    apart = found.lay_out().space_points(FINENESS)[:, None] - scene.centre[others]
-    is_met = np.hypot(apart[..., 0], apart[..., 1]) < scene.radius[found.goal, others] - GRAZE
+    points = found.lay_out().space_points(FINENESS)
+    _, distance = find_offsets(points, scene.centre[None, others], scene.take_polygons(found.goal, others))
+    is_met = distance < scene.radius[found.goal, others] - GRAZE
     met: list[int] = others[is_met.any(axis=0)].tolist()
     return met

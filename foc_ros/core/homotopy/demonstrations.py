@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from foc_ros.core.config import HomotopyConfig
+from foc_ros.core.obstacles.boundary import find_segment_squares
+from foc_ros.core.obstacles.rounded_polygon import measure_offsets, tabulate_polygons
 from foc_ros.core.types import Array, Candidate, HandState, Obstacles, Record
 
 from .class_search import name_course
@@ -131,13 +133,9 @@ def _deform(path: Array, hand: Array, goal: Array) -> Array | None:
 
 def _is_free(path: Array, obstacles: Obstacles) -> bool:
     """Tell whether no segment of a path runs through an obstacle, other than those that hold its first point."""
-    step = np.diff(path, axis=0)[:, None]
-    start = obstacles.centre - path[:-1, None]
-    squared = np.maximum((step**2).sum(2), np.finfo(float).tiny)
-    share = np.clip((start * step).sum(2) / squared, 0.0, 1.0)
-    distance = np.hypot(*(start - share[..., None] * step).transpose(2, 0, 1))
-    is_outside = np.hypot(*(obstacles.centre - path[0]).T) > obstacles.radius
-    return not bool(((distance < obstacles.radius) & is_outside).any())
+    squares = find_segment_squares(np.ascontiguousarray(path), obstacles.centre, tabulate_polygons(obstacles))
+    _, distance = measure_offsets(path[:1], obstacles)
+    return not bool(((squares < obstacles.radius**2) & (distance[0] > obstacles.radius)).any())
 
 
 def _is_near(points: Array, others: Array) -> bool:

@@ -7,11 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.core.kernels import Indices, Matrix, Vector, compiled_exactly
+from foc_ros.core.kernels import Indices, Matrix, Vector, compiled_exactly, freeze
+from foc_ros.core.obstacles.rounded_polygon import Polygons, find_offsets
 from foc_ros.core.types import Array, as_readonly
 
 from .search_scene import SearchScene
-from .tangent_graph import Circles, Runs, TangentGraph, measure_arc
+from .sides import TURN
+from .tangent_graph import Outlines, Runs, TangentGraph, measure_arc_between
 
 SLOPE = 0.5
 """A hand in a margin leaves it by this much for each metre of its path, and enters the margin of its goal likewise."""
@@ -77,28 +79,57 @@ class TautPath(NamedTuple):
 
 
 @compiled_exactly
-def lay_out_runs(circles: Circles, runs: Runs, path: Indices) -> TautPath:
-    """Lay out a path that is given by its runs (p,)."""
-    pieces, length = 2 * len(path), 0.0
-    begin, start, heading, bend = np.empty(pieces), np.empty((pieces, 2)), np.empty((pieces, 2)), np.zeros(pieces)
+def lay_out_runs(outlines: Outlines, runs: Runs, path: Indices) -> TautPath:
+    """Lay out a path that is given by its runs (p,): an arc along a shape has a piece about each vertex and along each edge."""
+    boundaries = outlines.boundaries
+    most, piece, length = len(path) * (2 * outlines.polygons.vertices.shape[1] + 4), 0, 0.0
+    begin, start, heading, bend = np.empty(most), np.empty((most, 2)), np.empty((most, 2)), np.zeros(most)
     for place, run in enumerate(path):
-        straight, arc, size = 2 * place, 2 * place + 1, 0.0
-        start[straight], start[arc] = runs.start[run], runs.end[run]
-        heading[straight], heading[arc] = runs.heading[run], runs.heading[run]
-        if place + 1 < len(path):
-            circle, sense = runs.head[run] >> 1, 2 * (runs.head[run] & 1) - 1
-            bend[arc] = sense / circles.radius[circle]
-            size = circles.radius[circle] * max(measure_arc(runs.leave_angle[path[place + 1]], runs.reach_angle[run], sense), 0.0)
         length += runs.length[run]
-        begin[straight] = length - runs.length[run]
+        begin[piece], start[piece], heading[piece] = length - runs.length[run], runs.start[run], runs.heading[run]
+        piece, size = piece + 1, 0.0
+        start[piece], heading[piece] = runs.end[run], runs.heading[run]
+        if place + 1 < len(path):
+            row, sense, following = runs.head[run] >> 1, 2 * (runs.head[run] & 1) - 1, path[place + 1]
+            corners, radius, vertex, angle = (
+                outlines.polygons.corners[row],
+                outlines.radius[row],
+                runs.reach_vertex[run],
+                runs.reach_angle[run],
+            )
+            _, is_past_beginning = measure_arc_between(outlines, runs, run, following)
+            while corners > 1 and (vertex != runs.leave_vertex[following] or is_past_beginning):
+                after = (vertex + sense) % corners
+                # an edge has the number of the vertex at its end, anticlockwise
+                edge, ahead = (after, 1) if sense > 0 else (vertex, 0)
+                normal_x, normal_y = boundaries.normal[row, edge, 0], boundaries.normal[row, edge, 1]
+                size = radius * max(sense * (boundaries.angle[row, vertex + ahead] - angle), 0.0)
+                length += size
+                begin[piece], bend[piece] = length - size, sense / radius
+                x, y = outlines.centre[row, 0] + radius * normal_x, outlines.centre[row, 1] + radius * normal_y
+                from_edge = vertex if sense > 0 else after
+                size = boundaries.edge[row, from_edge + 1] - boundaries.edge[row, from_edge]
+                length += size
+                begin[piece + 1] = length - size
+                for each, corner in ((piece + 1, vertex), (piece + 2, after)):
+                    start[each, 0], start[each, 1] = (
+                        x + outlines.polygons.vertices[row, corner, 0],
+                        y + outlines.polygons.vertices[row, corner, 1],
+                    )
+                    heading[each, 0], heading[each, 1] = -sense * normal_y, sense * normal_x
+                is_past_beginning &= edge != 0
+                piece, vertex, angle = piece + 2, after, boundaries.angle[row, after + 1 - ahead]
+            turn = sense * (runs.leave_angle[following] - angle) + (TURN if is_past_beginning else 0.0)
+            bend[piece], size = sense / radius, radius * max(turn, 0.0)
         length += size
-        begin[arc] = length - size
-    return TautPath(begin, start, heading, bend)
+        begin[piece] = length - size
+        piece += 1
+    return TautPath(begin[:piece], start[:piece], heading[:piece], bend[:piece])
 
 
 def lay_out(graph: TangentGraph, path: Sequence[int]) -> TautPath:
     """Lay out a path that is given by its runs in a graph."""
-    return lay_out_runs(graph.circles, graph.runs, np.array(path, dtype=np.intp))
+    return lay_out_runs(graph.outlines, graph.runs, np.array(path, dtype=np.intp))
 
 
 def timed(path: Array, velocity: Array, duration_s: float, steps: int) -> Array:
@@ -117,19 +148,21 @@ def compute_path_lengths(path: Array) -> Array:
 def build_guess(scene: SearchScene, path: TautPath, goal: int, velocity: Array, duration_s: float, steps: int) -> Array:
     """Return the positions (N + 1, 2) [m] at steps 0..N of a hand with a velocity (2,) [m/s] that follows a path, read-only.
 
-    The taut path touches no circle. If hand or goal lies in the margin of an obstacle, the guess leaves or enters the margin
+    The taut path enters no shape. If hand or goal lies in the margin of an obstacle, the guess leaves or enters the margin
     gradually, straight away from the obstacle, as far as other obstacles are not in the way.
     """
     along = compute_progress(path.length, float(path.heading[0] @ velocity), duration_s, steps)
     points = path.evaluate(along)
     for k in np.flatnonzero(scene.holds_hand | scene.holds_goal[goal]):
-        apart = points - scene.centre[k]
-        distance = np.hypot(*apart.T)
+        polygon = freeze(Polygons(scene.polygons.vertices[k : k + 1], scene.polygons.corners[k : k + 1]))
+        offsets, signed = find_offsets(points, scene.centre[None, k : k + 1], polygon)
+        apart, distance = offsets[:, 0], signed[:, 0]
         wanted = np.full(len(points), scene.wanted_radius[k])
         if scene.holds_hand[k]:
             wanted = np.minimum(wanted, distance[0] + SLOPE * along)
         if scene.holds_goal[goal, k]:
             wanted = np.minimum(wanted, distance[-1] + SLOPE * (along[-1] - along))
-        is_pushed = (distance > 0.0) & (distance < wanted)
-        points[is_pushed] = scene.centre[k] + apart[is_pushed] * (wanted / np.maximum(distance, 1e-300))[is_pushed, None]
+        is_pushed = (distance != 0.0) & (distance < wanted)
+        nearest = scene.centre[k] + (points - scene.centre[k] - apart)
+        points[is_pushed] = (nearest + apart * (wanted / np.where(distance == 0.0, 1.0, distance))[:, None])[is_pushed]
     return as_readonly(points)

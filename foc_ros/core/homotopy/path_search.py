@@ -20,7 +20,7 @@ from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.kernels import Indices, Matrix, Register, Table, Vector, compiled_exactly, freeze
 
 from .sides import TURN
-from .tangent_graph import TURN_BACK, TangentGraph
+from .tangent_graph import TangentGraph, measure_arc_between
 
 COAST_S = 0.2
 """A path that leaves at an angle p to the velocity v ranks as if |v| (1 - cos p) times this longer: a hand coasts first."""
@@ -35,7 +35,7 @@ GROWTH = 4.0
 class PathQuery(NamedTuple):
     """Which paths to look for.
 
-    goal: row; velocity (2,): of the hand [m/s]; named (k,): the circles of the graph that signatures count; bearing_change (k,):
+    goal: row; velocity (2,): of the hand [m/s]; named (k,): the shapes of the graph that signatures count; bearing_change (k,):
     direction of the goal less direction of the hand, as seen from these [rad]; is_complete: whether signatures distinguish all
     classes (if not, paths that arrive by different runs may be of different classes); max_key [m]; max_states: number to look
     at; max_paths: number of paths at which the search ends, as there are no more classes.
@@ -54,7 +54,7 @@ class PathQuery(NamedTuple):
 class Arrival(NamedTuple):
     """A path that has reached the goal.
 
-    key: length plus what coasting adds [m]; runs: of the graph; swept (k,): angles about the named circles [rad].
+    key: length plus what coasting adds [m]; runs: of the graph; swept (k,): angles about the named shapes [rad].
     """
 
     key: float
@@ -116,16 +116,16 @@ def find_shortest_paths(
 def extend_signature(graph: TangentGraph, named: Indices, before: int, run: int, signature: Register) -> None:
     """Add what a path crosses on a run, and on the arc from the run before, to a signature (k,); before: -1 if there is none."""
     runs = graph.runs
-    for k, circle in enumerate(named):
-        signature[k] += runs.crossings[run, circle]
+    for k, shape in enumerate(named):
+        signature[k] += runs.crossings[run, shape]
     if before >= 0:
         node = runs.head[before]
         sense = 2 * (node & 1) - 1
-        is_past_east = sense * (runs.leave_angle[run] - runs.reach_angle[before]) < -TURN_BACK
-        for k, circle in enumerate(named):
-            signature[k] -= runs.end_crossings[before, circle]
-            # an arc that passes angle 0 of its circle goes round all centres that the circle holds once more
-            if is_past_east and graph.circles.holds[node >> 1, circle]:
+        _, is_past_beginning = measure_arc_between(graph.outlines, runs, before, run)
+        for k, shape in enumerate(named):
+            signature[k] -= runs.end_crossings[before, shape]
+            # an arc that passes the beginning of the boundary goes round all centres that the shape holds once more
+            if is_past_beginning and graph.shapes.holds[node >> 1, shape]:
                 signature[k] += sense
 
 
@@ -143,11 +143,11 @@ def find_arrivals(graph: TangentGraph, query: PathQuery, most: int) -> Arrivals:
     """Find the shortest paths to a goal, until there are `most` groups of equally long ones.
 
     The estimate for a path is its key plus the length of the shortest path from its end to the goal, whatever the signature. A
-    path that winds about a named circle is not followed.
+    path that winds about a named shape is not followed.
     """
-    circles, runs, k = graph.circles, graph.runs, len(query.named)
+    n, runs, k = len(graph.shapes.extent), graph.runs, len(query.named)
     rest, arcs = graph.rest[query.goal], graph.arcs
-    goal_node, hand_runs = 2 * (len(circles.radius) + query.goal) + 1, graph.first_run[-1]
+    goal_node, hand_runs = 2 * (n + query.goal) + 1, graph.first_run[-1]
     # of each state: run, state before it, signature, and the state that was the last one with this run
     states, run_of, parent_of = 0, np.empty(query.max_states, np.intp), np.empty(query.max_states, np.intp)
     signatures, older = np.empty((query.max_states, k), np.intp), np.empty(query.max_states, np.intp)
@@ -175,7 +175,7 @@ def find_arrivals(graph: TangentGraph, query: PathQuery, most: int) -> Arrivals:
         if (np.abs(signatures[states]) > 1).any() or is_known(signatures, older, states):
             continue
         newest[place] = states
-        if runs.head[run] < 2 * len(circles.radius):
+        if runs.head[run] < 2 * n:
             for arc in range(arcs.first[run], arcs.first[run + 1]):
                 following, extended = arcs.after[arc], key + arcs.step[arc]
                 if extended + rest[following] < query.max_key:

@@ -10,6 +10,7 @@ import numpy as np
 
 from foc_ros.core.errors import SceneError
 from foc_ros.core.kernels import Flags, Matrix, Tensor, Vector, compiled_exactly
+from foc_ros.core.obstacles.rounded_polygon import Polygons, tabulate_polygons
 from foc_ros.core.types import LEFT, RIGHT, Array, Obstacles
 
 TURN = 2.0 * np.pi
@@ -27,9 +28,9 @@ def compute_swept_angles(path: Array, centres: Array) -> Array:
 def find_path_sides(path: Array, obstacles: Obstacles, centres: Array | None = None) -> dict[str, int]:
     """Find the side on which a path passes each obstacle.
 
-    A path that sweeps clockwise about a centre passes the obstacle on the left. A path passes an obstacle if the foot of the
-    centre on the chord from the first to the last point lies strictly between the two, or if the path winds about the centre by
-    more than half a turn. If the obstacle moves, points are relative to it.
+    A path that sweeps clockwise about a centre passes the obstacle on the left. A path passes an obstacle if the foot of
+    some point of its polygon on the chord from the first to the last point lies strictly between the two, or if the path winds
+    about the centre by more than half a turn. If the obstacle moves, points are relative to it.
 
     Parameters
     ----------
@@ -52,7 +53,7 @@ def find_path_sides(path: Array, obstacles: Obstacles, centres: Array | None = N
     """
     path, centres = _check_shapes(path, obstacles.centre if centres is None else centres)
     angles = sweep_angles(path, centres)
-    is_passed = find_passed(path, centres, angles).tolist()
+    is_passed = find_passed(path, centres, tabulate_polygons(obstacles), angles).tolist()
     return {identity: LEFT if angles[k] < 0.0 else RIGHT for k, identity in enumerate(obstacles.ids) if is_passed[k]}
 
 
@@ -92,14 +93,20 @@ def is_same_class(angles: Vector, others: Vector) -> bool:
 
 
 @compiled_exactly
-def find_passed(path: Matrix, centres: Tensor, angles: Vector) -> Flags:
-    """Tell which centres (m, n, 2) or (1, n, 2) a path (m, 2) passes that sweeps the angles (n,) about them; 15 us in NumPy."""
+def find_passed(path: Matrix, centres: Tensor, polygons: Polygons, angles: Vector) -> Flags:
+    """Tell which obstacles a path (m, 2) passes that sweeps the angles (n,) about their centres; 15 us in NumPy.
+
+    centres (m, n, 2), or (1, n, 2) if they stand still.
+    """
     is_passed = np.zeros(len(angles), np.bool_)
     for k in range(len(angles)):
         x, y = path[0, 0] - centres[0, k, 0], path[0, 1] - centres[0, k, 1]
         along_x, along_y = path[-1, 0] - centres[-1, k, 0] - x, path[-1, 1] - centres[-1, k, 1] - y
-        foot = -(x * along_x + y * along_y)
-        is_passed[k] = 0.0 < foot < along_x * along_x + along_y * along_y or abs(angles[k]) > np.pi
+        first, last = np.inf, -np.inf
+        for vertex in polygons.vertices[k, : polygons.corners[k]]:
+            foot = (vertex[0] - x) * along_x + (vertex[1] - y) * along_y
+            first, last = min(first, foot), max(last, foot)
+        is_passed[k] = (last > 0.0 and first < along_x * along_x + along_y * along_y) or abs(angles[k]) > np.pi
     return is_passed
 
 

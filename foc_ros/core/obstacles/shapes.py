@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from foc_ros.core.checks import check_array, check_number, check_vector
@@ -20,25 +20,32 @@ FLAT = 1e-9
 """Size [m] from which a box or a hull extends in a direction."""
 
 
-def make_box_polygon(size: ArrayLike, yaw: float) -> Array:
-    """Return the vertices (v, 2) [m] of a box of full lengths (2,) [m] at an angle [rad], anticlockwise, from its centre.
+def tabulate_boxes(size: ArrayLike, yaw: ArrayLike) -> tuple[Array, NDArray[np.intp]]:
+    """Return vertices (n, V, 2) and corners (n,), as in `Obstacles`, of boxes of full lengths (n, 2) [m] at angles (n,) [rad].
 
     A box that has no size along one of its axes has two vertices, and one without any size has one.
     """
-    half_x, half_y = (np.asarray(size, dtype=float) / 2.0).tolist()
-    corners = np.array([[half_x, half_y], [-half_x, half_y], [-half_x, -half_y], [half_x, -half_y]])
-    if 2.0 * half_y < FLAT:
-        corners = np.array([[half_x, 0.0], [-half_x, 0.0]])
-    if 2.0 * half_x < FLAT:
-        corners = np.array([[0.0, half_y], [0.0, -half_y]]) if 2.0 * half_y >= FLAT else np.zeros((1, 2))
-    turned: Array = corners @ np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
-    return turned
+    lengths, angle = np.reshape(np.asarray(size, dtype=float), (-1, 2)), np.reshape(np.asarray(yaw, dtype=float), -1)
+    is_long = lengths >= FLAT
+    corners = np.array([1, 2, 4], dtype=np.intp)[is_long.sum(axis=1)]
+    vertices = np.where(is_long, lengths / 2.0, 0.0)[:, None] * [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]
+    vertices[corners == 2, 1] = vertices[corners == 2, 2]
+    axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]).transpose(2, 0, 1)
+    turned = np.where((np.arange(4) < corners[:, None])[..., None], vertices @ axes, 0.0)
+    return turned[:, : corners.max(initial=1)], corners
+
+
+def make_box_polygon(size: ArrayLike, yaw: float) -> Array:
+    """Return the vertices (v, 2) [m] of a box of full lengths (2,) [m] at an angle [rad], anticlockwise, from its centre."""
+    vertices: Array = tabulate_boxes(size, yaw)[0][0]
+    return vertices
 
 
 def make_hull_polygon(points: Array) -> tuple[Array, Array]:
     """Return the mean of the corners of the convex hull of points (q, 2) [m], and these (v, 2), anticlockwise, from there [m]."""
     try:
         corners = points[ConvexHull(points).vertices]
+        corners = corners[np.hypot(*(corners - np.roll(corners, 1, axis=0)).T) >= FLAT]  # points that differ by rounding alone
     except (QhullError, ValueError):  # fewer than three points, or all on one line
         along = points - points.mean(axis=0)
         direction = along[np.hypot(along[:, 0], along[:, 1]).argmax()]

@@ -16,6 +16,7 @@ from foc_ros.core.obstacles.chance_constraint import CERTAIN_K, constraint_momen
 from foc_ros.core.obstacles.rounded_polygon import find_offset
 from foc_ros.core.types import Array
 
+from .contacts.corners import find_corner
 from .contacts.hermite import basis, interpolate, interpolation_row
 from .problem import Problem
 from .terms import ChanceTerms, Motion
@@ -85,7 +86,7 @@ def minimum_safety_factor(
     """Return the minimum safety factor of a control (2N,) with a trajectory (4, N + 1).
 
     Beside each step whose k is smaller than its neighbours', the minimum is sought at the vertex of the parabola through three
-    times, closer and closer.
+    times, closer and closer. Where the mean is over a corner, there may be a kink.
     """
     mean, variance = constraint_moments(trajectory[:2, 1:].T.copy(), position_variances(chance.noise, control), chance.obstacles)
     m, steps = mean.shape
@@ -132,6 +133,13 @@ def minimum_safety_factor(
                     c, kc = time, k
             if kb < least:
                 least, row, moment = kb, j, b
+        for t in range(1, steps if chance.obstacles.polygons.corners[j] > 1 else 1):
+            if _is_above(near, mean[j, t - 1], variance[j, t - 1]) and _is_above(near, mean[j, t], variance[j, t]):
+                continue
+            time = find_corner(chance.obstacles, trajectory, j, t + 0.5, 0.5).time
+            k = _k_at_time(motion, chance, trajectory, control_variance, j, time) if time < np.inf else np.inf
+            if k < least:
+                least, row, moment = k, j, time
     return MinimumSafetyFactor(min(least, CERTAIN_K), row, moment)
 
 

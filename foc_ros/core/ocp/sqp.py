@@ -103,7 +103,7 @@ def converge(
     tau, lam
         Clearance term [m^2] and weight of the variances [1/s^6].
     deadline
-        Checked before each QP.
+        Checked before each QP and each jump.
     options
         How the sequence proceeds.
 
@@ -140,6 +140,8 @@ def converge(
         reached = control, contacts
         if move < STAYS or count == options.max_qps:
             return SqpResult(control, positions, working, contacts, solves, count, stays=move < STAYS)
+        if options.jump is not None and not deadline.allows():
+            raise StoppedError(control, contacts)
         point = options.jump(control, contacts) if options.jump is not None else None
         if point is not None:
             positions = problem.positions(point.control)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled, freeze
-from foc_ros.core.types import Array, Solution
+from foc_ros.core.types import Array, Solution, Status
 
 from .contacts.contacts import NO_CONTACTS, Contacts
 from .problem import Problem
@@ -19,6 +19,7 @@ class Start:
 
     positions (N, 2): at steps 1..N, to linearise at [m]. A start from an earlier solution also has its stacked control (2N,), its
     contacts, safety factor, lambda, and slope dk/ds (0 where not known). lam is None for a cold start, which has none of these.
+    is_unfinished: whether the deadline stopped the earlier solution.
     """
 
     positions: Array
@@ -27,6 +28,7 @@ class Start:
     safety_factor: float = 0.0
     lam: float | None = None
     safety_factor_slope: float = 0.0
+    is_unfinished: bool = False
 
 
 def cold_start(guess: Array) -> Start:
@@ -50,7 +52,8 @@ def warm_start(previous: Solution, problem: Problem) -> Start:
     ]
     table = np.array(kept, dtype=float).reshape(-1, 3)
     contacts = freeze(Contacts(table[:, 0].astype(np.intp), table[:, 1].copy(), table[:, 2].copy()))
-    return Start(positions, control, contacts, previous.safety_factor, previous.lam, previous.safety_factor_slope)
+    is_unfinished, slope = previous.status is Status.DEADLINE, previous.safety_factor_slope
+    return Start(positions, control, contacts, previous.safety_factor, previous.lam, slope, is_unfinished)
 
 
 @compiled

@@ -5,7 +5,7 @@ const SPEED = data.unit.speed;
 const TIME = data.unit.time;
 const hand = { t: sums(data.hand.t, TIME), x: sums(data.hand.x, LENGTH), y: sums(data.hand.y, LENGTH), v: sums(data.hand.v, SPEED) };
 const goals = data.goals.map((places) => places.map(([x, y]) => [LENGTH * x, LENGTH * y]));
-const scenes = data.scenes.map((rows) => rows.map(([name, ...disc]) => [name, ...disc.map((value) => LENGTH * value)]));
+const scenes = data.scenes.map((rows) => rows.map(([name, ...shape]) => [name, ...shape.map((value) => LENGTH * value)]));
 const frameTimes = data.frames.map((frame) => data.times[frame.at]);
 const mostCandidates = Math.max(...data.frames.map((frame) => frame.candidates.length));
 const mostUnsolved = Math.max(...data.frames.map((frame) => frame.unsolved.length));
@@ -33,6 +33,31 @@ function outlines(ellipses, points = 36) {
     }
     x.push(null);
     y.push(null);
+  }
+  return { x, y, type: 'scatter', mode: 'lines', hoverinfo: 'skip', connectgaps: false };
+}
+
+// Returns the outlines of obstacles as one trace: an arc about each corner of its polygon; without corners it is a circle.
+function borders(scene, grow, points = 36) {
+  const x = [];
+  const y = [];
+  const turnOf = 2 * Math.PI;
+  for (const [, cx, cy, radius, stddev, ...rest] of scene) {
+    const corners = rest.length ? rest.flatMap((value, row) => (row % 2 ? [] : [[value, rest[row + 1]]])) : [[0, 0]];
+    const after = (row) => corners[(row + 1) % corners.length];
+    const normals = corners.map(([u, v], row) => Math.atan2(u - after(row)[0], after(row)[1] - v));
+    const begin = x.length;
+    corners.forEach(([u, v], row) => {
+      const from = normals[(row + corners.length - 1) % corners.length];
+      const turn = corners.length > 1 ? (((normals[row] - from) % turnOf) + turnOf) % turnOf : turnOf;
+      const steps = Math.max(1, Math.ceil((points * turn) / turnOf));
+      for (let k = 0; k <= steps; k += 1) {
+        x.push(cx + u + (radius + grow * stddev) * Math.cos(from + (turn * k) / steps));
+        y.push(cy + v + (radius + grow * stddev) * Math.sin(from + (turn * k) / steps));
+      }
+    });
+    x.push(x[begin], null);
+    y.push(y[begin], null);
   }
   return { x, y, type: 'scatter', mode: 'lines', hoverinfo: 'skip', connectgaps: false };
 }
@@ -82,7 +107,6 @@ const filled = (list, most = mostCandidates) => [...list, ...Array(most - list.l
 
 function sceneTraces(frame) {
   const scene = scenes[frame.scene];
-  const disc = (grow) => scene.map(([, x, y, radius, stddev]) => [x, y, radius + grow * stddev, radius + grow * stddev, 0]);
   const [from, to] = span();
   const now = data.times[frame.at];
   const [begin, middle, end] = [first(hand.t, from), first(hand.t, now + 1e-6), first(hand.t, to + 1e-6)];
@@ -92,8 +116,8 @@ function sceneTraces(frame) {
   const drawn = [...frame.candidates].reverse().map((candidate) => candidateTraces(frame, candidate));
   const places = goals[frame.goals];
   return [
-    { ...outlines(disc(1)), fill: 'toself', fillcolor: ink('--ring'), line: { color: ink('--disc'), width: 1 } },
-    { ...outlines(disc(0)), fill: 'toself', fillcolor: ink('--disc'), line: { color: ink('--soft'), width: 1 } },
+    { ...borders(scene, 1), fill: 'toself', fillcolor: ink('--ring'), line: { color: ink('--disc'), width: 1 } },
+    { ...borders(scene, 0), fill: 'toself', fillcolor: ink('--disc'), line: { color: ink('--soft'), width: 1 } },
     ...filled(frame.unsolved.map(unsolvedTrace), mostUnsolved),
     ...filled(drawn.map((each) => each.motor)),
     ...filled(drawn.map((each) => each.total)),

@@ -13,23 +13,29 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from foc_ros.core.errors import MessageError
-from foc_ros.core.types import NANOSECONDS, Obstacles, make_obstacles
+import numpy as np
 
+from foc_ros.core.errors import MessageError
+from foc_ros.core.types import NANOSECONDS, Array, Obstacles, make_obstacles
+
+from .decode_objects import encode_name
 from .decode_point_cloud import MAX_ROWS
 from .decode_poses import MAX_COORDINATE, check_coordinate, decode_stamp
-from .plane import project
+from .plane import compute_rotation, project, project_box
 
 ADD, DELETE, DELETE_ALL = 0, 2, 3
-SPHERE, CYLINDER = 2, 3
+CUBE, SPHERE, CYLINDER = 1, 2, 3
+POINT = np.zeros((1, 2))
+"""The polygon of a circle."""
 Key = tuple[str, int]
 
 
 @dataclass(frozen=True)
 class MarkerObstacle:
-    """A circle in the task plane [m]; expires_ns: the end of its lifetime, None if it does not expire."""
+    """A rounded polygon in the task plane [m]; expires_ns: the end of its lifetime, None if it does not expire."""
 
-    centre: tuple[float, float]
+    centre: Array
+    polygon: Array
     radius: float
     radius_stddev: float
     expires_ns: int | None
@@ -44,7 +50,7 @@ class MarkerTable:
     """The present markers; immutable: an update returns a new table.
 
     frame_id: of all markers; stamp_ns: newest stamp of the last message, 0 if it had none; dropped: markers of the last message
-    that are no obstacles, by reason (`not_finite`, `not_a_circle`).
+    that are no obstacles, by reason (`not_finite`, `not_a_shape`).
     """
 
     markers: Mapping[Key, MarkerObstacle] = field(default_factory=dict)
@@ -57,10 +63,11 @@ class MarkerTable:
 
         now_ns: start of the lifetime of an unstamped marker; 0 if unknown, and the marker does not expire. radius_stddev: [m].
 
-        The radius of a sphere is half its largest scale, that of a cylinder half the larger of scale.x and scale.y; the
-        orientation is not used. A marker with a number that is not finite is dropped, and the marker that it would replace stays.
-        A marker of another type replaces an obstacle, but is none; both are counted. Raises MessageError, and then nothing is
-        changed, for an unknown action, a negative scale or lifetime, a coordinate beyond MAX_COORDINATE, two frames, or more
+        The radius of a sphere is half its largest scale, that of a cylinder half the larger of scale.x and scale.y; their
+        orientation is not used. A cube is the convex hull of the projections of its corners, with the radius 0. A marker with a
+        number that is not finite is dropped, and the marker that it would replace stays. A marker of another type replaces an
+        obstacle, but is none; both are counted. Raises MessageError, and then nothing is changed, for an unknown action, a
+        negative scale or lifetime, a cube without an extent in the plane, a coordinate beyond MAX_COORDINATE, two frames, or more
         markers than MAX_ROWS.
         """
         held = self._find_existing(now_ns)
@@ -76,7 +83,7 @@ class MarkerTable:
                 dropped[reason] += 1
             if marker.action == DELETE_ALL:
                 held = {other: kept for other, kept in held.items() if key[0] not in ('', other[0])}
-            elif marker.action == DELETE or reason == 'not_a_circle':
+            elif marker.action == DELETE or reason == 'not_a_shape':
                 held.pop(key, None)
             elif reason is None:
                 given = str(marker.header.frame_id)
@@ -95,7 +102,8 @@ class MarkerTable:
             [marker.centre for marker in held.values()],
             [marker.radius for marker in held.values()],
             [marker.radius_stddev for marker in held.values()] or 0.0,
-            tuple(_encode_identity(key) for key in held),
+            tuple(encode_name(key[0], str(key[1])) for key in held),
+            polygons=[marker.polygon for marker in held.values()],
         )
 
     def find_unchanged_interval(self, now_ns: int) -> tuple[float, float]:
@@ -108,16 +116,14 @@ class MarkerTable:
         return {key: marker for key, marker in self.markers.items() if marker.exists(now_ns)}
 
 
-def _encode_identity(key: Key) -> str:
-    """Return ns/id without ';', which separates the labels of candidates."""
-    return f'{key[0].replace("%", "%25").replace(";", "%3B")}/{key[1]}'
-
-
 def _find_reason_to_drop(marker: Any) -> str | None:
-    if marker.type not in (SPHERE, CYLINDER):
-        return 'not_a_circle'
+    if marker.type not in (CUBE, SPHERE, CYLINDER):
+        return 'not_a_shape'
     position, scale = marker.pose.position, marker.scale
-    numbers = (position.x, position.y, position.z, scale.x, scale.y, scale.z)
+    numbers = [position.x, position.y, position.z, scale.x, scale.y, scale.z]
+    if marker.type == CUBE:
+        turned = marker.pose.orientation
+        numbers += [turned.x, turned.y, turned.z, turned.w]
     return None if all(math.isfinite(number) for number in numbers) else 'not_finite'
 
 
@@ -130,7 +136,12 @@ def _decode_marker(marker: Any, name: str, start_ns: int, plane: str, radius_std
     lifetime_ns = int(marker.lifetime.sec) * NANOSECONDS + int(marker.lifetime.nanosec)
     if lifetime_ns < 0:
         raise MessageError(f'{name}.lifetime', 'at least 0 s (0: no end)', f'{lifetime_ns / NANOSECONDS:g} s')
-    centre, _ = project((position.x, position.y, position.z), plane)
-    diameter = max(scale.x, scale.y, scale.z) if marker.type == SPHERE else max(scale.x, scale.y)
     expires_ns = start_ns + lifetime_ns if lifetime_ns and start_ns else None
-    return MarkerObstacle((float(centre[0]), float(centre[1])), float(diameter) / 2.0, radius_stddev, expires_ns)
+    place, size = (position.x, position.y, position.z), (scale.x, scale.y, scale.z)
+    if marker.type == CUBE:
+        centre, polygon = project_box(place, size, compute_rotation(marker.pose.orientation), plane)
+        if len(polygon) == 1:
+            raise MessageError(f'{name}.scale', 'a size > 0 m along an axis of the plane', '{:g} x {:g} x {:g} m'.format(*size))
+        return MarkerObstacle(centre, polygon, 0.0, radius_stddev, expires_ns)
+    diameter = max(size) if marker.type == SPHERE else max(size[:2])
+    return MarkerObstacle(project(place, plane)[0], POINT, float(diameter) / 2.0, radius_stddev, expires_ns)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import itemgetter
 from typing import Any
 
@@ -10,18 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.errors import MessageError
+from foc_ros.core.obstacles.shapes import tabulate_boxes
 from foc_ros.core.types import Array, Obstacles, make_obstacles
 
 from .decode_poses import MAX_COORDINATE, decode_stamp
 from .plane import project
 
 REQUIRED = ('x', 'y', 'z', 'radius')
-COLUMNS = (*REQUIRED, 'radius_stddev', 'vx', 'vy', 'vz')
+COLUMNS = (*REQUIRED, 'radius_stddev', 'vx', 'vy', 'vz', 'size_x', 'size_y', 'yaw')
+BOX = COLUMNS[8:]
+"""Columns of which any makes the rows boxes: full lengths along its own axes [m] and its angle to the plane's first axis."""
 IDENTITY = 'id'
 MAX_ROWS = 20_000
 """Largest number of obstacles in one message, or kept from markers."""
 
-_LOWEST = np.array([[0.0 if name.startswith('radius') else -MAX_COORDINATE] for name in COLUMNS])
+_LOWEST = np.array([[0.0 if name.startswith(('radius', 'size')) else -MAX_COORDINATE] for name in COLUMNS])
 _DTYPES = {1: 'i1', 2: 'u1', 3: 'i2', 4: 'u2', 5: 'i4', 6: 'u4', 7: 'f4', 8: 'f8'}
 """numpy's name of each sensor_msgs/PointField datatype."""
 
@@ -39,10 +42,13 @@ class DecodedCloud:
 def decode_point_cloud(message: Any, plane: str) -> DecodedCloud:
     """Decode the obstacles of a PointCloud2 and project them onto the task plane; a cloud without rows is an empty scene.
 
-    Coordinates and radii are floats of 4 or 8 bytes, `id` is an integer of any size (without it, the row number is the id), in
-    either byte order, organised or not; other fields are skipped. A row with a number that is not finite is dropped and counted;
-    of several rows with one id the last is used. Raises MessageError if the layout does not fit the data, a field is missing or
-    of the wrong type, a radius or deviation is negative, or a number is beyond MAX_COORDINATE.
+    An obstacle is a circle, or a box with rounded corners if its `size_x` or `size_y` is larger than 0.
+
+    Coordinates, sizes and radii are floats of 4 or 8 bytes, `id` is an integer of any size (without it, the row number is the
+    id), in either byte order, organised or not; other fields are skipped. A row with a number that is not finite is dropped and
+    counted; of several rows with one id the last is used. Raises MessageError if the layout does not fit the data, a field is
+    missing or of the wrong type, a radius, size or deviation is negative, a row with the fields of a box has neither size nor
+    radius, or a number is beyond MAX_COORDINATE.
     """
     stamp_ns, frame_id = decode_stamp(message.header), str(message.header.frame_id)
     table = read_table(message)
@@ -51,14 +57,20 @@ def decode_point_cloud(message: Any, plane: str) -> DecodedCloud:
     columns = _read_columns(table)
     is_finite = np.logical_and.reduce(np.isfinite(columns))
     _check_bounds(columns, is_finite)
+    is_box = not set(BOX).isdisjoint(table.dtype.names or ())
+    if is_box:
+        _check_extent(columns, is_finite)
     rows = np.flatnonzero(is_finite)
     identities = table[IDENTITY] if IDENTITY in (table.dtype.names or ()) else np.arange(len(table))
     latest = dict(zip(identities[rows].tolist(), rows.tolist(), strict=True))
     kept = sorted(latest.items(), key=itemgetter(1))
     dropped = {'not_finite': len(table) - len(rows), 'duplicate_id': len(rows) - len(kept)}
-    x_y_z, (radius, radius_stddev), velocity = np.split(columns[:, [row for _, row in kept]], (3, 5))
+    x_y_z, (radius, radius_stddev), velocity, box = np.split(columns[:, [row for _, row in kept]], (3, 5, 8))
     ids = tuple(str(identity) for identity, _ in kept)
     obstacles = make_obstacles(project(x_y_z.T, plane)[0], radius, radius_stddev, ids, project(velocity.T, plane)[0])
+    if is_box:
+        vertices, corners = tabulate_boxes(box[:2].T, box[2])
+        obstacles = replace(obstacles, vertices=vertices, corners=corners)
     return DecodedCloud(obstacles, stamp_ns, frame_id, {reason: count for reason, count in dropped.items() if count})
 
 
@@ -105,7 +117,7 @@ def _read_layout(message: Any, step: int) -> np.dtype[np.void]:
 
 
 def _read_columns(table: NDArray[np.void]) -> Array:
-    """Return the numbers of the rows, (8, n), in the order of COLUMNS; columns that the message does not have are 0."""
+    """Return the numbers of the rows, (11, n), in the order of COLUMNS; columns that the message does not have are 0."""
     columns = np.zeros((len(COLUMNS), len(table)))
     with np.errstate(invalid='ignore'):  # numpy warns of a signalling NaN, whose row is dropped like that of any other NaN
         for name in table.dtype.names or ():
@@ -119,5 +131,11 @@ def _check_bounds(columns: Array, is_finite: NDArray[np.bool_]) -> None:
     if is_wrong.any():
         column, row = np.argwhere(is_wrong)[0]
         name, value = COLUMNS[column], columns[column, row]
-        unit = 'm/s' if name.startswith('v') else 'm'
+        unit = 'm/s' if name.startswith('v') else 'rad' if name == 'yaw' else 'm'
         raise MessageError(f'{name}[{row}]', f'a number in [{_LOWEST[column, 0]:g}, {MAX_COORDINATE:g}] {unit}', f'{value:g}')
+
+
+def _check_extent(columns: Array, is_finite: NDArray[np.bool_]) -> None:
+    is_empty = (columns[[COLUMNS.index(name) for name in ('radius', 'size_x', 'size_y')]] == 0.0).all(axis=0) & is_finite
+    for row in np.flatnonzero(is_empty)[:1]:
+        raise MessageError(f'radius[{row}]', 'a number > 0 m where size_x and size_y are 0', 0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -13,9 +13,13 @@ from foc_ros.core.types import Array
 from .types import MessageTypes, make_header
 
 _NAMES = ('x', 'y', 'z', 'radius', 'radius_stddev', 'id')
+_BOX_NAMES = ('size_x', 'size_y', 'yaw')
 _DATATYPES = {'<i4': 5, '<u4': 6, '<f4': 7}
 CLOUD_ROW = np.dtype([(name, '<i4' if name == 'id' else '<f4') for name in _NAMES])
-"""One obstacle of the `obstacles` table [m], and its id."""
+"""One circle of the `obstacles` table [m], and its id."""
+BOX_ROW = np.dtype([*CLOUD_ROW.descr, *((name, '<f4') for name in _BOX_NAMES)])
+"""One obstacle of a table with boxes: circles have the sizes 0."""
+CUBE, GREY = 1, (0.45, 0.45, 0.5, 0.9)
 
 
 def encode_pose(types: MessageTypes, position: Iterable[float]) -> Any:
@@ -47,8 +51,34 @@ def encode_goals(types: MessageTypes, stamp_ns: int, frame_id: str, positions: A
 
 
 def encode_obstacles(types: MessageTypes, stamp_ns: int, frame_id: str, rows: Sequence[tuple[float, ...]]) -> Any:
-    """Encode obstacles (x, y, z, radius, radius_stddev, id) as a sensor_msgs/PointCloud2."""
-    return encode_table(types, make_header(types, stamp_ns, frame_id), np.array(rows, dtype=CLOUD_ROW))
+    """Encode obstacles (x, y, z, radius, radius_stddev, id[, size_x, size_y, yaw]) as a sensor_msgs/PointCloud2.
+
+    Rows without the last three are circles. The message has their fields only if a row has a size. No row can tell the corners of
+    a hull that is no box.
+    """
+    is_box = any(any(row[len(_NAMES) : -1]) for row in rows)
+    table = (
+        [(*row, 0.0, 0.0, 0.0)[: len(_NAMES + _BOX_NAMES)] for row in rows] if is_box else [row[: len(_NAMES)] for row in rows]
+    )
+    return encode_table(types, make_header(types, stamp_ns, frame_id), np.array(table, dtype=BOX_ROW if is_box else CLOUD_ROW))
+
+
+def encode_boxes(types: MessageTypes, stamp_ns: int, frame_id: str, boxes: Mapping[str, Sequence[float]]) -> Any:
+    """Encode boxes by name, x, y, z of the centre and full lengths along these axes [m], as a MarkerArray of cubes."""
+    colour = types.make('std_msgs/msg/ColorRGBA', **dict(zip('rgba', GREY, strict=True)))
+    markers = [
+        types.make(
+            'visualization_msgs/msg/Marker',
+            header=make_header(types, stamp_ns, frame_id),
+            ns=name,
+            type=CUBE,
+            pose=encode_pose(types, box[:3]),
+            scale=types.make('geometry_msgs/msg/Vector3', **dict(zip('xyz', box[3:], strict=True))),
+            color=colour,
+        )
+        for name, box in boxes.items()
+    ]
+    return types.make('visualization_msgs/msg/MarkerArray', markers=markers)
 
 
 def encode_table(types: MessageTypes, cloud_header: Any, table: np.ndarray[Any, np.dtype[np.void]]) -> Any:

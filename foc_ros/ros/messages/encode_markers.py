@@ -13,24 +13,29 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foc_ros.core.obstacles.outline import trace_obstacle
+from foc_ros.core.obstacles.rounded_polygon import measure_offsets
 from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Prediction
 
 from .plane import lift
 from .ranking import describe_candidate, find_drawn_curve, order_candidates
 from .types import MessageTypes, make_header
 
-CYLINDER, LINE_STRIP, TEXT = 3, 4, 9
+CYLINDER, LINE_STRIP, TEXT, TRIANGLES = 3, 4, 9, 11
 DELETE_ALL = 3
 LIFETIME_S = 1.0
 ELLIPSES = 6
 """Number of ellipses along each path."""
 MAX_DRAWN = 128
 """Number of obstacles drawn, the nearest to the hand: thousands of markers would take longer than the prediction."""
+ARC_POINTS = 32
+"""Points on a full circle of an outline."""
 THICKNESS, TEXT_HEIGHT = 0.002, 0.012
 MOTOR, TOTAL = 'motor_noise', 'total_uncertainty'
 """Namespaces of the two ellipses."""
@@ -109,19 +114,28 @@ class _MarkerEncoder:
 
     def encode_obstacles(self, obstacles: Obstacles) -> Iterator[Any]:
         near = self._find_nearest(obstacles)
-        centres = self._lift(near.centre)
-        for name, radii, colour in (
-            ('obstacle', near.radius, OBSTACLE),
-            ('obstacle_deviation', near.radius + near.radius_stddev, DEVIATION),
+        for name, growths, colour in (
+            ('obstacle', np.zeros(len(near)), OBSTACLE),
+            ('obstacle_deviation', near.radius_stddev, DEVIATION),
         ):
-            for i, (centre, diameter) in enumerate(zip(centres, (2 * radii).tolist(), strict=True)):
-                yield self.encode(name, i, CYLINDER, colour, (diameter, diameter, 10 * THICKNESS), centre)
+            for row, growth in enumerate(growths.tolist()):
+                yield self._encode_obstacle(name, near, row, growth, colour)
+
+    def _encode_obstacle(self, name: str, obstacles: Obstacles, row: int, growth: float, colour: Colour) -> Any:
+        """Return an obstacle, larger by a growth [m]: a cylinder, or triangles between its centre and its outline."""
+        (centre,) = self._lift(obstacles.centre[row : row + 1])
+        if obstacles.corners[row] == 1:
+            diameter = 2 * (float(obstacles.radius[row]) + growth)
+            return self.encode(name, row, CYLINDER, colour, (diameter, diameter, 10 * THICKNESS), centre)
+        outline = self._lift(trace_obstacle(obstacles, row, growth, ARC_POINTS))
+        corners = [corner for before, after in pairwise(outline) for corner in (centre, before, after)]
+        return self.encode(name, row, TRIANGLES, colour, points=[self._encode_point(*corner) for corner in corners])
 
     def _find_nearest(self, obstacles: Obstacles) -> Obstacles:
         if len(obstacles) <= MAX_DRAWN or not self.prediction.candidates:
             return obstacles.take(list(range(min(len(obstacles), MAX_DRAWN))))
         hand = self.prediction.candidates[0].candidate.guess[0]
-        distances = np.linalg.norm(obstacles.centre - hand, axis=1) - obstacles.radius
+        distances = measure_offsets(hand, obstacles)[1][0] - obstacles.radius
         return obstacles.take(np.argsort(distances, kind='stable')[:MAX_DRAWN])
 
     def encode(

@@ -20,6 +20,8 @@ CLEAR = 3e-8
 """Depth in an obstacle that counts as rounding, relative to the scene."""
 MAX_CHANGES = 8
 """How often contacts may be released or added."""
+MOST_CONTACTS = 12
+"""Contacts with which a point is given up: the work grows with the third power, and a movement has a few."""
 NEW_MULTIPLIER = 1e-6
 """Multiplier with which a new contact begins, relative to the largest, so that it bends the cost hardly at all."""
 
@@ -38,6 +40,8 @@ def update_active_contacts(
     control, obstacle = near.copy(), contacts.obstacle.copy()
     time, multiplier = contacts.time.copy(), contacts.multiplier.copy()
     for count in range(MAX_CHANGES + 1):
+        if len(multiplier) > MOST_CONTACTS:
+            break
         if len(multiplier):
             active = Contacts(obstacle, time, multiplier)
             found, control, active = newton_on_contacts(

@@ -10,16 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.core.kernels import Matrix, Vector, compiled_separately
-from foc_ros.core.ocp.terms import MovingObstacles, ProblemTerms
+from foc_ros.core.kernels import Matrix, compiled_separately
+from foc_ros.core.obstacles.chance_constraint import UncertainObstacles
+from foc_ros.core.ocp.terms import MovingObstacles
 
 from .hermite import interpolate
-from .surrogate import Margin, evaluate_margin
-
-CORNER_REACH = 1.0
-"""Time from a contact, in steps, within which it may be at a corner."""
-TIME_STEP = 1e-3
-"""Difference in time, in steps, by which derivatives by time are taken."""
 
 
 class Corner(NamedTuple):
@@ -38,8 +33,11 @@ class Corner(NamedTuple):
 
 
 @compiled_separately
-def find_corner(obstacles: MovingObstacles, trajectory: Matrix, j: int, s: float) -> Corner:
-    """Find the time nearest to s at which the nearest point of polygon j passes from an edge to a vertex, or back."""
+def find_corner(obstacles: MovingObstacles | UncertainObstacles, trajectory: Matrix, j: int, s: float, reach: float) -> Corner:
+    """Find the time nearest to s at which the nearest point of polygon j passes from an edge to a vertex, or back.
+
+    reach: how far from s it may be, in steps. The mean counts as straight in between.
+    """
     polygons, corners, found = obstacles.polygons, obstacles.polygons.corners[j], Corner(np.inf, 0.0, 0.0, 0.0, 0.0, 0.0)
     at, velocity, bend = interpolate(trajectory, s, 0), interpolate(trajectory, s, 1), interpolate(trajectory, s, 2)
     for k in range(corners if corners > 1 else 0):
@@ -57,29 +55,6 @@ def find_corner(obstacles: MovingObstacles, trajectory: Matrix, j: int, s: float
             speed = x * (velocity[0] - obstacles.drift[j, 0]) + y * (velocity[1] - obstacles.drift[j, 1])
             time = s - (x * apart_x + y * apart_y) / speed if speed != 0.0 else np.inf
             is_outside = y * apart_x - x * apart_y > 0.0 or corners == 2
-            if is_outside and abs(time - s) < min(abs(found.time - s), CORNER_REACH):
+            if is_outside and abs(time - s) < min(abs(found.time - s), reach):
                 found = Corner(time, x, y, speed, x * bend[0] + y * bend[1], 0.0)
     return found
-
-
-@compiled_separately
-def find_kink(
-    terms: ProblemTerms, obstacles: MovingObstacles, trajectory: Matrix, control: Vector, j: int, s: float, k: float
-) -> tuple[Corner, tuple[Margin, Margin, Margin]]:
-    """Find a corner near time s at which the margin of obstacle j is least, as it falls before it and rises after it.
-
-    Returns the corner, with an infinite time if there is none, and the margins that `hold_at_corner` needs.
-    """
-    corner = find_corner(obstacles, trajectory, j, s)
-    none = Corner(np.inf, 0.0, 0.0, 0.0, 0.0, 0.0)
-    at = evaluate_margin(terms, obstacles, trajectory, control, j, s, k, 0.0)
-    if not max(terms.chance.obstacles.ignored_until[j], 1.0) < corner.time < trajectory.shape[1] - 1.0:
-        return none, (at, at, at)
-    at = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time, k, 0.0)
-    before = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time - TIME_STEP, k, at.scale)
-    after = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time + TIME_STEP, k, at.scale)
-    if not before.value > at.value < after.value or before.is_on_edge == after.is_on_edge:
-        return none, (at, at, at)
-    step, near = (TIME_STEP, after) if before.is_on_edge else (-TIME_STEP, before)
-    far = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time + 2.0 * step, k, at.scale)
-    return Corner(corner.time, corner.x, corner.y, corner.speed, corner.growth, step), (at, near, far)

@@ -28,6 +28,7 @@ from foc_ros.core.obstacles.rounded_polygon import Offset, find_normal, find_off
 from foc_ros.core.ocp.clearance import required_distance
 from foc_ros.core.ocp.terms import ChanceTerms, MovingObstacles, ProblemTerms
 
+from .corners import Corner, find_corner
 from .hermite import basis, contact_rows, interpolate
 
 SMALLEST_VARIANCE = 1e-24
@@ -38,6 +39,10 @@ PARABOLAS = 8
 """Most parabolas fitted in the search for the least margin beside one step."""
 VERTEX_TOLERANCE = 1e-3
 """Distance in steps from the lowest time so far at which the next vertex is not evaluated any more."""
+CORNER_REACH = 1.0
+"""Time from a contact, in steps, within which it may be at a corner."""
+TIME_STEP = 1e-3
+"""Difference in time, in steps, by which derivatives by time are taken."""
 APART = 2.0
 """Least distance in steps between two shortfalls: a contact at the deeper one mends its neighbours too."""
 
@@ -190,6 +195,29 @@ def find_least_margin(
 
 
 @compiled_separately
+def find_kink(
+    terms: ProblemTerms, obstacles: MovingObstacles, trajectory: Matrix, control: Vector, j: int, s: float, k: float
+) -> tuple[Corner, tuple[Margin, Margin, Margin]]:
+    """Find a corner near time s at which the margin of obstacle j is least, as it falls before it and rises after it.
+
+    Returns the corner, with an infinite time if there is none, and the margins that `hold_at_corner` needs.
+    """
+    corner = find_corner(obstacles, trajectory, j, s, CORNER_REACH)
+    none = Corner(np.inf, 0.0, 0.0, 0.0, 0.0, 0.0)
+    at = evaluate_margin(terms, obstacles, trajectory, control, j, s, k, 0.0)
+    if not max(terms.chance.obstacles.ignored_until[j], 1.0) < corner.time < trajectory.shape[1] - 1.0:
+        return none, (at, at, at)
+    at = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time, k, 0.0)
+    before = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time - TIME_STEP, k, at.scale)
+    after = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time + TIME_STEP, k, at.scale)
+    if not before.value > at.value < after.value or before.is_on_edge == after.is_on_edge:
+        return none, (at, at, at)
+    step, near = (TIME_STEP, after) if before.is_on_edge else (-TIME_STEP, before)
+    far = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time + 2.0 * step, k, at.scale)
+    return Corner(corner.time, corner.x, corner.y, corner.speed, corner.growth, step), (at, near, far)
+
+
+@compiled_separately
 def find_shortfalls(
     terms: ProblemTerms,
     obstacles: MovingObstacles,
@@ -201,12 +229,12 @@ def find_shortfalls(
 ) -> Matrix:
     """Return where margins are least in time and below minus a tolerance [m], deepest first, (q, 2): row of the obstacle, time.
 
-    Only times from step 1 on are searched. Of equal obstacles the first alone counts (`Problem.first_alike`), and of shortfalls
-    nearer than `APART` in time the deepest.
+    Only times from step 1 on are searched: at and beside steps, and where the mean is over a corner. Of equal obstacles the first
+    alone counts (`Problem.first_alike`), and of shortfalls nearer than `APART` in time the deepest.
     """
     m, steps = len(obstacles.reach), trajectory.shape[1] - 1
     covariance = position_variances(terms.chance.noise, control)
-    depth, places, count = np.empty(m * (steps + 1)), np.empty((m * (steps + 1), 2)), 0
+    depth, places, count = np.empty(2 * m * (steps + 1)), np.empty((2 * m * (steps + 1), 2)), 0
     for j in range(m):
         if first_alike[j] != j:
             continue
@@ -219,6 +247,15 @@ def find_shortfalls(
             # between two steps a margin hardly falls by more than it rises to the step after
             if 1 < t < steps and here < max(margin[t - 1], margin[t + 1]) - here:
                 time, least = find_least_margin(terms, obstacles, trajectory, control, j, k, margin, t)
+            if least < -tolerance:
+                depth[count], places[count, 0], places[count, 1] = least, j, time
+                count += 1
+        for t in range(1, steps if obstacles.polygons.corners[j] > 1 else 1):
+            x, y = trajectory[0, t + 1] - trajectory[0, t], trajectory[1, t + 1] - trajectory[1, t]
+            if min(margin[t], margin[t + 1]) > np.hypot(x, y):
+                continue
+            time = find_corner(obstacles, trajectory, j, t + 0.5, 0.5).time
+            least = evaluate_margin(terms, obstacles, trajectory, control, j, time, k, 0.0).value if time < np.inf else np.inf
             if least < -tolerance:
                 depth[count], places[count, 0], places[count, 1] = least, j, time
                 count += 1

@@ -26,9 +26,9 @@ from foc_ros.core.linear_algebra import multiply_transposed, multiply_vector, so
 from foc_ros.core.ocp.terms import CostTerms, MovingObstacles, ProblemTerms
 
 from .contacts import Contacts
-from .corners import TIME_STEP, Corner, find_kink
+from .corners import Corner
 from .hermite import compute_trajectory, interpolate
-from .surrogate import Margin, evaluate_margin
+from .surrogate import TIME_STEP, Margin, evaluate_margin, find_kink
 
 MAX_STEPS = 12
 SETTLING_STEPS = 4

@@ -12,6 +12,7 @@ from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.terms import MovingObstacles, ProblemTerms
 from foc_ros.core.types import Array
 
+from .active_set import MOST_CONTACTS
 from .contacts import Contacts
 from .hermite import compute_trajectory
 from .surrogate import evaluate_margin, find_shortfalls
@@ -25,8 +26,6 @@ SPARE = 1e-8
 """Clearance term, relative to the square of the scene, that outweighs this rounding."""
 MAX_CHANGES = 10
 """How often contacts may be released or added."""
-MOST_CONTACTS = 24
-"""Contacts with which a point is given up: the work grows with the third power, and a movement has a few."""
 NEW_MULTIPLIER = 1e-6
 """Multiplier with which a new contact begins, relative to the largest, so that it bends the cost hardly at all."""
 K_IS_GIVEN = Preference(0.0, 0.0, 1.0)

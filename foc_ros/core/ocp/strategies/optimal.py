@@ -45,6 +45,8 @@ EVEN = 1e-4
 """Relative difference of the slope from the one that is worth it at which both are the same."""
 FOLLOW_SHARE = 0.5
 """Part of the time left that an earlier solution may take; then the search begins again."""
+NEARLY = 0.3
+"""Part of the slope that is worth it from which Newton steps are tried that have k as an unknown."""
 NARROW = 0.02
 """Bracket in k at which the search ends."""
 
@@ -59,6 +61,10 @@ def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadli
             raise
         status = Status.DEADLINE
     point = search.best
+    if status is Status.ITERATION_LIMIT:
+        assert start.control is not None
+        message = 'the earlier solution does not lead to one now'
+        return StrategyResult(status, message, correct_to_goal(problem, start.control, start.positions), aims_at_eta=False)
     if point is None or status is Status.INFEASIBLE:
         return find_best_effort(problem, start, qp_solves=search.qp_solves, deadline=deadline)
     minimum, found = find_minimum_safety_factor(problem, point.control, between_steps=True), problem.risk
@@ -100,9 +106,11 @@ class _Search:
 
     def run(self, start: Start) -> Status:
         """Leave the best point in `best`; return how the search ended."""
-        if not self.follow_in_time(start) and not self.begin(start):
-            return Status.INFEASIBLE
-        if not (self.is_hard and start.safety_factor < self.problem.wanted_k and start.control is not None):
+        if not self.follow_in_time(start):
+            if start.control is not None and not start.is_unfinished:
+                return Status.ITERATION_LIMIT
+            return self.judge() if self.begin(start) else Status.INFEASIBLE
+        if not (self.is_hard and start.safety_factor < self.problem.wanted_k):
             self.raise_k()
         return self.judge()
 
@@ -143,12 +151,12 @@ class _Search:
         return True
 
     def begin(self, start: Start) -> bool:
-        """Find the least effort that keeps the mean out of the obstacles, and a k near it; tell whether there is a path.
+        """Find the least effort that keeps the mean out of the obstacles, and raise k; tell whether there is a path.
 
         Where Newton steps on the surrogate do not lead on from the least effort, as at a sharp corner, they begin at the solution
         that keeps the distance of the wanted k, or a part of it.
         """
-        problem = self.problem
+        problem, tried = self.problem, list[SurrogatePoint]()
         follower = PathFollower(problem, LEAST_EFFORT, self.deadline, newton_only=False)
         first = follower.solve_first(start.positions, self.angles if len(self.angles) else None)
         if first is not None and not len(self.angles):
@@ -162,9 +170,17 @@ class _Search:
             found = self.solve_below(control, contacts, min(max(minimum.k, 0.0), self.wanted))
             if found is not None:
                 self.best = self.lower_k(found)
-                break
+                self.raise_k()
+                tried.append(self.best)
+                if not self.is_cheap(self.best):
+                    break
         self.qp_solves += follower.qp_solves
+        self.best = max(tried, key=lambda point: point.k, default=self.best)
         return self.best is not None and self.best.k > -NARROW  # below zero the mean itself passes through an obstacle
+
+    def is_cheap(self, point: SurrogatePoint) -> bool:
+        """Tell whether a larger k would be worth its effort at a point."""
+        return point.k < self.wanted and self.slope(point) < self.rate * (1.0 - EVEN)
 
     def approach(self, follower: PathFollower, first: PathPoint) -> Iterator[PathPoint]:
         """Yield points near which there may be a solution: the first, then those that keep a part of the distance.
@@ -192,17 +208,17 @@ class _Search:
         low, high = self.best, math.inf  # the k of a point that costs too much
         stride = self.wanted - low.k
         shortest = min(NARROW, stride / 4.0) / 2.0
-        while low.k < self.wanted and self.slope(low) < self.rate * (1.0 - EVEN) and stride > shortest:
+        while self.is_cheap(low) and stride > shortest:
             point = self.solve(low.control, low.contacts, min(low.k + stride, self.wanted))
             if point is None:
                 stride /= 2
                 continue
             if self.slope(point) <= self.rate:
                 low = self.best = point
-                stride *= 2
             else:
                 high = point.k
-            worth = self.weigh(point.control, point.contacts, point.k) if low.k < self.wanted else None
+            is_near = low.k < self.wanted and self.slope(point) > NEARLY * self.rate
+            worth = self.weigh(point.control, point.contacts, point.k) if is_near else None
             if worth is not None and low.k <= worth.k <= min(high, self.wanted):
                 self.best = worth
                 return

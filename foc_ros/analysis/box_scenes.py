@@ -1,0 +1,50 @@
+"""Scenes of boxes in space as a table: the boxes, walls and targets among which people reached, one scene for each recording.
+
+The columns are `recording`, `object`, the centre `x_m`, `y_m`, `z_m`, and the full lengths along these axes `width_m`, `depth_m`
+and `height_m`. The object `Target` is the goal of its recording, and no obstacle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from foc_ros.core.errors import RecordingError
+from foc_ros.io.csv_tables import read_rows
+
+from .csv_recordings import RecordedScene
+
+TARGET = 'Target'
+CENTRE, SIZE = ('x_m', 'y_m', 'z_m'), ('width_m', 'depth_m', 'height_m')
+
+
+class BoxScenes:
+    """The scenes of a table by recording; a wrong table raises RecordingError."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self._boxes = read_boxes(file)
+
+    def find(self, name: str) -> RecordedScene:
+        """Return the scene of a recording; raises RecordingError where the table has no target for it."""
+        boxes = self._boxes.get(name, {})
+        if TARGET not in boxes:
+            raise RecordingError(f'{self._file}: no row of recording {name!r} has the object {TARGET}')
+        goals = np.array([boxes[TARGET][:3]])
+        return RecordedScene(goals=goals, boxes={key: box for key, box in boxes.items() if key != TARGET})
+
+
+def read_boxes(file: Path) -> Mapping[str, Mapping[str, tuple[float, ...]]]:
+    """Return centre (3) and full lengths (3) [m] of each object by recording and name."""
+    found: dict[str, dict[str, tuple[float, ...]]] = {}
+    for row in read_rows(file, ('recording', 'object', *CENTRE, *SIZE)):
+        for column in ('recording', 'object'):
+            if not row.cells[column]:
+                raise row.make_error(column, 'a name')
+        boxes, name = found.setdefault(row.cells['recording'], {}), row.cells['object']
+        if name in boxes:
+            raise row.make_error('object', 'another name than the rows above of this recording')
+        boxes[name] = (*map(row.read_number, CENTRE), *(row.read_number(column, 0.0) for column in SIZE))
+    return found

@@ -1,0 +1,122 @@
+"""Recordings among boxes, one scene each: a small folder written here, and the optional data set of reaches."""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from evaluation_samples import reach, write_tables
+
+from foc_ros.analysis.evaluation.evaluate import find_label_mismatches
+from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
+from foc_ros.analysis.evaluation.questions import GAP, PATH_CLASS, ask_all
+from foc_ros.analysis.recordings import TableRecording, find_recordings
+from foc_ros.cli.main import main
+from foc_ros.core.config import Config
+from foc_ros.core.errors import RecordingError
+from foc_ros.io.bags import BagReader
+from foc_ros.ros.parameters import load_parameter_file
+
+SHARED = Path(__file__).parents[2] / 'shared' / 'data' / 'hlp_reaching'
+HEADER = 'recording,object,x_m,y_m,z_m,width_m,depth_m,height_m\n'
+BOXES = (
+    'a,Target,0.3,0,0,0.05,0.05,0.08\n'
+    'a,ObstacleLong,0.15,0.0,0,0.05,0.04,0.1\n'
+    'a,LeftBoundary,0.1,0.15,0,0.6,0.02,0.1\n'
+    'a,RightBoundary,0.1,-0.03,0,0.6,0.005,0.1\n'
+    'a,Ceiling,0.1,0.0,0.2,0.9,0.9,0.02\n'
+    'b,Target,0.3,0.01,0,0.05,0.05,0.08\n'
+)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Write a reach to the left of a box, between two walls and under a ceiling, and another without obstacles."""
+    write_tables(tmp_path / 'data', {'a': reach(0.06, (0.3, 0.0)), 'b': reach(0.0, (0.3, 0.01))}, ())
+    (tmp_path / 'data' / 'goals.csv').unlink()
+    (tmp_path / 'data' / 'scenes.csv').write_text(HEADER + BOXES)
+    (tmp_path / 'data' / 'trials.csv').write_text('recording,person,sides\na,one,Long=left\nb,one,\n')
+    return tmp_path / 'data'
+
+
+def observe_one(folder: Path, hand_radius: float) -> ObservedRecording:
+    config = load_parameter_file(folder / 'parameters.yaml').with_values({'scene.hand_radius': hand_radius})
+    return observe(find_recordings(folder)['a'], config)
+
+
+def test_each_recording_has_its_boxes_by_name_and_its_target_as_goal(folder: Path) -> None:
+    first = observe_one(folder, 0.0).observations[0]
+    assert first.ids == ('ObstacleLong/0', 'LeftBoundary/0', 'RightBoundary/0')
+    assert first.row.tolist() == [0, -1, -1] and first.goals.tolist() == [[0.3, 0.0]]
+    np.testing.assert_allclose(first.centre, [[0.15, 0.0], [0.1, 0.15], [0.1, -0.03]])
+
+
+def test_a_gap_between_box_and_wall_that_is_too_narrow_is_not_open(folder: Path) -> None:
+    for hand_radius, sides in ((0.0, [-1, 1]), (0.01, [1])):
+        gaps = observe_one(folder, hand_radius).observations[0].gaps
+        assert [each[:, 0].tolist() for each in gaps] == [sides]
+    assert not ask_all(observe_one(folder, 0.01), PATH_CLASS)
+
+
+def test_sides_of_the_table_of_trials_are_compared_with_the_path(folder: Path) -> None:
+    observed = [observe_one(folder, 0.0)]
+    assert find_label_mismatches(folder, observed) == {}
+    (folder / 'trials.csv').write_text('recording,person,sides\na,one,Long=right\n')
+    assert find_label_mismatches(folder, observed) == {'a': 'Long label right, path left'}
+    (folder / 'trials.csv').write_text('recording,person,sides\n')
+    assert find_label_mismatches(folder, observed) == {'a': 'no label'}
+
+
+def test_bags_of_the_folder_hold_cubes_that_are_read_back(folder: Path, tmp_path: Path) -> None:
+    assert main(['convert', str(folder), '--output', str(tmp_path / 'bags')]) == 0
+    with BagReader(tmp_path / 'bags' / 'a') as reader:
+        assert {item.role for item in reader} == {'hand_pose', 'obstacle_markers', 'goals'}
+    arguments = ['replay', str(tmp_path / 'bags' / 'a'), '--params', str(folder / 'parameters.yaml')]
+    assert main(arguments) == 0
+
+
+def test_evaluate_and_its_report_take_the_folder(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr('foc_ros.cli.evaluate.open_executor', lambda _: ThreadPoolExecutor(1))
+    assert main(['evaluate', str(folder), '--params', str(folder / 'parameters.yaml'), '--json']) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer['recordings'], answer['failed'], answer['labels_not_taken']) == (2, {}, {})
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('recording,object,x_m\n', 'scenes.csv: row 1: no column y_m'),
+        (HEADER + 'a,Target,0,0,0,1,1,-1\n', "row 2, column height_m: expected a number in [0, 10000], got '-1'"),
+        (HEADER + 'a,Target,0,nan,0,1,1,1\n', "row 2, column y_m: expected a number in [-10000, 10000], got 'nan'"),
+        (HEADER + 'a,,0,0,0,1,1,1\n', "row 2, column object: expected a name, got ''"),
+        (HEADER + 2 * 'a,Wall,0,0,0,1,1,1\n', 'row 3, column object: expected another name than the rows above'),
+        (HEADER + 'a,Wall,0,0,0,1,1,1\n', "scenes.csv: no row of recording 'a' has the object Target"),
+    ],
+)
+def test_a_wrong_table_is_named(folder: Path, text: str, words: str) -> None:
+    (folder / 'scenes.csv').write_text(text)
+    with pytest.raises(RecordingError) as caught:
+        find_recordings(folder)
+    assert words in str(caught.value)
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason='optional data ../shared/data/hlp_reaching is not there')
+def test_every_recording_of_the_data_set_is_read() -> None:
+    found = find_recordings(SHARED)
+    assert len(found) == 209
+    for each in found.values():
+        assert isinstance(each, TableRecording)
+        assert len(each.scene.boxes) >= 6 and len(each.scene.goals) == 1
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason='optional data ../shared/data/hlp_reaching is not there')
+def test_the_sides_told_of_reaches_are_those_of_their_paths() -> None:
+    config = Config().with_values({'scene.hand_radius': 0.0125, 'rate_hz': 2.0})
+    observed = [observe(each, config) for each in [*find_recordings(SHARED).values()][::20]]
+    assert find_label_mismatches(SHARED, observed) == {}
+    assert all(question.is_possible[question.truth] for each in observed for _, question in ask_all(each, GAP))

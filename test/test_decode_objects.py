@@ -1,0 +1,219 @@
+"""Collision objects and detections become obstacles, in messages and in bags; their packages need not be installed."""
+
+from __future__ import annotations
+
+import math
+import re
+from importlib.util import find_spec
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import ros_helpers
+from bag_helpers import CONFIG, messages, ns
+from message_helpers import SECOND, pose_stamped
+from object_messages import OBJECT_TYPES, STORE, collision_object, detection, detections
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from foc_ros.analysis.replay import replay
+from foc_ros.core.errors import MessageError
+from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.obstacles.shapes import make_box_polygon
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.types import Obstacles, SampleStatus
+from foc_ros.io.topics import OPTIONAL, TYPES
+from foc_ros.ros.intake import Intake
+from foc_ros.ros.messages.decode_objects import CollisionTable, decode_detections
+
+BOX, SPHERE, CYLINDER, CONE = 1, 2, 3, 4
+QUARTER = {'z': math.sqrt(0.5), 'w': math.sqrt(0.5)}
+
+
+def after(*given: Any) -> CollisionTable:
+    table = CollisionTable()
+    for message in given:
+        table = table.with_message(message)
+    return table
+
+
+def check_polygon(obstacles: Obstacles, row: int, centre: tuple[float, float], size: tuple[float, float], yaw: float) -> None:
+    polygon = make_box_polygon(size, yaw)
+    np.testing.assert_allclose(obstacles.centre[row], centre, atol=1e-12)
+    assert obstacles.corners[row] == len(polygon)
+    np.testing.assert_allclose(measure_offsets(centre + polygon, obstacles)[1][:, row], 0.0, atol=1e-12)
+
+
+def test_primitives_stand_where_the_poses_of_object_and_primitive_say() -> None:
+    parts = (BOX, (0.4, 0.2, 0.1), (0.5, 0, 0)), (SPHERE, (0.05,), (0, 0.3, 0)), (CYLINDER, (0.4, 0.02), (0, 0, 0))
+    obstacles = after(collision_object(*parts, place=(1, 2, 3), turned=QUARTER)).obstacles('xy', 0.01)
+    assert obstacles.ids == ('table/0', 'table/1', 'table/2')
+    check_polygon(obstacles, 0, (1.0, 2.5), (0.4, 0.2), math.pi / 2)
+    check_polygon(obstacles, 1, (0.7, 2.0), (0, 0), 0)
+    check_polygon(obstacles, 2, (1.0, 2.0), (0, 0), 0)
+    assert obstacles.radius.tolist() == [0.0, 0.05, 0.02] and obstacles.radius_stddev.tolist() == [0.01] * 3
+
+
+def test_a_lying_cylinder_is_a_capsule() -> None:
+    obstacles = after(collision_object((CYLINDER, (0.4, 0.02), (0, 0, 0)))).obstacles('xz', 0.0)
+    check_polygon(obstacles, 0, (0.0, 0.0), (0.0, 0.4), 0.0)
+    assert obstacles.radius.tolist() == [0.02]
+
+
+def test_objects_are_added_appended_moved_and_removed() -> None:
+    ball = (SPHERE, (0.05,), (0, 0, 0))
+    held = [collision_object(ball), collision_object(ball, name='cup'), collision_object(ball, ball, operation=2)]
+    assert after(*held).obstacles('xy', 0.0).ids == ('table/0', 'table/1', 'table/2', 'cup/0')
+    assert after(*held, collision_object(ball)).obstacles('xy', 0.0).ids == ('table/0', 'cup/0')
+    moved = after(*held, collision_object(name='cup', place=(1, 2, 0), operation=3)).obstacles('xy', 0.0)
+    np.testing.assert_allclose(moved.centre[-1], [1, 2])
+    assert after(*held, collision_object(operation=1)).obstacles('xy', 0.0).ids == ('cup/0',)
+    assert not len(after(*held, collision_object(name='', operation=1, frame_id='')).obstacles('xy', 0.0))
+
+
+def test_what_is_no_shape_is_counted() -> None:
+    mesh = OBJECT_TYPES.make('shape_msgs/msg/Mesh')
+    table = after(collision_object((CONE, (0.1, 0.1), (0, 0, 0)), (SPHERE, (0.1,), (0, 0, 0)), meshes=[mesh]))
+    assert dict(table.dropped) == {'not_a_shape': 2} and table.obstacles('xy', 0.0).ids == ('table/0',)
+
+
+@pytest.mark.parametrize(
+    ('message', 'words'),
+    [
+        (collision_object(operation=7), 'operation: expected ADD (0), REMOVE (1), APPEND (2) or MOVE (3), got 7'),
+        (collision_object((BOX, (1, 1), (0, 0, 0))), 'primitives[0].dimensions: expected 3 numbers for a primitive of type 1'),
+        (collision_object((BOX, (1, -1, 1), (0, 0, 0))), 'primitives[0].dimensions[1]: expected a size in [0, 10000] m, got -1'),
+        (collision_object((SPHERE, (math.nan,), (0, 0, 0))), 'primitives[0].dimensions[0]: expected a size in [0, 10000] m'),
+        (collision_object((BOX, (0, 0, 0), (0, 0, 0))), 'primitives[0].dimensions: expected a size > 0 m, got 0'),
+        (collision_object((SPHERE, (1,), (0, 2e4, 0))), 'primitive_poses[0].position.y: expected a coordinate within 10000 m'),
+        (collision_object(turned={'w': math.nan}), 'pose.orientation.w: expected a finite number [m], got nan'),
+        (collision_object((SPHERE, (1,), (0, 0, 0)), primitive_poses=[]), 'primitive_poses: expected 1, one for each primitive'),
+        (collision_object(name='chair', operation=3), "id: expected an object that was added before it is moved, got 'chair'"),
+        (collision_object(frame_id='base'), "header.frame_id: expected 'world', as the other objects, got 'base'"),
+        (collision_object(stamp_ns=-SECOND), 'header.stamp.sec: expected at least 0, got -1'),
+    ],
+)  # fmt: skip
+def test_a_wrong_object_is_refused(message: Any, words: str) -> None:
+    with pytest.raises(MessageError, match=re.escape(words)):
+        after(collision_object((SPHERE, (1,), (0, 0, 0))), message)
+
+
+def test_detections_are_boxes_by_id() -> None:
+    found = decode_detections(
+        detections(detection((1, 2, 3), (0.4, 0.2, 0.1), 'cup;1'), detection((4, 5, 6), (0.4, 0.2, 0.1), turned=QUARTER)),
+        'xy',
+        0.01,
+    )
+    assert (found.stamp_ns, found.frame_id, found.dropped) == (SECOND, 'world', {})
+    assert found.obstacles.ids == ('cup%3B1', '1') and found.obstacles.radius_stddev.tolist() == [0.01, 0.01]
+    check_polygon(found.obstacles, 0, (1.0, 2.0), (0.4, 0.2), 0.0)
+    check_polygon(found.obstacles, 1, (4.0, 5.0), (0.4, 0.2), math.pi / 2)
+    assert not len(decode_detections(detections(), 'xy', 0.0).obstacles)
+
+
+def test_detections_that_are_not_finite_or_repeated_are_dropped() -> None:
+    each = [detection((x, 0, 0), (1, 1, 1), 'a') for x in (1.0, 2.0)]
+    found = decode_detections(detections(*each, detection((math.nan, 0, 0), (1, 1, 1))), 'xy', 0.0)
+    assert found.dropped == {'duplicate_id': 1, 'not_finite': 1} and found.obstacles.centre.tolist() == [[2.0, 0.0]]
+
+
+@pytest.mark.parametrize(
+    ('each', 'words'),
+    [
+        (detection((0, 0, 0), (1, -1, 1)), 'detections[0].bbox.size.y: expected a size in [0, 10000] m, got -1'),
+        (detection((0, 0, 0), (0, 0, 1)), 'detections[0].bbox.size: expected a size > 0 m along an axis of the plane'),
+        (detection((2e4, 0, 0), (1, 1, 1)), 'detections[0].bbox.center.position.x: expected a coordinate within 10000 m'),
+        (detection((0, 0, 0), (1, 1, 1), frame_id='base'), "detections[0].header.frame_id: expected 'world', as the array"),
+    ],
+)  # fmt: skip
+def test_a_wrong_detection_is_refused(each: Any, words: str) -> None:
+    with pytest.raises(MessageError, match=re.escape(words)):
+        decode_detections(detections(each), 'xy', 0.0)
+
+
+def test_both_inputs_reach_the_pipeline() -> None:
+    intake = Intake(Pipeline(CONFIG))
+    intake.take('hand_pose', pose_stamped(OBJECT_TYPES, (0.0, 0.0, 0.2)))
+    ball = (SPHERE, (0.05,), (0.5, 0, 0))
+    assert intake.take('collision_objects', collision_object(ball)) is SampleStatus.ACCEPTED
+    assert intake.take('collision_objects', collision_object(ball, name='cup', stamp_ns=SECOND - 1000)) is SampleStatus.ACCEPTED
+    assert intake.take('detections', detections(detection((1, 0, 0), (1, 1, 1), 'a'))) is SampleStatus.ACCEPTED
+    assert intake.take('detections', detections(frame_id='base')) is SampleStatus.WRONG_FRAME
+    assert intake.take('collision_objects', collision_object(operation=9)) is None
+    assert intake.pipeline.scene.obstacles(SECOND).ids == ('table/0', 'cup/0', 'a')
+    assert intake.counts == {'obstacles_wrong_frame': 1, 'collision_objects_invalid': 1}
+    intake.remove_source('collision_objects')
+    intake.take('collision_objects', collision_object(ball, name='lamp'))
+    assert intake.pipeline.scene.obstacles(SECOND).ids == ('a', 'lamp/0')
+
+
+@pytest.mark.parametrize('topic', ['/collision_objects', '/scene/detections', '/other'])
+def test_a_bag_with_them_is_replayed_by_its_own_definitions(tmp_path: Path, topic: str) -> None:
+    items = [each for each in messages() if each[0] != '/obstacles']
+    for seconds in np.arange(-0.1, 0.6, 0.2):
+        where = {'stamp_ns': ns(seconds)}
+        box = detections(detection((0.15, 0, 0), (0.06, 0.04, 0.1), 'box'), **where)
+        if topic == '/collision_objects':
+            box = collision_object((BOX, (0.06, 0.04, 0.1), (0.15, 0, 0)), name='box', **where)
+        items.append((topic, ns(seconds), box))
+    with Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections: dict[str, Any] = {}
+        for name, stamp_ns, message in sorted(items, key=lambda item: item[1]):
+            kind = message.__msgtype__
+            connection = connections.setdefault(name, None) or writer.add_connection(name, kind, typestore=STORE)
+            connections[name] = connection
+            writer.write(connection, stamp_ns, STORE.serialize_cdr(message, kind))
+    predictions = list(replay(tmp_path / 'bag', CONFIG))
+    assert len(predictions) > 10
+    name = 'box/0' if topic == '/collision_objects' else 'box'
+    assert all(each.obstacles.ids == (name,) and each.obstacles.corners.tolist() == [4] for each in predictions)
+    assert {each.label for each in predictions[0].candidates} == {f'goal0:+{name}', f'goal0:-{name}'}
+
+
+def test_both_inputs_are_transformed(monkeypatch: pytest.MonkeyPatch) -> None:
+    ros_helpers.require_ros()
+    from foc_ros.ros.transforms import Transforms
+
+    monkeypatch.setattr('foc_ros.ros.transforms.Time', SimpleNamespace(from_msg=lambda stamp: stamp))
+
+    transforms: Any = Transforms.__new__(Transforms)
+    found = SimpleNamespace(translation=SimpleNamespace(x=1.0, y=0.0, z=0.0), rotation=SimpleNamespace(x=0.0, y=0.0, **QUARTER))
+    transforms.last_error = ''
+    transforms._buffer = SimpleNamespace(lookup_transform=lambda *_: SimpleNamespace(transform=found))
+    given = detections(detection((0.5, 0, 0), (0.4, 0.2, 0.1), frame_id='camera'), frame_id='camera')
+    array = decode_detections(transforms.transform('detections', given, 'world', 'xy'), 'xy', 0.0)
+    thing = collision_object((BOX, (0.4, 0.2, 0.1), (0, 0, 0)), place=(0.5, 0, 0), frame_id='camera')
+    table = after(transforms.transform('collision_objects', thing, 'world', 'xy'))
+    assert (array.frame_id, table.frame_id, transforms.last_error) == ('world', 'world', '')
+    for obstacles in (array.obstacles, table.obstacles('xy', 0.0)):
+        check_polygon(obstacles, 0, (1.0, 0.5), (0.4, 0.2), math.pi / 2)
+
+
+@pytest.mark.parametrize('role', OPTIONAL)
+def test_the_node_names_the_package_that_is_missing_for_a_published_topic(role: str, ros: Any) -> None:
+    from node_helpers import Bench
+    from std_msgs.msg import String
+
+    from foc_ros.ros.endpoints import find_missing_packages
+
+    package = TYPES[role].partition('/')[0]
+    assert find_missing_packages().get(role) == (None if find_spec(package) else package)
+    if find_spec(package):
+        pytest.skip(f'optional message package {package} is installed')
+    node, said = Bench(ros).node, []
+    node._loggers[role] = SimpleNamespace(error=lambda text, **_: said.append(text))
+    node._report_missing_packages()
+    assert said == [] and role not in node._inputs
+    node.create_publisher(String, role, 1)
+    node._report_missing_packages()
+    assert said == [f'{role} is published, but cannot be received: the package {package} is not installed']
+
+
+@pytest.mark.parametrize('role', OPTIONAL)
+def test_the_node_receives_them(role: str, ros: Any) -> None:
+    package = TYPES[role].partition('/')[0]
+    pytest.importorskip(f'{package}.msg', reason=f'optional message package {package} is not installed')
+    from node_helpers import Bench
+
+    assert role in Bench(ros).node._inputs

@@ -1,0 +1,53 @@
+"""The radius of the hand: what is computed has larger obstacles, what is shown has those that were given."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import foc_ros
+from foc_ros.core.memory import Memory
+from foc_ros.core.obstacles.shapes import collect_obstacles
+from foc_ros.core.predictor import predict
+from foc_ros.core.types import HandState
+
+WIDE = foc_ros.Config().with_values({'scene.hand_radius': 0.01})
+CUPS = foc_ros.Circle((0.15, 0.01), radius=0.02, radius_stddev=0.002), foc_ros.Circle((0.2, -0.05), radius=0.015)
+GOALS = np.array([[0.3, 0.0]])
+
+
+def test_a_prediction_is_that_for_larger_obstacles_and_holds_the_given_ones() -> None:
+    hand, given = HandState(0, np.zeros(6), np.zeros((6, 6))), collect_obstacles(CUPS)
+    wide, _ = predict(WIDE, hand, given, GOALS, Memory())
+    grown, _ = predict(foc_ros.Config(), hand, replace(given, radius=given.radius + 0.01), GOALS, Memory())
+    narrow, _ = predict(foc_ros.Config(), hand, given, GOALS, Memory())
+    assert wide.obstacles is given
+    assert [each.label for each in wide.candidates] == [each.label for each in grown.candidates]
+    for each, other in zip(wide.candidates, grown.candidates, strict=True):
+        np.testing.assert_array_equal(each.mean, other.mean)
+    assert wide.candidates[0].effort > narrow.candidates[0].effort
+
+
+def test_a_solution_keeps_the_hand_away_and_shows_the_given_obstacles() -> None:
+    wide = foc_ros.solve((0, 0), (0.3, 0), CUPS, config=WIDE)
+    grown = foc_ros.solve((0, 0), (0.3, 0), [replace(each, radius=each.radius + 0.01) for each in CUPS])
+    np.testing.assert_array_equal(wide.mean, grown.mean)
+    assert wide.obstacles.radius.tolist() == [0.02, 0.015]
+    assert wide.problem is not None and wide.problem.obstacles.radius.tolist() == [0.03, 0.025]
+    plots = pytest.importorskip('matplotlib.figure')
+    axes = wide.plot(plots.Figure().subplots())
+    assert {0.02, 0.015} <= {patch.radius for patch in axes.patches if hasattr(patch, 'radius')}
+
+
+def test_the_hand_has_to_fit_at_start_and_goal() -> None:
+    with pytest.raises(foc_ros.SceneError, match=r'^goal: expected a point outside obstacle 0, of radius 0\.03 m'):
+        foc_ros.solve((0, 0), (0.175, 0.01), CUPS, config=WIDE)
+
+
+def test_a_predictor_shows_what_was_set() -> None:
+    predictor = foc_ros.Predictor(WIDE.with_values({'budget_s': 0.0}))
+    predictor.set_goals(GOALS)
+    predictor.set_obstacles(CUPS)
+    assert predictor.update(0.0, (0.0, 0.0)).obstacles.radius.tolist() == [0.02, 0.015]

@@ -1,0 +1,256 @@
+"""Homotopy classes among boxes, capsules, hulls and circles: brute force, equal shapes, invariances, walls, hands inside."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from homotopy_scenes import CLEARANCE, GOAL, find
+from homotopy_shapes import HAND, make_box, random_shapes, shortest_by_pattern, turn
+
+from foc_ros.core.homotopy import find_path_sides
+from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, collect_obstacles, make_box_polygon
+from foc_ros.core.types import make_obstacles
+
+BEST = 16
+"""Number of classes to compare: the longest of 32 wind about obstacles, where limits of winding count."""
+EXACT = {'rel': 1e-3}
+
+
+def make_scene(seed):
+    rng = np.random.default_rng(seed)
+    return random_shapes(rng, int(rng.integers(1, 6)), may_overlap=seed % 3 == 0)
+
+
+def compare(obstacles, seed, clearance=CLEARANCE):
+    found, every = find(obstacles, k=BEST, clearance=clearance), shortest_by_pattern(obstacles, clearance=clearance)
+    named = [row for row, name in enumerate(obstacles.ids) if any(name == each for each, _ in found.candidates[0].sides)]
+    expected = {}
+    for pattern, length in every.items():
+        course = tuple((obstacles.ids[row], pattern[row]) for row in named)
+        expected[course] = min(expected.get(course, np.inf), length)
+    best = sorted(expected.values())[:BEST]
+    assert len(found.candidates) == len(best), f'scene {seed}'
+    assert len({one.label for one in found.candidates}) == len(best), f'scene {seed}: a class twice'
+    assert [one.length for one in found.candidates] == pytest.approx(best, **EXACT), f'scene {seed}: missed or not in order'
+    for one in found.candidates:
+        assert one.length == pytest.approx(expected[one.sides], **EXACT), f'scene {seed}: {one.label}'
+
+
+@pytest.mark.parametrize('batch', range(3))
+def test_brute_force_finds_no_class_that_the_search_misses(batch):
+    for seed in range(20 * batch, 20 * (batch + 1)):
+        compare(make_scene(seed), seed)
+
+
+@pytest.mark.parametrize('batch', range(22))
+def test_brute_force_finds_none_in_many_more_scenes(batch):
+    for seed in range(60 + 20 * batch, 60 + 20 * (batch + 1)):
+        compare(make_scene(seed), seed)
+
+
+def make_aligned_scene(seed):
+    """Upright boxes and capsules on a grid of a centimetre, so that edges lie on one line and shapes share corners."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 6))
+    while True:
+        centre = 0.01 * np.column_stack([rng.integers(5, 31, n), rng.integers(-6, 7, n)])
+        polygons = [make_box_polygon(size, 0.0) for size in 0.02 * rng.integers(0, 5, (n, 2))]
+        radius = [0.01 if len(polygon) < 3 else rng.choice([0.0, 0.006]) for polygon in polygons]
+        obstacles = make_obstacles(centre, radius, polygons=polygons)
+        if measure_clear(np.array([HAND, GOAL]), obstacles, 0.006) > 0.0:
+            return obstacles
+
+
+@pytest.mark.parametrize('batch', range(2))
+def test_brute_force_finds_no_class_that_the_search_misses_where_edges_lie_on_one_line(batch):
+    for seed in range(30 * batch, 30 * (batch + 1)):
+        compare(make_aligned_scene(seed), seed, 0.0041)
+
+
+def summarise(found):
+    return [(one.label, round(one.length, 9)) for one in found.candidates]
+
+
+def subdivide(polygon, count):
+    """The same polygon with further vertices on its edges."""
+    share = np.arange(count)[:, None] / count
+    after = np.roll(polygon, -1, axis=0)
+    return np.concatenate([a + share * (b - a) for a, b in zip(polygon, after, strict=True)])
+
+
+@pytest.mark.parametrize('yaw', [0.0, 0.3, np.pi / 4])
+@pytest.mark.parametrize('corners', [1, 3])
+def test_a_box_with_64_vertices_is_the_same_box(yaw, corners):
+    boxes = [make_box(0.05, 0.04, yaw), make_box(0.06, 0.03, yaw), make_box(0.03, 0.06, -yaw)][:corners]
+    centre = np.array([[0.1, 0.01], [0.19, -0.02], [0.25, 0.03]])[:corners]
+    one = find(make_obstacles(centre, 0.0, polygons=boxes), k=8)
+    other = find(make_obstacles(centre, 0.0, polygons=[subdivide(box, 16) for box in boxes]), k=8)
+    assert [a.label for a in one.candidates] == [b.label for b in other.candidates]
+    assert len(one.candidates) == 2**corners
+    for a, b in zip(one.candidates, other.candidates, strict=True):
+        assert a.length == pytest.approx(b.length, abs=1e-9)
+        np.testing.assert_allclose(a.guess, b.guess, atol=1e-9)
+
+
+def test_a_polygon_of_64_vertices_is_nearly_the_circle():
+    angle = np.arange(64) * 2 * np.pi / 64
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    one = find(make_obstacles([[0.15, 0.01]], 0.03))
+    other = find(make_obstacles([[0.15, 0.01]], 0.0, polygons=[0.03 * ring]))
+    assert [a.length for a in one.candidates] == pytest.approx([b.length for b in other.candidates], abs=1e-4)
+
+
+def test_boxes_without_a_length_are_capsules_and_circles():
+    boxes = [Box((0.1, 0.01), (0.0, 0.0), radius=0.02), Box((0.2, 0.0), (0.08, 0.0), 0.3, radius=0.01)]
+    along = 0.04 * np.array([np.cos(0.3), np.sin(0.3)])
+    others = [Circle((0.1, 0.01), 0.02), Capsule(np.array([0.2, 0.0]) - along, np.array([0.2, 0.0]) + along, radius=0.01)]
+    one, other = find(collect_obstacles(boxes)), find(collect_obstacles(others))
+    assert [a.label for a in one.candidates] == [b.label for b in other.candidates]
+    for a, b in zip(one.candidates, other.candidates, strict=True):
+        np.testing.assert_allclose(a.guess, b.guess, atol=1e-12)
+
+
+@pytest.mark.parametrize('seed', range(15))
+def test_turned_and_shifted_scenes_and_other_orders_have_the_same_classes(seed):
+    obstacles, rng = make_scene(seed), np.random.default_rng(seed)
+    order = rng.permutation(len(obstacles))
+    assert summarise(find(obstacles)) == summarise(find(obstacles.take(order)))
+    angle, shift, velocity = rng.uniform(-np.pi, np.pi), rng.uniform(-2, 2, 2), np.array([0.2, 0.1])
+    polygons = [turn(row[:corners], angle) for row, corners in zip(obstacles.vertices, obstacles.corners, strict=True)]
+    moved = make_obstacles(turn(obstacles.centre, angle) + shift, obstacles.radius, ids=obstacles.ids, polygons=polygons)
+    one = find(obstacles, velocity=velocity)
+    other = find(moved, turn(GOAL[None], angle) + shift, shift, turn(velocity[None], angle)[0])
+    assert [a.label for a in one.candidates] == [b.label for b in other.candidates]
+    for a, b in zip(one.candidates, other.candidates, strict=True):
+        np.testing.assert_allclose(turn(a.guess, angle) + shift, b.guess, atol=1e-7)
+
+
+@pytest.mark.parametrize('seed', range(15))
+def test_mirrored_scenes_have_the_mirrored_classes(seed):
+    obstacles, flip = make_scene(seed), np.array([1.0, -1.0])
+    polygons = [row[:corners][::-1] * flip for row, corners in zip(obstacles.vertices, obstacles.corners, strict=True)]
+    one, other = find(obstacles), find(make_obstacles(obstacles.centre * flip, obstacles.radius, polygons=polygons))
+    changed = str.maketrans('+-', '-+')
+    assert [a.label.translate(changed) for a in one.candidates] == [b.label for b in other.candidates]
+    for a, b in zip(one.candidates, other.candidates, strict=True):
+        np.testing.assert_allclose(a.guess * flip, b.guess, atol=1e-9)
+
+
+def measure_clear(path, obstacles, clearance=CLEARANCE):
+    """Least distance of a path's points from the obstacles with the clearance [m]."""
+    return float((measure_offsets(path, obstacles)[1] - obstacles.radius - clearance).min())
+
+
+@pytest.mark.parametrize('seed', range(30))
+def test_guesses_are_clear_and_pass_as_their_names_say(seed):
+    obstacles = make_scene(seed)
+    for one in find(obstacles, steps=300).candidates:
+        np.testing.assert_allclose(one.guess[[0, -1]], [HAND, GOAL], atol=1e-12)
+        assert measure_clear(one.guess, obstacles) > -1e-9
+        assert dict(one.sides).items() <= find_path_sides(one.guess, obstacles).items()
+        assert np.hypot(*np.diff(one.guess, axis=0).T).sum() == pytest.approx(one.length, rel=5e-3)
+
+
+WALLS = [make_box(0.6, 0.02, 0.0), make_box(0.6, 0.02, 0.0), make_box(0.02, 0.32, 0.0), make_box(0.02, 0.32, 0.0)]
+WALL_CENTRES = [[0.175, 0.15], [0.175, -0.15], [-0.115, 0.0], [0.465, 0.0]]
+
+
+@pytest.mark.parametrize('yaw', [0.0, 0.2])
+def test_in_a_closed_workspace_all_ways_stay_inside(yaw):
+    boxes = [*WALLS, make_box(0.05, 0.08, 0.4)]
+    centre = turn(np.array([*WALL_CENTRES, [0.17, 0.01]]), yaw)
+    obstacles = make_obstacles(centre, 0.0, ids=('n', 's', 'w', 'e', 'box'), polygons=[turn(box, yaw) for box in boxes])
+    found = find(obstacles, turn(GOAL[None], yaw), k=8)
+    assert len(found.candidates) == 2 and not found.notes
+    assert {dict(one.sides)['box'] for one in found.candidates} == {1, -1}
+    for one in found.candidates:
+        assert measure_clear(one.guess, obstacles) > -1e-9
+        inside = np.abs(turn(one.guess, -yaw) - [0.175, 0.0])
+        assert (inside < [0.28, 0.14]).all()
+    assert find(obstacles, turn(np.array([[0.7, 0.0]]), yaw)).notes['no_way'] == 1
+
+
+def test_a_cross_of_two_bars_is_passed_on_two_sides_and_left_from_its_notches():
+    bars = [make_box(0.12, 0.01, 0.5), make_box(0.12, 0.01, 0.5 + np.pi / 2)]
+    obstacles = make_obstacles([[0.175, 0.005]] * 2, 0.0, polygons=bars)
+    found, expected = find(obstacles), shortest_by_pattern(obstacles)
+    assert [dict(one.sides) for one in found.candidates] == [{'0': -1, '1': -1}, {'0': 1, '1': 1}]
+    assert [one.length for one in found.candidates] == pytest.approx(sorted(expected.values()), **EXACT)
+    notch = np.array([0.175, 0.005]) + turn(np.array([[0.02, 0.02]]), 0.5)
+    inside = find(obstacles, notch)
+    assert len(inside.candidates) == 2
+    for one in inside.candidates:
+        assert measure_clear(one.guess, obstacles) > -1e-9
+
+
+def test_a_bar_through_a_circle_covers_it_in_two_places():
+    obstacles = make_obstacles(
+        [[0.175, 0.01], [0.175, -0.01]], [0.04, 0.0], polygons=[np.zeros((1, 2)), make_box(0.02, 0.2, 0.0)]
+    )
+    expected = shortest_by_pattern(obstacles)
+    assert [one.length for one in find(obstacles).candidates] == pytest.approx(sorted(expected.values()), **EXACT)
+
+
+def test_a_chain_of_capsules_that_share_their_ends_is_one_obstacle():
+    corners = np.array([[0.1, 0.1], [0.18, 0.02], [0.16, -0.1], [0.25, -0.12]])
+    obstacles = collect_obstacles([Capsule(a, b, radius=0.01) for a, b in pairwise(corners)])
+    expected = shortest_by_pattern(obstacles)
+    assert [one.length for one in find(obstacles).candidates] == pytest.approx(sorted(expected.values()), **EXACT)
+
+
+def test_a_wall_across_the_way_is_named_though_its_centre_lies_beyond_the_goal():
+    wall = Capsule((0.1, -0.05), (0.7, 0.4), radius=0.01, name='wall')
+    found = find(collect_obstacles([wall]), [[0.3, -0.04]], (0.1, 0.1))
+    assert {one.label for one in found.candidates} == {'goal0:+wall', 'goal0:-wall'}
+    obstacles = collect_obstacles([wall])
+    for one in found.candidates:
+        assert find_path_sides(one.guess, obstacles) == dict(one.sides)
+
+
+@pytest.mark.parametrize('centre', [(0.033, 0.0), (0.028, 0.004), (0.01, 0.002), (0.02, -0.01)])
+def test_a_hand_in_a_box_or_in_its_margin_gets_out_on_both_sides(centre):
+    obstacles = make_obstacles([centre], 0.0, polygons=[make_box(0.06, 0.04, 0.1)])
+    found = find(obstacles)
+    assert found.notes == {'hand_inside': 1}
+    assert {one.label for one in found.candidates} == {'goal0:+0', 'goal0:-0'}
+    depth = -measure_clear(HAND[None], obstacles)
+    for one in found.candidates:
+        assert dict(one.sides).items() <= find_path_sides(one.guess, obstacles).items()
+        assert measure_clear(one.guess, obstacles) >= -depth - 1e-9
+        far = np.hypot(*one.guess.T) > 3 * depth
+        assert measure_clear(one.guess[far], obstacles) > -1e-9
+
+
+@pytest.mark.parametrize('polygon', [make_box(0.06, 0.04, 0.1), make_box(0.06, 0.0, 0.2)[:3:2]])
+def test_a_hand_at_the_centre_of_a_shape_still_gets_out(polygon):
+    found = find(make_obstacles([[0.0, 0.0]], 0.01, polygons=[polygon]))
+    assert [one.label for one in found.candidates] == ['goal0:']
+    assert found.candidates[0].length == pytest.approx(0.35)
+
+
+def test_a_goal_in_a_box_has_no_candidates_and_one_in_its_margin_has():
+    box = make_box(0.04, 0.04, 0.3)
+    inside = find(make_obstacles([GOAL + 0.01], 0.0, polygons=[box]))
+    assert inside.candidates == () and inside.notes == {'goal_inside': 1}
+    obstacles = make_obstacles([GOAL + np.array([0.0, 0.025])], 0.0, polygons=[make_box(0.04, 0.04, 0.0)])
+    near = find(obstacles, clearance=0.01)
+    assert near.notes == {'goal_near': 1} and near.candidates
+    assert all(measure_clear(one.guess, obstacles, 0.0) > 0.0 for one in near.candidates)
+
+
+def test_a_gap_between_boxes_is_open_from_twice_the_clearance():
+    for gap, through in ((2 * CLEARANCE - 1e-4, False), (2 * CLEARANCE + 1e-4, True)):
+        y = 0.03 + gap / 2
+        obstacles = make_obstacles([[0.15, y], [0.15, -y]], 0.0, polygons=[make_box(0.04, 0.06, 0.0)] * 2)
+        sides = [dict(one.sides) for one in find(obstacles, k=3).candidates]
+        assert ({'0': -1, '1': 1} in sides) is through
+
+
+def test_a_gap_that_was_taken_stays_open_while_it_is_a_little_too_narrow():
+    y = 0.03 + CLEARANCE
+    boxes = [make_box(0.04, 0.06, 0.0)] * 2
+    before = find(make_obstacles([[0.15, y + 1e-4], [0.15, -y]], 0.0, polygons=boxes), k=3)
+    narrow = make_obstacles([[0.15, y - 2e-3], [0.15, -y]], 0.0, polygons=boxes)
+    assert {'0': -1, '1': 1} not in [dict(one.sides) for one in find(narrow, k=3).candidates]
+    assert {'0': -1, '1': 1} in [dict(one.sides) for one in find(narrow, k=3, previous=before.candidates).candidates]
