@@ -52,7 +52,7 @@ KINDS = (
     ('uncertain box', 'capsule'),
     ('sharp box', 'rotated box', 'circle'),
     ('capsule', 'hull'),
-    ('hull', 'sharp box', 'capsule', 'circle'),
+    ('hull', 'sharp box'),
     ('rotated box', 'hull', 'box'),
 )
 
