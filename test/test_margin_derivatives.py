@@ -137,14 +137,14 @@ def test_second_derivatives_at_a_vertex_and_on_an_edge(name):
 
 def find_kink(problem: Problem, control: np.ndarray, time: float):
     trajectory = problem.trajectory(control)
-    return corners.find_kink(problem.terms, problem.obstacles_with_reach(0.0), trajectory, control, 0, time, K)
+    return surrogate.find_kink(problem.terms, problem.obstacles_with_reach(0.0), trajectory, control, 0, time, K)
 
 
 def find_corner_time(problem: Problem, control: np.ndarray, time: float) -> float:
     """Return the time near another at which the mean is over a corner, infinite if there is none."""
     for _ in range(6):
         if time < STEPS:
-            time = corners.find_corner(problem.obstacles_with_reach(0.0), problem.trajectory(control), 0, time).time
+            time = corners.find_corner(problem.obstacles_with_reach(0.0), problem.trajectory(control), 0, time, 1.0).time
     return float(time)
 
 
@@ -168,7 +168,7 @@ def test_the_derivatives_of_a_margin_that_is_held_at_a_corner(monkeypatch):
 
     The Hessian is exact but for a term of the order of the difference in time, which is smaller here than in the solver.
     """
-    for module in (corners, surrogate_newton):
+    for module in (surrogate, surrogate_newton):
         monkeypatch.setattr(module, 'TIME_STEP', 1e-4)
     kinks = find_kinks()
     assert len(kinks) >= 5
