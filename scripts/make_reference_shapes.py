@@ -21,6 +21,7 @@ from typing import Any
 import casadi
 import numpy as np
 from make_reference_cases import Array, guess_path
+from numpy.typing import NDArray
 
 OUTPUT = Path(__file__).resolve().parents[1] / 'test' / 'reference_shapes.json'
 SEED = 20261123
@@ -153,7 +154,8 @@ def ends_at(case: dict[str, Any]) -> Array:
 
 def centre_moved(case: dict[str, Any], obstacle: dict[str, Any], time: float) -> Array:
     """Return how far an obstacle has moved at a time in steps, (2,) [m]."""
-    return np.array(obstacle.get('velocity', [0.0, 0.0])) * time * case['duration_s'] / case['steps']
+    moved: Array = np.array(obstacle.get('velocity', [0.0, 0.0])) * time * case['duration_s'] / case['steps']
+    return moved
 
 
 def required(obstacle: dict[str, Any]) -> tuple[float, float]:
@@ -259,7 +261,7 @@ class Programme:
                 distances[i, j] = find_weights(find_vertices(obstacle), path[i] - centre_moved(self.case, obstacle, time))[1]
         return distances
 
-    def solve_rows(self, control: Array, rows: Array, slack: float) -> Array | None:
+    def solve_rows(self, control: Array, rows: NDArray[np.intp], slack: float) -> Array | None:
         """Solve with margins at some rows, from a control."""
         case, steps = self.case, self.case['steps']
         made = Collected()
@@ -281,7 +283,8 @@ class Programme:
         answer = solver(x0=made.start, lbx=made.lowest, lbg=made.low, ubg=made.high)
         if solver.stats()['return_status'] not in ('Solve_Succeeded', 'Solved_To_Acceptable_Level'):
             return None
-        return self.unit * np.asarray(answer['x']).ravel()[: 2 * steps]
+        found: Array = self.unit * np.asarray(answer['x']).ravel()[: 2 * steps]
+        return found
 
     def add_time(self, made: Collected, axes: tuple[Any, Any], control: Array, i: int) -> tuple[Any, Any]:
         """Add the position and the variances at a time as variables, so that the Hessian is sparse; return them."""
