@@ -27,6 +27,7 @@ def main() -> None:
         'curves': effort_over_eta.format_curves(curves),
         'algorithm1': algorithm1.format_ends(ends),
         'reference': reference.format_agreement(),
+        'shapes': reference.format_shapes(),
         'bounds': bounds.format_costs(bounds.measure()),
     }
     page.write_blocks(texts)

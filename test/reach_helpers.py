@@ -8,13 +8,17 @@ import pytest
 
 from foc_ros.core.config import FocConfig
 from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
+from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, collect_obstacles
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import cold_start
 from foc_ros.core.types import Obstacles, Solution, make_obstacles
 
 REFERENCE = Path(__file__).with_name('reference_cases.json')
+REFERENCE_SHAPES = Path(__file__).with_name('reference_shapes.json')
 MORE_REFERENCE = Path(__file__).resolve().parents[2] / 'shared' / 'reference' / 'cases.json'
+
+KINDS = {'box': Box, 'capsule': Capsule, 'circle': Circle, 'hull': Hull}
 
 
 def reference_cases() -> list:
@@ -50,6 +54,19 @@ def case_problem(case: dict, eta: float | None = None) -> Problem:
         duration=case['duration_s'],
         noise=case['noise'],
         eta=case['min_effort_at_eta']['eta'] if eta is None else eta,
+    )
+
+
+def shapes_problem(case: dict) -> Problem:
+    """Return the problem of a case of `reference_shapes.json`."""
+    shapes = [KINDS[each['kind']](**{key: value for key, value in each.items() if key != 'kind'}) for each in case['obstacles']]
+    return reach(
+        collect_obstacles(shapes),
+        goal=case['goal'],
+        steps=case['steps'],
+        duration=case['duration_s'],
+        noise=case['noise'],
+        eta=case['min_effort_at_eta']['eta'],
     )
 
 

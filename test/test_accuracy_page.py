@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT / 'scripts'))
 
 page = importlib.import_module('accuracy.page')
-MEASURED = {'guarantee', 'outcomes', 'curves', 'algorithm1', 'reference', 'bounds'}
+MEASURED = {'guarantee', 'outcomes', 'curves', 'algorithm1', 'reference', 'shapes', 'bounds'}
 
 
 def test_the_page_shows_every_measurement_with_its_picture():

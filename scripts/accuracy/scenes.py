@@ -67,3 +67,9 @@ def load_reference_cases() -> list[tuple[dict[str, Any], Problem, Array]]:
     """Return ten cases with the answers of independent solvers, each with its problem and guess."""
     cases = json.loads((ROOT / 'test' / 'reference_cases.json').read_text(encoding='utf-8'))
     return [(case, reach_helpers.case_problem(case), reach_helpers.case_guess(case)) for case in cases]
+
+
+def load_reference_shapes() -> list[tuple[dict[str, Any], Problem, Array]]:
+    """Return the same for ten scenes of boxes, capsules, hulls and circles."""
+    cases = json.loads((ROOT / 'test' / 'reference_shapes.json').read_text(encoding='utf-8'))
+    return [(case, reach_helpers.shapes_problem(case), reach_helpers.case_guess(case)) for case in cases]

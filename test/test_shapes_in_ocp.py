@@ -1,0 +1,293 @@
+"""Boxes, capsules and hulls in the optimal control problem: noisy movements, shapes that are the same, frames, derivatives."""
+
+from dataclasses import replace
+from statistics import NormalDist
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+from reach_helpers import bowed, reach, solved
+
+from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
+from foc_ros.core.obstacles.chance_constraint import k_of_eta
+from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles, make_box_polygon
+from foc_ros.core.ocp.monte_carlo import wilson
+from foc_ros.core.ocp.problem import Problem, rest_to_goal
+from foc_ros.core.types import Obstacles, Solution, Status, make_obstacles
+
+GOAL = np.array([0.3, 0.0])
+SAMPLES = 20_000
+Z = NormalDist().inv_cdf(1 - 1e-3 / 1000)
+"""Of all counts of this file together, one in a thousand runs is off by more."""
+GUESS = bowed((0, 0), GOAL, 50, 0.09)
+SEEDS = st.integers(0, 10_000)
+FEW = settings(max_examples=12, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.filter_too_much])
+FIXED = {'strategy': 'fixed', 'tau': 3e-4, 'lam': 1e4}
+SETTINGS = {'fixed': FIXED, 'lv': {'strategy': 'lv'}, 'hc': {'strategy': 'hc'}, 'optimal': {'strategy': 'optimal'}}
+EVERY = pytest.mark.parametrize('strategy', SETTINGS)
+MONTE_CARLO = pytest.mark.parametrize('strategy', ['lv', 'optimal'])
+
+SHAPES: dict[str, Shape] = {
+    'box': Box((0.14, 0.0), size=(0.06, 0.04), radius=0.01, radius_stddev=0.002),
+    'sharp box': Box((0.14, -0.01), size=(0.06, 0.04)),
+    'capsule': Capsule((0.11, -0.01), (0.17, 0.02), radius=0.02, radius_stddev=0.002),
+    'rotated box': Box((0.15, -0.01), size=(0.07, 0.03), yaw=0.5, radius=0.008, radius_stddev=0.002),
+    'hull': Hull([(0.1, -0.02), (0.17, -0.03), (0.19, 0.01), (0.14, 0.03)], radius=0.01, radius_stddev=0.001),
+    'moving box': Box((0.13, -0.03), size=(0.05, 0.04), yaw=-0.4, radius=0.01, velocity=(0.02, 0.05)),
+    'uncertain box': Box((0.15, 0.0), size=(0.05, 0.03), yaw=0.3, radius=0.01, radius_stddev=0.001, centre_stddev=0.003),
+}
+
+
+def expect_failure(request: pytest.FixtureRequest, is_known: bool) -> None:
+    """Mark scenes that `optimal` does not solve although `lv` does: Newton steps stop at a corner."""
+    if is_known:
+        request.applymarker(pytest.mark.xfail(strict=True, reason='optimal stops at a corner, at a smaller eta'))
+
+
+def make_reach(*shapes: Shape, **options) -> Problem:
+    return reach(collect_obstacles(shapes), goal=GOAL, **{'noise': (0.1, 0.1), 'eta': 0.9, **options})
+
+
+def measure_distance(points: np.ndarray, polygon: np.ndarray) -> np.ndarray:
+    """Return the distance of points (..., 2) from a convex polygon (v, 2) with its inside, which is at distance 0."""
+    nearest, is_inside = np.full(points.shape[:-1], np.inf), np.full(points.shape[:-1], len(polygon) > 2)
+    for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        along, apart = b - a, points - a
+        share = np.clip((apart @ along) / max(along @ along, 1e-300), 0.0, 1.0)
+        nearest = np.minimum(nearest, np.linalg.norm(apart - share[..., None] * along, axis=-1))
+        is_inside &= along[0] * apart[..., 1] - along[1] * apart[..., 0] > 0.0
+    return np.where(is_inside, 0.0, nearest)
+
+
+def count_clear(problem: Problem, solution: Solution, shape: Shape) -> int:
+    """Return the number of noisy movements that are clear of the true shape at the step where the fewest are.
+
+    Position, velocity and acceleration are stepped on with a jerk whose noise is normal, with the deviation c |U|.
+    """
+    generator, dt, least = np.random.default_rng(7), problem.horizon.dt, SAMPLES
+    x, v, a = (np.tile(problem.initial_mean[i : i + 2], (SAMPLES, 1)) for i in (0, 2, 4))
+    radius = np.abs(generator.normal(shape.radius, shape.radius_stddev, SAMPLES))
+    centre = np.asarray(shape.centre) + shape.centre_stddev * generator.standard_normal((SAMPLES, 2))
+    for step, wanted in enumerate(solution.control, start=1):
+        jerk = wanted + problem.noise * np.abs(wanted) * generator.standard_normal((SAMPLES, 2))
+        x, v, a = x + dt * v + dt**2 / 2 * a + dt**3 / 6 * jerk, v + dt * a + dt**2 / 2 * jerk, a + dt * jerk
+        distance = measure_distance(x - centre - step * dt * np.asarray(shape.velocity), shape.polygon)
+        least = min(least, int(((distance >= radius) & (distance > 0.0)).sum()))
+    return least
+
+
+@MONTE_CARLO
+@pytest.mark.parametrize('name', SHAPES)
+@pytest.mark.parametrize('eta', [0.8, 0.95])
+def test_noisy_movements_stay_clear_of_the_true_shape_as_often_as_promised(strategy, name, eta, request):
+    expect_failure(request, (strategy, name, eta) == ('optimal', 'hull', 0.95))
+    problem = make_reach(SHAPES[name], eta=eta)
+    solution = solved(problem, GUESS, strategy)
+    assert solution.status is Status.SOLVED, solution.message
+    assert solution.eta >= eta - 1e-6
+    clear = wilson(count_clear(problem, solution, SHAPES[name]), SAMPLES, Z)[1]
+    assert clear >= solution.eta
+    # the polygon lies within its tangent, beyond which the mean is k standard deviations or more
+    assert clear >= NormalDist().cdf(k_of_eta(eta))
+
+
+@pytest.mark.parametrize('name', SHAPES)
+def test_a_mean_that_only_just_stays_clear_is_found_out(name):
+    """The check can fail: a way planned without the chance constraint is hit more often than eta allows."""
+    problem = make_reach(SHAPES[name])
+    naive = solved(problem, GUESS, 'fixed', tau=0.0, lam=0.0)
+    assert wilson(count_clear(problem, naive, SHAPES[name]), SAMPLES, Z)[1] < 0.9
+
+
+def same(first: Solution, second: Solution, moved=lambda path: path, tolerance: float = 1e-6) -> None:
+    """The second solution is the first one moved."""
+    assert first.status is second.status is Status.SOLVED, (first.message, second.message)
+    assert second.effort == pytest.approx(first.effort, rel=tolerance)
+    assert np.abs(second.path - moved(first.path)).max() < tolerance
+
+
+def add_vertices(corners: np.ndarray, each: int) -> np.ndarray:
+    """Return a polygon with vertices on the edges of another, `each` on every edge."""
+    share = np.arange(each)[:, None] / each
+    return np.concatenate([a + share * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)])
+
+
+@EVERY
+@pytest.mark.parametrize('yaw', [0.0, 0.5, -1.1])
+@pytest.mark.parametrize('radius', [0.0, 0.01])
+def test_a_box_and_the_same_box_as_a_polygon_of_64_vertices(strategy, yaw, radius, request):
+    expect_failure(request, (strategy, yaw, radius) == ('optimal', -1.1, 0.0))
+    corners, rest = make_box_polygon((0.06, 0.04), yaw), ([[0.14, -0.01]], [radius], [0.1 * radius])
+    box = reach(collect_obstacles([Box((0.14, -0.01), (0.06, 0.04), yaw, radius, 0.1 * radius)]), noise=(0.1, 0.1))
+    fine = reach(make_obstacles(*rest, polygons=[add_vertices(corners, 16)]), noise=(0.1, 0.1))
+    same(*(solved(problem, GUESS, **SETTINGS[strategy]) for problem in (box, fine)))
+
+
+@EVERY
+@pytest.mark.parametrize('angle', [0.0, 0.46, 2.0])
+def test_a_capsule_and_a_box_without_width(strategy, angle):
+    half = 0.033 * np.array([np.cos(angle), np.sin(angle)])
+    capsule = Capsule(np.array([0.14, 0.0]) - half, np.array([0.14, 0.0]) + half, radius=0.02, radius_stddev=0.002)
+    boxes = [
+        Box((0.14, 0.0), size=(0.066, 0.0), yaw=angle, radius=0.02, radius_stddev=0.002),
+        Box((0.14, 0.0), size=(0.0, 0.066), yaw=angle - np.pi / 2, radius=0.02, radius_stddev=0.002),
+        Box((0.14, 0.0), size=(0.066, 2e-9), yaw=angle, radius=0.02, radius_stddev=0.002),
+    ]
+    first = solved(make_reach(capsule), GUESS, **SETTINGS[strategy])
+    for box in boxes:
+        same(first, solved(make_reach(box), GUESS, **SETTINGS[strategy]))
+
+
+@EVERY
+def test_a_circle_and_a_box_without_size(strategy):
+    circle = Circle((0.14, 0.01), radius=0.03, radius_stddev=0.002, velocity=(0.01, 0.02), centre_stddev=0.001)
+    rest = {'radius': 0.03, 'radius_stddev': 0.002, 'velocity': (0.01, 0.02), 'centre_stddev': 0.001}
+    shapes = [
+        Box((0.14, 0.01), size=(0.0, 0.0), yaw=1.0, **rest),
+        Capsule((0.14, 0.01), (0.14, 0.01), **rest),
+        Hull([(0.14, 0.01)] * 3, **rest),
+        Box((0.14, 0.01), size=(2e-9, 2e-9), yaw=1.0, **rest),
+    ]
+    first = solved(make_reach(circle), GUESS, **SETTINGS[strategy])
+    for shape in shapes:
+        same(first, solved(make_reach(shape), GUESS, **SETTINGS[strategy]))
+
+
+@EVERY
+def test_the_order_of_vertices_and_the_place_of_the_centre_do_not_matter(strategy):
+    corners = make_box_polygon((0.06, 0.04), 0.3)
+    first = reach(make_obstacles([[0.14, 0.0]], [0.01], [0.001], polygons=[corners]), noise=(0.1, 0.1))
+    rolled = reach(make_obstacles([[0.14, 0.0]], [0.01], [0.001], polygons=[np.roll(corners, 2, axis=0)]), noise=(0.1, 0.1))
+    shift = np.array([0.013, -0.007])
+    moved = reach(make_obstacles([np.add([0.14, 0.0], shift)], [0.01], [0.001], polygons=[corners - shift]), noise=(0.1, 0.1))
+    answer = solved(first, GUESS, **SETTINGS[strategy])
+    for other in (rolled, moved):
+        same(answer, solved(other, GUESS, **SETTINGS[strategy]))
+
+
+def random_shapes(generator: np.random.Generator) -> list[Shape]:
+    """Return one to three shapes of all kinds near the straight way."""
+    made: list[Shape] = []
+    for _ in range(generator.integers(1, 4)):
+        centre = np.array([generator.uniform(0.09, 0.21), generator.uniform(-0.06, 0.06)])
+        rest = {'radius': generator.uniform(0.008, 0.02), 'radius_stddev': generator.uniform(0.001, 0.003)}
+        half = generator.uniform(-0.03, 0.03, 2)
+        kinds = [
+            lambda at=centre, rest=rest: Circle(at, **rest),
+            lambda at=centre, rest=rest: Box(at, generator.uniform(0.01, 0.06, 2), generator.uniform(-3, 3), **rest),
+            lambda at=centre, rest=rest, half=half: Capsule(at - half, at + half, **rest),
+            lambda at=centre, rest=rest: Hull(at + generator.uniform(-0.03, 0.03, (5, 2)), **rest),
+        ]
+        made.append(kinds[generator.integers(4)]())
+    return made
+
+
+def random_reach(seed: int) -> tuple[Obstacles, np.ndarray]:
+    generator = np.random.default_rng(seed)
+    amplitude = float(generator.choice([-1, 1]) * generator.uniform(0.07, 0.13))
+    return collect_obstacles(random_shapes(generator)), bowed((0, 0), GOAL, 40, amplitude)
+
+
+def solve(obstacles: Obstacles, guess, strategy: str, goal=GOAL, start=(0.0, 0.0), eta=0.8) -> Solution:
+    problem = reach(obstacles, goal=goal, start=start, steps=40, noise=(0.1, 0.1), eta=eta)
+    return solved(problem, guess, **SETTINGS[strategy])
+
+
+def well_posed(obstacles: Obstacles, guess, strategy: str) -> Solution:
+    """Solve a scene in which rounding decides nothing: see `test_invariance.py`."""
+    assume(solve(obstacles, guess, strategy, eta=0.87).status is Status.SOLVED)
+    solution = solve(obstacles, guess, strategy)
+    assert solution.status is Status.SOLVED
+    assume(strategy == 'fixed' or solution.lam <= 1.0 or solution.eta < 0.8 + 1e-4)
+    return solution
+
+
+def alike(first: Solution, second: Solution, moved) -> None:
+    """Within what the root in s and the relinearisation leave open, as for circles."""
+    assert second.status is Status.SOLVED
+    assert second.effort == pytest.approx(first.effort, rel=1e-3)
+    assert np.abs(second.path - moved(first.path)).max() < 5e-4
+
+
+def transform(obstacles: Obstacles, map_: np.ndarray, shift: float = 0.0) -> Obstacles:
+    """Return obstacles turned or mirrored; of a mirrored polygon the order of the vertices turns round."""
+    vertices = obstacles.vertices @ map_.T
+    if np.linalg.det(map_) < 0.0:
+        for row, corners in enumerate(obstacles.corners):
+            vertices[row, :corners] = vertices[row, :corners][::-1].copy()
+    return replace(obstacles, centre=obstacles.centre @ map_.T + shift, velocity=obstacles.velocity @ map_.T, vertices=vertices)
+
+
+@EVERY
+@FEW
+@given(SEEDS)
+def test_mirror(strategy, seed):
+    obstacles, guess = random_reach(seed)
+    flip = np.diag([1.0, -1.0])
+    mirrored = transform(obstacles, flip)
+    alike(well_posed(obstacles, guess, strategy), solve(mirrored, guess @ flip, strategy), lambda path: path @ flip)
+
+
+@EVERY
+@FEW
+@given(SEEDS, st.integers(1, 3), st.floats(-5, 5))
+def test_quarter_turns_and_shift(strategy, seed, quarters, shift):
+    """Only by quarter turns: the model's noise acts along two axes."""
+    obstacles, guess = random_reach(seed)
+    turn = np.linalg.matrix_power(np.array([[0.0, -1.0], [1.0, 0.0]]), quarters)
+
+    def moved(points):
+        return points @ turn.T + shift
+
+    first = well_posed(obstacles, guess, strategy)
+    there = transform(obstacles, turn, shift)
+    alike(first, solve(there, moved(guess), strategy, goal=moved(GOAL), start=moved(np.zeros(2))), moved)
+
+
+@EVERY
+@FEW
+@given(SEEDS, st.randoms(use_true_random=False))
+def test_order_and_duplicates_of_obstacles(strategy, seed, random):
+    obstacles, guess = random_reach(seed)
+    rows = [*range(len(obstacles)), *range(len(obstacles))]
+    random.shuffle(rows)
+    alike(well_posed(obstacles, guess, strategy), solve(obstacles.take(rows), guess, strategy), lambda path: path)
+
+
+@EVERY
+def test_a_box_that_moves_and_the_same_problem_in_its_frame(strategy):
+    """Seen from the box, the hand begins and ends with minus its velocity; jerk, effort and noise are the same."""
+    velocity = np.array([0.03, 0.06])
+    moving = make_reach(replace(SHAPES['box'], velocity=tuple(velocity), centre=(0.13, -0.04)))
+    begun = np.concatenate(([0.0, 0.0], -velocity, [0.0, 0.0]))
+    still = collect_obstacles([replace(SHAPES['box'], centre=(0.13, -0.04))])
+    horizon = build_triple_integrator_horizon(0.02, 50)
+    made = rest_to_goal(horizon, begun, GOAL - velocity, still, np.array([0.1, 0.1]), 0.9)
+    made = replace(made, goal=np.concatenate((GOAL - velocity, -velocity, [0.0, 0.0])))
+    drift = 0.02 * np.arange(51)[:, None] * velocity
+    same(
+        solved(moving, GUESS, **SETTINGS[strategy]),
+        solved(made, GUESS - drift, **SETTINGS[strategy]),
+        lambda path: path - drift,
+        1e-5,
+    )
+
+
+@pytest.mark.parametrize('strategy', ['lv', 'optimal'])
+def test_an_uncertain_centre_takes_more_effort_and_a_larger_one_more(strategy):
+    box = SHAPES['rotated box']
+    efforts = []
+    for stddev in (0.0, 0.002, 0.004):
+        solution = solved(make_reach(replace(box, centre_stddev=stddev)), GUESS, strategy)
+        assert solution.status is Status.SOLVED
+        efforts.append(solution.effort)
+    assert efforts[0] * 1.001 < efforts[1] < efforts[2] / 1.001
+
+
+@EVERY
+def test_a_hand_with_a_radius_and_larger_shapes_are_the_same(strategy):
+    shapes = [SHAPES['rotated box'], Circle((0.2, -0.06), radius=0.02)]
+    grown = reach(collect_obstacles(shapes).grow(0.008), goal=GOAL, noise=(0.1, 0.1))
+    larger = make_reach(*(replace(each, radius=each.radius + 0.008) for each in shapes))
+    same(solved(grown, GUESS, **SETTINGS[strategy]), solved(larger, GUESS, **SETTINGS[strategy]))
