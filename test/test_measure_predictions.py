@@ -60,16 +60,6 @@ def measure(*shares: dict[str, float]) -> steadiness.Steadiness:
     return total
 
 
-def test_a_box_becomes_circles_that_cover_its_length(tmp_path: Path) -> None:
-    data = data_sets.load_data_set(write_reach(tmp_path))
-    assert '0' in data.asked
-    (recording,) = data.recordings.values()
-    circles = np.array(recording.scene.obstacles)
-    assert circles[0].tolist() == pytest.approx([0.02, 0.2, 0.0, 0.0375, 0.0, 0.0])
-    assert np.sort(circles[:, 0]) == pytest.approx([-0.005, 0.02, 0.045])
-    assert recording.scene.goals.tolist() == [[0.0, 0.4, 0.0]]
-
-
 def test_candidates_of_a_reach_are_counted_and_scored(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     settings = [f'--set={each}' for each in ('rate_hz=10', 'foc.steps=20', 'foc.eta=0.1')]
     measure_candidates.main([str(write_reach(tmp_path)), *settings])

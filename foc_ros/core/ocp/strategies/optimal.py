@@ -33,7 +33,7 @@ from foc_ros.core.types import Array, Status
 from . import StrategyResult, find_best_effort
 from .penalty_path import PathFollower, PathPoint, PenaltyPath
 
-LEAST_EFFORT = PenaltyPath(delta=1.0, growth=2.0, first_lambda=0.0)
+LEAST_EFFORT = PenaltyPath(delta=1.0, growth=1.0, first_lambda=0.0)
 """The path on which only the effort counts, and s is tau: at its beginning the mean just touches the obstacles."""
 ROUNDINGS = (1.0, 0.25, 0.05)
 """Parts of the clearance for the wanted k with which Newton steps begin where they do not lead on from the least effort."""
