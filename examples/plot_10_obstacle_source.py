@@ -2,9 +2,9 @@
 A custom obstacle source
 ========================
 
-foc_ros needs circles with a centre, a radius and, if the obstacles move, a velocity. This example turns the boxes of an object
-detector into circles. A small tracker estimates the velocity of each object from its last two detections. The prediction moves
-each circle at this velocity.
+foc_ros takes obstacles from any source: circles, boxes, capsules and convex hulls, each with a velocity if it moves. This example
+takes the boxes of an object detector. A small tracker estimates the velocity of each object from its last two detections. The
+prediction moves each box at this velocity.
 """
 
 from dataclasses import dataclass, field
@@ -17,30 +17,31 @@ import foc_ros
 
 @dataclass
 class BoxTracker:
-    """Turn detected boxes into circles that move.
+    """Turn detected boxes into boxes that move.
 
-    size_error: standard deviation of a detected size [m].
+    rounding: radius of their corners [m]; size_error: standard deviation of the place of a detected side [m].
     """
 
+    rounding: float = 0.005
     size_error: float = 0.004
     last: dict[str, tuple[float, np.ndarray]] = field(default_factory=dict)
 
-    def track(self, t: float, boxes: dict[str, tuple[float, float, float, float]]) -> list[foc_ros.Circle]:
-        """Return a circle around each box (x, y, width, height) [m] that was detected at time t [s]."""
-        circles = []
-        for name, (x, y, width, height) in boxes.items():
+    def track(self, t: float, detected: dict[str, tuple[float, float, float, float, float]]) -> list[foc_ros.Box]:
+        """Return a box for each detection (x, y, length, width [m], yaw [rad]) at time t [s]."""
+        boxes = []
+        for name, (x, y, length, width, yaw) in detected.items():
             centre = np.array([x, y])
             seen_at, was_at = self.last.get(name, (t, centre))
             velocity = (centre - was_at) / (t - seen_at) if t > seen_at else np.zeros(2)
             self.last[name] = t, centre
-            radius = float(np.hypot(width, height)) / 2
-            circles.append(foc_ros.Circle(centre, radius, self.size_error, velocity, name))
-        return circles
+            size = length - 2 * self.rounding, width - 2 * self.rounding
+            boxes.append(foc_ros.Box(centre, size, yaw, self.rounding, self.size_error, velocity, name))
+        return boxes
 
 
-def detect_boxes(t: float) -> dict[str, tuple[float, float, float, float]]:
+def detect_boxes(t: float) -> dict[str, tuple[float, float, float, float, float]]:
     """Return what a detector would report: a box that stands still, and a cart that crosses the scene."""
-    return {'box': (0.22, 0.05, 0.04, 0.03), 'cart': (0.13, -0.16 + 0.25 * t, 0.05, 0.04)}
+    return {'box': (0.22, 0.05, 0.06, 0.03, 0.5), 'cart': (0.13, -0.16 + 0.25 * t, 0.05, 0.04, 0.0)}
 
 
 # %%

@@ -44,11 +44,12 @@ FEEDBACK_RATE = 3.5
 
 NEAR = np.array([[0.0, -0.06], [0.0, 0.07]])
 FAR = np.array([[0.36, -0.065], [0.35, 0.08]])
-OBSTACLES = [  # x, y, z, radius, radius_stddev, id
-    (0.170, 0.005, HEIGHT, 0.035, 0.003, 1),
-    (0.135, 0.125, HEIGHT, 0.030, 0.002, 2),
-    (0.200, -0.125, HEIGHT, 0.030, 0.002, 3),
-    (0.255, 0.075, HEIGHT, 0.020, 0.002, 4),
+OBSTACLES = [  # x, y, z, radius, radius_stddev, id, size_x, size_y, yaw: a box, three circles, and a wall beside the workspace
+    (0.170, 0.003, HEIGHT, 0.004, 0.003, 1, 0.064, 0.036, 0.6),
+    (0.135, 0.125, HEIGHT, 0.030, 0.002, 2, 0.0, 0.0, 0.0),
+    (0.200, -0.125, HEIGHT, 0.030, 0.002, 3, 0.0, 0.0, 0.0),
+    (0.255, 0.075, HEIGHT, 0.020, 0.002, 4, 0.0, 0.0, 0.0),
+    (0.180, 0.240, HEIGHT, 0.003, 0.002, 5, 0.360, 0.010, 0.0),
 ]
 
 

@@ -11,9 +11,11 @@ import csv
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from make_demo_recording import OBSTACLES
+
 from foc_ros.core.config import Config
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import NANOSECONDS, Array, HandSample, Obstacles
+from foc_ros.core.types import NANOSECONDS, Array, HandSample
 from foc_ros.io.bags import BagReader
 from foc_ros.reporting.snapshots import HandTrajectory, build_hand_trajectory
 from foc_ros.ros.intake import Intake
@@ -31,7 +33,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description='Make the tables of doc/examples.')
     parser.add_argument('directory', nargs='?', type=Path, default=EXAMPLES)
     directory = parser.parse_args().directory
-    hand, obstacles, goals = read()
+    hand, goals = read()
     spans = hand.find_movements(Config().estimator.onset_speed)
     samples = []
     for name, number in zip('ab', MOVEMENTS, strict=True):
@@ -39,15 +41,18 @@ def main() -> None:
         rows = hand.between(begin_ns, end_ns)
         for stamp, (x, y) in list(zip(hand.stamps_ns[rows], hand.positions[rows], strict=True))[::EVERY]:
             samples.append((name, f'{(stamp - begin_ns) / NANOSECONDS:.3f}', f'{x:.4f}', f'{y:.4f}'))
-    discs = zip(obstacles.ids, obstacles.centre, obstacles.radius, obstacles.radius_stddev, strict=True)
-    circles = [(name, *(f'{value:.4f}' for value in (*centre, radius, stddev))) for name, centre, radius, stddev in discs]
+    obstacles = [
+        (str(name), *(f'{value:.4f}' for value in (x, y, radius, stddev, *box)))
+        for x, y, _, radius, stddev, name, *box in OBSTACLES
+    ]
     _write(directory / 'recordings.csv', ('recording', 't_s', 'x_m', 'y_m'), samples)
-    _write(directory / 'obstacles.csv', ('id', 'x_m', 'y_m', 'radius_m', 'radius_stddev_m'), circles)
+    columns = ('id', 'x_m', 'y_m', 'radius_m', 'radius_stddev_m', 'size_x_m', 'size_y_m', 'yaw_rad')
+    _write(directory / 'obstacles.csv', columns, obstacles)
     _write(directory / 'goals.csv', ('x_m', 'y_m'), [tuple(f'{value:.4f}' for value in goal) for goal in goals])
 
 
-def read() -> tuple[HandTrajectory, Obstacles, Array]:
-    """Return the hand, the obstacles and the goals of the recording, decoded as in the node."""
+def read() -> tuple[HandTrajectory, Array]:
+    """Return the hand and the goals of the recording, decoded as in the node."""
     intake = Intake(Pipeline(Config()))
     samples: list[HandSample] = []
     with BagReader(RECORDING) as reader:
@@ -55,9 +60,8 @@ def read() -> tuple[HandTrajectory, Obstacles, Array]:
             intake.take(item.role, item.message)
             if intake.sample is not None and (not samples or intake.sample is not samples[-1]):
                 samples.append(intake.sample)
-    scene = intake.pipeline.scene
-    assert scene.goals is not None
-    return build_hand_trajectory(samples), scene.obstacles(samples[-1].stamp_ns), scene.goals
+    assert intake.pipeline.scene.goals is not None
+    return build_hand_trajectory(samples), intake.pipeline.scene.goals
 
 
 def _write(file: Path, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

@@ -87,8 +87,12 @@ def test_rates_length_and_frame(recorded: list[tuple[str, int, Any]]) -> None:
 
 
 def test_movements_are_reaches_without_collision(script: ModuleType, recorded: list[tuple[str, int, Any]]) -> None:
-    track, OBSTACLES = hand(recorded), np.array(script.OBSTACLES)
-    clearance = np.linalg.norm(track[:, None, 1:3] - OBSTACLES[None, :, :2], axis=2) - OBSTACLES[:, 3]
+    track, rows = hand(recorded), np.array(script.OBSTACLES)
+    away = track[:, None, 1:3] - rows[:, :2]
+    across = np.stack([-np.sin(rows[:, 8]), np.cos(rows[:, 8])], axis=1)
+    along = np.stack([np.cos(rows[:, 8]), np.sin(rows[:, 8])], axis=1)
+    own = np.stack([(away * along).sum(axis=2), (away * across).sum(axis=2)], axis=2)
+    clearance = np.linalg.norm(np.maximum(np.abs(own) - rows[:, 6:8] / 2, 0.0), axis=2) - rows[:, 3]
     assert clearance.min() > 0.008
     starts = np.cumsum([0.0, *(r.rest_s + r.duration_s for r in script.REACHES)])
     for reach, start, end in zip(script.REACHES, starts, starts[1:], strict=False):
