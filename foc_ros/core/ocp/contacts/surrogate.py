@@ -41,6 +41,8 @@ VERTEX_TOLERANCE = 1e-3
 """Distance in steps from the lowest time so far at which the next vertex is not evaluated any more."""
 CORNER_REACH = 1.0
 """Time from a contact, in steps, within which it may be at a corner."""
+FLAT_SLOPE = 1e-9
+"""Rise of a margin towards a corner, per step, that counts as rounding [m]."""
 TIME_STEP = 1e-3
 """Difference in time, in steps, by which derivatives by time are taken."""
 APART = 2.0
@@ -206,7 +208,9 @@ def find_kink(
     at = evaluate_margin(terms, obstacles, trajectory, control, j, s, k, 0.0)
     if not max(terms.chance.obstacles.ignored_until[j], 1.0) < corner.time < trajectory.shape[1] - 1.0:
         return NO_CORNER, (at, at, at)
-    at = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time, k, 0.0)
+    value, at = at.value, evaluate_margin(terms, obstacles, trajectory, control, j, corner.time, k, at.scale)
+    if at.value > value + abs(corner.time - s) * FLAT_SLOPE:
+        return NO_CORNER, (at, at, at)
     before = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time - TIME_STEP, k, at.scale)
     after = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time + TIME_STEP, k, at.scale)
     if not before.value > at.value < after.value or before.is_on_edge == after.is_on_edge:

@@ -26,6 +26,8 @@ SPARE = 1e-8
 """Clearance term, relative to the square of the scene, that outweighs this rounding."""
 SAME_TIME = 1e-6
 """Difference in time, in steps, up to which two shortfalls are the same."""
+MOST_REPEATS = 3
+"""How often the same contact may be added, and released, one time after the other."""
 MAX_CHANGES = 10
 """How often contacts may be released or added."""
 NEW_MULTIPLIER = 1e-6
@@ -65,7 +67,7 @@ def update_active_contacts(
     """
     control, obstacle = near.copy(), contacts.obstacle.copy()
     time, multiplier = contacts.time.copy(), contacts.multiplier.copy()
-    added = np.full(2, np.nan)
+    added, repeats = np.full(2, np.nan), 0
     for _ in range(MAX_CHANGES + 1):
         if len(time) > MOST_CONTACTS:
             break
@@ -83,9 +85,10 @@ def update_active_contacts(
         new = find_shortfalls(terms, obstacles, first_alike, trajectory, control, k, CLEAR * terms.extent)
         if len(new) == 0:
             return True, control, Contacts(obstacle, time, multiplier), k
-        if new[0, 0] == added[0] and abs(new[0, 1] - added[1]) < SAME_TIME:
-            break  # the deepest shortfall was added before, and released
-        added[:] = new[0]
+        if repeats == MOST_REPEATS:
+            break
+        is_same = new[0, 0] == added[0] and abs(new[0, 1] - added[1]) < SAME_TIME
+        repeats, added[:] = repeats + 1 if is_same else 0, new[0]
         slight = NEW_MULTIPLIER * multiplier.max() if len(multiplier) else 1.0
         obstacle = np.concatenate((obstacle, new[:, 0].astype(np.intp)))
         time, multiplier = np.concatenate((time, new[:, 1])), np.concatenate((multiplier, np.full(len(new), slight)))

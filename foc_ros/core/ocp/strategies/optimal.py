@@ -39,7 +39,7 @@ ROUNDINGS = (1.0, 0.25, 0.05)
 """Parts of the clearance for the wanted k with which Newton steps begin where they do not lead on from the least effort."""
 CLOSE = 5e-6
 """Relative excess over the wanted k that is aimed at."""
-FALLBACKS = (1.0, 0.6, 0.3, 0.0)
+FALLBACKS = (1.0, 0.75, 0.5, 0.35, 0.25)
 """Shares of the earlier k that are tried where Newton steps do not lead to the one that is wanted: k rises again from there."""
 EVEN = 1e-4
 """Relative difference of the slope from the one that is worth it at which both are the same."""
@@ -221,6 +221,7 @@ class _Search:
                 continue
             if self.slope(point) <= self.rate:
                 low = self.best = point
+                stride *= 2
             else:
                 high = point.k
             is_near = low.k < self.wanted and self.slope(point) > NEARLY * self.rate
