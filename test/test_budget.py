@@ -60,7 +60,7 @@ def test_without_any_time_the_last_answers_are_kept_with_their_age():
     assert {each.age_s for each in late.candidates} == {PERIOD_S}
     assert all('out of time' in each.solution.message and '0.02 s ago' in each.solution.message for each in late.candidates)
     after, _ = predicted(2, later)
-    assert labels(after.solved_candidates) == labels(before.solved_candidates)
+    assert labels(after.candidates_with_likelihood) == labels(before.candidates_with_likelihood)
     assert {each.age_s for each in after.candidates} == {0.0}
     assert max(each.solution.qp_solves for each in after.solved_candidates) <= 3, 'warm started from before the late one'
 

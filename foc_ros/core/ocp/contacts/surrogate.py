@@ -41,8 +41,8 @@ VERTEX_TOLERANCE = 1e-3
 """Distance in steps from the lowest time so far at which the next vertex is not evaluated any more."""
 CORNER_REACH = 1.0
 """Time from a contact, in steps, within which it may be at a corner."""
-FLAT_SLOPE = 1e-9
-"""Rise of a margin towards a corner, per step, that counts as rounding [m]."""
+LEAST_RISE = 1e-9
+"""Rise of a margin towards a corner that does not count as rounding [m]."""
 TIME_STEP = 1e-3
 """Difference in time, in steps, by which derivatives by time are taken."""
 APART = 2.0
@@ -209,7 +209,7 @@ def find_kink(
     if not max(terms.chance.obstacles.ignored_until[j], 1.0) < corner.time < trajectory.shape[1] - 1.0:
         return NO_CORNER, (at, at, at)
     value, at = at.value, evaluate_margin(terms, obstacles, trajectory, control, j, corner.time, k, at.scale)
-    if at.value > value + abs(corner.time - s) * FLAT_SLOPE:
+    if at.value > value + LEAST_RISE:
         return NO_CORNER, (at, at, at)
     before = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time - TIME_STEP, k, at.scale)
     after = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time + TIME_STEP, k, at.scale)
