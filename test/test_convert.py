@@ -179,7 +179,7 @@ def test_an_existing_bag_stops_before_anything_is_written(tmp_path: Path, capsys
         ('obstacles', 'x_m,y_m,size_x_m\n0,0,1\n', 'o.csv: row 1: no column radius_m; it has x_m, y_m, size_x_m'),
         ('obstacles', 'x_m,y_m,size_x_m,size_y_m\n0,0,1,-1\n', "size_y_m: expected a number in [0, 10000], got '-1'"),
         ('obstacles', 'x_m,y_m,size_x_m,size_y_m\n0,0,0,0\n', "row 2, column size_x_m: expected a size or a radius > 0, got '0'"),
-        ('obstacles', 'x_m,y_m,size_x_m,size_y_m,yaw_rad\n0,0,1,1,nan\n', "yaw_rad: expected a number in [-10000, 10000]"),
+        ('obstacles', 'x_m,y_m,size_x_m,size_y_m,yaw_rad\n0,0,1,1,nan\n', 'yaw_rad: expected a number in [-10000, 10000]'),
         ('obstacles', 'recording,x_m,y_m,radius_m\n,0,0,1\n', "row 2, column recording: expected a name, got ''"),
         ('goals', 'recording,x_m,y_m\nb,0,0\n', "recording 'a': the table of goals has no row for it"),
         ('obstacles', 'x_m,y_m,radius_m\n0,0,-0.1\n', "radius_m: expected a number in [0, 10000], got '-0.1'"),
