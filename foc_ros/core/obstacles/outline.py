@@ -6,7 +6,7 @@ import numpy as np
 
 from foc_ros.core.types import Array, Obstacles
 
-TURN = 2.0 * np.pi
+from .rounded_polygon import TURN
 
 
 def trace_outline(polygon: Array, radius: float, points: int = 64) -> Array:

@@ -6,8 +6,7 @@ q(p) the nearest point of the polygon, d = p - q(p). Outside the polygon |d| gro
 moves where q is a vertex (by t / |d| along the tangent t), and keeps its direction where q is on an edge. Inside the polygon q is
 the nearest point of its boundary, d points inwards, and distances count as negative: n = -d / |d| points outwards everywhere.
 
-The boundary of the rounded shape consists of an arc about each vertex and a straight part along each edge. A place on the
-boundary is told by the length from the beginning of the arc about the first vertex, anticlockwise.
+The boundary of the rounded shape consists of an arc about each vertex and a straight part along each edge: see `boundary`.
 """
 
 from __future__ import annotations

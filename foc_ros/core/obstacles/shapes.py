@@ -195,8 +195,25 @@ class Box(Shape):
         return super().__repr__().replace(', radius', f', size {length:g} x {width:g} m, radius')
 
 
+class _HullOfPoints(Shape):
+    """What shapes have in common whose polygon is the convex hull of some points."""
+
+    def _list_points(self) -> Array:
+        raise NotImplementedError
+
+    @property
+    def centre(self) -> ArrayLike:  # type: ignore[override]
+        """Mean of the corners, (2,) [m]."""
+        return make_hull_polygon(self._list_points())[0]
+
+    @property
+    def polygon(self) -> Array:
+        """Vertices of the polygon, (v, 2), anticlockwise, relative to the centre [m]."""
+        return make_hull_polygon(self._list_points())[1]
+
+
 @dataclass(frozen=True, repr=False)
-class Capsule(Shape):
+class Capsule(_HullOfPoints):
     """All points within a radius of a line, such as a tool or an arm.
 
     Parameters
@@ -238,19 +255,12 @@ class Capsule(Shape):
     def __post_init__(self) -> None:
         self._check('start', 'end')
 
-    @property
-    def centre(self) -> ArrayLike:  # type: ignore[override]
-        """Middle of the line, (2,) [m]."""
-        return make_hull_polygon(np.array([self.start, self.end]))[0]
-
-    @property
-    def polygon(self) -> Array:
-        """Vertices of the polygon, (v, 2), anticlockwise, relative to the centre [m]."""
-        return make_hull_polygon(np.array([self.start, self.end]))[1]
+    def _list_points(self) -> Array:
+        return np.array([self.start, self.end])
 
 
 @dataclass(frozen=True, repr=False)
-class Hull(Shape):
+class Hull(_HullOfPoints):
     """The convex hull of some points, with corners that are sharp or rounded.
 
     Parameters
@@ -297,15 +307,8 @@ class Hull(Shape):
             raise SceneError('obstacle.points', f'a hull of at most {MOST_VERTICES} corners', len(self.polygon))
         self._check()
 
-    @property
-    def centre(self) -> ArrayLike:  # type: ignore[override]
-        """Mean of the corners, (2,) [m]."""
-        return make_hull_polygon(np.array(self.points))[0]
-
-    @property
-    def polygon(self) -> Array:
-        """Vertices of the polygon, (v, 2), anticlockwise, relative to the centre [m]."""
-        return make_hull_polygon(np.array(self.points))[1]
+    def _list_points(self) -> Array:
+        return np.array(self.points)
 
 
 def collect_obstacles(shapes: Iterable[Shape] | Obstacles) -> Obstacles:

@@ -73,8 +73,9 @@ def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadli
     reached = found.find_probability(minimum.k)
     message = {
         Status.SOLVED: 'solved',
-        Status.COMPROMISED: f'eta {reached:.4g} only: more would cost more than likelihood.shortfall, or is out of reach',
-        Status.ETA_UNREACHABLE: f'eta {problem.eta:g} is out of reach: the largest found is {reached:.4g}',
+        Status.ETA_UNREACHABLE: f'eta {problem.eta:g} is out of reach: the largest found is {reached:.4g}'
+        if search.is_hard
+        else f'eta {reached:.4g} only: more would cost more than likelihood.shortfall, or is out of reach',
         Status.DEADLINE: f'out of time, with eta {reached:.4g} reached',
     }[status]
     weights = compute_equivalent_weights(point)
@@ -123,7 +124,7 @@ class _Search:
         assert self.best is not None
         if self.best.k >= self.wanted:
             return Status.SOLVED
-        return Status.ETA_UNREACHABLE if self.is_hard else Status.COMPROMISED
+        return Status.ETA_UNREACHABLE
 
     def follow_in_time(self, start: Start) -> bool:
         """Follow an earlier solution, if there is one, and leave time to begin again; tell whether that worked."""
