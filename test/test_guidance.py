@@ -13,6 +13,7 @@ from prediction_samples import outcome, prediction, three_ways
 import foc_ros
 from foc_ros.core.config import Config, GuidanceConfig
 from foc_ros.core.guidance.agreement import MISSING_S, combine, remember_likelihoods, weigh_candidates
+from foc_ros.core.guidance.clearance import find_need, keep_clear, saturate
 from foc_ros.core.guidance.energy_tank import limit_by_energy, update_energy
 from foc_ros.core.guidance.limits import find_largest_force, step_force
 from foc_ros.core.guidance.obstacle_margin import TOLERANCE, build_margins, measure_opposing_distance, turn_along
@@ -22,7 +23,7 @@ from foc_ros.core.guidance.stiffness import compute_stiffness, find_deflection, 
 from foc_ros.core.types import Array, Prediction, Status, make_obstacles
 
 ROUND = make_obstacles([(0.1, 0.0)], [0.03])
-SETTINGS = GuidanceConfig(k_max=100.0, precision_low=1e3, precision_high=1e4, position_stddev=1e-6)
+SETTINGS = GuidanceConfig(k_max=100.0, precision_low=1e3, precision_high=1e4, position_stddev=1e-6, clearance=0.0)
 
 
 def straight(label: str = 'goal0:', likelihood: float = 1.0, start: Array = (0.0, 0.0), end: Array = (0.3, 0.0), **rest: object):
@@ -166,13 +167,17 @@ def test_a_hand_beside_its_only_path_is_drawn_to_it() -> None:
 
 def test_the_mode_trajectory_keeps_the_force_along_the_path() -> None:
     newest = prediction(straight(), stamp_ns=0)
-    velocity = (0.0, 0.2)  # where the hand would go, and the path does not
-    along = {
-        mode: guide_hand(Config(guidance=replace(SETTINGS, mode=mode)), newest, (0.0, 0.0), velocity).force[0]
-        for mode in ('path', 'trajectory')
-    }
-    assert along['path'] == pytest.approx(0.0, abs=1e-9)
-    assert along['trajectory'] > 1.0
+    config = {mode: Config(guidance=replace(SETTINGS, mode=mode, lookahead_s=0.1)) for mode in ('path', 'trajectory')}
+    forces = {mode: guide_hand(each, newest, (-0.01, 0.01), (0.001, 0.0)).force for mode, each in config.items()}
+    assert forces['path'] == pytest.approx([0.0, -1.0], abs=1e-6)
+    assert forces['trajectory'][0] > 0.9
+
+
+def test_in_mode_path_the_force_neither_drives_nor_brakes_a_moving_hand() -> None:
+    velocity = np.array([0.3, 0.2])
+    output = guide_hand(Config(guidance=SETTINGS), prediction(straight(), stamp_ns=0), (0.1, 0.01), velocity)
+    assert np.hypot(*output.force) > 1.0
+    assert abs(output.force @ velocity) < 0.05 * np.hypot(*output.force) * np.hypot(*velocity)
 
 
 def bent(label: str, likelihood: float, aside: float):
@@ -193,11 +198,45 @@ def test_a_hand_at_a_fork_is_left_alone() -> None:
 
 
 def test_the_look_ahead_damps_movement_across_the_path() -> None:
-    newest = prediction(straight(), stamp_ns=0)
-    output = guide_hand(Config(guidance=replace(SETTINGS, lookahead_s=0.1)), newest, (0.1, 0.0), (0.2, 0.05))
-    assert output.force == pytest.approx([0.0, -0.1 * 100.0 * 0.05], abs=1e-6)
-    none = guide_hand(Config(guidance=replace(SETTINGS, lookahead_s=0.0)), newest, (0.1, 0.0), (0.2, 0.05))
-    assert none.force == pytest.approx([0.0, 0.0], abs=1e-9)
+    newest, velocity = prediction(straight(), stamp_ns=0), (0.0, 0.05)
+    settings = replace(SETTINGS, mode='trajectory', lookahead_s=0.1)
+    output = guide_hand(Config(guidance=settings), newest, (0.0, 0.0), velocity)
+    assert output.force[1] == pytest.approx(-0.1 * 100.0 * 0.05, abs=1e-6)
+    none = guide_hand(Config(guidance=replace(settings, lookahead_s=0.0)), newest, (0.0, 0.0), velocity)
+    assert none.force == pytest.approx([0.0, 0.0], abs=1e-6)
+
+
+def test_help_is_needed_where_the_hand_would_come_too_near_to_an_obstacle() -> None:
+    settings = GuidanceConfig(clearance=0.02, lookahead_s=0.2)
+    velocity = np.array([0.4, 0.0])
+    assert find_need(settings, ROUND, np.zeros(2), velocity) == (0.2, 1.0)  # 80 mm ahead lies inside
+    assert find_need(settings, ROUND, np.array([0.0, 0.051]), velocity)[1] == 0.0
+    time, need = find_need(settings, ROUND, np.array([0.06, 0.045]), velocity)
+    assert (time, need) == (pytest.approx(0.1), pytest.approx(0.5))
+    assert find_need(settings, make_obstacles(), np.zeros(2), velocity) == (0.0, 0.0)
+    assert find_need(replace(settings, clearance=0.0), ROUND, np.zeros(2), velocity) == (0.2, 1.0)
+
+
+def test_references_are_moved_out_to_the_clearance() -> None:
+    settings = GuidanceConfig(clearance=0.02)
+    moved = keep_clear(settings, ROUND, np.array([[0.1, 0.035], [0.1, -0.06]]))
+    assert moved == pytest.approx(np.array([[0.1, 0.05], [0.1, -0.06]]))
+    gap = make_obstacles([(0.1, 0.04), (0.1, -0.04)], [0.03, 0.03])
+    assert keep_clear(settings, gap, np.array([[0.1, 0.005]]))[0, 1] < 0.0 + 1e-12
+
+
+def test_a_distant_candidate_does_not_outweigh_a_near_one() -> None:
+    errors = saturate(GuidanceConfig(clearance=0.02), np.array([[0.0, 0.01], [0.0, -0.08]]))
+    assert errors.tolist() == [[0.0, 0.01], [0.0, pytest.approx(-0.02)]]
+
+
+def test_a_hand_far_from_obstacles_is_left_alone_and_one_that_comes_too_near_is_turned_away() -> None:
+    newest = prediction(bent('goal0:+0', 1.0, 0.2), stamp_ns=0, obstacles=ROUND)
+    settings = replace(SETTINGS, clearance=0.02)
+    far = guide_hand(Config(guidance=settings), newest, (0.0, 0.06), (0.3, 0.0))
+    near = guide_hand(Config(guidance=settings), newest, (0.01, 0.03), (0.5, 0.0))
+    assert far.force.tolist() == [0.0, 0.0]
+    assert near.force[1] > 0.5
 
 
 def test_a_blended_command_is_never_faster_and_equals_the_command_without_authority() -> None:
@@ -222,13 +261,14 @@ def test_mirrored_input_gives_mirrored_guidance() -> None:
             stamp_ns=0,
             obstacles=make_obstacles([(0.05, -sign * 0.03)], [0.02]),
         )
-        forces.append(guide_hand(Config(), newest, (0.01, -sign * 0.005), (0.2, -sign * 0.05)).force)
+        forces.append(guide_hand(Config(), newest, (0.02, -sign * 0.005), (0.2, -sign * 0.05)).force)
     assert forces[0] == pytest.approx(forces[1] * mirror, abs=1e-9)
     assert np.hypot(*forces[0]) > 0.01
 
 
 def test_the_public_class_checks_its_input_and_keeps_its_state() -> None:
-    guidance, newest = foc_ros.Guidance(), prediction(straight(), stamp_ns=0)
+    config = foc_ros.Config(guidance=SETTINGS)
+    guidance, newest = foc_ros.Guidance(config), prediction(straight(), stamp_ns=0)
     guidance.update(0.0, (0.1, 0.01), (0.0, 0.0), newest)
     output = guidance.update(0.005, (0.1, 0.01), (0.0, 0.0), newest)
     assert output.status is foc_ros.GuidanceStatus.GUIDING and output.force[1] < 0.0

@@ -85,10 +85,10 @@ DEAD_MAN = {
 
 
 @pytest.mark.parametrize('case', DEAD_MAN)
-@pytest.mark.parametrize('settings', [GuidanceConfig(), GuidanceConfig(f_max=20.0), GuidanceConfig(ramp_s=0.5)], ids=str)
+@pytest.mark.parametrize('settings', [GuidanceConfig(), GuidanceConfig(f_max=20.0), GuidanceConfig(ramp_s=0.5)])
 def test_every_dead_man_condition_releases_the_hand_within_the_ramp(case: str, settings: GuidanceConfig) -> None:
     config = Config(guidance=settings)
-    state, given = build_guiding_state(Config(guidance=replace(settings, hold_s=5.0, k_max=5000.0, tank=10.0)))
+    state, given = build_guiding_state(Config(guidance=replace(settings, hold_s=5.0, k_max=5000.0, tank=10.0, clearance=0.0)))
     changes, status = DEAD_MAN[case]
     begin, sizes = given.t, [float(np.hypot(*state.force))]
     while given.t < begin + settings.ramp_s - 1e-9:

@@ -28,6 +28,7 @@ COMMANDS = {
     'replay': 'compute predictions from a recording, without ROS and faster than real time',
     'fit': 'find the parameters that explain recordings best',
     'evaluate': 'compare predictions with recordings of people, beside simple baselines',
+    'simulate': 'compare guidance with other assistance for simulated operators',
     'convert': 'convert motion capture in CSV tables to bags',
 }
 """Purpose of each command. The module of that name defines `add_arguments(parser)` and `run(arguments) -> exit code`."""

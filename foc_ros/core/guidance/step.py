@@ -8,9 +8,10 @@ from enum import StrEnum
 import numpy as np
 
 from foc_ros.core.config import Config, GuidanceConfig
-from foc_ros.core.types import Array, Prediction, Record, make_obstacles
+from foc_ros.core.types import Array, Obstacles, Prediction, Record, make_obstacles
 
 from .agreement import combine, remember_likelihoods, weigh_candidates
+from .clearance import find_need, keep_clear, saturate
 from .energy_tank import limit_by_energy, update_energy
 from .limits import find_largest_force, shorten, step_force
 from .obstacle_margin import NEAR_M, Margins, build_margins, measure_opposing_distance, turn_along
@@ -19,6 +20,8 @@ from .stiffness import compute_stiffness, find_deflection, project_out
 
 HEADING_M = 0.02
 """Shortest distance ahead on a path at which the heading points [m]."""
+SLOW = 0.02
+"""Speed [m/s] from which on the direction of the hand counts more than that of a path as the one along the path."""
 LATE_PERIODS = 2.0
 """Longest time between two updates for which the tank is guaranteed, in periods of `guidance.rate_hz`."""
 
@@ -93,13 +96,14 @@ class GuidanceOutput(Record):
 class Followed(Record):
     """The newest prediction as guidance uses it.
 
-    paths: of its candidates, None if none has a likelihood; progress (c,): on them [m]; margins: of its obstacles; known: last
-    likelihoods by label.
+    paths: of its candidates, None if none has a likelihood; progress (c,): on them [m]; obstacles: as far as the hand has to keep
+    away; margins: of these; known: last likelihoods by label.
     """
 
     prediction: Prediction | None = None
     paths: GuidePaths | None = None
     progress: Array = field(default_factory=lambda: np.zeros(0))
+    obstacles: Obstacles = field(default_factory=make_obstacles)
     margins: Margins = field(default_factory=lambda: build_margins(make_obstacles(), 0.0))
     known: dict[str, tuple[float, float]] = field(default_factory=dict)
 
@@ -176,52 +180,60 @@ def _follow_prediction(config: Config, before: Followed, given: GuidanceInput) -
     prediction = given.prediction
     if prediction is None or prediction is before.prediction:
         return before
-    known, margins = remember_likelihoods(prediction, before.known), before.margins
+    known, obstacles, margins = remember_likelihoods(prediction, before.known), before.obstacles, before.margins
     if before.prediction is None or prediction.obstacles is not before.prediction.obstacles:
-        margins = build_margins(prediction.obstacles, config.guidance.margin + config.scene.hand_radius)
+        obstacles = prediction.obstacles.grow(config.scene.hand_radius)
+        margins = build_margins(obstacles, config.guidance.margin)
     if not prediction.candidates_with_likelihood:
-        return Followed(prediction, margins=margins, known=known)
+        return Followed(prediction, obstacles=obstacles, margins=margins, known=known)
     paths, references = build_paths(prediction), {}
     if before.paths is not None:
         points = before.paths.interpolate(before.paths.points, before.progress)
         references = dict(zip(before.paths.labels, points, strict=True))
     travelled = float(np.hypot(*given.velocity)) * max(given.prediction_age_s, 0.0)
-    return Followed(prediction, paths, transfer_progress(paths, references, given.position, travelled), margins, known)
+    progress = transfer_progress(paths, references, given.position, travelled)
+    return Followed(prediction, paths, progress, obstacles, margins, known)
 
 
 def _compute_wish(settings: GuidanceConfig, followed: Followed, given: GuidanceInput) -> _Wish:
     """Return what the candidates ask for.
 
     A prediction begins at the hand, so what distinguishes a path from the movement of the hand is ahead of both. With the
-    look-ahead h, x_i is the point of path i that is |v| h farther than the progress, and it is compared with where the hand is by
-    then, if it keeps its velocity v:
+    look-ahead h of `clearance.find_need`, x_i is the point of path i that is |v| h farther than the progress, and it is compared
+    with where the hand is by then, if it keeps its velocity v:
 
         f_i = K_i (x_i - (x + h v)).
 
-    The part -h K_i v is a damping across the path. With h = 0 this is f_i = K_i (x_i - x). Near the end of a path, h is the time
-    to its end.
+    In mode `path` there is no force along the direction of the hand, which is that of the path where the hand is at rest. Near
+    the end of a path, h is the time to its end. With h = 0 this is f_i = K_i (x_i - x).
     """
     paths, progress, speed = followed.paths, followed.progress, float(np.hypot(*given.velocity))
     assert paths is not None
-    ahead = np.minimum(progress + settings.lookahead_s * speed, paths.lengths[:, -1])
-    times = np.minimum(settings.lookahead_s, (ahead - progress) / max(speed, 1e-9))
+    lookahead_s, need = find_need(settings, followed.obstacles, given.position, given.velocity)
+    ahead = np.minimum(progress + lookahead_s * speed, paths.lengths[:, -1])
+    times = np.minimum(lookahead_s, (ahead - progress) / max(speed, 1e-9))
     stiffness = compute_stiffness(paths.interpolate(paths.covariances, ahead), settings)
     if settings.mode == 'path':
-        stiffness = project_out(stiffness, paths.find_tangents(progress))
-    errors = paths.interpolate(paths.points, ahead) - given.position - times[:, None] * given.velocity
+        stiffness = project_out(stiffness, normalize(given.velocity + SLOW * paths.find_tangents(progress)))
+    points = keep_clear(settings, followed.obstacles, paths.interpolate(paths.points, ahead))
+    errors = saturate(settings, points - given.position - times[:, None] * given.velocity)
     weights = weigh_candidates(paths.labels, paths.likelihoods, followed.known)
     force, agreement = combine(weights, (stiffness @ errors[..., None])[..., 0])
-    mean_stiffness = agreement * np.einsum('c,cab->ab', weights, stiffness)
     reference = given.position + weights @ errors
-    farther = paths.interpolate(paths.points, np.maximum(ahead, progress + HEADING_M))
-    heading = weights @ normalize(farther - given.position)
+    heading, target = _find_heading(paths, np.maximum(ahead, progress + HEADING_M), weights, given.position)
     return _Wish(
-        turn_along(followed.margins, given.position, reference, force),
-        mean_stiffness,
+        need * turn_along(followed.margins, given.position, reference, force),
+        need * agreement * np.einsum('c,cab->ab', weights, stiffness),
         agreement,
         settings.authority * min(float(np.hypot(*heading)), 1.0),
-        turn_along(followed.margins, given.position, weights @ farther, normalize(heading)),
+        turn_along(followed.margins, given.position, target, normalize(heading)),
     )
+
+
+def _find_heading(paths: GuidePaths, ahead: Array, weights: Array, position: Array) -> tuple[Array, Array]:
+    """Return the weighted sum of the unit vectors to a point of each path, and the weighted mean of these points (2,) [m]."""
+    points = paths.interpolate(paths.points, ahead)
+    return weights @ normalize(points - position), weights @ points
 
 
 def _release(settings: GuidanceConfig, force: Array, dt: float) -> Array:
