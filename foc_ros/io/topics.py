@@ -8,6 +8,8 @@ from foc_ros.core.errors import RecordingError
 
 HAND, CLOUD, MARKERS, GOALS, GOAL = 'hand_pose', 'obstacles', 'obstacle_markers', 'goals', 'goal_pose'
 COLLISION, DETECTIONS = 'collision_objects', 'detections'
+COMMAND = 'command_twist'
+"""The operator's velocity command, an input of guidance alone."""
 TYPES = {
     HAND: 'geometry_msgs/msg/PoseStamped',
     CLOUD: 'sensor_msgs/msg/PointCloud2',
@@ -28,7 +30,7 @@ NAMES = {role: (role,) for role in TYPES} | {HAND: ('hand_pose', 'measured_cp')}
 REQUIRED = ((HAND,), (CLOUD, MARKERS, COLLISION, DETECTIONS), (GOALS, GOAL))
 """Roles that a recording must contain for a prediction: one of each row."""
 
-OUTPUTS = ('prediction', 'likelihoods', 'path', 'markers')
+OUTPUTS = ('prediction', 'likelihoods', 'path', 'markers', 'reference')
 """Last parts of the node's own outputs, which are never used as an input because of their type."""
 
 
