@@ -22,7 +22,6 @@ OPTIONS = (
     'guidance.clearance:=0.0',
     'scene.timeout_s:=0.0',
     'budget_s:=0.0',
-    f'guidance.ramp_s:={RAMP_S}',
 )
 REPEATS = 10
 GUIDED_S = 1.0

@@ -269,8 +269,8 @@ def test_mirrored_input_gives_mirrored_guidance() -> None:
 def test_the_public_class_checks_its_input_and_keeps_its_state() -> None:
     config = foc_ros.Config(guidance=SETTINGS)
     guidance, newest = foc_ros.Guidance(config), prediction(straight(), stamp_ns=0)
-    guidance.update(0.0, (0.1, 0.01), (0.0, 0.0), newest)
-    output = guidance.update(0.005, (0.1, 0.01), (0.0, 0.0), newest)
+    guidance.update(0.0, (0.1, 0.03), (0.0, 0.0), newest)
+    output = guidance.update(0.005, (0.1, 0.03), (0.0, 0.0), newest)
     assert output.status is foc_ros.GuidanceStatus.GUIDING and output.force[1] < 0.0
     for wrong, field in (
         ((0.005, (0.1, 0.01), (0.0, 0.0), newest), 't'),
@@ -280,7 +280,7 @@ def test_the_public_class_checks_its_input_and_keeps_its_state() -> None:
     ):
         with pytest.raises(foc_ros.InputError, match=f'^{field}: expected'):
             guidance.update(*wrong)
-    assert guidance.update(0.01, (0.1, 0.01), (0.0, 0.0), newest).force[1] < output.force[1]
+    assert guidance.update(0.01, (0.1, 0.03), (0.0, 0.0), newest).force[1] < output.force[1]
     guidance.reset()
     assert guidance.update(0.0, (0.1, 0.01), (0.0, 0.0), newest).force.tolist() == [0.0, 0.0]
 

@@ -1,9 +1,9 @@
 """A small stand-in for a teleoperation stack: a hand that reaches to and fro, a scene, and a consumer of the prediction.
 
-Run it beside the node, `foc_ros node --ros-args -r hand_pose:=MTMR/measured_cp`. With `--seconds 20` it ends by itself. It
-publishes a set point: the position of the hand, moved towards the predicted path by a share of at most LARGEST_SHARE. The share
-grows while predictions are fresh, and falls to zero as soon as they are not, whatever the reason is. The consumer judges a
-prediction by its stamp alone.
+Run it beside the node, `foc_ros node --ros-args -r hand_pose:=MTMR/measured_cp -p guidance.enabled:=true`. With `--seconds 20` it
+ends by itself. It publishes a set point: the position of the hand, moved towards the predicted path by a share of at most
+LARGEST_SHARE, and by the force of guidance, as on a compliant device. The share grows while predictions are fresh, and falls to
+zero as soon as they are not, whatever the reason is. The consumer judges a prediction by its stamp alone.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import time
 
 import numpy as np
 import rclpy
-from geometry_msgs.msg import Pose, PoseArray, PoseStamped
+from geometry_msgs.msg import Pose, PoseArray, PoseStamped, WrenchStamped
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
@@ -33,6 +33,10 @@ FRESH_S = 0.3
 """Age of the hand pose beyond which a prediction is not used."""
 LARGEST_SHARE, RISE_PER_S = 0.4, 1.0
 LOOKAHEAD_S = 0.05
+COMPLIANCE_M_PER_N = 0.002
+"""How far a force of guidance moves the set point, in place of a haptic device."""
+FORCE_FRESH_S = 0.05
+"""Age beyond which a force is not used: the node publishes 200 of them each second."""
 
 
 def compute_hand_position(seconds: float) -> np.ndarray:
@@ -57,12 +61,18 @@ class TeleoperationLoop(Node):
         self._set_point = self.create_publisher(PoseStamped, 'PSM1/servo_cp', 10)
         self._shares = self.create_publisher(Float64, '~/share', 10)
         self.create_subscription(PointCloud2, 'foc/prediction', self._keep_prediction, 10)
+        self._force, self._force_s = np.zeros(3), 0.0
+        self.create_subscription(WrenchStamped, 'foc/guidance/wrench', self._keep_force, 10)
         self.create_timer(0.01, self._move_hand)
         self.create_timer(0.1, self._publish_scene)
         self.create_timer(1.0, self._print_share)
 
     def _keep_prediction(self, cloud: PointCloud2) -> None:
         self._prediction = cloud
+
+    def _keep_force(self, message: WrenchStamped) -> None:
+        force = message.wrench.force
+        self._force, self._force_s = np.array([force.x, force.y, force.z]), time.monotonic()
 
     def _move_hand(self) -> None:
         now, position = self.get_clock().now(), compute_hand_position(time.monotonic() - self._began)
@@ -72,6 +82,8 @@ class TeleoperationLoop(Node):
         self._share = min(self._share + step, LARGEST_SHARE) if target is not None else 0.0
         self._shares.publish(Float64(data=self._share))
         blended = position if target is None else position + self._share * (target - position)
+        if time.monotonic() - self._force_s < FORCE_FRESH_S:
+            blended = blended + COMPLIANCE_M_PER_N * self._force
         self._set_point.publish(self._make_pose(now, blended))
 
     def _find_target(self, now: Time) -> np.ndarray | None:

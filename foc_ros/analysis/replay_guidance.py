@@ -32,7 +32,7 @@ class GuidanceReplay:
     def __init__(self, pipeline: Pipeline) -> None:
         self._pipeline = pipeline
         self._period_ns = round(NANOSECONDS / pipeline.config.guidance.rate_hz)
-        self._state, self._next_ns = GuidanceState(), 0
+        self._state, self._first_ns, self._next_ns = GuidanceState(), 0, 0
         self._hand: HandState | None = None
         self._prediction: Prediction | None = None
 
@@ -42,7 +42,7 @@ class GuidanceReplay:
             return
         stamp_ns, hand = step.sample.stamp_ns, self._pipeline.hand_state
         if self._hand is None or stamp_ns < self._hand.stamp_ns:  # the recording began anew
-            self._state, self._next_ns, self._prediction = GuidanceState(), stamp_ns, None
+            self._state, self._first_ns, self._next_ns, self._prediction = GuidanceState(), stamp_ns, stamp_ns, None
         elif self._hand is not None:
             yield from self._update_until(stamp_ns, self._hand)
         self._hand = hand
@@ -57,10 +57,12 @@ class GuidanceReplay:
             self._next_ns += self._period_ns
             if output.status is GuidanceStatus.STALE and not output.force.any() and not output.authority:
                 self._next_ns = max(self._next_ns, end_ns)
-                self._state = replace(self._state, t=self._next_ns / NANOSECONDS)
+                self._state = replace(self._state, t=(self._next_ns - self._first_ns) / NANOSECONDS)
 
     def _make_input(self, hand: HandState) -> GuidanceInput:
         now_ns, prediction = self._next_ns, self._prediction
         prediction_ns = now_ns if prediction is None else prediction.stamp_ns
         ages = (now_ns - hand.stamp_ns) / NANOSECONDS, (now_ns - prediction_ns) / NANOSECONDS
-        return GuidanceInput(now_ns / NANOSECONDS, hand.mean[:2], hand.mean[2:4], prediction, *ages)
+        # seconds since the epoch would be rounded to a quarter of a microsecond
+        t = (now_ns - self._first_ns) / NANOSECONDS
+        return GuidanceInput(t, hand.mean[:2], hand.mean[2:4], prediction, *ages)

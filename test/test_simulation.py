@@ -1,0 +1,219 @@
+"""The closed-loop study: peers on cases with known answers, operators, measures, and the command."""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from foc_ros.analysis.simulation import operators as people
+from foc_ros.analysis.simulation.assistance import ASSISTANCE, make_assistance
+from foc_ros.analysis.simulation.intended_path import DT, FREE_M, interpolate_minimum_jerk, plan_path
+from foc_ros.analysis.simulation.operators import OPERATORS, Arm, SimulatedArm, Task, draw_task
+from foc_ros.analysis.simulation.peers import (
+    ASSISTANCE_N,
+    FULL_FORCE_M,
+    INFLUENCE_M,
+    RATIONALITY,
+    GoalInference,
+    compute_blending_force,
+    compute_field_force,
+    compute_hindsight_force,
+)
+from foc_ros.analysis.simulation.study import estimate_mean, make_pairs, simulate, summarise
+from foc_ros.analysis.simulation.trial import Trial, measure_trial, run_trial
+from foc_ros.cli.main import main
+from foc_ros.core.config import Config
+from foc_ros.core.types import Array, make_obstacles
+
+GOALS = np.array([[0.3, 0.1], [0.3, -0.1]])
+POST = make_obstacles([(0.0, 0.0)], [0.02])
+QUICK = Config(budget_s=0.0).with_values({'foc.steps': 20, 'homotopy.max_candidates': 2, 'rate_hz': 10.0})
+AT_REST = (np.zeros(2), np.zeros(2))
+
+
+def cross(goal_row: int = 0) -> Task:
+    """Return a straight movement to a goal, without obstacles."""
+    path = interpolate_minimum_jerk(np.array([[0.0, 0.0], GOALS[goal_row]]), np.array([0.0, 1.2]), AT_REST)
+    return Task(Arm(noise=0.0), make_obstacles(), GOALS, GOALS[goal_row], goal_row, path)
+
+
+def test_goals_at_the_same_distance_are_equally_likely_until_the_hand_turns() -> None:
+    inference = GoalInference(GOALS, np.zeros(2))
+    assert inference.update(np.array([0.05, 0.0])) == pytest.approx([0.5, 0.5])
+    assert inference.update(np.array([0.06, 0.01]))[0] > 0.5
+
+
+def test_a_detour_costs_a_goal_its_likelihood() -> None:
+    goals = np.array([[0.3, 0.0], [-0.3, 0.0]])
+    probabilities = GoalInference(goals, np.zeros(2)).update(np.array([0.02, 0.0]))
+    assert probabilities[1] / probabilities[0] == pytest.approx(np.exp(-RATIONALITY * 0.04))
+
+
+def test_hindsight_is_the_mean_of_the_policies() -> None:
+    assert compute_hindsight_force(np.array([0.3, 0.0]), GOALS, np.array([0.5, 0.5])) == pytest.approx([0.0, 0.0], abs=1e-12)
+    alone = compute_hindsight_force(np.zeros(2), np.array([[0.3, 0.0]]), np.ones(1))
+    assert alone == pytest.approx([ASSISTANCE_N, 0.0])
+    weighted = compute_hindsight_force(np.array([0.3, 0.0]), GOALS, np.array([0.75, 0.25]))
+    assert weighted == pytest.approx([0.0, 0.5 * ASSISTANCE_N])
+
+
+@pytest.mark.parametrize(('lead', 'share'), [(0.0, 0.0), (0.2, 0.0), (0.4, 0.5), (0.6, 1.0), (1.0, 1.0)])
+def test_blending_begins_and_is_complete_at_its_confidences(lead: float, share: float) -> None:
+    probabilities = np.array([0.5 + lead / 2, 0.5 - lead / 2])
+    force = compute_blending_force(np.array([0.3, 0.0]), GOALS, probabilities)
+    assert force == pytest.approx([0.0, share * ASSISTANCE_N], abs=1e-9)
+
+
+def test_the_potential_field_pushes_outward_within_its_influence_only() -> None:
+    at = lambda rho: compute_field_force(np.array([0.02 + rho, 0.0]), POST, 100.0)  # noqa: E731
+    assert at(FULL_FORCE_M) == pytest.approx([ASSISTANCE_N, 0.0])
+    assert at(INFLUENCE_M + 1e-6).tolist() == [0.0, 0.0]
+    assert compute_field_force(np.array([0.0, -0.0201]), POST, 3.0) == pytest.approx([0.0, -3.0])
+    # the force is minus the gradient of the potential, eta / 2 (1 / rho - 1 / rho_0)^2
+    rho, step = 0.012, 1e-7
+    eta = ASSISTANCE_N * FULL_FORCE_M**2 / (1 / FULL_FORCE_M - 1 / INFLUENCE_M)
+    potential = lambda rho: 0.5 * eta * (1 / rho - 1 / INFLUENCE_M) ** 2  # noqa: E731
+    assert at(rho)[0] == pytest.approx(-(potential(rho + step) - potential(rho - step)) / (2 * step), rel=1e-5)
+
+
+def test_a_path_of_minimum_jerk_between_two_points_is_the_known_polynomial() -> None:
+    path = interpolate_minimum_jerk(np.array([[0.0, 0.0], [0.3, 0.1]]), np.array([0.0, 1.0]), AT_REST)
+    s = np.linspace(0.0, 1.0, len(path.position))[:, None]
+    assert path.position == pytest.approx((10 * s**3 - 15 * s**4 + 6 * s**5) * np.array([0.3, 0.1]), abs=1e-9)
+    assert path.velocity[-1] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+def test_an_intended_path_avoids_the_obstacles_as_they_are_seen() -> None:
+    seen = make_obstacles([(0.15, 0.0)], [0.03])
+    path = plan_path(np.random.default_rng(1), np.zeros(2), np.array([0.3, 0.0]), seen)
+    assert path is not None
+    assert np.hypot(*(path.position - seen.centre[0]).T).min() >= 0.03 + FREE_M
+
+
+@pytest.mark.parametrize('operator', OPERATORS[:-1])
+def test_operators_intend_what_their_names_say(operator: str) -> None:
+    task = draw_task(operator, np.random.default_rng(4))
+    assert np.hypot(*(task.path.position[-1] - task.goal)) < 1e-9
+    is_announced = bool((np.hypot(*(task.goals - task.goal).T) < 1e-9).any())
+    assert is_announced == (operator != people.UNANNOUNCED_GOAL) == (task.goal_row >= 0)
+    jumps = np.hypot(*np.diff(task.path.position, axis=0).T) / DT
+    assert jumps.max() < 1.5, 'the path is continuous'
+
+
+def test_an_arm_without_noise_follows_its_path_and_sight_brings_it_back() -> None:
+    task = cross()
+    arm = SimulatedArm(task.arm, task.path, np.zeros((600, 2)))
+    for _ in range(len(task.path.position)):
+        arm.move(np.zeros(2))
+    assert arm.position == pytest.approx(task.goal, abs=0.005)
+    for step in range(200):
+        arm.move(np.array([0.0, 1.0 if step < 20 else 0.0]))
+    assert arm.position == pytest.approx(task.goal, abs=0.005)
+
+
+def test_measures_of_a_trial_with_known_answers() -> None:
+    task = replace(cross(), obstacles=make_obstacles([(0.15, 0.05)], [0.02]))
+    position = np.linspace([0.0, 0.0], [0.3, 0.1], 101)
+    direction = np.array([0.3, 0.1]) / np.hypot(0.3, 0.1)
+    forces = np.tile(-2.0 * direction, (101, 1))
+    measures = measure_trial(Trial(position, forces, np.ones((101, 2)), np.zeros(101)), task, 4.0)
+    assert measures['collision_rate'] == 1.0
+    assert measures['min_clearance_m'] == pytest.approx(-0.02, abs=1e-6)
+    assert measures['path_m'] == pytest.approx(np.hypot(0.3, 0.1))
+    assert measures['effort'] == pytest.approx(2.0 * 101 * DT)
+    assert measures['opposing_impulse'] == pytest.approx(2.0 * 100 * DT, rel=0.02)
+    assert measures['opposing_share'] == pytest.approx(0.5, rel=0.02)
+
+
+@pytest.mark.parametrize('rule', ASSISTANCE)
+def test_every_rule_keeps_force_and_slew_within_the_limits(rule: str) -> None:
+    task = draw_task(people.NOISY, np.random.default_rng(2))
+    noise = np.random.default_rng(3).normal(size=(900, 2, 2))
+    trial = run_trial(task, rule, QUICK, noise)
+    sizes = np.hypot(*trial.assistance.T)
+    assert sizes.max() <= QUICK.guidance.f_max + 1e-9
+    assert np.hypot(*np.diff(trial.assistance, axis=0).T).max() <= QUICK.guidance.slew * DT + 1e-9
+    assert (sizes.max() > 0.0) == (rule != 'none')
+
+
+def test_a_rule_without_reason_leaves_the_hand_alone() -> None:
+    task = cross()
+    assert not make_assistance('potential_field', task, QUICK).update(0, np.zeros(2)).any()
+
+
+def run_study(workers: int) -> list[dict[str, object]]:
+    with ThreadPoolExecutor(workers) as executor:
+        results = simulate(make_pairs(['noisy', 'changes_way'], ['foc', 'blend'], 2, 7), QUICK, executor)
+    return summarise(results, 7)
+
+
+def test_equal_seeds_give_equal_studies_whatever_the_executor() -> None:
+    cells = run_study(1)
+    assert cells == run_study(2)
+    assert [(cell['operator'], cell['assistance'], cell['trials']) for cell in cells] == [
+        (operator, rule, 2) for operator in ('noisy', 'changes_way') for rule in ('none', 'foc', 'blend')
+    ]
+
+
+def test_intervals_contain_the_mean_and_shrink_with_the_number_of_trials() -> None:
+    rng = np.random.default_rng(0)
+
+    def width(count: int) -> float:
+        mean, (low, high) = estimate_mean(rng.normal(1.0, 1.0, count), 0)
+        assert low < mean < high
+        return high - low
+
+    assert width(400) == pytest.approx(2 * 1.96 / 20, rel=0.2)
+    assert width(25) > 2.5 * width(400)
+    assert estimate_mean(np.array([np.nan, np.inf]), 0) == (None, None)
+
+
+def test_the_command_prints_cells_and_writes_a_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip('matplotlib', reason='matplotlib is not installed')
+    options = ['--operators', 'noisy', '--assistance', 'none,potential_field', '--trials', '2', '--workers', '1']
+    assert main(['simulate', *options, '--json', '--report', str(tmp_path)]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    cell = answer['cells'][1]
+    assert (cell['operator'], cell['assistance'], cell['trials']) == ('noisy', 'potential_field', 2)
+    assert cell['completion_s_interval'][0] <= cell['completion_s'] <= cell['completion_s_interval'][1]
+    page = (tmp_path / 'simulation.html').read_text('utf-8')
+    assert page.count('<figure>') == 3 + 2 and 'potential_field' in page
+
+
+@pytest.mark.parametrize(
+    ('options', 'words'),
+    [
+        (['--operators', 'noisy,careless'], '--operators: expected names of accurate, noisy'),
+        (['--assistance', 'magic'], '--assistance: expected names of none, foc'),
+        (['--operators', 'human_paths'], '--recordings: expected recordings of people for the operator human_paths, got none'),
+        (['--trials', '0'], '--trials: expected a whole number in [1, 100000], got 0'),
+        (['--seed', '-1'], '--seed: expected a whole number in [0, 100000], got -1'),
+    ],
+)
+def test_wrong_options_are_refused(options: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['simulate', *options]) == 2
+    assert words in capsys.readouterr().err
+
+
+def write_recording(folder: Path, shift: Array) -> None:
+    """Write a recorded movement past an obstacle to one of two goals."""
+    s = np.linspace(0.0, 1.0, 40)
+    x = 0.3 * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    rows = [f'a,{t:.4f},{x:.5f},{y:.5f}' for t, x, y in zip(1.2 * s, x, 0.05 * np.sin(np.pi * s) + shift, strict=True)]
+    (folder / 'recordings.csv').write_text('\n'.join(['recording,t_s,x_m,y_m', *rows]), 'utf-8')
+    (folder / 'obstacles.csv').write_text('x_m,y_m,radius_m\n0.15,0.0,0.02\n', 'utf-8')
+    (folder / 'goals.csv').write_text('x_m,y_m\n0.3,0.0\n0.3,0.2\n', 'utf-8')
+
+
+def test_recorded_paths_are_intended_paths(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_recording(tmp_path, np.zeros(40))
+    options = ['--operators', 'human_paths', '--assistance', 'none', '--trials', '1', '--workers', '1', '--json']
+    assert main(['simulate', *options, '--recordings', str(tmp_path)]) == 0
+    cell = json.loads(capsys.readouterr().out)['cells'][0]
+    assert cell['collision_rate'] == 0.0
+    assert cell['min_clearance_m'] == pytest.approx(0.03, abs=0.01)
