@@ -37,7 +37,9 @@ forces = np.array([output.force for output in outputs])
 figure, (scene, graph) = plt.subplots(1, 2, figsize=(11, 4), width_ratios=(1.5, 1), layout='constrained')
 prediction.plot(scene)
 scene.plot(*positions.T, color='black', linewidth=1)
-scene.quiver(*positions[::6].T, *forces[::6].T, angles='xy', scale_units='xy', scale=60.0, width=0.004, color='tab:green', zorder=6)
+scene.quiver(
+    *positions[::6].T, *forces[::6].T, angles='xy', scale_units='xy', scale=60.0, width=0.004, color='tab:green', zorder=6
+)
 graph.plot(times, np.hypot(*forces.T), label='force [N]')
 graph.plot(times, [output.agreement for output in outputs], label='agreement')
 graph.set(xlabel='time [s]')
