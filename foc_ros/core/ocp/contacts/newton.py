@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foc_ros.core.kernels import Indices, Matrix, Vector, compiled_with_caller
+from foc_ros.core.kernels import Indices, Matrix, Vector, compiled_separately, compiled_with_caller
 from foc_ros.core.linear_algebra import (
     factorise_cholesky,
     multiply,
@@ -67,7 +67,7 @@ def limit_turn(distance: float, across: float, along: float) -> float:
     return min(1.0, LARGEST_TURN * distance / excess) if excess > 0.0 else 1.0
 
 
-@compiled_with_caller
+@compiled_separately
 def newton_step(schur: Matrix, missing: Matrix, curvature: Vector, distance: Vector, slides: Indices) -> tuple[bool, Matrix]:
     """Solve for one Newton step: whether there is a solution, and the multipliers (1, 3k) of the rows h, r and g.
 
@@ -128,7 +128,7 @@ def newton_step(schur: Matrix, missing: Matrix, curvature: Vector, distance: Vec
     return bool(np.isfinite(step).all()), step
 
 
-@compiled_with_caller
+@compiled_separately
 def newton_on_contacts(
     motion: Motion,
     obstacles: MovingObstacles,

@@ -154,12 +154,12 @@ def linearise_contact(
     """Write all that belongs to contact i."""
     m, steps = len(contacts.time), trajectory.shape[1] - 1
     j, s = contacts.obstacle[i], contacts.time[i]
+    at = evaluate_margin(terms, obstacles, trajectory, control, j, s, k, 0.0)
     if obstacles.polygons.corners[j] > 1:
-        corner, side = find_kink(terms, obstacles, trajectory, control, j, s, k)
+        corner, side = find_kink(terms, obstacles, trajectory, control, j, s, k, at)
         if corner.time < np.inf:
             hold_at_corner(terms, control, contacts, i, corner, side, into)
             return
-    at = evaluate_margin(terms, obstacles, trajectory, control, j, s, k, 0.0)
     earlier, later = max(s - TIME_STEP, 1.0), min(s + TIME_STEP, float(steps))
     before = evaluate_margin(terms, obstacles, trajectory, control, j, earlier, k, at.scale)
     after = evaluate_margin(terms, obstacles, trajectory, control, j, later, k, at.scale)
