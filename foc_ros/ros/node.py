@@ -42,9 +42,12 @@ from .lifecycle import answer_refused_transitions
 from .messages.encode_prediction import encode_outputs
 from .messages.types import RclpyTypes
 from .node_parameters import LiveParameters, declare_autostart, declare_parameters
-from .transforms import Transforms
+from .tf_listener import TfListener
+from .transforms import Arrival, Transforms
 from .worker import Computation, Worker
 
+RETRY_S = 0.01
+"""Time between two checks of messages that are held until their transform is known [s]."""
 THROTTLE_S = 5.0
 """Shortest time between two log lines of one kind [s]."""
 COMPLETE = (GOALS, GOAL, CLOUD, DETECTIONS)
@@ -68,7 +71,11 @@ class FocNode(LifecycleNode):
         self._state, self._is_engaged, self._start_error = 'unconfigured', True, ''
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
-        self._transforms = Transforms(self)
+        try:
+            self._tf: TfListener | None = TfListener(self, self._take_held)
+        except ImportError:  # tf2 is optional
+            self._tf = None
+        self._retries = self.create_timer(RETRY_S, self._take_held, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._worker = Worker(self, self._finish)
         self._create_pipeline()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -141,6 +148,7 @@ class FocNode(LifecycleNode):
             self.pipeline.reset()  # ends a prediction that is being computed
         self.pipeline = Pipeline(self._live_parameters.config, self._library)
         self.intake, self._freshness, self._monitor = Intake(self.pipeline), Freshness(), Monitor(monotonic())
+        self._transforms = Transforms(self._tf)
 
     def _destroy_topics(self) -> None:
         for subscription in self._inputs.values():
@@ -162,26 +170,38 @@ class FocNode(LifecycleNode):
 
         Markers are taken one message at a time, because every message counts and takes time; the hand has its turn in between.
         """
-        messages = [message] if role == MARKERS else [message, *take_queued(self._inputs[role])]
+        for each in [message] if role == MARKERS else [message, *take_queued(self._inputs[role])]:
+            self._transforms.add(role, each, monotonic())
+        self._take_released(role)
+
+    def _take_held(self) -> None:
+        """Take the held messages whose transform has arrived, or will not arrive any more."""
+        for role in self._transforms.roles:
+            self._take_released(role)
+        if not self._transforms.roles:
+            self._retries.cancel()
+
+    def _take_released(self, role: str) -> None:
+        arrivals = self._transforms.release(role, self.pipeline.frame_id, self.pipeline.config, monotonic())
         is_taken = False
-        for each in reversed(messages) if role in COMPLETE else messages:
+        for each in reversed(arrivals) if role in COMPLETE else arrivals:
             is_taken = self._take(role, each) or is_taken
             if is_taken and role in COMPLETE:
                 break
+        if self._retries.is_canceled() and self._transforms.roles:
+            self._retries.reset()
         if is_taken and role == HAND and self.pipeline.is_due:
             self._predict()
 
-    def _take(self, role: str, message: Any) -> bool:
-        transformed = self._transforms.transform(role, message, self.pipeline.frame_id, self.pipeline.config.plane)
-        status, now_s = self.intake.take(role, transformed), monotonic()
+    def _take(self, role: str, arrival: Arrival) -> bool:
+        status = self.intake.take_arrival(role, arrival)
         is_taken = status is not None and status.is_taken
-        refused, received = self._monitor.note_message(role, now_s, is_taken=is_taken)
+        refused, received = self._monitor.note_message(role, arrival.received_s, is_taken=is_taken)
         if status is None or not is_taken:
-            reasons = '; '.join(filter(None, [self.intake.last_refusal, self._transforms.last_error]))
-            text = f'{reasons} ({refused} of {received} refused so far)'
+            text = f'{self.intake.last_refusal} ({refused} of {received} refused so far)'
             self._loggers[role].warning(text, throttle_duration_sec=THROTTLE_S)
             return False
-        self._freshness.note_received(role, now_s)
+        self._freshness.note_received(role, arrival.received_s)
         if role == HAND and self.intake.sample is not None:
             clock_ns, timeout_s = self.get_clock().now().nanoseconds, self.pipeline.config.estimator.hand_timeout_s
             self._freshness.note_pose(self.intake.sample.stamp_ns, clock_ns, timeout_s, is_restart=status.is_restart)
