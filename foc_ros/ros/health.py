@@ -170,11 +170,19 @@ class Monitor:
         self._counts['internal_errors'] += 1
         self._error = f'{type(error).__name__}: {error}'
 
-    def report(self, now_s: float, intake: Intake, state: str, not_ready_reason: str | None, busy_s: float = 0.0) -> Health:
+    def report(
+        self,
+        now_s: float,
+        intake: Intake,
+        state: str,
+        not_ready_reason: str | None,
+        busy_s: float = 0.0,
+        unheard: Iterable[str] = (),
+    ) -> Health:
         """Return the health since the last call.
 
         state: of the managed node; not_ready_reason: text, None if ready; busy_s: for how long the present prediction has been
-        computed, 0 if there is none [s].
+        computed, 0 if there is none [s]; unheard: a text for each publisher that cannot be heard.
         """
         pipeline, seconds = intake.pipeline, max(now_s - self._reported_s, 1e-3)
         totals = Counter(intake.counts) + self._counts
@@ -199,7 +207,7 @@ class Monitor:
         self._counts_before, self._reported_s = totals, now_s
         for entry in self._inputs.values():
             entry.received_before = entry.received
-        reasons = [] if not_ready_reason is None else [f'no prediction: {not_ready_reason}']
+        reasons = [*unheard, *([] if not_ready_reason is None else [f'no prediction: {not_ready_reason}'])]
         if busy_s > BUSY_S:
             reasons.append(f'busy: a prediction has been computed for {busy_s:.1f} s')
         if recent['predict_too_late']:

@@ -35,7 +35,14 @@ from foc_ros.core.predictor import warm_up
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import CLOUD, DETECTIONS, GOAL, GOALS, HAND, MARKERS
 
-from .endpoints import INPUTS, create_publishers, create_subscriptions, find_missing_packages, take_queued
+from .endpoints import (
+    INPUTS,
+    create_publishers,
+    create_subscriptions,
+    describe_incompatible_publishers,
+    find_missing_packages,
+    take_queued,
+)
 from .health import SOURCE_TOPICS, Freshness, Monitor, encode_diagnostics
 from .intake import Intake
 from .lifecycle import answer_refused_transitions
@@ -71,6 +78,7 @@ class FocNode(LifecycleNode):
         self._state, self._is_engaged, self._start_error = 'unconfigured', True, ''
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
+        self._incompatible: set[str] = set()
         try:
             self._tf: TfListener | None = TfListener(self, self._take_held)
         except ImportError:  # tf2 is optional
@@ -92,7 +100,7 @@ class FocNode(LifecycleNode):
         try:
             warm_up(self._live_parameters.config)
             self._outputs = create_publishers(self)
-            self._inputs = create_subscriptions(self, self._receive)
+            self._inputs = create_subscriptions(self, self._receive, self._incompatible.add)
         except Exception as error:
             self._destroy_topics()
             self._start_error = ' '.join(str(error).split())
@@ -269,7 +277,8 @@ class FocNode(LifecycleNode):
         clock_reason, present = self._find_clock_reason(), self._worker.present
         not_ready_reason = self.pipeline.not_ready_reason() or (clock_reason and clock_reason[1])
         busy_s = monotonic() - present.start_s if present is not None else 0.0
-        health = self._monitor.report(monotonic(), self.intake, self._state, not_ready_reason, busy_s)
+        unheard = self._report_incompatible_publishers()
+        health = self._monitor.report(monotonic(), self.intake, self._state, not_ready_reason, busy_s, unheard)
         name, stamp_ns = self.get_fully_qualified_name(), self.get_clock().now().nanoseconds
         self._publish(self._diagnostics, encode_diagnostics(health, name, stamp_ns, self._types))
 
@@ -279,6 +288,20 @@ class FocNode(LifecycleNode):
             if self._inputs and self.count_publishers(role):
                 text = f'{role} is published, but cannot be received: the package {package} is not installed'
                 self._loggers[role].error(text, throttle_duration_sec=THROTTLE_S)
+
+    def _report_incompatible_publishers(self) -> list[str]:
+        """Log and return which inputs are published with a quality of service that their subscription cannot receive."""
+        texts = {
+            role: describe_incompatible_publishers(self, role, self._inputs[role])
+            for role in INPUTS
+            if role in self._incompatible and role in self._inputs
+        }
+        for role, found in texts.items():
+            if found:
+                self._loggers[role].warning('; '.join(found), throttle_duration_sec=THROTTLE_S)
+            else:
+                self._incompatible.discard(role)
+        return [text for found in texts.values() for text in found]
 
     def _publish(self, publisher: Any, message: Any) -> None:
         if self.context.ok():
