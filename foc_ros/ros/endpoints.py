@@ -7,6 +7,7 @@ from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
+from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import (
@@ -38,7 +39,7 @@ OVERRIDABLE = QoSOverridingOptions(
 
 
 def create_subscriptions(
-    node: Node, receive: Callable[[str, Any], None], note_incompatible: Callable[[str], None]
+    node: Node, receive: Callable[[str, Any], None], note_incompatible: Callable[[str], None], hand_group: CallbackGroup
 ) -> dict[str, Any]:
     """Create the subscriptions, by topic; each calls `receive(topic, message)`.
 
@@ -46,7 +47,7 @@ def create_subscriptions(
     reliably. `note_incompatible(topic)` is called when a publisher appears that a subscription cannot hear:
     `describe_incompatible_publishers` then tells which. A scene that was published once, before the start of the node, is
     received with `qos_overrides./obstacles.subscription.durability: transient_local`, reliably, but then not from volatile or
-    best-effort publishers. Inputs of `find_missing_packages` have no subscription.
+    best-effort publishers. Inputs of `find_missing_packages` have no subscription. hand_group: callback group of the hand.
     """
     subscriptions = {}
     missing = find_missing_packages()
@@ -60,6 +61,7 @@ def create_subscriptions(
             role,
             partial(receive, role),
             _build_qos(reliability, HAND_DEPTH if role == HAND else SCENE_DEPTH),
+            callback_group=hand_group if role == HAND else None,
             event_callbacks=SubscriptionEventCallbacks(incompatible_qos=lambda _, role=role: note_incompatible(role)),
             qos_overriding_options=OVERRIDABLE,
         )

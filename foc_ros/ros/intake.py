@@ -49,11 +49,12 @@ class Intake:
     @property
     def counts(self) -> dict[str, int]:
         """How often each kind of refusal, drop, restart or failure occurred here and in the pipeline, by name."""
-        return {**self.pipeline.counts, **+self._counts}
+        return {**self.pipeline.counts, **self._counts}
 
     def take_arrival(self, role: str, arrival: Arrival) -> SampleStatus | None:
         """Take one message that was transformed, or could not be; None if it cannot be decoded."""
-        self._counts[f'transform_newest_{role}'] += arrival.is_inexact
+        if arrival.is_inexact:
+            self._counts[f'transform_newest_{role}'] += 1
         return self.take(role, arrival.message, arrival.error)
 
     def take(self, role: str, message: Any, transform_error: str = '') -> SampleStatus | None:

@@ -49,6 +49,7 @@ from .lifecycle import answer_refused_transitions
 from .messages.encode_prediction import encode_outputs
 from .messages.types import RclpyTypes
 from .node_parameters import LiveParameters, declare_autostart, declare_parameters
+from .queue_polling import QueuePolling
 from .tf_listener import TfListener
 from .transforms import Arrival, Transforms
 from .worker import Computation, Worker
@@ -84,6 +85,7 @@ class FocNode(LifecycleNode):
         except ImportError:  # tf2 is optional
             self._tf = None
         self._retries = self.create_timer(RETRY_S, self._take_held, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._polling = QueuePolling(self, self._take_queued_poses)
         self._worker = Worker(self, self._finish)
         self._create_pipeline()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -100,7 +102,7 @@ class FocNode(LifecycleNode):
         try:
             warm_up(self._live_parameters.config)
             self._outputs = create_publishers(self)
-            self._inputs = create_subscriptions(self, self._receive, self._incompatible.add)
+            self._inputs = create_subscriptions(self, self._receive, self._incompatible.add, self._polling)
         except Exception as error:
             self._destroy_topics()
             self._start_error = ' '.join(str(error).split())
@@ -178,7 +180,18 @@ class FocNode(LifecycleNode):
 
         Markers are taken one message at a time, because every message counts and takes time; the hand has its turn in between.
         """
-        for each in [message] if role == MARKERS else [message, *take_queued(self._inputs[role])]:
+        if role == HAND:
+            self._polling.note_message()
+        self._take_all(role, [message] if role == MARKERS else [message, *take_queued(self._inputs[role])])
+
+    def _take_queued_poses(self) -> bool:
+        """Take the hand poses that wait; return whether there were any."""
+        messages = take_queued(self._inputs[HAND]) if HAND in self._inputs else []
+        self._take_all(HAND, messages)
+        return bool(messages)
+
+    def _take_all(self, role: str, messages: list[Any]) -> None:
+        for each in messages:
             self._transforms.add(role, each, monotonic())
         self._take_released(role)
 
@@ -270,9 +283,7 @@ class FocNode(LifecycleNode):
         self.pipeline.reset()
 
     def _publish_health(self) -> None:
-        if HAND in self._inputs:
-            for message in take_queued(self._inputs[HAND]):  # a hand whose poses wait here is not silent
-                self._receive(HAND, message)
+        self._take_queued_poses()  # a hand whose poses wait here is not silent
         self._report_missing_packages()
         clock_reason, present = self._find_clock_reason(), self._worker.present
         not_ready_reason = self.pipeline.not_ready_reason() or (clock_reason and clock_reason[1])
