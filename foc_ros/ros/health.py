@@ -29,6 +29,8 @@ OK, WARN, ERROR = 0, 1, 2
 HARMLESS = ('candidate_', 'hand_disengaged', 'hand_duplicate', 'predict_', 'predictions', 'transform_newest_')
 """Prefixes of the counts that are no fault by themselves; the reason why no prediction is made is reported as text."""
 FAULTS = ('predict_failed', 'predict_nothing_solved', 'predict_too_late')
+DROPPED = 'hand_superseded'
+"""Count of hand samples that were due and were replaced by a newer one before a prediction was made from them."""
 OVER_BUDGET_S = 0.002
 """Time beyond `budget_s` after which a prediction is counted as over budget [s]."""
 BUSY_S = 0.5
@@ -198,7 +200,7 @@ class Monitor:
             'prediction age [s]': 'none yet' if self._predicted_s is None else f'{now_s - self._predicted_s:.3f}',
             'solve time p50, p99 [ms]': _describe_percentiles(self._solve_ms),
             'cycle time p50, p99 [ms]': _describe_percentiles(self._cycle_ms),
-            'dropped cycles': str(totals['hand_superseded']),
+            'dropped cycles': str(totals[DROPPED]),
             **_describe_prediction(self._prediction),
             **{f'count {name}': str(count) for name, count in sorted(totals.items())},
             'last refusal': intake.last_refusal or 'none',
@@ -212,7 +214,14 @@ class Monitor:
             reasons.append(f'busy: a prediction has been computed for {busy_s:.1f} s')
         if recent['predict_too_late']:
             reasons.append(f'busy: {self._late}')
+        if self._is_punctual(recent, now_s):
+            del recent[DROPPED]
         return Health(*self._judge(pipeline, recent, state, reasons), values)
+
+    def _is_punctual(self, recent: Counter[str], now_s: float) -> bool:
+        """Return whether predictions are fresh and within their budget, so that hand samples between them are not missed."""
+        is_fresh = self._predicted_s is not None and now_s - self._predicted_s < BUSY_S
+        return is_fresh and not recent['predict_over_budget'] and not recent['predict_too_late']
 
     def _judge(self, pipeline: Pipeline, recent: Counter[str], state: str, reasons: list[str]) -> tuple[int, str]:
         if recent['internal_errors']:

@@ -33,7 +33,7 @@ from foc_ros.core.errors import FocError
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predictor import warm_up
 from foc_ros.io.class_library import load_library
-from foc_ros.io.topics import CLOUD, DETECTIONS, GOAL, GOALS, HAND, MARKERS
+from foc_ros.io.topics import CLOUD, DETECTIONS, GOAL, GOALS, HAND, MARKERS, REQUIRED
 
 from .endpoints import (
     INPUTS,
@@ -77,6 +77,7 @@ class FocNode(LifecycleNode):
         # a logger throttles each line of code by itself: with one logger per input, no input suppresses the lines of another
         self._loggers = {role: self.get_logger().get_child(role) for role in INPUTS}
         self._state, self._is_engaged, self._start_error = 'unconfigured', True, ''
+        self._has_predicted = False
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
         self._incompatible: set[str] = set()
@@ -112,6 +113,10 @@ class FocNode(LifecycleNode):
 
     def on_activate(self, _: LifecycleState) -> TransitionCallbackReturn:
         """Predict from the next hand pose on."""
+        topics = {role: subscription.topic_name for role, subscription in self._inputs.items()}
+        groups = [' or '.join(topics[role] for role in group if role in topics) for group in REQUIRED]
+        self.get_logger().info(f'ready, waiting for {"; ".join(groups)}')
+        self._has_predicted = False
         return self._enter('active')
 
     def on_deactivate(self, _: LifecycleState) -> TransitionCallbackReturn:
@@ -277,6 +282,9 @@ class FocNode(LifecycleNode):
         for name, message in messages.items():
             self._publish(self._outputs[name], message)
         self._monitor.note_prediction(prediction, ended.start_s, monotonic())
+        if not self._has_predicted:
+            self._has_predicted = True
+            self.get_logger().info(f'predicting in frame {self.pipeline.frame_id}, plane {config.plane}')
 
     def _recover(self, error: Exception) -> None:
         self.report(error)
