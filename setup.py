@@ -28,6 +28,7 @@ setup(
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (f'share/{PACKAGE}', ['package.xml']),
         (f'share/{PACKAGE}/config', sorted(glob('config/*'))),
+        (f'share/{PACKAGE}/launch', sorted(glob('launch/*.launch.py'))),
         (f'share/{PACKAGE}/rosdep', sorted(glob('rosdep/*.yaml'))),
         # `ros2 run foc_ros COMMAND` looks here. As console scripts they would put `node` and `demo` on everybody's PATH.
         (f'lib/{PACKAGE}', sorted(glob('scripts/ros2_run/*'))),

@@ -85,6 +85,8 @@ def test_wheel_contains_all_files_of_the_program(wheel: zipfile.ZipFile) -> None
     assert f'{data}share/foc_ros/package.xml' in names
     for name in ('foc.yaml', 'foc.rviz', 'foxglove.json', 'sros2_policy.xml'):
         assert f'{data}share/foc_ros/config/{name}' in names
+    for file in (ROOT / 'launch').iterdir():
+        assert f'{data}share/foc_ros/launch/{file.name}' in names
     sources = {path.relative_to(ROOT).as_posix() for path in (ROOT / 'foc_ros').rglob('*') if path.suffix in SOURCES}
     assert 'foc_ros/recordings/reaching.mcap' in sources
     assert sources <= names, sources - names
