@@ -36,6 +36,7 @@ setup(
     zip_safe=False,
     python_requires='>=3.11',
     install_requires=[
+        'mcap>=1.1',
         'numba>=0.58',
         'numpy>=1.23',
         'pebble>=5',
@@ -61,7 +62,6 @@ setup(
             'distributed>=2024.1',
             'hypothesis>=6.80',
             'import-linter>=2.1',
-            'mcap>=1.1',
             'mcap-ros2-support>=0.5',
             'mypy>=1.11',
             'pytest>=7.4',

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
+from foc_ros.core.errors import MessageError
 from foc_ros.core.types import NANOSECONDS, Array
 
 from .messages.decode_poses import decode_stamp
@@ -85,17 +86,24 @@ class TransformTree:
         self._frames: dict[str, _Frame] = {}
 
     def add(self, message: Any, *, is_static: bool) -> None:
-        """Add the transforms of a tf2_msgs/TFMessage; one with a number that is not finite or without a rotation is left out."""
+        """Add the transforms of a tf2_msgs/TFMessage.
+
+        One with a wrong stamp, with a number that is not finite, or without a rotation is left out.
+        """
         for each in message.transforms:
             position = np.array([getattr(each.transform.translation, axis) for axis in 'xyz'], dtype=float)
             quaternion = np.array([getattr(each.transform.rotation, axis) for axis in 'xyzw'], dtype=float)
             child, parent = str(each.child_frame_id).lstrip('/'), str(each.header.frame_id).lstrip('/')
+            try:
+                stamp_ns = decode_stamp(each.header)
+            except MessageError:
+                continue
             if not (np.isfinite([*position, *quaternion]).all() and quaternion.any()) or child == parent:
                 continue
             frame = self._frames.get(child)
             if frame is None or (frame.parent, frame.is_static) != (parent, is_static):
                 frame = self._frames[child] = _Frame(parent, is_static)
-            frame.add(_Pose(decode_stamp(each.header), position, quaternion))
+            frame.add(_Pose(stamp_ns, position, quaternion))
 
     def look_up(self, target: str, source: str, stamp_ns: int) -> Transform:
         """Return the transform from one frame to another at a stamp [ns], the newest one for a stamp of 0.
