@@ -51,7 +51,11 @@ def running(ros: Graph, launch: str, *arguments: str) -> Iterator[subprocess.Pop
         try:
             yield process
         finally:
-            if process.poll() is None:
+            # a process that is killed remains in the graph for 20 s, and the next test in this domain would take it for its own
+            process.terminate()
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:
                 process.kill()
 
 
