@@ -79,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
             show_table(('', str(arguments.bag)), facts(answer).items())
     if summary.solved:
         return 0
-    reason = replay.pipeline.not_ready_reason() or replay.intake.last_refusal or 'see the candidates not solved'
+    reason = replay.describe_refusals() or replay.pipeline.not_ready_reason() or 'see the candidates not solved'
     print(f'foc_ros replay: no prediction has a solved candidate: {reason}', file=sys.stderr)
     return 3
 
@@ -94,6 +94,8 @@ def _play(arguments: argparse.Namespace, replay: Replay, consumers: list[Consume
         for step in replay.steps(show_progress(reader, 'replay', reader.message_count)):
             for consume in consumers:
                 consume(step)
+        for warning in reader.warnings:
+            print(f'foc_ros replay: {arguments.bag}: {warning}', file=sys.stderr)
         return reader.duration_s
 
 

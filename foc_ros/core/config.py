@@ -164,6 +164,15 @@ class SceneConfig:
 
 
 @dataclass(frozen=True)
+class FramesConfig:
+    """Transforms of messages that are in another frame than the working frame."""
+
+    tolerance_s: float = _p(
+        0.1, 'time to wait for the transform at the stamp of a message, and largest age of another one then', 's', 0.0, 10.0
+    )
+
+
+@dataclass(frozen=True)
 class Config:
     """All parameters of the predictor.
 
@@ -192,6 +201,7 @@ class Config:
     homotopy: HomotopyConfig = field(default_factory=HomotopyConfig)
     likelihood: LikelihoodConfig = field(default_factory=LikelihoodConfig)
     scene: SceneConfig = field(default_factory=SceneConfig)
+    frames: FramesConfig = field(default_factory=FramesConfig)
 
     def __repr__(self) -> str:
         """Name the parameters that differ from their defaults."""
