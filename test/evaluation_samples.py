@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.ground_truth import TIMES_S, GroundTruth, find_open_gaps
+from foc_ros.analysis.evaluation.ground_truth import TIMES_S, GroundTruth, RecordedPath, find_open_gaps
 from foc_ros.analysis.evaluation.observations import CandidateTable, Observation, ObservedRecording
 from foc_ros.core.homotopy.branch_times import BranchTimes
 from foc_ros.core.types import LEFT, RIGHT, make_obstacles
@@ -80,7 +80,9 @@ def observation(
 
 
 def recorded(*each: Observation, name: str = 'one') -> ObservedRecording:
-    return ObservedRecording(name, each)
+    """Return a recording of a hand that moves along x."""
+    stamps_ns = np.arange(0, 2_000_000_001, 50_000_000)
+    return ObservedRecording(name, each, RecordedPath(stamps_ns, np.outer(stamps_ns / 1e9, [1.0, 0.0]), np.array([[2.0, 0.0]])))
 
 
 TWO_CLASSES = make_candidates([[LEFT], [RIGHT]])

@@ -162,3 +162,7 @@ def test_displacements_are_averaged_up_to_the_horizon_and_ellipses_cover_what_is
     # with unit covariance, 90 % lie within 2.15 and 50 % within 1.18
     assert scores['inside'] == {'0.5': {'0.25': 0.0, '0.5': 0.0, '1': None}, '0.9': {'0.25': 1.0, '0.5': 0.0, '1': None}}
     assert scores['displacement_m']['constant velocity']['final']['0.5'] == pytest.approx(3.5)
+    # two equal candidates of unit covariance, both at the origin
+    flat = np.log(2 * np.pi)
+    assert scores['nlpd']['foc'] == {'0.25': pytest.approx(flat + 2.0), '0.5': pytest.approx(flat + 8.0), '1': None}
+    assert scores['nlpd']['Singer Kalman']['0.5'] > 0.0

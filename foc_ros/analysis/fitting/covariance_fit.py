@@ -14,7 +14,7 @@ import numpy as np
 
 from foc_ros.analysis.evaluation.forecasts import power_rule_shares
 from foc_ros.analysis.evaluation.ground_truth import TIMES_S
-from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording
+from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording, interpolate_steps
 from foc_ros.analysis.evaluation.position_metrics import (
     EXACT,
     HORIZONS,
@@ -99,9 +99,8 @@ def _compute_unit_variances(time_s: float, config: Config) -> Array:
     """Return the variance of a position at `TIMES_S` by process noise and by scatter of the end, of 1 each, (2, h)."""
     steps = config.foc.steps
     kind = time_s / steps, steps, is_passing(config.duration)
-    rows = np.minimum(np.rint(np.array(TIMES_S) / kind[0]).astype(int), steps)
     jerk, end = triple_integrator_process_covariance(*kind), triple_integrator_goal_map(*kind) ** 2
-    return np.array([jerk[rows, 0, 0], end[rows, 0, 0]])
+    return np.array([interpolate_steps(each[:, 0, 0], kind[0]) for each in (jerk, end)])
 
 
 def tabulate_densities(recordings: Sequence[ObservedRecording], config: Config) -> SettingTable:
