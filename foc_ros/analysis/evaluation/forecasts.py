@@ -78,7 +78,7 @@ def power_rule_shares(observation: Observation, config: LikelihoodConfig) -> Arr
     solved = np.flatnonzero(candidates.has_likelihood)
     costs = compute_shared_cost(candidates.effort_spent, config) + candidates.cost_to_go[solved]
     branch_times, shortfalls = candidates.branch_times.take(solved), candidates.safety_shortfall[solved]
-    return _add_unsolved(observation, compute_likelihoods(costs, config, branch_times, shortfalls))
+    return _add_unsolved(observation, compute_likelihoods(costs, config, branch_times, shortfalls, candidates.decisions))
 
 
 def boltzmann_shares(observation: Observation, inverse_temperature: float) -> Array:

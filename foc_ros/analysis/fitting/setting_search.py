@@ -21,6 +21,7 @@ from itertools import product
 
 import numpy as np
 
+from foc_ros.analysis.evaluation.baselines import make_plain
 from foc_ros.analysis.evaluation.forecasts import Forecast, power_rule_shares
 from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
 from foc_ros.analysis.evaluation.questions import GAP, ask_all, ask_main
@@ -44,9 +45,15 @@ PLAINLY_WORSE = 3.0
 """Standard errors by which a setting behind the best is plainly worse."""
 CONFIDENT = 0.95
 """Share of the resamples below which a choice has a warning."""
-RULES = tuple(
-    replace(LikelihoodConfig(), beta=beta, spent_share=share, lookahead_s=seconds)
-    for seconds, beta, share in product((0.0, 0.35, 0.7), (0.5, 1.0, 2.0, 3.0, 6.0, 12.0), (1.0, 0.0))
+RULES = (
+    *(
+        replace(make_plain(LikelihoodConfig(), beta), spent_share=share)
+        for beta, share in product((0.5, 1.0, 2.0, 3.0, 6.0, 12.0), (1.0, 0.0))
+    ),
+    *(
+        replace(LikelihoodConfig(), spent_share=0.0, lookahead_s=seconds, beta=beta, beta_beyond=beyond)
+        for seconds, beta, beyond in product((0.0, 0.5, 1.0), (1.0, 2.0, 3.0, 6.0), (0.05, 0.3))
+    ),
 )
 """The likelihoods of which each setting gets its best. By a single one, settings that suit the others would lose."""
 
