@@ -142,6 +142,10 @@ class LikelihoodConfig:
     lookahead_s: float = _p(
         0.0, 'mean look-ahead of the operator: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
     )
+    beta_beyond: float = _p(0.5, 'exponent of the cost ratio for what lies beyond the next row of obstacles', '', 0.0, 100.0)
+    weaving: float = _p(
+        4.0, 'log-likelihood that a class loses for each row through several gaps of which it leads', '', 0.0, 100.0
+    )
     hold_s: float = _p(
         0.2, 'longest time for which a class keeps its last answer if there is no time for a new one or it fails', 's', 0.0, 10.0
     )
