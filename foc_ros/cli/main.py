@@ -28,6 +28,7 @@ COMMANDS = {
     'replay': 'compute predictions from a recording, without ROS and faster than real time',
     'fit': 'find the parameters that explain recordings best',
     'evaluate': 'compare predictions with recordings of people, beside simple baselines',
+    'simulate': 'compare guidance with other assistance for simulated operators',
     'convert': 'convert motion capture in CSV tables to bags',
     'warm-up': 'compile the solver for this machine and keep it, so that nothing else has to',
 }

@@ -19,6 +19,7 @@ DURATION_MODELS = ('fixed', 'fitts', 'cost_of_time')
 ARRIVALS = ('rest', 'passing')
 BOUNDS = ('cantelli', 'gaussian')
 RISKS = ('step', 'path')
+GUIDANCE_MODES = ('path', 'trajectory')
 MOST_CANDIDATES = 64
 """Largest number of homotopy classes that are solved in one prediction."""
 WIDENS = 'widens the predicted covariance, not the chance constraint'
@@ -142,6 +143,10 @@ class LikelihoodConfig:
     lookahead_s: float = _p(
         0.0, 'mean look-ahead of the operator: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
     )
+    beta_beyond: float = _p(0.5, 'exponent of the cost ratio for what lies beyond the next row of obstacles', '', 0.0, 100.0)
+    weaving: float = _p(
+        4.0, 'log-likelihood that a class loses for each row through several gaps of which it leads', '', 0.0, 100.0
+    )
     hold_s: float = _p(
         0.2, 'longest time for which a class keeps its last answer if there is no time for a new one or it fails', 's', 0.0, 10.0
     )
@@ -173,8 +178,39 @@ class FramesConfig:
 
 
 @dataclass(frozen=True)
+class GuidanceConfig:
+    """The guiding force: `core/guidance`."""
+
+    enabled: bool = _p(False, 'whether the node publishes guidance; without it the node is a predictor only')
+    rate_hz: float = _p(200.0, 'updates of guidance per second, independent of the predictions', 'Hz', 1.0, 1000.0)
+    mode: str = _p(
+        'path', 'path: no force along the path, the operator sets the pace; trajectory: also along it', choices=GUIDANCE_MODES
+    )
+    k_max: float = _p(200.0, 'largest stiffness in any direction', 'N/m', 0.0, 5000.0)
+    f_max: float = _p(3.0, 'largest force; it is also at most what `slew` reduces to zero within `ramp_s`', 'N', 0.0, 100.0)
+    slew: float = _p(100.0, 'largest rate of change of the force', 'N/s', 0.1, 1e5)
+    lookahead_s: float = _p(
+        0.15, 'longest time ahead at which a path is compared with where the hand goes by its velocity', 's', 0.0, 2.0
+    )
+    clearance: float = _p(
+        0.02, 'distance that guidance keeps the hand from obstacles: no force farther away; 0: force everywhere', 'm', 0.0, 1.0
+    )
+    precision_low: float = _p(
+        100.0, 'precision, an inverse variance of position, up to which there is no stiffness', '1/m^2', 0.0, 1e9
+    )
+    precision_high: float = _p(2500.0, 'precision from which on the stiffness is `k_max`', '1/m^2', 1.0, 1e9)
+    position_stddev: float = _p(0.002, 'standard deviation that is added to that of every predicted position', 'm', 1e-6, 1.0)
+    margin: float = _p(0.002, 'distance from every obstacle within which no force leads towards it', 'm', 0.0, 1.0)
+    tank: float = _p(0.5, 'capacity and first content of the energy tank: most energy that guidance gives', 'J', 0.0, 1e3)
+    max_speed: float = _p(1.5, 'speed of the fastest hand, for which tank and margins are guaranteed', 'm/s', 0.01, 100.0)
+    hold_s: float = _p(0.25, 'age of the newest pose or prediction after which the force is released', 's', 0.001, 10.0)
+    ramp_s: float = _p(0.1, 'time within which a released force becomes zero', 's', 0.001, 10.0)
+    authority: float = _p(0.5, 'largest share of guidance in `~/guidance/twist`', '', 0.0, 1.0)
+
+
+@dataclass(frozen=True)
 class Config:
-    """All parameters of the predictor.
+    """All parameters of the predictor and of guidance.
 
     Groups of parameters are fields of this class: ``Config().foc.eta`` is the parameter ``foc.eta``. A config is frozen;
     `with_values` returns a changed one. The page `parameters` of the documentation lists names, bounds, units and meanings.
@@ -202,6 +238,7 @@ class Config:
     likelihood: LikelihoodConfig = field(default_factory=LikelihoodConfig)
     scene: SceneConfig = field(default_factory=SceneConfig)
     frames: FramesConfig = field(default_factory=FramesConfig)
+    guidance: GuidanceConfig = field(default_factory=GuidanceConfig)
 
     def __repr__(self) -> str:
         """Name the parameters that differ from their defaults."""
@@ -245,9 +282,9 @@ def list_parameters(group: type = Config, prefix: str = '') -> Iterator[Paramete
             yield from list_parameters(cast('type', item.default_factory), f'{prefix}{item.name}.')
 
 
-def flatten(config: Config) -> dict[str, float | int | str]:
+def flatten(config: Config) -> dict[str, float | int | str | bool]:
     """Return every value by dotted name."""
-    values: dict[str, float | int | str] = {}
+    values: dict[str, float | int | str | bool] = {}
     for parameter in list_parameters():
         value: Any = config
         for part in parameter.name.split('.'):
@@ -268,9 +305,13 @@ def replace_values(config: Config, values: Mapping[str, object]) -> Config:
     return config
 
 
-def _check_value(parameter: Parameter, value: object) -> float | int | str:
+def _check_value(parameter: Parameter, value: object) -> float | int | str | bool:
     """Return a value in the type of its parameter; raise ParameterError for a wrong type or a value out of bounds."""
     name, bound = parameter.name, parameter.bound
+    if isinstance(parameter.default, bool):
+        if not isinstance(value, bool):
+            raise ParameterError(name, 'true or false', repr(value))
+        return value
     if isinstance(parameter.default, str):
         if not isinstance(value, str) or (bound.choices and value not in bound.choices):
             raise ParameterError(name, f'one of {", ".join(bound.choices)}' if bound.choices else 'a text', repr(value))

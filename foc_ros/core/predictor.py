@@ -80,7 +80,7 @@ def predict(
     solved = solve_candidates(candidates, problems, config.foc, costs, earlier, until)
     widened = _widen_covariances(solved, problems, hand, config)
     kept = keep_answers(candidates, widened, past, hand.stamp_ns, config.likelihood.hold_s, costs)
-    ranked = rank_candidates(kept, config.likelihood, obstacles)
+    ranked = rank_candidates(kept, config.likelihood, obstacles, hand, goals)
     smooth = smooth_paths(ranked, past, hand.stamp_ns, config.likelihood.smoothing_s)
     continuous = make_continuous(smooth, past, hand.stamp_ns, config.likelihood)
     numbers = memory.numbers.keep_goals(past.durations_s)
