@@ -13,6 +13,7 @@ import pytest
 from bag_helpers import START_NS, TYPES, messages, write_bag, write_mcap
 from rosbags.rosbag2 import StoragePlugin, Writer
 
+from foc_ros.analysis.recordings import BagRecording
 from foc_ros.core.errors import RecordingError
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
 from foc_ros.ros.messages.encode_inputs import encode_hand_pose
@@ -195,6 +196,8 @@ def test_a_file_without_its_footer_is_read_up_to_its_last_whole_chunk(tmp_path: 
         assert reader.warnings == ['killed_0.mcap: the recorder was killed; read up to the last whole chunk']
         assert reader.message_count == 30
         assert_same(list(reader), messages()[:30])
+    with pytest.raises(RecordingError, match='the recorder was killed'):  # a part of a movement cannot be evaluated
+        list(BagRecording('killed', path).items())
 
 
 @pytest.mark.parametrize('share', [0.02, 0.3, 0.6])
