@@ -22,7 +22,7 @@ from foc_ros.io.json_output import encode_prediction
 from foc_ros.io.terminal import show_progress, show_table
 from foc_ros.ros.messages.encode_prediction import encode_outputs
 from foc_ros.ros.messages.types import RosbagsTypes
-from foc_ros.ros.parameters import load_optional_config
+from foc_ros.ros.parameters import load_optional_config, write_parameter_file
 
 NODE = '/foc'
 """Name of the node in the topics of the output bag."""
@@ -38,6 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--params', type=Path, metavar='YAML', help="the node's parameter file")
     words = 'add the demonstrated homotopy classes to a class library, for homotopy.library'
     parser.add_argument('--learn', type=Path, metavar='FILE', help=words)
+    words = 'write the parameters with the durations of this operator, for --params'
+    parser.add_argument('--operator', type=Path, metavar='FILE', help=words)
     parser.add_argument('--json', action='store_true', help='print one JSON object')
     words = 'take an input from a topic, as in hand_pose:=/PSM1/measured_cp (default: by name, else by type)'
     parser.add_argument('--remap', action='append', default=[], metavar='INPUT:=TOPIC', help=words)
@@ -68,6 +70,8 @@ def run(arguments: argparse.Namespace) -> int:
             learner.finish()
             save_library(arguments.learn, learner.demonstrations)
             answer['learned'] = learner.learned
+        if arguments.operator is not None:
+            write_parameter_file('--operator', arguments.operator, replay.pipeline.adapted_config)
         if report is not None:
             report.write(arguments.report, arguments.bag.resolve().name, facts(answer))
         if arguments.json:

@@ -17,6 +17,7 @@ from .registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registr
 PLANES = ('xy', 'xz', 'yz')
 DURATION_MODELS = ('fixed', 'fitts', 'cost_of_time')
 ARRIVALS = ('rest', 'passing')
+ADAPTATIONS = ('none', 'online')
 BOUNDS = ('cantelli', 'gaussian')
 RISKS = ('step', 'path')
 GUIDANCE_MODES = ('path', 'trajectory')
@@ -93,6 +94,9 @@ class DurationConfig:
     target_width: float = _p(0.02, 'target width of Fitts law', 'm', 1e-4, 10.0)
     time_cost: float = _p(
         100.0, f'cost of time of model cost_of_time, for {JERK_ONLY} also in the cost of a class', 'm^2/s^6', 1e-9, 1e9
+    )
+    adaptation: str = _p(
+        'online', "whether expected durations follow the operator's earlier movements, by a factor", choices=ADAPTATIONS
     )
     min_time_to_go_s: float = _p(0.3, 'lower limit of the time to go', 's', 0.01, 60.0)
     spread: float = _p(0.0, f'standard deviation of the time to go, as a fraction of it; it {WIDENS}', '', 0.0, 2.0)

@@ -195,6 +195,7 @@ class Monitor:
             'working frame': pipeline.frame_id if pipeline.frame_id is not None else 'not known yet',
             **{f'obstacles of {source}': str(len(part.obstacles)) for source, part in pipeline.scene.sources.items()},
             'goals': 'none yet' if pipeline.scene.goals is None else str(len(pipeline.scene.goals)),
+            'operator': f'{pipeline.operator.movements} movements, durations x {pipeline.operator.duration_factor:.2f}',
             **self._describe_inputs(now_s, seconds),
             'prediction rate [Hz]': f'{recent["predictions"] / seconds:.1f}',
             'prediction age [s]': 'none yet' if self._predicted_s is None else f'{now_s - self._predicted_s:.3f}',
