@@ -190,14 +190,14 @@ class GuidanceConfig:
     mode: str = _p(
         'path', 'path: no force along the path, the operator sets the pace; trajectory: also along it', choices=GUIDANCE_MODES
     )
-    k_max: float = _p(200.0, 'largest stiffness in any direction', 'N/m', 0.0, 5000.0)
+    k_max: float = _p(300.0, 'largest stiffness in any direction', 'N/m', 0.0, 5000.0)
     f_max: float = _p(3.0, 'largest force; it is also at most what `slew` reduces to zero within `ramp_s`', 'N', 0.0, 100.0)
-    slew: float = _p(100.0, 'largest rate of change of the force', 'N/s', 0.1, 1e5)
+    slew: float = _p(300.0, 'largest rate of change of the force', 'N/s', 0.1, 1e5)
     lookahead_s: float = _p(
         0.15, 'longest time ahead at which a path is compared with where the hand goes by its velocity', 's', 0.0, 2.0
     )
     clearance: float = _p(
-        0.02, 'distance that guidance keeps the hand from obstacles: no force farther away; 0: force everywhere', 'm', 0.0, 1.0
+        0.015, 'distance that guidance keeps the hand from obstacles: no force farther away; 0: force everywhere', 'm', 0.0, 1.0
     )
     precision_low: float = _p(
         100.0, 'precision, an inverse variance of position, up to which there is no stiffness', '1/m^2', 0.0, 1e9
@@ -206,7 +206,7 @@ class GuidanceConfig:
     position_stddev: float = _p(0.002, 'standard deviation that is added to that of every predicted position', 'm', 1e-6, 1.0)
     margin: float = _p(0.002, 'distance from every obstacle within which no force leads towards it', 'm', 0.0, 1.0)
     tank: float = _p(0.5, 'capacity and first content of the energy tank: most energy that guidance gives', 'J', 0.0, 1e3)
-    max_speed: float = _p(1.5, 'speed of the fastest hand, for which tank and margins are guaranteed', 'm/s', 0.01, 100.0)
+    max_speed: float = _p(1.0, 'speed of the fastest hand, for which tank and margins are guaranteed', 'm/s', 0.01, 100.0)
     hold_s: float = _p(0.25, 'age of the newest pose or prediction after which the force is released', 's', 0.001, 10.0)
     ramp_s: float = _p(0.1, 'time within which a released force becomes zero', 's', 0.001, 10.0)
     authority: float = _p(0.5, 'largest share of guidance in `~/guidance/twist`', '', 0.0, 1.0)

@@ -8,6 +8,8 @@ from foc_ros.core.errors import RecordingError
 
 HAND, CLOUD, MARKERS, GOALS, GOAL = 'hand_pose', 'obstacles', 'obstacle_markers', 'goals', 'goal_pose'
 COLLISION, DETECTIONS = 'collision_objects', 'detections'
+COMMAND = 'command_twist'
+"""The operator's velocity command, an input of guidance alone."""
 TYPES = {
     HAND: 'geometry_msgs/msg/PoseStamped',
     CLOUD: 'sensor_msgs/msg/PointCloud2',
@@ -31,7 +33,7 @@ REQUIRED = ((HAND,), (CLOUD, MARKERS, COLLISION, DETECTIONS), (GOALS, GOAL))
 TRANSFORMS, STATIC_TRANSFORMS = 'tf', 'tf_static'
 """Last parts of the topics of transforms, which are no input of the predictor but move its inputs into the working frame."""
 
-OUTPUTS = ('prediction', 'likelihoods', 'path', 'markers')
+OUTPUTS = ('prediction', 'likelihoods', 'path', 'markers', 'reference')
 """Last parts of the node's own outputs, which are never used as an input because of their type."""
 
 

@@ -21,8 +21,9 @@ from rclpy.qos import (
 )
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from foc_ros.io.topics import CLOUD, COLLISION, DETECTIONS, GOAL, GOALS, HAND, MARKERS, OPTIONAL, TYPES
+from foc_ros.io.topics import CLOUD, COLLISION, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, OPTIONAL, TYPES
 
+from .messages.encode_guidance import GUIDANCE_OUTPUTS, TWIST, TWIST_TYPE
 from .messages.encode_prediction import OUTPUTS
 from .messages.types import find_message_class
 
@@ -86,6 +87,18 @@ def describe_incompatible_publishers(node: Node, role: str, subscription: Any) -
     return texts
 
 
+def create_command_subscription(node: Node, receive: Callable[[Any], None]) -> Any:
+    """Create the subscription of the operator's velocity command, of which only the newest counts."""
+    qos = _build_qos(QoSReliabilityPolicy.BEST_EFFORT, 1)
+    return node.create_subscription(find_message_class(TWIST_TYPE), COMMAND, receive, qos, qos_overriding_options=OVERRIDABLE)
+
+
+def create_guidance_publishers(node: Node) -> dict[str, Any]:
+    """Create the publishers of guidance, by the name of the topic below the node's name."""
+    kinds = {name: kind for name, (kind, _) in GUIDANCE_OUTPUTS.items()} | {TWIST: TWIST_TYPE}
+    return {name: _create_publisher(node, name, kind) for name, kind in kinds.items()}
+
+
 def find_missing_packages() -> dict[str, str]:
     """Return the package of messages that is not installed, by the optional input that needs it."""
     packages = {role: TYPES[role].partition('/')[0] for role in OPTIONAL}
@@ -94,15 +107,12 @@ def find_missing_packages() -> dict[str, str]:
 
 def create_publishers(node: Node) -> dict[str, Any]:
     """Create the publishers of the outputs, by the name of the topic below the node's name."""
-    return {
-        name: node.create_publisher(
-            find_message_class(kind),
-            f'~/{name}',
-            _build_qos(QoSReliabilityPolicy.RELIABLE, OUTPUT_DEPTH),
-            qos_overriding_options=OVERRIDABLE,
-        )
-        for name, (kind, _) in OUTPUTS.items()
-    }
+    return {name: _create_publisher(node, name, kind) for name, (kind, _) in OUTPUTS.items()}
+
+
+def _create_publisher(node: Node, name: str, kind: str) -> Any:
+    qos = _build_qos(QoSReliabilityPolicy.RELIABLE, OUTPUT_DEPTH)
+    return node.create_publisher(find_message_class(kind), f'~/{name}', qos, qos_overriding_options=OVERRIDABLE)
 
 
 def take_queued(subscription: Any) -> list[Any]:

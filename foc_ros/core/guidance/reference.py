@@ -33,7 +33,7 @@ class GuidePaths(Record):
         """Return values (c, m, ...) of the samples at a length (c,) [m] of each path."""
         rows, before = np.arange(len(at)), self._find_segments(at)
         low, high = self.lengths[rows, before], self.lengths[rows, before + 1]
-        share = np.clip((at - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
+        share = np.minimum(np.maximum((at - low) / np.where(high > low, high - low, 1.0), 0.0), 1.0)
         share = share.reshape(-1, *[1] * (values.ndim - 2))
         found: Array = (1.0 - share) * values[rows, before] + share * values[rows, before + 1]
         return found
@@ -48,8 +48,8 @@ class GuidePaths(Record):
         start, edge = self.points[:, :-1], np.diff(self.points, axis=1)
         long = np.diff(self.lengths, axis=1)
         along = ((points[:, None] - start) * edge).sum(axis=2) / np.where(long > 0.0, long, 1.0)
-        at = np.clip(self.lengths[:, :-1] + np.clip(along, 0.0, long), low[:, None], high[:, None])
-        share = np.clip((at - self.lengths[:, :-1]) / np.where(long > 0.0, long, 1.0), 0.0, 1.0)
+        at = np.minimum(np.maximum(self.lengths[:, :-1] + np.minimum(np.maximum(along, 0.0), long), low[:, None]), high[:, None])
+        share = np.minimum(np.maximum((at - self.lengths[:, :-1]) / np.where(long > 0.0, long, 1.0), 0.0), 1.0)
         away = start + share[..., None] * edge - points[:, None]
         is_reached = (self.lengths[:, 1:] >= low[:, None]) & (self.lengths[:, :-1] <= high[:, None])
         squares = np.where(is_reached, (away**2).sum(axis=2), np.inf)
@@ -57,7 +57,9 @@ class GuidePaths(Record):
         return nearest
 
     def _find_segments(self, at: Array) -> NDArray[np.intp]:
-        before: NDArray[np.intp] = np.clip((self.lengths <= at[:, None]).sum(axis=1) - 1, 0, self.lengths.shape[1] - 2)
+        before: NDArray[np.intp] = np.minimum(
+            np.maximum((self.lengths <= at[:, None]).sum(axis=1) - 1, 0), self.lengths.shape[1] - 2
+        )
         return before
 
 
@@ -97,9 +99,11 @@ def advance_progress(paths: GuidePaths, progress: Array, position: Array, veloci
         s <- s + u . v dt,    s <- s + (1 - exp(-dt / T)) (s* - s).
     """
     ends = paths.lengths[:, -1]
-    moved = np.clip(progress + dt * np.clip(paths.find_tangents(progress) @ velocity, -1e3, 1e3), 0.0, ends)
+    moved = np.minimum(
+        np.maximum(progress + dt * np.minimum(np.maximum(paths.find_tangents(progress) @ velocity, -1e3), 1e3), 0.0), ends
+    )
     nearest = paths.find_nearest(np.tile(position, (len(moved), 1)), moved - WINDOW_M, moved + WINDOW_M)
-    advanced: Array = np.clip(moved + (1.0 - np.exp(-dt / CORRECTION_S)) * (nearest - moved), 0.0, ends)
+    advanced: Array = np.minimum(np.maximum(moved + (1.0 - np.exp(-dt / CORRECTION_S)) * (nearest - moved), 0.0), ends)
     return advanced
 
 

@@ -61,14 +61,15 @@ class GuidanceInput(Record):
 class GuidanceOutput(Record):
     """The answer of one update.
 
-    t: its time [s]; status; force (2,) [N]. reference (2,) [m] and stiffness (2, 2) [N/m]: an impedance with the same force at
-    the present position, for controllers with a stiffness of their own. agreement in [0, 1]: of the candidates; authority in
-    [0, 1]: share of guidance in a blended command; heading (2,): direction of that share, of at most unit length. tank: its
-    content [J].
+    t: its time [s]; status; position (2,) [m]: of the hand; force (2,) [N]. reference (2,) [m] and stiffness (2, 2) [N/m]: an
+    impedance with the same force at the present position, for controllers with a stiffness of their own. agreement in [0, 1]: of
+    the candidates; authority in [0, 1]: share of guidance in a blended command; heading (2,): direction of that share, of at most
+    unit length. tank: its content [J].
     """
 
     t: float
     status: GuidanceStatus
+    position: Array
     force: Array
     reference: Array
     stiffness: Array
@@ -152,15 +153,18 @@ def guide(config: Config, state: GuidanceState, given: GuidanceInput) -> tuple[G
         followed = replace(followed, progress=progress)
         wish = _compute_wish(settings, followed, given)
     target = wish.force if status is GuidanceStatus.GUIDING else _release(settings, state.force, dt)
+    longest = LATE_PERIODS / settings.rate_hz if status is GuidanceStatus.GUIDING else dt  # no sudden force after a gap
 
     def find_bound(force: Array) -> float:
         return _find_bound(settings, followed.margins, given.position, energy, force)
 
-    force = step_force(state.force, target, settings.slew * dt, find_bound)
+    force = step_force(state.force, target, settings.slew * min(dt, longest), find_bound)
     change = dt / settings.ramp_s
     authority = state.authority + min(max(wish.authority - state.authority, -change), change)
     reference = given.position + find_deflection(wish.stiffness, force)
-    output = GuidanceOutput(given.t, status, force, reference, wish.stiffness, wish.agreement, authority, wish.heading, energy)
+    output = GuidanceOutput(
+        given.t, status, given.position, force, reference, wish.stiffness, wish.agreement, authority, wish.heading, energy
+    )
     return output, GuidanceState(energy, given.t, given.position, force, authority, followed)
 
 

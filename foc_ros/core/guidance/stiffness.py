@@ -24,7 +24,7 @@ def compute_stiffness(covariances: Array, config: GuidanceConfig) -> Array:
     variances, axes = np.linalg.eigh(covariances)
     precisions = 1.0 / (np.maximum(variances, 0.0) + config.position_stddev**2)
     width = max(config.precision_high - config.precision_low, 1e-9)
-    shares = np.clip((precisions - config.precision_low) / width, 0.0, 1.0)
+    shares = np.minimum(np.maximum((precisions - config.precision_low) / width, 0.0), 1.0)
     stiffness: Array = config.k_max * np.einsum('cj,caj,cbj->cab', shares, axes, axes)
     return stiffness
 
