@@ -32,7 +32,7 @@ def tabulate_sides(solutions: Sequence[Solution], obstacles: Obstacles) -> NDArr
         compute_swept_angles(each.path, centre_trajectories(obstacles.centre, each.dt * obstacles.velocity, len(each.mean) - 1))
         for each in solutions
     ]
-    return np.where(np.array(angles).reshape(len(solutions), -1) < 0.0, LEFT, RIGHT).astype(np.int8)
+    return np.where(np.array(angles).reshape(len(solutions), len(obstacles)) < 0.0, LEFT, RIGHT).astype(np.int8)
 
 
 def find_decisions(sides: NDArray[np.int8], obstacles: Obstacles, hand: HandState, goals: Array) -> Decisions:
