@@ -253,7 +253,7 @@ class Predictor:
             last = '' if self._hand is None else f', {self._hand.stamp_ns / NANOSECONDS:.9g} s'
             raise InputError('t', f'a time after the last one{last}', t)
         if updated.status.is_restart:
-            self._memory = Memory()
+            self._memory = self._memory.forget()
         self._hand = updated.state
         if self._obstacles.stamp_ns is None:
             self._obstacles = replace(self._obstacles, stamp_ns=stamp_ns)
@@ -264,7 +264,7 @@ class Predictor:
 
     def reset(self) -> None:
         """Forget the movement; keep goals and obstacles. The next update may have any time."""
-        self._hand, self._memory = None, Memory()
+        self._hand, self._memory = None, self._memory.forget()
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.ground_truth import TIMES_S, GroundTruth, find_open_gaps
+from foc_ros.analysis.evaluation.ground_truth import TIMES_S, GroundTruth, RecordedPath, find_open_gaps
 from foc_ros.analysis.evaluation.observations import CandidateTable, Observation, ObservedRecording
+from foc_ros.core.decisions import Decisions
 from foc_ros.core.homotopy.branch_times import BranchTimes
 from foc_ros.core.types import LEFT, RIGHT, make_obstacles
 
@@ -36,6 +37,7 @@ def make_candidates(sides, goal=None, likelihood=None, cost_to_go=None, solved=N
         covariance=np.tile(np.eye(2), (k, H, 1, 1)),
         duration_sensitivity=np.zeros((k, H, 2)),
         branch_times=BranchTimes(np.where(np.eye(k, dtype=bool), np.inf, 0.0), np.arange(k)),
+        decisions=Decisions(np.arange(solved.sum()), np.zeros(solved.sum(), dtype=np.intp)),
     )
 
 
@@ -80,7 +82,9 @@ def observation(
 
 
 def recorded(*each: Observation, name: str = 'one') -> ObservedRecording:
-    return ObservedRecording(name, each)
+    """Return a recording of a hand that moves along x."""
+    stamps_ns = np.arange(0, 2_000_000_001, 50_000_000)
+    return ObservedRecording(name, each, RecordedPath(stamps_ns, np.outer(stamps_ns / 1e9, [1.0, 0.0]), np.array([[2.0, 0.0]])))
 
 
 TWO_CLASSES = make_candidates([[LEFT], [RIGHT]])

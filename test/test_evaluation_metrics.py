@@ -7,7 +7,7 @@ import pytest
 from evaluation_samples import TWO_CLASSES, make_candidates, observation, recorded
 
 from foc_ros.analysis.evaluation.cross_validation import choose_held_out
-from foc_ros.analysis.evaluation.forecasts import UNCERTAINTY, Forecast, published_shares
+from foc_ros.analysis.evaluation.forecasts import UNCERTAINTY, Forecast, power_rule_shares, published_shares
 from foc_ros.analysis.evaluation.ground_truth import TIMES_S
 from foc_ros.analysis.evaluation.metrics import (
     Scores,
@@ -20,6 +20,7 @@ from foc_ros.analysis.evaluation.metrics import (
 )
 from foc_ros.analysis.evaluation.position_metrics import compute_position_scores
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
+from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.types import LEFT, RIGHT
 
 L, R = LEFT, RIGHT
@@ -81,11 +82,12 @@ def test_a_true_answer_that_no_candidate_gives_has_only_the_rest() -> None:
     ) == pytest.approx(UNCERTAINTY / 6.0)
 
 
-def test_an_unsolved_candidate_counts_as_the_average_of_the_solved_ones() -> None:
+def test_an_unsolved_candidate_counts_as_published() -> None:
     observed = observation(
         make_candidates([[L, L, L], [R, L, R], [R, L, L]], solved=[True, True, False], likelihood=[0.9, 0.1, 0.0]), **TWO_ROWS
     )
-    np.testing.assert_allclose(published_shares(observed), [0.6, 1.0 / 15.0, 1.0 / 3.0])
+    np.testing.assert_allclose(published_shares(observed), [0.9, 0.1, 0.0])
+    assert power_rule_shares(observed, LikelihoodConfig())[2] == 0.0
 
 
 def test_forecasts_sum_to_one() -> None:
@@ -162,3 +164,7 @@ def test_displacements_are_averaged_up_to_the_horizon_and_ellipses_cover_what_is
     # with unit covariance, 90 % lie within 2.15 and 50 % within 1.18
     assert scores['inside'] == {'0.5': {'0.25': 0.0, '0.5': 0.0, '1': None}, '0.9': {'0.25': 1.0, '0.5': 0.0, '1': None}}
     assert scores['displacement_m']['constant velocity']['final']['0.5'] == pytest.approx(3.5)
+    # two equal candidates of unit covariance, both at the origin
+    flat = np.log(2 * np.pi)
+    assert scores['nlpd']['foc'] == {'0.25': pytest.approx(flat + 2.0), '0.5': pytest.approx(flat + 8.0), '1': None}
+    assert scores['nlpd']['Singer Kalman']['0.5'] > 0.0

@@ -11,12 +11,13 @@ from evaluation_samples import reach, write_tables
 
 from foc_ros.analysis.csv_recordings import EPOCH_NS, read_movements, read_scenes, write_movement
 from foc_ros.analysis.evaluation.forecasts import power_rule_shares
-from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
+from foc_ros.analysis.evaluation.ground_truth import TIMES_S
+from foc_ros.analysis.evaluation.observations import ObservedRecording, interpolate_path, interpolate_steps, observe
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
 from foc_ros.analysis.recordings import BagRecording, find_recordings
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.types import LEFT
+from foc_ros.core.types import LEFT, Solution, Status
 from foc_ros.io.bags import TYPESTORE, BagReader, Item
 from foc_ros.ros.messages.encode_inputs import encode_goals
 from foc_ros.ros.messages.types import RosbagsTypes
@@ -102,3 +103,14 @@ def test_no_goal_is_true_for_predictions_with_other_goals(data: Path) -> None:
     recording = observe(Changing(), PLAIN)
     assert {len(each.goals) for each in recording.observations} == {2, 3}
     assert all(each.truth.goal == (0 if len(each.goals) == 2 else None) for each in recording.observations)
+
+
+@pytest.mark.parametrize('dt', [0.011, 0.13])
+def test_predictions_are_compared_at_the_exact_time(dt: float) -> None:
+    steps = dt * np.arange(8)
+    states = np.column_stack([steps**3, steps**2, 3.0 * steps**2, 2.0 * steps, 6.0 * steps, np.full(8, 2.0)])
+    plan = Solution(Status.SOLVED, '', dt, states, np.tile(np.eye(6), (8, 1, 1)), np.zeros((7, 2)), 0.0, {}, 0.0, 0.0, 0.9)
+    expected = np.minimum(TIMES_S, steps[-1])
+    np.testing.assert_allclose(interpolate_path(plan), np.column_stack([expected**3, expected**2]), atol=1e-12)
+    np.testing.assert_allclose(interpolate_steps(2.0 * steps, dt), 2.0 * expected)
+    assert interpolate_steps(np.zeros((8, 2, 2)), dt).shape == (len(TIMES_S), 2, 2)

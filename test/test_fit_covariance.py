@@ -40,7 +40,8 @@ def _make_recordings(endpoint: float, spread: float) -> list:
 def test_the_true_values_are_found_and_ellipses_then_have_their_coverage(endpoint: float, spread: float) -> None:
     recordings = _make_recordings(endpoint, spread)
     table = tabulate_densities(recordings, Config())
-    found = estimate_widening(table)
+    found, warnings = estimate_widening(table)
+    assert warnings == []
     assert found['foc.endpoint_stddev'].value == pytest.approx(endpoint, rel=0.4)
     assert found['duration.spread'].value == pytest.approx(spread, abs=0.11)
     for each in found.values():
@@ -67,3 +68,10 @@ def test_the_density_is_that_of_the_widened_mixture() -> None:
 
 def test_a_hand_at_rest_does_not_count() -> None:
     assert compute_log_densities(observation(CANDIDATES, movement_age_s=0.0), np.array([0.5, 0.5]), Config(), WIDENINGS) is None
+
+
+def test_a_value_at_the_edge_of_the_grid_has_a_warning() -> None:
+    table = tabulate_densities(_make_recordings(0.3, 0.0), Config())
+    found, warnings = estimate_widening(table)
+    assert found['foc.endpoint_stddev'].value == max(each.endpoint_stddev for each in WIDENINGS)
+    assert [words for words in warnings if words.startswith('foc.endpoint_stddev: 0.16 is the largest')]

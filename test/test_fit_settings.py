@@ -31,8 +31,9 @@ ARRIVALS = [CONFIG, replace_values(CONFIG, {'duration.arrival': 'passing'})]
 class KnownReplays:
     """Replays with known scores by setting and recording; keeps the number of settings and recordings of each round."""
 
-    def __init__(self, classes: Array) -> None:
+    def __init__(self, classes: Array, positions: Array | None = None) -> None:
         self.classes = np.asarray(classes, dtype=float)
+        self.positions = np.zeros_like(self.classes) if positions is None else np.asarray(positions, dtype=float)
         self.recordings = {str(place): None for place in range(self.classes.shape[1])}
         self.rounds: list[tuple[int, int]] = []
 
@@ -43,9 +44,8 @@ class KnownReplays:
 
     def score(self, settings: list[Config], names: list[str], words: str) -> Array:
         self.rounds.append((len(settings), len(names)))
-        rows = self.classes[[self.settings.index(each) for each in settings]]
-        classes = rows[:, [int(name) for name in names]]
-        return np.array([classes, np.zeros_like(classes)])
+        rows, columns = [self.settings.index(each) for each in settings], [int(name) for name in names]
+        return np.array([self.classes[rows][:, columns], self.positions[rows][:, columns]])
 
 
 def test_the_better_choice_is_taken() -> None:
@@ -91,10 +91,17 @@ def test_the_number_of_replayed_recordings_is_bounded() -> None:
     assert replays.rounds[-1] == (2, setting_search.MAX_RECORDINGS)
 
 
-def test_classes_decide_and_positions_where_classes_are_equal() -> None:
+def test_classes_decide_and_positions_where_classes_are_alike() -> None:
     positions = np.array([[0.0, 0.0], [5.0, 5.0], [1.0, 1.0]])
     assert setting_search.rank(np.array([[[1.0, 1.2], [0.5, 0.8], [0.9, 1.4]], positions])) == [2, 0, 1]
+    assert setting_search.rank(np.array([[[1.0, 1.2], [0.7, 1.55], [0.9, 1.4]], positions])) == [1, 2, 0]
     assert setting_search.rank(np.array([np.zeros((3, 2)), positions])) == [1, 2, 0]
+
+
+def test_worse_positions_have_a_warning() -> None:
+    found = KnownReplays([[0.0] * 8, [1.0] * 8], [[0.0] * 8, [-0.3] * 8]).search(ARRIVALS)
+    assert found.config.duration.arrival == 'passing'
+    assert [words for words in found.warnings if 'predicts positions worse' in words and '0.3 nat' in words]
 
 
 def test_models_durations_arrivals_and_fading_are_tried_in_all_combinations() -> None:

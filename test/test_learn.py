@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 from bag_helpers import messages, write_bag
 
+from foc_ros.analysis.replay import Replay
 from foc_ros.cli.main import main
 from foc_ros.core.homotopy.demonstrations import record_demonstration
 from foc_ros.core.types import make_obstacles
+from foc_ros.io.bags import BagReader
 from foc_ros.io.class_library import MOST_WAYS, load_library, save_library
+from foc_ros.ros.parameters import load_parameter_file
 
 PARAMETERS = '/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 20, homotopy.library: "%s"}}'
 
@@ -78,3 +81,13 @@ def test_a_full_library_stays_as_it_was(bag: Path, tmp_path: Path, capsys: pytes
     assert run(bag, '--learn', str(file)) == 2
     assert 'ways: expected at most 500, got 501 with the new ones' in capsys.readouterr().err
     assert file.read_bytes() == held
+
+
+def test_the_parameters_of_the_operator_are_written(bag: Path, tmp_path: Path) -> None:
+    file = tmp_path / 'operator.yaml'
+    assert run(bag, '--operator', str(file)) == 0
+    replayed = Replay(load_parameter_file(bag.parent / 'parameters.yaml'))
+    with BagReader(bag) as reader:
+        assert sum(step.prediction is not None for step in replayed.steps(reader)) > 0
+    assert load_parameter_file(file) == replayed.pipeline.adapted_config
+    assert run(bag, '--operator', '/nowhere/operator.yaml') == 2

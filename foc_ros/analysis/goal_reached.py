@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from foc_ros.core.estimation.adaptation import REMAINING_SHARE
 from foc_ros.core.types import Array
 
 AT_GOAL_M = 0.05
 """A path that ends no farther from a goal than this ends at it [m]."""
-REMAINING_SHARE = 0.25
-"""A movement that leaves no more than this share of its first distance to a goal has covered the distance."""
 
 
 def find_reached_goal(positions: Array, goals: Array) -> tuple[int | None, int]:

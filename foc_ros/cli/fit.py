@@ -17,7 +17,7 @@ from foc_ros.core.config import Config, flatten
 from foc_ros.core.errors import InputError
 from foc_ros.io.outputs import check_replaceable
 from foc_ros.io.terminal import show_table
-from foc_ros.ros.parameters import dump_parameter_file, load_optional_config
+from foc_ros.ros.parameters import load_optional_config, write_parameter_file
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,10 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
     recordings = find_recordings(arguments.data)
     with open_executor(arguments) as executor:
         fit = fit_parameters(recordings, config, executor)
-    try:
-        output.write_text(dump_parameter_file(fit.config), encoding='utf-8')
-    except OSError as error:
-        raise InputError('--output', 'a file that can be written', f'{output}: {error.strerror}') from error
+    write_parameter_file('--output', output, fit.config)
     answer = make_answer(fit, config, output)
     if arguments.report is not None:
         write_report(arguments.report, arguments.data.resolve().name, answer)

@@ -24,7 +24,7 @@ from foc_ros.io.terminal import show_progress, show_table
 from foc_ros.ros.messages.encode_guidance import GUIDANCE_OUTPUTS
 from foc_ros.ros.messages.encode_prediction import encode_outputs
 from foc_ros.ros.messages.types import RosbagsTypes
-from foc_ros.ros.parameters import load_optional_config
+from foc_ros.ros.parameters import load_optional_config, write_parameter_file
 
 NODE = '/foc'
 """Name of the node in the topics of the output bag."""
@@ -42,6 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--params', type=Path, metavar='YAML', help="the node's parameter file")
     words = 'add the demonstrated homotopy classes to a class library, for homotopy.library'
     parser.add_argument('--learn', type=Path, metavar='FILE', help=words)
+    words = 'write the parameters with the durations of this operator, for --params'
+    parser.add_argument('--operator', type=Path, metavar='FILE', help=words)
     words = 'compute guidance as well, at guidance.rate_hz: into the output bag and, with --json, as a list `guidance`'
     parser.add_argument('--guidance', action='store_true', help=words)
     parser.add_argument('--json', action='store_true', help='print one JSON object')
@@ -75,6 +77,8 @@ def run(arguments: argparse.Namespace) -> int:
             learner.finish()
             save_library(arguments.learn, learner.demonstrations)
             answer['learned'] = learner.learned
+        if arguments.operator is not None:
+            write_parameter_file('--operator', arguments.operator, replay.pipeline.adapted_config)
         if report is not None:
             report.write(arguments.report, arguments.bag.resolve().name, facts(answer))
         if arguments.json:
@@ -90,7 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
             show_table(('', str(arguments.bag)), facts(answer).items())
     if summary.solved:
         return 0
-    reason = replay.pipeline.not_ready_reason() or replay.intake.last_refusal or 'see the candidates not solved'
+    reason = replay.describe_refusals() or replay.pipeline.not_ready_reason() or 'see the candidates not solved'
     print(f'foc_ros replay: no prediction has a solved candidate: {reason}', file=sys.stderr)
     return 3
 
@@ -110,6 +114,8 @@ def _play(arguments: argparse.Namespace, replay: Replay, consumers: list[Consume
                     take(step, each)
             for consume in consumers:
                 consume(step)
+        for warning in reader.warnings:
+            print(f'foc_ros replay: {arguments.bag}: {warning}', file=sys.stderr)
         return reader.duration_s
 
 

@@ -10,13 +10,14 @@ import numpy as np
 
 from .config import FocConfig, LikelihoodConfig
 from .deadline import NEVER, Deadline
+from .decisions import find_decisions, tabulate_sides
 from .homotopy import find_path_sides
 from .homotopy.branch_times import compute_branch_times
 from .likelihood import CostModel, compute_likelihoods
 from .ocp.problem import Problem
 from .ocp.solve import solve_problem
 from .ocp.warm_start import cold_start, warm_start
-from .types import Candidate, Obstacles, PredictedCandidate, Solution, Status
+from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Solution, Status
 
 EFFORT_ONLY = CostModel()
 
@@ -133,14 +134,20 @@ def _identify_class(candidate: PredictedCandidate) -> tuple[int, frozenset[tuple
 
 
 def rank_candidates(
-    candidates: Sequence[PredictedCandidate], likelihood: LikelihoodConfig, obstacles: Obstacles
+    candidates: Sequence[PredictedCandidate], likelihood: LikelihoodConfig, obstacles: Obstacles, hand: HandState, goals: Array
 ) -> list[PredictedCandidate]:
-    """Return the distinct candidates: solved and compromised ones, most likely first, then the others, with likelihood 0."""
+    """Return the distinct candidates: solved and compromised ones, most likely first, then the others, with likelihood 0.
+
+    obstacles: grown by the radius of the hand; goals (g, 2) [m].
+    """
     candidates = drop_duplicates(candidates)
     taken = [each for each in candidates if each.has_likelihood]
     branch_times = compute_branch_times(taken, obstacles) if likelihood.lookahead_s > 0.0 else None
     costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))
-    pairs = zip(taken, compute_likelihoods(costs, likelihood, branch_times, shortfalls).tolist(), strict=True)
+    sides = tabulate_sides([each.solution for each in taken], obstacles)
+    decisions = find_decisions(sides, obstacles, hand, goals) if len(taken) > 1 else None
+    shares = compute_likelihoods(costs, likelihood, branch_times, shortfalls, decisions)
+    pairs = zip(taken, shares.tolist(), strict=True)
     ranked = [replace(each, likelihood=share) for each, share in pairs]
     ranked.sort(key=lambda each: (-each.likelihood, each.label))
     return ranked + [each for each in candidates if not each.has_likelihood]

@@ -17,6 +17,7 @@ from .registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registr
 PLANES = ('xy', 'xz', 'yz')
 DURATION_MODELS = ('fixed', 'fitts', 'cost_of_time')
 ARRIVALS = ('rest', 'passing')
+ADAPTATIONS = ('none', 'online')
 BOUNDS = ('cantelli', 'gaussian')
 RISKS = ('step', 'path')
 GUIDANCE_MODES = ('path', 'trajectory')
@@ -94,6 +95,9 @@ class DurationConfig:
     time_cost: float = _p(
         100.0, f'cost of time of model cost_of_time, for {JERK_ONLY} also in the cost of a class', 'm^2/s^6', 1e-9, 1e9
     )
+    adaptation: str = _p(
+        'online', "whether expected durations follow the operator's earlier movements, by a factor", choices=ADAPTATIONS
+    )
     min_time_to_go_s: float = _p(0.3, 'lower limit of the time to go', 's', 0.01, 60.0)
     spread: float = _p(0.0, f'standard deviation of the time to go, as a fraction of it; it {WIDENS}', '', 0.0, 2.0)
     wait_s: float = _p(0.0, f'mean time until a hand at rest starts to move; it {WIDENS}', 's', 0.0, 60.0)
@@ -143,6 +147,10 @@ class LikelihoodConfig:
     lookahead_s: float = _p(
         0.0, 'mean look-ahead of the operator: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
     )
+    beta_beyond: float = _p(0.5, 'exponent of the cost ratio for what lies beyond the next row of obstacles', '', 0.0, 100.0)
+    weaving: float = _p(
+        4.0, 'log-likelihood that a class loses for each row through several gaps of which it leads', '', 0.0, 100.0
+    )
     hold_s: float = _p(
         0.2, 'longest time for which a class keeps its last answer if there is no time for a new one or it fails', 's', 0.0, 10.0
     )
@@ -162,6 +170,15 @@ class SceneConfig:
         0.0, 'standard deviation of the radius of obstacles from markers, collision objects and detections', 'm', 0.0, 1.0
     )
     hand_radius: float = _p(0.0, 'added to the radius of every obstacle: hands and tools are not points', 'm', 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class FramesConfig:
+    """Transforms of messages that are in another frame than the working frame."""
+
+    tolerance_s: float = _p(
+        0.1, 'time to wait for the transform at the stamp of a message, and largest age of another one then', 's', 0.0, 10.0
+    )
 
 
 @dataclass(frozen=True)
@@ -224,6 +241,7 @@ class Config:
     homotopy: HomotopyConfig = field(default_factory=HomotopyConfig)
     likelihood: LikelihoodConfig = field(default_factory=LikelihoodConfig)
     scene: SceneConfig = field(default_factory=SceneConfig)
+    frames: FramesConfig = field(default_factory=FramesConfig)
     guidance: GuidanceConfig = field(default_factory=GuidanceConfig)
 
     def __repr__(self) -> str:

@@ -18,17 +18,26 @@ distinguished from W, so that each gets their mean weight:
 
 A choice that lies tau ahead is therefore made with the exponent beta exp(-tau / lookahead_s): by the ratio of costs when it is
 near, evenly when it is far. Without `lookahead_s`, h is infinite, and p_i is as above.
+
+These p_i give the probabilities of the gaps of the next row. What lies beyond this row is decided with an exponent of its own,
+beta' = `likelihood.beta_beyond`. A class that weaves through w_i rows (`decisions`) has a weight that is smaller by
+exp(-`likelihood.weaving` w_i), in both. With G the classes that take the same gap in the next row, those of class i,
+
+    p_i <- sum_{j in G} p_j  r_i / sum_{j in G} r_j,  r_i = J_i^-beta' exp(-shortfall (k_wanted - k) - weaving w_i).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .config import Config, LikelihoodConfig
+from .decisions import Decisions
 from .dynamics.plant_models import make_plant_model
 from .errors import InputError
 from .estimation.duration import get_time_price
@@ -73,23 +82,32 @@ def compute_shared_cost(effort_spent: float, config: LikelihoodConfig) -> float:
 
 
 def compute_likelihoods(
-    costs: Array, config: LikelihoodConfig, branch_times: BranchTimes | None = None, shortfalls: Array | None = None
+    costs: Array,
+    config: LikelihoodConfig,
+    branch_times: BranchTimes | None = None,
+    shortfalls: Array | None = None,
+    decisions: Decisions | None = None,
 ) -> Array:
     """Return the likelihoods (k,) of classes by the rule that `likelihood.rule` names; they sum to one.
 
     costs (k,) >= 0 [m^2/s^5], of which those below `COST_FLOOR` count as `COST_FLOOR`; branch_times: of these classes, for a
-    look-ahead only; shortfalls (k,) >= 0: of their safety factors, zero if not given. Logarithms keep numbers in range. Raises
-    InputError for a cost that is negative or not finite.
+    look-ahead only; shortfalls (k,) >= 0: of their safety factors, zero if not given; decisions: of these classes, without which
+    all choices are near. Logarithms keep numbers in range. Raises InputError for a cost that is negative or not finite.
     """
     values = np.ascontiguousarray(costs, dtype=float)
     for row, value in enumerate(values.tolist()):
         if not 0.0 <= value < math.inf:
             raise InputError(f'costs[{row}]', 'a finite number >= 0', value)
-    logs = LIKELIHOOD_RULES.get(config.rule)(values, config)
+    rule, losses = LIKELIHOOD_RULES.get(config.rule), np.zeros(len(values))
     if shortfalls is not None and shortfalls.any():
-        logs = logs - config.shortfall * shortfalls
+        losses = config.shortfall * shortfalls
+    logs = rule(values, config) - losses
     if config.lookahead_s > 0.0 and branch_times is not None and len(logs):
         logs = _weigh_by_lookahead(logs - logs.max(), branch_times, config.lookahead_s)
+    if decisions is not None and len(logs):
+        losses = losses + config.weaving * decisions.woven
+        beyond = rule(values, replace(config, beta=config.beta_beyond)) - losses
+        logs = _share_next_gaps(logs - config.weaving * decisions.woven, beyond, decisions.next_gap)
     return normalise_logs(np.ascontiguousarray(logs, dtype=float))
 
 
@@ -112,6 +130,15 @@ def normalise_logs(logs: Vector) -> Vector:
     weights: Array = np.exp(logs - logs.max())
     weights /= weights.sum()
     return weights
+
+
+def _share_next_gaps(near: Array, beyond: Array, next_gap: NDArray[np.intp]) -> Array:
+    """Return logarithms (k,) that give each gap the weight that it has by `near`, and share it among its classes by `beyond`."""
+    weights = np.full((2, int(next_gap.max()) + 1), -np.inf)
+    np.logaddexp.at(weights[0], next_gap, near)
+    np.logaddexp.at(weights[1], next_gap, beyond)
+    shared: Array = beyond + (weights[0] - weights[1])[next_gap]
+    return shared
 
 
 def _weigh_by_lookahead(logs: Array, branch_times: BranchTimes, lookahead_s: float) -> Array:

@@ -6,11 +6,12 @@ The pipeline uses the stamps of messages only and reads no clock, so that equal 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .config import Config
 from .deadline import NEVER, Deadline
 from .errors import FocError
+from .estimation.adaptation import Operator
 from .estimation.kalman_filter import FilterState, update
 from .homotopy.demonstrations import Demonstration
 from .memory import Memory
@@ -44,7 +45,7 @@ class Pipeline:
 
     library: demonstrated paths. Attributes: config; hand_state, None before the first hand sample; scene, obstacles and goals;
     engaged, whether predictions are made; frame_id, the working frame, None until the parameter or the first hand sample fixes
-    it.
+    it; operator, what was learnt from the movements so far.
     """
 
     def __init__(self, config: Config, library: Sequence[Demonstration] = ()) -> None:
@@ -53,6 +54,7 @@ class Pipeline:
         self.hand_state: FilterState | None = None
         self.scene = Scene()
         self.is_engaged = True
+        self.operator = Operator()
         self.frame_id = config.frame_id or None
         self._rejections = Rejections()
         self._memory = Memory()
@@ -60,6 +62,12 @@ class Pipeline:
         self._was_tried = False
         self._predicted_ns: int | None = None
         self._task: PredictionTask | None = None
+
+    @property
+    def adapted_config(self) -> Config:
+        """The parameters with which the next prediction is made: those given, adapted to the operator."""
+        adapted = self.operator.adapt(self.config.duration)
+        return self.config if adapted is self.config.duration else replace(self.config, duration=adapted)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -106,6 +114,8 @@ class Pipeline:
         if not self.is_engaged:
             self._rejections.reject('hand_disengaged', 'hand_pose: disengaged, nothing is predicted')
             return SampleStatus.DISENGAGED
+        if self.config.duration.adaptation == 'online':
+            self.operator = self.operator.follow(self.hand_state, self.scene.goals, self.config.duration)
         return status
 
     def set_obstacles(self, source: str, obstacles: Obstacles, stamp_ns: int | None, frame_id: str) -> SampleStatus:
@@ -154,7 +164,7 @@ class Pipeline:
         self._is_new, self._predicted_ns = False, self.hand_state.stamp_ns
         obstacles = self.scene.obstacles(self.hand_state.stamp_ns)
         self._task = PredictionTask(
-            self.config, self.hand_state, obstacles, self.scene.goals, self._memory, self._library, deadline
+            self.adapted_config, self.hand_state, obstacles, self.scene.goals, self._memory, self._library, deadline
         )
         return self._task
 
@@ -188,7 +198,7 @@ class Pipeline:
         """Engage or disengage: while disengaged the hand is followed, but nothing is predicted."""
         if on != self.is_engaged:
             self._forget_predictions()
-            self._is_new = False
+            self._is_new, self.operator = False, replace(self.operator, states=())
         self.is_engaged = on
 
     def remove_source(self, source: str) -> None:
@@ -196,8 +206,8 @@ class Pipeline:
         self.scene = self.scene.without_source(source)
 
     def reset(self) -> None:
-        """Forget the movement; keep the scene, the working frame and the counts."""
-        self.hand_state, self._is_new = None, False
+        """Forget the movement and the operator; keep the scene, the working frame and the counts."""
+        self.hand_state, self._is_new, self.operator = None, False, Operator()
         self._forget_predictions()
 
     def reconfigure(self, config: Config) -> None:
@@ -211,11 +221,13 @@ class Pipeline:
         if config.frame_id and config.frame_id != self.frame_id:
             self.reset()
             self._fix_frame(config.frame_id)
+        if config.duration != self.config.duration:
+            self.operator = Operator()
         self.config = config
         if self._task is not None:
             self._abandon_task()
             self._is_new, self._predicted_ns = True, None
-        self._memory = Memory(self._memory.most_likely)
+        self._memory = Memory(self._memory.most_likely, numbers=self._memory.numbers)
 
     def _find_not_ready_reason(self) -> tuple[str, str] | None:
         """Return why the pipeline cannot predict, as (kind, message), judged by stamps; the node also judges by its clocks."""
@@ -227,7 +239,7 @@ class Pipeline:
 
     def _forget_predictions(self) -> None:
         self._abandon_task()
-        self._memory, self._predicted_ns = Memory(), None
+        self._memory, self._predicted_ns = self._memory.forget(), None
 
     def _abandon_task(self) -> None:
         """Make sure that a prediction that is being computed is neither returned nor remembered, and end it soon."""

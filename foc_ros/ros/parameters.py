@@ -14,7 +14,7 @@ from typing import Any
 import yaml
 
 from foc_ros.core.config import Config, Parameter, flatten, list_parameters, replace_values
-from foc_ros.core.errors import ParameterError
+from foc_ros.core.errors import InputError, ParameterError
 from foc_ros.io.documents import read_document
 
 NODE_KEYS = ('/**', 'foc', '/foc')
@@ -83,6 +83,14 @@ def dump_parameter_file(config: Config) -> str:
         value = yaml.safe_dump(values[parameter.name], default_flow_style=True).splitlines()[0]
         lines += [f'{indent}# {_describe(parameter)}', f'{indent}{leaf}: {value}']
     return '\n'.join(lines) + '\n'
+
+
+def write_parameter_file(option: str, file: Path, config: Config) -> None:
+    """Write a parameter file; raises InputError, which names the option of the command, where that is impossible."""
+    try:
+        file.write_text(dump_parameter_file(config), encoding='utf-8')
+    except OSError as error:
+        raise InputError(option, 'a file that can be written', f'{file}: {error.strerror}') from error
 
 
 def _describe(parameter: Parameter) -> str:

@@ -27,7 +27,13 @@ from .questions import GOAL, Answer, Question
 PUBLISHED, REFITTED, PLAIN, UNIFORM, BOLTZMANN = 'foc', 'foc, held out', 'foc, plain rule', 'uniform', 'Boltzmann'
 CONFIDENCES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 POWERS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
-LOOKAHEADS_S = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4)
+LOOKAHEADS_S, POWERS_AHEAD, POWERS_BEYOND, WEAVINGS = (
+    (0.0, 0.35, 0.5, 1.0, 1.5),
+    (1.0, 2.0, 3.0, 5.0),
+    (0.05, 0.2, 1.0),
+    (1.0, 4.0),
+)
+"""Values that are tried where near and far choices differ."""
 RATES = tuple(float(rate) for rate in np.geomspace(0.01, 100.0, 25))
 """Inverse temperatures that are tried, in parts of one over the median effort to go."""
 
@@ -90,16 +96,28 @@ def _make_baseline(
 
 
 def make_plain_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[LikelihoodConfig, ...]:
-    """Return the exponents that are tried for ratios of whole costs, effort spent and to go, without looking ahead."""
-    return tuple(replace(published, beta=beta, spent_share=1.0, lookahead_s=0.0) for beta in POWERS)
+    """Return the exponents that are tried for ratios of whole costs, effort spent and to go, by which all choices are made."""
+    return tuple(replace(make_plain(published, beta), spent_share=1.0) for beta in POWERS)
 
 
 def make_power_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[LikelihoodConfig, ...]:
-    """Return all parameters of the likelihood that are tried, with and without looking ahead."""
-    return tuple(
-        replace(published, beta=beta, spent_share=share, lookahead_s=seconds)
-        for seconds, beta, share in product((0.0, *LOOKAHEADS_S), POWERS, (1.0, 0.0))
+    """Return all parameters of the likelihood that are tried: one exponent for all choices, or near and far ones that differ."""
+    plain = (replace(make_plain(published, beta), spent_share=share) for beta, share in product(POWERS, (1.0, 0.0)))
+    ahead = (
+        replace(published, spent_share=0.0, lookahead_s=seconds, beta=beta, beta_beyond=beyond, weaving=weaving)
+        for seconds, beta, beyond, weaving in product(LOOKAHEADS_S, POWERS_AHEAD, POWERS_BEYOND, WEAVINGS)
     )
+    return (*plain, *ahead)
+
+
+def make_plain(likelihood: LikelihoodConfig, beta: float) -> LikelihoodConfig:
+    """Return a likelihood by which all choices are made with one exponent."""
+    return replace(likelihood, beta=beta, beta_beyond=beta, lookahead_s=0.0)
+
+
+def is_plain(likelihood: LikelihoodConfig) -> bool:
+    """Return whether all choices are made with one exponent."""
+    return likelihood.beta_beyond == likelihood.beta and likelihood.lookahead_s == 0.0
 
 
 def make_boltzmann_rates(recordings: Sequence[ObservedRecording], _: LikelihoodConfig) -> tuple[float, ...]:

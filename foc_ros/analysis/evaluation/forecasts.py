@@ -1,8 +1,7 @@
 """Forecasts: the probabilities that a predictor gives to the answers of a question, and likelihood rules tried on observations.
 
 What a predictor leaves over is spread evenly over the possible answers. Every predictor leaves at least `UNCERTAINTY`, so that an
-answer that no candidate gives is unlikely, not impossible. A candidate that could not be solved is unknown, not unlikely: it
-counts as much as the solved ones do on average.
+answer that no candidate gives is unlikely, not impossible. A candidate without a likelihood counts as the node publishes it: 0.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ class Forecast(Record):
 
     @classmethod
     def from_shares(cls, shares: Array, question: Question) -> Forecast:
-        """Sum shares (k,) of all candidates, unsolved ones included, by the answers that they give."""
+        """Sum shares (k,) of all candidates by the answers that they give."""
         by_answer = np.bincount(question.given, shares, len(question.answers)).astype(float)
         return cls.from_answer_shares(by_answer, question, UNCERTAINTY)
 
@@ -69,7 +68,7 @@ class Forecast(Record):
 
 def published_shares(observation: Observation, _: None = None) -> Array:
     """Return the shares (k,) of the candidates by the likelihoods that the node publishes."""
-    return _add_unsolved(observation, observation.candidates.likelihood[observation.candidates.has_likelihood])
+    return observation.candidates.likelihood
 
 
 def power_rule_shares(observation: Observation, config: LikelihoodConfig) -> Array:
@@ -78,19 +77,18 @@ def power_rule_shares(observation: Observation, config: LikelihoodConfig) -> Arr
     solved = np.flatnonzero(candidates.has_likelihood)
     costs = compute_shared_cost(candidates.effort_spent, config) + candidates.cost_to_go[solved]
     branch_times, shortfalls = candidates.branch_times.take(solved), candidates.safety_shortfall[solved]
-    return _add_unsolved(observation, compute_likelihoods(costs, config, branch_times, shortfalls))
+    return _share_among_solved(observation, compute_likelihoods(costs, config, branch_times, shortfalls, candidates.decisions))
 
 
 def boltzmann_shares(observation: Observation, inverse_temperature: float) -> Array:
     """Return the maximum-entropy rule exp(-b J), (k,); b: inverse temperature [s^5/m^2]. Effort spent is the same for all."""
     cost = observation.candidates.cost_to_go[observation.candidates.has_likelihood]
     weights = np.exp(-inverse_temperature * (cost - cost.min()))
-    return _add_unsolved(observation, weights / weights.sum())
+    return _share_among_solved(observation, weights / weights.sum())
 
 
-def _add_unsolved(observation: Observation, solved: Array) -> Array:
-    """Return shares (k,) of all candidates from those of the solved ones, which sum to 1."""
-    count = len(observation.candidates)
-    shares = np.full(count, 1.0 / count)
-    shares[observation.candidates.has_likelihood] = solved * (len(solved) / count)
+def _share_among_solved(observation: Observation, solved: Array) -> Array:
+    """Return shares (k,) of all candidates from those of the ones that take part; the others have none."""
+    shares = np.zeros(len(observation.candidates))
+    shares[observation.candidates.has_likelihood] = solved
     return shares

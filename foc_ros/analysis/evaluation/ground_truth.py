@@ -1,10 +1,7 @@
 """The ground truth of a recording: the path of the hand, the rows of obstacles across it, and what the hand did after a stamp.
 
-Obstacles whose extents along the direction of movement overlap stand in one row, which the hand passes through one of its gaps;
-an obstacle by itself is a row with two gaps. In a row of m obstacles a path that does not turn back takes one of m + 1 gaps, so
-that rows of m_1, m_2, ... obstacles leave (m_1 + 1)(m_2 + 1)... homotopy classes. A gap that is too narrow for the hand is none.
-
-A wall, along which the hand moves from the start to the goals, is in no row: it bounds the outer gaps of the rows.
+In a row of m obstacles (`rows`) a path that does not turn back takes one of m + 1 gaps, so that rows of m_1, m_2, ... obstacles
+leave (m_1 + 1)(m_2 + 1)... homotopy classes. A gap that is too narrow for the hand is none.
 """
 
 from __future__ import annotations
@@ -17,6 +14,7 @@ from numpy.typing import NDArray
 from foc_ros.analysis.goal_reached import find_reached_goal
 from foc_ros.core.homotopy import compute_swept_angles
 from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.rows import WALL, Rows, locate_rows
 from foc_ros.core.types import LEFT, NANOSECONDS, RIGHT, Array, Obstacles, Record
 
 TIMES_S = tuple(0.125 * step for step in range(1, 9))
@@ -28,9 +26,6 @@ RESOLUTION = 0.02
 
 Bools = NDArray[np.bool_]
 Sides = NDArray[np.int8]
-Rows = NDArray[np.int64]
-WALL = -1
-"""The row of an obstacle that is in none."""
 
 
 class RecordedPath:
@@ -93,43 +88,6 @@ def find_ground_truth(
     )
 
 
-def find_direction(start: Array, goals: Array) -> Array:
-    """Return the unit vector (2,) from a start (2,) [m] to the mean of the goals (g, 2) [m]; x where they coincide."""
-    offset: Array = goals.mean(axis=0) - start
-    length = float(np.hypot(*offset))
-    return offset / length if length > 0.0 else np.array([1.0, 0.0])
-
-
-def find_rows(obstacles: Obstacles, direction: Array, start: Array, goals: Array) -> Rows:
-    """Return the row (n,) of each obstacle, counted along a unit vector (2,), or WALL; start (2,), goals (g, 2) [m]."""
-    low, high = _find_extents(obstacles, direction)
-    row = np.full(len(obstacles), WALL, dtype=np.int64)
-    number, end = -1, -np.inf
-    is_wall = find_walls(obstacles, np.vstack([start, goals]))
-    for each in np.argsort(low, kind='stable'):
-        if is_wall[each]:
-            continue
-        if low[each] > end:
-            number += 1
-        end = max(end, high[each])
-        row[each] = number
-    return row
-
-
-def find_walls(obstacles: Obstacles, points: Array) -> Bools:
-    """Tell which obstacles (n,) have an edge beside which all points (q, 2) [m] lie: outside of it, and between its ends."""
-    is_wall = np.zeros(len(obstacles), dtype=bool)
-    for j in range(len(obstacles)):
-        corners = obstacles.centre[j] + obstacles.vertices[j, : obstacles.corners[j]]
-        edges = np.roll(corners, -1, axis=0) - corners
-        offset = points[:, None] - corners
-        along = (offset * edges).sum(axis=2)
-        is_outside = edges[:, 0] * offset[..., 1] - edges[:, 1] * offset[..., 0] < 0.0
-        is_beside = is_outside & (along > 0.0) & (along < (edges**2).sum(axis=1))
-        is_wall[j] = is_beside.all(axis=0).any()
-    return is_wall
-
-
 def find_open_gaps(obstacles: Obstacles, row: Rows, direction: Array, hand_radius: float) -> tuple[Sides, ...]:
     """Return for each row the sides (k, n) on which a path through one of its k open gaps passes its obstacles, 0 for all others.
 
@@ -161,23 +119,12 @@ def _find_walls_beside(obstacles: Obstacles, walls: NDArray[np.intp], member: in
     return walls[is_beside]
 
 
-def _find_extents(obstacles: Obstacles, direction: Array) -> tuple[Array, Array]:
-    """Return the ends (n,) of the obstacles along a unit vector (2,) [m]."""
-    along, position = obstacles.vertices @ direction, obstacles.centre @ direction
-    return position + along.min(axis=1) - obstacles.radius, position + along.max(axis=1) + obstacles.radius
-
-
 def _measure_distances(obstacles: Obstacles) -> Array:
     """Return the distances (n, n) [m] between obstacles; two convex polygons that are apart are nearest at a vertex of one."""
     corners = obstacles.centre[:, None] + obstacles.vertices
     nearest = measure_offsets(corners, obstacles)[1].reshape(*corners.shape[:2], len(obstacles)).min(axis=1)
     distance: Array = np.minimum(nearest, nearest.T) - obstacles.radius[:, None] - obstacles.radius
     return distance
-
-
-def locate_rows(position: Array, row: Rows) -> Array:
-    """Return the position (r,) [m] of each row: the mean of its obstacles; position (n,) [m] and row (n,) of the obstacles."""
-    return np.array([position[row == each].mean() for each in range(int(row.max(initial=-1)) + 1)])
 
 
 def find_rows_ahead(row_position: Array, position: Array) -> Bools:

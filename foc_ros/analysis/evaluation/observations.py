@@ -9,28 +9,28 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
 from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay, Step
-from foc_ros.core.config import Config, DurationConfig
+from foc_ros.core.config import Config
+from foc_ros.core.decisions import Decisions, find_decisions
 from foc_ros.core.dynamics.predictive_covariance import compute_duration_sensitivity
 from foc_ros.core.errors import RecordingError
 from foc_ros.core.estimation.duration import get_time_price, is_passing
 from foc_ros.core.homotopy.branch_times import BranchTimes, compute_branch_times
 from foc_ros.core.obstacles.chance_constraint import centre_trajectories
-from foc_ros.core.types import NANOSECONDS, Array, HandState, Obstacles, PredictedCandidate, Prediction, Record
+from foc_ros.core.rows import Rows, find_direction, find_rows
+from foc_ros.core.types import NANOSECONDS, Array, HandState, Obstacles, PredictedCandidate, Prediction, Record, Solution
 
 from .ground_truth import (
     TIMES_S,
     Bools,
     GroundTruth,
     RecordedPath,
-    Rows,
     Sides,
-    find_direction,
     find_ground_truth,
     find_open_gaps,
-    find_rows,
     find_sides,
 )
 
@@ -45,7 +45,7 @@ class CandidateTable(Record):
     [m^2/s^6]; time_s (k,): time to the goal; is_named (k, n): whether the obstacle is in the label; sides (k, n): LEFT or RIGHT,
     on which the candidate passes each obstacle; mean (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2]: of the position at
     `TIMES_S`; duration_sensitivity (k, h, 2) [m]: by how much the position lags behind for each share of the time to go that the
-    movement takes longer; branch_times: when the candidates part.
+    movement takes longer; branch_times: when the candidates part; decisions: of those that take part.
     """
 
     labels: tuple[str, ...]
@@ -64,6 +64,7 @@ class CandidateTable(Record):
     covariance: Array
     duration_sensitivity: Array
     branch_times: BranchTimes
+    decisions: Decisions
 
     def __len__(self) -> int:
         return len(self.labels)
@@ -99,15 +100,19 @@ class Observation(Record):
 
 @dataclass(frozen=True, eq=False)
 class ObservedRecording:
-    """One recording: its name and its observations in order."""
+    """One recording: its name, its observations in order, and the whole path of the hand."""
 
     name: str
     observations: tuple[Observation, ...]
+    path: RecordedPath
 
 
-def observe(recording: Recording, config: Config) -> ObservedRecording:
-    """Replay a recording; raises RecordingError where it cannot be read or nothing could be predicted in it."""
-    replayed = Replay(config)
+def observe(recording: Recording, config: Config, replayed: Replay | None = None) -> ObservedRecording:
+    """Replay a recording; raises RecordingError where it cannot be read or nothing could be predicted in it.
+
+    replayed: a replay with the same config that goes on, with what it has learnt of the operator; a new one if not given.
+    """
+    replayed = replayed or Replay(config)
     stamps: list[int] = []
     positions: list[Array] = []
     made: list[tuple[Step, HandState]] = []
@@ -119,7 +124,7 @@ def observe(recording: Recording, config: Config) -> ObservedRecording:
             assert replayed.pipeline.hand_state is not None
             made.append((step, replayed.pipeline.hand_state))
     if not made:
-        reason = replayed.pipeline.not_ready_reason() or replayed.intake.last_refusal or 'no candidate could be solved'
+        reason = replayed.describe_refusals() or replayed.pipeline.not_ready_reason() or 'no candidate could be solved'
         raise RecordingError(f'{recording.name}: nothing could be predicted: {reason}')
     goals = made[-1][0].scene.goals
     assert goals is not None
@@ -127,7 +132,7 @@ def observe(recording: Recording, config: Config) -> ObservedRecording:
     found = [make_observation(step, hand, path, config) for step, hand in made if hand.stamp_ns <= path.end_ns]
     if not found:
         raise RecordingError(f'{recording.name}: nothing was predicted before its goal was reached')
-    return ObservedRecording(recording.name, tuple(found))
+    return ObservedRecording(recording.name, tuple(found), path)
 
 
 def make_observation(step: Step, hand: HandState, path: RecordedPath, config: Config) -> Observation:
@@ -147,24 +152,25 @@ def make_observation(step: Step, hand: HandState, path: RecordedPath, config: Co
         gaps=find_open_gaps(obstacles, row, direction, config.scene.hand_radius),
         direction=direction,
         goals=goals,
-        candidates=_tabulate_candidates(prediction, obstacles, hand.effort_spent, config.duration),
+        candidates=_tabulate_candidates(prediction, obstacles, hand, goals, config),
         most_likely=prediction.most_likely,
         truth=find_ground_truth(prediction.stamp_ns, path, obstacles, row, direction, goals),
     )
 
 
 def _tabulate_candidates(
-    prediction: Prediction, obstacles: Obstacles, effort_spent: float, duration: DurationConfig
+    prediction: Prediction, obstacles: Obstacles, hand: HandState, goals: Array, config: Config
 ) -> CandidateTable:
-    predicted, price, passing = prediction.candidates, get_time_price(duration), is_passing(duration)
+    predicted, price, passing = prediction.candidates, get_time_price(config.duration), is_passing(config.duration)
     solutions = [each.solution for each in predicted]
-    steps = [np.minimum(np.rint(np.array(TIMES_S) / each.dt).astype(int), len(each.mean) - 1) for each in solutions]
+    has_likelihood = np.array([each.has_likelihood for each in predicted])
+    sides = np.array([_find_predicted_sides(each, obstacles) for each in predicted])
     named = [[identity in dict(each.candidate.sides) for identity in obstacles.ids] for each in predicted]
     return CandidateTable(
         labels=tuple(each.candidate.label for each in predicted),
         goal=np.array([each.candidate.goal for each in predicted]),
-        has_likelihood=np.array([each.has_likelihood for each in predicted]),
-        effort_spent=effort_spent,
+        has_likelihood=has_likelihood,
+        effort_spent=hand.effort_spent,
         cost_to_go=np.array([each.effort * each.dt + price * each.times[-1] for each in solutions]),
         safety_shortfall=np.array([each.safety_shortfall for each in solutions]),
         likelihood=np.array([each.likelihood for each in predicted]),
@@ -172,14 +178,29 @@ def _tabulate_candidates(
         time_price=price,
         time_s=np.array([each.times[-1] for each in solutions]),
         is_named=np.array(named, dtype=bool).reshape(len(predicted), len(obstacles)),
-        sides=np.array([_find_predicted_sides(each, obstacles) for each in predicted]),
-        mean=np.array([each.mean[at, :2] for each, at in zip(solutions, steps, strict=True)]),
-        covariance=np.array([each.covariance[at, :2, :2] for each, at in zip(solutions, steps, strict=True)]),
+        sides=sides,
+        mean=np.array([interpolate_path(each) for each in solutions]),
+        covariance=np.array([interpolate_steps(each.covariance[:, :2, :2], each.dt) for each in solutions]),
         duration_sensitivity=np.array(
-            [compute_duration_sensitivity(each, passing)[at, :2] for each, at in zip(solutions, steps, strict=True)]
+            [interpolate_steps(compute_duration_sensitivity(each, passing)[:, :2], each.dt) for each in solutions]
         ),
         branch_times=compute_branch_times(predicted, obstacles),
+        decisions=find_decisions(sides[has_likelihood], obstacles.grow(config.scene.hand_radius), hand, goals),
     )
+
+
+def interpolate_path(solution: Solution) -> Array:
+    """Return the mean positions (h, 2) [m] at `TIMES_S`, by the cubic through positions and velocities; at the end afterwards."""
+    path = CubicHermiteSpline(solution.times, solution.mean[:, :2], solution.mean[:, 2:4])
+    return np.asarray(path(np.minimum(TIMES_S, solution.times[-1])))
+
+
+def interpolate_steps(values: Array, dt: float) -> Array:
+    """Return values (N + 1, ...) at steps of dt [s] at `TIMES_S` (h, ...), linear between steps; the last one afterwards."""
+    at = np.minimum(np.array(TIMES_S) / dt, len(values) - 1)
+    before = np.minimum(at.astype(int), len(values) - 2)
+    share = (at - before).reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray((1.0 - share) * values[before] + share * values[before + 1])
 
 
 def _find_predicted_sides(predicted: PredictedCandidate, obstacles: Obstacles) -> Sides:

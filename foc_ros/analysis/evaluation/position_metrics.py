@@ -1,4 +1,4 @@
-"""Displacement errors of predicted positions, and the coverage of predicted ellipses and regions.
+"""Displacement errors and densities of predicted positions, and the coverage of predicted ellipses and regions.
 
 The ellipse of a candidate says where the hand is if it follows this candidate. The whole prediction is the mixture of all
 candidates, each with its likelihood. Its smallest region of probability p is where the density f is above a level (Hyndman 1996,
@@ -19,10 +19,12 @@ from scipy.special import logsumexp
 
 from foc_ros.core.types import Array
 
+from .cross_validation import choose_held_out
 from .ground_truth import HORIZONS_S, TIMES_S
 from .minimum_jerk import compute_straight_costs, compute_straight_positions
 from .observations import Observation, ObservedRecording
 from .questions import ask_main
+from .singer import SETTINGS, forecast_singer
 
 LEVELS = (0.5, 0.9)
 """Probabilities of the ellipses and regions."""
@@ -44,7 +46,9 @@ def compute_position_scores(recordings: Sequence[ObservedRecording]) -> dict[str
     """Return average and final displacement errors [m] by predictor and horizon, and shares of true positions inside.
 
     inside: the ellipse of the most likely candidate; inside_taken: of the candidate that was taken; inside_all: the smallest
-    region of all candidates. The average is over the times up to the horizon; recordings that end before a horizon do not count.
+    region of all candidates. nlpd: the mean negative logarithm of the density [1/m^2] at the true position, under the mixture of
+    all candidates, and under the Singer model with the setting that is best for the other recordings. The average is over the
+    times up to the horizon; recordings that end before a horizon do not count.
     """
     observations = [each for recording in recordings for each in recording.observations]
     true = np.array([each.truth.positions for each in observations])
@@ -63,6 +67,10 @@ def compute_position_scores(recordings: Sequence[ObservedRecording]) -> dict[str
 
     return {
         'displacement_m': {name: _compute_errors(positions, true) for name, positions in predicted.items()},
+        'nlpd': {
+            'foc': _average_at_horizons(np.array([compute_nlpd(each) for each in observations])),
+            'Singer Kalman': _average_at_horizons(_score_singer(recordings)),
+        },
         'inside': _compute_coverage(observations, leading),
         'inside_taken': _compute_coverage(observations, taken),
         'inside_all': {
@@ -77,6 +85,37 @@ def _compute_coverage(observations: Sequence[Observation], rows: Sequence[int]) 
     mean = np.array([each.candidates.mean[row] for each, row in zip(observations, rows, strict=True)])
     covariance = np.array([each.candidates.covariance[row] for each, row in zip(observations, rows, strict=True)])
     return {f'{level:g}': _average_at_horizons(is_inside_ellipse(true - mean, covariance, level)) for level in LEVELS}
+
+
+def compute_nlpd(observation: Observation) -> Array:
+    """Return the negative log-density of the true positions under the published mixture (h,) [nat, metres], nan elsewhere."""
+    candidates, found = observation.candidates, np.full(len(TIMES), np.nan)
+    counted = np.flatnonzero(candidates.likelihood > 0.0)
+    offset = observation.truth.positions - candidates.mean[counted]
+    covariance = candidates.covariance[counted] + EXACT * np.eye(2)
+    entries = covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1]
+    found[HORIZONS] = -log_mixture_density(candidates.likelihood[counted], offset, *entries)[HORIZONS]
+    return found
+
+
+def _score_singer(recordings: Sequence[ObservedRecording]) -> Array:
+    """Return the negative log-densities (m, h) of the Singer model, each with the setting best for the other recordings."""
+    tables = [_tabulate_singer(each) for each in recordings]
+    table = np.array([-np.nansum(each, axis=(0, 2)) for each in tables])
+    chosen = choose_held_out(table, [each.name for each in recordings])
+    return np.concatenate([each[:, setting] for each, setting in zip(tables, chosen, strict=True)])
+
+
+def _tabulate_singer(recording: ObservedRecording) -> Array:
+    """Return the negative log-densities of the true positions (m, s, h) [nat, metres] under each setting of the Singer model."""
+    path, observations = recording.path, recording.observations
+    stamps_ns = np.array([each.stamp_ns for each in observations])
+    mean, variance = forecast_singer(path.stamps_ns, path.positions, stamps_ns, TIMES[HORIZONS])
+    true = np.array([each.truth.positions[HORIZONS] for each in observations])
+    squared = ((true[:, None] - mean) ** 2).sum(axis=-1)
+    found = np.full((len(observations), len(SETTINGS), len(TIMES)), np.nan)
+    found[:, :, HORIZONS] = np.log(2.0 * np.pi * variance) + squared / (2.0 * variance)
+    return found
 
 
 def is_inside_ellipse(offset: Array, covariance: Array, level: float) -> Array:

@@ -55,6 +55,8 @@ def _make_position_tables(positions: Mapping[str, Any]) -> Iterator[Table]:
     ]
     columns = ('', *(f'{kind} {each} s' for kind in ('average', 'final') for each in horizons))
     yield 'Displacement error [mm]', columns, errors
+    densities = [(name, *(_number(by[each], 2) for each in horizons)) for name, by in positions['nlpd'].items()]
+    yield 'Negative log-density of the true position [nat, metres]', ('', *(f'{each} s' for each in horizons)), densities
     inside = [
         (f'{words}, {100 * float(level):g} %', *(_percent(by[each]) for each in horizons))
         for name, words in REGIONS.items()

@@ -14,7 +14,7 @@ import numpy as np
 
 from foc_ros.analysis.evaluation.forecasts import power_rule_shares
 from foc_ros.analysis.evaluation.ground_truth import TIMES_S
-from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording
+from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording, interpolate_steps
 from foc_ros.analysis.evaluation.position_metrics import (
     EXACT,
     HORIZONS,
@@ -52,13 +52,13 @@ class Widening(NamedTuple):
 NO_WIDENING = Widening()
 PROCESS_NOISES = (0.0, *(float(value) for value in np.geomspace(0.01, 100.0, 33)))
 """Process noises that are tried [m/s^2.5], from far below the jerk density of the filter to that of a hand in free motion."""
-ENDPOINT_STDDEVS = (0.0, 5e-4, 1e-3, 2e-3, 3e-3, 4e-3, 6e-3, 8e-3, 12e-3, 16e-3, 24e-3, 32e-3, 48e-3)
+ENDPOINT_STDDEVS = (0.0, 1e-3, 2e-3, 3e-3, 4e-3, 6e-3, 8e-3, 12e-3, 16e-3, 24e-3, 32e-3, 48e-3, 72e-3, 0.11, 0.16)
 """Scatter of the end point that is tried [m]: Fitts' law expects 48 mm for a target of 0.2 m."""
-SPREADS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.6)
+SPREADS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.9)
 WIDENINGS = tuple(Widening(*values) for values in product(PROCESS_NOISES, ENDPOINT_STDDEVS, SPREADS))
 FEW_WIDENINGS = tuple(
     Widening(*values)
-    for values in product(PROCESS_NOISES[:1] + PROCESS_NOISES[1::4], (0.0, 3e-3, 6e-3, 12e-3, 24e-3), (0.0, 0.2, 0.4))
+    for values in product(PROCESS_NOISES[:1] + PROCESS_NOISES[1::4], (0.0, 3e-3, 8e-3, 24e-3, 72e-3), (0.0, 0.2, 0.4))
 )
 """Their best is good enough to compare predictions that differ in other parameters."""
 
@@ -99,9 +99,8 @@ def _compute_unit_variances(time_s: float, config: Config) -> Array:
     """Return the variance of a position at `TIMES_S` by process noise and by scatter of the end, of 1 each, (2, h)."""
     steps = config.foc.steps
     kind = time_s / steps, steps, is_passing(config.duration)
-    rows = np.minimum(np.rint(np.array(TIMES_S) / kind[0]).astype(int), steps)
     jerk, end = triple_integrator_process_covariance(*kind), triple_integrator_goal_map(*kind) ** 2
-    return np.array([jerk[rows, 0, 0], end[rows, 0, 0]])
+    return np.array([interpolate_steps(each[:, 0, 0], kind[0]) for each in (jerk, end)])
 
 
 def tabulate_densities(recordings: Sequence[ObservedRecording], config: Config) -> SettingTable:
@@ -117,17 +116,20 @@ def tabulate_densities(recordings: Sequence[ObservedRecording], config: Config) 
     return SettingTable(np.array(rows), WIDENINGS)
 
 
-def estimate_widening(table: SettingTable) -> Estimates:
-    """Return the estimates of the parameters that widen the covariance."""
+def estimate_widening(table: SettingTable) -> tuple[Estimates, list[str]]:
+    """Return the estimates of the parameters that widen the covariance, and a warning for each at the largest value tried."""
     columns = range(len(table.settings))
     best = table.settings[table.find_best(columns)].parameters()
     resampled = [table.settings[column].parameters() for column in table.resample_best(columns)]
-    return {
+    estimates = {
         name: Estimate.from_resamples(
             name, float(f'{value:.4g}'), [each[name] for each in resampled], 'density of true positions'
         )
         for name, value in best.items()
     }
+    largest = {name: max(each.parameters()[name] for each in table.settings) for name in NAMES}
+    words = 'is the largest value tried: the plans differ from the movements by more than it describes'
+    return estimates, [f'{name}: {value:.4g} {words}' for name, value in best.items() if value == largest[name]]
 
 
 def score_positions(table: SettingTable, config: Config, recordings: Sequence[ObservedRecording], cross: bool) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from scipy.optimize import minimize
 from foc_ros.analysis.evaluation.ground_truth import RecordedPath
 from foc_ros.analysis.goal_reached import has_covered_distance
 from foc_ros.core.config import Config, DurationConfig, replace_values
+from foc_ros.core.estimation.duration import CONSTANTS as MODEL_CONSTANTS
 from foc_ros.core.estimation.duration import estimate_times_to_go
 from foc_ros.core.types import NANOSECONDS, Array, HandState
 
@@ -26,12 +27,8 @@ from .estimates import CENTRAL, Estimate, Estimates, apply_estimates, clip_to_bo
 from .recorded_hand import RecordedHand
 from .resampling import RESAMPLES, SEED, draw_resamples
 
-CONSTANTS = {
-    'fixed': {'duration.fixed_s': 1.0},
-    'fitts': {'duration.fitts_a_s': 1.0, 'duration.fitts_b_s': 1.0},
-    'cost_of_time': {'duration.time_cost': -6.0},
-}
-"""By model, the constants that determine durations, each with its power in a factor on all durations."""
+CONSTANTS = {model: {f'duration.{name}': power for name, power in powers.items()} for model, powers in MODEL_CONSTANTS.items()}
+"""By model, the constants that determine durations by dotted name, each with its power in a factor on all durations."""
 DISTANCE_MODELS = ('fitts', 'cost_of_time')
 """Models whose durations depend on the distance."""
 NARROW_BITS = 0.5

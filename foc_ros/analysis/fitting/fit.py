@@ -100,7 +100,7 @@ def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: M
         fit.take(*likelihood_fit.estimate_likelihood(table, columns))
         fit.scores.update(likelihood_fit.score_classes(table, columns, observed, cross))
     densities = covariance_fit.tabulate_densities(observed, fit.config)
-    fit.take(covariance_fit.estimate_widening(densities))
+    fit.take(*covariance_fit.estimate_widening(densities))
     fit.scores.update(covariance_fit.score_positions(densities, fit.config, observed, cross))
     if not cross:
         fit.warnings.append(f'cross-validation: {len(observed)} recordings are too few, {MIN_FOLDS} are needed')

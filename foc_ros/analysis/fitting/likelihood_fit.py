@@ -1,7 +1,8 @@
 """The parameters of the likelihood, from one replay: every setting is tried on every recording once.
 
 So the cross-validation is exact: a recording, or all that took the same path class, is held out and scored with the setting that
-is best for the others. The plain form of the likelihood stays unless the form that looks ahead is better held out by a margin.
+is best for the others. The plain form of the likelihood, with one exponent for all choices, stays unless one in which near and
+far choices differ is better held out by a margin.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, make_power_rules
+from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, is_plain, make_power_rules
 from foc_ros.analysis.evaluation.cross_validation import compute_log_likelihoods
 from foc_ros.analysis.evaluation.forecasts import power_rule_shares
 from foc_ros.analysis.evaluation.observations import ObservedRecording
@@ -27,10 +28,10 @@ from .estimates import Estimate, Estimates
 from .resampling import SettingTable
 
 MARGIN_NAT = 0.02
-"""By how much per prediction, held out, the likelihood that looks ahead has to be better."""
+"""By how much per prediction, held out, a likelihood in which near and far choices differ has to be better."""
 INDISTINCT_NAT = 2.0
 """Settings whose total log-likelihood is less than this below the best are not distinguished: 95 % of chi-square, halved."""
-NAMES = ('likelihood.beta', 'likelihood.spent_share', 'likelihood.lookahead_s')
+NAMES = tuple(f'likelihood.{each}' for each in ('beta', 'spent_share', 'lookahead_s', 'beta_beyond', 'weaving'))
 MISSED = 0.1
 """Share of predictions without the true class among their candidates above which there is a warning."""
 
@@ -61,7 +62,9 @@ def warn_of_missed_classes(recordings: Sequence[ObservedRecording]) -> list[str]
 def choose_form(table: SettingTable, groups: Sequence[Hashable]) -> list[int]:
     """Return the columns of the form of the likelihood that is better held out; the plain one if the gain is small."""
     columns = range(1, len(table.settings))
-    forms = [[each for each in columns if (table.settings[each].lookahead_s > 0.0) == is_ahead] for is_ahead in (False, True)]
+    forms = [
+        [each for each in columns if is_plain(table.settings[each]) == has_one_exponent] for has_one_exponent in (True, False)
+    ]
     plain, ahead = (table.score(table.choose_held_out(form, groups)) for form in forms)
     return forms[int(ahead - plain > MARGIN_NAT)]
 

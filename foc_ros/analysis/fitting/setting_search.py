@@ -3,9 +3,9 @@
 A setting has two scores, means over the recordings. The score of classes is the log-likelihood of the homotopy class that was
 taken plus that of the gap taken in the next row, or without obstacles that of the goal. (Assistance acts on the next gap first,
 and less chance is in it than in choices that the operator has yet to make.) The score of positions is the log-density of the true
-ones 0.25, 0.5 and 1 s ahead under the mixture of the candidates. Both are proper scores: no setting gains by claiming more or
-less than it knows. What needs no replay, the parameters of the likelihood and the widening of the covariance, is at its best for
-each setting.
+ones 0.25, 0.5 and 1 s ahead under the mixture of the candidates, by which settings are ranked that are alike in classes. Both are
+proper scores: no setting gains by claiming more or less than it knows. What needs no replay, the parameters of the likelihood and
+the widening of the covariance, is at its best for each setting.
 
 The race is successive halving (Jamieson and Talwalkar 2016, arXiv:1502.07943): all settings predict a few recordings, the better
 half of them twice as many, and so on. Settings that are hard to tell apart get the data, and plainly worse ones none.
@@ -20,7 +20,9 @@ from functools import partial
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
+from foc_ros.analysis.evaluation.baselines import make_plain
 from foc_ros.analysis.evaluation.forecasts import Forecast, power_rule_shares
 from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
 from foc_ros.analysis.evaluation.questions import GAP, ask_all, ask_main
@@ -42,11 +44,21 @@ MAX_RECORDINGS = 48
 """Recordings in which settings are compared; more make no difference that counts."""
 PLAINLY_WORSE = 3.0
 """Standard errors by which a setting behind the best is plainly worse."""
+ALIKE = 1.0
+"""Standard errors within which settings are alike in classes, so that positions decide (Breiman et al. 1984)."""
+WORSE_NAT = 0.05
+"""Loss of log-density of the true positions above which there is a warning."""
 CONFIDENT = 0.95
 """Share of the resamples below which a choice has a warning."""
-RULES = tuple(
-    replace(LikelihoodConfig(), beta=beta, spent_share=share, lookahead_s=seconds)
-    for seconds, beta, share in product((0.0, 0.35, 0.7), (0.5, 1.0, 2.0, 3.0, 6.0, 12.0), (1.0, 0.0))
+RULES = (
+    *(
+        replace(make_plain(LikelihoodConfig(), beta), spent_share=share)
+        for beta, share in product((0.5, 1.0, 2.0, 3.0, 6.0, 12.0), (1.0, 0.0))
+    ),
+    *(
+        replace(LikelihoodConfig(), spent_share=0.0, lookahead_s=seconds, beta=beta, beta_beyond=beyond)
+        for seconds, beta, beyond in product((0.0, 0.5, 1.0), (1.0, 2.0, 3.0, 6.0), (0.05, 0.3))
+    ),
 )
 """The likelihoods of which each setting gets its best. By a single one, settings that suit the others would lose."""
 
@@ -157,11 +169,17 @@ def _take_best(parts: Sequence[Logs]) -> dict[Key, float]:
 
 def search_settings(kind: str, settings: Sequence[Config], replays: Replays, fit: Fit) -> None:
     """Take the best of some settings into a fit; the first is the present one."""
-    finalists, scores = race(kind, settings, replays)
+    finalists, scores, first_scores = race(kind, settings, replays)
     n = scores.shape[2]
     draws = np.random.default_rng(SEED)
     resampled = [finalists[rank(scores[:, :, draws.integers(n, size=n)])[0]] for _ in range(RESAMPLES)]
     fit.config = best = finalists[rank(scores)[0]]
+    positions = first_scores[1].mean(axis=1)
+    if (loss := float(positions[0] - positions[settings.index(best)])) > WORSE_NAT:
+        words = (
+            'the setting that explains the classes best predicts positions worse: the mean log-density of the true ones falls by'
+        )
+        fit.warnings.append(f'{kind}: {words} {loss:.2g} nat')
     given, constants = flatten(settings[0]), [name for each in CONSTANTS.values() for name in each]
     for name, value in flatten(best).items():
         if name in constants and name not in CONSTANTS[best.duration.model]:
@@ -173,34 +191,34 @@ def search_settings(kind: str, settings: Sequence[Config], replays: Replays, fit
         _take_value(name, float(value), alike, [each for each in resampled if each in alike], fit)
 
 
-def race(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[list[Config], Array]:
-    """Return the finalists, in the given order, with their scores as of `compare_settings`."""
+def race(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[list[Config], Array, Array]:
+    """Return the finalists, in the given order, with their scores as of `compare_settings`, and all scores of the first round."""
     names = list(replays.recordings)
     # every beginning of the list is a fair sample of the recordings, however they were ordered
     names = [names[index] for index in np.random.default_rng(SEED).permutation(len(names))[:MAX_RECORDINGS]]
     left, count = list(settings), FIRST
-    while True:
-        known = names[:count]
-        scores = replays.score(left, known, f'{kind} {len(left)}')
-        if len(known) == len(names) or len(left) == 1:
-            return left, scores
-        kept = set(rank(scores)[: max(-(-len(left) // 2), FINALISTS)]) - find_plainly_worse(scores)
+    first_scores = scores = replays.score(left, names[:count], f'{kind} {len(left)}')
+    while count < len(names) and len(left) > 1:
+        is_behind = find_behind(scores, PLAINLY_WORSE)
+        kept = [index for index in rank(scores)[: max(-(-len(left) // 2), FINALISTS)] if not is_behind[index]]
         left, count = [left[index] for index in sorted(kept)], 2 * count
+        scores = replays.score(left, names[:count], f'{kind} {len(left)}')
+    return left, scores, first_scores
 
 
 def rank(scores: Array) -> list[int]:
-    """Return the settings from the best to the worst: by classes, and where these are equal by positions."""
+    """Return the settings from the best to the worst: those alike in classes by positions, then the others by classes."""
     classes, positions = scores.mean(axis=2)
-    order: list[int] = np.lexsort((-positions, -classes)).tolist()
+    is_behind = find_behind(scores, ALIKE)
+    order: list[int] = np.lexsort((-classes, np.where(is_behind, 0.0, -positions), is_behind)).tolist()
     return order
 
 
-def find_plainly_worse(scores: Array) -> set[int]:
-    """Return the settings that are plainly worse than the best in classes."""
+def find_behind(scores: Array, errors: float) -> NDArray[np.bool_]:
+    """Tell which settings are behind the best in classes by more than some standard errors."""
     classes = scores[0]
     behind = classes[classes.mean(axis=1).argmax()] - classes
-    limit = PLAINLY_WORSE * behind.std(axis=1) / np.sqrt(classes.shape[1])
-    return set(np.flatnonzero(behind.mean(axis=1) > limit).tolist())
+    return np.asarray(behind.mean(axis=1) > errors * behind.std(axis=1) / np.sqrt(classes.shape[1]))
 
 
 def _take_choice(name: str, value: str, given: str, resampled: Sequence[Config], fit: Fit) -> None:

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -31,6 +32,12 @@ from foc_ros.core.types import NANOSECONDS, Array, Candidate, HandState
 
 from .time_cost import find_least_cost_time
 
+CONSTANTS = {
+    'fixed': {'fixed_s': 1.0},
+    'fitts': {'fitts_a_s': 1.0, 'fitts_b_s': 1.0},
+    'cost_of_time': {'time_cost': -6.0},
+}
+"""By model, the constants that determine durations, each with its power in a factor on all durations."""
 PACE_AFTER = 0.3
 """Share of the expected duration after which the present speed counts."""
 SLOWEST = 1e-6
@@ -47,6 +54,16 @@ def compute_movement_time(distance: float, config: DurationConfig) -> float:
     if config.model == 'fixed':
         return config.fixed_s
     return config.fitts_a_s + config.fitts_b_s * math.log2(distance / config.target_width + 1.0)
+
+
+def scale_durations(config: DurationConfig, factor: float) -> DurationConfig:
+    """Return the configuration by which all movements take longer by a factor; constants stay within their bounds."""
+    scaled = {}
+    for item in fields(config):
+        if item.name in (powers := CONSTANTS[config.model]):
+            bound = item.metadata['bound']
+            scaled[item.name] = min(max(getattr(config, item.name) * factor ** powers[item.name], bound.low), bound.high)
+    return replace(config, **scaled)
 
 
 def limit_change(expected_s: float, before_s: float, elapsed_s: float) -> float:

@@ -1,0 +1,65 @@
+"""Rows of obstacles: those that a hand passes through one gap each.
+
+Obstacles whose extents along the direction of movement overlap stand in one row, which the hand passes through one of its gaps;
+an obstacle by itself is a row with two gaps. A wall, along which the hand moves from the start to the goals, is in no row: it
+bounds the outer gaps of the rows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .types import Array, Obstacles
+
+Rows = NDArray[np.int64]
+WALL = -1
+"""The row of an obstacle that is in none."""
+
+
+def find_direction(start: Array, goals: Array) -> Array:
+    """Return the unit vector (2,) from a start (2,) [m] to the mean of the goals (g, 2) [m]; x where they coincide."""
+    offset: Array = goals.mean(axis=0) - start
+    length = float(np.hypot(*offset))
+    return offset / length if length > 0.0 else np.array([1.0, 0.0])
+
+
+def find_rows(obstacles: Obstacles, direction: Array, start: Array, goals: Array) -> Rows:
+    """Return the row (n,) of each obstacle, counted along a unit vector (2,), or WALL; start (2,), goals (g, 2) [m]."""
+    low, high = _find_extents(obstacles, direction)
+    row = np.full(len(obstacles), WALL, dtype=np.int64)
+    number, end = -1, -np.inf
+    is_wall = find_walls(obstacles, np.vstack([start, goals]))
+    for each in np.argsort(low, kind='stable'):
+        if is_wall[each]:
+            continue
+        if low[each] > end:
+            number += 1
+        end = max(end, high[each])
+        row[each] = number
+    return row
+
+
+def find_walls(obstacles: Obstacles, points: Array) -> NDArray[np.bool_]:
+    """Tell which obstacles (n,) have an edge beside which all points (q, 2) [m] lie: outside of it, and between its ends."""
+    is_wall = np.zeros(len(obstacles), dtype=bool)
+    for j in range(len(obstacles)):
+        corners = obstacles.centre[j] + obstacles.vertices[j, : obstacles.corners[j]]
+        edges = np.roll(corners, -1, axis=0) - corners
+        offset = points[:, None] - corners
+        along = (offset * edges).sum(axis=2)
+        is_outside = edges[:, 0] * offset[..., 1] - edges[:, 1] * offset[..., 0] < 0.0
+        is_beside = is_outside & (along > 0.0) & (along < (edges**2).sum(axis=1))
+        is_wall[j] = is_beside.all(axis=0).any()
+    return is_wall
+
+
+def _find_extents(obstacles: Obstacles, direction: Array) -> tuple[Array, Array]:
+    """Return the ends (n,) of the obstacles along a unit vector (2,) [m]."""
+    along, position = obstacles.vertices @ direction, obstacles.centre @ direction
+    return position + along.min(axis=1) - obstacles.radius, position + along.max(axis=1) + obstacles.radius
+
+
+def locate_rows(position: Array, row: Rows) -> Array:
+    """Return the position (r,) [m] of each row: the mean of its obstacles; position (n,) [m] and row (n,) of the obstacles."""
+    return np.array([position[row == each].mean() for each in range(int(row.max(initial=-1)) + 1)])

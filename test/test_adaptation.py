@@ -1,0 +1,97 @@
+"""Expected durations follow the operator's earlier movements: causally, equally for equal input, and until a reset."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from foc_ros.core.config import Config, DurationConfig, replace_values
+from foc_ros.core.estimation.adaptation import FACTORS, Operator
+from foc_ros.core.estimation.duration import compute_movement_time, estimate_times_to_go, scale_durations
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.types import NANOSECONDS, HandSample
+
+CONFIG = replace_values(Config(), {'estimator.position_stddev': 1e-4})
+GOAL = np.array([[0.4, 0.0]])
+STEP_NS = NANOSECONDS // 50
+
+
+def reach(duration_s: float, distance: float = 0.4) -> np.ndarray:
+    """Return positions at 50 Hz of a minimum-jerk reach along x, at rest for 0.6 s before and after."""
+    s = np.clip((np.arange(0.0, duration_s + 1.2, 0.02) - 0.6) / duration_s, 0.0, 1.0)
+    return np.outer(distance * (10 * s**3 - 15 * s**4 + 6 * s**5), [1.0, 0.0])
+
+
+def follow(pipeline: Pipeline, *movements: np.ndarray, goal: np.ndarray = GOAL) -> Pipeline:
+    """Pass movements, and back to the start in between by a jump of time, to a pipeline."""
+    for positions in movements:
+        pipeline.set_goals(goal, 'world')
+        start_ns = (0 if pipeline.hand_state is None else pipeline.hand_state.stamp_ns) + 2 * NANOSECONDS
+        for row, position in enumerate(positions):
+            pipeline.add_hand_sample(HandSample(start_ns + row * STEP_NS, position, 0.0, 'world'))
+    return pipeline
+
+
+@pytest.mark.parametrize('model', ['fixed', 'fitts', 'cost_of_time'])
+def test_scaled_durations_are_longer_by_the_factor(model: str) -> None:
+    pipeline, config = follow(Pipeline(CONFIG), np.zeros((5, 2))), DurationConfig(model=model)
+    assert pipeline.hand_state is not None
+    once, twice = (estimate_times_to_go(pipeline.hand_state, GOAL, each)[0] for each in (config, scale_durations(config, 2.0)))
+    assert twice == pytest.approx(2.0 * once, rel=1e-3)
+
+
+@pytest.mark.parametrize('factor', [1.0, 2.0, 3.0])
+def test_the_factor_approaches_that_of_the_operator(factor: float) -> None:
+    duration_s = factor * compute_movement_time(0.4, CONFIG.duration)
+    pipeline = follow(Pipeline(CONFIG), *[reach(duration_s)] * 8)
+    assert pipeline.operator.movements >= 7
+    assert pipeline.operator.duration_factor == pytest.approx(factor, rel=0.3)
+    adapted = pipeline.adapted_config.duration
+    assert adapted == scale_durations(CONFIG.duration, pipeline.operator.duration_factor)
+
+
+def test_a_fast_operator_keeps_the_expected_durations() -> None:
+    pipeline = follow(Pipeline(CONFIG), *[reach(0.5 * compute_movement_time(0.4, CONFIG.duration))] * 4)
+    assert pipeline.operator.movements >= 3 and pipeline.adapted_config == CONFIG
+
+
+def test_without_a_movement_nothing_changes() -> None:
+    pipeline = follow(Pipeline(CONFIG), np.zeros((100, 2)))
+    assert pipeline.operator.movements == 0 and pipeline.operator.duration_factor == 1.0
+    assert pipeline.adapted_config is CONFIG
+
+
+def test_a_movement_that_ends_on_the_way_does_not_count() -> None:
+    assert follow(Pipeline(CONFIG), reach(2.0, distance=0.2), np.zeros((50, 2))).operator.movements == 0
+
+
+def test_the_present_movement_has_no_influence_before_its_end() -> None:
+    slow, pipeline = reach(4.0), Pipeline(CONFIG)
+    follow(pipeline, slow[: len(slow) // 2])
+    assert pipeline.operator.movements == 0 and pipeline.operator.states
+
+
+def test_equal_samples_give_equal_factors_and_a_reset_forgets_them() -> None:
+    one, other = (follow(Pipeline(CONFIG), reach(4.0), reach(3.5), reach(4.2)) for _ in range(2))
+    np.testing.assert_array_equal(one.operator.losses, other.operator.losses)
+    assert one.operator.movements > 0
+    one.reset()
+    assert one.operator.movements == 0 and one.adapted_config is CONFIG
+    np.testing.assert_array_equal(one.operator.losses, np.log(FACTORS) ** 2)
+
+
+def test_it_can_be_switched_off_and_new_durations_begin_anew() -> None:
+    off = replace_values(CONFIG, {'duration.adaptation': 'none'})
+    assert follow(Pipeline(off), reach(4.0), reach(4.0)).operator.movements == 0
+    pipeline = follow(Pipeline(CONFIG), reach(4.0), reach(4.0))
+    pipeline.reconfigure(replace_values(CONFIG, {'rate_hz': 20.0}))
+    assert pipeline.operator.movements > 0
+    pipeline.reconfigure(pipeline.adapted_config)
+    assert pipeline.operator.movements == 0 and pipeline.config.duration.fitts_b_s > CONFIG.duration.fitts_b_s
+
+
+def test_factors_stay_within_the_bounds_of_the_parameters() -> None:
+    assert scale_durations(DurationConfig(model='fixed', fixed_s=50.0), 3.0).fixed_s == 60.0
+    assert replace(Operator(), movements=1).duration_factor == pytest.approx(1.0)

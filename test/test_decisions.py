@@ -1,0 +1,61 @@
+"""The next row and weaving are found from the sides; choices beyond the next row have an exponent of their own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from foc_ros.core.config import LikelihoodConfig
+from foc_ros.core.decisions import Decisions, find_decisions
+from foc_ros.core.likelihood import compute_likelihoods
+from foc_ros.core.types import LEFT, RIGHT, HandState, make_obstacles
+
+OBSTACLES = make_obstacles([[0.1, 0.05], [0.1, -0.05], [0.3, 0.0]], 0.01)
+GOALS = np.array([[0.5, 0.02], [0.5, -0.02]])
+SIDES = np.array(
+    [[LEFT, LEFT, LEFT], [RIGHT, LEFT, LEFT], [RIGHT, LEFT, RIGHT], [LEFT, RIGHT, LEFT], [RIGHT, RIGHT, RIGHT]], dtype=np.int8
+)
+COSTS = np.array([1.0, 2.0, 3.0, 2.5, 4.0])
+CONFIG = replace(LikelihoodConfig(), beta=2.0, beta_beyond=0.3, weaving=1.5)
+
+
+def make_hand(x: float) -> HandState:
+    return HandState(0, np.array([x, 0.0, 0.3, 0.0, 0.0, 0.0]), np.eye(6), onset_ns=0, onset_position=np.zeros(2))
+
+
+def test_the_next_row_is_the_first_open_one_ahead() -> None:
+    found = find_decisions(SIDES, OBSTACLES, make_hand(0.0), GOALS)
+    gap = found.next_gap
+    assert gap[1] == gap[2] and len(set(gap.tolist())) == 4
+    assert found.woven.tolist() == [0, 0, 0, 1, 0]
+    beyond = find_decisions(SIDES, OBSTACLES, make_hand(0.2), GOALS)
+    assert len(set(beyond.next_gap[[0, 1, 3]].tolist())) == 1
+    assert beyond.next_gap[0] != beyond.next_gap[4] and not beyond.woven.any()
+
+
+def test_where_all_agree_nothing_is_open() -> None:
+    found = find_decisions(SIDES[:1].repeat(3, axis=0), OBSTACLES, make_hand(0.0), GOALS)
+    assert not found.next_gap.any() and not found.woven.any()
+    assert find_decisions(np.zeros((2, 0), dtype=np.int8), make_obstacles(), make_hand(0.0), GOALS).next_gap.tolist() == [0, 0]
+
+
+def test_gaps_keep_their_weight_and_share_it_by_the_other_exponent() -> None:
+    decisions = Decisions(np.array([0, 1, 1, 2, 3]), np.zeros(5, dtype=np.intp))
+    near, p = compute_likelihoods(COSTS, CONFIG), compute_likelihoods(COSTS, CONFIG, decisions=decisions)
+    np.testing.assert_allclose(np.bincount(decisions.next_gap, p), np.bincount(decisions.next_gap, near))
+    assert p[1] / p[2] == pytest.approx((3.0 / 2.0) ** 0.3)
+
+
+def test_weaving_costs_a_factor() -> None:
+    straight = Decisions(np.arange(5), np.zeros(5, dtype=np.intp))
+    p, woven = (compute_likelihoods(COSTS, CONFIG, decisions=each) for each in (straight, straight._replace(woven=np.eye(5)[3])))
+    assert woven[3] / woven[0] == pytest.approx(p[3] / p[0] * np.exp(-1.5))
+
+
+def test_with_one_exponent_and_no_weaving_the_rule_is_the_plain_one() -> None:
+    decisions = Decisions(np.array([0, 0, 1, 1, 1]), np.zeros(5, dtype=np.intp))
+    config, shortfalls = replace(CONFIG, beta_beyond=CONFIG.beta), np.array([0.0, 0.4, 0.0, 0.2, 0.0])
+    plain, two = (compute_likelihoods(COSTS, config, shortfalls=shortfalls, decisions=each) for each in (None, decisions))
+    np.testing.assert_allclose(two, plain)
