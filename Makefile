@@ -8,6 +8,7 @@
 # make demo        the demo: the node and the packaged recording
 # make doc         the documentation as HTML, in build/doc/index.html
 # make bench       the benchmark; OPTIONS=--quick for a first look, --json, --markdown, '--only NAME'
+# make people      predictions of people, where their recordings are beside the checkout: doc/people.md; OPTIONS=--every 4
 # make pages       files that are derived from the parameters in foc_ros/core/config.py
 # make colcon      build, start, lint and test with colcon, as in a ROS workspace
 # make fuzz        100,000 random messages
@@ -46,7 +47,7 @@ endif
 
 TEST = ROS_PYTHON_CHECK_FIELDS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
 
-.PHONY: setup help check test test-long lint demo doc bench pages colcon fuzz soak stops hostile clean
+.PHONY: setup help check test test-long lint demo doc bench people pages colcon fuzz soak stops hostile clean
 
 setup: $(STAMP)
 ifneq ($(origin PYTHON),file)
@@ -116,6 +117,9 @@ $(VENV)/.bench: $(STAMP)
 	@echo 'bench: installing the peers'
 	@$(PIP) install --quiet --editable '.[bench]'
 	touch $@
+
+people: $(STAMP)
+	$(BIN)/python scripts/people.py $(OPTIONS)
 
 pages: $(STAMP)
 	$(BIN)/python -m foc_ros.ros.parameters > config/foc.yaml

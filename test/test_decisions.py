@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from foc_ros.core.config import LikelihoodConfig
+from foc_ros.core.config import Config, LikelihoodConfig
 from foc_ros.core.decisions import Decisions, find_decisions
 from foc_ros.core.likelihood import compute_likelihoods
+from foc_ros.core.memory import Memory
+from foc_ros.core.predictor import predict
 from foc_ros.core.types import LEFT, RIGHT, HandState, make_obstacles
 
 OBSTACLES = make_obstacles([[0.1, 0.05], [0.1, -0.05], [0.3, 0.0]], 0.01)
@@ -59,3 +61,9 @@ def test_with_one_exponent_and_no_weaving_the_rule_is_the_plain_one() -> None:
     config, shortfalls = replace(CONFIG, beta_beyond=CONFIG.beta), np.array([0.0, 0.4, 0.0, 0.2, 0.0])
     plain, two = (compute_likelihoods(COSTS, config, shortfalls=shortfalls, decisions=each) for each in (None, decisions))
     np.testing.assert_allclose(two, plain)
+
+
+def test_where_no_class_can_be_solved_there_is_no_likelihood() -> None:
+    config = Config().with_values({'foc.eta': 0.999, 'foc.noise_x': 2.0, 'foc.noise_y': 2.0, 'likelihood.shortfall': np.inf})
+    found, _ = predict(config, make_hand(0.0), OBSTACLES, GOALS, Memory())
+    assert found.candidates and not found.candidates_with_likelihood

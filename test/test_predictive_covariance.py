@@ -63,7 +63,8 @@ def test_the_duration_sensitivity_is_the_difference_between_plans_of_other_durat
 
 def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoods() -> None:
     scene = make_obstacles([[0.2, 0.0]], 0.02), np.array([GOAL, [0.4, -0.1]])
-    sure = predict(Config(), HAND, *scene, Memory())[0]
+    exact = replace_values(Config(), {'foc.endpoint_stddev': 0.0, 'duration.spread': 0.0})
+    sure = predict(exact, HAND, *scene, Memory())[0]
     unsure = predict(replace_values(Config(), {'foc.endpoint_stddev': 0.006, 'duration.spread': 0.3}), HAND, *scene, Memory())[0]
     assert len(sure.solved_candidates) == len(unsure.solved_candidates) >= 3
     for before, after in zip(sure.candidates, unsure.candidates, strict=True):

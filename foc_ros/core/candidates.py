@@ -144,8 +144,9 @@ def rank_candidates(
     taken = [each for each in candidates if each.has_likelihood]
     branch_times = compute_branch_times(taken, obstacles) if likelihood.lookahead_s > 0.0 else None
     costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))
-    sides = tabulate_sides([each.solution for each in taken], obstacles)
-    decisions = find_decisions(sides, obstacles, hand, goals) if len(taken) > 1 else None
+    decisions = None
+    if len(taken) > 1:
+        decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), obstacles, hand, goals)
     shares = compute_likelihoods(costs, likelihood, branch_times, shortfalls, decisions)
     pairs = zip(taken, shares.tolist(), strict=True)
     ranked = [replace(each, likelihood=share) for each, share in pairs]

@@ -47,7 +47,7 @@ class TimesToGo:
     """The samples in movement of each recording that reached a goal."""
 
     def __init__(self, hands: Sequence[RecordedHand], config: Config) -> None:
-        samples = [_find_samples(each, config) for each in hands]
+        samples = [find_samples(each, config) for each in hands]
         self.samples = [each for each in samples if each]
 
     def compute_errors(self, duration: DurationConfig) -> Array:
@@ -65,7 +65,8 @@ class TimesToGo:
         return np.log2(np.array(distances) / width + 1.0)
 
 
-def _find_samples(hand: RecordedHand, config: Config) -> list[Sample]:
+def find_samples(hand: RecordedHand, config: Config) -> list[Sample]:
+    """Return the samples in movement of a recording that covered the distance to a goal; none of another one."""
     path = RecordedPath(hand.stamps_ns, hand.positions, hand.goals)
     if path.goal is None or not has_covered_distance(hand.positions, hand.goals[path.goal]):
         return []
