@@ -61,7 +61,7 @@ $(STAMP): setup.py setup.cfg pyproject.toml
 	@echo 'setup: installing foc_ros[$(EXTRAS)], one to three minutes'
 	@$(PIP) install --quiet --editable '.[$(EXTRAS)]'
 	@echo "setup: compiling the solver's kernels, one to three minutes once"
-	@$(BIN)/python -c 'from foc_ros.core.registry import import_all; import_all()'
+	@$(BIN)/python -m foc_ros warm-up
 	@touch $@
 
 help:

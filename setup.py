@@ -28,6 +28,7 @@ setup(
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (f'share/{PACKAGE}', ['package.xml']),
         (f'share/{PACKAGE}/config', sorted(glob('config/*'))),
+        (f'share/{PACKAGE}/launch', sorted(glob('launch/*.launch.py'))),
         (f'share/{PACKAGE}/rosdep', sorted(glob('rosdep/*.yaml'))),
         # `ros2 run foc_ros COMMAND` looks here. As console scripts they would put `node` and `demo` on everybody's PATH.
         (f'lib/{PACKAGE}', sorted(glob('scripts/ros2_run/*'))),
@@ -35,6 +36,7 @@ setup(
     zip_safe=False,
     python_requires='>=3.11',
     install_requires=[
+        'mcap>=1.1',
         'numba>=0.58',
         'numpy>=1.23',
         'pebble>=5',
@@ -60,7 +62,6 @@ setup(
             'distributed>=2024.1',
             'hypothesis>=6.80',
             'import-linter>=2.1',
-            'mcap>=1.1',
             'mcap-ros2-support>=0.5',
             'mypy>=1.11',
             'pytest>=7.4',

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from foc_ros.core.errors import ParameterError as ParameterError
     from foc_ros.core.errors import RecordingError as RecordingError
     from foc_ros.core.errors import SceneError as SceneError
+    from foc_ros.core.guidance.step import GuidanceOutput as GuidanceOutput
+    from foc_ros.core.guidance.step import GuidanceStatus as GuidanceStatus
     from foc_ros.core.obstacles.shapes import Box as Box
     from foc_ros.core.obstacles.shapes import Capsule as Capsule
     from foc_ros.core.obstacles.shapes import Circle as Circle
@@ -35,7 +37,7 @@ if TYPE_CHECKING:
 
 _MODULES = {
     'api': (
-        'Prediction Predictor Solution compute_eta get_strategy load_config monte_carlo plot_candidates'
+        'Guidance Prediction Predictor Solution compute_eta get_strategy load_config monte_carlo plot_candidates'
         ' register_likelihood_rule register_plant register_qp_backend register_strategy replay solve solve_classes'
     ),
     'analysis.evaluation': 'register_baseline',
@@ -43,6 +45,7 @@ _MODULES = {
     'core.dynamics.plant_models': 'PlantModel',
     'core.dynamics.plants': 'Plant',
     'core.errors': 'FocError InputError MessageError ParameterError RecordingError SceneError',
+    'core.guidance.step': 'GuidanceOutput GuidanceStatus',
     'core.obstacles.shapes': 'Box Capsule Circle Hull',
     'core.ocp.monte_carlo': 'MonteCarlo',
     'core.ocp.strategies': 'StrategyResult',

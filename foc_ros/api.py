@@ -16,6 +16,7 @@ from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import InputError, SceneError
 from foc_ros.core.estimation.kalman_filter import FilterState, update
+from foc_ros.core.guidance.step import GuidanceInput, GuidanceOutput, GuidanceState, guide
 from foc_ros.core.homotopy.demonstrations import Demonstration
 from foc_ros.core.memory import Memory
 from foc_ros.core.obstacles.scene import ObstacleSource
@@ -75,6 +76,78 @@ class Prediction(types.Prediction):
         from foc_ros.reporting.plots import plot_prediction
 
         return plot_prediction(self, axes)
+
+
+class Guidance:
+    """Turn predictions into a guiding force: bounded, passive, and zero without a fresh prediction.
+
+    Call `update` at `guidance.rate_hz`, several times for each prediction. `guidance.enabled` has no effect here.
+
+    Parameters
+    ----------
+    config : Config, optional
+        Parameters, of which `guidance` and `scene.hand_radius` are used; the defaults if not given.
+
+    Examples
+    --------
+    >>> import foc_ros
+    >>> config = foc_ros.Config(budget_s=0.0)
+    >>> predictor, guidance = foc_ros.Predictor(config), foc_ros.Guidance(config)
+    >>> predictor.set_goals([(0.3, 0.0)])
+    >>> prediction = predictor.update(t=0.0, position=(0.0, 0.0))
+    >>> for tick in range(20):
+    ...     output = guidance.update(t=0.005 * tick, position=(0.0, 0.0), velocity=(0.2, 0.1), prediction=prediction)
+    >>> output.status.value, output.agreement
+    ('guiding', 1.0)
+    """
+
+    def __init__(self, config: Config | None = None) -> None:
+        self.config = _check_config(config)
+        self._state = GuidanceState()
+
+    def __repr__(self) -> str:
+        """Say mode and force."""
+        return f'<Guidance of mode {self.config.guidance.mode}, force {np.hypot(*self._state.force):.3g} N>'
+
+    def update(self, t: float, position: ArrayLike, velocity: ArrayLike, prediction: types.Prediction | None) -> GuidanceOutput:
+        """Return the guidance for a hand.
+
+        Parameters
+        ----------
+        t : float
+            Time, by the clock of the predictions [s].
+        position : array_like of shape (2,)
+            Position of the hand [m].
+        velocity : array_like of shape (2,)
+            Velocity of the hand [m/s].
+        prediction : Prediction or None
+            The newest prediction; None to release the hand.
+
+        Returns
+        -------
+        GuidanceOutput
+            The force, and what it was computed from.
+
+        Raises
+        ------
+        InputError
+            For a time that is not after the last one, a number that is not finite or a wrong shape. Nothing is changed then.
+        """
+        time = check_number('t', t, -LATEST_S, LATEST_S)
+        if self._state.energy is not None and time <= self._state.t:
+            raise InputError('t', f'a time after the last one, {self._state.t:.9g} s', t)
+        if prediction is not None and not isinstance(prediction, types.Prediction):
+            raise InputError('prediction', 'a Prediction or None', repr(prediction))
+        age_s = 0.0 if prediction is None else time - prediction.t
+        given = GuidanceInput(
+            time, check_vector('position', position, 2), check_vector('velocity', velocity, 2), prediction, 0.0, age_s
+        )
+        output, self._state = guide(self.config, self._state, given)
+        return output
+
+    def reset(self) -> None:
+        """Forget everything: the force begins at zero, the tank is full. The next update may have any time."""
+        self._state = GuidanceState()
 
 
 class Predictor:
@@ -180,7 +253,7 @@ class Predictor:
             last = '' if self._hand is None else f', {self._hand.stamp_ns / NANOSECONDS:.9g} s'
             raise InputError('t', f'a time after the last one{last}', t)
         if updated.status.is_restart:
-            self._memory = Memory()
+            self._memory = self._memory.forget()
         self._hand = updated.state
         if self._obstacles.stamp_ns is None:
             self._obstacles = replace(self._obstacles, stamp_ns=stamp_ns)
@@ -191,7 +264,7 @@ class Predictor:
 
     def reset(self) -> None:
         """Forget the movement; keep goals and obstacles. The next update may have any time."""
-        self._hand, self._memory = None, Memory()
+        self._hand, self._memory = None, self._memory.forget()
 
 
 @dataclass(frozen=True, eq=False, repr=False)

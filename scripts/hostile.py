@@ -31,7 +31,7 @@ from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS, Array
 
 STRATEGIES = ('lv', 'hc', 'optimal')
-GAP_S, ANSWER_S, PUNCTUAL = 1.3, 0.2, 0.999
+GAP_S, ANSWER_S, PUNCTUAL = 1.3, 0.05, 0.999
 ASK_EVERY = 10
 """Number of periods between two calls of the service."""
 START_S = 120.0

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from mcap.writer import Writer
 
 from foc_ros.core.config import Config, replace_values
 from foc_ros.io.bags import TYPESTORE, BagWriter
@@ -18,6 +20,7 @@ TYPES = RosbagsTypes(TYPESTORE)
 CONFIG = replace_values(Config(), {'foc.strategy': 'fixed', 'foc.tau': 5e-4, 'foc.steps': 30})
 """With it, every class of these recordings is solved, whatever eta is reachable."""
 FRAME = 'world'
+STORE = TYPESTORE
 START_NS = 5_000_000_000
 SCENE = [(0.15, 0.0, 0.0, 0.03, 0.002, 7)]
 GOAL = np.array([[0.3, 0.0, 0.0]])
@@ -54,6 +57,36 @@ def write_bag(path: Path, items: Iterable[tuple[str, int, Any]] | None = None, r
             if names.get(topic, topic):
                 writer.write(names.get(topic, topic), message, stamp_ns)
     return path
+
+
+def write_mcap(
+    path: Path,
+    items: Iterable[tuple[str, int, Any]],
+    per_chunk: int = 1000,
+    odd: Mapping[str, tuple[str, str, str, bytes]] = MappingProxyType({}),
+) -> list[int]:
+    """Write an MCAP file as a recorder does, with a number of messages in each chunk; return where the chunks end.
+
+    odd: by topic, encoding of messages, name, encoding and text of the schema, for a channel with one message.
+    """
+    ends, channels = [], {}
+    with path.open('wb') as stream:
+        writer = Writer(stream)
+        writer.start('ros2')
+        for topic, (encoding, name, form, text) in odd.items():
+            channel = writer.register_channel(topic, encoding, writer.register_schema(name, form, text) if name else 0)
+            writer.add_message(channel, START_NS, b'{}', START_NS)
+        for i, (topic, stamp_ns, message) in enumerate(items, 1):
+            kind = message.__msgtype__
+            if topic not in channels:
+                text = STORE.generate_msgdef(kind, ros_version=2)[0].encode()
+                channels[topic] = writer.register_channel(topic, 'cdr', writer.register_schema(kind, 'ros2msg', text))
+            writer.add_message(channels[topic], stamp_ns, bytes(STORE.serialize_cdr(message, kind)), stamp_ns)
+            if i % per_chunk == 0:
+                writer.flush()
+                ends.append(stream.tell())
+        writer.finish()
+    return ends
 
 
 def write_parameters(folder: Path, config: Config = CONFIG) -> str:

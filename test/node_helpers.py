@@ -23,8 +23,8 @@ QUICK = {
     'budget_s': 0.0,
 }
 """Parameters for quick predictions, without time limits that a slow machine would exceed."""
-RELIABLE_HAND = {'qos_overrides./hand_pose.subscription.reliability': 'reliable'}
-"""Reliable hand poses, so that a test can wait until all of them are received."""
+RELIABLE = {f'qos_overrides./{name}.subscription.reliability': 'reliable' for name in ('hand_pose', 'obstacles')}
+"""Reliable inputs, so that a test can wait until all of them are received."""
 
 
 def hand_path(count: int, rate_hz: float = 100.0, start_s: float = 10.0) -> list[Any]:
@@ -49,7 +49,7 @@ class Bench:
         from foc_ros.ros.messages.types import find_message_class
         from foc_ros.ros.node import FocNode
 
-        parameters = QUICK | RELIABLE_HAND | options.pop('parameters', {})
+        parameters = QUICK | RELIABLE | options.pop('parameters', {})
         ticking, connected = options.pop('ticking', False), options.pop('connected', True)
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
         namespace = options.get('namespace', '')

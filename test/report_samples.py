@@ -77,6 +77,7 @@ def outcome(
         {},
         100.0 * (2 - likelihood),
         likelihood if solution.status in (Status.SOLVED, Status.COMPROMISED) else 0.0,
+        way=list(SIDES).index(label),
     )
 
 

@@ -18,6 +18,7 @@ ROS = 'needs the commands of a ROS installation'
 BY_CI = '.ci/run runs this line'
 LONG = 'takes minutes'
 FIT = 'takes minutes; test_fit.py and test_evaluate.py run it with few predictions'
+LAUNCH = 'ros2launch is not a package of the index; test_launch.py starts the files where launch_ros is installed'
 SHELL = 'the program is on the path of the test already'
 NOT_RUN = {
     # README
@@ -31,6 +32,7 @@ NOT_RUN = {
     '--params-file install/foc_ros/share/foc_ros/config/foc.yaml': 'scripts/colcon_check starts the same program',
     'python3 -m venv venv && . venv/bin/activate': ROOT_OR_NETWORK,
     "pip install '.[ros,report]'": ROOT_OR_NETWORK,
+    'foc_ros warm-up': 'compiles for minutes in a new folder; test_command_line.py runs it',
     'export AMENT_PREFIX_PATH=$VIRTUAL_ENV': SHELL,
     'foc_ros evaluate bags --report evaluation': FIT,
     'foc_ros fit recordings --output operator.yaml': FIT,
@@ -45,6 +47,9 @@ NOT_RUN = {
     "ros2 service call /foc/engage std_srvs/srv/SetBool '{data: true}'": f'{ROS}; test_beside_a_stack.py makes the same calls',
     'ros2 param set /teleoperation obstacles false': f'{ROS}; test_beside_a_stack.py makes the same calls',
     'ros2 param set /teleoperation obstacles true': f'{ROS}; test_beside_a_stack.py makes the same calls',
+    'ros2 launch foc_ros foc.launch.py hand_pose:=/MTMR/measured_cp obstacles:=/perception/obstacles plane:=xz': LAUNCH,
+    'ros2 launch foc_ros two_arms.launch.py left_hand:=/MTML/measured_cp right_hand:=/MTMR/measured_cp': LAUNCH,
+    'ros2 launch foc_ros foc_rviz.launch.py hand_pose:=/MTMR/measured_cp': LAUNCH,
     # security
     'ros2 security create_keystore keystore': ROS,
     'ros2 security create_enclave keystore /foc': ROS,
@@ -65,6 +70,7 @@ NOT_RUN = {
     'make doc': BY_CI,
     'make bench': LONG,
     'make colcon': BY_CI,
+    'scripts/tf2_check': 'clones and compiles tf2; run it before a release',
     'make fuzz': LONG,
     'make soak': LONG,
     'make stops': LONG,
@@ -74,6 +80,7 @@ NOT_RUN = {
 ENDLESS = (
     'foc_ros node --ros-args -r hand_pose:=/MTMR/measured_cp',
     'foc_ros node --ros-args -r hand_pose:=/MTMR/measured_cp -r obstacles:=/perception/obstacles -p plane:=xz',
+    'foc_ros node --ros-args -r obstacles:=/camera/obstacles -p frame_id:=world -p frames.tolerance_s:=0.1',
     'python doc/examples/teleoperation_loop.py',
 )
 KNOWN_BLOCKS = ('console', 'python', 'yaml', 'text', '{toctree}', '{eval-rst}')

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bag_helpers import START_NS, TYPES, messages, write_bag
+from bag_helpers import START_NS, TYPES, messages, write_bag, write_mcap
 from rosbags.rosbag2 import StoragePlugin, Writer
 
+from foc_ros.analysis.recordings import BagRecording
 from foc_ros.core.errors import RecordingError
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
 from foc_ros.ros.messages.encode_inputs import encode_hand_pose
@@ -69,6 +70,18 @@ def test_other_topics_are_skipped_and_counted(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'more', [*messages(), ('/log', START_NS + 10**9, extra)])
     with BagReader(bag) as reader:
         assert len(list(reader)) == reader.message_count - 1
+
+
+def test_channels_that_are_not_needed_may_be_anything(tmp_path: Path) -> None:
+    """A JSON channel, one without a definition, the events of a service, and a definition that cannot be parsed."""
+    odd = {
+        '/notes': ('json', 'notes', 'jsonschema', b'{"type": "object"}'),
+        '/plain': ('json', '', '', b''),
+        '/foc/engage/_service_event': ('cdr', 'std_srvs/srv/SetBool_Event', 'ros2msg', b'service_msgs/ServiceEventInfo info'),
+        '/odd': ('cdr', 'odd_msgs/msg/Odd', 'ros2msg', b'?!'),
+    }
+    write_mcap(tmp_path / 'mixed.mcap', messages(), odd=odd)
+    assert_same(read(tmp_path / 'mixed.mcap'), messages())
 
 
 def test_a_copy_is_byte_for_byte(tmp_path: Path) -> None:
@@ -152,10 +165,10 @@ def test_two_types_on_one_topic_are_refused(tmp_path: Path) -> None:
     ('make', 'reason'),
     [
         (lambda path: None, 'no such file or directory'),
-        (lambda path: path.mkdir(), 'no metadata.yaml in the directory'),
+        (lambda path: path.mkdir(), 'no metadata.yaml and no .mcap file in the directory'),
         (lambda path: path.write_bytes(b''), 'the file is empty'),
         (lambda path: path.write_bytes(b'not a bag at all, whatever its name says'), 'cannot be read'),
-        (lambda path: path.write_bytes(b'\x89MCAP0\r\n'), 'cannot be read'),
+        (lambda path: path.write_bytes(b'\x89MCAP0\r\n'), 'damaged or cut short'),
     ],
 )
 def test_a_path_that_is_no_bag_is_refused(tmp_path: Path, make: Any, reason: str) -> None:
@@ -171,13 +184,29 @@ def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
         read(tmp_path / 'notes.txt')
 
 
-@pytest.mark.parametrize('share', [0.02, 0.3, 0.6, 0.9, 0.999])
+@pytest.mark.parametrize('beyond', [0, 4, 50, 100, 400])
+@pytest.mark.parametrize('as_folder', [True, False])
+def test_a_file_without_its_footer_is_read_up_to_its_last_whole_chunk(tmp_path: Path, beyond: int, as_folder: bool) -> None:
+    """The recorder was killed: there is no metadata.yaml either."""
+    (tmp_path / 'killed').mkdir()
+    path = tmp_path / 'killed' / 'killed_0.mcap'
+    ends = write_mcap(path, messages(), per_chunk=10)
+    path.write_bytes(path.read_bytes()[: ends[2] + beyond])
+    with BagReader(path.parent if as_folder else path) as reader:
+        assert reader.warnings == ['killed_0.mcap: the recorder was killed; read up to the last whole chunk']
+        assert reader.message_count == 30
+        assert_same(list(reader), messages()[:30])
+    with pytest.raises(RecordingError, match='the recorder was killed'):  # a part of a movement cannot be evaluated
+        list(BagRecording('killed', path).items())
+
+
+@pytest.mark.parametrize('share', [0.02, 0.3, 0.6])
 @pytest.mark.parametrize('single', [True, False])
-def test_a_truncated_bag_is_never_read_in_part(tmp_path: Path, share: float, single: bool) -> None:
+def test_a_file_without_a_whole_chunk_is_refused(tmp_path: Path, share: float, single: bool) -> None:
     bag = write_bag(tmp_path / 'cut')
     whole = mcap(bag).read_bytes()
     mcap(bag).write_bytes(whole[: int(share * len(whole))])
-    with pytest.raises(RecordingError, match='damaged or cut short'):
+    with pytest.raises(RecordingError, match='damaged or cut short: no whole chunk'):
         read(mcap(bag) if single else bag)
 
 

@@ -85,6 +85,13 @@ def test_exit_codes(
     assert capsys.readouterr() == ('', line)
 
 
+def test_warm_up_compiles_what_is_missing(capsys: pytest.CaptureFixture[str]) -> None:
+    assert command_line.main(['warm-up']) == 0
+    capsys.readouterr()
+    assert command_line.main(['warm-up']) == 0
+    assert capsys.readouterr() == ('nothing has to be compiled\n', '')
+
+
 def test_arguments_of_node_are_passed_to_ros(monkeypatch: pytest.MonkeyPatch) -> None:
     taken = []
 

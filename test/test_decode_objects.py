@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import ros_helpers
 from bag_helpers import CONFIG, messages, ns
 from message_helpers import SECOND, pose_stamped
 from object_messages import OBJECT_TYPES, STORE, collision_object, detection, detections
@@ -26,6 +25,7 @@ from foc_ros.core.types import Obstacles, SampleStatus
 from foc_ros.io.topics import OPTIONAL, TYPES
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.decode_objects import CollisionTable, decode_detections
+from foc_ros.ros.messages.transform_messages import Transform, transform_message
 
 BOX, SPHERE, CYLINDER, CONE = 1, 2, 3, 4
 QUARTER = {'z': math.sqrt(0.5), 'w': math.sqrt(0.5)}
@@ -171,23 +171,16 @@ def test_a_bag_with_them_is_replayed_by_its_own_definitions(tmp_path: Path, topi
     assert {each.label for each in predictions[0].candidates} == {f'goal0:+{name}', f'goal0:-{name}'}
 
 
-def test_both_inputs_are_transformed(monkeypatch: pytest.MonkeyPatch) -> None:
-    ros_helpers.require_ros()
-    from foc_ros.ros.transforms import Transforms
-
-    monkeypatch.setattr('foc_ros.ros.transforms.Time', SimpleNamespace(from_msg=lambda stamp: stamp))
-
-    transforms: Any = Transforms.__new__(Transforms)
-    found = SimpleNamespace(translation=SimpleNamespace(x=1.0, y=0.0, z=0.0), rotation=SimpleNamespace(x=0.0, y=0.0, **QUARTER))
-    transforms.last_error = ''
-    transforms._buffer = SimpleNamespace(lookup_transform=lambda *_: SimpleNamespace(transform=found))
+def test_both_inputs_are_transformed() -> None:
+    found = Transform(SimpleNamespace(x=0.0, y=0.0, **QUARTER), SimpleNamespace(x=1.0, y=0.0, z=0.0), 0)
     given = detections(detection((0.5, 0, 0), (0.4, 0.2, 0.1), frame_id='camera'), frame_id='camera')
-    array = decode_detections(transforms.transform('detections', given, 'world', 'xy'), 'xy', 0.0)
+    array = decode_detections(transform_message('detections', given, 'world', 'xy', lambda _: found), 'xy', 0.0)
     thing = collision_object((BOX, (0.4, 0.2, 0.1), (0, 0, 0)), place=(0.5, 0, 0), frame_id='camera')
-    table = after(transforms.transform('collision_objects', thing, 'world', 'xy'))
-    assert (array.frame_id, table.frame_id, transforms.last_error) == ('world', 'world', '')
+    table = after(transform_message('collision_objects', thing, 'world', 'xy', lambda _: found))
+    assert (array.frame_id, table.frame_id) == ('world', 'world')
     for obstacles in (array.obstacles, table.obstacles('xy', 0.0)):
         check_polygon(obstacles, 0, (1.0, 0.5), (0.4, 0.2), math.pi / 2)
+    assert (given.header.frame_id, thing.header.frame_id) == ('camera', 'camera'), 'what was received is not changed'
 
 
 @pytest.mark.parametrize('role', OPTIONAL)

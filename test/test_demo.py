@@ -135,4 +135,5 @@ def test_a_node_that_dies_is_told(domain: int, tmp_path: Path) -> None:
     os.kill(node, signal.SIGKILL)
     _, errors = demo.communicate(timeout=60)
     assert demo.returncode == 1
-    assert errors.splitlines() == ['foc_ros demo: the node ended with exit code -9: it printed nothing']
+    (line,) = errors.splitlines()
+    assert line.startswith('foc_ros demo: the node ended with exit code -9: ')

@@ -63,7 +63,7 @@ def test_parameters_named_exist(page: Path) -> None:
 def test_commands_named_exist(page: Path) -> None:
     text = page.read_text('utf-8')
     shown = '\n'.join([*re.findall(r'^```console\n(.*?)^```', text, re.MULTILINE | re.DOTALL), *re.findall(r'`([^`\n]+)`', text)])
-    for command in re.findall(r'(?:^|[/ ])foc_ros ([a-z]\w*)', shown, re.MULTILINE):
+    for command in re.findall(r'(?:^|[/ ])foc_ros ([a-z][\w-]*)(?![\w.])', shown, re.MULTILINE):
         assert command in {*COMMANDS, 'foc_node'}, f'{page.name}: there is no command {command}'
 
 

@@ -24,7 +24,7 @@ from foc_ros.ros.messages.types import MessageTypes
 BAGS = message_types('rosbags')
 NAMES = ['x', 'y', 'z', 't', 'vx', 'vy', 'vz', 'xx', 'xy', 'xz', 'yy', 'yz', 'zz', 'candidate', 'likelihood']
 PAIRS = NAMES[7:13]
-NAMES += ['compromised', *(f'motor_{pair}' for pair in PAIRS)]
+NAMES += ['compromised', *(f'motor_{pair}' for pair in PAIRS), 'goal', 'way']
 
 
 def made(name: str, of: Prediction, types: MessageTypes = BAGS, plane: str = 'xy') -> Any:
@@ -50,8 +50,8 @@ def test_the_cloud_contains_every_solved_candidate(types: MessageTypes, plane: s
     assert (cloud.height, cloud.width, cloud.row_step, len(cloud.data)) == (
         1,
         2 * (STEPS + 1),
-        2 * (STEPS + 1) * 88,
-        2 * (STEPS + 1) * 88,
+        2 * (STEPS + 1) * 96,
+        2 * (STEPS + 1) * 96,
     )
     assert (cloud.header.stamp.sec, cloud.header.stamp.nanosec, cloud.header.frame_id) == (5, 0, 'world')
     for index, each in enumerate(ways.solved_candidates):
@@ -69,10 +69,19 @@ def test_the_cloud_contains_every_solved_candidate(types: MessageTypes, plane: s
             np.testing.assert_allclose(table['xyz'[i] + 'xyz'[j]][rows], space[:, i, j], rtol=1e-6)
 
 
+def test_goal_and_number_of_the_class_do_not_depend_on_the_rank() -> None:
+    one, other = outcome('goal1:+l1', 0.2, 0.1), outcome('goal0:-l1', 0.8, -0.1)
+    one = replace(one, candidate=replace(one.candidate, goal=1), way=7)
+    table = columns(made('prediction', prediction(replace(other, way=3), one)))
+    assert table['way'].tolist() == [3] * (STEPS + 1) + [7] * (STEPS + 1)
+    assert table['goal'].tolist() == [0] * (STEPS + 1) + [1] * (STEPS + 1)
+
+
 @both_kinds
 def test_the_likelihoods_are_a_table_with_labels(types: MessageTypes) -> None:
     message = made('likelihoods', three_ways(), types)
-    rows, columns_ = message.layout.dim
+    rows, columns_, stamp = message.layout.dim
+    assert (stamp.label, stamp.size, stamp.stride) == ('stamp_ns:5000000000', 1, 1)
     assert (rows.label, rows.size, rows.stride) == ('goal0:+l1;goal0:-l1', 2, 8)
     assert (columns_.label, columns_.size, columns_.stride) == ('likelihood,effort,cost_ratio,eta', 4, 4)
     table = np.array(message.data).reshape(rows.size, columns_.size)

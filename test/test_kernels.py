@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import sys
+from importlib import import_module
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
+from foc_ros.core.compilation import count_kernels, follow_compilation
 from foc_ros.core.kernels import Matrix, Vector, compiled, compiled_with_caller, forget_outdated, freeze
 
 KERNEL, GROUP = '@compiled\ndef kernel(): ...', 'class Group(NamedTuple): ...'
@@ -69,3 +72,19 @@ def test_an_entry_kernel_takes_nested_tuples_and_an_inner_one_those_that_a_kerne
 def test_a_tuple_that_is_not_frozen_is_refused():
     with pytest.raises(TypeError, match='No matching definition'):
         add_up(Lines(Line(np.zeros((3, 2)), 2.0), np.ones(4)), 3)
+
+
+def test_the_compilation_of_kernels_is_followed_and_happens_once(tmp_path, monkeypatch):
+    (tmp_path / 'followed_kernel.py').write_text(
+        'from __future__ import annotations\nfrom foc_ros.core.kernels import compiled, compiled_with_caller\n'
+        '@compiled_with_caller\ndef half(number: float) -> float:\n    return number / 2.0\n'
+        '@compiled\ndef quarter(number: float) -> float:\n    return half(half(number))\n'
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    reported = []
+    for _ in range(2):
+        with follow_compilation(reported.append):
+            assert import_module('followed_kernel').quarter(2.0) == 0.5
+        del sys.modules['followed_kernel']
+    assert reported == [0, 1]
+    assert count_kernels() > 10

@@ -136,8 +136,9 @@ def test_second_derivatives_at_a_vertex_and_on_an_edge(name):
 
 
 def find_kink(problem: Problem, control: np.ndarray, time: float):
-    trajectory = problem.trajectory(control)
-    return surrogate.find_kink(problem.terms, problem.obstacles_with_reach(0.0), trajectory, control, 0, time, K)
+    terms, obstacles, trajectory = problem.terms, problem.obstacles_with_reach(0.0), problem.trajectory(control)
+    here = surrogate.evaluate_margin(terms, obstacles, trajectory, control, 0, time, K, 0.0)
+    return surrogate.find_kink(terms, obstacles, trajectory, control, 0, time, K, here)
 
 
 def find_corner_time(problem: Problem, control: np.ndarray, time: float) -> float:

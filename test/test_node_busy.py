@@ -88,6 +88,25 @@ def test_services_and_diagnostics_answer_during_a_prediction(ros: Graph, gate: G
     assert stamps == [hand_path(1)[0].header.stamp, poses[-1].header.stamp], 'the next one is made from the newest pose'
 
 
+def test_a_fast_hand_is_polled_until_it_is_slow_again(ros: Graph) -> None:
+    """The executor does not wake up for each pose at 1 kHz; every pose is received all the same."""
+    bench, poses = Bench(ros), iter(hand_path(1000, rate_hz=1000.0))
+    timer = bench.node._polling._timer
+    bench.deliver('hand_pose', next(poses))
+    assert timer.is_canceled()
+
+    def is_polled() -> bool:
+        bench.deliver('hand_pose', next(poses))
+        return not timer.is_canceled()
+
+    ros.spin_until(is_polled, 'polling')
+    bench.deliver('hand_pose', *(next(poses) for _ in range(100)))
+    ros.spin_until(timer.is_canceled, 'the end of polling')
+    bench.deliver('hand_pose', next(poses))
+    refused, _, received = figures(bench.health())['hand_pose refused'].partition(' of ')
+    assert (refused, int(received)) == ('0', bench.node._monitor._inputs['hand_pose'].received)
+
+
 def test_poses_in_the_queue_are_no_silence(ros: Graph) -> None:
     """Whatever kept the node from taking its messages, its diagnostics do not blame the hand."""
     bench = Bench(ros, parameters={'estimator.hand_timeout_s': 0.3})

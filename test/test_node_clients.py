@@ -66,7 +66,9 @@ def test_the_state_is_changed_and_every_topic_is_received(ros: Graph) -> None:
         assert ros.call(client, ChangeState, 'foc/change_state', request).success
         return str(ros.call(client, GetState, 'foc/get_state', GetState.Request()).current_state.label)
 
-    with running(ros, 'module', '--ros-args', '-p', 'autostart:=false', '-p', 'foc.steps:=20', '-p', 'scene.timeout_s:=0.0'):
+    reliable = 'qos_overrides./obstacles.subscription.reliability:=reliable'
+    parameters = ['autostart:=false', 'foc.steps:=20', 'scene.timeout_s:=0.0', reliable]
+    with running(ros, 'module', '--ros-args', *(word for each in parameters for word in ('-p', each))):
         assert change('configure') == 'inactive'
         assert change('activate') == 'active'
         ros.spin_until(lambda: all(each.get_subscription_count() for each in publishers.values()), 'the inputs')

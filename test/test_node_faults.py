@@ -207,7 +207,7 @@ def test_parameters_are_listed_described_and_read_by_others(ros: Graph) -> None:
 def test_quality_of_service_is_overridden_topic_by_topic(ros: Graph) -> None:
     overrides = {
         'qos_overrides./obstacles.subscription.depth': 3,
-        'qos_overrides./obstacles.subscription.reliability': 'best_effort',
+        'qos_overrides./obstacle_markers.subscription.reliability': 'best_effort',
         'qos_overrides./foc/path.publisher.depth': 2,
     }
     bench = Bench(ros, outputs=[], parameters=overrides)
@@ -221,10 +221,44 @@ def test_quality_of_service_is_overridden_topic_by_topic(ros: Graph) -> None:
         )
     }
     assert list(found.values()) == [3, 10, 2, 10]
-    (info,) = bench.player.get_subscriptions_info_by_topic('obstacles')
+    (info,) = bench.player.get_subscriptions_info_by_topic('obstacle_markers')
     assert info.qos_profile.reliability.name == 'BEST_EFFORT'
     (info,) = bench.player.get_subscriptions_info_by_topic('goals')
     assert info.qos_profile.reliability.name == 'RELIABLE'
+
+
+def test_obstacles_are_heard_from_a_best_effort_publisher(ros: Graph) -> None:
+    from rclpy.qos import qos_profile_sensor_data
+    from sensor_msgs.msg import PointCloud2
+
+    from foc_ros.ros.node import FocNode
+
+    node, perception = ros.add(FocNode(context=ros.context)), ros.node('perception')
+    publisher = perception.create_publisher(PointCloud2, 'obstacles', qos_profile_sensor_data)
+
+    def is_heard() -> bool:
+        publisher.publish(cloud(TYPES, obstacle_table(ROWS), 10 * SECOND))
+        return 'cloud' in node.pipeline.scene.sources
+
+    ros.spin_until(is_heard, 'the obstacles')
+
+
+def test_a_publisher_that_cannot_be_heard_is_named(ros: Graph) -> None:
+    from rclpy.qos import qos_profile_sensor_data
+    from visualization_msgs.msg import MarkerArray
+
+    bench, perception = Bench(ros, outputs=[]), ros.node('perception')
+    publisher = perception.create_publisher(MarkerArray, 'obstacle_markers', qos_profile_sensor_data)
+    ros.spin_until(lambda: bench.node._incompatible == {'obstacle_markers'}, 'the event')
+    status = bench.health()
+    assert status.level == b'\x01'
+    assert status.message.startswith(
+        'obstacle_markers is not heard from perception, incompatible QoS: Best effort publisher and reliable subscription '
+        '(see qos_overrides./obstacle_markers.subscription); no prediction: no hand pose yet'
+    )
+    perception.destroy_publisher(publisher)
+    ros.spin_until(lambda: len(bench.node.get_publishers_info_by_topic('obstacle_markers')) == 1, 'its end')
+    assert bench.health().message == 'no prediction: no hand pose yet'
 
 
 def test_parameters_change_together_and_without_a_missed_prediction(ros: Graph) -> None:

@@ -55,6 +55,19 @@ def test_a_managed_node_waits_for_configuration_and_activation(ros: Graph) -> No
     assert predicted(bench, hand_path(6)[4:]) == 1
 
 
+def test_a_manager_changes_the_state_by_number(ros: Graph) -> None:
+    bench = Bench(ros, outputs=[], connected=False, parameters={'autostart': False})
+    for number, state in (
+        (Transition.TRANSITION_CONFIGURE, 'inactive'),
+        (Transition.TRANSITION_ACTIVATE, 'active'),
+        (Transition.TRANSITION_DEACTIVATE, 'inactive'),
+        (Transition.TRANSITION_CLEANUP, 'unconfigured'),
+    ):
+        request = ChangeState.Request(transition=Transition(id=number))
+        assert ros.call(bench.player, ChangeState, 'foc/change_state', request).success
+        assert state_of(bench) == state
+
+
 def test_a_deactivated_node_keeps_the_scene_and_can_be_activated_again(ros: Graph) -> None:
     bench, poses = Bench(ros, outputs=[]), hand_path(12)
     bench.publish_scene()

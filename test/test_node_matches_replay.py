@@ -31,7 +31,7 @@ CONFIGS = {
 @contextmanager
 def node_process(ros: Graph, parameters: str) -> Iterator[subprocess.Popen[str]]:
     """Run the node until the end of the block; it must still run then, and stop without an error."""
-    reliable = 'qos_overrides./hand_pose.subscription.reliability:=reliable'
+    reliable = [f'qos_overrides./{name}.subscription.reliability:=reliable' for name in ('hand_pose', 'obstacles')]
     command = [
         sys.executable,
         '-m',
@@ -40,8 +40,7 @@ def node_process(ros: Graph, parameters: str) -> Iterator[subprocess.Popen[str]]
         '--ros-args',
         '--params-file',
         parameters,
-        '-p',
-        reliable,
+        *(word for each in reliable for word in ('-p', each)),
         '-p',
         'scene.timeout_s:=0.0',
         '-p',

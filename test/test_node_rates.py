@@ -22,7 +22,7 @@ from test_node_process import running  # noqa: E402
 
 OK, WARN = b'\x00', b'\x01'
 LIGHT = ['foc.steps:=20', 'homotopy.max_candidates:=1', 'rate_hz:=10.0', 'scene.timeout_s:=0.0', 'estimator.hand_timeout_s:=10.0']
-RELIABLE = 'qos_overrides./hand_pose.subscription.reliability:=reliable'
+RELIABLE = [f'qos_overrides./{name}.subscription.reliability:=reliable' for name in ('hand_pose', 'obstacles')]
 
 
 class Feeder:
@@ -85,7 +85,7 @@ def test_ten_thousand_obstacles_at_50_hz(ros: Graph) -> None:
     Without a time limit: while 500,000 rows are decoded a second, a prediction on two busy cores may miss its budget.
     """
     feeder, flood = Feeder(ros), cloud(TYPES, obstacle_table(CROWD), 10 * SECOND)
-    with running(ros, 'module', *parameters(*LIGHT, RELIABLE, 'budget_s:=0.0')) as process:
+    with running(ros, 'module', *parameters(*LIGHT, *RELIABLE, 'budget_s:=0.0')) as process:
         feeder.connect()
         feeder.play(3.0, 100.0, lambda i: i % 2 or feeder.publishers['obstacles'].publish(flood))
         ros.spin_until(feeder.all_heard, f'{feeder.sent} poses in the diagnostics')
@@ -100,7 +100,7 @@ def test_ten_thousand_obstacles_at_50_hz(ros: Graph) -> None:
 
 def test_poses_at_1_khz(ros: Graph) -> None:
     feeder = Feeder(ros)
-    with running(ros, 'module', *parameters(*LIGHT, RELIABLE)) as process:
+    with running(ros, 'module', *parameters(*LIGHT, *RELIABLE)) as process:
         feeder.connect()
         feeder.play(2.0, 1000.0)
         ros.spin_until(feeder.all_heard, f'{feeder.sent} poses in the diagnostics')
@@ -115,7 +115,7 @@ def test_poses_at_1_khz(ros: Graph) -> None:
 
 def test_bad_poses_at_1_khz_write_few_lines_to_the_log(ros: Graph) -> None:
     feeder, nowhere = Feeder(ros), pose_stamped(TYPES, (float('nan'), 0.0, 0.0), 10 * SECOND)
-    with running(ros, 'module', *parameters(*LIGHT, RELIABLE)) as process:
+    with running(ros, 'module', *parameters(*LIGHT, *RELIABLE)) as process:
         feeder.connect()
         feeder.play(2.0, 0.0, lambda _: [feeder.publishers['hand_pose'].publish(nowhere) for _ in range(10)])
         ros.spin_until(lambda: feeder.figure('hand_pose refused') == '2000 of 2000', 'all poses in the diagnostics')

@@ -85,6 +85,8 @@ def test_wheel_contains_all_files_of_the_program(wheel: zipfile.ZipFile) -> None
     assert f'{data}share/foc_ros/package.xml' in names
     for name in ('foc.yaml', 'foc.rviz', 'foxglove.json', 'sros2_policy.xml'):
         assert f'{data}share/foc_ros/config/{name}' in names
+    for file in (ROOT / 'launch').iterdir():
+        assert f'{data}share/foc_ros/launch/{file.name}' in names
     sources = {path.relative_to(ROOT).as_posix() for path in (ROOT / 'foc_ros').rglob('*') if path.suffix in SOURCES}
     assert 'foc_ros/recordings/reaching.mcap' in sources
     assert sources <= names, sources - names
@@ -94,7 +96,7 @@ def test_wheel_contains_all_files_of_the_program(wheel: zipfile.ZipFile) -> None
 def test_ros2_run_finds_every_command(wheel: zipfile.ZipFile) -> None:
     """`ros2 run` starts files of lib/foc_ros: one executable per command, which is not on PATH."""
     scripts = {Path(info.filename).name: info for info in wheel.infolist() if '.data/data/lib/foc_ros/' in info.filename}
-    assert set(scripts) == set(COMMANDS)
+    assert set(scripts) == {*COMMANDS, 'foc_node'}
     assert all(info.external_attr >> 16 & 0o111 == 0o111 for info in scripts.values())
     entry_points = wheel.read(next(n for n in wheel.namelist() if n.endswith('/entry_points.txt'))).decode()
     assert re.findall(r'^(\w+) =', entry_points, re.MULTILINE) == ['foc_node', 'foc_ros']
@@ -106,7 +108,7 @@ def test_ros2_run_starts_the_command(script: Path, monkeypatch: pytest.MonkeyPat
     with pytest.raises(SystemExit) as ended:
         runpy.run_path(str(script), run_name='__main__')
     assert not ended.value.code
-    assert f' {script.name} ' in capsys.readouterr().out
+    assert f' {script.name.replace("foc_node", "node")} ' in capsys.readouterr().out
 
 
 def test_ros2_run_starts_a_script_without_the_working_directory(tmp_path: Path) -> None:
@@ -117,6 +119,19 @@ def test_ros2_run_starts_a_script_without_the_working_directory(tmp_path: Path) 
     result = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=100, check=False)
     assert result.returncode == 0, result.stderr
     assert ' solve ' in result.stdout
+
+
+def test_an_executable_runs_in_the_python_of_its_environment(tmp_path: Path) -> None:
+    """`lib/foc_ros` of a virtual environment that is not activated; without a Python in the environment, that of the PATH."""
+    script, interpreter = tmp_path / 'lib' / 'foc_ros' / 'foc_node', tmp_path / 'bin' / 'python3'
+    for each in (script, interpreter):
+        each.parent.mkdir(parents=True)
+    shutil.copy(ROOT / 'scripts' / 'ros2_run' / 'foc_node', script)
+    interpreter.write_text('#!/bin/sh\necho "$@"\n')
+    interpreter.chmod(0o755)
+    command = [sys.executable, script, '--ros-args']
+    result = subprocess.run(command, capture_output=True, text=True, timeout=100, check=True)
+    assert result.stdout == f'{script} --ros-args\n'
 
 
 def test_no_file_contains_a_path_of_one_machine() -> None:

@@ -56,6 +56,8 @@ def values_of(parameter: Any) -> st.SearchStrategy[Any]:
         return st.sampled_from(tuple(bound.choices))
     if isinstance(parameter.default, str):
         return st.text(st.characters(codec='ascii', exclude_categories=['Cc']), max_size=12)
+    if isinstance(parameter.default, bool):
+        return st.booleans()
     if isinstance(parameter.default, int):
         return st.integers(int(bound.low), int(bound.high))
     return st.floats(bound.low, bound.high)

@@ -54,7 +54,7 @@ def test_nothing_solved() -> None:
 
 
 def test_messages_of_different_predictions_are_refused() -> None:
-    one, two = prediction(START_NS, np.zeros(2), 0.6), prediction(START_NS, np.zeros(2), 0.61)
+    one, two = prediction(START_NS, np.zeros(2)), prediction(START_NS + 20_000_000, np.zeros(2))
     cloud = encode_prediction_cloud(one, 'xy', TYPES)
     assert is_same_prediction(cloud, encode_likelihoods(one, TYPES))
     assert not is_same_prediction(cloud, encode_likelihoods(two, TYPES))

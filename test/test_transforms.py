@@ -16,31 +16,58 @@ from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table,
 from node_helpers import GOALS, ROWS, TYPES, Bench, figures, hand_path  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
+from foc_ros.core.config import Config, replace_values  # noqa: E402
 from foc_ros.core.obstacles.rounded_polygon import measure_offsets  # noqa: E402
 from foc_ros.core.obstacles.shapes import make_box_polygon  # noqa: E402
+from foc_ros.ros.transform_tree import TransformTree  # noqa: E402
+from foc_ros.ros.transforms import Transforms, TransformUnavailableError  # noqa: E402
 
 QUARTER = {'x': 0.0, 'y': 0.0, 'z': np.sqrt(0.5), 'w': np.sqrt(0.5)}
 
 
-class Buffer:
-    """A transform buffer with the camera at (1, 0, 0) in the world, rotated by 90 degrees to the left."""
+class TransformException(Exception):
+    """What the exceptions of tf2 have in common."""
 
-    asked: list[tuple[str, str, int]]
 
-    def __init__(self) -> None:
-        self.asked = []
+class Buffer(TransformTree):
+    """A substitute for the buffer of tf2, with a camera that stands still at (1, 0, 0)."""
+
+    def __init__(self, node: Any) -> None:
+        super().__init__()
+        self.set_transform_static(camera(1.0), '')
 
     def lookup_transform(self, target: str, source: str, time: Any) -> Any:
-        self.asked.append((target, source, time.nanoseconds))
-        if (target, source) != ('world', 'camera'):
-            raise LookupError(f'"{source}" passed to lookupTransform does not exist')
-        transform = SimpleNamespace(translation=SimpleNamespace(x=1.0, y=0.0, z=0.0), rotation=SimpleNamespace(**QUARTER))
-        return SimpleNamespace(transform=transform)
+        try:
+            found = self.look_up(target, source, time.nanoseconds)
+        except TransformUnavailableError as error:
+            raise TransformException(str(error)) from None
+        return transform(target, source, found.stamp_ns, found.translation, found.rotation)
+
+    def set_transform(self, transform: Any, authority: str) -> None:
+        self.add(SimpleNamespace(transforms=[transform]), is_static=False)
+
+    def set_transform_static(self, transform: Any, authority: str) -> None:
+        self.add(SimpleNamespace(transforms=[transform]), is_static=True)
+
+
+def transform(parent: str, child: str, stamp_ns: int, translation: Any, rotation: Any) -> Any:
+    """Return a geometry_msgs/TransformStamped."""
+    return SimpleNamespace(
+        header=SimpleNamespace(stamp=pose_stamped(TYPES, (0, 0, 0), stamp_ns).header.stamp, frame_id=parent),
+        child_frame_id=child,
+        transform=SimpleNamespace(translation=translation, rotation=rotation),
+    )
+
+
+def camera(x: float, stamp_ns: int = 0) -> Any:
+    """Return the transform of a camera at (x, 0, 0) in the world, rotated by 90 degrees to the left."""
+    return transform('world', 'camera', stamp_ns, SimpleNamespace(x=x, y=0.0, z=0.0), SimpleNamespace(**QUARTER))
 
 
 @pytest.fixture
 def tf2(monkeypatch: pytest.MonkeyPatch) -> None:
-    module = SimpleNamespace(Buffer=Buffer, TransformListener=lambda buffer, node: SimpleNamespace(buffer=buffer, node=node))
+    """Install a substitute for tf2."""
+    module = SimpleNamespace(Buffer=Buffer, TransformListener=lambda buffer, node: None, TransformException=TransformException)
     monkeypatch.setitem(sys.modules, 'tf2_ros', module)
 
 
@@ -76,7 +103,6 @@ def test_every_input_is_transformed_into_the_working_frame(ros: Graph) -> None:
     bench.deliver('hand_pose', pose_stamped(TYPES, (0.0, 1.0, 0.25), stamp_ns, 'camera'))
     assert bench.node.pipeline.hand_state.stamp_ns == stamp_ns
     assert bench.node.intake.sample.height == 0.25
-    assert ('world', 'camera', stamp_ns) in bench.node._transforms._buffer.asked
     assert {message.header.frame_id for message in bench.wait_for('prediction', 2)} == {'world'}
 
 
@@ -110,8 +136,10 @@ def test_boxes_are_turned(ros: Graph) -> None:
 def test_boxes_that_cannot_be_turned_are_refused(ros: Graph, columns: list[Any], plane: str, words: str) -> None:
     message = cloud(TYPES, obstacle_table([(0.2, 0.3, 0.4, 0.0, 0.2, 0.1, 0.3)[: len(columns)]], columns), 10 * SECOND, 'camera')
     transforms = Bench(ros).node._transforms
-    assert transforms.transform('obstacles', message, 'world', plane) is message
-    assert words in transforms.last_error
+    transforms.add('obstacles', message, 0.0)
+    (arrival,) = transforms.release('obstacles', 'world', replace_values(Config(), {'plane': plane}), 0.0)
+    assert arrival.message is message
+    assert words in arrival.error
 
 
 @pytest.mark.usefixtures('tf2')
@@ -136,8 +164,9 @@ def test_a_frame_unknown_to_tf2_is_refused_with_both_names(ros: Graph) -> None:
     scene = bench.node.pipeline.scene
     bench.deliver('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'moon'))
     assert bench.node.pipeline.scene is scene
-    assert "the working frame 'world', got 'moon'" in figures(bench.health())['last refusal']
-    assert 'no transform to world: "moon" passed to lookupTransform does not exist' in bench.node._transforms.last_error
+    refusal = figures(bench.health())['last refusal']
+    assert "the working frame 'world', got 'moon'" in refusal
+    assert 'no transform to world: moon and world are not connected' in refusal
 
 
 @pytest.mark.usefixtures('tf2')
@@ -156,3 +185,79 @@ def test_without_tf2_other_frames_are_refused(ros: Graph) -> None:
     bench.wait_for('prediction', 1)
     bench.deliver('goals', pose_array(TYPES, GOALS, 'camera'))
     assert "the working frame 'world', got 'camera'" in figures(bench.health())['last refusal']
+
+
+HAND = [pose_stamped(TYPES, (0.0, 0.01 * i, 0.0), 10 * SECOND + i * SECOND // 100, 'camera') for i in range(8)]
+"""Hand poses in the frame of a camera."""
+
+
+class Held:
+    """Messages of the hand on their way to the world, through transforms that the test adds; times in hundredths of a second."""
+
+    def __init__(self, tolerance_s: float) -> None:
+        self.tree = TransformTree()
+        self.transforms = Transforms(self.tree)
+        self.config = replace_values(Config(), {'frames.tolerance_s': tolerance_s})
+
+    def move_camera(self, tick: float, x: float) -> None:
+        self.tree.add(SimpleNamespace(transforms=[camera(x, round((10 + tick / 100) * SECOND))]), is_static=False)
+
+    def release(self, tick: float) -> list[Any]:
+        return self.transforms.release('hand_pose', 'world', self.config, 10 + tick / 100)
+
+
+def test_messages_are_held_in_order_until_their_transform_arrives() -> None:
+    held = Held(0.1)
+    held.move_camera(-1, 1.0)
+    for i in range(4):
+        held.transforms.add('hand_pose', HAND[i], 10 + i / 100)
+        assert held.release(i) == []
+    held.move_camera(1, 1.2)
+    released = held.release(4)
+    assert [(each.received_s, each.error, each.is_inexact) for each in released] == [(10.0, '', False), (10.01, '', False)]
+    np.testing.assert_allclose([each.message.pose.position.x for each in released], [1.1, 1.2 - 0.01])
+    held.move_camera(3, 1.2)
+    assert len(held.release(5)) == 2
+    assert held.transforms.roles == []
+
+
+def test_after_the_tolerance_the_newest_transform_is_taken_if_it_is_near_enough() -> None:
+    held = Held(0.05)
+    held.move_camera(-2, 1.0)
+    for i in (0, 7):
+        held.transforms.add('hand_pose', HAND[i], 10 + i / 100)
+    assert held.release(4.9) == []
+    (near,) = held.release(5.1)
+    assert (near.is_inexact, near.error, near.message.pose.position.x) == (True, '', 1.0)
+    (far,) = held.release(12.1)
+    assert far.message is HAND[7]
+    assert 'the newest one is 0.09 s older than the message (frames.tolerance_s is 0.05)' in far.error
+
+
+def test_a_transform_that_arrives_after_its_message_is_awaited(ros: Graph, tf2: None) -> None:
+    """Obstacles and hand in the frame of a camera that moves: every message is taken with the transform for its stamp."""
+    bench = Bench(ros, parameters={'frame_id': 'world', 'frames.tolerance_s': 10.0})
+    tf = bench.node._tf
+    tf.set_transform(camera(1.0, 9 * SECOND), '')
+    for i, pose in enumerate(HAND):
+        stamp_ns = 10 * SECOND + i * SECOND // 100
+        bench.send('obstacles', cloud(TYPES, obstacle_table([(0.2, 0.1 * i, 0.0, 0.03)]), stamp_ns, 'camera'))
+        bench.send('hand_pose', pose)
+        ros.spin_until(lambda: bench.node._transforms.roles == ['obstacles', 'hand_pose'], 'messages that are held')
+        tf.set_transform(camera(1.0 + 0.1 * i, stamp_ns), '')
+        np.testing.assert_allclose(seen(bench), [[1.0, 0.2]], atol=1e-12)
+        np.testing.assert_allclose(bench.node.intake.sample.position, [1.0 + 0.1 * i - 0.01 * i, 0.0], atol=1e-12)
+    status = figures(bench.health())
+    assert (status['obstacles refused'], status['hand_pose refused']) == ('0 of 8', '0 of 8')
+    assert 'count transform_newest_obstacles' not in status
+
+
+def test_without_a_transform_for_its_stamp_the_newest_one_is_taken_and_counted(ros: Graph, tf2: None) -> None:
+    bench = Bench(ros, parameters={'frame_id': 'world', 'frames.tolerance_s': 0.05})
+    bench.node._tf.set_transform(camera(1.0, 10 * SECOND), '')
+    for i, expected in ((4, '0 of 1'), (6, '1 of 2')):
+        rows = obstacle_table([(0.2, 0.1, 0.0, 0.03)])
+        bench.deliver('obstacles', cloud(TYPES, rows, 10 * SECOND + i * SECOND // 100, 'camera'))
+        status = figures(bench.health())
+        assert (status['obstacles refused'], status['count transform_newest_obstacles']) == (expected, '1')
+    assert 'the newest one is 0.06 s older than the message (frames.tolerance_s is 0.05)' in status['last refusal']

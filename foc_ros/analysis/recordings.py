@@ -34,8 +34,10 @@ class BagRecording:
     path: Path
 
     def items(self) -> Iterator[Item]:
-        """Yield the recorded messages; raises RecordingError."""
+        """Yield the recorded messages; raises RecordingError, also for a recording of which only a part can be read."""
         with BagReader(self.path) as reader:
+            if reader.warnings:
+                raise RecordingError(f'{self.path}: {"; ".join(reader.warnings)}')
             yield from reader
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,11 +11,13 @@ from pathlib import Path
 from foc_ros.core.config import Config
 from foc_ros.core.obstacles.scene import Scene
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import HandSample, Prediction
+from foc_ros.core.types import NANOSECONDS, HandSample, Prediction, SampleStatus
 from foc_ros.io.bags import BagReader, Item
 from foc_ros.io.class_library import load_library
-from foc_ros.io.topics import HAND
+from foc_ros.io.topics import HAND, STATIC_TRANSFORMS, TRANSFORMS
 from foc_ros.ros.intake import Intake
+from foc_ros.ros.transform_tree import TransformTree
+from foc_ros.ros.transforms import Transforms
 
 
 @dataclass(frozen=True)
@@ -33,21 +37,62 @@ class Step:
 class Replay:
     """Feeds recorded messages to a pipeline as the node does live; `intake` keeps the counts.
 
+    Transforms of the recording are applied as the node applies those of tf2, by the log times of the messages.
+
     Raises RecordingError or InputError where the class library cannot be used.
     """
 
     def __init__(self, config: Config) -> None:
         self.pipeline = Pipeline(config, load_library(config.homotopy.library))
         self.intake = Intake(self.pipeline)
+        self._tree = TransformTree()
+        self._transforms = Transforms(self._tree)
+        self._held: dict[str, deque[Item]] = defaultdict(deque)
+        self._received: Counter[str] = Counter()
+        self._refused: Counter[str] = Counter()
+        self._reasons: dict[str, str] = {}
+
+    def take(self, items: Iterable[Item]) -> Iterator[tuple[Item, SampleStatus | None]]:
+        """Pass the messages to the pipeline in the order in which the node does, without predicting.
+
+        Yield each with its status, which is None for transforms and for what cannot be decoded.
+        """
+        for item in items:
+            now_s = item.log_ns / NANOSECONDS
+            if item.role in (TRANSFORMS, STATIC_TRANSFORMS):
+                self._tree.add(item.message, is_static=item.role == STATIC_TRANSFORMS)
+                yield item, None
+            else:
+                self._held[item.role].append(item)
+                self._transforms.add(item.role, item.message, now_s)
+            for role in self._transforms.roles:
+                yield from self._release(role, now_s)
+        for role in self._transforms.roles:
+            yield from self._release(role, math.inf)
 
     def steps(self, items: Iterable[Item]) -> Iterator[Step]:
         """Process the messages in their order and yield the effect of each."""
-        for item in items:
-            status = self.intake.take(item.role, item.message)
+        for item, status in self.take(items):
             is_hand = item.role == HAND
             prediction = self.pipeline.predict() if is_hand and self.pipeline.is_due else None
             sample = self.intake.sample if is_hand and status is not None and status.is_taken else None
             yield Step(item, sample, prediction, self.pipeline.scene)
+
+    def describe_refusals(self) -> str:
+        """Return how many messages of each input were refused, with the last reason; empty if none was."""
+        return '; '.join(
+            f'{count} of {self._received[role]} messages of {role} refused, the last: {self._reasons[role]}'
+            for role, count in self._refused.items()
+        )
+
+    def _release(self, role: str, now_s: float) -> Iterator[tuple[Item, SampleStatus | None]]:
+        for arrival in self._transforms.release(role, self.pipeline.frame_id, self.pipeline.config, now_s):
+            status = self.intake.take_arrival(role, arrival)
+            self._received[role] += 1
+            if status is None or not status.is_taken:
+                self._refused[role] += 1
+                self._reasons[role] = self.intake.last_refusal or ''
+            yield self._held[role].popleft(), status
 
 
 def replay(bag: Path | str, config: Config, chosen: Mapping[str, str] | None = None) -> Iterator[Prediction]:

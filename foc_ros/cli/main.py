@@ -28,9 +28,12 @@ COMMANDS = {
     'replay': 'compute predictions from a recording, without ROS and faster than real time',
     'fit': 'find the parameters that explain recordings best',
     'evaluate': 'compare predictions with recordings of people, beside simple baselines',
+    'simulate': 'compare guidance with other assistance for simulated operators',
     'convert': 'convert motion capture in CSV tables to bags',
+    'warm-up': 'compile the solver for this machine and keep it, so that nothing else has to',
 }
-"""Purpose of each command. The module of that name defines `add_arguments(parser)` and `run(arguments) -> exit code`."""
+"""Purpose of each command. The module of that name (with an underscore for a hyphen) defines `add_arguments(parser)` and
+`run(arguments) -> exit code`."""
 
 
 class _StoreOnce(argparse.Action):
@@ -93,7 +96,7 @@ def _parse_and_run(given: list[str]) -> int:
     for name, purpose in COMMANDS.items():
         command = commands.add_parser(name, help=purpose, description=f'{purpose[0].upper()}{purpose[1:]}.')
         if given[:1] == [name]:
-            import_module(f'.{name}', __package__).add_arguments(command)
+            _import_command(name).add_arguments(command)
     try:
         parsed, rest = parser.parse_known_args(given)
         if rest and parsed.command != 'node':
@@ -102,10 +105,14 @@ def _parse_and_run(given: list[str]) -> int:
         return int(leaving.code or 0)
     parsed.rest = rest
     try:
-        return int(import_module(f'.{parsed.command}', __package__).run(parsed))
+        return int(_import_command(parsed.command).run(parsed))
     except FocError as error:
         print(f'foc_ros {parsed.command}: {_format_line(error)}', file=sys.stderr)
         return 2
+
+
+def _import_command(name: str) -> Any:
+    return import_module(f'.{name.replace("-", "_")}', __package__)
 
 
 def _format_line(error: Exception) -> str:

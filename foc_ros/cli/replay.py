@@ -14,12 +14,14 @@ from typing import TextIO
 
 from foc_ros.analysis.learn_demonstrations import Learner
 from foc_ros.analysis.replay import Replay, Step
+from foc_ros.analysis.replay_guidance import GuidanceReplay, GuidanceStep
 from foc_ros.analysis.replay_summary import Summary, facts
 from foc_ros.core.errors import InputError
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
 from foc_ros.io.class_library import load_library, save_library
-from foc_ros.io.json_output import encode_prediction
+from foc_ros.io.json_output import encode_guidance, encode_prediction
 from foc_ros.io.terminal import show_progress, show_table
+from foc_ros.ros.messages.encode_guidance import GUIDANCE_OUTPUTS
 from foc_ros.ros.messages.encode_prediction import encode_outputs
 from foc_ros.ros.messages.types import RosbagsTypes
 from foc_ros.ros.parameters import load_optional_config, write_parameter_file
@@ -28,6 +30,8 @@ NODE = '/foc'
 """Name of the node in the topics of the output bag."""
 Consumer = Callable[[Step], None]
 """Function that receives every step of a replay."""
+GuidanceConsumer = Callable[[Step, GuidanceStep], None]
+"""Function that receives every update of guidance, with the step before which it happens."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,6 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--learn', type=Path, metavar='FILE', help=words)
     words = 'write the parameters with the durations of this operator, for --params'
     parser.add_argument('--operator', type=Path, metavar='FILE', help=words)
+    words = 'compute guidance as well, at guidance.rate_hz: into the output bag and, with --json, as a list `guidance`'
+    parser.add_argument('--guidance', action='store_true', help=words)
     parser.add_argument('--json', action='store_true', help='print one JSON object')
     words = 'take an input from a topic, as in hand_pose:=/PSM1/measured_cp (default: by name, else by type)'
     parser.add_argument('--remap', action='append', default=[], metavar='INPUT:=TOPIC', help=words)
@@ -60,11 +66,12 @@ def run(arguments: argparse.Namespace) -> int:
         known = load_library(str(arguments.learn)) if arguments.learn.exists() else ()
         learner = Learner(replay.pipeline, known)
         consumers.append(learner.add)
-    # The predictions wait in a file: nothing is printed of a recording that turns out to be damaged.
-    with TemporaryFile('w+', encoding='utf-8') as predictions:
+    # The answers wait in files: nothing is printed of a recording that turns out to be damaged.
+    with TemporaryFile('w+', encoding='utf-8') as predictions, TemporaryFile('w+', encoding='utf-8') as guidance:
+        guided = [_guidance_writer(guidance)] if arguments.guidance and arguments.json else []
         if arguments.json:
             consumers.append(_json_writer(predictions))
-        duration_s = _play(arguments, replay, consumers)
+        duration_s = _play(arguments, replay, consumers, guided)
         answer = summary.answer(replay.intake.counts, duration_s)
         if learner is not None:
             learner.finish()
@@ -78,26 +85,37 @@ def run(arguments: argparse.Namespace) -> int:
             print(f'{{"summary": {json.dumps(answer)}, "predictions": [', end='')
             predictions.seek(0)
             shutil.copyfileobj(predictions, sys.stdout)
+            if arguments.guidance:
+                print('], "guidance": [', end='')
+                guidance.seek(0)
+                shutil.copyfileobj(guidance, sys.stdout)
             print(']}')
         else:
             show_table(('', str(arguments.bag)), facts(answer).items())
     if summary.solved:
         return 0
-    reason = replay.pipeline.not_ready_reason() or replay.intake.last_refusal or 'see the candidates not solved'
+    reason = replay.describe_refusals() or replay.pipeline.not_ready_reason() or 'see the candidates not solved'
     print(f'foc_ros replay: no prediction has a solved candidate: {reason}', file=sys.stderr)
     return 3
 
 
-def _play(arguments: argparse.Namespace, replay: Replay, consumers: list[Consumer]) -> float:
+def _play(arguments: argparse.Namespace, replay: Replay, consumers: list[Consumer], guided: list[GuidanceConsumer]) -> float:
     """Pass every step to the consumers and to the output bag, if there is one; return the recording's duration [s]."""
     with ExitStack() as stack:
         reader = stack.enter_context(BagReader(arguments.bag, _parse_remaps(arguments.remap)))
         if arguments.output is not None:
             writer = stack.enter_context(BagWriter(arguments.output))
             consumers = [*consumers, _bag_writer(reader, writer, replay.pipeline.config.plane)]
+            guided = [*guided, _guidance_bag_writer(writer)]
+        guidance = GuidanceReplay(replay.pipeline) if arguments.guidance else None
         for step in replay.steps(show_progress(reader, 'replay', reader.message_count)):
+            for each in guidance.add(step) if guidance is not None else ():
+                for take in guided:
+                    take(step, each)
             for consume in consumers:
                 consume(step)
+        for warning in reader.warnings:
+            print(f'foc_ros replay: {arguments.bag}: {warning}', file=sys.stderr)
         return reader.duration_s
 
 
@@ -110,6 +128,27 @@ def _bag_writer(reader: BagReader, writer: BagWriter, plane: str) -> Consumer:
         if step.prediction is not None:
             for name, message in encode_outputs(step.prediction, step.prediction.obstacles, plane, types).items():
                 writer.write(f'{NODE}/{name}', message, step.item.log_ns)
+
+    return write
+
+
+def _guidance_bag_writer(writer: BagWriter) -> GuidanceConsumer:
+    """Return a consumer that writes what a node would publish for each update of guidance."""
+    types = RosbagsTypes(TYPESTORE)
+
+    def write(step: Step, update: GuidanceStep) -> None:
+        for name, (_, encode) in GUIDANCE_OUTPUTS.items():
+            writer.write(f'{NODE}/{name}', encode(update.output, update.place, types), step.item.log_ns)
+
+    return write
+
+
+def _guidance_writer(file: TextIO) -> GuidanceConsumer:
+    """Return a consumer that writes the updates of guidance as the elements of a JSON list."""
+
+    def write(_: Step, update: GuidanceStep) -> None:
+        separator = ',\n' if file.tell() else '\n'
+        file.write(separator + json.dumps(encode_guidance(update.stamp_ns, update.output), allow_nan=False))
 
     return write
 

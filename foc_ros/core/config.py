@@ -20,6 +20,7 @@ ARRIVALS = ('rest', 'passing')
 ADAPTATIONS = ('none', 'online')
 BOUNDS = ('cantelli', 'gaussian')
 RISKS = ('step', 'path')
+GUIDANCE_MODES = ('path', 'trajectory')
 MOST_CANDIDATES = 64
 """Largest number of homotopy classes that are solved in one prediction."""
 WIDENS = 'widens the predicted covariance, not the chance constraint'
@@ -66,7 +67,7 @@ class FocConfig:
     process_noise: float = _p(
         0.0, f'root of the spectral density of unplanned control, which {WIDENS}; N s^0.5 for damped_mass', 'm/s^2.5', 0.0, 1e3
     )
-    endpoint_stddev: float = _p(0.03, f'standard deviation of end points about their goal, per axis; it {WIDENS}', 'm', 0.0, 1.0)
+    endpoint_stddev: float = _p(0.0, f'standard deviation of end points about their goal, per axis; it {WIDENS}', 'm', 0.0, 1.0)
     lv_delta: float = _p(5e-5, 'tau per unit of s for strategy lv', 'm^2', 0.0, 1.0)
     hc_delta: float = _p(1e-4, 'tau per unit of s for strategy hc', 'm^2', 0.0, 1.0)
     growth: float = _p(2.0, 'factor on lambda per unit of s (Delta)', '', 1.0001, 1e6)
@@ -98,7 +99,7 @@ class DurationConfig:
         'online', "whether expected durations follow the operator's earlier movements, by a factor", choices=ADAPTATIONS
     )
     min_time_to_go_s: float = _p(0.3, 'lower limit of the time to go', 's', 0.01, 60.0)
-    spread: float = _p(0.4, f'standard deviation of the time to go, as a fraction of it; it {WIDENS}', '', 0.0, 2.0)
+    spread: float = _p(0.0, f'standard deviation of the time to go, as a fraction of it; it {WIDENS}', '', 0.0, 2.0)
     wait_s: float = _p(0.0, f'mean time until a hand at rest starts to move; it {WIDENS}', 's', 0.0, 60.0)
     arrival: str = _p('rest', 'how the hand arrives at its goal: it comes to rest, or passes at any speed', choices=ARRIVALS)
     max_time_to_go_s: float = _p(10.0, 'upper limit of the time to go', 's', 0.05, 120.0)
@@ -172,8 +173,48 @@ class SceneConfig:
 
 
 @dataclass(frozen=True)
+class FramesConfig:
+    """Transforms of messages that are in another frame than the working frame."""
+
+    tolerance_s: float = _p(
+        0.1, 'time to wait for the transform at the stamp of a message, and largest age of another one then', 's', 0.0, 10.0
+    )
+
+
+@dataclass(frozen=True)
+class GuidanceConfig:
+    """The guiding force: `core/guidance`."""
+
+    enabled: bool = _p(False, 'whether the node publishes guidance; without it the node is a predictor only')
+    rate_hz: float = _p(200.0, 'updates of guidance per second, independent of the predictions', 'Hz', 1.0, 1000.0)
+    mode: str = _p(
+        'path', 'path: no force along the path, the operator sets the pace; trajectory: also along it', choices=GUIDANCE_MODES
+    )
+    k_max: float = _p(300.0, 'largest stiffness in any direction', 'N/m', 0.0, 5000.0)
+    f_max: float = _p(3.0, 'largest force; it is also at most what `slew` reduces to zero within `ramp_s`', 'N', 0.0, 100.0)
+    slew: float = _p(300.0, 'largest rate of change of the force', 'N/s', 0.1, 1e5)
+    lookahead_s: float = _p(
+        0.15, 'longest time ahead at which a path is compared with where the hand goes by its velocity', 's', 0.0, 2.0
+    )
+    clearance: float = _p(
+        0.015, 'distance that guidance keeps the hand from obstacles: no force farther away; 0: force everywhere', 'm', 0.0, 1.0
+    )
+    precision_low: float = _p(
+        100.0, 'precision, an inverse variance of position, up to which there is no stiffness', '1/m^2', 0.0, 1e9
+    )
+    precision_high: float = _p(2500.0, 'precision from which on the stiffness is `k_max`', '1/m^2', 1.0, 1e9)
+    position_stddev: float = _p(0.002, 'standard deviation that is added to that of every predicted position', 'm', 1e-6, 1.0)
+    margin: float = _p(0.002, 'distance from every obstacle within which no force leads towards it', 'm', 0.0, 1.0)
+    tank: float = _p(0.5, 'capacity and first content of the energy tank: most energy that guidance gives', 'J', 0.0, 1e3)
+    max_speed: float = _p(1.0, 'speed of the fastest hand, for which tank and margins are guaranteed', 'm/s', 0.01, 100.0)
+    hold_s: float = _p(0.25, 'age of the newest pose or prediction after which the force is released', 's', 0.001, 10.0)
+    ramp_s: float = _p(0.1, 'time within which a released force becomes zero', 's', 0.001, 10.0)
+    authority: float = _p(0.5, 'largest share of guidance in `~/guidance/twist`', '', 0.0, 1.0)
+
+
+@dataclass(frozen=True)
 class Config:
-    """All parameters of the predictor.
+    """All parameters of the predictor and of guidance.
 
     Groups of parameters are fields of this class: ``Config().foc.eta`` is the parameter ``foc.eta``. A config is frozen;
     `with_values` returns a changed one. The page `parameters` of the documentation lists names, bounds, units and meanings.
@@ -200,6 +241,8 @@ class Config:
     homotopy: HomotopyConfig = field(default_factory=HomotopyConfig)
     likelihood: LikelihoodConfig = field(default_factory=LikelihoodConfig)
     scene: SceneConfig = field(default_factory=SceneConfig)
+    frames: FramesConfig = field(default_factory=FramesConfig)
+    guidance: GuidanceConfig = field(default_factory=GuidanceConfig)
 
     def __repr__(self) -> str:
         """Name the parameters that differ from their defaults."""
@@ -243,9 +286,9 @@ def list_parameters(group: type = Config, prefix: str = '') -> Iterator[Paramete
             yield from list_parameters(cast('type', item.default_factory), f'{prefix}{item.name}.')
 
 
-def flatten(config: Config) -> dict[str, float | int | str]:
+def flatten(config: Config) -> dict[str, float | int | str | bool]:
     """Return every value by dotted name."""
-    values: dict[str, float | int | str] = {}
+    values: dict[str, float | int | str | bool] = {}
     for parameter in list_parameters():
         value: Any = config
         for part in parameter.name.split('.'):
@@ -266,9 +309,13 @@ def replace_values(config: Config, values: Mapping[str, object]) -> Config:
     return config
 
 
-def _check_value(parameter: Parameter, value: object) -> float | int | str:
+def _check_value(parameter: Parameter, value: object) -> float | int | str | bool:
     """Return a value in the type of its parameter; raise ParameterError for a wrong type or a value out of bounds."""
     name, bound = parameter.name, parameter.bound
+    if isinstance(parameter.default, bool):
+        if not isinstance(value, bool):
+            raise ParameterError(name, 'true or false', repr(value))
+        return value
     if isinstance(parameter.default, str):
         if not isinstance(value, str) or (bound.choices and value not in bound.choices):
             raise ParameterError(name, f'one of {", ".join(bound.choices)}' if bound.choices else 'a text', repr(value))

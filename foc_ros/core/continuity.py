@@ -24,6 +24,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .class_numbers import is_renamed
 from .config import LikelihoodConfig
 from .likelihood import CostModel
 from .ocp.warm_start import resample_rest
@@ -103,14 +104,6 @@ class Past(Record):
 
 
 NO_PAST = Past()
-
-
-def is_renamed(before: Candidate, now: Candidate) -> bool:
-    """Return whether the label of one class to a goal is that of the other with obstacles left out."""
-    if before.goal != now.goal:
-        return False
-    fewer, more = sorted((before.sides, now.sides), key=len)
-    return set(fewer) <= set(more)
 
 
 def find_successor(before: Candidate, now: Mapping[Candidate, float]) -> str | None:

@@ -27,12 +27,12 @@ class Decisions(NamedTuple):
 
 
 def tabulate_sides(solutions: Sequence[Solution], obstacles: Obstacles) -> NDArray[np.int8]:
-    """Return LEFT or RIGHT, (k, n): the side on which the mean path of each of k >= 1 solutions passes each obstacle."""
+    """Return LEFT or RIGHT, (k, n): the side on which the mean path of each solution passes each obstacle."""
     angles = [
         compute_swept_angles(each.path, centre_trajectories(obstacles.centre, each.dt * obstacles.velocity, len(each.mean) - 1))
         for each in solutions
     ]
-    return np.where(np.array(angles) < 0.0, LEFT, RIGHT).astype(np.int8)
+    return np.where(np.array(angles).reshape(len(solutions), len(obstacles)) < 0.0, LEFT, RIGHT).astype(np.int8)
 
 
 def find_decisions(sides: NDArray[np.int8], obstacles: Obstacles, hand: HandState, goals: Array) -> Decisions:

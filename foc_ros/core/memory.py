@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from .candidates import NOTHING, EarlierSolutions
-from .continuity import NO_PAST, Past, is_renamed
+from .class_numbers import NO_NUMBERS, ClassNumbers, is_renamed
+from .continuity import NO_PAST, Past
 from .types import Candidate, PredictedCandidate, Solution, Status
 
 RETRY_AFTER = 10
@@ -23,7 +24,7 @@ class Memory:
 
     most_likely: label; candidates: the homotopy classes followed; earlier: their solutions, likelihoods and turns; followed: for
     how many predictions in a row each has been followed without being solved; past: what continuity needs; next_goal: row of the
-    goal at which the search begins.
+    goal at which the search begins; numbers: of the classes.
     """
 
     most_likely: str | None = None
@@ -32,6 +33,11 @@ class Memory:
     followed: Mapping[str, int] = field(default_factory=dict)
     past: Past = NO_PAST
     next_goal: int = 0
+    numbers: ClassNumbers = NO_NUMBERS
+
+    def forget(self) -> Memory:
+        """Return the memory with which a new movement begins: empty, but no number of a class is given again."""
+        return Memory(numbers=self.numbers.forget())
 
     def find_earlier(self, candidates: Sequence[Candidate]) -> EarlierSolutions:
         """Return the earlier results of candidates under their present labels, also if their labels have changed.

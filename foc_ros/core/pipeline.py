@@ -227,7 +227,7 @@ class Pipeline:
         if self._task is not None:
             self._abandon_task()
             self._is_new, self._predicted_ns = True, None
-        self._memory = Memory(self._memory.most_likely)
+        self._memory = Memory(self._memory.most_likely, numbers=self._memory.numbers)
 
     def _find_not_ready_reason(self) -> tuple[str, str] | None:
         """Return why the pipeline cannot predict, as (kind, message), judged by stamps; the node also judges by its clocks."""
@@ -239,7 +239,7 @@ class Pipeline:
 
     def _forget_predictions(self) -> None:
         self._abandon_task()
-        self._memory, self._predicted_ns = Memory(), None
+        self._memory, self._predicted_ns = self._memory.forget(), None
 
     def _abandon_task(self) -> None:
         """Make sure that a prediction that is being computed is neither returned nor remembered, and end it soon."""

@@ -82,7 +82,9 @@ def predict(
     kept = keep_answers(candidates, widened, past, hand.stamp_ns, config.likelihood.hold_s, costs)
     ranked = rank_candidates(kept, config.likelihood, obstacles, hand, goals)
     smooth = smooth_paths(ranked, past, hand.stamp_ns, config.likelihood.smoothing_s)
-    predicted = make_continuous(smooth, past, hand.stamp_ns, config.likelihood)
+    continuous = make_continuous(smooth, past, hand.stamp_ns, config.likelihood)
+    numbers = memory.numbers.keep_goals(past.durations_s)
+    predicted, numbers = numbers.number(continuous, hand.stamp_ns, config.likelihood.hold_s)
     likelihoods = {each.label: each.likelihood for each in predicted if each.has_likelihood}
     shares = {each.candidate: each.likelihood for each in predicted if each.has_likelihood}
     best = select_most_likely(likelihoods, past.find_renamed(memory.most_likely, shares), config.likelihood.margin)
@@ -91,10 +93,10 @@ def predict(
     counts['waiting'] = len(candidates) - len({each.label for each in candidates} & {each.label for each in kept})
     notes = dict(found.notes) | {name: count for name, count in counts.items() if count}
     hand_at = hand.stamp_ns, hand.frame_id, hand.height
-    prediction = Prediction(*hand_at, tuple(predicted), best, notes, time.perf_counter() - began, given, goals)
+    prediction = Prediction(*hand_at, predicted, best, notes, time.perf_counter() - began, given, goals)
     earlier, followed = memory.remember(candidates, solved, earlier, likelihoods, hand.stamp_ns)
     present = past.follow(prediction, durations, config.likelihood.hold_s)
-    return prediction, Memory(best, candidates, earlier, followed, present, found.next_goal)
+    return prediction, Memory(best, candidates, earlier, followed, present, found.next_goal, numbers)
 
 
 def warm_up(config: Config) -> None:

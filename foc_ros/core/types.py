@@ -335,7 +335,8 @@ class PredictedCandidate:
     candidate: the homotopy class; solution: its forward optimal control; sides: side on which the mean path passes each obstacle,
     by id. cost: effort to go, time cost, and the share of the effort since onset that all classes have in common [m^2/s^5];
     likelihood in [0, 1]: 0 unless solved or compromised. age_s: 0, or how long ago the solution was found, of which this is the
-    rest, if there was no time for a new one or it failed [s].
+    rest, if there was no time for a new one or it failed [s]. way: a number that stays the same for as long as the class is
+    followed, whatever its label and its rank are.
     """
 
     candidate: Candidate
@@ -344,6 +345,7 @@ class PredictedCandidate:
     cost: float
     likelihood: float
     age_s: float = 0.0
+    way: int = 0
 
     def __repr__(self) -> str:
         """Say label, status and likelihood."""

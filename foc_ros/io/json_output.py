@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from foc_ros.core.guidance.step import GuidanceOutput
 from foc_ros.core.types import LEFT, Array, PredictedCandidate, Prediction, Solution
 
 
@@ -92,3 +93,17 @@ def encode_table(rows: Array) -> list[list[float | None]]:
 
 def _encode_place(place: tuple[str, float] | None) -> dict[str, Any] | None:
     return None if place is None else {'obstacle': place[0], 'step': place[1]}
+
+
+def encode_guidance(stamp_ns: int, output: GuidanceOutput) -> dict[str, Any]:
+    """Encode one update of guidance for JSON."""
+    return {
+        'stamp_ns': stamp_ns,
+        'status': output.status.value,
+        'force': output.force.tolist(),
+        'reference': output.reference.tolist(),
+        'stiffness': output.stiffness.tolist(),
+        'agreement': output.agreement,
+        'authority': output.authority,
+        'tank_J': output.tank,
+    }

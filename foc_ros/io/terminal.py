@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TypeVar
 
 from rich.box import SIMPLE_HEAD
@@ -31,6 +32,27 @@ def show_progress(items: Iterable[T], words: str, total: int) -> Iterator[T]:
         return
     with Progress(console=console, transient=True) as progress:
         yield from progress.track(items, total=total, description=words)
+
+
+class Counter:
+    """A number that is shown in a progress bar. Attributes: done, the number."""
+
+    def __init__(self, progress: Progress, words: str, total: int) -> None:
+        self.done = 0
+        self._progress, self._task = progress, progress.add_task(words, total=total)
+
+    def show(self, done: int) -> None:
+        """Show a number."""
+        self.done = done
+        self._progress.update(self._task, completed=done)
+
+
+@contextmanager
+def show_counter(words: str, total: int) -> Iterator[Counter]:
+    """Return a counter with a progress bar; words: its description; total: the number at its end."""
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+        yield Counter(progress, words, total)
 
 
 def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:

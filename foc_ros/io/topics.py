@@ -8,6 +8,8 @@ from foc_ros.core.errors import RecordingError
 
 HAND, CLOUD, MARKERS, GOALS, GOAL = 'hand_pose', 'obstacles', 'obstacle_markers', 'goals', 'goal_pose'
 COLLISION, DETECTIONS = 'collision_objects', 'detections'
+COMMAND = 'command_twist'
+"""The operator's velocity command, an input of guidance alone."""
 TYPES = {
     HAND: 'geometry_msgs/msg/PoseStamped',
     CLOUD: 'sensor_msgs/msg/PointCloud2',
@@ -28,7 +30,10 @@ NAMES = {role: (role,) for role in TYPES} | {HAND: ('hand_pose', 'measured_cp')}
 REQUIRED = ((HAND,), (CLOUD, MARKERS, COLLISION, DETECTIONS), (GOALS, GOAL))
 """Roles that a recording must contain for a prediction: one of each row."""
 
-OUTPUTS = ('prediction', 'likelihoods', 'path', 'markers')
+TRANSFORMS, STATIC_TRANSFORMS = 'tf', 'tf_static'
+"""Last parts of the topics of transforms, which are no input of the predictor but move its inputs into the working frame."""
+
+OUTPUTS = ('prediction', 'likelihoods', 'path', 'markers', 'reference')
 """Last parts of the node's own outputs, which are never used as an input because of their type."""
 
 
@@ -48,6 +53,12 @@ def assign_topics(topics: Mapping[str, str], chosen: Mapping[str, str] | None = 
             role, topic = _find_by_type(topics, alternatives, roles)
             roles[role] = topic
     return roles
+
+
+def find_transforms(topics: Mapping[str, str]) -> dict[str, str]:
+    """Return which topics have transforms, by topic: `TRANSFORMS` or `STATIC_TRANSFORMS`. topics: message type by topic."""
+    names = {topic: topic.rpartition('/')[2] for topic, kind in topics.items() if kind == 'tf2_msgs/msg/TFMessage'}
+    return {topic: name for topic, name in names.items() if name in (TRANSFORMS, STATIC_TRANSFORMS)}
 
 
 def _check_choice(topics: Mapping[str, str], role: str, topic: str) -> str:

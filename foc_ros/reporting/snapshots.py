@@ -25,7 +25,7 @@ from foc_ros.core.types import (
     describe_class,
 )
 from foc_ros.ros.messages.decode_poses import decode_stamp
-from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS
+from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS, STAMP
 from foc_ros.ros.messages.plane import project
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate, find_drawn_curve, order_candidates
 
@@ -40,7 +40,7 @@ class CandidateView(Record):
     description: its class in words, with the goal where there are several; is_compromised: whether eta is below the wanted one;
     times (m,): seconds after the stamp of the snapshot; path (m, 2) [m]; velocity (m, 2) [m/s]; covariance and motor_covariance
     (m, 2, 2) of the position [m^2]: the total, and the part that motor noise causes, which eta is about; effort [m^2/s^6];
-    cost_ratio: cost over the least cost; eta: achieved probability of avoidance.
+    cost_ratio: cost over the least cost; eta: achieved probability of avoidance; way: number of the class while it is followed.
     """
 
     label: str
@@ -55,6 +55,7 @@ class CandidateView(Record):
     velocity: Array
     covariance: Array
     motor_covariance: Array
+    way: int = 0
 
     @property
     def speed(self) -> Array:
@@ -181,7 +182,13 @@ def _build_candidate_view(candidate: PredictedCandidate, cost_ratio: float, goal
     numbers = candidate.likelihood, solution.effort, cost_ratio, solution.eta
     arrays = solution.path, solution.mean[:, 2:4], solution.covariance[:, :2, :2], candidate.motor_covariance[:, :2, :2]
     return CandidateView(
-        candidate.label, describe_candidate(candidate, goals), not candidate.is_solved, *numbers, solution.times, *arrays
+        candidate.label,
+        describe_candidate(candidate, goals),
+        not candidate.is_solved,
+        *numbers,
+        solution.times,
+        *arrays,
+        candidate.way,
     )
 
 
@@ -218,10 +225,8 @@ def build_snapshot(prediction: Prediction) -> Snapshot:
 
 
 def is_same_prediction(cloud: Any, likelihoods: Any) -> bool:
-    """Whether messages of `~/prediction` and `~/likelihoods` hold the same prediction; the latter carries no stamp."""
-    rows = _read_cloud(cloud)
-    _, first = np.unique(rows['candidate'], return_index=True)
-    return np.array_equal(rows['likelihood'][first], _read_likelihoods(likelihoods)[:, 0].astype(np.float32))
+    """Whether messages of `~/prediction` and `~/likelihoods` hold the same prediction."""
+    return bool(likelihoods.layout.dim[2].label == f'{STAMP}{decode_stamp(cloud.header)}')
 
 
 def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles, goals: Array) -> Snapshot:
@@ -254,7 +259,7 @@ def _read_candidate(name: tuple[str, str], values: Array, rows: Any, plane: str)
         covariances.append(project(half.swapaxes(1, 2), plane)[0])
     likelihood, effort, cost_ratio, eta = values.tolist()
     head = *name, bool(rows['compromised'].any()), likelihood, effort, cost_ratio, eta
-    return CandidateView(*head, rows['t'].astype(float), path, velocity, covariances[0], covariances[1])
+    return CandidateView(*head, rows['t'].astype(float), path, velocity, covariances[0], covariances[1], int(rows['way'][0]))
 
 
 def _read_cloud(cloud: Any) -> Any:

@@ -1,8 +1,4 @@
-"""Association of candidates over time: which candidate of one prediction continues which candidate of the prediction before.
-
-A label names only the obstacles that matter. It changes when an obstacle is left behind or comes near: the candidate
-`goal0:+1-2` continues as `goal0:-2`. A track follows the candidate through such changes.
-"""
+"""Candidates over time: a track has the candidates whose class has the same number, and a colour of its own."""
 
 from __future__ import annotations
 
@@ -14,10 +10,7 @@ import numpy as np
 from foc_ros.core.types import Array
 
 from .drawing import CLASS_COLOURS, CLASSES
-from .snapshots import Snapshot, parse_label
-
-LONGEST_GAP_NS = 300_000_000
-"""A track continues after a gap of up to this length, in which its candidate was not solved."""
+from .snapshots import Snapshot
 
 
 @dataclass(frozen=True)
@@ -54,34 +47,9 @@ class CandidateTracks:
 
 
 def build_candidate_tracks(snapshots: Sequence[Snapshot]) -> CandidateTracks:
-    """Associate the candidates of successive snapshots and give the tracks their letters and colours."""
-    tracks = associate_tracks(snapshots)
+    """Return the candidates of successive snapshots by track, and give the tracks their letters and colours."""
+    tracks = [{each.label: each.way for each in snapshot.candidates} for snapshot in snapshots]
     return CandidateTracks(snapshots, tracks, assign_slots(snapshots, tracks))
-
-
-def associate_tracks(snapshots: Sequence[Snapshot]) -> list[dict[str, int]]:
-    """Return the number of the track of each candidate, by label, for each snapshot.
-
-    A candidate continues a track of the same goal that passes no common obstacle on the other side: preferably the one with the
-    same label, then the one that shares most sides, then the latest, then the most likely. All tracks end when the goals change.
-    """
-    associated: list[dict[str, int]] = []
-    count = 0
-    last_seen: dict[int, tuple[int, str]] = {}
-    goals: Array | None = None
-    for snapshot in snapshots:
-        if goals is None or not np.array_equal(goals, snapshot.goals):
-            last_seen = {}
-        goals = snapshot.goals
-        alive = {track: seen for track, seen in last_seen.items() if snapshot.stamp_ns - seen[0] <= LONGEST_GAP_NS}
-        tracks = _continue_tracks(snapshot, {track: label for track, (_, label) in alive.items()})
-        for each in snapshot.candidates:
-            if each.label not in tracks:
-                tracks[each.label], count = count, count + 1
-        current = {tracks[each.label]: (snapshot.stamp_ns, each.label) for each in snapshot.candidates}
-        last_seen = current | {track: seen for track, seen in alive.items() if track not in current}
-        associated.append(tracks)
-    return associated
 
 
 def assign_slots(
@@ -105,20 +73,3 @@ def assign_slots(
                 taken_until[slots[track]] = last_row[track]
             begun.add(track)
     return slots
-
-
-def _continue_tracks(snapshot: Snapshot, labels: Mapping[int, str]) -> dict[str, int]:
-    """Return the track of each candidate that continues one, by label; labels: of the earlier tracks. No track is split."""
-    ids = snapshot.obstacles.ids
-    parsed = {track: parse_label(label, ids) for track, label in labels.items()}
-    pairs = []
-    for each in snapshot.candidates:
-        goal, sides = parse_label(each.label, ids)
-        for track, (other_goal, others) in parsed.items():
-            if other_goal == goal and all(sides.get(name, side) == side for name, side in others.items()):
-                pairs.append((each.label == labels[track], len(sides.items() & others.items()), each.label, track))
-    continued: dict[str, int] = {}
-    for *_, label, track in sorted(pairs, key=lambda pair: pair[:2], reverse=True):
-        if label not in continued and track not in continued.values():
-            continued[label] = track
-    return continued

@@ -7,17 +7,30 @@ from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
+from rclpy.callback_groups import CallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSPolicyKind, QoSProfile, QoSReliabilityPolicy
+from rclpy.qos import (
+    QoSCompatibility,
+    QoSDurabilityPolicy,
+    QoSHistoryPolicy,
+    QoSPolicyKind,
+    QoSProfile,
+    QoSReliabilityPolicy,
+    qos_check_compatible,
+)
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from foc_ros.io.topics import CLOUD, COLLISION, DETECTIONS, GOAL, GOALS, HAND, MARKERS, OPTIONAL, TYPES
+from foc_ros.io.topics import CLOUD, COLLISION, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, OPTIONAL, TYPES
 
+from .messages.encode_guidance import GUIDANCE_OUTPUTS, TWIST, TWIST_TYPE
 from .messages.encode_prediction import OUTPUTS
 from .messages.types import find_message_class
 
 INPUTS = (GOALS, GOAL, CLOUD, MARKERS, COLLISION, DETECTIONS, HAND)
 """Input topics in the order in which the executor takes their messages: the scene before the hand."""
+BEST_EFFORT = (HAND, CLOUD, DETECTIONS)
+"""Inputs of which a later message makes up for a lost one: best-effort subscriptions hear every publisher."""
 HAND_DEPTH = 200
 """Length of the queue of hand poses: 0.2 s at 1 kHz, during which a prediction may be computed."""
 SCENE_DEPTH, OUTPUT_DEPTH = 10, 10
@@ -26,24 +39,64 @@ OVERRIDABLE = QoSOverridingOptions(
 )
 
 
-def create_subscriptions(node: Node, receive: Callable[[str, Any], None]) -> dict[str, Any]:
+def create_subscriptions(
+    node: Node, receive: Callable[[str, Any], None], note_incompatible: Callable[[str], None], hand_group: CallbackGroup
+) -> dict[str, Any]:
     """Create the subscriptions, by topic; each calls `receive(topic, message)`.
 
-    Hand poses are received as best-effort sensor data, the scene reliably. A scene that was published once, before the start of
-    the node, is received with `qos_overrides./obstacles.subscription.durability: transient_local`, but then not from volatile
-    publishers. Inputs of `find_missing_packages` have none.
+    A message of `BEST_EFFORT` is a complete state; those of the other inputs are changes, or are sent once, and are received
+    reliably. `note_incompatible(topic)` is called when a publisher appears that a subscription cannot hear:
+    `describe_incompatible_publishers` then tells which. A scene that was published once, before the start of the node, is
+    received with `qos_overrides./obstacles.subscription.durability: transient_local`, reliably, but then not from volatile or
+    best-effort publishers. Inputs of `find_missing_packages` have no subscription. hand_group: callback group of the hand.
     """
     subscriptions = {}
     missing = find_missing_packages()
     for role in INPUTS:
         if role in missing:
             continue
-        reliability = QoSReliabilityPolicy.BEST_EFFORT if role == HAND else QoSReliabilityPolicy.RELIABLE
-        qos = _build_qos(reliability, HAND_DEPTH if role == HAND else SCENE_DEPTH)
+        is_best_effort = role in BEST_EFFORT and not _is_kept_by_publishers(node, role)
+        reliability = QoSReliabilityPolicy.BEST_EFFORT if is_best_effort else QoSReliabilityPolicy.RELIABLE
         subscriptions[role] = node.create_subscription(
-            find_message_class(TYPES[role]), role, partial(receive, role), qos, qos_overriding_options=OVERRIDABLE
+            find_message_class(TYPES[role]),
+            role,
+            partial(receive, role),
+            _build_qos(reliability, HAND_DEPTH if role == HAND else SCENE_DEPTH),
+            callback_group=hand_group if role == HAND else None,
+            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=lambda _, role=role: note_incompatible(role)),
+            qos_overriding_options=OVERRIDABLE,
         )
     return subscriptions
+
+
+def _is_kept_by_publishers(node: Node, role: str) -> bool:
+    """Return whether a parameter asks for messages from before the subscription; only reliable ones are sent again."""
+    name = f'qos_overrides.{node.resolve_topic_name(role)}.subscription.durability'
+    return bool(node.has_parameter(name) and node.get_parameter(name).value == 'transient_local')
+
+
+def describe_incompatible_publishers(node: Node, role: str, subscription: Any) -> list[str]:
+    """Return a text for each present publisher of an input that its subscription cannot hear."""
+    texts = []
+    for info in node.get_publishers_info_by_topic(subscription.topic_name):
+        compatibility, reason = qos_check_compatible(info.qos_profile, subscription.qos_profile)
+        if compatibility == QoSCompatibility.ERROR:
+            why = reason.removeprefix('ERROR: ').rstrip('; ')
+            remedy = f'qos_overrides.{subscription.topic_name}.subscription'
+            texts.append(f'{role} is not heard from {info.node_name}, incompatible QoS: {why} (see {remedy})')
+    return texts
+
+
+def create_command_subscription(node: Node, receive: Callable[[Any], None]) -> Any:
+    """Create the subscription of the operator's velocity command, of which only the newest counts."""
+    qos = _build_qos(QoSReliabilityPolicy.BEST_EFFORT, 1)
+    return node.create_subscription(find_message_class(TWIST_TYPE), COMMAND, receive, qos, qos_overriding_options=OVERRIDABLE)
+
+
+def create_guidance_publishers(node: Node) -> dict[str, Any]:
+    """Create the publishers of guidance, by the name of the topic below the node's name."""
+    kinds = {name: kind for name, (kind, _) in GUIDANCE_OUTPUTS.items()} | {TWIST: TWIST_TYPE}
+    return {name: _create_publisher(node, name, kind) for name, kind in kinds.items()}
 
 
 def find_missing_packages() -> dict[str, str]:
@@ -54,15 +107,12 @@ def find_missing_packages() -> dict[str, str]:
 
 def create_publishers(node: Node) -> dict[str, Any]:
     """Create the publishers of the outputs, by the name of the topic below the node's name."""
-    return {
-        name: node.create_publisher(
-            find_message_class(kind),
-            f'~/{name}',
-            _build_qos(QoSReliabilityPolicy.RELIABLE, OUTPUT_DEPTH),
-            qos_overriding_options=OVERRIDABLE,
-        )
-        for name, (kind, _) in OUTPUTS.items()
-    }
+    return {name: _create_publisher(node, name, kind) for name, (kind, _) in OUTPUTS.items()}
+
+
+def _create_publisher(node: Node, name: str, kind: str) -> Any:
+    qos = _build_qos(QoSReliabilityPolicy.RELIABLE, OUTPUT_DEPTH)
+    return node.create_publisher(find_message_class(kind), f'~/{name}', qos, qos_overriding_options=OVERRIDABLE)
 
 
 def take_queued(subscription: Any) -> list[Any]:

@@ -26,9 +26,11 @@ WINDOW = 1000
 """Number of predictions over which the percentiles are computed."""
 OK, WARN, ERROR = 0, 1, 2
 """Levels of diagnostic_msgs/DiagnosticStatus."""
-HARMLESS = ('candidate_', 'hand_disengaged', 'hand_duplicate', 'predict_', 'predictions')
+HARMLESS = ('candidate_', 'hand_disengaged', 'hand_duplicate', 'predict_', 'predictions', 'transform_newest_')
 """Prefixes of the counts that are no fault by themselves; the reason why no prediction is made is reported as text."""
 FAULTS = ('predict_failed', 'predict_nothing_solved', 'predict_too_late')
+DROPPED = 'hand_superseded'
+"""Count of hand samples that were due and were replaced by a newer one before a prediction was made from them."""
 OVER_BUDGET_S = 0.002
 """Time beyond `budget_s` after which a prediction is counted as over budget [s]."""
 BUSY_S = 0.5
@@ -170,11 +172,19 @@ class Monitor:
         self._counts['internal_errors'] += 1
         self._error = f'{type(error).__name__}: {error}'
 
-    def report(self, now_s: float, intake: Intake, state: str, not_ready_reason: str | None, busy_s: float = 0.0) -> Health:
+    def report(
+        self,
+        now_s: float,
+        intake: Intake,
+        state: str,
+        not_ready_reason: str | None,
+        busy_s: float = 0.0,
+        unheard: Iterable[str] = (),
+    ) -> Health:
         """Return the health since the last call.
 
         state: of the managed node; not_ready_reason: text, None if ready; busy_s: for how long the present prediction has been
-        computed, 0 if there is none [s].
+        computed, 0 if there is none [s]; unheard: a text for each publisher that cannot be heard.
         """
         pipeline, seconds = intake.pipeline, max(now_s - self._reported_s, 1e-3)
         totals = Counter(intake.counts) + self._counts
@@ -191,7 +201,7 @@ class Monitor:
             'prediction age [s]': 'none yet' if self._predicted_s is None else f'{now_s - self._predicted_s:.3f}',
             'solve time p50, p99 [ms]': _describe_percentiles(self._solve_ms),
             'cycle time p50, p99 [ms]': _describe_percentiles(self._cycle_ms),
-            'dropped cycles': str(totals['hand_superseded']),
+            'dropped cycles': str(totals[DROPPED]),
             **_describe_prediction(self._prediction),
             **{f'count {name}': str(count) for name, count in sorted(totals.items())},
             'last refusal': intake.last_refusal or 'none',
@@ -200,12 +210,19 @@ class Monitor:
         self._counts_before, self._reported_s = totals, now_s
         for entry in self._inputs.values():
             entry.received_before = entry.received
-        reasons = [] if not_ready_reason is None else [f'no prediction: {not_ready_reason}']
+        reasons = [*unheard, *([] if not_ready_reason is None else [f'no prediction: {not_ready_reason}'])]
         if busy_s > BUSY_S:
             reasons.append(f'busy: a prediction has been computed for {busy_s:.1f} s')
         if recent['predict_too_late']:
             reasons.append(f'busy: {self._late}')
+        if self._is_punctual(recent, now_s):
+            del recent[DROPPED]
         return Health(*self._judge(pipeline, recent, state, reasons), values)
+
+    def _is_punctual(self, recent: Counter[str], now_s: float) -> bool:
+        """Return whether predictions are fresh and within their budget, so that hand samples between them are not missed."""
+        is_fresh = self._predicted_s is not None and now_s - self._predicted_s < BUSY_S
+        return is_fresh and not recent['predict_over_budget'] and not recent['predict_too_late']
 
     def _judge(self, pipeline: Pipeline, recent: Counter[str], state: str, reasons: list[str]) -> tuple[int, str]:
         if recent['internal_errors']:

@@ -17,6 +17,7 @@ from .messages.decode_markers import MarkerTable
 from .messages.decode_objects import CollisionTable, decode_detections
 from .messages.decode_point_cloud import decode_point_cloud
 from .messages.decode_poses import decode_goal, decode_goals, decode_hand_sample
+from .transforms import Arrival
 
 
 class Intake:
@@ -50,8 +51,14 @@ class Intake:
         """How often each kind of refusal, drop, restart or failure occurred here and in the pipeline, by name."""
         return {**self.pipeline.counts, **self._counts}
 
-    def take(self, role: str, message: Any) -> SampleStatus | None:
-        """Take one message; None if it cannot be decoded."""
+    def take_arrival(self, role: str, arrival: Arrival) -> SampleStatus | None:
+        """Take one message that was transformed, or could not be; None if it cannot be decoded."""
+        if arrival.is_inexact:
+            self._counts[f'transform_newest_{role}'] += 1
+        return self.take(role, arrival.message, arrival.error)
+
+    def take(self, role: str, message: Any, transform_error: str = '') -> SampleStatus | None:
+        """Take one message; None if it cannot be decoded. transform_error: why it is not in the working frame."""
         refused_before = self.pipeline.refused
         try:
             status = self._handlers[role](message)
@@ -60,7 +67,7 @@ class Intake:
             self.last_refusal = f'{role}: {error}'
             return None
         if self.pipeline.refused > refused_before:
-            self.last_refusal = self.pipeline.last_refusal
+            self.last_refusal = '; '.join(filter(None, [self.pipeline.last_refusal, transform_error]))
         return status
 
     def remove_source(self, source: str) -> None:

@@ -7,13 +7,20 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from functools import partial
 from types import FrameType
+from typing import Any
 
+from foc_ros.core.compilation import count_kernels, follow_compilation
 from foc_ros.core.errors import FocError
 from foc_ros.core.registry import import_all
 
 SPIN_S = 0.1
 """Longest time between two checks of the stop flag [s]."""
+SWITCH_S = 0.001
+"""Longest time for which the thread of the predictions keeps the others waiting for the interpreter [s]."""
+LOGGED_KERNELS = 10
+"""Number of compiled kernels after which the log says so again."""
 END_S = 0.5
 """Time after which a prediction that is still being computed does not delay the end of the process [s]."""
 
@@ -50,12 +57,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     stop = StopSignals()
     import rclpy
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+    from rclpy.logging import get_logger
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
 
     from .node import FocNode
 
-    import_all()  # compiles the kernels on a new machine
+    with follow_compilation(partial(_log_compilation, get_logger('foc'))):
+        import_all()
     stop.defer()
     given = ['foc_node', *(sys.argv[1:] if arguments is None else arguments)]
     context = rclpy.Context()
@@ -69,6 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         context.try_shutdown()
         print(f'foc_node: {" ".join(str(error).split())}', file=sys.stderr)
         return 2
+    sys.setswitchinterval(SWITCH_S)
     gc.collect()
     gc.freeze()  # these objects stay alive: a full collection over them would delay a prediction by 80 ms
     executor = SingleThreadedExecutor(context=context)
@@ -86,6 +96,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if node.is_busy_after(END_S):
         os._exit(0)  # otherwise the interpreter waits for the computation
     return 0
+
+
+def _log_compilation(logger: Any, done: int) -> None:
+    """Log that kernels are compiled, and how many of them are."""
+    total = count_kernels()
+    if done == 0:
+        logger.info(f'compiling the solver for this machine, up to {total} kernels; this happens once (see foc_ros warm-up)')
+    elif done % LOGGED_KERNELS == 0:
+        logger.info(f'compiled {done} of up to {total} kernels')
 
 
 if __name__ == '__main__':

@@ -4,7 +4,8 @@ The pipeline holds the model and the memory and is driven by message stamps, so 
 the same messages, apart from candidates for which `budget_s` left no time. The node adds the clocks: it makes no prediction from
 an input that has fallen silent, and publishes none that has become too old.
 
-A prediction is computed in another thread, and everything else happens in that of the executor. What is received or asked for
+A prediction is computed in another thread, guidance in a third one (`guidance_loop`), and all else in that of the executor. What
+is received or asked for
 meanwhile is done at once: after a reset, a release of the clutch, a change of parameters or of the state of the managed node,
 nothing that was computed before is published.
 
@@ -30,21 +31,37 @@ from std_srvs.srv import SetBool, Trigger
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import FocError
+from foc_ros.core.guidance.step import GuidanceOutput
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predictor import warm_up
 from foc_ros.io.class_library import load_library
-from foc_ros.io.topics import CLOUD, DETECTIONS, GOAL, GOALS, HAND, MARKERS
+from foc_ros.io.topics import CLOUD, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, REQUIRED
 
-from .endpoints import INPUTS, create_publishers, create_subscriptions, find_missing_packages, take_queued
+from .endpoints import (
+    INPUTS,
+    create_command_subscription,
+    create_guidance_publishers,
+    create_publishers,
+    create_subscriptions,
+    describe_incompatible_publishers,
+    find_missing_packages,
+    take_queued,
+)
+from .guidance_loop import GuidanceLoop
 from .health import SOURCE_TOPICS, Freshness, Monitor, encode_diagnostics
 from .intake import Intake
 from .lifecycle import answer_refused_transitions
+from .messages.encode_guidance import GUIDANCE_OUTPUTS, TWIST, Place, blend_twist, encode_guidance_markers
 from .messages.encode_prediction import encode_outputs
 from .messages.types import RclpyTypes
 from .node_parameters import LiveParameters, declare_autostart, declare_parameters
-from .transforms import Transforms
+from .queue_polling import QueuePolling
+from .tf_listener import TfListener
+from .transforms import Arrival, Transforms
 from .worker import Computation, Worker
 
+RETRY_S = 0.01
+"""Time between two checks of messages that are held until their transform is known [s]."""
 THROTTLE_S = 5.0
 """Shortest time between two log lines of one kind [s]."""
 COMPLETE = (GOALS, GOAL, CLOUD, DETECTIONS)
@@ -62,13 +79,22 @@ class FocNode(LifecycleNode):
         self._live_parameters = LiveParameters(self, declare_parameters(self, Config()), self._reconfigure)
         self._library = load_library(self._live_parameters.config.homotopy.library)
         autostart = declare_autostart(self)
-        self._types = RclpyTypes()
+        self._types, self._guidance_types = RclpyTypes(), RclpyTypes()  # one for each thread
         # a logger throttles each line of code by itself: with one logger per input, no input suppresses the lines of another
         self._loggers = {role: self.get_logger().get_child(role) for role in INPUTS}
         self._state, self._is_engaged, self._start_error = 'unconfigured', True, ''
+        self._has_predicted = False
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
-        self._transforms = Transforms(self)
+        self._guidance_outputs: dict[str, Any] = {}
+        self._guidance = GuidanceLoop(self._live_parameters.config, self._publish_guidance, self.report)
+        self._incompatible: set[str] = set()
+        try:
+            self._tf: TfListener | None = TfListener(self, self._take_held)
+        except ImportError:  # tf2 is optional
+            self._tf = None
+        self._retries = self.create_timer(RETRY_S, self._take_held, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._polling = QueuePolling(self, self._take_queued_poses)
         self._worker = Worker(self, self._finish)
         self._create_pipeline()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -84,8 +110,10 @@ class FocNode(LifecycleNode):
         self._create_pipeline()
         try:
             warm_up(self._live_parameters.config)
-            self._outputs = create_publishers(self)
-            self._inputs = create_subscriptions(self, self._receive)
+            self._outputs, self._guidance_outputs = create_publishers(self), create_guidance_publishers(self)
+            self._inputs = create_subscriptions(self, self._receive, self._incompatible.add, self._polling)
+            self._inputs[COMMAND] = create_command_subscription(self, self._blend_command)
+            self._guidance.start()
         except Exception as error:
             self._destroy_topics()
             self._start_error = ' '.join(str(error).split())
@@ -95,6 +123,10 @@ class FocNode(LifecycleNode):
 
     def on_activate(self, _: LifecycleState) -> TransitionCallbackReturn:
         """Predict from the next hand pose on."""
+        topics = {role: subscription.topic_name for role, subscription in self._inputs.items()}
+        groups = [' or '.join(topics[role] for role in group if role in topics) for group in REQUIRED]
+        self.get_logger().info(f'ready, waiting for {"; ".join(groups)}')
+        self._has_predicted = False
         return self._enter('active')
 
     def on_deactivate(self, _: LifecycleState) -> TransitionCallbackReturn:
@@ -124,6 +156,7 @@ class FocNode(LifecycleNode):
 
     def destroy_node(self) -> None:
         """Destroy the node; a prediction that is being computed ends at the next check of its deadline."""
+        self._guidance.stop()
         self._worker.stop()
         super().destroy_node()
 
@@ -141,47 +174,76 @@ class FocNode(LifecycleNode):
             self.pipeline.reset()  # ends a prediction that is being computed
         self.pipeline = Pipeline(self._live_parameters.config, self._library)
         self.intake, self._freshness, self._monitor = Intake(self.pipeline), Freshness(), Monitor(monotonic())
+        self._transforms = Transforms(self._tf)
 
     def _destroy_topics(self) -> None:
+        self._guidance.stop()
         for subscription in self._inputs.values():
             self.destroy_subscription(subscription)
-        for publisher in self._outputs.values():
+        for publisher in (*self._outputs.values(), *self._guidance_outputs.values()):
             self.destroy_publisher(publisher)
-        self._inputs, self._outputs = {}, {}
+        self._inputs, self._outputs, self._guidance_outputs = {}, {}, {}
 
     def _enter(self, state: str) -> TransitionCallbackReturn:
         self._state = state
         self.pipeline.set_engaged(self._is_engaged and state == 'active')
+        self._guidance.set_released(not self.pipeline.is_engaged)
         return SUCCESS
 
     def _reconfigure(self, config: Config) -> None:
         self.pipeline.reconfigure(config)
+        self._guidance.reconfigure(config)
 
     def _receive(self, role: str, message: Any) -> None:
         """Take a message and those in the queue behind it, and predict once, from the newest hand pose.
 
         Markers are taken one message at a time, because every message counts and takes time; the hand has its turn in between.
         """
-        messages = [message] if role == MARKERS else [message, *take_queued(self._inputs[role])]
+        if role == HAND:
+            self._polling.note_message()
+        self._take_all(role, [message] if role == MARKERS else [message, *take_queued(self._inputs[role])])
+
+    def _take_queued_poses(self) -> bool:
+        """Take the hand poses that wait; return whether there were any."""
+        messages = take_queued(self._inputs[HAND]) if HAND in self._inputs else []
+        self._take_all(HAND, messages)
+        return bool(messages)
+
+    def _take_all(self, role: str, messages: list[Any]) -> None:
+        for each in messages:
+            self._transforms.add(role, each, monotonic())
+        self._take_released(role)
+
+    def _take_held(self) -> None:
+        """Take the held messages whose transform has arrived, or will not arrive any more."""
+        for role in self._transforms.roles:
+            self._take_released(role)
+        if not self._transforms.roles:
+            self._retries.cancel()
+
+    def _take_released(self, role: str) -> None:
+        arrivals = self._transforms.release(role, self.pipeline.frame_id, self.pipeline.config, monotonic())
         is_taken = False
-        for each in reversed(messages) if role in COMPLETE else messages:
+        for each in reversed(arrivals) if role in COMPLETE else arrivals:
             is_taken = self._take(role, each) or is_taken
             if is_taken and role in COMPLETE:
                 break
+        if self._retries.is_canceled() and self._transforms.roles:
+            self._retries.reset()
         if is_taken and role == HAND and self.pipeline.is_due:
             self._predict()
 
-    def _take(self, role: str, message: Any) -> bool:
-        transformed = self._transforms.transform(role, message, self.pipeline.frame_id, self.pipeline.config.plane)
-        status, now_s = self.intake.take(role, transformed), monotonic()
+    def _take(self, role: str, arrival: Arrival) -> bool:
+        status = self.intake.take_arrival(role, arrival)
         is_taken = status is not None and status.is_taken
-        refused, received = self._monitor.note_message(role, now_s, is_taken=is_taken)
+        refused, received = self._monitor.note_message(role, arrival.received_s, is_taken=is_taken)
         if status is None or not is_taken:
-            reasons = '; '.join(filter(None, [self.intake.last_refusal, self._transforms.last_error]))
-            text = f'{reasons} ({refused} of {received} refused so far)'
+            text = f'{self.intake.last_refusal} ({refused} of {received} refused so far)'
             self._loggers[role].warning(text, throttle_duration_sec=THROTTLE_S)
             return False
-        self._freshness.note_received(role, now_s)
+        self._freshness.note_received(role, arrival.received_s)
+        if role == HAND:
+            self._guidance.note_hand(self.pipeline.hand_state, arrival.received_s)
         if role == HAND and self.intake.sample is not None:
             clock_ns, timeout_s = self.get_clock().now().nanoseconds, self.pipeline.config.estimator.hand_timeout_s
             self._freshness.note_pose(self.intake.sample.stamp_ns, clock_ns, timeout_s, is_restart=status.is_restart)
@@ -233,23 +295,55 @@ class FocNode(LifecycleNode):
         if reason is not None:
             self._monitor.note_late(reason)
             return
+        self._guidance.note_prediction(prediction, ended.received_s)
+        self._add_guidance_markers(messages)
         for name, message in messages.items():
             self._publish(self._outputs[name], message)
         self._monitor.note_prediction(prediction, ended.start_s, monotonic())
+        if not self._has_predicted:
+            self._has_predicted = True
+            self.get_logger().info(f'predicting in frame {self.pipeline.frame_id}, plane {config.plane}')
+
+    def _publish_guidance(self, output: GuidanceOutput, place: Place) -> None:
+        """Publish an output of guidance; this happens in the thread of guidance."""
+        for name, (_, encode) in GUIDANCE_OUTPUTS.items():
+            if self._guidance_outputs[name].get_subscription_count():
+                self._publish(self._guidance_outputs[name], encode(output, place, self._guidance_types))
+
+    def _add_guidance_markers(self, messages: dict[str, Any]) -> None:
+        output, hand = self._guidance.output, self.pipeline.hand_state
+        if 'markers' in messages and output is not None and hand is not None and self.pipeline.config.guidance.enabled:
+            place = Place(hand.stamp_ns, hand.frame_id, hand.height, self.pipeline.config.plane)
+            messages['markers'].markers.extend(encode_guidance_markers(output, place, self._types))
+
+    def _blend_command(self, command: Any) -> None:
+        """Publish the operator's command with the share of guidance in it; without guidance, the command as it is."""
+        output, config = self._guidance.output, self.pipeline.config
+        if not config.guidance.enabled or self._state != 'active':
+            return
+        frame_id = command.header.frame_id
+        is_fresh = output is not None and monotonic() - output.t <= config.guidance.hold_s
+        if output is not None and is_fresh and frame_id == self.pipeline.frame_id:
+            command = blend_twist(output, command, config.plane, self._types)
+        elif is_fresh:
+            text = f'{COMMAND}: frame {frame_id!r} is not the working frame {self.pipeline.frame_id!r}: not blended'
+            self.get_logger().warning(text, throttle_duration_sec=THROTTLE_S)
+        self._publish(self._guidance_outputs[TWIST], command)
 
     def _recover(self, error: Exception) -> None:
         self.report(error)
         self.pipeline.reset()
+        self._guidance.note_hand(None, monotonic())
 
     def _publish_health(self) -> None:
-        if HAND in self._inputs:
-            for message in take_queued(self._inputs[HAND]):  # a hand whose poses wait here is not silent
-                self._receive(HAND, message)
+        self._take_queued_poses()  # a hand whose poses wait here is not silent
         self._report_missing_packages()
         clock_reason, present = self._find_clock_reason(), self._worker.present
         not_ready_reason = self.pipeline.not_ready_reason() or (clock_reason and clock_reason[1])
         busy_s = monotonic() - present.start_s if present is not None else 0.0
-        health = self._monitor.report(monotonic(), self.intake, self._state, not_ready_reason, busy_s)
+        unheard = self._report_incompatible_publishers()
+        health = self._monitor.report(monotonic(), self.intake, self._state, not_ready_reason, busy_s, unheard)
+        health.values.update(self._guidance.describe())
         name, stamp_ns = self.get_fully_qualified_name(), self.get_clock().now().nanoseconds
         self._publish(self._diagnostics, encode_diagnostics(health, name, stamp_ns, self._types))
 
@@ -259,6 +353,20 @@ class FocNode(LifecycleNode):
             if self._inputs and self.count_publishers(role):
                 text = f'{role} is published, but cannot be received: the package {package} is not installed'
                 self._loggers[role].error(text, throttle_duration_sec=THROTTLE_S)
+
+    def _report_incompatible_publishers(self) -> list[str]:
+        """Log and return which inputs are published with a quality of service that their subscription cannot receive."""
+        texts = {
+            role: describe_incompatible_publishers(self, role, self._inputs[role])
+            for role in INPUTS
+            if role in self._incompatible and role in self._inputs
+        }
+        for role, found in texts.items():
+            if found:
+                self._loggers[role].warning('; '.join(found), throttle_duration_sec=THROTTLE_S)
+            else:
+                self._incompatible.discard(role)
+        return [text for found in texts.values() for text in found]
 
     def _publish(self, publisher: Any, message: Any) -> None:
         if self.context.ok():
@@ -276,6 +384,7 @@ class FocNode(LifecycleNode):
         for source in silent:
             self.intake.remove_source(source)
         self.pipeline.reset()
+        self._guidance.note_hand(None, monotonic())
         self._freshness.forget_clock()
         removed = ' and '.join(SOURCE_TOPICS[source] for source in silent)
         without = f' without the obstacles of {removed}, which fell silent' if silent else ''

@@ -1,129 +1,117 @@
-"""Transformation of messages into the working frame, if tf2 is installed and knows the transform at the message's stamp.
+"""Messages on their way into the working frame: one whose transform arrives later than itself is held until then.
 
-Otherwise the message is not changed, and is refused later because of its frame. An older transform is not used, because it
-would put obstacles in the wrong place.
+A transform is usually published after the measurement that needs it. A message is therefore held until the transform for its
+stamp is known. After `frames.tolerance_s` the newest transform is taken instead, if it is not farther from the stamp than that.
+Otherwise the message is passed on unchanged with the reason, and is refused because of its frame. The messages of an input keep
+their order. Node and replay share this: times are those of the steady clock in the node, and those of the log in a replay.
 """
 
 from __future__ import annotations
 
-from copy import copy, deepcopy
-from typing import Any
+from collections import deque
+from functools import partial
+from typing import Any, NamedTuple, Protocol
 
-import numpy as np
-from rclpy.time import Time
+from foc_ros.core.config import Config
+from foc_ros.core.types import NANOSECONDS
 
-from foc_ros.core.errors import MessageError
-from foc_ros.core.types import Array
-from foc_ros.io.topics import CLOUD, DETECTIONS, GOALS, MARKERS
+from .messages.decode_poses import decode_stamp
+from .messages.transform_messages import Transform, transform_message
 
-from .messages.decode_markers import ADD
-from .messages.decode_point_cloud import read_table
-from .messages.plane import compute_rotation, lift, project
+MOST_HELD = 1000
+"""Largest number of messages of one input that are held: 1 s of a hand at 1 kHz."""
 
-MOST_TILT = 1e-3
-"""Sine of the largest angle between the task plane and the sizes of boxes after a transform."""
+
+class TransformUnavailableError(Exception):
+    """No transform between two frames is known, or none for the stamp."""
+
+
+class TransformSource(Protocol):
+    """What knows transforms: tf2 in the node, a recording in a replay."""
+
+    def look_up(self, target: str, source: str, stamp_ns: int) -> Transform:
+        """Return the transform from one frame to another at a stamp [ns], the newest one for a stamp of 0.
+
+        Raises TransformUnavailableError.
+        """
+
+
+class Arrival(NamedTuple):
+    """A message that can be taken.
+
+    message: in the working frame, or unchanged; received_s: when it arrived [s]; error: why it could not be transformed, empty if
+    it could or did not have to be; is_inexact: whether the newest transform was taken instead of that for its stamp.
+    """
+
+    message: Any
+    received_s: float
+    error: str = ''
+    is_inexact: bool = False
 
 
 class Transforms:
-    """Transforms from a listener of tf2 on the node. Attributes: last_error: why the last message was not transformed."""
+    """Queues of messages, one for each input; source: None if there is none."""
 
-    def __init__(self, node: Any) -> None:
-        self.last_error = ''
-        self._buffer: Any = None
-        try:
-            import tf2_ros
-        except ImportError:
-            return
-        self._buffer = tf2_ros.Buffer()
-        self._listener = tf2_ros.TransformListener(self._buffer, node)
+    def __init__(self, source: TransformSource | None) -> None:
+        self._source = source
+        self._held: dict[str, deque[tuple[Any, float]]] = {}
 
-    def transform(self, role: str, message: Any, frame_id: str | None, plane: str) -> Any:
-        """Return a message in the working frame; unchanged if that frame or the transform is unknown.
+    @property
+    def roles(self) -> list[str]:
+        """The inputs of which messages are held."""
+        return [role for role, queue in self._held.items() if queue]
 
-        plane: in which the sizes of the boxes of a cloud are.
+    def add(self, role: str, message: Any, now_s: float) -> None:
+        """Append a message of an input that arrives at a time [s]."""
+        self._held.setdefault(role, deque()).append((message, now_s))
+
+    def release(self, role: str, frame_id: str | None, config: Config, now_s: float) -> list[Arrival]:
+        """Return the messages of an input that need not be held any longer at a time [s], in the order of their arrival.
+
+        frame_id: the working frame; while it is unknown, None, messages are not transformed.
         """
-        if self._buffer is None or frame_id is None:
-            return message
+        queue, arrivals = self._held.get(role, ()), []
+        while queue:
+            message, received_s = queue[0]
+            is_overdue = now_s - received_s >= config.frames.tolerance_s or len(queue) > MOST_HELD
+            try:
+                transformed, is_inexact = self._transform(role, message, frame_id, config, is_overdue)
+                arrival = Arrival(transformed, received_s, is_inexact=is_inexact)
+            except TransformUnavailableError as error:
+                if not is_overdue:
+                    break
+                arrival = Arrival(message, received_s, f'no transform to {frame_id}: {error}')
+            except Exception as error:  # the message is not checked yet
+                arrival = Arrival(message, received_s, f'cannot be transformed to {frame_id}: {" ".join(str(error).split())}')
+            queue.popleft()
+            arrivals.append(arrival)
+        return arrivals
+
+    def _transform(self, role: str, message: Any, frame_id: str | None, config: Config, is_overdue: bool) -> tuple[Any, bool]:
+        """Return a message in the working frame, and whether the newest transform was taken for it."""
+        if self._source is None or frame_id is None:
+            return message, False
         try:
-            if role == MARKERS:
-                # markers that delete others have no position and often no frame
-                parts = [self._transform(each, frame_id, plane) if each.action == ADD else each for each in message.markers]
-                return message if parts == message.markers else type(message)(markers=parts)
-            return self._transform(message, frame_id, plane, role)
-        except Exception as error:  # tf2 has many kinds of errors, and the message is not checked yet
-            self.last_error = f'no transform to {frame_id}: {" ".join(str(error).split())}'
-            return message
+            return transform_message(role, message, frame_id, config.plane, partial(self._find, frame_id)), False
+        except TransformUnavailableError:
+            if not is_overdue:
+                raise
+        find = partial(self._find_newest, frame_id, config.frames.tolerance_s)
+        return transform_message(role, message, frame_id, config.plane, find), True
 
-    def _transform(self, message: Any, frame_id: str, plane: str, role: str = '') -> Any:
-        if message.header.frame_id == frame_id:
-            return message
-        stamp = Time.from_msg(message.header.stamp)
-        found = self._buffer.lookup_transform(frame_id, message.header.frame_id, stamp).transform
-        rotation, shift = compute_rotation(found.rotation), _read_xyz(found.translation)
-        if role == CLOUD:
-            transformed = _transform_cloud(message, rotation, shift, plane)
-        else:
-            transformed = deepcopy(message)
-            for each in transformed.detections if role == DETECTIONS else []:
-                each.header.frame_id = frame_id
-            for pose in _list_poses(role, transformed):
-                point = pose.position
-                point.x, point.y, point.z = (rotation @ _read_xyz(point) + shift).tolist()
-                _turn(pose.orientation, found.rotation)
-        transformed.header = deepcopy(message.header)
-        transformed.header.frame_id = frame_id
-        return transformed
+    def _find(self, frame_id: str, header: Any) -> Transform:
+        assert self._source is not None
+        return self._source.look_up(frame_id, header.frame_id, decode_stamp(header))
 
-
-def _read_xyz(vector: Any) -> Array:
-    return np.array([vector.x, vector.y, vector.z], dtype=float)
-
-
-def _list_poses(role: str, message: Any) -> list[Any]:
-    if role == DETECTIONS:
-        return [each.bbox.center for each in message.detections]
-    return list(message.poses) if role == GOALS else [message.pose]
-
-
-def _turn(orientation: Any, rotation: Any) -> None:
-    """Rotate an orientation in place; one that was never set, all 0, is no rotation. Both are quaternions."""
-    vector, scalar = _read_xyz(orientation), float(orientation.w)
-    if not vector.any() and not scalar:
-        scalar = 1.0
-    by, real = _read_xyz(rotation), float(rotation.w)
-    orientation.x, orientation.y, orientation.z = (real * vector + scalar * by + np.cross(by, vector)).tolist()
-    orientation.w = float(real * scalar - by @ vector)
-
-
-def _transform_cloud(message: Any, rotation: Array, shift: Array, plane: str) -> Any:
-    """Return a cloud with x, y, z transformed, vx, vy, vz rotated and yaw turned.
-
-    Raises MessageError for boxes that would not lie in the plane any more, or whose yaw has no field.
-    """
-    rows = read_table(message).copy()
-    if {'size_x', 'size_y'} & set(rows.dtype.names or ()):
-        with np.errstate(invalid='ignore'):
-            rows['yaw'] = _turn_boxes(rows, rotation, plane)
-    for names, offset in ((('x', 'y', 'z'), shift), (('vx', 'vy', 'vz'), np.zeros(3))):
-        if not set(names) <= set(rows.dtype.names or ()):
-            continue
-        with np.errstate(invalid='ignore', over='ignore'):  # rows that are not finite are dropped when the cloud is decoded
-            transformed = np.stack([rows[name].astype(float) for name in names], axis=-1) @ rotation.T + offset
-            for name, column in zip(names, transformed.T, strict=True):
-                rows[name] = column
-    made = copy(message)
-    made.height, made.width, made.data = 1, len(rows), rows.tobytes()
-    return made
-
-
-def _turn_boxes(rows: Any, rotation: Array, plane: str) -> Array:
-    """Return the yaw (n,) [rad] of boxes after a rotation, which has to leave them in the plane."""
-    tilt = float(np.abs(project((rotation @ lift(np.eye(2), 0.0, plane).T).T, plane)[1]).max())
-    if tilt > MOST_TILT:
-        raise MessageError('fields[size_x]', 'boxes that the transform leaves in the task plane', f'a tilt of {tilt:.3g}')
-    if 'yaw' not in rows.dtype.names:
-        raise MessageError('fields', 'a field yaw, because the transform turns the boxes', ', '.join(rows.dtype.names))
-    yaw = rows['yaw'].astype(float)
-    first = project(lift(np.column_stack([np.cos(yaw), np.sin(yaw)]), 0.0, plane) @ rotation.T, plane)[0]
-    turned: Array = np.arctan2(first[:, 1], first[:, 0])
-    return turned
+    def _find_newest(self, frame_id: str, tolerance_s: float, header: Any) -> Transform:
+        """Return the transform for a header or else the newest one, if its stamp differs by the tolerance [s] at most."""
+        try:
+            return self._find(frame_id, header)
+        except TransformUnavailableError as reason:
+            assert self._source is not None
+            newest = self._source.look_up(frame_id, header.frame_id, 0)
+            late_s = (decode_stamp(header) - newest.stamp_ns) / NANOSECONDS
+            if abs(late_s) > tolerance_s:
+                text = f'{reason}; the newest one is {abs(late_s):.3g} s {"older" if late_s > 0.0 else "newer"} than the message'
+                raise TransformUnavailableError(f'{text} (frames.tolerance_s is {tolerance_s:g})') from None
+            return newest

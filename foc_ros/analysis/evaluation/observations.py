@@ -124,7 +124,7 @@ def observe(recording: Recording, config: Config, replayed: Replay | None = None
             assert replayed.pipeline.hand_state is not None
             made.append((step, replayed.pipeline.hand_state))
     if not made:
-        reason = replayed.pipeline.not_ready_reason() or replayed.intake.last_refusal or 'no candidate could be solved'
+        reason = replayed.describe_refusals() or replayed.pipeline.not_ready_reason() or 'no candidate could be solved'
         raise RecordingError(f'{recording.name}: nothing could be predicted: {reason}')
     goals = made[-1][0].scene.goals
     assert goals is not None

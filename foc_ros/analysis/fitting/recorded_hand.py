@@ -46,8 +46,7 @@ def read_hand(recording: Recording, config: Config) -> RecordedHand:
     """Read a recording as a replay does, without predicting; raises RecordingError for one without goals or with few samples."""
     replayed = Replay(config)
     samples: list[HandSample] = []
-    for item in recording.items():
-        status = replayed.intake.take(item.role, item.message)
+    for _, status in replayed.take(recording.items()):
         sample = replayed.intake.sample
         if status is not None and status.is_taken and sample is not None and (not samples or sample is not samples[-1]):
             samples = samples if not samples or sample.stamp_ns > samples[-1].stamp_ns else []

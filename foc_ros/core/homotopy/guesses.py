@@ -8,11 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from foc_ros.core.kernels import Indices, Matrix, Vector, compiled_exactly, freeze
-from foc_ros.core.obstacles.rounded_polygon import Polygons, find_offsets
+from foc_ros.core.obstacles.rounded_polygon import TURN, Polygons, find_offsets
 from foc_ros.core.types import Array, as_readonly
 
 from .search_scene import SearchScene
-from .sides import TURN
 from .tangent_graph import Outlines, Runs, TangentGraph, measure_arc_between
 
 SLOPE = 0.5

@@ -18,8 +18,8 @@ import numpy as np
 
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.kernels import Indices, Matrix, Register, Table, Vector, compiled_exactly, freeze
+from foc_ros.core.obstacles.rounded_polygon import TURN
 
-from .sides import TURN
 from .tangent_graph import TangentGraph, measure_arc_between
 
 COAST_S = 0.2

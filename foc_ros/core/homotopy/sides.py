@@ -10,10 +10,8 @@ import numpy as np
 
 from foc_ros.core.errors import SceneError
 from foc_ros.core.kernels import Flags, Matrix, Tensor, Vector, compiled_exactly
-from foc_ros.core.obstacles.rounded_polygon import Polygons, tabulate_polygons
+from foc_ros.core.obstacles.rounded_polygon import TURN, Polygons, tabulate_polygons
 from foc_ros.core.types import LEFT, RIGHT, Array, Obstacles
-
-TURN = 2.0 * np.pi
 
 
 def compute_swept_angles(path: Array, centres: Array) -> Array:

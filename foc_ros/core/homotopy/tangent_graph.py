@@ -41,10 +41,10 @@ from foc_ros.core.obstacles.boundary import (
     measure_arc,
     tabulate_boundaries,
 )
-from foc_ros.core.obstacles.rounded_polygon import Polygons, find_offset, find_support
+from foc_ros.core.obstacles.rounded_polygon import TURN, Polygons, find_offset, find_support
 from foc_ros.core.types import Array, as_readonly
 
-from .sides import TURN, count_crossing
+from .sides import count_crossing
 
 GRAZE = 1e-9
 """A run may pass this much nearer to a shape than its radius [m]: shapes in a row share tangents, up to rounding."""

@@ -16,13 +16,12 @@ from foc_ros.core.obstacles.chance_constraint import CERTAIN_K, constraint_momen
 from foc_ros.core.obstacles.rounded_polygon import find_offset
 from foc_ros.core.types import Array
 
+from .contacts.bracket import PARABOLAS, Bracket, find_vertex, narrow
 from .contacts.corners import find_corner
 from .contacts.hermite import basis, interpolate, interpolation_row
 from .problem import Problem
 from .terms import ChanceTerms, Motion
 
-PARABOLAS = 8
-"""Most parabolas fitted in the search beside one step."""
 VERTEX_TOLERANCE = 1e-4
 """Distance in steps from the lowest time so far at which the next vertex is not evaluated any more: k is flat there."""
 WORTH_REFINING = 0.5
@@ -112,27 +111,14 @@ def minimum_safety_factor(
             )
             if not (kb <= ka and kb < kc and kb < near and ka < CERTAIN_K and kc < CERTAIN_K):
                 continue
-            a, b, c = float(t), t + 1.0, t + 2.0
+            bracket = Bracket(float(t), t + 1.0, t + 2.0, ka, kb, kc)
             for _ in range(PARABOLAS):
-                bend = (b - a) * (kb - kc) - (b - c) * (kb - ka)
-                if bend == 0.0:
+                time = find_vertex(bracket, VERTEX_TOLERANCE)
+                if time == np.inf:
                     break
-                time = b - 0.5 * ((b - a) ** 2 * (kb - kc) - (b - c) ** 2 * (kb - ka)) / bend
-                if not a < time < c or abs(time - b) < VERTEX_TOLERANCE:
-                    break
-                k = _k_at_time(motion, chance, trajectory, control_variance, j, time)
-                if k <= kb:
-                    if time < b:
-                        c, kc = b, kb
-                    else:
-                        a, ka = b, kb
-                    b, kb = time, k
-                elif time < b:
-                    a, ka = time, k
-                else:
-                    c, kc = time, k
-            if kb < least:
-                least, row, moment = kb, j, b
+                bracket = narrow(bracket, time, _k_at_time(motion, chance, trajectory, control_variance, j, time))
+            if bracket.at_b < least:
+                least, row, moment = bracket.at_b, j, bracket.b
         for t in range(1, steps if chance.obstacles.polygons.corners[j] > 1 else 1):
             if _is_above(near, mean[j, t - 1], variance[j, t - 1]) and _is_above(near, mean[j, t], variance[j, t]):
                 continue

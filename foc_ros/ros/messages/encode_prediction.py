@@ -30,9 +30,14 @@ CLOUD_ROW = np.dtype(
         ('likelihood', '<f4'),
         ('compromised', '<u4'),
         *((_MOTOR + pair, '<f4') for pair in _PAIRS),
+        ('goal', '<u4'),
+        ('way', '<u4'),
     ]
 )
-"""One time sample of one candidate [m, s, m/s, m^2]; compromised: 1 if eta is below the wanted one."""
+"""One time sample of one candidate [m, s, m/s, m^2]; compromised: 1 if eta is below the wanted one; goal: row; way: number
+of the class."""
+STAMP = 'stamp_ns:'
+"""Beginning of the label with the stamp [ns] of a table of likelihoods, whose message has no header."""
 LIKELIHOOD_COLUMNS = ('likelihood', 'effort', 'cost_ratio', 'eta')
 
 
@@ -60,6 +65,8 @@ def _build_table(prediction: Prediction, plane: str) -> NDArray[np.void]:
     rows['t'] = np.concatenate([solution.times for solution in solutions])
     rows['candidate'] = np.repeat(np.arange(len(outcomes)), lengths)
     rows['likelihood'] = np.repeat([outcome.likelihood for outcome in outcomes], lengths)
+    rows['goal'] = np.repeat([outcome.candidate.goal for outcome in outcomes], lengths)
+    rows['way'] = np.repeat([outcome.way for outcome in outcomes], lengths)
     rows['compromised'] = np.repeat([not outcome.is_solved for outcome in outcomes], lengths)
     return rows
 
@@ -67,7 +74,8 @@ def _build_table(prediction: Prediction, plane: str) -> NDArray[np.void]:
 def encode_likelihoods(prediction: Prediction, types: MessageTypes) -> Any:
     """Encode one row per candidate with a likelihood, with the columns LIKELIHOOD_COLUMNS, as a Float64MultiArray.
 
-    The first dimension's label joins the labels of the candidates by ';'. effort: the remaining one [m^2/s^6].
+    The first dimension's label joins the labels of the candidates by ';', and that of the third one, of size 1, has the stamp.
+    effort: the remaining one [m^2/s^6].
     """
     outcomes = order_candidates(prediction)
     ratios = compute_cost_ratios(outcomes)
@@ -75,7 +83,11 @@ def encode_likelihoods(prediction: Prediction, types: MessageTypes) -> Any:
     labels, width = ';'.join(outcome.candidate.label for outcome in outcomes), len(LIKELIHOOD_COLUMNS)
     dimensions = [
         types.make('std_msgs/msg/MultiArrayDimension', label=label, size=size, stride=stride)
-        for label, size, stride in ((labels, len(rows), width * len(rows)), (','.join(LIKELIHOOD_COLUMNS), width, width))
+        for label, size, stride in (
+            (labels, len(rows), width * len(rows)),
+            (','.join(LIKELIHOOD_COLUMNS), width, width),
+            (f'{STAMP}{prediction.stamp_ns}', 1, 1),
+        )
     ]
     layout = types.make('std_msgs/msg/MultiArrayLayout', dim=dimensions)
     return types.make('std_msgs/msg/Float64MultiArray', layout=layout, data=np.array(rows, dtype=float).ravel())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foc_ros.core.kernels import Matrix, Vector, compiled_with_caller
+from foc_ros.core.kernels import Matrix, Vector, compiled_separately
 from foc_ros.core.ocp.clearance import find_penetrations
 from foc_ros.core.ocp.qp import GoalSolution
 from foc_ros.core.ocp.terms import MovingObstacles, ProblemTerms
@@ -26,7 +26,7 @@ NEW_MULTIPLIER = 1e-6
 """Multiplier with which a new contact begins, relative to the largest, so that it bends the cost hardly at all."""
 
 
-@compiled_with_caller
+@compiled_separately
 def update_active_contacts(
     terms: ProblemTerms, obstacles: MovingObstacles, goal: GoalSolution, contacts: Contacts, near: Vector
 ) -> tuple[bool, bool, Vector, Matrix, Contacts]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from foc_ros.core.dynamics.condensed import largest_shift
 from foc_ros.core.homotopy import compute_swept_angles, is_same_class, sweep_angles
-from foc_ros.core.kernels import Matrix, Vector, compiled, compiled_with_caller, freeze
+from foc_ros.core.kernels import Matrix, Vector, compiled, compiled_separately, freeze
 from foc_ros.core.obstacles.rounded_polygon import find_normal, find_offset, measure_half_widths
 from foc_ros.core.ocp.clearance import SMALLEST_DISTANCE, find_deepest, find_penetrations, required_distance
 from foc_ros.core.ocp.minimum_safety_factor import MinimumSafetyFactor, minimum_safety_factor
@@ -122,7 +122,7 @@ def is_fixed_point(problem: Problem, control: Array, contacts: Contacts, tau: fl
     return largest_shift(problem.horizon.maps[:2], control, free + multipliers @ dual.effects) < STAYS * problem.extent
 
 
-@compiled_with_caller
+@compiled_separately
 def _linearise_contacts(motion: Motion, obstacles: MovingObstacles, control: Vector, contacts: Contacts) -> tuple[Matrix, Vector]:
     """Return rows n.S(s) (k, 2N) and limits (k,) on them [m]: the half-planes that touch the obstacles at the contacts."""
     k = len(contacts.time)

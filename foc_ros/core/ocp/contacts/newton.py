@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foc_ros.core.kernels import Indices, Matrix, Vector, compiled_with_caller
+from foc_ros.core.kernels import Indices, Matrix, Vector, compiled_separately, compiled_with_caller
 from foc_ros.core.linear_algebra import (
     factorise_cholesky,
     multiply,
@@ -41,6 +41,8 @@ SETTLING_STEPS = 4
 """Steps after which the moves have to shrink."""
 LARGEST_GROWTH = 2.0
 """Growth of the moves from one step to the next beyond which the iteration is then given up."""
+LARGEST_TURN = 0.5
+"""Tangent of the largest angle by which the normal of a contact may turn in one step: beyond it a linearisation means little."""
 LONGEST_SLIDE = 2.0
 """Most steps in time that a contact may slide at once."""
 SMALLEST_MULTIPLIER = 1e-3
@@ -56,6 +58,16 @@ REGULARISATION = 1e-13
 
 
 @compiled_with_caller
+def limit_turn(distance: float, across: float, along: float) -> float:
+    """Return the largest part, at most 1, of a move that turns the normal of a contact no further than `LARGEST_TURN`.
+
+    distance: from the vertex [m]; across, along: the parts of the move along the tangent and away from the vertex [m].
+    """
+    excess = abs(across) - LARGEST_TURN * along
+    return min(1.0, LARGEST_TURN * distance / excess) if excess > 0.0 else 1.0
+
+
+@compiled_separately
 def newton_step(schur: Matrix, missing: Matrix, curvature: Vector, distance: Vector, slides: Indices) -> tuple[bool, Matrix]:
     """Solve for one Newton step: whether there is a solution, and the multipliers (1, 3k) of the rows h, r and g.
 
@@ -116,7 +128,7 @@ def newton_step(schur: Matrix, missing: Matrix, curvature: Vector, distance: Vec
     return bool(np.isfinite(step).all()), step
 
 
-@compiled_with_caller
+@compiled_separately
 def newton_on_contacts(
     motion: Motion,
     obstacles: MovingObstacles,
@@ -170,19 +182,22 @@ def newton_on_contacts(
         found, step = newton_step(schur, missing, curvature / weight, distance / weight, slides)
         if not found:
             break
-        multiplier = step[0, :k].copy()
+        before = control
+        control = goal.control + multiply(step, effects)[0]
+        moved, move, share = multiply_vector(rows, control - before), 0.0, 1.0
+        for i in range(k):
+            move = max(move, abs(moved[i]), abs(moved[2 * k + i]))
+            share = min(share, limit_turn(abs(distance[i]), moved[2 * k + i], np.sign(distance[i]) * moved[i]))
+        control = before + share * (control - before)
+        multiplier += share * (step[0, :k] - multiplier)
         if multiplier.min() < 0.0:
             pulling = contacts.multiplier.copy()
             pulling[multiplier.argmin()] = multiplier.min()
             return True, near.copy(), Contacts(contacts.obstacle.copy(), contacts.time.copy(), pulling)
-        before = control
-        control = goal.control + multiply(step, effects)[0]
-        moved, move = multiply_vector(rows, control - before), 0.0
         for i in range(k):
-            move = max(move, abs(moved[i]), abs(moved[2 * k + i]))
             if slides[i] == 1:
                 slide = min(max(step[0, k + i] / weight[i], -LONGEST_SLIDE), LONGEST_SLIDE)
-                time[i] = min(max(time[i] + slide, 1.0), steps)
+                time[i] = min(max(time[i] + share * slide, 1.0), steps)
                 move = max(move, abs(slide * passing[i]))
         if move < tolerance:
             is_turned = False  # a contact went round to the other side of its obstacle: another homotopy class

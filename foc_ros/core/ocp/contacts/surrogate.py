@@ -28,6 +28,7 @@ from foc_ros.core.obstacles.rounded_polygon import Offset, find_normal, find_off
 from foc_ros.core.ocp.clearance import required_distance
 from foc_ros.core.ocp.terms import ChanceTerms, MovingObstacles, ProblemTerms
 
+from .bracket import PARABOLAS, Bracket, find_vertex, narrow
 from .corners import NO_CORNER, Corner, find_corner
 from .hermite import basis, contact_rows, interpolate
 
@@ -35,8 +36,6 @@ SMALLEST_VARIANCE = 1e-24
 """Least Var[C] [m^4]: its root has no derivative at zero."""
 SMALLEST_DISTANCE = 1e-9
 """Least distance from a centre by which a margin is divided [m]."""
-PARABOLAS = 8
-"""Most parabolas fitted in the search for the least margin beside one step."""
 VERTEX_TOLERANCE = 1e-3
 """Distance in steps from the lowest time so far at which the next vertex is not evaluated any more."""
 CORNER_REACH = 1.0
@@ -173,43 +172,29 @@ def find_least_margin(
     terms: ProblemTerms, obstacles: MovingObstacles, trajectory: Matrix, control: Vector, j: int, k: float, margin: Vector, t: int
 ) -> tuple[float, float]:
     """Return the time near step t of the least margin of obstacle j, and that margin, by parabolas through three times."""
-    a, b, c = t - 1.0, float(t), t + 1.0
-    before, least, after = margin[t - 1], margin[t], margin[t + 1]
+    bracket = Bracket(t - 1.0, float(t), t + 1.0, margin[t - 1], margin[t], margin[t + 1])
     for _ in range(PARABOLAS):
-        bend = (b - a) * (least - after) - (b - c) * (least - before)
-        if bend == 0.0:
-            break
-        time = b - 0.5 * ((b - a) ** 2 * (least - after) - (b - c) ** 2 * (least - before)) / bend
-        if not a < time < c or abs(time - b) < VERTEX_TOLERANCE:
+        time = find_vertex(bracket, VERTEX_TOLERANCE)
+        if time == np.inf:
             break
         value = evaluate_margin(terms, obstacles, trajectory, control, j, time, k, 0.0).value
-        if value <= least:
-            if time < b:
-                c, after = b, least
-            else:
-                a, before = b, least
-            b, least = time, value
-        elif time < b:
-            a, before = time, value
-        else:
-            c, after = time, value
-    return b, least
+        bracket = narrow(bracket, time, value)
+    return bracket.b, bracket.at_b
 
 
 @compiled_separately
 def find_kink(
-    terms: ProblemTerms, obstacles: MovingObstacles, trajectory: Matrix, control: Vector, j: int, s: float, k: float
+    terms: ProblemTerms, obstacles: MovingObstacles, trajectory: Matrix, control: Vector, j: int, s: float, k: float, here: Margin
 ) -> tuple[Corner, tuple[Margin, Margin, Margin]]:
     """Find a corner near time s at which the margin of obstacle j is least, as it falls before it and rises after it.
 
-    Returns the corner, with an infinite time if there is none, and the margins that `hold_at_corner` needs.
+    here: the margin at s. Returns the corner, at an infinite time if there is none, and the margins that `hold_at_corner` needs.
     """
     corner = find_corner(obstacles, trajectory, j, s, CORNER_REACH)
-    at = evaluate_margin(terms, obstacles, trajectory, control, j, s, k, 0.0)
     if not max(terms.chance.obstacles.ignored_until[j], 1.0) < corner.time < trajectory.shape[1] - 1.0:
-        return NO_CORNER, (at, at, at)
-    value, at = at.value, evaluate_margin(terms, obstacles, trajectory, control, j, corner.time, k, at.scale)
-    if at.value > value + LEAST_RISE:
+        return NO_CORNER, (here, here, here)
+    at = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time, k, here.scale)
+    if at.value > here.value + LEAST_RISE:
         return NO_CORNER, (at, at, at)
     before = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time - TIME_STEP, k, at.scale)
     after = evaluate_margin(terms, obstacles, trajectory, control, j, corner.time + TIME_STEP, k, at.scale)

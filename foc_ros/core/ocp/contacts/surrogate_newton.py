@@ -28,21 +28,11 @@ from foc_ros.core.ocp.terms import CostTerms, MovingObstacles, ProblemTerms
 from .contacts import Contacts
 from .corners import Corner
 from .hermite import compute_trajectory, interpolate
-from .surrogate import TIME_STEP, Margin, evaluate_margin, find_kink
+from .newton import LARGEST_GROWTH, LONGEST_SLIDE, MAX_STEPS, SETTLING_STEPS, SMALLEST_CURVATURE, SMALLEST_MULTIPLIER, limit_turn
+from .surrogate import SMALLEST_DISTANCE, TIME_STEP, Margin, evaluate_margin, find_kink
 
-MAX_STEPS = 12
-SETTLING_STEPS = 4
-"""Steps after which the moves have to shrink."""
-LARGEST_GROWTH = 2.0
-"""Growth of the moves from one step to the next beyond which the iteration is then given up."""
-LONGEST_SLIDE = 2.0
-"""Most steps in time that a contact may slide at once."""
-SMALLEST_MULTIPLIER = 1e-3
-"""Least multiplier in the equations of the times, relative to the largest."""
-SMALLEST_CURVATURE = 1e-2
-"""Least curvature of a margin over time while steps are made, as a share of that of a straight pass."""
 STANDSTILL_CURVATURE = 1e-12
-"""The same of a mean that stands still [m]."""
+"""Least curvature of a margin over time while steps are made, of a mean that stands still [m]."""
 FAR_OFF = 10.0
 """Margin at a contact, relative to the tolerance of moves, at which the iteration goes on although nothing moves."""
 K_SCALE = 1e-2
@@ -164,12 +154,12 @@ def linearise_contact(
     """Write all that belongs to contact i."""
     m, steps = len(contacts.time), trajectory.shape[1] - 1
     j, s = contacts.obstacle[i], contacts.time[i]
+    at = evaluate_margin(terms, obstacles, trajectory, control, j, s, k, 0.0)
     if obstacles.polygons.corners[j] > 1:
-        corner, side = find_kink(terms, obstacles, trajectory, control, j, s, k)
+        corner, side = find_kink(terms, obstacles, trajectory, control, j, s, k, at)
         if corner.time < np.inf:
             hold_at_corner(terms, control, contacts, i, corner, side, into)
             return
-    at = evaluate_margin(terms, obstacles, trajectory, control, j, s, k, 0.0)
     earlier, later = max(s - TIME_STEP, 1.0), min(s + TIME_STEP, float(steps))
     before = evaluate_margin(terms, obstacles, trajectory, control, j, earlier, k, at.scale)
     after = evaluate_margin(terms, obstacles, trajectory, control, j, later, k, at.scale)
@@ -293,7 +283,8 @@ def newton_on_surrogate(
     multiplier.
     """
     m, r, steps, last = len(contacts.time), len(terms.cost.softness), terms.motion.responses.shape[2] - 1.0, np.inf
-    control, time, multiplier, first = near.copy(), contacts.time.copy(), contacts.multiplier.copy(), np.empty((m, 2))
+    control, time, multiplier = near.copy(), contacts.time.copy(), contacts.multiplier.copy()
+    first, slide = np.empty((m, 2)), np.empty(m)
     for count in range(MAX_STEPS):
         made = linearise_conditions(terms, obstacles, control, Contacts(contacts.obstacle, time, multiplier), k)
         if count == 0:
@@ -305,16 +296,24 @@ def newton_on_surrogate(
         if parity == 0.0:
             break
         change = alone + found @ influence
-        control = control + change
-        k, move = k + found[len(found) - 1 - r], K_SCALE * terms.extent * abs(found[len(found) - 1 - r])
-        weight = SMALLEST_MULTIPLIER * multiplier.max() if m > 0 else 0.0
+        k_change = found[len(found) - 1 - r]
+        move, share, weight = (
+            K_SCALE * terms.extent * abs(k_change),
+            1.0,
+            SMALLEST_MULTIPLIER * multiplier.max() if m > 0 else 0.0,
+        )
         for i in range(m):
             shift = multiply_vector(made.rows[rank * i : rank * i + 2], change)
-            slide = min(max(found[sigma + i] / max(multiplier[i], weight), -LONGEST_SLIDE), LONGEST_SLIDE)
+            slide[i] = min(max(found[sigma + i] / max(multiplier[i], weight), -LONGEST_SLIDE), LONGEST_SLIDE)
+            apart = max(np.hypot(made.offset[i, 0], made.offset[i, 1]), SMALLEST_DISTANCE)
+            nx, ny = made.offset[i, 0] / apart, made.offset[i, 1] / apart
+            share = min(share, limit_turn(apart, nx * shift[1] - ny * shift[0], nx * shift[0] + ny * shift[1]))
+            move = max(move, np.hypot(shift[0], shift[1]), abs(slide[i]) * made.speed[i], abs(made.value[i]) / FAR_OFF)
+        control, k = control + share * change, k + share * k_change
+        multiplier += share * (found[y : y + m] - multiplier)
+        for i in range(m):
             begin = max(terms.chance.obstacles.ignored_until[contacts.obstacle[i]], 1.0)
-            time[i] = min(max(time[i] + slide, begin if time[i] >= begin else 1.0), steps)
-            move = max(move, np.hypot(shift[0], shift[1]), abs(slide) * made.speed[i], abs(made.value[i]) / FAR_OFF)
-        multiplier[:] = found[y : y + m]
+            time[i] = min(max(time[i] + share * slide[i], begin if time[i] >= begin else 1.0), steps)
         if m > 0 and multiplier.min() < 0.0:
             pulling = contacts.multiplier.copy()
             pulling[multiplier.argmin()] = multiplier.min()

@@ -39,15 +39,15 @@ ROUNDINGS = (1.0, 0.25, 0.05)
 """Parts of the clearance for the wanted k with which Newton steps begin where they do not lead on from the least effort."""
 CLOSE = 5e-6
 """Relative excess over the wanted k that is aimed at."""
-FALLBACKS = (1.0, 0.75, 0.5, 0.35, 0.25)
-"""Shares of the earlier k that are tried where Newton steps do not lead to the one that is wanted: k rises again from there."""
+WARM_SHARES, COLD_SHARES = (1.0, 0.75), (1.0, 0.75, 0.5, 0.35, 0.25)
+"""Parts of k that are tried from an earlier solution, and from the least effort: k rises again from there."""
 EVEN = 1e-4
 """Relative difference of the slope from the one that is worth it at which both are the same."""
 FOLLOW_SHARE = 0.5
 """Part of the time left that an earlier solution may take; then the search begins again."""
 NEARLY = 0.3
 """Part of the slope that is worth it from which Newton steps are tried that have k as an unknown."""
-MOST_TRIES, WARM_STRIDE = 4, 0.3
+MOST_TRIES, WARM_STRIDE = 2, 0.3
 """Values of k that are tried where the next prediction goes on from the result; the first stride in k of that."""
 NARROW = 0.02
 """Bracket in k at which the search ends."""
@@ -143,10 +143,7 @@ class _Search:
         positions = np.concatenate((problem.initial_mean[None, :2], start.positions))
         self.angles = compute_swept_angles(positions, problem.centre_trajectories)
         control, contacts = correct_to_goal(problem, start.control, start.positions), start.contacts.merge(problem.first_alike)
-        before = min(start.safety_factor, self.wanted)
-        point = self.weigh(control, contacts, before) if before < problem.wanted_k else None
-        if point is None or point.k > self.wanted:
-            point = self.solve_below(control, contacts, before)
+        point = self.solve_below(control, contacts, min(start.safety_factor, self.wanted), WARM_SHARES)
         point = None if point is None else self.lower_k(point)
         if point is None or not 0.0 <= point.k <= self.wanted:
             return False
@@ -170,7 +167,7 @@ class _Search:
             if at is first:
                 unknown = np.full(len(contacts.time), np.nan)
                 self.best = SurrogatePoint(control, contacts, minimum.k, 0.0, float(control @ control), unknown, unknown)
-            found = self.solve_below(control, contacts, min(max(minimum.k, 0.0), self.wanted))
+            found = self.solve_below(control, contacts, min(max(minimum.k, 0.0), self.wanted), COLD_SHARES)
             if found is not None:
                 self.best = self.lower_k(found)
                 is_stuck = self.raise_k()
@@ -179,7 +176,7 @@ class _Search:
                     break
         self.qp_solves += follower.qp_solves
         self.best = max(tried, key=lambda point: point.k, default=self.best)
-        return self.best is not None and self.best.k > -NARROW  # below zero the mean itself passes through an obstacle
+        return self.best is not None
 
     def is_cheap(self, point: SurrogatePoint) -> bool:
         """Tell whether a larger k would be worth its effort at a point."""
@@ -243,9 +240,9 @@ class _Search:
         self.deadline.check()
         return solve_surrogate_point(self.problem, near, contacts, k, self.angles)
 
-    def solve_below(self, near: Array, contacts: Contacts, k: float) -> SurrogatePoint | None:
-        """Find the point at a k near another one, or at a part of it where Newton steps do not lead there."""
-        for share in FALLBACKS if k > 0.0 else (1.0,):
+    def solve_below(self, near: Array, contacts: Contacts, k: float, shares: tuple[float, ...]) -> SurrogatePoint | None:
+        """Find the point near another one at the first of the shares of k that Newton steps lead to."""
+        for share in shares if k > 0.0 else (1.0,):
             point = self.solve(near, contacts, share * k)
             if point is not None:
                 return point

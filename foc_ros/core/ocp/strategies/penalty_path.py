@@ -138,10 +138,10 @@ class PathFollower:
     ) -> PathPoint | None:
         """Solve at s from a guess (N, 2) by QPs, until Newton steps lead from one of them to a solution, or the QPs settle.
 
-        thorough: spare no effort.
+        thorough: spare no effort, and return the solution of the last QP where they do not settle, which keeps clear as well.
         """
         found = self._run_qps(s, guess, working, class_angles, thorough=thorough)
-        if found is None or not found.stays:
+        if found is None or not (found.stays or thorough):
             return None
         if found.jumped is not None:
             return self._remember(PathPoint(s, found.jumped))

@@ -1,0 +1,95 @@
+"""The closed-loop study as a page: a figure of the main measures, the table of each operator, and single trials."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from foc_ros.analysis.simulation.assistance import FOC, NONE
+from foc_ros.analysis.simulation.operators import Task
+from foc_ros.analysis.simulation.study import PairResult
+from foc_ros.analysis.simulation.tables import COLUMNS, make_tables
+from foc_ros.analysis.simulation.trial import Trial
+
+from .drawing import draw_scene, get_class_style, open_figure
+from .page import render_page, render_picture, render_pictures, render_table, write_page
+from .plots import save_figure
+
+PAGE = 'simulation.html'
+DRAWN = ('collision_rate', 'completion_s', 'opposing_impulse')
+"""Measures with a figure."""
+WIDTH_IN, HEIGHT_IN = 6.4, 4.2
+ARROWS = 24
+"""Number of arrows along a path."""
+NEWTONS_PER_M = 60.0
+"""Force that is drawn with the length of one metre [N/m]."""
+BORDER_M = 0.04
+
+
+def write_report(directory: Path, cells: Sequence[Mapping[str, Any]], results: Sequence[PairResult]) -> None:
+    """Write the page; cells: of `simulate --json`. Raises InputError where that cannot be done."""
+    tables = ''.join(render_table(columns, rows, heading) for heading, columns, rows in make_tables(cells))
+    with TemporaryDirectory() as scratch:
+        file = Path(scratch) / 'picture.png'
+        figures = render_pictures(_render_measures(cells, file))
+        trials = render_pictures(_render_trials(results, file))
+    body = f'{figures}{tables}<h2>Single trials</h2>{trials}'
+    write_page(directory, PAGE, render_page('Closed-loop study of guidance', body))
+
+
+def _render_measures(cells: Sequence[Mapping[str, Any]], file: Path) -> Iterator[str]:
+    for name in DRAWN:
+        with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
+            _draw_measure(figure.subplots(), cells, name)
+        save_figure(figure, file)
+        yield render_picture(file, f'{COLUMNS[name][0]}: mean over the paired trials, with its bootstrap interval of 95 %.')
+
+
+def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> None:
+    """Draw the mean of a measure with its interval for every operator and rule."""
+    operators, rules = (list(dict.fromkeys(cell[key] for cell in cells)) for key in ('operator', 'assistance'))
+    heading, factor, _ = COLUMNS[name]
+    for number, rule in enumerate(rules):
+        drawn = [cell for cell in cells if cell['assistance'] == rule and cell[name] is not None]
+        at = [operators.index(cell['operator']) + 0.14 * (number - (len(rules) - 1) / 2) for cell in drawn]
+        means = factor * np.array([cell[name] for cell in drawn])
+        bounds = factor * np.array([cell[f'{name}_interval'] for cell in drawn]).reshape(-1, 2)
+        errors = np.maximum(np.abs(bounds.T - means), 0.0)
+        axes.errorbar(at, means, errors, fmt='o', markersize=4, capsize=2, color=get_class_style(number)[0], label=rule)
+    axes.set_xticks(range(len(operators)), [name.replace('_', '\n') for name in operators])
+    axes.set(ylabel=heading)
+    axes.set_ylim(bottom=0.0)
+    axes.legend(fontsize='small')
+
+
+def _render_trials(results: Sequence[PairResult], file: Path) -> Iterator[str]:
+    """Yield a picture of every trial that was kept."""
+    for result in results:
+        if result.task is None:
+            continue
+        with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
+            _draw_trial(figure.subplots(), result.task, result.trials)
+        save_figure(figure, file)
+        words = 'Intended path dashed; arrows: force of foc; crosses: within an obstacle.'
+        yield render_picture(file, f'Operator {result.operator}. {words}')
+
+
+def _draw_trial(axes: Any, task: Task, trials: Mapping[str, Trial]) -> None:
+    everything = np.concatenate([task.path.position, task.goals, *(each.position for each in trials.values())])
+    (left, low), (right, high) = everything.min(axis=0) - BORDER_M, everything.max(axis=0) + BORDER_M
+    draw_scene(axes, task.obstacles, task.goals, (float(left), float(right), float(low), float(high)))
+    axes.plot(*task.path.position.T, color='black', linestyle='--', linewidth=1.0, label='intended')
+    for number, (rule, trial) in enumerate(trials.items()):
+        look = {'color': get_class_style(number)[0], 'linewidth': 2.0 if rule in (FOC, NONE) else 1.0}
+        axes.plot(*trial.position.T, label=rule, **look)
+        touching = trial.position[trial.find_collisions(task)]
+        axes.plot(*touching.T, linestyle='', marker='x', markersize=4, color=look['color'])
+        if rule == FOC:
+            rows = np.linspace(0, len(trial.position) - 1, ARROWS).astype(int)
+            options = {'angles': 'xy', 'scale_units': 'xy', 'scale': NEWTONS_PER_M, 'width': 0.004, 'color': look['color']}
+            axes.quiver(*trial.position[rows].T, *trial.assistance[rows].T, zorder=6, **options)
+    axes.legend(fontsize='small', loc='upper left')

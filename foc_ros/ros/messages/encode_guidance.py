@@ -1,0 +1,105 @@
+"""Encoding of guidance: wrench, reference, stiffness, a blended command and markers, in the task plane only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from foc_ros.core.guidance.step import GuidanceOutput
+
+from .encode_inputs import encode_hand_pose
+from .plane import lift, project
+from .types import MessageTypes, make_header
+
+ARROW, SPHERE = 0, 2
+METRES_PER_NEWTON = 0.02
+ARROW_SCALE = (0.004, 0.008, 0.0)
+"""Diameters of the shaft and the head of the arrow [m]."""
+REFERENCE_DIAMETER = 0.008
+COLOUR = (0.0, 0.62, 0.45, 0.9)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where guidance holds: stamp [ns], frame and height [m] of the hand sample, and the task plane."""
+
+    stamp_ns: int
+    frame_id: str
+    height: float
+    plane: str
+
+
+def encode_wrench(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
+    """Encode the force as a geometry_msgs/WrenchStamped without torque."""
+    wrench = types.make('geometry_msgs/msg/Wrench', force=_encode_vector(lift(output.force, 0.0, place.plane), types))
+    return types.make('geometry_msgs/msg/WrenchStamped', header=_encode_header(place, types), wrench=wrench)
+
+
+def encode_reference(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
+    """Encode the reference as a geometry_msgs/PoseStamped, whose orientation means nothing."""
+    position = lift(output.reference, place.height, place.plane).tolist()
+    return encode_hand_pose(types, place.stamp_ns, place.frame_id, position)
+
+
+def encode_stiffness(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
+    """Encode the stiffness [N/m] as a std_msgs/Float64MultiArray of 3 x 3."""
+    axes = lift(np.eye(2), 0.0, place.plane)
+    dimensions = [
+        types.make('std_msgs/msg/MultiArrayDimension', label=label, size=3, stride=stride)
+        for label, stride in (('row', 9), ('column', 3))
+    ]
+    layout = types.make('std_msgs/msg/MultiArrayLayout', dim=dimensions)
+    return types.make('std_msgs/msg/Float64MultiArray', layout=layout, data=(axes.T @ output.stiffness @ axes).ravel())
+
+
+def blend_twist(output: GuidanceOutput, command: Any, plane: str, types: MessageTypes) -> Any:
+    """Return a geometry_msgs/TwistStamped command with the part in the plane blended; the rest of it is kept."""
+    linear = command.twist.linear
+    velocity, across = project([linear.x, linear.y, linear.z], plane)
+    blended = lift(output.blend_command(velocity), across, plane)
+    twist = types.make('geometry_msgs/msg/Twist', linear=_encode_vector(blended, types), angular=command.twist.angular)
+    return types.make('geometry_msgs/msg/TwistStamped', header=command.header, twist=twist)
+
+
+def encode_guidance_markers(output: GuidanceOutput, place: Place, types: MessageTypes) -> list[Any]:
+    """Encode the force as an arrow from the hand, and the reference as a sphere."""
+    start = lift(output.position, place.height, place.plane)
+    end = start + METRES_PER_NEWTON * lift(output.force, 0.0, place.plane)
+    points = [types.make('geometry_msgs/msg/Point', **dict(zip('xyz', each.tolist(), strict=True))) for each in (start, end)]
+    reference = encode_reference(output, place, types).pose
+    arrow = {'type': ARROW, 'scale': _encode_vector(np.array(ARROW_SCALE), types), 'points': points}
+    sphere = {'type': SPHERE, 'scale': _encode_vector(np.full(3, REFERENCE_DIAMETER), types)}
+    shared = {
+        'header': _encode_header(place, types),
+        'ns': 'guidance',
+        'color': types.make('std_msgs/msg/ColorRGBA', **dict(zip('rgba', COLOUR, strict=True))),
+        'lifetime': types.make('builtin_interfaces/msg/Duration', sec=1),
+    }
+    origin = encode_hand_pose(types, 0, '', (0.0, 0.0, 0.0)).pose
+    return [
+        types.make('visualization_msgs/msg/Marker', id=0, pose=origin, **arrow, **shared),
+        types.make('visualization_msgs/msg/Marker', id=1, pose=reference, **sphere, **shared),
+    ]
+
+
+def _encode_header(place: Place, types: MessageTypes) -> Any:
+    return make_header(types, place.stamp_ns, place.frame_id)
+
+
+def _encode_vector(vector: Any, types: MessageTypes) -> Any:
+    x, y, z = vector.tolist()
+    return types.make('geometry_msgs/msg/Vector3', x=x, y=y, z=z)
+
+
+WRENCH, REFERENCE, STIFFNESS, TWIST = (f'guidance/{name}' for name in ('wrench', 'reference', 'stiffness', 'twist'))
+TWIST_TYPE = 'geometry_msgs/msg/TwistStamped'
+Encoder = Callable[[GuidanceOutput, Place, MessageTypes], Any]
+GUIDANCE_OUTPUTS: dict[str, tuple[str, Encoder]] = {
+    WRENCH: ('geometry_msgs/msg/WrenchStamped', encode_wrench),
+    REFERENCE: ('geometry_msgs/msg/PoseStamped', encode_reference),
+    STIFFNESS: ('std_msgs/msg/Float64MultiArray', encode_stiffness),
+}
+"""Message type and encoder of every output of each update, by the name of its topic below the node's name."""

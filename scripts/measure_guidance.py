@@ -1,0 +1,155 @@
+"""Measure the period of the wrench while predictions take long, and the time from the clutch to a force of zero.
+
+The node runs in a process of its own, where every prediction first keeps Python's global lock for `--load` seconds. This process
+plays a hand at 100 Hz and notes when wrenches arrive. Run `.venv/bin/python scripts/measure_guidance.py`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import time
+from typing import Any
+
+import numpy as np
+
+RATE_HZ = 200.0
+OPTIONS = (
+    'guidance.enabled:=true',
+    'guidance.clearance:=0.0',
+    'scene.timeout_s:=0.0',
+    'budget_s:=0.0',
+)
+REPEATS = 10
+GUIDED_S = 1.0
+"""Time of guidance before each use of the clutch [s]."""
+
+
+def run_node(load_s: float) -> int:
+    """Run the node with predictions that keep the global lock for a time [s]."""
+    from foc_ros.core.pipeline import PredictionTask
+    from foc_ros.ros.main import main
+
+    run = PredictionTask.run
+
+    def run_slowly(task: PredictionTask) -> Any:
+        end = time.monotonic() + load_s
+        while time.monotonic() < end:
+            sum(range(100))
+        return run(task)
+
+    PredictionTask.run = run_slowly  # type: ignore[method-assign, assignment]
+    return main(['--ros-args', *(word for option in OPTIONS for word in ('-p', option))])
+
+
+class Player:
+    """Plays a hand that passes an obstacle, and keeps the arrival time [s] and the size [N] of every wrench."""
+
+    def __init__(self, node: Any) -> None:
+        from geometry_msgs.msg import PoseArray, PoseStamped, WrenchStamped
+        from rclpy.qos import qos_profile_sensor_data
+        from sensor_msgs.msg import PointCloud2
+        from std_srvs.srv import SetBool
+
+        from foc_ros.ros.messages.encode_inputs import encode_goals, encode_obstacles
+        from foc_ros.ros.messages.types import RclpyTypes
+
+        self._types, self._tick = RclpyTypes(), 0
+        self.wrenches: list[tuple[float, float]] = []
+        self._hand = node.create_publisher(PoseStamped, 'hand_pose', qos_profile_sensor_data)
+        self._scene = node.create_publisher(PointCloud2, 'obstacles', 10), node.create_publisher(PoseArray, 'goals', 10)
+        node.create_subscription(WrenchStamped, 'foc/guidance/wrench', self._note, 100)
+        node.create_timer(0.01, self._move)
+        self.clutch, self._request = node.create_client(SetBool, 'foc/engage'), SetBool.Request
+        rows = [(0.15, 0.02, 0.0, 0.03, 0.0, 0.0)]
+        self._messages = (
+            encode_obstacles(self._types, 1, 'world', rows),
+            encode_goals(self._types, 1, 'world', np.eye(3)[:1] * 0.3),
+        )
+
+    def engage(self, is_on: bool) -> Any:
+        """Close or open the clutch; return the future."""
+        return self.clutch.call_async(self._request(data=is_on))
+
+    def _move(self) -> None:
+        from foc_ros.ros.messages.encode_inputs import encode_hand_pose
+
+        self._tick += 1
+        if self._tick % 50 == 1:
+            for publisher, message in zip(self._scene, self._messages, strict=True):
+                publisher.publish(message)
+        t = 0.01 * (self._tick % 150)
+        position = (0.15 * t, 0.02 * np.sin(6.0 * t), 0.0)
+        self._hand.publish(encode_hand_pose(self._types, time.time_ns(), 'world', position))
+
+    def _note(self, message: Any) -> None:
+        force = message.wrench.force
+        self.wrenches.append((time.monotonic(), float(np.hypot(force.x, force.y))))
+
+
+def measure(load_s: float) -> dict[str, float]:
+    """Return percentiles of the period, in nominal periods, and the times from the clutch to a force of zero [s]."""
+    import rclpy
+    from rclpy.executors import SingleThreadedExecutor
+
+    command = [sys.executable, __file__, '--node', '--load', str(load_s)]
+    with rclpy.Context() as context, subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+        node = rclpy.create_node('player', context=context)
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        try:
+            return _play(Player(node), executor)
+        finally:
+            process.terminate()
+
+
+def _play(player: Player, executor: Any) -> dict[str, float]:
+    def spin(seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            executor.spin_once(timeout_sec=0.01)
+
+    end = time.monotonic() + 60.0
+    while not player.wrenches and time.monotonic() < end:
+        spin(0.1)
+    periods, delays = [], []
+    for _ in range(REPEATS):
+        player.engage(True)
+        spin(0.5)
+        player.wrenches.clear()
+        spin(GUIDED_S)
+        periods += np.diff([at for at, _ in player.wrenches]).tolist()
+        asked = time.monotonic()
+        player.engage(False)
+        spin(0.5)
+        zeros = [at for at, force in player.wrenches if at > asked and force == 0.0]
+        delays.append(zeros[0] - asked if zeros else np.inf)
+    p50, p99, longest = RATE_HZ * np.percentile(periods, [50, 99, 100])
+    return {
+        'wrenches': len(periods),
+        'period_p50': float(p50),
+        'period_p99': float(p99),
+        'period_max': float(longest),
+        'to_zero_p50_s': float(np.median(delays)),
+        'to_zero_max_s': float(np.max(delays)),
+    }
+
+
+def main() -> int:
+    """Print the measurement as a JSON object."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--load', type=float, default=0.03, metavar='S', help='time for which each prediction keeps the lock')
+    parser.add_argument('--node', action='store_true', help='run the node (used by the script itself)')
+    arguments = parser.parse_args()
+    if arguments.node:
+        return run_node(arguments.load)
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    print(json.dumps({'load_s': arguments.load, **measure(arguments.load)}))
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,117 @@
+"""The real tf2, where it is installed: transforms over DDS that arrive after the messages that need them.
+
+`scripts/tf2_check` compiles tf2 where ROS 2 is not installed, and runs this file.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import ros_helpers
+from scipy.spatial.transform import Rotation
+
+ros_helpers.require_ros()
+tf2_ros = pytest.importorskip('tf2_ros', reason='optional message package: tf2_ros', exc_type=ImportError)
+
+from geometry_msgs.msg import TransformStamped  # noqa: E402
+from message_helpers import SECOND, cloud, obstacle_table  # noqa: E402
+from node_helpers import TYPES, Bench, figures, hand_path  # noqa: E402
+from rclpy.time import Time  # noqa: E402
+from ros_helpers import Graph  # noqa: E402
+from rosgraph_msgs.msg import Clock  # noqa: E402
+
+from foc_ros.ros.transform_tree import TransformTree  # noqa: E402
+from foc_ros.ros.transforms import TransformUnavailableError  # noqa: E402
+
+
+def transform(parent: str, child: str, stamp_ns: int, position: Any, quaternion: Any = (0.0, 0.0, 0.0, 1.0)) -> Any:
+    message = TransformStamped(child_frame_id=child)
+    message.header.frame_id, message.header.stamp = parent, Time(nanoseconds=stamp_ns).to_msg()
+    for axis, value in zip('xyz', position, strict=True):
+        setattr(message.transform.translation, axis, float(value))
+    for axis, value in zip('xyzw', quaternion, strict=True):
+        setattr(message.transform.rotation, axis, float(value))
+    return message
+
+
+def is_followed(ros: Graph, bench: Bench) -> Any:
+    """Return a broadcaster whose transforms the node receives."""
+    broadcaster = tf2_ros.TransformBroadcaster(bench.player)
+    ros.spin_until(lambda: broadcaster.pub_tf.get_subscription_count() > 0, 'the listener')
+    return broadcaster
+
+
+def test_no_message_is_refused_whose_transform_arrives_after_it(ros: Graph) -> None:
+    """A hand and obstacles in the frame of a camera on a moving arm, each sent before the transform for its stamp."""
+    bench = Bench(ros, parameters={'frame_id': 'world', 'frames.tolerance_s': 10.0})
+    bench.publish_scene()
+    broadcaster, rows = is_followed(ros, bench), obstacle_table([(0.2, 0.02, 0.0, 0.03)])
+    broadcaster.sendTransform(transform('world', 'camera', 10 * SECOND - 1, (0.0, 0.0, 0.0)))
+    for i, pose in enumerate(hand_path(40)):
+        pose.header.frame_id = 'camera'
+        stamp_ns = 10 * SECOND + i * SECOND // 100
+        if i % 4 == 0:
+            bench.send('obstacles', cloud(TYPES, rows, stamp_ns, 'camera'))
+        bench.send('hand_pose', pose)
+        ros.spin_until(lambda: 'hand_pose' in bench.node._transforms.roles, 'a message that is held')
+        broadcaster.sendTransform(transform('world', 'camera', stamp_ns, (0.0, 0.001 * i, 0.0)))
+        ros.spin_until(lambda: not bench.node._transforms.roles, 'the transform')
+        assert bench.node.intake.sample.position.tolist() == pytest.approx([pose.pose.position.x, 0.001 * i])
+    status = figures(bench.health())
+    assert (status['hand_pose refused'], status['obstacles refused']) == ('0 of 40', '0 of 11')
+    assert not [name for name in status if 'transform_newest' in name]
+    assert len(bench.wait_for('prediction', 2)) >= 2
+
+
+def test_a_simulation_that_starts_again_forgets_its_transforms(ros: Graph) -> None:
+    """In the second round the camera is elsewhere: the transforms of the first, newer by their stamps, are not used."""
+    parameters = {'frame_id': 'world', 'frames.tolerance_s': 10.0, 'use_sim_time': True}
+    bench = Bench(ros, parameters=parameters, outputs=[])
+    broadcaster, clock = is_followed(ros, bench), bench.player.create_publisher(Clock, '/clock', 10)
+    ros.spin_until(lambda: clock.get_subscription_count() > 0, 'the clock')
+    rows, node_clock = obstacle_table([(0.2, 0.0, 0.0, 0.03)]), bench.node.get_clock()
+    for turn in range(2):
+        for i in range(20):
+            stamp_ns = 100 * SECOND + i * SECOND // 10
+            clock.publish(Clock(clock=Time(nanoseconds=stamp_ns).to_msg()))
+            ros.spin_until(lambda now=stamp_ns: node_clock.now().nanoseconds == now, 'the clock of the node')
+            bench.send('obstacles', cloud(TYPES, rows, stamp_ns, 'camera'))
+            ros.spin_until(lambda: bench.node._transforms.roles == ['obstacles'], 'a message that is held')
+            broadcaster.sendTransform(transform('world', 'camera', stamp_ns, (turn + 0.01 * i, 0.0, 0.0)))
+            ros.spin_until(lambda: not bench.node._transforms.roles, 'the transform')
+            centre = bench.node.pipeline.scene.sources['cloud'].obstacles.centre
+            np.testing.assert_allclose(centre, [[0.2 + turn + 0.01 * i, 0.0]])
+    assert figures(bench.health())['obstacles refused'] == '0 of 40'
+
+
+def test_the_transforms_of_a_recording_are_those_of_tf2() -> None:
+    """Random trees of frames, static and moving, looked up at random stamps."""
+    generator = np.random.default_rng(0)
+    for _ in range(20):
+        tree, buffer = TransformTree(), tf2_ros.Buffer()
+        names = [f'frame{i}' for i in range(6)]
+        for i in range(1, 6):
+            parent, is_static = names[generator.integers(i)], generator.random() < 0.3
+            for stamp_ns in np.sort(generator.integers(1, 5 * SECOND, 1 if is_static else 8)).tolist():
+                message = transform(
+                    parent, names[i], stamp_ns, generator.normal(size=3), Rotation.random(rng=generator).as_quat()
+                )
+                tree.add(SimpleNamespace(transforms=[message]), is_static=is_static)
+                (buffer.set_transform_static if is_static else buffer.set_transform)(message, '')
+        for stamp_ns in [0, *generator.integers(1, 5 * SECOND, 20).tolist()]:
+            target, source = generator.choice(names, 2).tolist()
+            try:
+                expected = buffer.lookup_transform(target, source, Time(nanoseconds=stamp_ns))
+            except tf2_ros.TransformException:
+                with pytest.raises(TransformUnavailableError):
+                    tree.look_up(target, source, stamp_ns)
+                continue
+            found = tree.look_up(target, source, stamp_ns)
+            assert found.stamp_ns == Time.from_msg(expected.header.stamp).nanoseconds
+            wanted = expected.transform
+            np.testing.assert_allclose(found.translation, [getattr(wanted.translation, axis) for axis in 'xyz'], atol=1e-9)
+            turn = Rotation.from_quat([getattr(wanted.rotation, axis) for axis in 'xyzw'])
+            assert (turn.inv() * Rotation.from_quat(found.rotation)).magnitude() < 1e-9
