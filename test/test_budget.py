@@ -131,7 +131,7 @@ def test_a_solve_that_takes_longer_than_one_prediction_ends_in_a_later_one(monke
 
     def stop_after_a_few(*_):
         looks.append(1)
-        if len(looks) > 3:
+        if len(looks) > 5:
             raise OutOfTimeError
 
     monkeypatch.setattr(Deadline, 'check', stop_after_a_few)

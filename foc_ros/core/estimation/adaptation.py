@@ -7,7 +7,7 @@ have had in this movement, relative to the duration D of the movement:
 
 with the true time to go T(t) and the one T_f(t) that is estimated if all expected durations are multiplied by f. The factor in
 use minimises log(f)^2 + sum l_f over the movements so far, as a regularised leader (Shalev-Shwartz 2012, Foundations and Trends
-in Machine Learning 4(2)): without movements it is 1, and it adapts within two or three movements. It depends on the samples and
+in Machine Learning 4(2)): without movements it is 1, and it adapts in the course of about ten. It depends on the samples and
 goals alone, so that equal input gives equal factors.
 """
 

@@ -47,8 +47,10 @@ FOLLOW_SHARE = 0.5
 """Part of the time left that an earlier solution may take; then the search begins again."""
 NEARLY = 0.3
 """Part of the slope that is worth it from which Newton steps are tried that have k as an unknown."""
-MOST_TRIES, WARM_STRIDE = 2, 0.3
-"""Values of k that are tried where the next prediction goes on from the result; the first stride in k of that."""
+WARM_TRIES, COLD_TRIES = 2, 4
+"""Values of k that are tried from an earlier solution, and from the least effort, where the next prediction goes on from the result."""
+WARM_STRIDE = 0.3
+"""The longest first stride in k from an earlier solution."""
 NARROW = 0.02
 """Bracket in k at which the search ends."""
 
@@ -101,7 +103,7 @@ class _Search:
         self.problem, self.deadline, self.qp_solves = problem, deadline, 0
         self.best: SurrogatePoint | None = None
         self.wanted = problem.wanted_k * (1.0 + CLOSE)
-        self.most_tries: float = math.inf
+        self.is_followed = False
         wish = problem.preference
         self.is_hard = math.isinf(wish.shortfall)
         rate = wish.shortfall / wish.beta if wish.beta > 0.0 else math.inf
@@ -110,13 +112,13 @@ class _Search:
 
     def run(self, start: Start) -> Status:
         """Leave the best point in `best`; return how the search ended."""
-        self.most_tries = MOST_TRIES if start.is_followed and not self.is_hard else math.inf
+        self.is_followed = start.is_followed and not self.is_hard
         if not self.follow_in_time(start):
             if start.control is not None and not start.is_unfinished:
                 return Status.ITERATION_LIMIT
             return self.judge() if self.begin(start) else Status.INFEASIBLE
         if not (self.is_hard and start.safety_factor < self.problem.wanted_k):
-            self.raise_k(WARM_STRIDE)
+            self.raise_k(WARM_TRIES, WARM_STRIDE)
         return self.judge()
 
     def judge(self) -> Status:
@@ -170,7 +172,7 @@ class _Search:
             found = self.solve_below(control, contacts, min(max(minimum.k, 0.0), self.wanted), COLD_SHARES)
             if found is not None:
                 self.best = self.lower_k(found)
-                is_stuck = self.raise_k()
+                is_stuck = self.raise_k(COLD_TRIES)
                 tried.append(self.best)
                 if not is_stuck:
                     break
@@ -202,17 +204,17 @@ class _Search:
             return point
         return self.weigh(point.control, point.contacts, point.k) or point
 
-    def raise_k(self, stride: float = math.inf) -> bool:
+    def raise_k(self, tries: float, stride: float = math.inf) -> bool:
         """Raise k to the wanted one, or to the one that is worth its effort; tell whether no larger k could be reached.
 
-        stride: the longest in k to begin with.
+        tries: values of k that are tried where the next prediction goes on from the result; stride: the longest in k to begin with.
         """
         assert self.best is not None
         low, high = self.best, math.inf  # the k of a point that costs too much
-        stride, tries = min(self.wanted - low.k, stride), 0
+        stride, tries = min(self.wanted - low.k, stride), tries if self.is_followed else math.inf
         shortest = min(NARROW, stride / 4.0) / 2.0
-        while self.is_cheap(low) and stride > shortest and tries < self.most_tries:
-            tries += 1
+        while self.is_cheap(low) and stride > shortest and tries > 0:
+            tries -= 1
             point = self.solve(low.control, low.contacts, min(low.k + stride, self.wanted))
             if point is None:
                 stride /= 2
