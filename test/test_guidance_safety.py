@@ -45,7 +45,7 @@ def check_many(count: int) -> None:
             extracted += run.measure_extracted_energy().max() > 0.1 * run.config.tank
             near += bool(run.forces.any())
     assert extracted > count / 100, 'hardly any hand extracts energy: the test is too kind'
-    assert near > count / 5, 'hardly any hand feels a force: the test is too kind'
+    assert near > count / 8, 'hardly any hand feels a force: the test is too kind'
 
 
 def test_hostile_hands() -> None:

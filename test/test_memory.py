@@ -89,7 +89,7 @@ def test_a_candidate_stopped_by_the_deadline_continues_from_there(monkeypatch):
     assert memory.earlier.solutions, 'the first candidate had some time'
     assert all(solution.multipliers for solution in memory.earlier.solutions.values())
     after, _ = reaching(0.0, memory)
-    assert set(memory.earlier.solutions) <= {outcome.candidate.label for outcome in after.solved_candidates}
+    assert set(memory.earlier.solutions) <= {outcome.candidate.label for outcome in after.candidates_with_likelihood}
 
 
 def test_an_unreachable_candidate_is_followed_and_restarted_at_intervals(monkeypatch):

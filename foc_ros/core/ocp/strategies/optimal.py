@@ -48,7 +48,7 @@ FOLLOW_SHARE = 0.5
 NEARLY = 0.3
 """Part of the slope that is worth it from which Newton steps are tried that have k as an unknown."""
 WARM_TRIES, COLD_TRIES = 2, 4
-"""Values of k that are tried from an earlier solution, and from the least effort, where the next prediction goes on from the result."""
+"""Values of k that are tried from an earlier solution, and from the least effort, if the next prediction goes on from there."""
 WARM_STRIDE = 0.3
 """The longest first stride in k from an earlier solution."""
 NARROW = 0.02
@@ -207,7 +207,7 @@ class _Search:
     def raise_k(self, tries: float, stride: float = math.inf) -> bool:
         """Raise k to the wanted one, or to the one that is worth its effort; tell whether no larger k could be reached.
 
-        tries: values of k that are tried where the next prediction goes on from the result; stride: the longest in k to begin with.
+        tries: values of k that are tried if the next prediction goes on from the result; stride: the longest in k at first.
         """
         assert self.best is not None
         low, high = self.best, math.inf  # the k of a point that costs too much
