@@ -11,6 +11,7 @@ import time
 from importlib import import_module
 from pathlib import Path
 
+import numba.core.serialize
 import pytest
 
 from foc_ros.cli import interrupts
@@ -51,6 +52,16 @@ def test_an_interrupt_waits_for_the_end_of_an_import(tmp_path: Path, monkeypatch
         import_module('slowly_imported')
         wait_for_interrupt()
     assert sys.modules.pop('slowly_imported').is_complete
+
+
+def test_an_interrupt_waits_for_the_class_of_a_named_tuple_that_a_kernel_returns() -> None:
+    """Numba looks it up in Python; an exception there would end the process with a segmentation fault."""
+    reached = []
+    code = compile('signal.raise_signal(signal.SIGINT)\nreached.append(True)', 'serialize.py', 'exec')
+    with pytest.raises(KeyboardInterrupt), handle_interrupts():  # noqa: PT012
+        exec(code, vars(numba.core.serialize) | {'signal': signal, 'reached': reached})
+        wait_for_interrupt()
+    assert reached == [True]
 
 
 def test_an_import_that_does_not_end_is_left(tmp_path: Path) -> None:

@@ -19,14 +19,17 @@ REPEATED_S = 2.0
 PATIENCE_S = 1.0
 """Longest time for which an interrupt waits for code in which an exception would be lost; after it the process is ended [s]."""
 
+LOSING_MODULES = ('importlib._bootstrap', '_frozen_importlib', 'numba.core.serialize')
+"""Modules that native code calls without passing on an exception."""
+
 
 @contextmanager
 def handle_interrupts() -> Iterator[None]:
     """Raise KeyboardInterrupt on SIGINT within the context, and again until the context is left.
 
     Three kinds of code cannot pass on an exception. Callbacks of the import system and modules that an extension module imports
-    lose it. In the constructor of a named tuple that a kernel returns, it would end the process. An interrupt that arrives there
-    is delayed until this code has ended.
+    lose it. Where a kernel returns a named tuple, in numba's look-up of its class and in its constructor, it would end the process
+    with a segmentation fault. An interrupt that arrives there is delayed until this code has ended.
     """
     usual = signal.default_int_handler
     if signal.getsignal(signal.SIGINT) is not usual or threading.current_thread() is not threading.main_thread():
@@ -62,9 +65,9 @@ class _Interrupt:
 
 
 def _loses_exceptions(frame: FrameType | None) -> bool:
-    """Return whether an exception would be lost: the frame has no file, as in a named tuple, or is part of an import."""
+    """Return whether an exception would be lost: in the constructor of a named tuple, which has no file, or within `LOSING_MODULES`."""
     if frame is not None and frame.f_code.co_filename.startswith('<'):
         return True
-    while frame is not None and not frame.f_code.co_filename.startswith('<frozen importlib'):
+    while frame is not None and not str(frame.f_globals.get('__name__')).startswith(LOSING_MODULES):
         frame = frame.f_back
     return frame is not None
