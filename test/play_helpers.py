@@ -21,7 +21,7 @@ const { settings, view } = play;
 const box = canvas.getBoundingClientRect();
 const [low, high, bottom, top] = settings.bounds;
 const point = ([x, y]) => canvas.dispatchEvent(new PointerEvent('pointermove', {
-  clientX: box.left + box.width * (x - low) / (high - low), clientY: box.top + box.height * (top - y) / (top - bottom), bubbles: true,
+  clientX: box.left + box.width * (x - low) / (high - low), clientY: box.top + box.height * (top - y) / (top - bottom),
 }));
 let at = view.hand.target;
 let row = 0;
@@ -41,7 +41,7 @@ function step() {
 }
 step();
 """
-"""Moves the pointer through targets [m] at a speed [m/s]; returns the candidates on the way: time [ms], and way, goal, likelihood."""
+"""Moves the pointer through targets [m] at a speed [m/s]; returns times [ms], and way, goal and likelihood of candidates."""
 
 
 class Play:

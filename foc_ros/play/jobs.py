@@ -13,11 +13,10 @@ from typing import Any
 
 from foc_ros.core.errors import FocError
 
-from .recorder import SESSION, UNGUIDED
+from .recorder import UNGUIDED
 
 PARAMETERS, OPERATOR = 'parameters.yaml', 'operator.yaml'
 """Files of a session: the parameters that it began with, and those that were fitted to it."""
-REPORT = Path('report') / 'index.html'
 NICENESS = 10
 COMPARE_COLUMNS = ('', 'before', 'after')
 FITTED_COLUMNS = ('parameter', 'before', 'after')
@@ -49,13 +48,6 @@ async def run_command(*arguments: str | Path) -> str:
         lines = errors.decode(errors='replace').strip().splitlines()
         raise CommandError(lines[-1] if lines else f'foc_ros {arguments[0]} ended with exit code {process.returncode}')
     return output.decode()
-
-
-async def write_report(folder: Path) -> Path:
-    """Write the report of a session and return its page."""
-    page = folder / REPORT
-    await run_command('replay', folder / SESSION, '--params', folder / PARAMETERS, '--report', page.parent)
-    return page
 
 
 async def fit_operator(folder: Path) -> list[tuple[str, str, str]]:

@@ -8,10 +8,11 @@ DIR/2026-01-31_12-00-00/guided/      trials with guidance
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
-from foc_ros.core.errors import InputError
+from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.io.bags import BagWriter
 from foc_ros.io.topics import TYPES
 
@@ -84,6 +85,11 @@ class Recorder:
             for role, raw, log_ns in self._trial:
                 bag.write_raw(f'/{role}', TYPES[role], raw, log_ns)
         self._trial = None
+
+    def discard(self, error: RecordingError) -> None:
+        """Remove the bag of the session, after an error in writing; the bags of trials stay."""
+        with suppress(RecordingError):
+            self._bag.__exit__(type(error), error, None)
 
     def close(self) -> None:
         """End the session; a trial that is not over has no bag of its own."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections import deque
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from time import monotonic, time_ns
 from typing import Any
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.errors import FocError, InputError, RecordingError
+from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.io.topics import CLOUD, GOALS, HAND
 from foc_ros.reporting.drawing import CLASS_COLOURS
@@ -22,15 +21,17 @@ from foc_ros.ros.messages.types import RosbagsTypes
 from foc_ros.ros.parameters import load_parameter_file, write_parameter_file
 
 from . import jobs, page_messages, scene, tasks
+from .after_session import AfterSession
 from .page_clock import PageClock
 from .page_messages import HandMessage, Message, TasksMessage
 from .prediction_view import Slots, view_candidates
 from .predictors import KINDS, NODE, LivePredictor, Receive, State
-from .recorder import UNGUIDED, Recorder, make_session_folder
+from .recorder import Recorder, make_session_folder
+from .session_report import PREDICTION, SessionReport
 
 OWN_VALUES = {'plane': 'xy', 'frame_id': ''}
 """Parameters that the page fixes."""
-WRENCH, PREDICTION = f'{NODE}/guidance/wrench', f'{NODE}/prediction'
+WRENCH = f'{NODE}/guidance/wrench'
 FORCE_PERIOD_S = 0.012
 """Shortest time between two forces that the page receives [s]; guidance updates more often than a screen."""
 REMEMBERED_HANDS = 256
@@ -40,7 +41,7 @@ Send = Callable[[dict[str, Any]], None]
 class Session:
     """Connects one page with one predictor.
 
-    Attributes: predictor; report, the page of the last report, None before the first.
+    Attributes: predictor.
 
     Parameters
     ----------
@@ -54,21 +55,19 @@ class Session:
 
     def __init__(self, make_predictor: Callable[[Config, Receive], LivePredictor], config: Config, data: Path) -> None:
         self._standard = replace_values(config, OWN_VALUES)
-        self._operator: Path | None = None
+        self._after = AfterSession(self._say, self._use_operator)
         self._parameters, self._is_guided = 'standard', config.guidance.enabled
         self._data = data
         self.predictor = make_predictor(self._config, self._receive)
-        self.report: Path | None = None
         self._types = RosbagsTypes(TYPESTORE)
         self._scene = scene.FIRST_SCENE
         self._page: Send | None = None
         self._clock, self._slots = PageClock(), Slots()
         self._hands: deque[tuple[int, HandMessage]] = deque(maxlen=REMEMBERED_HANDS)
         self._recorder: Recorder | None = None
-        self._folder: Path | None = None
+        self._reported = SessionReport()
         self._tasks: tasks.Tasks | None = None
         self._force_s, self._touched = 0.0, 0
-        self._job: asyncio.Task[None] | None = None
         self._handlers: dict[type, Callable[[Any], None]] = {
             HandMessage: self._move_hand,
             page_messages.SceneMessage: self._change_scene,
@@ -80,6 +79,11 @@ class Session:
             page_messages.ParametersMessage: self._choose_parameters,
             page_messages.JobMessage: self._begin_job,
         }
+
+    @property
+    def report(self) -> Path | None:
+        """The page of the last report, None before the first."""
+        return self._after.report
 
     def open(self, page: Send) -> None:
         """Serve a page from now on, in place of the one before."""
@@ -109,8 +113,7 @@ class Session:
 
     def close(self) -> None:
         """End recording, jobs and predictor."""
-        if self._job is not None:
-            self._job.cancel()
+        self._after.cancel()
         self._end_recording()
         self.predictor.stop()
 
@@ -133,6 +136,8 @@ class Session:
             return
         self._hands.append((stamp_ns, message))
         position = (*message.position, 0.0)
+        if self._recorder is not None:
+            self._reported.add_hand(stamp_ns, message.position)
         self._send(HAND, encode_hand_pose(self._types, stamp_ns, scene.FRAME, position))
         if self._tasks is not None:
             self._follow_tasks(self._tasks, stamp_ns * 1e-9, message.position)
@@ -152,7 +157,7 @@ class Session:
 
     def _choose_parameters(self, message: page_messages.ParametersMessage) -> None:
         self._refuse_during_tasks('parameters')
-        if message.name == 'mine' and self._operator is None:
+        if message.name == 'mine' and self._after.operator is None:
             raise InputError('parameters', 'standard until parameters were fitted', 'mine')
         self._parameters = message.name
         self._configure()
@@ -219,7 +224,8 @@ class Session:
         folder = make_session_folder(self._data)
         write_parameter_file('--data', folder / jobs.PARAMETERS, self._standard)
         messages = {role: _serialize(message) for role, message in self._scene.encode(self._types, time_ns()).items()}
-        self._recorder, self._folder = Recorder(folder, messages, time_ns()), folder
+        self._recorder = Recorder(folder, messages, time_ns())
+        self._reported = self._after.begin_session(folder)
         self._say_settings()
 
     def _end_recording(self) -> None:
@@ -235,58 +241,28 @@ class Session:
         try:
             add(self._recorder)
         except RecordingError as error:
+            self._recorder.discard(error)
             self._recorder, self._tasks = None, None
             self._say('error', text=str(error))
             self._say_settings()
             self._say_task()
 
     def _begin_job(self, message: page_messages.JobMessage) -> None:
-        if self._job is not None and not self._job.done():
-            raise InputError('job', 'one at a time', message.name)
-        if self._recorder is not None or self._folder is None:
-            raise InputError('job', 'a session that was recorded and has ended', message.name)
-        if message.name != 'report' and not (self._folder / UNGUIDED).is_dir():
-            raise InputError('job', 'a session with trials without guidance', message.name)
-        if message.name == 'compare' and self._operator is None:
-            raise InputError('job', 'a fit before', message.name)
-        work = {'report': self._write_report, 'fit': self._fit, 'compare': self._compare}[message.name]
-        self._job = asyncio.ensure_future(self._run_job(message.name, work(self._folder)))
+        if self._recorder is not None:
+            raise InputError('job', 'a session that has ended', message.name)
+        self._after.begin(message.name)
 
-    async def _run_job(self, name: str, work: Awaitable[dict[str, Any]]) -> None:
-        began = monotonic()
-        self._say('job', name=name, state='running')
-        try:
-            answer = await work
-            self._say('job', name=name, state='done', seconds=round(monotonic() - began, 1), **answer)
-        except Exception as error:
-            self._say('job', name=name, state='failed', text=str(error))
-            if not isinstance(error, FocError):
-                raise
-
-    async def _write_report(self, folder: Path) -> dict[str, Any]:
-        self.report = await jobs.write_report(folder)
-        return {'text': 'The report is ready.'}
-
-    async def _fit(self, folder: Path) -> dict[str, Any]:
-        rows = await jobs.fit_operator(folder)
-        self._operator, self._parameters = folder / jobs.OPERATOR, 'mine'
+    def _use_operator(self) -> None:
+        self._parameters = 'mine'
         self._configure()
-        return {'text': 'Predictions now use your parameters.', 'columns': jobs.FITTED_COLUMNS, 'rows': rows}
-
-    async def _compare(self, folder: Path) -> dict[str, Any]:
-        assert self._operator is not None
-        rows = await jobs.compare_parameters(folder, self._operator)
-        is_same = folder == self._operator.parent
-        text = 'on the trials of the fit; record new trials for an independent comparison' if is_same else 'on new trials'
-        return {'text': f'Before and after the fit, {text}.', 'columns': jobs.COMPARE_COLUMNS, 'rows': rows}
 
     # the predictor
 
     @property
     def _config(self) -> Config:
         given = self._standard
-        if self._parameters == 'mine' and self._operator is not None:
-            given = replace_values(load_parameter_file(self._operator), OWN_VALUES)
+        if self._parameters == 'mine' and self._after.operator is not None:
+            given = replace_values(load_parameter_file(self._after.operator), OWN_VALUES)
         return replace_values(given, {'guidance.enabled': self._is_guided})
 
     def _configure(self) -> None:
@@ -314,6 +290,8 @@ class Session:
 
     def _receive(self, topic: str, raw: bytes) -> None:
         """Take an output of the predictor."""
+        if self._recorder is not None:
+            self._reported.add_output(topic, raw, self._scene, time_ns())
         self._record(lambda recorder: recorder.add_output(topic, KINDS[topic], raw, time_ns()))
         if topic == PREDICTION:
             self._receive_prediction(TYPESTORE.deserialize_cdr(raw, KINDS[topic]))
@@ -354,9 +332,9 @@ class Session:
             'settings',
             guided=self._is_guided and not self._is_blind,
             parameters=self._parameters,
-            fitted=self._operator is not None,
+            fitted=self._after.operator is not None,
             recording=self._recorder is not None,
-            session='' if self._folder is None else str(self._folder),
+            session='' if self._after.folder is None else str(self._after.folder),
         )
 
     def _say_task(self) -> None:
