@@ -45,17 +45,26 @@ step();
 
 
 class Play:
-    """A process of `foc_ros play`. Attributes: url; data, the folder of its recordings; process."""
+    """A process of `foc_ros play`. Attributes: url, of the page; data, the folder of recordings; process."""
 
-    def __init__(self, folder: Path, *arguments: str) -> None:
+    def __init__(self, folder: Path, *arguments: str, program: str = '') -> None:
         self.data = folder / 'data'
         self._log = (folder / 'play.txt').open('w+', encoding='utf-8')
-        command = [sys.executable, '-m', 'foc_ros', 'play', '--data', str(self.data), '--port', '0', *arguments]
+        start = ['-c', program] if program else ['-m', 'foc_ros']
+        port = [] if '--port' in arguments else ['--port', '0']
+        command = [sys.executable, *start, 'play', '--data', str(self.data), *port, *arguments]
         self.process = subprocess.Popen(command, stdout=self._log, stderr=subprocess.STDOUT)
-        until(lambda: STARTED.search(self.output) or self.process.poll() is not None, 'the address of the page')
+
+    def wait(self) -> None:
+        """Wait until the page is served."""
+        until(lambda: STARTED.search(self.output) or self.process.poll() is not None, 'the address of the page', 100.0)
+        assert STARTED.search(self.output), self.output
+
+    @property
+    def url(self) -> str:
         found = STARTED.search(self.output)
-        assert found, self.output
-        self.url = found.group(1)
+        assert found
+        return found.group(1)
 
     @property
     def output(self) -> str:
@@ -72,10 +81,11 @@ class Play:
 
 
 @contextmanager
-def play(folder: Path, *arguments: str) -> Iterator[Play]:
-    """Run `foc_ros play` within a context."""
-    started = Play(folder, *arguments)
+def play(folder: Path, *arguments: str, program: str = '') -> Iterator[Play]:
+    """Run `foc_ros play` within a context; program: Python code in place of `-m foc_ros`."""
+    started = Play(folder, *arguments, program=program)
     try:
+        started.wait()
         yield started
     finally:
         started.stop()

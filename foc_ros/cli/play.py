@@ -35,6 +35,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError('--port', 'a whole number in [0, 65535]', arguments.port)
     if not arguments.no_ros and find_spec('rclpy') is None:
         raise FocError('rclpy is not installed: use --no-ros, or source a ROS 2 installation, or install the extra `ros`')
+    if arguments.data.exists() and not arguments.data.is_dir():
+        raise InputError('--data', 'a folder', arguments.data)
     config = load_optional_config(arguments.params)
     sys.setswitchinterval(SWITCH_S)
     asyncio.run(_serve(arguments, config))
