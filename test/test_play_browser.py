@@ -37,12 +37,17 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 
 
 @pytest.fixture(scope='module')
-def library(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Play]:
-    """Start a server without ROS, without a time limit for predictions that a busy machine would exceed."""
-    folder = tmp_path_factory.mktemp('library')
-    parameters = folder / 'parameters.yaml'
-    parameters.write_text(dump_parameter_file(Config(budget_s=0.0).with_values({'rate_hz': 20.0})), encoding='utf-8')
-    with play(folder, '--no-ros', '--params', str(parameters)) as started:
+def parameters(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Return a file with parameters without a time limit, which a busy machine would exceed."""
+    file = tmp_path_factory.mktemp('parameters') / 'foc.yaml'
+    file.write_text(dump_parameter_file(Config(budget_s=0.0, rate_hz=20.0)), encoding='utf-8')
+    return str(file)
+
+
+@pytest.fixture(scope='module')
+def library(tmp_path_factory: pytest.TempPathFactory, parameters: str) -> Iterator[Play]:
+    """Start a server without ROS."""
+    with play(tmp_path_factory.mktemp('library'), '--no-ros', '--params', parameters) as started:
         yield started
 
 
@@ -50,6 +55,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Play]:
 def page(browser: Any, library: Play) -> Iterator[Any]:
     """Open the page anew, with the hand at the start; leave it after the test, because it keeps a processor busy."""
     visit(browser, library)
+    click(browser, 'restore')
     yield browser
     browser.get('about:blank')
 
@@ -82,7 +88,7 @@ def check_steering(browser: Any) -> None:
     assert shares[2] > 0.99
     steer(browser, *ON)
     wait_for(browser, 'Math.abs(play.view.hand.position[0] - 0.3) < 0.003', 'the hand at the goal', 20)
-    wait_for(browser, 'play.measured.delayMs > 0 && play.measured.fps > 0 && play.measured.delays.length > 20', 'numbers', 20)
+    wait_for(browser, 'play.measured.delayMs > 0 && play.measured.fps > 0 && play.measured.delays.length > 5', 'numbers', 20)
     assert 'frames a second' in text_of(browser, 'numbers')
 
 
@@ -101,7 +107,7 @@ def test_the_likelihood_of_the_way_taken_rises(page: Any) -> None:
 
 
 def test_an_obstacle_that_is_dragged_changes_the_prediction(page: Any) -> None:
-    """The circle is dragged by the pointer from one side of the straight line to goal 1 to the other."""
+    """The circle is dragged away from the straight line to goal 1."""
     steer(page, (0.0, 0.0))
     click(page, 'arrange')
     page.execute_script("""
@@ -113,14 +119,14 @@ def test_an_obstacle_that_is_dragged_changes_the_prediction(page: Any) -> None:
         }));
         canvas.setPointerCapture = () => {};
         send('pointerdown', 0.14, 0.015);
-        send('pointermove', 0.14, 0.0);
-        send('pointermove', 0.15, -0.02);
-        send('pointerup', 0.15, -0.02);
+        send('pointermove', 0.14, 0.1);
+        send('pointermove', 0.13, 0.13);
+        send('pointerup', 0.13, 0.13);
     """)
     moved = page.execute_script('return play.view.scene.obstacles[0]')
-    assert (moved['x'], moved['y']) == pytest.approx((0.15, -0.02), abs=1e-3)
-    straight = 'play.view.candidates.some((each) => each.goal === 1 && each.path.every(([x, y]) => y > -0.01))'
-    wait_for(page, straight, 'a way to goal 1 above the circle', 20)
+    assert (moved['x'], moved['y']) == pytest.approx((0.13, 0.13), abs=1e-3)
+    straight = 'play.view.candidates.some((each) => each.goal === 1 && each.path.every(([x, y]) => Math.abs(y) < 0.01))'
+    wait_for(page, straight, 'a straight way to goal 1', 20)
     assert page.execute_script('return play.view.hand.position') == pytest.approx([0.0, 0.0], abs=1e-3)
     press(page, 'n', 'g', 'b', '+', 'r')
     wait_for(page, 'play.view.scene.obstacles.length === 4 && play.view.scene.goals.length === 4', 'objects added by keys', 20)
@@ -206,9 +212,9 @@ def test_the_page_says_that_the_server_is_gone_and_recovers(browser: Any, tmp_pa
         browser.get('about:blank')
 
 
-def test_over_dds_a_killed_node_is_reported_and_started_again(browser: Any, tmp_path: Path) -> None:
+def test_over_dds_a_killed_node_is_reported_and_started_again(browser: Any, tmp_path: Path, parameters: str) -> None:
     require_ros()
-    with play(tmp_path) as started:
+    with play(tmp_path, '--params', parameters) as started:
         visit(browser, started)
         check_steering(browser)
         click(browser, 'guidance')
@@ -252,7 +258,7 @@ BROKEN = [
 @pytest.mark.parametrize(
     ('file', 'old', 'new'), BROKEN, ids=['pointer', 'hand', 'candidates', 'message', 'socket', 'syntax', 'draw']
 )
-def test_the_check_finds_a_broken_page(browser: Any, library: Play, tmp_path: Path, file: str, old: str, new: str) -> None:
+def test_the_check_finds_a_broken_page(browser: Any, tmp_path: Path, file: str, old: str, new: str) -> None:
     """Serve the page with one text changed, in a process of its own; then the check of steering fails."""
     source = (server.FOLDER / file).read_text(encoding='utf-8')
     assert old in source

@@ -36,7 +36,7 @@ def view_candidates(cloud: Any, slots: Slots) -> list[dict[str, Any]]:
     """Return the candidates of a prediction on the plane xy, the most likely one first.
 
     Each has its slot, way, goal and likelihood, whether it is compromised, its path [m], and ellipses of the standard deviation
-    of the position [m]: x, y, greater and smaller half axis, and the angle of the greater one [rad].
+    that motor noise causes [m]: x, y, greater and smaller half axis, and the angle of the greater one [rad].
     """
     rows = np.frombuffer(cloud.data, dtype=CLOUD_ROW)
     starts = np.flatnonzero(np.diff(rows['candidate'].astype(int), prepend=-1))
@@ -57,7 +57,8 @@ def view_candidates(cloud: Any, slots: Slots) -> list[dict[str, Any]]:
 
 
 def _compute_ellipses(rows: Any) -> Array:
-    covariance = np.array([[rows['xx'], rows['xy']], [rows['xy'], rows['yy']]], dtype=float).transpose(2, 0, 1)
+    xx, xy, yy = (rows[f'motor_{pair}'].astype(float) for pair in ('xx', 'xy', 'yy'))
+    covariance = np.array([[xx, xy], [xy, yy]]).transpose(2, 0, 1)
     greater, smaller, angle = compute_ellipse_axes(covariance)
     return np.column_stack([rows['x'], rows['y'], STDDEVS * greater, STDDEVS * smaller, np.radians(angle)])
 

@@ -97,6 +97,7 @@ class Session:
             start=scene.START,
             target_radius=scene.TARGET_RADIUS,
             radius_stddev=scene.RADIUS_STDDEV,
+            first_scene=scene.FIRST_SCENE.as_json(),
             most={'obstacles': scene.MOST_OBSTACLES, 'goals': scene.MOST_GOALS},
             max_speed=self._standard.guidance.max_speed,
             # with a spring that is as stiff as guidance at most, the loop of cursor and guidance is stable at any delay

@@ -134,7 +134,7 @@ export class Drawing {
     for (const [x, y, a, b, angle] of candidate.ellipses) {
       pen.beginPath();
       pen.ellipse(x, y, a, b, angle, 0, FULL);
-      this.fill(colour, 0.03 + 0.12 * likelihood);
+      this.fill(colour, 0.06 + 0.2 * likelihood);
     }
     pen.beginPath();
     path.forEach(([x, y], row) => (row ? pen.lineTo(x, y) : pen.moveTo(x, y)));

@@ -23,7 +23,16 @@ const view = { scene: arranging.scene, selected: null, goal: null, phase: 'none'
 // What the page measures: frames per second, the median time from an input to the drawn prediction that was made from it [ms], and
 // how many predictions were drawn.
 const measured = { fps: 0, delayMs: null, predictions: 0, delays: [] };
-globalThis.play = { view, measured, settings: null };
+// For scripts: what is drawn, what is measured, and a new scene in place of the present one.
+globalThis.play = {
+  view,
+  measured,
+  settings: null,
+  setScene(scene) {
+    arranging.setScene(scene);
+    isSceneChanged = true;
+  },
+};
 
 let socket = null;
 let settings = null;
@@ -103,7 +112,7 @@ const handlers = {
     view.goal = isRunning ? message.goal : null;
     view.hidden = isRunning && message.blinded;
     byId('begin').textContent = isRunning ? 'end' : 'begin';
-    for (const name of ['arrange', 'shuffle', 'guidance', 'record', 'parameters']) byId(name).disabled = isRunning;
+    for (const name of ['arrange', 'shuffle', 'restore', 'guidance', 'record', 'parameters']) byId(name).disabled = isRunning;
     if (isRunning) setArranging(false);
     byId('task').textContent = isRunning ? `${message.trial} of ${message.trials}: ${TASK_WORDS[message.phase]}` : '';
   },
@@ -203,6 +212,7 @@ for (const [name, key] of Object.entries({ 'add-circle': 'c', 'add-box': 'b', 'a
   byId(name).addEventListener('click', () => arranging.actionOf(key)());
 }
 byId('shuffle').addEventListener('click', () => send({ type: 'shuffle', seed: Math.floor(2 ** 31 * Math.random()) }));
+byId('restore').addEventListener('click', () => play.setScene(structuredClone(settings.first_scene)));
 byId('guidance').addEventListener('change', ({ target }) => send({ type: 'guidance', on: target.checked }));
 byId('parameters').addEventListener('change', ({ target }) => send({ type: 'parameters', name: target.value }));
 byId('record').addEventListener('click', ({ target }) => send({ type: 'record', on: target.dataset.on !== 'true' }));
