@@ -116,3 +116,9 @@ def steer(browser: Any, *targets: tuple[float, float], speed: float = 0.3) -> li
     browser.set_script_timeout(60)
     seen: list[Any] = browser.execute_async_script(STEER, [list(each) for each in targets], speed)
     return seen
+
+
+def wait_for_answer(browser: Any) -> None:
+    """Wait for a prediction from the present position of the hand."""
+    distance = 'Math.hypot(...play.view.hand.position.map((value, axis) => value - play.view.candidates[0].path[0][axis]))'
+    wait_for(browser, f'play.view.candidates.length && {distance} < 0.005', 'predictions')

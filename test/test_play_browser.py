@@ -16,7 +16,7 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 pytest.importorskip('plotly', reason='plotly is not installed')
 
 from browser_helpers import check_report, chromium, screenshot
-from play_helpers import Play, play, steer, until, visit, wait_for
+from play_helpers import Play, play, steer, until, visit, wait_for, wait_for_answer
 from ros_helpers import require_ros
 
 from foc_ros.core.config import Config
@@ -94,8 +94,7 @@ def check_steering(browser: Any) -> None:
 
 def share_above(browser: Any) -> float:
     """Return the likelihood of all candidates above the first circle, when those of the present position have come."""
-    distance = 'Math.hypot(...play.view.hand.position.map((value, axis) => value - play.view.candidates[0].path[0][axis]))'
-    wait_for(browser, f'play.view.candidates.length && {distance} < 0.01', 'predictions', 20)
+    wait_for_answer(browser)
     candidates = browser.execute_script('return play.view.candidates')
     paths = [np.array(each['path']) for each in candidates]
     is_above = [np.interp(0.14, path[:, 0], path[:, 1]) > 0.015 for path in paths]
@@ -208,7 +207,7 @@ def test_the_page_says_that_the_server_is_gone_and_recovers(browser: Any, tmp_pa
     assert browser.execute_script('return play.view.candidates.length') == 0
     with play(tmp_path, '--no-ros', '--port', port):
         wait_for(browser, 'play.view.candidates.length > 0', 'predictions after a new start of the server')
-        assert not browser.execute_script("return document.getElementById('status').classList.contains('gone')")
+        wait_for(browser, "!document.getElementById('status').classList.contains('gone')", 'the message is gone')
         browser.get('about:blank')
 
 

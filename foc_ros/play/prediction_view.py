@@ -35,8 +35,9 @@ class Slots:
 def view_candidates(cloud: Any, slots: Slots) -> list[dict[str, Any]]:
     """Return the candidates of a prediction on the plane xy, the most likely one first.
 
-    Each has its slot, way, goal and likelihood, whether it is compromised, its path [m], and ellipses of the standard deviation
-    that motor noise causes [m]: x, y, greater and smaller half axis, and the angle of the greater one [rad].
+    Each has its slot, way, goal and likelihood, whether it is compromised, its path [m], and ellipses of one standard deviation,
+    motor: of the motor noise, total: of the position, for the most likely one only. An ellipse has x, y, greater and smaller half
+    axis [m], and the angle of the greater one [rad].
     """
     rows = np.frombuffer(cloud.data, dtype=CLOUD_ROW)
     starts = np.flatnonzero(np.diff(rows['candidate'].astype(int), prepend=-1))
@@ -50,17 +51,19 @@ def view_candidates(cloud: Any, slots: Slots) -> list[dict[str, Any]]:
             'likelihood': round(float(part['likelihood'][0]), 4),
             'compromised': bool(part['compromised'][0]),
             'path': _round(np.column_stack([part[axis] for axis in 'xy'])[select_evenly(len(part), PATH_POINTS)]),
-            'ellipses': _round(_compute_ellipses(part[select_evenly(len(part), ELLIPSES_PER_CANDIDATE + 1)[1:]])),
+            'motor': _compute_ellipses(part, 'motor_'),
+            'total': [] if rank else _compute_ellipses(part, ''),
         }
-        for part, slot in zip(parts, given, strict=True)
+        for rank, (part, slot) in enumerate(zip(parts, given, strict=True))
     ]
 
 
-def _compute_ellipses(rows: Any) -> Array:
-    xx, xy, yy = (rows[f'motor_{pair}'].astype(float) for pair in ('xx', 'xy', 'yy'))
-    covariance = np.array([[xx, xy], [xy, yy]]).transpose(2, 0, 1)
-    greater, smaller, angle = compute_ellipse_axes(covariance)
-    return np.column_stack([rows['x'], rows['y'], STDDEVS * greater, STDDEVS * smaller, np.radians(angle)])
+def _compute_ellipses(rows: Any, prefix: str) -> list[list[float]]:
+    """Return ellipses along a path, of the covariance whose columns have a prefix."""
+    chosen = rows[select_evenly(len(rows), ELLIPSES_PER_CANDIDATE + 1)[1:]]
+    xx, xy, yy = (chosen[prefix + pair].astype(float) for pair in ('xx', 'xy', 'yy'))
+    greater, smaller, angle = compute_ellipse_axes(np.array([[xx, xy], [xy, yy]]).transpose(2, 0, 1))
+    return _round(np.column_stack([chosen['x'], chosen['y'], STDDEVS * greater, STDDEVS * smaller, np.radians(angle)]))
 
 
 def _round(values: Array) -> list[list[float]]:

@@ -131,10 +131,15 @@ export class Drawing {
     const { context: pen } = this;
     const { path, likelihood, slot } = candidate;
     const colour = this.colourOf(slot);
-    for (const [x, y, a, b, angle] of candidate.ellipses) {
+    for (const [x, y, a, b, angle] of candidate.motor) {
       pen.beginPath();
       pen.ellipse(x, y, a, b, angle, 0, FULL);
       this.fill(colour, 0.06 + 0.2 * likelihood);
+    }
+    for (const [x, y, a, b, angle] of candidate.total) {
+      pen.beginPath();
+      pen.ellipse(x, y, a, b, angle, 0, FULL);
+      this.stroke(colour, 0.7, [4, 4]);
     }
     pen.beginPath();
     path.forEach(([x, y], row) => (row ? pen.lineTo(x, y) : pen.moveTo(x, y)));
