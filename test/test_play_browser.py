@@ -136,10 +136,13 @@ def test_an_obstacle_that_is_dragged_changes_the_prediction(page: Any) -> None:
     wait_for(page, 'play.view.scene.obstacles.length === 3 && play.view.scene.goals.length === 4', 'the scene is kept', 20)
 
 
-def test_keys_steer_and_guidance_pulls(page: Any) -> None:
+def test_keys_and_a_gamepad_steer_and_guidance_pulls(page: Any) -> None:
     page.execute_script("document.getElementById('scene').dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowRight' }))")
     wait_for(page, 'play.view.hand.position[0] > 0.1', 'the hand follows a key', 20)
     page.execute_script("dispatchEvent(new KeyboardEvent('keyup', { key: 'ArrowRight' }))")
+    page.execute_script('navigator.getGamepads = () => [null, { axes: [-1, 0.1] }]')
+    wait_for(page, 'play.view.hand.position[0] < 0.03', 'the hand follows a stick', 20)
+    page.execute_script('navigator.getGamepads = () => []')
     click(page, 'guidance')
     pulled = []
 

@@ -15,6 +15,8 @@ import pytest
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 pytest.importorskip('plotly', reason='plotly is not installed')
 
+from report_samples import predictions, samples
+
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config
@@ -31,6 +33,7 @@ from foc_ros.play.session import Session
 from foc_ros.play.tasks import Phase, Tasks, make_trials, tabulate_scores
 from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud
 from foc_ros.ros.messages.decode_poses import decode_goals
+from foc_ros.ros.messages.encode_prediction import encode_prediction_cloud
 from foc_ros.ros.messages.types import RosbagsTypes
 
 HAND = {'type': 'hand', 't': 10.0, 'x': 0.1, 'y': 0.0, 'event': 8.0}
@@ -266,6 +269,51 @@ def test_a_stopped_task_leaves_its_session_and_restores_guidance(page: Page) -> 
     assert [each.guidance.enabled for each in page.session.predictor.configs] == [True, False]
     folder = Path(page.last('settings')['session'])
     assert sorted(each.name for each in folder.iterdir()) == ['parameters.yaml', 'session']
+
+
+def test_a_blinded_page_learns_nothing_from_what_it_receives(page: Page) -> None:
+    """The page receives no prediction, and the same messages with and without guidance; the force itself must be felt."""
+    received = {}
+    for assistance in ('with', 'without'):
+        page.send(TASKS | {'assistance': assistance, 'blinded': True})
+        begin = len(page.received)
+        page.move(START, 60)
+        prediction = encode_prediction_cloud(predictions(samples())[0], 'xy', RosbagsTypes(TYPESTORE))
+        page.session._receive('/foc/prediction', bytes(TYPESTORE.serialize_cdr(prediction, prediction.__msgtype__)))
+        received[assistance] = page.received[begin:]
+        page.send({'type': 'stop'})
+    assert received['with'] == received['without']
+    assert {each['type'] for each in received['with']} == {'task'}
+
+
+def test_a_fit_and_its_comparison(page: Page) -> None:
+    """The commands behind the buttons, on three trials."""
+
+    async def work(name: str) -> dict[str, Any]:
+        page.send({'type': 'job', 'name': name})
+        await wait_until(lambda: page.last('job')['state'] != 'running', 500.0)
+        assert page.last('job')['state'] == 'done', page.last('job')
+        return page.last('job')
+
+    async def run() -> None:
+        fitted = await work('fit')
+        assert fitted['columns'] == ['parameter', 'before', 'after']
+        assert 'duration.fitts_b_s' in [row[0] for row in fitted['rows']]
+        compared = await work('compare')
+        assert 'on the trials of the fit' in compared['text']
+        assert [row[0] for row in compared['rows']][:2] == ['path class: correct [%]', 'path class: log-likelihood [nat]']
+
+    page.send(TASKS | {'trials': 3, 'assistance': 'without'})
+    for _ in range(3):
+        reach(page)
+    asyncio.run(run())
+    settings = page.last('settings')
+    assert (settings['parameters'], settings['fitted']) == ('mine', True)
+    mine = page.session.predictor.configs[-1]
+    assert mine.duration != Config().duration
+    assert mine.plane == 'xy'
+    page.send({'type': 'parameters', 'name': 'standard'})
+    assert page.session.predictor.configs[-1] == Config()
 
 
 def test_what_is_impossible_is_refused(page: Page) -> None:

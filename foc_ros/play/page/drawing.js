@@ -163,13 +163,15 @@ export class Drawing {
       pen.lineTo(...tip);
       this.stroke('#009E73', 4);
     }
-    pen.beginPath();
-    pen.moveTo(...target);
-    pen.lineTo(...position);
-    this.stroke(ink.soft, 1, [3, 3]);
-    pen.beginPath();
-    pen.arc(...target, 0.6 * HAND_RADIUS, 0, FULL);
-    this.stroke(ink.soft, 1);
+    if (!view.hidden) { // the distance between pointer and hand tells whether there is guidance
+      pen.beginPath();
+      pen.moveTo(...target);
+      pen.lineTo(...position);
+      this.stroke(ink.soft, 1, [3, 3]);
+      pen.beginPath();
+      pen.arc(...target, 0.6 * HAND_RADIUS, 0, FULL);
+      this.stroke(ink.soft, 1);
+    }
     pen.beginPath();
     pen.arc(...position, HAND_RADIUS, 0, FULL);
     this.fill(now - view.touchedMs < 400 ? '#D55E00' : ink.ink);
