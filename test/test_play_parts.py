@@ -217,6 +217,8 @@ class Page:
     def move(self, position: tuple[float, float], count: int = 1) -> None:
         for _ in range(count):
             self.t_ms += 20.0
+            if self.t_ms % 500.0 == 0.0:
+                self.session.tick()
             self.send({'type': 'hand', 't': self.t_ms, 'x': position[0], 'y': position[1], 'event': self.t_ms})
 
 
@@ -277,21 +279,22 @@ def test_a_blinded_page_learns_nothing_from_what_it_receives(page: Page) -> None
     for assistance in ('with', 'without'):
         page.send(TASKS | {'assistance': assistance, 'blinded': True})
         begin = len(page.received)
-        page.move(START, 60)
+        page.move(START, 100)
         prediction = encode_prediction_cloud(predictions(samples())[0], 'xy', RosbagsTypes(TYPESTORE))
         page.session._receive('/foc/prediction', bytes(TYPESTORE.serialize_cdr(prediction, prediction.__msgtype__)))
         received[assistance] = page.received[begin:]
         page.send({'type': 'stop'})
     assert received['with'] == received['without']
-    assert {each['type'] for each in received['with']} == {'task'}
+    assert {each['type'] for each in received['with']} == {'task', 'status'}
 
 
+@pytest.mark.timeout(500)
 def test_a_fit_and_its_comparison(page: Page) -> None:
     """The commands behind the buttons, on three trials."""
 
     async def work(name: str) -> dict[str, Any]:
         page.send({'type': 'job', 'name': name})
-        await wait_until(lambda: page.last('job')['state'] != 'running', 500.0)
+        await wait_until(lambda: page.last('job')['state'] != 'running', 400.0)
         assert page.last('job')['state'] == 'done', page.last('job')
         return page.last('job')
 
