@@ -57,7 +57,7 @@ def main() -> None:
         with play(folder, '--params', str(file), *options) as started, chromium(folder / 'profile') as browser:
             visit(browser, started)
             browser.execute_script(SCENE)
-            wait_for(browser, f'play.view.candidates.length === {WAYS}', f'{WAYS} ways')
+            wait_for(browser, f'play.view.scene.obstacles.length === {OBSTACLES} && play.view.candidates.length > 1', 'ways')
             start = 'play.measured.delays.length = 0; return [performance.now(), play.measured.predictions]'
             begun = browser.execute_script(start)
             frames, ways = [], []
