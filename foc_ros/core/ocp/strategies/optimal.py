@@ -58,14 +58,17 @@ NARROW = 0.02
 
 
 def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadline = NEVER) -> StrategyResult:
-    """Find a local minimum from a start."""
-    search = _Search(problem, deadline)
+    """Find a local minimum from a start.
+
+    Where the next prediction goes on from the result, a search that runs out of time has the k that it has reached.
+    """
+    search, is_late = _Search(problem, deadline), False
     try:
         status = search.run(start)
     except OutOfTimeError:
         if search.best is None:
             raise
-        status = Status.DEADLINE
+        status, is_late = search.judge() if search.is_followed else Status.DEADLINE, True
     point = search.best
     if status is Status.ITERATION_LIMIT:
         assert start.control is not None
@@ -76,13 +79,13 @@ def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadli
         return find_best_effort(problem, start, qp_solves=search.qp_solves, deadline=deadline)
     minimum, found = find_minimum_safety_factor(problem, point.control, between_steps=True), problem.risk
     reached = found.find_probability(minimum.k)
-    message = {
+    messages = {
         Status.SOLVED: 'solved',
         Status.ETA_UNREACHABLE: f'eta {problem.eta:g} is out of reach: the largest found is {reached:.4g}'
         if search.is_hard
         else f'eta {reached:.4g} only: more would cost more than likelihood.shortfall, or is out of reach',
-        Status.DEADLINE: f'out of time, with eta {reached:.4g} reached',
-    }[status]
+    }
+    message = f'out of time, with eta {reached:.4g} reached' if is_late else messages[status]
     weights = compute_equivalent_weights(point)
     return StrategyResult(
         status, message, point.control, point.contacts, qp_solves=search.qp_solves, minimum=minimum, equivalent_weights=weights
@@ -137,7 +140,8 @@ class _Search:
                 return Status.ITERATION_LIMIT
             return self.judge() if self.begin(start) else Status.INFEASIBLE
         assert self.best is not None
-        if self.is_cheap(self.best) and not (self.is_hard and start.safety_factor < self.problem.wanted_k):
+        is_known = self.is_hard and start.safety_factor < self.problem.wanted_k and not start.is_unfinished
+        if self.is_cheap(self.best) and not is_known:  # that no larger k is in reach
             self.raise_k(WARM_TRIES, WARM_STRIDE * (1.0 - self.slope(self.best) / self.rate))
         return self.judge()
 
