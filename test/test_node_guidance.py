@@ -89,13 +89,13 @@ def test_a_node_that_is_a_predictor_only_publishes_no_guidance(ros: Graph) -> No
 
 
 def test_guidance_updates_only_while_it_is_enabled(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
-    updates, update = [], guidance_loop.GuidanceLoop._update
+    updates, update = [], guidance_loop.GuidanceLoop.update
 
     def count(self: guidance_loop.GuidanceLoop, now_s: float) -> None:
         updates.append(now_s)
         update(self, now_s)
 
-    monkeypatch.setattr(guidance_loop.GuidanceLoop, '_update', count)
+    monkeypatch.setattr(guidance_loop.GuidanceLoop, 'update', count)
     bench = Guided(ros, **{'guidance.enabled': False})
     bench.publish_scene()
     bench.drive(60)

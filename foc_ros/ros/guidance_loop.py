@@ -119,6 +119,24 @@ class GuidanceLoop:
             'force_N': f'{float((output.force @ output.force) ** 0.5):.3f}',
         }
 
+    def update(self, now_s: float) -> None:
+        """Compute guidance at a time by the steady clock, and publish it; called in the thread."""
+        newest = self.newest
+        is_released = newest.is_released or not newest.config.guidance.enabled
+        position = newest.hand.mean[:2] if newest.hand is not None else self._state.position
+        velocity = newest.hand.mean[2:4] if newest.hand is not None else 0.0 * position
+        if self._zeros >= ZEROS and (is_released or newest.prediction is None):
+            self._state = replace(self._state, t=now_s, position=position)
+            return
+        ages = now_s - newest.hand_s, now_s - newest.prediction_s
+        given = GuidanceInput(now_s, position, velocity, newest.prediction, *ages, is_released=is_released)
+        self.output, self._state = guide(newest.config, self._state, given)
+        self._zeros = self._zeros + 1 if _has_ended(self.output) else 0
+        if self._zeros <= ZEROS:
+            self.place = newest.place or self.place
+            if self.place is not None:
+                self._publish(self.output, self.place)
+
     def _wake(self) -> None:
         """Let the thread update if guidance is enabled."""
         if self.newest.config.guidance.enabled:
@@ -135,29 +153,12 @@ class GuidanceLoop:
                 self._state = GuidanceState()
                 continue
             try:
-                self._update(monotonic())
+                self.update(monotonic())
             except Exception as error:
                 self._state = GuidanceState()
                 self._report(error)
             period_s = 1.0 / self.newest.config.guidance.rate_hz
             due_s = max(due_s + period_s, monotonic())
-
-    def _update(self, now_s: float) -> None:
-        newest = self.newest
-        is_released = newest.is_released or not newest.config.guidance.enabled
-        position = newest.hand.mean[:2] if newest.hand is not None else self._state.position
-        velocity = newest.hand.mean[2:4] if newest.hand is not None else 0.0 * position
-        if self._zeros >= ZEROS and (is_released or newest.prediction is None):
-            self._state = replace(self._state, t=now_s, position=position)
-            return
-        ages = now_s - newest.hand_s, now_s - newest.prediction_s
-        given = GuidanceInput(now_s, position, velocity, newest.prediction, *ages, is_released=is_released)
-        self.output, self._state = guide(newest.config, self._state, given)
-        self._zeros = self._zeros + 1 if _has_ended(self.output) else 0
-        if self._zeros <= ZEROS:
-            self.place = newest.place or self.place
-            if self.place is not None:
-                self._publish(self.output, self.place)
 
 
 def _has_ended(output: GuidanceOutput) -> bool:
