@@ -199,6 +199,9 @@ class GuidanceConfig:
     clearance: float = _p(
         0.015, 'distance that guidance keeps the hand from obstacles: no force farther away; 0: force everywhere', 'm', 0.0, 1.0
     )
+    sharpness: float = _p(
+        2.0, 'exponent of the likelihoods as weights: the larger, the more the likeliest candidate leads', '', 0.1, 10.0
+    )
     precision_low: float = _p(
         100.0, 'precision, an inverse variance of position, up to which there is no stiffness', '1/m^2', 0.0, 1e9
     )
