@@ -190,14 +190,17 @@ class GuidanceConfig:
     mode: str = _p(
         'path', 'path: no force along the path, the operator sets the pace; trajectory: also along it', choices=GUIDANCE_MODES
     )
-    k_max: float = _p(300.0, 'largest stiffness in any direction', 'N/m', 0.0, 5000.0)
+    k_max: float = _p(150.0, 'largest stiffness in any direction', 'N/m', 0.0, 5000.0)
     f_max: float = _p(3.0, 'largest force; it is also at most what `slew` reduces to zero within `ramp_s`', 'N', 0.0, 100.0)
     slew: float = _p(300.0, 'largest rate of change of the force', 'N/s', 0.1, 1e5)
     lookahead_s: float = _p(
-        0.15, 'longest time ahead at which a path is compared with where the hand goes by its velocity', 's', 0.0, 2.0
+        0.25, 'longest time ahead at which a path is compared with where the hand goes by its velocity', 's', 0.0, 2.0
     )
     clearance: float = _p(
-        0.015, 'distance that guidance keeps the hand from obstacles: no force farther away; 0: force everywhere', 'm', 0.0, 1.0
+        0.012, 'distance that guidance keeps the hand from obstacles: no force farther away; 0: force everywhere', 'm', 0.0, 1.0
+    )
+    sharpness: float = _p(
+        3.0, 'exponent of the likelihoods as weights: the larger, the more the likeliest candidate leads', '', 0.1, 10.0
     )
     precision_low: float = _p(
         100.0, 'precision, an inverse variance of position, up to which there is no stiffness', '1/m^2', 0.0, 1e9

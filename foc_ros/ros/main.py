@@ -17,8 +17,9 @@ from foc_ros.core.registry import import_all
 
 SPIN_S = 0.1
 """Longest time between two checks of the stop flag [s]."""
-SWITCH_S = 0.001
-"""Longest time for which the thread of the predictions keeps the others waiting for the interpreter [s]."""
+SWITCH_S = 0.0002
+"""Longest time for which the thread of the predictions keeps the others waiting for the interpreter [s]. An update of guidance
+gives the interpreter away several times, so with 0.001 it took up to 12 ms (`scripts/measure_guidance.py`)."""
 LOGGED_KERNELS = 10
 """Number of compiled kernels after which the log says so again."""
 END_S = 0.5
