@@ -11,38 +11,25 @@ from typing import Any
 from foc_ros.analysis.fitting.estimates import Fit
 from foc_ros.analysis.fitting.fit import fit_parameters
 from foc_ros.analysis.fitting.tables import PARAMETER_COLUMNS, SCORE_COLUMNS, format_parameters, format_scores
-from foc_ros.analysis.parallel import add_worker_arguments, open_executor
+from foc_ros.analysis.parallel import open_executor
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.core.config import Config, flatten
 from foc_ros.core.errors import InputError
-from foc_ros.io.outputs import check_replaceable
+from foc_ros.io.outputs import check_page
 from foc_ros.io.terminal import show_table
-from foc_ros.ros.parameters import load_optional_config, write_parameter_file
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
-    words = 'folder of bags, or of recordings.csv, goals.csv and, where there are obstacles, obstacles.csv'
-    parser.add_argument('data', type=Path, metavar='DATA', help=words)
-    parser.add_argument('--output', type=Path, metavar='YAML', required=True, help='parameter file to write')
-    parser.add_argument('--params', type=Path, metavar='FILE', help='parameter file with the values to start from')
-    parser.add_argument('--json', action='store_true', help='print one JSON object')
-    parser.add_argument('--report', type=Path, metavar='DIR', help='write a page with plots')
-    add_worker_arguments(parser)
+from foc_ros.ros.parameters import write_parameter_file
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Fit, write and show; return 2 where a recording could not be used, and the others were."""
-    config, output = load_optional_config(arguments.params), arguments.output
+    config, output = arguments.config, arguments.output
     # before the work, not after it
     if output.is_dir() or not output.resolve().parent.is_dir():
         raise InputError('--output', 'a file in a directory that exists', output)
-    if arguments.report is not None and arguments.report.is_file():
-        raise InputError('--report', 'a folder', arguments.report)
     if arguments.report is not None:
         from foc_ros.reporting.fit_report import PAGE, write_report
 
-        check_replaceable('--report', arguments.report / PAGE)
+        check_page('--report', arguments.report, PAGE)
     recordings = find_recordings(arguments.data)
     with open_executor(arguments) as executor:
         fit = fit_parameters(recordings, config, executor)

@@ -31,12 +31,6 @@ MARK = '.foc_ros_demo'
 """File that marks the output directory of a demo: the next demo may replace its bag and report."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
-    words = "directory for bag and report (default: %(default)s); an earlier demo's are replaced, other files are kept"
-    parser.add_argument('--output', type=Path, default=Path('demo_output'), metavar='DIR', help=words)
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Run the demo; return 1 if the node fails, 130 after an interrupt."""
     if find_spec('rclpy') is None:
