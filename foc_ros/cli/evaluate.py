@@ -13,7 +13,7 @@ from foc_ros.analysis.evaluation.tables import make_tables
 from foc_ros.analysis.parallel import collect, open_executor
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.io.outputs import check_page
-from foc_ros.io.terminal import show_table
+from foc_ros.io.terminal import show_table, show_text
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -43,4 +43,6 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         for title, columns, lines in make_tables(answer):
             show_table(columns, lines, title)
+        for sentence in answer['verdict']:
+            show_text(sentence)
     return 2 if failed else 0

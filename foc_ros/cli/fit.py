@@ -5,18 +5,28 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from foc_ros.analysis.fitting.comparison import find_worse_positions
 from foc_ros.analysis.fitting.estimates import Fit
 from foc_ros.analysis.fitting.fit import fit_parameters
-from foc_ros.analysis.fitting.tables import PARAMETER_COLUMNS, SCORE_COLUMNS, format_parameters, format_scores
+from foc_ros.analysis.fitting.tables import (
+    COMPARISON_COLUMNS,
+    PARAMETER_COLUMNS,
+    SCORE_COLUMNS,
+    format_comparison,
+    format_parameters,
+    format_scores,
+    make_verdict,
+)
 from foc_ros.analysis.parallel import open_executor
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.core.config import Config, flatten
 from foc_ros.core.errors import InputError
 from foc_ros.io.outputs import check_page
-from foc_ros.io.terminal import show_table
+from foc_ros.io.terminal import show_table, show_text
 from foc_ros.ros.parameters import write_parameter_file
 
 
@@ -32,9 +42,12 @@ def run(arguments: argparse.Namespace) -> int:
         check_page('--report', arguments.report, PAGE)
     recordings = find_recordings(arguments.data)
     with open_executor(arguments) as executor:
-        fit = fit_parameters(recordings, config, executor)
-    write_parameter_file('--output', output, fit.config)
+        fit = fit_parameters(recordings, config, executor, may_lower_eta=arguments.allow == 'eta')
     answer = make_answer(fit, config, output)
+    if not _confirm(find_worse_positions(fit.comparison), output):
+        print(f'foc_ros fit: {output} is not written', file=sys.stderr)
+        return 2
+    write_parameter_file('--output', output, fit.config)
     if arguments.report is not None:
         write_report(arguments.report, arguments.data.resolve().name, answer)
     if arguments.json:
@@ -55,16 +68,29 @@ def make_answer(fit: Fit, given: Config, output: Path) -> dict[str, Any]:
         'parameters': {name: {**each.as_json(), 'given': before[name]} for name, each in fit.estimates.items()},
         'chosen': {name: {'value': value, 'given': before[name]} for name, value in fit.chosen.items()},
         'scores': fit.scores,
+        'comparison': fit.comparison,
         'warnings': fit.warnings,
         'output': str(output),
         'node': [f'python -m foc_ros node {options}', f'ros2 run foc_ros foc_node {options}'],
     }
 
 
+def _confirm(losses: Sequence[str], output: Path) -> bool:
+    """Say what becomes worse before the file is written; on a terminal, return whether the user wants it all the same."""
+    for loss in losses:
+        print(f'foc_ros fit: {loss}', file=sys.stderr)
+    if not losses or not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return True
+    return input(f'Write {output} all the same? [y/N] ').strip().lower() in ('y', 'yes')
+
+
 def _show(answer: dict[str, Any]) -> None:
     show_table(PARAMETER_COLUMNS, format_parameters(answer))
     show_table(SCORE_COLUMNS, format_scores(answer))
+    show_table(COMPARISON_COLUMNS, format_comparison(answer))
     for warning in answer['warnings']:
-        print(f'note: {warning}')
+        show_text(f'note: {warning}')
+    for sentence in make_verdict(answer):
+        show_text(sentence)
     words = f'{answer["recordings"]} recordings; parameters written to {answer["output"]}. Run the node with them:'
     print('\n  '.join((words, *answer['node'])))
