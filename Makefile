@@ -11,6 +11,7 @@
 # make people      predictions of people, where their recordings are beside the checkout: doc/people.md; OPTIONS=--every 4
 # make pages       files that are derived from the parameters in foc_ros/core/config.py
 # make colcon      build, start, lint and test with colcon, as in a ROS workspace
+# make dist        build the source distribution and the wheel in build/dist, and try the wheel in an empty environment
 # make fuzz        100,000 random messages
 # make soak        ten minutes of a node among faulty publishers
 # make stops       a node that is stopped 200 times
@@ -47,7 +48,7 @@ endif
 
 TEST = ROS_PYTHON_CHECK_FIELDS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
 
-.PHONY: setup help check test test-long lint demo doc bench people pages colcon fuzz soak stops hostile clean
+.PHONY: setup help check test test-long lint demo doc bench people pages colcon dist fuzz soak stops hostile clean
 
 setup: $(STAMP)
 ifneq ($(origin PYTHON),file)
@@ -87,6 +88,9 @@ lint: $(STAMP)
 
 colcon:
 	PYTHON=$(PYTHON) scripts/colcon_check
+
+dist: $(STAMP)
+	PYTHON=$(BIN)/python scripts/dist_check
 
 fuzz: $(STAMP)
 	FOC_ROS_FUZZ=100000 $(TEST) --timeout 3600 test/test_fuzz.py

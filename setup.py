@@ -9,7 +9,7 @@ PACKAGE = 'foc_ros'
 
 setup(
     name=PACKAGE,
-    version='0.1.0',
+    version='0.2.0',
     description='Predicts where the hand of a teleoperator is going among obstacles, with uncertainty and likelihood, on ROS 2',
     # resolved: colcon build --symlink-install runs a link to this file
     long_description=Path(__file__).resolve().with_name('README.md').read_text(encoding='utf-8'),
@@ -58,8 +58,10 @@ setup(
         # what the benchmark compares with
         'bench': ['casadi>=3.7', 'cvxpy>=1.4', 'daqp>=0.5', 'matplotlib>=3.6', 'scipy>=1.15'],
         'test': [
+            'build>=1.2',
             'daqp>=0.5',
             'distributed>=2024.1',
+            'dockerfile-parse>=2',
             'hypothesis>=6.80',
             'import-linter>=2.1',
             'mcap-ros2-support>=0.5',
@@ -72,6 +74,7 @@ setup(
             'scipy>=1.9',
             'selenium>=4.11',
             'setuptools>=70.1',
+            'twine>=5',
             'types-PyYAML',
         ],
     },
