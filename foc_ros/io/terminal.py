@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from textwrap import fill
@@ -16,6 +17,8 @@ from rich.table import Table
 T = TypeVar('T')
 COLUMNS = 80
 """Width of a terminal, into which tables fit where only their first and last columns are long [characters]."""
+PRINTED = 20
+"""A counter is printed each time that it has grown by this, where there is no terminal."""
 LEAST = 12
 """Width to which the last column of a wide table is folded [characters]."""
 
@@ -39,16 +42,22 @@ def show_progress(items: Iterable[T], words: str, total: int) -> Iterator[T]:
 
 
 class Counter:
-    """A number that is shown in a progress bar. Attributes: done, the number."""
+    """A number that is shown in a progress bar, or where there is no terminal in a line of text at times.
+
+    Attributes: done, the number.
+    """
 
     def __init__(self, progress: Progress, words: str, total: int) -> None:
         self.done = 0
         self._progress, self._task = progress, progress.add_task(words, total=total)
+        self._words, self._total = words, total
 
     def show(self, done: int) -> None:
         """Show a number."""
         self.done = done
         self._progress.update(self._task, completed=done)
+        if self._progress.disable and done % PRINTED == 0:
+            print(f'{self._words}: {done} of {self._total}', file=sys.stderr, flush=True)
 
 
 @contextmanager

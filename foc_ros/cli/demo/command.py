@@ -20,11 +20,12 @@ from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import BagReader, BagWriter, Item
-from foc_ros.io.terminal import show_table
+from foc_ros.io.terminal import show_table, show_text
 from foc_ros.reporting.snapshots import build_hand_trajectory
 
 from .environment import NodeDiedError, NodeProcess, free_domain, private_environment, set_environment
 from .recorder import Recorder, show_live
+from .summary import describe_lead
 
 RECORDING = Path(__file__).resolve().parents[2] / 'recordings' / 'reaching.mcap'
 MARK = '.foc_ros_demo'
@@ -65,7 +66,9 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf, d
     title, hand = 'Reaching among obstacles, live', build_hand_trajectory(recorder.samples)
     write_report(output / 'report', title, hand, recorder.snapshots, facts)
     show_table(('', str(output)), [('predictions', str(len(recorder.snapshots))), *facts.items()])
-    print(f'written to {output}: bag (inputs and outputs, MCAP), report/index.html')
+    print(f'written to {output}: bag (inputs and outputs, MCAP) and the report')
+    print(f'report: {(output / "report" / "index.html").resolve().as_uri()}')
+    show_text(describe_lead(hand, recorder.snapshots))
     return 0
 
 
