@@ -10,7 +10,6 @@ from foc_ros.core.dynamics.plants import (
     condense,
     discretise_damped_mass,
     discretise_triple_integrator,
-    find_states_at_goal,
 )
 from foc_ros.core.dynamics.replanning import compute_error_map, triple_integrator_error_map
 from foc_ros.core.errors import InputError
@@ -92,17 +91,3 @@ def test_mass_and_damping_are_checked():
         discretise_damped_mass(0.01, 0.0, 1.0)
     with pytest.raises(InputError, match='damping'):
         discretise_damped_mass(0.01, 1.0, float('nan'))
-
-
-@pytest.mark.parametrize('passing', [False, True])
-def test_a_correction_ends_at_the_goal_and_nearer_to_the_path(passing):
-    generator = np.random.default_rng(6)
-    stacked = build_triple_integrator_horizon(0.02, 40)
-    fixed = find_states_at_goal(6, passing)
-    path, state = 0.01 * np.cumsum(generator.standard_normal((40, 2)), axis=0), generator.standard_normal(6)
-    control = stacked.compute_correction(path, state, fixed)
-    np.testing.assert_allclose(stacked.response[-1, fixed] @ control, state[fixed], atol=1e-8)
-    straight = stacked.compute_correction(np.zeros((40, 2)), state, fixed)
-    assert np.linalg.norm((stacked.position @ control).T - path) < np.linalg.norm((stacked.position @ straight).T - path)
-    own = condense(discretise_triple_integrator(0.02), 40).compute_correction(path, state, fixed)
-    np.testing.assert_allclose(stacked.position @ control, stacked.position @ own, atol=1e-9)

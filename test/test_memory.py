@@ -79,7 +79,7 @@ def test_a_candidate_stopped_by_the_deadline_continues_from_there(monkeypatch):
 
     def stop_after_a_few(*_):
         looks.append(1)
-        if len(looks) > 4:
+        if len(looks) > 3:
             raise OutOfTimeError
 
     with monkeypatch.context() as patch:

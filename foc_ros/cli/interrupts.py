@@ -28,8 +28,8 @@ def handle_interrupts() -> Iterator[None]:
     """Raise KeyboardInterrupt on SIGINT within the context, and again until the context is left.
 
     Three kinds of code cannot pass on an exception. Callbacks of the import system and modules that an extension module imports
-    lose it. Where a kernel returns a named tuple, in numba's look-up of its class and in its constructor, it would end the process
-    with a segmentation fault. An interrupt that arrives there is delayed until this code has ended.
+    lose it. Where a kernel returns a named tuple, in numba's look-up of its class and in its constructor, it would end the
+    process with a segmentation fault. An interrupt that arrives there is delayed until this code has ended.
     """
     usual = signal.default_int_handler
     if signal.getsignal(signal.SIGINT) is not usual or threading.current_thread() is not threading.main_thread():
@@ -65,7 +65,7 @@ class _Interrupt:
 
 
 def _loses_exceptions(frame: FrameType | None) -> bool:
-    """Return whether an exception would be lost: in the constructor of a named tuple, which has no file, or within `LOSING_MODULES`."""
+    """Return whether an exception would be lost: in a frame without a file, as in a named tuple, or within `LOSING_MODULES`."""
     if frame is not None and frame.f_code.co_filename.startswith('<'):
         return True
     while frame is not None and not str(frame.f_globals.get('__name__')).startswith(LOSING_MODULES):

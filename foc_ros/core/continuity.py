@@ -27,7 +27,7 @@ import numpy as np
 from .class_numbers import is_renamed
 from .config import LikelihoodConfig
 from .likelihood import CostModel
-from .ocp.warm_start import resample_rest
+from .ocp.warm_start import interpolate_rest, resample_rest
 from .types import NANOSECONDS, Array, Candidate, PredictedCandidate, Prediction, Record, Solution, as_readonly
 
 MOVED = 0.01
@@ -194,7 +194,8 @@ def _smooth_path(candidate: PredictedCandidate, answer: Answer, stamp_ns: int, g
     left_s = float(answer.predicted.solution.times[-1]) - age_s
     if left_s <= solution.dt:
         return candidate
-    before, total_s = _shift(answer.predicted.solution, age_s, left_s, ''), float(solution.times[-1])
+    earlier, total_s = answer.predicted.solution, float(solution.times[-1])
+    before = interpolate_rest(earlier.mean, age_s / earlier.dt)
     s = solution.times / total_s
     fall = np.stack(
         (
@@ -203,7 +204,7 @@ def _smooth_path(candidate: PredictedCandidate, answer: Answer, stamp_ns: int, g
             -60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / total_s**2,
         )
     )
-    difference = before.mean - solution.mean
+    difference = before - solution.mean
     now = difference[0, :2].copy()
     for state in range(difference.shape[1] // 2):
         difference[:, 2 * state : 2 * state + 2] -= fall[state][:, None] * now

@@ -27,6 +27,22 @@ def multiply_transposed(a: Matrix, b: Matrix) -> Matrix:
 
 
 @compiled
+def multiply_weighted(a: Matrix, weights: Vector) -> Matrix:
+    """Return a D a', (m, m), for rows a (m, q) and the diagonal (q,) of D; half of it is computed, as it is symmetric."""
+    m, q = a.shape
+    product, row = np.empty((m, m)), np.empty(q)
+    for i in range(m):
+        for k in range(q):
+            row[k] = weights[k] * a[i, k]
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(q):
+                total += row[k] * a[j, k]
+            product[i, j] = product[j, i] = total
+    return product
+
+
+@compiled
 def multiply(weights: Matrix, rows: Matrix) -> Matrix:
     """Return weights @ rows, (m, q), for weights (m, n) and rows (n, q); numpy takes 2.3, 1.9 and 1.0 times as long for n = 6."""
     m, n, q = weights.shape[0], rows.shape[0], rows.shape[1]

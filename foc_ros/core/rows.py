@@ -42,15 +42,14 @@ def find_rows(obstacles: Obstacles, direction: Array, start: Array, goals: Array
 
 def find_walls(obstacles: Obstacles, points: Array) -> NDArray[np.bool_]:
     """Tell which obstacles (n,) have an edge beside which all points (q, 2) [m] lie: outside of it, and between its ends."""
-    is_wall = np.zeros(len(obstacles), dtype=bool)
-    for j in range(len(obstacles)):
-        corners = obstacles.centre[j] + obstacles.vertices[j, : obstacles.corners[j]]
-        edges = np.roll(corners, -1, axis=0) - corners
-        offset = points[:, None] - corners
-        along = (offset * edges).sum(axis=2)
-        is_outside = edges[:, 0] * offset[..., 1] - edges[:, 1] * offset[..., 0] < 0.0
-        is_beside = is_outside & (along > 0.0) & (along < (edges**2).sum(axis=1))
-        is_wall[j] = is_beside.all(axis=0).any()
+    vertices, number, corners = obstacles.vertices, np.arange(obstacles.vertices.shape[1]), obstacles.corners[:, None]
+    following = np.where(number + 1 < corners, number + 1, 0)
+    edges = np.take_along_axis(vertices, following[..., None], axis=1) - vertices
+    offset = points[:, None, None] - (obstacles.centre[:, None] + vertices)
+    along = (offset * edges).sum(axis=-1)
+    is_outside = edges[..., 0] * offset[..., 1] - edges[..., 1] * offset[..., 0] < 0.0
+    is_beside = is_outside & (along > 0.0) & (along < (edges**2).sum(axis=-1)) & (number < corners)
+    is_wall: NDArray[np.bool_] = is_beside.all(axis=0).any(axis=1)
     return is_wall
 
 

@@ -17,8 +17,6 @@ from foc_ros.core.types import Array, Record
 
 CACHED_HORIZONS = 16
 """Size of caches: one horizon per duration, for a prediction and a few before it, about 30 kB each at N = 50."""
-CORRECTION_WEIGHT = 1e-2
-"""Relative weight w of a correcting control: with a smaller one the correction would be abrupt."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,31 +117,6 @@ class Horizon(Record):
         """S: matrices (2, N, 2N) from u to the positions at steps 1..N."""
         return self.response[:, :2].swapaxes(0, 1)
 
-    def compute_correction(self, path: Array, state: Array, fixed: NDArray[np.bool_]) -> Array:
-        """Return the control (2N,) that corrects deviations of a path, and of the fixed states (n,) at its end.
-
-        path (N, 2): deviations of the positions at steps 1..N; state (n,): of the states at step N. The control minimises
-        |S u - path|^2 + w |u|^2 subject to E u = state, with S and E the matrices to the positions and to the fixed states.
-        """
-        to_path, to_goal = _correction_matrices(self, fixed.tobytes())
-        # not by BLAS, whose threads take milliseconds to wake up on a busy machine
-        control: Array = np.einsum('ij,j', to_path, path.T.ravel()) + to_goal @ state
-        return control
-
-
-@lru_cache(maxsize=CACHED_HORIZONS)
-def _correction_matrices(horizon: Horizon, fixed: bytes) -> tuple[Array, Array]:
-    is_fixed = np.frombuffer(fixed, dtype=np.bool_)
-    S, E = np.concatenate(horizon.position), horizon.last[is_fixed]
-    unit = 1.0 / np.sqrt((E**2).sum(axis=1))[:, None]  # the rows have different units: m, m/s, ...
-    square = S.T @ S
-    weight = square + CORRECTION_WEIGHT * np.trace(square) / len(square) * np.eye(len(square))
-    to_path, turned = np.linalg.solve(weight, S.T), np.linalg.solve(weight, (unit * E).T)
-    to_goal = turned @ np.linalg.pinv(unit * E @ turned) * unit.T
-    of_each_state = np.zeros((len(to_goal), len(is_fixed)))
-    of_each_state[:, is_fixed] = to_goal
-    return to_path - to_goal @ (E @ to_path), of_each_state
-
 
 def condense(plant: Plant, steps: int) -> Horizon:
     """Return the condensed horizon of a plant over `steps` >= 1 steps."""
@@ -167,16 +140,6 @@ def compute_state_scale(dt: float) -> Array:
     return scale
 
 
-@dataclass(frozen=True, eq=False)
-class _Scaled(Horizon):
-    """The triple integrator's horizon at a step dt [s]; unit: the one of unit step, which computes the corrections."""
-
-    unit: Horizon
-
-    def compute_correction(self, path: Array, state: Array, fixed: NDArray[np.bool_]) -> Array:
-        return self.unit.compute_correction(path, state * self.dt**STATE_ORDER, fixed) / self.dt**3
-
-
 @lru_cache(maxsize=CACHED_HORIZONS)
 def _unit_horizon(steps: int) -> Horizon:
     return condense(discretise_triple_integrator(1.0), steps)
@@ -190,7 +153,7 @@ def build_triple_integrator_horizon(dt: float, steps: int) -> Horizon:
     """
     unit = _unit_horizon(steps)
     scale = compute_state_scale(dt)
-    return _Scaled(unit.powers * (scale[:, None] / scale), unit.states * (dt**3 * scale)[:, None, None], dt, unit)
+    return Horizon(unit.powers * (scale[:, None] / scale), unit.states * (dt**3 * scale)[:, None, None], dt)
 
 
 def find_states_at_goal(n: int, passing: bool = False) -> NDArray[np.bool_]:

@@ -7,10 +7,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled, freeze
+from foc_ros.core.linear_algebra import (
+    factorise_cholesky,
+    multiply_transposed,
+    multiply_vector,
+    solve_lower,
+    solve_lower_transposed,
+)
 from foc_ros.core.types import Array, Solution, Status
 
 from .contacts.contacts import NO_CONTACTS, Contacts
+from .contacts.hermite import interpolation_rows
 from .problem import Problem
+from .terms import Motion
+
+REGULARISATION = 1e-9
+"""Added to the diagonal of R R', which is singular where two contacts are at the same time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +112,46 @@ def resample_rest(mean: Matrix, covariance: Tensor, control: Matrix, begin: floa
     return means, covariances, controls
 
 
-def correct_to_goal(problem: Problem, control: Array, path: Array) -> Array:
-    """Change a control (2N,) so that the mean returns to a path (N, 2) and to the goal, from where the hand really is now."""
-    missing = problem.goal - problem.free[-1] - problem.horizon.last @ control
-    corrected: Array = control + problem.horizon.compute_correction(path - problem.positions(control), missing, problem.at_goal)
-    return corrected
+def interpolate_rest(mean: Array, begin: float) -> Array:
+    """Return the mean (N + 1, n) from the step `begin` on, at N steps."""
+    steps = len(mean) - 1
+    at = np.linspace(begin, steps, steps + 1)
+    row = np.minimum(at.astype(np.intp), steps - 1)
+    share = (at - row)[:, None]
+    rest: Array = (1.0 - share) * mean[row] + share * mean[row + 1]
+    return rest
+
+
+def correct_to_goal(problem: Problem, control: Array, path: Array, times: Array) -> Array:
+    """Change a control (2N,) so that the mean meets a path (N, 2) at some times (c,) and the goal, from where the hand now is.
+
+    times: of the contacts, in steps. Of all controls that do so the nearest is returned, u + R'(R R')^-1 e, with the rows R of
+    what is to be met and the errors e of u, each divided by the length of its row.
+    """
+    whole, goal = np.concatenate((problem.initial_mean[None, :2], path)), problem.at_goal
+    rows, targets = problem.horizon.last[goal], (problem.goal - problem.free[-1])[goal]
+    return _correct_to_goal(problem.terms.motion, rows, targets, control, whole, times)
+
+
+@compiled
+def _correct_to_goal(motion: Motion, goal_rows: Matrix, targets: Vector, control: Vector, path: Matrix, times: Vector) -> Vector:
+    """Return the corrected control; goal_rows (r, 2N) and targets (r,) of the states at the goal, path (N + 1, 2)."""
+    count, steps = len(times), len(path) - 1
+    rows, wanted = np.empty((2 * count + len(targets), len(control))), np.empty((2 * count + len(targets), 1))
+    at_contacts, free = interpolation_rows(motion, times)
+    for i in range(count):
+        t = min(int(times[i]), steps - 1)
+        share = times[i] - t
+        for axis in range(2):
+            rows[2 * i + axis] = at_contacts[axis, i]
+            wanted[2 * i + axis, 0] = (1.0 - share) * path[t, axis] + share * path[t + 1, axis] - free[i, axis]
+    rows[2 * count :], wanted[2 * count :, 0] = goal_rows, targets
+    for i in range(len(rows)):
+        length = np.sqrt((rows[i] ** 2).sum())
+        rows[i], wanted[i] = rows[i] / length, wanted[i] / length
+    square, missing = multiply_transposed(rows, rows), wanted - multiply_vector(rows, control)[:, None]
+    for i in range(len(rows)):
+        square[i, i] += REGULARISATION
+    factor = factorise_cholesky(square, 0.0)
+    weights = solve_lower_transposed(factor, solve_lower(factor, missing)[:, 0].copy())
+    return control + weights @ rows

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled_separately
-from foc_ros.core.linear_algebra import multiply_transposed, multiply_vector, solve_by_elimination
+from foc_ros.core.linear_algebra import multiply_vector, multiply_weighted, solve_by_elimination
 from foc_ros.core.ocp.terms import CostTerms, MovingObstacles, ProblemTerms
 
 from .contacts import Contacts
@@ -35,6 +35,8 @@ STANDSTILL_CURVATURE = 1e-12
 """Least curvature of a margin over time while steps are made, of a mean that stands still [m]."""
 FAR_OFF = 10.0
 """Margin at a contact, relative to the tolerance of moves, at which the iteration goes on although nothing moves."""
+SMALLEST_SHARE = 0.1
+"""Least share of a step that the limit on turns may leave: below it an iteration hardly ever comes to an end."""
 K_SCALE = 1e-2
 """A change of k by one counts as a move by so much of the scene."""
 SMALLEST_COST = 1e-9
@@ -234,7 +236,8 @@ def assemble_system(
     alone = -made.gradient / made.diagonal
     influence = -made.rows / made.diagonal
     influence[y:by_k] *= -1.0
-    matrix, right = multiply_transposed(made.rows, influence), -multiply_vector(made.rows, alone)
+    matrix, right = -multiply_weighted(made.rows, 1.0 / made.diagonal), -multiply_vector(made.rows, alone)
+    matrix[:, y:by_k] *= -1.0
     worth, weight = max(preference.fixed_cost + preference.dt * float(control @ control), SMALLEST_COST), 0.0
     for i in range(m):
         weight = max(weight, SMALLEST_MULTIPLIER * multiplier[i])
@@ -309,6 +312,8 @@ def newton_on_surrogate(
             nx, ny = made.offset[i, 0] / apart, made.offset[i, 1] / apart
             share = min(share, limit_turn(apart, nx * shift[1] - ny * shift[0], nx * shift[0] + ny * shift[1]))
             move = max(move, np.hypot(shift[0], shift[1]), abs(slide[i]) * made.speed[i], abs(made.value[i]) / FAR_OFF)
+        if share < SMALLEST_SHARE:
+            break
         control, k = control + share * change, k + share * k_change
         multiplier += share * (found[y : y + m] - multiplier)
         for i in range(m):

@@ -93,7 +93,8 @@ def _search(follower: PathFollower, start: Start) -> StrategyResult:
     else:
         positions = np.concatenate((problem.initial_mean[None, :2], start.positions))
         angles = compute_swept_angles(positions, problem.centre_trajectories)
-        control, contacts = correct_to_goal(problem, start.control, start.positions), start.contacts.merge(problem.first_alike)
+        contacts = start.contacts.merge(problem.first_alike)
+        control = correct_to_goal(problem, start.control, start.positions, contacts.time)
         first = follower.solve_by_newton(follower.path.s_of(start.lam), control, contacts, angles)
         if first is None:
             first = follower.solve_first(start.positions, angles)

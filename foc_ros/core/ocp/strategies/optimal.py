@@ -45,12 +45,12 @@ EVEN = 1e-4
 """Relative difference of the slope from the one that is worth it at which both are the same."""
 FOLLOW_SHARE = 0.5
 """Part of the time left that an earlier solution may take; then the search begins again."""
-NEARLY = 0.3
+NEARLY = 0.6
 """Part of the slope that is worth it from which Newton steps are tried that have k as an unknown."""
 WARM_TRIES, COLD_TRIES = 2, 4
 """Values of k that are tried from an earlier solution, and from the least effort, if the next prediction goes on from there."""
 WARM_STRIDE = 0.3
-"""The longest first stride in k from an earlier solution."""
+"""The longest first stride in k from an earlier solution; it is shorter, the nearer the slope is to the one that is worth it."""
 NARROW = 0.02
 """Bracket in k at which the search ends."""
 
@@ -68,7 +68,8 @@ def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadli
     if status is Status.ITERATION_LIMIT:
         assert start.control is not None
         message = 'the earlier solution does not lead to one now'
-        return StrategyResult(status, message, correct_to_goal(problem, start.control, start.positions), aims_at_eta=False)
+        control = correct_to_goal(problem, start.control, start.positions, start.contacts.time)
+        return StrategyResult(status, message, control, aims_at_eta=False)
     if point is None or status is Status.INFEASIBLE:
         return find_best_effort(problem, start, qp_solves=search.qp_solves, deadline=deadline)
     minimum, found = find_minimum_safety_factor(problem, point.control, between_steps=True), problem.risk
@@ -117,8 +118,9 @@ class _Search:
             if start.control is not None and not start.is_unfinished:
                 return Status.ITERATION_LIMIT
             return self.judge() if self.begin(start) else Status.INFEASIBLE
-        if not (self.is_hard and start.safety_factor < self.problem.wanted_k):
-            self.raise_k(WARM_TRIES, WARM_STRIDE)
+        assert self.best is not None
+        if self.is_cheap(self.best) and not (self.is_hard and start.safety_factor < self.problem.wanted_k):
+            self.raise_k(WARM_TRIES, WARM_STRIDE * (1.0 - self.slope(self.best) / self.rate))
         return self.judge()
 
     def judge(self) -> Status:
@@ -144,7 +146,8 @@ class _Search:
         problem = self.problem
         positions = np.concatenate((problem.initial_mean[None, :2], start.positions))
         self.angles = compute_swept_angles(positions, problem.centre_trajectories)
-        control, contacts = correct_to_goal(problem, start.control, start.positions), start.contacts.merge(problem.first_alike)
+        contacts = start.contacts.merge(problem.first_alike)
+        control = correct_to_goal(problem, start.control, start.positions, contacts.time)
         point = self.solve_below(control, contacts, min(start.safety_factor, self.wanted), WARM_SHARES)
         point = None if point is None else self.lower_k(point)
         if point is None or not 0.0 <= point.k <= self.wanted:
@@ -244,7 +247,7 @@ class _Search:
 
     def solve_below(self, near: Array, contacts: Contacts, k: float, shares: tuple[float, ...]) -> SurrogatePoint | None:
         """Find the point near another one at the first of the shares of k that Newton steps lead to."""
-        for share in shares if k > 0.0 else (1.0,):
+        for share in shares if k > NARROW else (1.0,):
             point = self.solve(near, contacts, share * k)
             if point is not None:
                 return point

@@ -153,9 +153,9 @@ class PathFollower:
     def _run_qps(
         self, s: float, guess: Array, working: WorkingSet, class_angles: Array | None, *, thorough: bool
     ) -> SqpResult | None:
-        """Solve QPs until they converge, with rows at the steps; where the mean crosses one between them, add rows there."""
+        """Solve QPs until they converge, with rows at steps and halfway between; where the mean crosses one, add rows there."""
         problem, (tau, lam) = self.problem, self.weights_at(s)
-        left, between = MAX_QPS if thorough else FURTHER_QPS, NO_TIMES
+        left, between = MAX_QPS if thorough else FURTHER_QPS, np.arange(1.5, problem.horizon.steps)
 
         def jump(control: Array, contacts: Contacts) -> KktPoint | None:
             return solve_kkt_point(problem, control, contacts.merge(problem.first_alike), tau, lam, class_angles)
