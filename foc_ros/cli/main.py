@@ -38,8 +38,6 @@ COMMANDS = {
 }
 """Purpose of each command. With an underscore for a hyphen, `arguments` declares its arguments in `add_NAME_arguments(parser)`,
 and the module of its name defines `run(arguments) -> exit code`."""
-
-
 COMPUTING = ('paper', 'solve', 'replay', 'fit', 'evaluate', 'simulate')
 """Commands whose modules import the solver; `demo`, `node` and `warm-up` show its compilation themselves."""
 
