@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, cast
 
-from .errors import ParameterError
+from .errors import ParameterError, join_errors, suggest
 from .registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
 
 PLANES = ('xy', 'xz', 'yz')
@@ -301,15 +301,29 @@ def flatten(config: Config) -> dict[str, float | int | str | bool]:
 
 
 def replace_values(config: Config, values: Mapping[str, object]) -> Config:
-    """Return the config with some values changed, by dotted name: `Config.with_values`."""
+    """Return the config with some values changed, by dotted name: `Config.with_values`. An error names all wrong values."""
     known = {parameter.name: parameter for parameter in list_parameters()}
+    errors = []
     for name, value in values.items():
-        if name not in known:
-            raise ParameterError(name, 'a known parameter', repr(value))
         group, _, leaf = name.rpartition('.')
-        checked = _check_value(known[name], value)
+        try:
+            checked = _check_value(_find_parameter(name, value, known), value)
+        except ParameterError as error:
+            errors.append(error)
+            continue
         config = replace(config, **({group: replace(getattr(config, group), **{leaf: checked})} if group else {leaf: checked}))
+    if errors:
+        raise join_errors(errors)
     return config
+
+
+def _find_parameter(name: str, value: object, known: Mapping[str, Parameter]) -> Parameter:
+    """Return the parameter of a name; raise ParameterError for a name that is unknown or that of a group."""
+    if name in known:
+        return known[name]
+    groups = {each.partition('.')[0] for each in known if '.' in each}
+    expected = 'a group of parameters' if name in groups else f'a known parameter{suggest(name, (*known, *groups))}'
+    raise ParameterError(name, expected, repr(value))
 
 
 def _check_value(parameter: Parameter, value: object) -> float | int | str | bool:

@@ -12,7 +12,7 @@ from types import FrameType
 from typing import Any
 
 from foc_ros.core.compilation import count_kernels, follow_compilation
-from foc_ros.core.errors import FocError
+from foc_ros.core.errors import FocError, list_messages
 from foc_ros.core.registry import import_all
 
 SPIN_S = 0.1
@@ -77,7 +77,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         node = FocNode(context=context)
     except (FocError, RuntimeError, ValueError) as error:
         context.try_shutdown()
-        print(f'foc_node: {" ".join(str(error).split())}', file=sys.stderr)
+        for message in list_messages(error):
+            print(f'foc_node: {" ".join(message.split())}', file=sys.stderr)
         return 2
     sys.setswitchinterval(SWITCH_S)
     gc.collect()
