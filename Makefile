@@ -36,11 +36,11 @@ export ROS_LOG_DIR := $(CURDIR)/build/ros_log
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 # A ROS installation of the surrounding shell must not mix with the one in .venv. The loader of the wheels sets these variables itself.
 ifeq ($(ROS),wheels)
-EXTRAS := ros,report,test
+EXTRAS := ros,report,play,test
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV)
 unexport LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONPATH RMW_IMPLEMENTATION
 else ifeq ($(ROS),system)
-EXTRAS := report,test
+EXTRAS := report,play,test
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 VENV_OPTIONS := --system-site-packages
 # the pytest plugins of a ROS installation are for launch tests and do not fit this pytest

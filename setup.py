@@ -6,6 +6,8 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 PACKAGE = 'foc_ros'
+PAGES = ('play/page', 'reporting/page')
+REPORT = ['Jinja2>=3.1', 'matplotlib>=3.6', 'plotly>=5.24']
 
 setup(
     name=PACKAGE,
@@ -22,7 +24,7 @@ setup(
     keywords=['ROS', 'teleoperation', 'motion prediction', 'stochastic optimal control', 'homotopy'],
     packages=find_packages(exclude=['test', 'test.*']),
     package_data={
-        PACKAGE: ['py.typed', 'reporting/page/*.css', 'reporting/page/*.html', 'reporting/page/*.js', 'recordings/*.mcap']
+        PACKAGE: ['py.typed', *(f'{page}/*.{kind}' for page in PAGES for kind in ('css', 'html', 'js')), 'recordings/*.mcap']
     },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
@@ -50,7 +52,9 @@ setup(
     extras_require={
         # rclpy with Fast DDS and the common interfaces as wheels, for machines without a ROS installation
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
-        'report': ['Jinja2>=3.1', 'matplotlib>=3.6', 'plotly>=5.24'],
+        'report': REPORT,
+        # the page on which one tries it with one's own hand
+        'play': [*REPORT, 'tornado>=6.2'],
         # recordings on the workers of a Dask cluster
         'cluster': ['distributed>=2024.1'],
         # the documentation as a web site

@@ -28,8 +28,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from foc_ros.cli.demo.environment import free_domain, private_environment
 from foc_ros.core.types import Array
+from foc_ros.ros.isolated_node import free_domain, private_environment
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import RclpyTypes
 

@@ -52,6 +52,11 @@ def chromium(profile: Path) -> Iterator[Any]:
 
 
 def show(browser: Any, page: Path, width: int = 1280, height: int = 900, dark: bool = False) -> list[str]:
+    """Open a page of a file; see `show_address`."""
+    return show_address(browser, page.resolve().as_uri(), width, height, dark)
+
+
+def show_address(browser: Any, address: str, width: int = 1280, height: int = 900, dark: bool = False) -> list[str]:
     """Open a page on a screen of the given size; return the messages of the browser's log."""
     browser.get_log('browser')
     screen = {'width': width, 'height': height, 'deviceScaleFactor': 1, 'mobile': width < 500}
@@ -59,7 +64,7 @@ def show(browser: Any, page: Path, width: int = 1280, height: int = 900, dark: b
     browser.execute_cdp_cmd('Emulation.setTouchEmulationEnabled', {'enabled': width < 500})
     scheme = {'name': 'prefers-color-scheme', 'value': 'dark' if dark else 'light'}
     browser.execute_cdp_cmd('Emulation.setEmulatedMedia', {'features': [scheme]})
-    browser.get(page.resolve().as_uri())
+    browser.get(address)
     return [entry['message'] for entry in browser.get_log('browser')]
 
 

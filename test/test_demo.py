@@ -84,13 +84,14 @@ def start(domain: int, output: Path) -> tuple[subprocess.Popen[str], int]:
     program = f"""
 import sys
 from pathlib import Path
-from foc_ros.cli.demo import command, environment
-entered = environment.NodeProcess.__enter__
+from foc_ros.cli.demo import command
+from foc_ros.ros import isolated_node
+entered = isolated_node.NodeProcess.__enter__
 def enter(self):
     node = entered(self)
     print({STARTED!r} + str(node.pid), flush=True)
     return node
-environment.NodeProcess.__enter__ = enter
+isolated_node.NodeProcess.__enter__ = enter
 sys.exit(command.perform(Path({str(output)!r}), domain={domain}))
 """
     demo = subprocess.Popen(

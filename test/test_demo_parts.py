@@ -17,7 +17,7 @@ import pytest
 from report_samples import START_NS, prediction, predictions, samples
 from rich.console import Console
 
-from foc_ros.cli.demo import command, environment
+from foc_ros.cli.demo import command
 from foc_ros.cli.demo.recorder import Recorder, show_live
 from foc_ros.cli.demo.scene_text import GOAL, HAND, HEIGHT, OBSTACLE, WIDTH, draw_scene, extend_bounds
 from foc_ros.cli.demo.summary import describe_lead
@@ -27,6 +27,7 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.types import Prediction
 from foc_ros.io.bags import TYPESTORE, Item
 from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
+from foc_ros.ros import isolated_node
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
 from foc_ros.ros.messages.types import RosbagsTypes
@@ -228,30 +229,30 @@ def test_the_lead_of_the_goal_that_was_reached_is_described() -> None:
 
 
 def test_a_domain_in_use_is_not_taken() -> None:
-    start = environment.free_domain()
+    start = isolated_node.free_domain()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(('', 7400 + 250 * start + 10))
-        assert environment.free_domain() != start
+        assert isolated_node.free_domain() != start
 
 
 def test_environment_is_private(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv('ROS_DISCOVERY_SERVER', 'somewhere:11811')
     monkeypatch.setenv('ROS_DOMAIN_ID', '0')
-    made = environment.private_environment(42, tmp_path)
+    made = isolated_node.private_environment(42, tmp_path)
     assert made['ROS_DOMAIN_ID'] == '42'
     assert made['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
     assert made['ROS_LOG_DIR'] == str(tmp_path)
     assert 'ROS_DISCOVERY_SERVER' not in made
 
 
-def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: str) -> environment.NodeProcess:
+def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: str) -> isolated_node.NodeProcess:
     """Return a process that runs another program in place of the node."""
     package = tmp_path / 'foc_ros'
     package.mkdir()
     (package / '__init__.py').touch()
     (package / '__main__.py').write_text(program)
     monkeypatch.chdir(tmp_path)
-    return environment.NodeProcess(os.environ | {'PYTHONPATH': str(tmp_path)}, tmp_path / 'log.txt')
+    return isolated_node.NodeProcess(os.environ | {'PYTHONPATH': str(tmp_path)}, tmp_path / 'log.txt')
 
 
 def until(condition: object, seconds: float = 20.0) -> None:
@@ -272,7 +273,7 @@ def alive(pid: int) -> bool:
 def test_a_node_that_dies_is_reported_with_its_output(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     with stand_in(monkeypatch, tmp_path, 'import sys; print("out of"); sys.exit("luck")') as node:
         until(lambda: not alive(node.pid))
-        with pytest.raises(environment.NodeDiedError, match=r'exit code 1: out of \| luck|exit code 1: luck \| out of'):
+        with pytest.raises(isolated_node.NodeDiedError, match=r'exit code 1: out of \| luck|exit code 1: luck \| out of'):
             until(lambda: node.check() is not None)
 
 
@@ -284,7 +285,7 @@ def test_a_node_that_dies_is_reported_with_its_output(monkeypatch: pytest.Monkey
     ],
 )
 def test_the_node_ends_with_its_context(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: str) -> None:
-    monkeypatch.setattr(environment, 'STOP_S', 0.3)
+    monkeypatch.setattr(isolated_node, 'STOP_S', 0.3)
     with pytest.raises(KeyboardInterrupt), stand_in(monkeypatch, tmp_path, 'print("up", flush=True);' + program) as node:  # noqa: PT012
         until(lambda: 'up' in (tmp_path / 'log.txt').read_text())
         node.check()
@@ -303,7 +304,7 @@ def test_the_node_does_not_outlive_a_killed_demo(tmp_path: Path) -> None:
 import os, sys, time
 sys.path.insert(0, {str(root)!r})
 from pathlib import Path
-from foc_ros.cli.demo.environment import NodeProcess
+from foc_ros.ros.isolated_node import NodeProcess
 os.chdir({str(package.parent)!r})
 with NodeProcess(os.environ | {{'PYTHONPATH': {str(package.parent)!r}}}, Path({str(tmp_path / 'log.txt')!r})) as node:
     print(node.pid, flush=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -72,3 +74,15 @@ def test_simultaneous_tracks_have_different_colours_while_there_are_any() -> Non
     assert [slots[track] for track in tracks[2].values()] == [0, 2]
     assert len({slots[track] % 3 for track in list(tracks[3].values())[:3]}) == 3
     assert len({slots[track] for track in tracks[3].values()}) == 4
+
+
+def test_tracks_are_numbered_from_0_whatever_the_classes_are_called() -> None:
+    """The rows of a report's tracks are their numbers, and its recording may begin after the classes were numbered."""
+    first = snapshot(0, 'goal0:+1', 'goal0:-1')
+    renamed = [
+        replace(each, candidates=tuple(replace(view, way=view.way + 70) for view in each.candidates))
+        for each in (first, snapshot(1, 'goal0:-1', 'goal1:'))
+    ]
+    tracks = build_candidate_tracks(renamed)
+    assert [dict(each) for each in tracks.tracks] == [{'goal0:+1': 0, 'goal0:-1': 1}, {'goal0:-1': 1, 'goal1:': 2}]
+    assert list(tracks.likelihoods()) == [0, 1, 2]

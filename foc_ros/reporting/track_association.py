@@ -47,8 +47,13 @@ class CandidateTracks:
 
 
 def build_candidate_tracks(snapshots: Sequence[Snapshot]) -> CandidateTracks:
-    """Return the candidates of successive snapshots by track, and give the tracks their letters and colours."""
-    tracks = [{each.label: each.way for each in snapshot.candidates} for snapshot in snapshots]
+    """Return the candidates of successive snapshots by track, and give the tracks their letters and colours.
+
+    A track has the candidates of one class. Tracks are numbered from 0 in order of their appearance, whatever the classes were
+    numbered before the first snapshot.
+    """
+    numbers: dict[int, int] = {}
+    tracks = [{each.label: numbers.setdefault(each.way, len(numbers)) for each in snapshot.candidates} for snapshot in snapshots]
     return CandidateTracks(snapshots, tracks, assign_slots(snapshots, tracks))
 
 

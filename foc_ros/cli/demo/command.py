@@ -22,8 +22,8 @@ from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import BagReader, BagWriter, Item
 from foc_ros.io.terminal import show_table, show_text
 from foc_ros.reporting.snapshots import build_hand_trajectory
+from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, free_domain, private_environment, set_environment
 
-from .environment import NodeDiedError, NodeProcess, free_domain, private_environment, set_environment
 from .recorder import Recorder, show_live
 from .summary import describe_lead
 

@@ -17,9 +17,9 @@ from rclpy.signals import SignalHandlerOptions
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io import topics
 from foc_ros.io.bags import TYPESTORE, BagWriter, Item
+from foc_ros.ros.isolated_node import NodeDiedError
 from foc_ros.ros.messages.encode_prediction import OUTPUTS
 
-from .environment import NodeDiedError
 from .recorder import Recorder
 
 NODE = '/foc'

@@ -22,6 +22,8 @@ DOMAINS = range(1, 102)
 STOP_S = 5.0
 """Seconds after SIGTERM at which a node that is still running is killed."""
 _PR_SET_PDEATHSIG = 1
+_PRCTL = ctypes.CDLL(None).prctl if sys.platform == 'linux' else None
+"""Loaded here: between fork and exec of a process with threads, a library must not be loaded."""
 
 
 class NodeDiedError(FocError):
@@ -75,6 +77,8 @@ def set_environment(values: Mapping[str, str]) -> Iterator[None]:
 class NodeProcess:
     """The node as a process that starts on entering the context and has ended on leaving it.
 
+    It also ends with the thread that started it.
+
     environment: variables of the process; log: file for its output.
     """
 
@@ -92,7 +96,7 @@ class NodeProcess:
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,  # Ctrl-C does not reach the node: __exit__ ends it
-                preexec_fn=_end_with_parent,  # noqa: PLW1509 (no other thread runs yet)
+                preexec_fn=_end_with_parent,  # noqa: PLW1509 (one system call, without a lock)
             )
         return self
 
@@ -119,5 +123,5 @@ class NodeProcess:
 
 def _end_with_parent() -> None:
     """Let Linux end the node if this process is killed and cannot do so."""
-    if sys.platform == 'linux':
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    if _PRCTL is not None:
+        _PRCTL(_PR_SET_PDEATHSIG, signal.SIGTERM)

@@ -1,0 +1,124 @@
+"""`foc_ros play` as a process, its page in a browser, and a hand that is steered by synthetic events."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from browser_helpers import show_address
+
+STARTED = re.compile(r'open (http://\S+) ')
+STEER = """
+const [targets, speed, done] = arguments;
+const canvas = document.getElementById('scene');
+const { settings, view } = play;
+const box = canvas.getBoundingClientRect();
+const [low, high, bottom, top] = settings.bounds;
+const point = ([x, y]) => canvas.dispatchEvent(new PointerEvent('pointermove', {
+  clientX: box.left + box.width * (x - low) / (high - low), clientY: box.top + box.height * (top - y) / (top - bottom),
+}));
+let at = view.hand.target;
+let row = 0;
+let last = performance.now();
+const seen = [];
+function step() {
+  const now = performance.now();
+  const left = targets[row].map((value, axis) => value - at[axis]);
+  const distance = Math.hypot(...left);
+  const share = Math.min(1, speed * (now - last) / 1000 / Math.max(distance, 1e-9));
+  last = now;
+  at = at.map((value, axis) => value + share * left[axis]);
+  point(at);
+  seen.push([now, view.candidates.map((each) => [each.way, each.goal, each.likelihood])]);
+  if (share === 1 && (row += 1) === targets.length) done(seen);
+  else setTimeout(step, 8);
+}
+step();
+"""
+"""Moves the pointer through targets [m] at a speed [m/s]; returns times [ms], and way, goal and likelihood of candidates."""
+
+
+class Play:
+    """A process of `foc_ros play`. Attributes: url, of the page; data, the folder of recordings; process."""
+
+    def __init__(self, folder: Path, *arguments: str, program: str = '') -> None:
+        self.data = folder / 'data'
+        self._log = (folder / 'play.txt').open('w+', encoding='utf-8')
+        start = ['-c', program] if program else ['-m', 'foc_ros']
+        port = [] if '--port' in arguments else ['--port', '0']
+        command = [sys.executable, *start, 'play', '--data', str(self.data), *port, *arguments]
+        self.process = subprocess.Popen(command, stdout=self._log, stderr=subprocess.STDOUT)
+
+    def wait(self) -> None:
+        """Wait until the page is served."""
+        until(lambda: STARTED.search(self.output) or self.process.poll() is not None, 'the address of the page', 100.0)
+        assert STARTED.search(self.output), self.output
+
+    @property
+    def url(self) -> str:
+        found = STARTED.search(self.output)
+        assert found
+        return found.group(1)
+
+    @property
+    def output(self) -> str:
+        return Path(self._log.name).read_text(encoding='utf-8')
+
+    def stop(self) -> int:
+        """Interrupt the process and return its exit code."""
+        self.process.terminate()
+        try:
+            return self.process.wait(30)
+        finally:
+            self.process.kill()
+            self._log.close()
+
+
+@contextmanager
+def play(folder: Path, *arguments: str, program: str = '') -> Iterator[Play]:
+    """Run `foc_ros play` within a context; program: Python code in place of `-m foc_ros`."""
+    started = Play(folder, *arguments, program=program)
+    try:
+        started.wait()
+        yield started
+    finally:
+        started.stop()
+
+
+def until(condition: Callable[[], Any], what: str, seconds: float = 60.0) -> Any:
+    """Wait until a condition holds and return its value; fail after a deadline."""
+    deadline = time.monotonic() + seconds
+    while not (value := condition()):
+        assert time.monotonic() < deadline, f'waited {seconds} s for: {what}'
+        time.sleep(0.02)
+    return value
+
+
+def visit(browser: Any, started: Play, width: int = 1280, height: int = 1000, dark: bool = False) -> None:
+    """Open the page and wait until it shows predictions."""
+    show_address(browser, started.url, width, height, dark)
+    wait_for(browser, 'play.view.candidates.length > 0', 'predictions')
+
+
+def wait_for(browser: Any, expression: str, what: str, seconds: float = 60.0) -> Any:
+    """Wait until an expression of the page is true."""
+    return until(lambda: browser.execute_script(f'return {expression}'), what, seconds)
+
+
+def steer(browser: Any, *targets: tuple[float, float], speed: float = 0.3) -> list[Any]:
+    """Move the pointer through targets [m]; return what the page showed on the way."""
+    browser.set_script_timeout(60)
+    seen: list[Any] = browser.execute_async_script(STEER, [list(each) for each in targets], speed)
+    return seen
+
+
+def wait_for_answer(browser: Any) -> None:
+    """Wait for a prediction from the present position of the hand."""
+    distance = 'Math.hypot(...play.view.hand.position.map((value, axis) => value - play.view.candidates[0].path[0][axis]))'
+    wait_for(browser, f'play.view.candidates.length && {distance} < 0.005', 'predictions')

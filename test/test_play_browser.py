@@ -1,0 +1,280 @@
+"""The page of `foc_ros play` in a browser: steered by synthetic events, with a node and without ROS; broken pages."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip('tornado', reason='tornado is not installed')
+pytest.importorskip('matplotlib', reason='matplotlib is not installed')
+pytest.importorskip('plotly', reason='plotly is not installed')
+
+from browser_helpers import check_report, chromium, screenshot
+from play_helpers import Play, play, steer, until, visit, wait_for, wait_for_answer
+from ros_helpers import require_ros
+
+from foc_ros.core.config import Config
+from foc_ros.io.bags import BagReader
+from foc_ros.play import server
+from foc_ros.ros.parameters import dump_parameter_file
+
+ABOVE = (0.07, 0.035), (0.13, 0.056)
+"""On a path above the first circle [m]."""
+ON = (0.2, 0.045), (0.3, 0.09)
+"""On to goal 2 [m]."""
+
+
+@pytest.fixture(scope='module')
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    with chromium(tmp_path_factory.mktemp('profile')) as opened:
+        yield opened
+
+
+@pytest.fixture(scope='module')
+def parameters(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Return a file with parameters without a time limit, which a busy machine would exceed."""
+    file = tmp_path_factory.mktemp('parameters') / 'foc.yaml'
+    file.write_text(dump_parameter_file(Config(budget_s=0.0, rate_hz=20.0)), encoding='utf-8')
+    return str(file)
+
+
+@pytest.fixture(scope='module')
+def library(tmp_path_factory: pytest.TempPathFactory, parameters: str) -> Iterator[Play]:
+    """Start a server without ROS."""
+    with play(tmp_path_factory.mktemp('library'), '--no-ros', '--params', parameters) as started:
+        yield started
+
+
+@pytest.fixture
+def page(browser: Any, library: Play) -> Iterator[Any]:
+    """Open the page anew, with the hand at the start; leave it after the test, because it keeps a processor busy."""
+    visit(browser, library)
+    click(browser, 'restore')
+    yield browser
+    browser.get('about:blank')
+
+
+def click(browser: Any, name: str) -> None:
+    browser.execute_script(f"document.getElementById('{name}').click()")
+
+
+def text_of(browser: Any, name: str) -> str:
+    return str(browser.execute_script(f"return document.getElementById('{name}').innerText"))
+
+
+def press(browser: Any, *keys: str) -> None:
+    browser.execute_script("document.getElementById('scene').focus()")
+    for key in keys:
+        browser.switch_to.active_element.send_keys(key)
+
+
+def check_steering(browser: Any) -> None:
+    """Assert that the likelihood of the way that the hand takes rises, and that the page measures frames and delay."""
+    wait_for(browser, 'globalThis.play && play.view.candidates.length > 0', 'predictions', 20)
+    assert [each for each in browser.get_log('browser') if each['level'] == 'SEVERE'] == []
+    steer(browser, (0.0, 0.0))
+    wait_for(browser, 'play.view.candidates.length > 1', 'candidates at the start', 20)
+    shares = [share_above(browser)]
+    for target in ABOVE:
+        steer(browser, target, speed=0.2)
+        shares.append(share_above(browser))
+    assert shares[0] < 0.2 < shares[1] < 1.0
+    assert shares[2] > 0.99
+    steer(browser, *ON)
+    wait_for(browser, 'Math.abs(play.view.hand.position[0] - 0.3) < 0.003', 'the hand at the goal', 20)
+    wait_for(browser, 'play.measured.delayMs > 0 && play.measured.fps > 0 && play.measured.delays.length > 5', 'numbers', 20)
+    assert 'frames a second' in text_of(browser, 'numbers')
+
+
+def share_above(browser: Any) -> float:
+    """Return the likelihood of all candidates above the first circle, when those of the present position have come."""
+    wait_for_answer(browser)
+    candidates = browser.execute_script('return play.view.candidates')
+    paths = [np.array(each['path']) for each in candidates]
+    is_above = [np.interp(0.14, path[:, 0], path[:, 1]) > 0.015 for path in paths]
+    return sum(each['likelihood'] for each, above in zip(candidates, is_above, strict=True) if above)
+
+
+def test_the_likelihood_of_the_way_taken_rises(page: Any) -> None:
+    check_steering(page)
+
+
+def test_an_obstacle_that_is_dragged_changes_the_prediction(page: Any) -> None:
+    """The circle is dragged away from the straight line to goal 1."""
+    steer(page, (0.0, 0.0))
+    click(page, 'arrange')
+    page.execute_script("""
+        const canvas = document.getElementById('scene');
+        const box = canvas.getBoundingClientRect();
+        const [low, high, bottom, top] = play.settings.bounds;
+        const send = (kind, x, y) => canvas.dispatchEvent(new PointerEvent(kind, {
+          clientX: box.left + box.width * (x - low) / (high - low), clientY: box.top + box.height * (top - y) / (top - bottom),
+        }));
+        canvas.setPointerCapture = () => {};
+        send('pointerdown', 0.14, 0.015);
+        send('pointermove', 0.14, 0.1);
+        send('pointermove', 0.13, 0.13);
+        send('pointerup', 0.13, 0.13);
+    """)
+    moved = page.execute_script('return play.view.scene.obstacles[0]')
+    assert (moved['x'], moved['y']) == pytest.approx((0.13, 0.13), abs=1e-3)
+    straight = 'play.view.candidates.some((each) => each.goal === 1 && each.path.every(([x, y]) => Math.abs(y) < 0.01))'
+    wait_for(page, straight, 'a straight way to goal 1', 20)
+    assert page.execute_script('return play.view.hand.position') == pytest.approx([0.0, 0.0], abs=1e-3)
+    press(page, 'n', 'g', 'b', '+', 'r')
+    wait_for(page, 'play.view.scene.obstacles.length === 4 && play.view.scene.goals.length === 4', 'objects added by keys', 20)
+    wait_for(page, 'play.view.candidates.some((each) => each.goal === 3)', 'a way to the new goal', 20)
+    press(page, '\ue017')  # Delete: the box, which is selected
+    wait_for(page, 'play.view.scene.obstacles.length === 3', 'the box is removed', 20)
+    page.refresh()
+    wait_for(page, 'play.view.scene.obstacles.length === 3 && play.view.scene.goals.length === 4', 'the scene is kept', 20)
+
+
+def test_keys_and_a_gamepad_steer_and_guidance_pulls(page: Any) -> None:
+    page.execute_script("document.getElementById('scene').dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowRight' }))")
+    wait_for(page, 'play.view.hand.position[0] > 0.1', 'the hand follows a key', 20)
+    page.execute_script("dispatchEvent(new KeyboardEvent('keyup', { key: 'ArrowRight' }))")
+    page.execute_script('navigator.getGamepads = () => [null, { axes: [-1, 0.1] }]')
+    wait_for(page, 'play.view.hand.position[0] < 0.03', 'the hand follows a stick', 20)
+    page.execute_script('navigator.getGamepads = () => []')
+    click(page, 'guidance')
+    pulled = []
+
+    def is_pulled() -> bool:
+        for target in ((0.06, 0.0), (0.12, -0.008)):
+            steer(page, target, speed=0.15)
+            pulled.append(page.execute_script('return Math.hypot(...play.view.hand.pull)'))
+        return max(pulled) > 1e-4
+
+    until(is_pulled, 'a pull of guidance')
+    click(page, 'guidance')
+
+
+def test_tasks_are_recorded_and_reported(page: Any, library: Play, tmp_path: Path) -> None:
+    page.execute_script("""
+        document.getElementById('trials').value = 2;
+        document.getElementById('assistance').value = 'without';
+        document.getElementById('begin').click();
+    """)
+    for _ in range(2):
+        steer(page, (0.155, -0.04), (0.0, 0.0), speed=0.5)
+        wait_for(page, "play.view.phase === 'reach'", 'the light', 30)
+        goal = page.execute_script('return [play.view.scene.goals[play.view.goal].x, play.view.scene.goals[play.view.goal].y]')
+        steer(page, (0.155, -0.04), goal)
+        wait_for(page, "play.view.phase !== 'reach'", 'the end of the trial', 30)
+    assert wait_for(page, "document.querySelectorAll('#score tr').length", 'the score') == 2
+    click(page, 'report')
+    wait_for(page, "!document.getElementById('download').hidden", 'the report')
+    folder = next(each for each in library.data.iterdir() if (each / 'report').exists())
+    link = page.find_element('css selector', '#download a')
+    assert link.get_attribute('download') == 'foc_ros_report.html'
+    fetched = page.execute_async_script("const done = arguments[0]; fetch('report').then((r) => r.text()).then(done)")
+    assert fetched == (folder / 'report' / 'index.html').read_text(encoding='utf-8')
+    with BagReader(folder / 'session') as reader:
+        stamps = [item.message.header.stamp for item in reader if item.role == 'hand_pose']
+    seconds = np.array([stamp.sec + 1e-9 * stamp.nanosec for stamp in stamps])
+    assert np.diff(seconds).min() > 0.0
+    assert len(list((folder / 'unguided').iterdir())) == 2
+    page.get('about:blank')
+    check_report(page, folder / 'report')
+
+
+@pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
+def test_the_page_fits_on_a_phone(browser: Any, library: Play, dark: bool) -> None:
+    visit(browser, library, 390, 844, dark)
+    assert browser.execute_script('return document.documentElement.scrollWidth') == 390
+    colour = 'return getComputedStyle(document.body).backgroundColor'
+    before = browser.execute_script(colour)
+    assert before == ('rgb(20, 24, 28)' if dark else 'rgb(255, 255, 255)')
+    assert len(screenshot(browser)) > 20_000
+    click(browser, 'theme')
+    assert browser.execute_script(colour) != before
+    unnamed = """return [...document.querySelectorAll('button, input, select, canvas')].filter(
+        (each) => !(each.innerText || each.ariaLabel || (each.labels && each.labels.length)))"""
+    assert browser.execute_script(unnamed) == []
+    assert browser.execute_script("return performance.getEntriesByType('resource').every((each) => each.name.startsWith(origin))")
+    browser.get('about:blank')
+
+
+def test_the_page_says_that_the_server_is_gone_and_recovers(browser: Any, tmp_path: Path) -> None:
+    with play(tmp_path, '--no-ros') as started:
+        visit(browser, started)
+        port = started.url.rpartition(':')[2]
+    wait_for(browser, "document.getElementById('status').innerText === 'The server is gone; trying again.'", 'the message')
+    assert browser.execute_script('return play.view.candidates.length') == 0
+    with play(tmp_path, '--no-ros', '--port', port):
+        wait_for(browser, 'play.view.candidates.length > 0', 'predictions after a new start of the server')
+        wait_for(browser, "!document.getElementById('status').classList.contains('gone')", 'the message is gone')
+        browser.get('about:blank')
+
+
+def test_over_dds_a_killed_node_is_reported_and_started_again(browser: Any, tmp_path: Path, parameters: str) -> None:
+    require_ros()
+    with play(tmp_path, '--params', parameters) as started:
+        visit(browser, started)
+        check_steering(browser)
+        click(browser, 'guidance')
+        (node,) = find_nodes(started.process.pid)
+        os.kill(node, signal.SIGKILL)
+        wait_for(browser, "document.getElementById('status').classList.contains('gone')", 'the page says that the node is gone')
+        assert 'the node' in text_of(browser, 'status')
+        wait_for(browser, "!document.getElementById('status').classList.contains('gone')", 'the node is back')
+        assert find_nodes(started.process.pid) != [node]
+        wait_for(browser, 'play.view.candidates.length > 0', 'predictions of the new node')
+        browser.get('about:blank')
+    assert started.process.returncode == 0
+
+
+def find_nodes(parent: int) -> list[int]:
+    """Return the process ids of the nodes that a process has started."""
+    nodes = []
+    for folder in Path('/proc').iterdir():
+        if folder.name.isdigit():
+            try:
+                state = (folder / 'stat').read_text().rpartition(')')[2].split()
+                words = (folder / 'cmdline').read_text().split('\0')
+            except OSError:
+                continue
+            if int(state[1]) == parent and state[0] != 'Z' and 'node' in words:
+                nodes.append(int(folder.name))
+    return nodes
+
+
+BROKEN = [
+    ('hand.js', "canvas.addEventListener('pointermove', point)", ''),
+    ('hand.js', 'this.followed = this.followed.map(', 'this.ignored = this.followed.map('),
+    ('play.js', 'view.candidates = candidates;', ''),
+    ('play.js', "send({ type: 'hand'", "send({ type: 'hands'"),
+    ('play.js', 'connect();\nrequest', 'request'),
+    ('drawing.js', 'class Drawing {', 'class Drawing {{'),
+    ('drawing.js', 'drawCandidate(candidate) {', 'drawCandidate(candidate) { null.x;'),
+]
+
+
+@pytest.mark.parametrize(
+    ('file', 'old', 'new'), BROKEN, ids=['pointer', 'hand', 'candidates', 'message', 'socket', 'syntax', 'draw']
+)
+def test_the_check_finds_a_broken_page(browser: Any, tmp_path: Path, file: str, old: str, new: str) -> None:
+    """Serve the page with one text changed, in a process of its own; then the check of steering fails."""
+    source = (server.FOLDER / file).read_text(encoding='utf-8')
+    assert old in source
+    (tmp_path / file).write_text(source.replace(old, new), encoding='utf-8')
+    program = f"""
+import sys
+from pathlib import Path
+from foc_ros.cli.main import main
+from foc_ros.play import server
+server.FILES['/{file}'] = Path({str(tmp_path / file)!r})
+sys.exit(main(sys.argv[1:]))
+"""
+    with play(tmp_path, '--no-ros', program=program) as started:
+        browser.get(started.url)
+        with pytest.raises(AssertionError):
+            check_steering(browser)
+        browser.get('about:blank')
