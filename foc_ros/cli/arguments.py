@@ -12,6 +12,7 @@ from foc_ros.ros.parameters import load_parameter_file
 
 MOST_SAMPLES, MOST_TRIALS, MOST_WORKERS = 10_000_000, 100_000, 1024
 DATA = 'folder of bags, or of recordings.csv, goals.csv and, where there are obstacles, obstacles.csv'
+HOST, PORT, LARGEST_PORT = '127.0.0.1', 8420, 65535
 ALLOWED = ('eta',)
 """What `fit` does only if it is allowed to."""
 
@@ -90,6 +91,18 @@ def add_simulate_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--recordings', type=_read_existing_path, metavar='DATA', help=words)
     _add_parameter_file(parser)
     _add_evaluation_arguments(parser)
+
+
+def add_play_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `play`."""
+    words = 'address to serve on (default: %(default)s, this computer only); any other lets everybody there steer the hand'
+    parser.add_argument('--host', default=HOST, metavar='HOST', help=words)
+    number = _WholeNumber('--port', 0, LARGEST_PORT)
+    parser.add_argument('--port', type=number, default=PORT, metavar='PORT', help='port (default: %(default)s; 0: a free one)')
+    parser.add_argument('--no-ros', action='store_true', help='predict with the library, without a node and DDS')
+    words = 'folder for recordings, reports and fitted parameters (default: %(default)s)'
+    parser.add_argument('--data', type=Path, default=Path('play_data'), metavar='DIR', help=words)
+    _add_parameter_file(parser)
 
 
 def add_convert_arguments(parser: argparse.ArgumentParser) -> None:
