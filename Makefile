@@ -1,4 +1,5 @@
-# make setup [PYTHON=python3.12] [ROS=wheels|system]   create .venv with everything; repeated only if something has changed
+# make setup [PYTHON=python3.12] [ROS=wheels|system]   create .venv with what demo and test need; repeated only after a change.
+#                  Linters, Sphinx and the peers of the benchmark are installed by the targets that use them
 # make check       lint, and the tests that run within one process: less than a minute on two cores
 # make test        all tests but the long ones: less than three minutes
 # make test-long   the long studies, tests under load and the commands of the documentation
@@ -11,12 +12,16 @@
 # make people      predictions of people, where their recordings are beside the checkout: doc/people.md; OPTIONS=--every 4
 # make pages       files that are derived from the parameters in foc_ros/core/config.py
 # make colcon      build, start, lint and test with colcon, as in a ROS workspace
+# make dist        build the source distribution and the wheel in build/dist, and try the wheel in an empty environment
 # make fuzz        100,000 random messages
 # make soak        ten minutes of a node among faulty publishers
 # make stops       a node that is stopped 200 times
 # make hostile     a node in scenes that are hard to predict in
 # make clean       remove everything that these targets have made
 
+# a pipeline fails if any of its commands fails
+SHELL := bash
+.SHELLFLAGS := -o pipefail -c
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -45,9 +50,19 @@ else
 $(error ROS is wheels or system, got '$(ROS)')
 endif
 
+# why $(PYTHON) does not run
+define EXPLAIN_PYTHON
+case "$$(command -v $(PYTHON))" in \
+'') echo 'make: there is no $(PYTHON); choose another, as in make setup PYTHON=python3.12' >&2 ;; \
+*/shims/*) echo "make: $(PYTHON) is a shim of pyenv, and no active version has it; activate one that has: pyenv shell" \
+    $$(pyenv whence $(notdir $(PYTHON)) 2>/dev/null | head -n 1) >&2 ;; \
+*) $(PYTHON) -c '' ;; \
+esac
+endef
+
 TEST = ROS_PYTHON_CHECK_FIELDS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
 
-.PHONY: setup help check test test-long lint demo doc bench people pages colcon fuzz soak stops hostile clean
+.PHONY: setup help check test test-long lint demo doc bench people pages colcon dist fuzz soak stops hostile clean
 
 setup: $(STAMP)
 ifneq ($(origin PYTHON),file)
@@ -56,10 +71,11 @@ endif
 	@echo 'setup: ready'
 
 $(STAMP): setup.py setup.cfg pyproject.toml
-	@echo 'setup: creating .venv'
+	@$(PYTHON) -c '' 2>/dev/null || { $(EXPLAIN_PYTHON); exit 1; }
+	@echo "setup: creating .venv with $$($(PYTHON) -V)"
 	@test -e $@ || $(PYTHON) -m venv --clear $(VENV_OPTIONS) $(VENV) || { echo 'make: no venv in $(PYTHON); on Debian and Ubuntu: apt install python3-venv' >&2; exit 1; }
 	@echo 'setup: installing foc_ros[$(EXTRAS)], one to three minutes'
-	@$(PIP) install --quiet --editable '.[$(EXTRAS)]'
+	@$(PIP) install --progress-bar off --editable '.[$(EXTRAS)]' | sed -un 's/^Collecting \([^ ]*\).*/  \1/p; s/^Installing collected packages.*/  installing them/p'
 	@echo "setup: compiling the solver's kernels, one to three minutes once"
 	@$(BIN)/python -m foc_ros warm-up
 	@touch $@
@@ -79,14 +95,27 @@ test-long: $(STAMP)
 demo: $(STAMP)
 	$(BIN)/python -m foc_ros demo
 
-lint: $(STAMP)
+lint: $(VENV)/.lint
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+$(VENV)/.lint: $(STAMP)
+	@echo 'lint: installing the linters'
+	@$(PIP) install --quiet --editable '.[lint]'
+	@touch $@
+
 colcon:
 	PYTHON=$(PYTHON) scripts/colcon_check
+
+dist: $(VENV)/.dist
+	PYTHON=$(BIN)/python scripts/dist_check
+
+$(VENV)/.dist: $(STAMP)
+	@echo 'dist: installing build and twine'
+	@$(PIP) install --quiet --editable '.[dist]'
+	@touch $@
 
 fuzz: $(STAMP)
 	FOC_ROS_FUZZ=100000 $(TEST) --timeout 3600 test/test_fuzz.py

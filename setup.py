@@ -11,7 +11,7 @@ REPORT = ['Jinja2>=3.1', 'matplotlib>=3.6', 'plotly>=5.24']
 
 setup(
     name=PACKAGE,
-    version='0.1.0',
+    version='0.2.0',
     description='Predicts where the hand of a teleoperator is going among obstacles, with uncertainty and likelihood, on ROS 2',
     # resolved: colcon build --symlink-install runs a link to this file
     long_description=Path(__file__).resolve().with_name('README.md').read_text(encoding='utf-8'),
@@ -61,22 +61,24 @@ setup(
         'doc': ['furo>=2024.8', 'matplotlib>=3.6', 'myst-parser>=4', 'numpydoc>=1.7', 'sphinx>=8', 'sphinx-gallery>=0.17'],
         # what the benchmark compares with
         'bench': ['casadi>=3.7', 'cvxpy>=1.4', 'daqp>=0.5', 'matplotlib>=3.6', 'scipy>=1.15'],
+        # the linters, and what builds and checks the distributions
+        'lint': ['import-linter>=2.1', 'mypy>=1.11', 'ruff>=0.8', 'types-PyYAML'],
+        'dist': ['build>=1.2', 'setuptools>=70.1', 'twine>=5'],
         'test': [
             'daqp>=0.5',
             'distributed>=2024.1',
+            'dockerfile-parse>=2',
             'hypothesis>=6.80',
-            'import-linter>=2.1',
+            'ipykernel>=6.29',
             'mcap-ros2-support>=0.5',
-            'mypy>=1.11',
+            'nbclient>=0.10',
             'pytest>=7.4',
             'pytest-timeout>=2.2',
             'pytest-xdist>=3.3',
             'quadprog>=0.1.11',
-            'ruff>=0.8',
             'scipy>=1.9',
             'selenium>=4.11',
             'setuptools>=70.1',
-            'types-PyYAML',
         ],
     },
     entry_points={

@@ -7,7 +7,7 @@ when they are first used, so that `import foc_ros` alone is fast.
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = '0.1.0'
+__version__ = '0.2.0'
 
 if TYPE_CHECKING:
     from foc_ros.analysis.evaluation import register_baseline as register_baseline

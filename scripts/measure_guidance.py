@@ -1,7 +1,9 @@
 """Measure the period of the wrench while predictions take long, and the time from the clutch to a force of zero.
 
 The node runs in a process of its own, where every prediction first keeps Python's global lock for `--load` seconds. This process
-plays a hand at 100 Hz and notes when wrenches arrive. Run `.venv/bin/python scripts/measure_guidance.py`.
+plays a hand at 100 Hz and notes when wrenches arrive. The node says for how long its updates of guidance waited: for a processor
+that was taken by other programs, as Linux counts it, and otherwise, which is for Python's global lock.
+Run `.venv/bin/python scripts/measure_guidance.py`.
 """
 
 from __future__ import annotations
@@ -12,6 +14,8 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,10 +32,43 @@ GUIDED_S = 1.0
 """Time of guidance before each use of the clutch [s]."""
 
 
+class Waits:
+    """For how long each update of guidance waited [s]: for a processor, and otherwise."""
+
+    def __init__(self) -> None:
+        self._rows: list[tuple[float, float]] = []
+
+    def time(self, update: Callable[..., None]) -> Callable[..., None]:
+        """Return an update whose waits are noted."""
+
+        def timed(*arguments: Any) -> None:
+            with Path('/proc/thread-self/schedstat').open('rb', buffering=0) as counts:
+                begin = self._read(counts)
+                update(*arguments)
+                wall, processor, queue = self._read(counts) - begin
+            self._rows.append((queue, wall - processor - queue))
+
+        return timed
+
+    def summarise(self) -> dict[str, float]:
+        """Return the 99th percentiles [s]."""
+        queue, lock = np.percentile(np.array(self._rows or [(np.nan, np.nan)]), 99, axis=0)
+        return {'wait_processor_p99_s': float(queue), 'wait_lock_p99_s': float(lock)}
+
+    @staticmethod
+    def _read(counts: Any) -> Any:
+        """Return clock, time of computing and time in the queue of this thread [s]."""
+        return np.array([time.monotonic(), time.thread_time(), 1e-9 * int(os.pread(counts.fileno(), 100, 0).split()[1])])
+
+
 def run_node(load_s: float) -> int:
-    """Run the node with predictions that keep the global lock for a time [s]."""
+    """Run the node with predictions that keep the global lock for a time [s]; print the waits at the end."""
     from foc_ros.core.pipeline import PredictionTask
+    from foc_ros.ros.guidance_loop import GuidanceLoop
     from foc_ros.ros.main import main
+
+    waits = Waits()
+    GuidanceLoop.update = waits.time(GuidanceLoop.update)  # type: ignore[method-assign]
 
     run = PredictionTask.run
 
@@ -42,7 +79,9 @@ def run_node(load_s: float) -> int:
         return run(task)
 
     PredictionTask.run = run_slowly  # type: ignore[method-assign, assignment]
-    return main(['--ros-args', *(word for option in OPTIONS for word in ('-p', option))])
+    code = main(['--ros-args', *(word for option in OPTIONS for word in ('-p', option))])
+    print(json.dumps(waits.summarise()))
+    return code
 
 
 class Player:
@@ -91,19 +130,22 @@ class Player:
 
 
 def measure(load_s: float) -> dict[str, float]:
-    """Return percentiles of the period, in nominal periods, and the times from the clutch to a force of zero [s]."""
+    """Return percentiles of the period, in nominal periods, the times from the clutch to a force of zero, and the waits [s]."""
     import rclpy
     from rclpy.executors import SingleThreadedExecutor
 
     command = [sys.executable, __file__, '--node', '--load', str(load_s)]
-    with rclpy.Context() as context, subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+    with rclpy.Context() as context, subprocess.Popen(command, stdout=subprocess.PIPE) as process:
         node = rclpy.create_node('player', context=context)
         executor = SingleThreadedExecutor(context=context)
         executor.add_node(node)
         try:
-            return _play(Player(node), executor)
+            played = _play(Player(node), executor)
         finally:
             process.terminate()
+            said = process.communicate()[0]
+        waits: dict[str, float] = json.loads(said.splitlines()[-1])
+        return played | waits
 
 
 def _play(player: Player, executor: Any) -> dict[str, float]:

@@ -26,9 +26,10 @@ from foc_ros.analysis.evaluation.position_metrics import compute_position_scores
 from foc_ros.analysis.evaluation.questions import PATH_CLASS, ask_all
 from foc_ros.analysis.fitting.duration_fit import find_samples
 from foc_ros.analysis.fitting.recorded_hand import RecordedHand, read_hand
-from foc_ros.analysis.parallel import add_worker_arguments, collect, collect_all, open_executor
+from foc_ros.analysis.parallel import collect, collect_all, open_executor
 from foc_ros.analysis.recordings import Recording, find_recordings
 from foc_ros.analysis.replay import Replay
+from foc_ros.cli.arguments import add_worker_arguments
 from foc_ros.core.config import Config
 from foc_ros.core.estimation.adaptation import Operator
 from foc_ros.core.estimation.duration import estimate_times_to_go

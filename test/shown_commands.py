@@ -79,6 +79,7 @@ NOT_RUN = {
     'make doc': BY_CI,
     'make bench': LONG,
     'make colcon': BY_CI,
+    'make dist': BY_CI,
     'scripts/tf2_check': 'clones and compiles tf2; run it before a release',
     'make fuzz': LONG,
     'make soak': LONG,

@@ -25,10 +25,12 @@ def started(*arguments: str, **options: object) -> subprocess.CompletedProcess[s
     ('arguments', 'line'),
     [
         ([], 'foc_ros: the following arguments are required: command'),
-        (['fly'], 'foc_ros: argument command: invalid choice'),
+        (['fly'], 'foc_ros: there is no command fly; demo, '),
+        (['evalute', 'bags'], 'foc_ros: there is no command evalute (did you mean evaluate?)'),
         (['convert'], 'foc_ros convert: the following arguments are required: CSV, --output'),
-        (['replay', 'bag', '--fast'], 'foc_ros replay: unrecognized arguments: --fast'),
-        (['replay', 'bag', '--params', 'a', '--params', 'b'], 'foc_ros replay: argument --params: given twice'),
+        (['replay', '.', '--prams', 'a'], 'foc_ros replay: unrecognized arguments: --prams (did you mean --params?) a\n'),
+        (['replay', '.', '--fast'], 'foc_ros replay: unrecognized arguments: --fast'),
+        (['replay', '.', '--output', 'a', '--output', 'b'], 'foc_ros replay: argument --output: given twice'),
         (['evaluate', 'x' * 300], 'foc_ros evaluate: [Errno 36] File name too long'),
         (['replay', 'no_such_bag'], 'foc_ros replay: no_such_bag: no such file or directory'),
     ],
@@ -40,15 +42,41 @@ def test_wrong_arguments_exit_2_with_one_line(arguments: list[str], line: str) -
     assert result.stderr.startswith(line) and result.stderr.count('\n') == 1
 
 
-def test_help_names_every_command_and_imports_nothing_heavy() -> None:
+def run_without_heavy_imports(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the program, and check that it has imported nothing that takes long."""
     program = (
-        'import sys\nfrom foc_ros.cli.main import main\ntry:\n main(["--help"])\nfinally:\n'
-        ' print("heavy:", sorted({"numpy", "rclpy", "rosbags", "rich", "piqp"} & set(sys.modules)))'
+        'import sys\nfrom foc_ros.cli.main import main\ncode = main(sys.argv[1:])\n'
+        'print("heavy:", sorted({"numpy", "numba", "rclpy", "rosbags", "rich", "piqp"} & set(sys.modules)))\nsys.exit(code)'
     )
-    result = subprocess.run([sys.executable, '-c', program], cwd=ROOT, capture_output=True, text=True, timeout=100, check=False)
+    command = [sys.executable, '-c', program, *arguments]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=100, check=False)
+    assert 'heavy: []' in result.stdout, result.stderr
+    return result
+
+
+def test_help_names_every_command_and_imports_nothing_heavy() -> None:
+    result = run_without_heavy_imports('--help')
     assert result.returncode == 0, result.stderr
     assert all(f'  {name} ' in result.stdout for name in command_line.COMMANDS)
-    assert 'heavy: []' in result.stdout
+
+
+@pytest.mark.parametrize('command', [name for name in command_line.COMMANDS if name != 'node'])
+def test_wrong_arguments_are_answered_before_anything_is_imported(command: str) -> None:
+    result = run_without_heavy_imports(command, '--no-such-option', *(['.'] if command in ('solve', 'replay') else ()))
+    assert result.returncode == 2
+    assert result.stderr.startswith(f'foc_ros {command}: ') and result.stderr.count('\n') == 1
+
+
+def test_all_errors_of_a_parameter_file_are_listed_before_anything_is_imported(tmp_path: Path) -> None:
+    file = tmp_path / 'wrong.yaml'
+    file.write_text('/**: {ros__parameters: {foc: {etta: 0.5, steps: 1}, likelihod: {beta: 3}, rate_hz: 5.0}}')
+    result = run_without_heavy_imports('replay', '.', '--params', str(file))
+    assert result.returncode == 2
+    assert result.stderr.splitlines() == [
+        'foc_ros replay: foc.etta: expected a known parameter (did you mean foc.eta?), got 0.5',
+        'foc_ros replay: foc.steps: expected a number in [5, 400], got 1',
+        "foc_ros replay: likelihod: expected a known parameter (did you mean likelihood?), got {'beta': 3}",
+    ]
 
 
 class Fake:
@@ -56,9 +84,6 @@ class Fake:
 
     def __init__(self, outcome: int | BaseException) -> None:
         self.outcome = outcome
-
-    def add_arguments(self, parser: object) -> None:
-        pass
 
     def run(self, arguments: object) -> int:
         if isinstance(self.outcome, BaseException):
@@ -71,9 +96,9 @@ class Fake:
     [
         (0, 0, ''),
         (3, 3, ''),
-        (InputError('start', 'two\n  numbers', 'one'), 2, 'foc_ros solve: start: expected two numbers, got one\n'),
-        (InputError('topic', 'a name', '/\x1b[31mhand'), 2, 'foc_ros solve: topic: expected a name, got /\\x1b[31mhand\n'),
-        (OSError(5, 'Input/output error', 'a'), 2, "foc_ros solve: [Errno 5] Input/output error: 'a'\n"),
+        (InputError('start', 'two\n  numbers', 'one'), 2, 'foc_ros paper: start: expected two numbers, got one\n'),
+        (InputError('topic', 'a name', '/\x1b[31mhand'), 2, 'foc_ros paper: topic: expected a name, got /\\x1b[31mhand\n'),
+        (OSError(5, 'Input/output error', 'a'), 2, "foc_ros paper: [Errno 5] Input/output error: 'a'\n"),
         (KeyboardInterrupt(), 130, ''),
     ],
 )
@@ -81,7 +106,7 @@ def test_exit_codes(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], outcome: int | BaseException, code: int, line: str
 ) -> None:
     monkeypatch.setattr(command_line, 'import_module', lambda name, package: Fake(outcome))
-    assert command_line.main(['solve']) == code
+    assert command_line.main(['paper']) == code
     assert capsys.readouterr() == ('', line)
 
 
@@ -116,10 +141,9 @@ def test_a_name_that_standard_output_cannot_show_is_escaped() -> None:
     program = (
         'import sys\nfrom foc_ros.cli import main as command_line\n'
         'class Named:\n'
-        ' add_arguments = staticmethod(lambda parser: None)\n'
         ' run = staticmethod(lambda arguments: print("b\\udcff", "\u2500") or 0)\n'
         'command_line.import_module = lambda name, package: Named\n'
-        'sys.exit(command_line.main(["solve"]))'
+        'sys.exit(command_line.main(["paper"]))'
     )
     environment = {**os.environ, 'PYTHONIOENCODING': 'ascii', 'PYTHONUTF8': '1'}
     command = [sys.executable, '-c', program]
@@ -131,13 +155,12 @@ LOUD = """
 import sys
 from foc_ros.cli import main as command_line
 class Loud:
-    add_arguments = staticmethod(lambda parser: None)
     @staticmethod
     def run(arguments):
         {}
         return 0
 command_line.import_module = lambda name, package: Loud
-sys.exit(command_line.main(["solve"]))
+sys.exit(command_line.main(["paper"]))
 """
 MANY_LINES, A_LINE = 'for _ in range(100000): print("x" * 100)', 'print("x")'
 A_TABLE = 'from foc_ros.io.terminal import show_table; show_table(("a", "b"), [("c", "d")] * 10000)'
@@ -166,7 +189,7 @@ def test_a_pipe_whose_reader_has_closed_it_gives_141_and_no_traceback(what: str)
 def test_a_full_standard_output_gives_2_and_one_line(what: str) -> None:
     with Path('/dev/full').open('w') as full:
         result = printed_to(full.fileno(), what)
-    assert (result.returncode, result.stderr) == (2, 'foc_ros solve: [Errno 28] No space left on device\n')
+    assert (result.returncode, result.stderr) == (2, 'foc_ros paper: [Errno 28] No space left on device\n')
 
 
 @pytest.mark.parametrize('what', [A_LINE, A_TABLE])

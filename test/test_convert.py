@@ -203,13 +203,15 @@ def test_what_is_wrong_is_said_in_one_line(
 
 
 def test_files_that_are_no_text_or_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / 'o.csv').write_text('x_m,y_m,radius_m\n')
     (tmp_path / 'binary.csv').write_bytes(b'recording,t_s,x_m,y_m\na,0,\xff,0\n')
     for file, reason in (
         ('binary.csv', 'expected UTF-8 text, got byte 0xff'),
-        ('none.csv', 'No such file'),
+        ('none.csv', 'no such file'),
         ('.', 'Is a directory'),
     ):
-        assert main(['convert', str(tmp_path / file), '--obstacles', 'o.csv', '--output', str(tmp_path / 'bags')]) == 2
+        tables = str(tmp_path / file), '--obstacles', str(tmp_path / 'o.csv')
+        assert main(['convert', *tables, '--output', str(tmp_path / 'bags')]) == 2
         error = capsys.readouterr().err
         assert reason in error and error.count('\n') == 1
 

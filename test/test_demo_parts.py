@@ -9,21 +9,24 @@ import socket
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from report_samples import START_NS, prediction
+from report_samples import START_NS, prediction, predictions, samples
 from rich.console import Console
 
 from foc_ros.cli.demo import command
 from foc_ros.cli.demo.recorder import Recorder, show_live
+from foc_ros.cli.demo.scene_text import GOAL, HAND, HEIGHT, OBSTACLE, WIDTH, draw_scene, extend_bounds
+from foc_ros.cli.demo.summary import describe_lead
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
 from foc_ros.core.types import Prediction
 from foc_ros.io.bags import TYPESTORE, Item
-from foc_ros.reporting.snapshots import build_snapshot
+from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
 from foc_ros.ros import isolated_node
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
@@ -172,6 +175,57 @@ def test_without_rclpy_one_line_says_how_to_install_it(
     assert error.count('\n') == 1
     assert 'make setup' in error
     assert not (tmp_path / 'out').exists()
+
+
+def test_the_first_line_is_printed_before_anything_is_imported(tmp_path: Path) -> None:
+    program = """
+import builtins, sys
+from foc_ros.cli.main import main
+show = print
+def say(text, **options):
+    show(text, sorted({'numpy', 'numba', 'rclpy', 'matplotlib'} & set(sys.modules)), **options)
+    raise KeyboardInterrupt
+builtins.print = say
+sys.exit(main(['demo']))
+"""
+    command = [sys.executable, '-c', program]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=100, check=False)
+    assert (result.returncode, result.stderr) == (130, '')
+    assert result.stdout.startswith('A recorded hand moves ') and result.stdout.endswith(' []\n')
+
+
+def test_the_scene_is_drawn_with_hand_goals_obstacles_and_candidates() -> None:
+    recorder = filled()
+    snapshot, hand = recorder.snapshots[0], recorder.samples[0].position
+    lines = draw_scene(snapshot, hand, extend_bounds(snapshot, hand, None)).splitlines()
+    assert len(lines) == HEIGHT and max(map(len, lines)) <= WIDTH
+    text = ''.join(lines)
+    assert text.count(HAND) == 1 and text.count(GOAL) == 2 and OBSTACLE in text and '1' in text and '2' in text
+    # x grows to the right: the hand is left of the obstacle, and that left of the goals
+    columns = {mark: [line.find(mark) for line in lines if mark in line] for mark in (HAND, OBSTACLE, GOAL)}
+    assert max(columns[HAND]) < min(columns[OBSTACLE]) < min(columns[GOAL])
+
+
+def test_the_drawing_does_not_shrink() -> None:
+    recorder = filled()
+    snapshot, hand = recorder.snapshots[0], recorder.samples[0].position
+    before = (-1.0, 1.0, -1.0, 1.0)
+    assert extend_bounds(snapshot, hand, before) == before
+    assert extend_bounds(snapshot, np.array([3.0, 0.0]), before)[1] > 3.0
+
+
+def test_the_lead_of_the_goal_that_was_reached_is_described() -> None:
+    made = samples(1)
+    snapshots = [build_snapshot(each) for each in predictions(made)]
+    words = describe_lead(build_hand_trajectory(made), snapshots)
+    # the most likely candidate always leads to goal0, where the hand arrives
+    assert words.startswith(
+        f'{len(snapshots)} predictions were made. In 1 movements to a goal, of 0.8 s, this goal was the most '
+    )
+    assert 'most likely one from 0.8 s before the end' in words
+    others = [replace(each, most_likely='goal1:+1-post') for each in snapshots]
+    assert 'from 0.0 s before the end' in describe_lead(build_hand_trajectory(made), others)
+    assert describe_lead(build_hand_trajectory(made[:5]), snapshots).endswith('no movement ended at a goal.')
 
 
 def test_a_domain_in_use_is_not_taken() -> None:

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
+import yaml
 
 from foc_ros.cli.main import COMMANDS
 from foc_ros.core.config import list_parameters
@@ -74,13 +75,26 @@ def test_every_command_is_documented() -> None:
 
 
 def test_failures_are_tested_as_they_say() -> None:
-    """Every row of doc/failures.md names tests, and they exist."""
-    rows = [line for line in (ROOT / 'doc' / 'failures.md').read_text('utf-8').splitlines() if re.match(r'\| (?!when|-)', line)]
-    assert len(rows) >= 14
-    for row in rows:
-        named_tests = re.findall(r'`(test_\w+\.py::test_\w+)`', row)
-        assert named_tests, f'no test is named in: {row}'
-        assert not set(named_tests) - TESTS, f'no such test: {set(named_tests) - TESTS}'
+    """Every row of doc/failures.md has tests, and they exist."""
+    lines = (ROOT / 'doc' / 'failures.md').read_text('utf-8').splitlines()
+    rows = [line[2:].partition(' | ')[0] for line in lines if re.match(r'\| (?!when|-)', line)]
+    named_tests = yaml.safe_load((ROOT / 'test' / 'failure_tests.yaml').read_text('utf-8'))
+    assert rows == list(named_tests)
+    for row, names in named_tests.items():
+        assert names and not set(names) - TESTS, f'{row}: no such test: {set(names) - TESTS}'
+
+
+def test_troubleshooting_quotes_texts_that_exist() -> None:
+    """What the page quotes in its first column is in the sources, perhaps with a value between."""
+    lines = (ROOT / 'doc' / 'troubleshooting.md').read_text('utf-8').splitlines()
+    quoted = [text for line in lines if line.startswith('| ') for text in re.findall(r'`([^`]+)`', line.split(' | ')[0])]
+    sources = [ROOT / 'Makefile', *(ROOT / 'foc_ros').rglob('*.py')]
+    text = '\n'.join(file.read_text('utf-8') for file in sources)
+    composed = {'hand_wrong_frame', 'obstacles_wrong_frame', 'goals_wrong_frame', 'scene_goal_inside', 'scene_no_way'}
+    assert len(quoted) > 20 and composed <= set(quoted)
+    for each in quoted:
+        wanted = each.partition('_')[2] if each in composed else each
+        assert wanted in text, f'no source has the text {each}'
 
 
 def test_failures_of_the_node_name_the_level_of_its_diagnostics() -> None:
@@ -89,7 +103,7 @@ def test_failures_of_the_node_name_the_level_of_its_diagnostics() -> None:
     assert len(node_sections) == 4
     for section in node_sections:
         header, _, *rows = [line for line in section.splitlines() if line.startswith('|')]
-        assert header == '| when | what happens | level | where you see it | test |'
+        assert header == '| when | what happens | level | where you see it |'
         for row in rows:
             level = row.split(' | ')[2]
             assert re.match(r'(OK|WARN|ERROR|unchanged|none)\b', level), row

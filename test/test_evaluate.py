@@ -163,3 +163,11 @@ def test_the_report_is_one_page(tables: Path, tmp_path: Path, capsys: pytest.Cap
 def test_a_report_that_cannot_be_written_is_refused_before_the_work(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(tables, '--report', str(tables / 'goals.csv')) == 2
     assert '--report: expected a folder' in capsys.readouterr().err
+
+
+def test_tables_and_verdict_fit_into_80_columns(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(tables) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert any(line.startswith('Homotopy classes: foc is better than uniform (+') for line in lines)
+    assert any(line.startswith('Positions 0.5 s ahead: ') for line in lines)

@@ -20,6 +20,7 @@ from foc_ros.analysis.evaluation.metrics import (
 )
 from foc_ros.analysis.evaluation.position_metrics import compute_position_scores
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
+from foc_ros.analysis.evaluation.verdict import compare_scores, make_verdict
 from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.types import LEFT, RIGHT
 
@@ -128,6 +129,51 @@ def test_the_calibration_error_is_the_distance_of_confidence_and_share_correct()
     assert compute_calibration_error(found) == pytest.approx((4 * 0.2 + 2 * 0.55) / 6)
     assert [each['count'] for each in compute_reliability(found)] == [0, 0, 0, 0, 0, 2, 0, 0, 0, 4]
     assert compute_calibration_error(make_scores([0.75] * 4, [1, 1, 1, 0])) == pytest.approx(0.0)
+
+
+def test_the_interval_of_a_bin_is_that_of_a_bootstrap_over_recordings() -> None:
+    one = compute_reliability(make_scores([0.95] * 40, [1, 0] * 20, [0] * 40))[9]
+    assert one['interval'] == [0.5, 0.5]
+    two = compute_reliability(make_scores([0.95] * 40, [1] * 20 + [0] * 20, [0] * 20 + [1] * 20))[9]
+    assert two['interval'] == [0.0, 1.0]
+    many = compute_reliability(make_scores([0.95] * 400, [1, 0] * 200, range(400)))[9]
+    # the binomial interval of a share of a half of 400
+    np.testing.assert_allclose(many['interval'], [0.451, 0.549], atol=0.006)
+    assert compute_reliability(make_scores([0.95], [1]))[0]['interval'] is None
+
+
+def test_a_comparison_counts_recordings_and_names_the_tenths_that_are_worse() -> None:
+    ours = make_scores([0.5] * 40, [1] * 40, range(40), [0.05] * 20 + [0.95] * 20)
+    change = np.where(np.arange(40) < 20, 0.1, -0.5)
+    found = compare_scores(ours, ours._replace(log_likelihood=change), is_share=False)
+    assert found['difference'] == pytest.approx(0.2) and found['worse_tenths'] == [1]
+    assert 0.0 < found['interval'][0] < 0.2 < found['interval'][1]
+    assert compare_scores(ours, ours._replace(correct=np.zeros(40)), is_share=True)['difference'] == 1.0
+
+
+@pytest.mark.parametrize(
+    ('interval', 'words'),
+    [
+        ([0.1, 0.3], 'foc is better than uniform (+0.2 nat, worse in tenths 1).'),
+        ([-0.1, 0.3], 'foc is not distinguishable from uniform (+0.2 nat, worse in tenths 1).'),
+        ([-0.4, -0.1], 'foc is worse than uniform (+0.2 nat, worse in tenths 1).'),
+    ],
+)
+def test_the_verdict_is_by_the_interval(interval: list[float], words: str) -> None:
+    errors = {'likelihood-weighted': 0.04, 'most likely': 0.03, 'constant velocity': 0.05, 'straight minimum jerk': 0.0401}
+    answer = {
+        'comparisons': {PATH_CLASS: {'uniform': {'difference': 0.2, 'interval': interval, 'worse_tenths': [1]}}},
+        'positions': {
+            'displacement_m': {name: {'final': {'0.5': each}} for name, each in errors.items()},
+            'inside_all': {'0.9': {'0.5': 0.7}},
+        },
+    }
+    assert make_verdict(answer) == [
+        f'Homotopy classes: {words}',
+        'Positions 0.5 s ahead: 40 mm away on average, better than constant velocity (50 mm), '
+        'like straight minimum jerk (40 mm).',
+        'Uncertainty: the region of 90 % holds 70 % of the true positions 0.5 s ahead, so it is too narrow.',
+    ]
 
 
 def test_tenths_include_their_lower_bound() -> None:

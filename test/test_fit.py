@@ -45,7 +45,7 @@ def past_an_obstacle(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_everything_is_fitted_and_written_for_the_node(past_an_obstacle: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    answer, config = _fit(past_an_obstacle, capsys)
+    answer, config = _fit(past_an_obstacle, capsys, '--allow', 'eta')
     assert answer['recordings'] == 6 and answer['failed'] == {}
     values = flatten(config)
     fitted = {'estimator.position_stddev', 'estimator.jerk_density', 'duration.fitts_a_s', 'duration.fitts_b_s'}
@@ -63,6 +63,14 @@ def test_everything_is_fitted_and_written_for_the_node(past_an_obstacle: Path, c
     assert classes['fitted'] >= classes['without the recording'] and classes['fitted'] > classes['uniform']
     assert set(classes) == {'uniform', 'as given', 'fitted', 'without the recording', 'without its way'}
     assert 0.5 < answer['scores']['inside_90']['fitted'] <= 1.0
+    assert set(answer['comparison']) == {
+        'class_gain',
+        'gap_right',
+        'nlpd',
+        'inside_90',
+        *(f'error_m {t}' for t in ('0.25', '0.5', '1')),
+    }
+    assert answer['comparison']['class_gain']['after'] > answer['comparison']['class_gain']['before']
     assert answer['node'][0].startswith('python -m foc_ros node ')
     _check_node_starts(answer['node'][0], config)
     assert any('too alike to tell intercept and slope apart' in words for words in answer['warnings'])
@@ -101,6 +109,8 @@ def test_the_result_is_printed_as_tables(tmp_path: Path, capsys: pytest.CaptureF
     assert main(['fit', str(bag), '--output', str(output), '--params', str(given), '--workers', '1']) == 0
     words = capsys.readouterr().out
     assert 'log-likelihood of the class taken' in words and 'note: ' in words
+    assert 'with the fitted parameters: ' in words
+    assert max(len(line) for line in words.splitlines() if str(output) not in line) <= 80
     assert f'python -m foc_ros node --ros-args --params-file {output}' in words
 
 

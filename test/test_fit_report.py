@@ -18,6 +18,7 @@ ANSWER = {
         'duration.intercept_s': {'value': 0.0, 'interval': [0.0, 0.1], 'how': 'durations', 'given': 0.0},
     },
     'scores': {'ways': {'given': -1.0, 'fitted': -0.75, 'held out': None}},
+    'comparison': {'error_m 0.5': {'before': 0.063, 'after': 0.096}, 'inside_90': {'before': 0.5, 'after': 0.8}},
     'warnings': ['<b>few</b> recordings'],
     'failed': {'x.mcap': 'no hand'},
     'output': 'mine.yaml',
@@ -32,6 +33,8 @@ def test_the_page_holds_values_intervals_scores_and_warnings(tmp_path: Path) -> 
     assert '<tr><th>likelihood.beta</th><td>1</td><td>0.5</td><td>0.4 to 0.7</td><td>classes taken</td></tr>' in page
     assert '<td>- to -</td>' in page
     assert '<tr><th>log-likelihood of the class taken [nat]</th><td>fitted</td><td>-0.750</td></tr>' in page
+    row = '<th>error of positions 0.5 s ahead [mm]</th><td>63.0</td><td>96.0</td><td>worse</td>'
+    assert row in page and 'Better with the fitted parameters: positions in the region of 90 %' in page
     assert '&lt;b&gt;few&lt;/b&gt; recordings' in page and 'x.mcap: no hand' in page
     assert page.count('<img') == 1
 

@@ -10,11 +10,13 @@ import pytest
 from fit_recordings import recorded_hand, write_tables
 
 from foc_ros.analysis.fitting import setting_search
+from foc_ros.analysis.fitting.comparison import find_worse_positions
 from foc_ros.analysis.fitting.duration_fit import fit_duration, fit_other_models
 from foc_ros.analysis.fitting.estimates import Fit
 from foc_ros.analysis.fitting.estimator_fit import FADING, fit_fading
-from foc_ros.analysis.fitting.predictor_settings import DURATIONS, make_movement_settings
+from foc_ros.analysis.fitting.predictor_settings import DURATIONS, make_eta_settings, make_movement_settings
 from foc_ros.analysis.fitting.setting_search import Replays
+from foc_ros.analysis.fitting.tables import make_verdict
 from foc_ros.analysis.parallel import IsolatedProcessPool
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.core.config import Config, replace_values
@@ -175,3 +177,21 @@ def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twic
         assert scores.shape == (2, 2, 4) and scores[0, 1].mean() > scores[0, 0].mean() + 0.1
         monkeypatch.setattr('foc_ros.analysis.fitting.setting_search._score_replay', None)
         assert np.array_equal(replays.score([CONFIG, hopeless], names, 'again'), scores[:, ::-1])
+
+
+def test_eta_is_lowered_only_if_that_is_allowed() -> None:
+    assert {each.foc.eta for each in make_eta_settings(CONFIG, may_be_lower=False)} == {0.9, 0.95}
+    assert {each.foc.eta for each in make_eta_settings(CONFIG, may_be_lower=True)} == {0.9, 0.95, 0.7, 0.5}
+
+
+def test_worse_positions_are_named_with_both_errors() -> None:
+    comparison = {
+        'class_gain': {'before': 0.5, 'after': 0.1},
+        'error_m 0.25': {'before': 0.010, 'after': 0.011},
+        'error_m 0.5': {'before': 0.063, 'after': 0.096},
+        'error_m 1': {'before': None, 'after': 0.2},
+    }
+    words = 'predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm'
+    assert find_worse_positions(comparison) == [words]
+    (sentence,) = make_verdict({'comparison': {name: comparison[name] for name in ('error_m 0.5', 'error_m 1')}})
+    assert sentence == 'Worse with the fitted parameters: error of positions 0.5 s ahead [mm] 63.0 to 96.0.'

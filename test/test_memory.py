@@ -50,7 +50,7 @@ def test_a_candidate_is_found_by_its_present_or_its_earlier_label(memory, now, b
     assert found is (None if before is None else memory.earlier.solutions[before.label])
 
 
-def reaching(x: float, memory: Memory):
+def reaching(x: float, memory: Memory, config: Config = CONFIG):
     """Predict for a hand at (x, 0) that moves, among two obstacles of which it passes the first at x = 0.1."""
     obstacles = make_obstacles([[0.1, 0.04], [0.2, -0.01]], 0.02, 0.001)
     state = None
@@ -58,7 +58,7 @@ def reaching(x: float, memory: Memory):
         place = np.array([x - 0.004 * (39 - tick), 0.0])
         stamp_ns = 1_000_000_000 + round(x / 0.4 * 1e9) + 10_000_000 * tick
         state = update(state, HandSample(stamp_ns, place), CONFIG.estimator).state
-    return predict(CONFIG, state, obstacles, np.array([[0.3, 0.0]]), memory)
+    return predict(config, state, obstacles, np.array([[0.3, 0.0]]), memory)
 
 
 def test_when_an_obstacle_is_passed_the_candidates_keep_their_solutions():
@@ -75,20 +75,21 @@ def test_when_an_obstacle_is_passed_the_candidates_keep_their_solutions():
 
 
 def test_a_candidate_stopped_by_the_deadline_continues_from_there(monkeypatch):
+    config = replace_values(CONFIG, {'likelihood.shortfall': math.inf})
     looks = []
 
     def stop_after_a_few(*_):
         looks.append(1)
-        if len(looks) > 3:
+        if len(looks) > 4:
             raise OutOfTimeError
 
     with monkeypatch.context() as patch:
         patch.setattr(Deadline, 'check', stop_after_a_few)
-        late, memory = reaching(0.0, Memory())
+        late, memory = reaching(0.0, Memory(), config)
     assert {outcome.solution.status for outcome in late.candidates} == {Status.DEADLINE}
     assert memory.earlier.solutions, 'the first candidate had some time'
     assert all(solution.multipliers for solution in memory.earlier.solutions.values())
-    after, _ = reaching(0.0, memory)
+    after, _ = reaching(0.0, memory, config)
     assert set(memory.earlier.solutions) <= {outcome.candidate.label for outcome in after.candidates_with_likelihood}
 
 

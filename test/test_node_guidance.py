@@ -12,9 +12,11 @@ ros_helpers.require_ros()
 
 from message_helpers import SECOND, pose_stamped  # noqa: E402
 from node_helpers import TYPES, Bench, figures  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
 from foc_ros.core import pipeline as pipelines  # noqa: E402
+from foc_ros.ros import guidance_loop  # noqa: E402
 
 GUIDED = {'guidance.enabled': True, 'guidance.clearance': 0.0, 'rate_hz': 25.0}
 """Guidance everywhere, so that a hand that leaves its path feels a force."""
@@ -43,7 +45,7 @@ class Guided(Bench):
         self.stiffness = ros.collect(self.player, Float64MultiArray, 'foc/guidance/stiffness')
         self.twists = ros.collect(self.player, TwistStamped, 'foc/guidance/twist')
         self.commands = self.player.create_publisher(TwistStamped, 'command_twist', 10)
-        publishers = self.node._guidance_outputs.values()
+        publishers = self.node._guidance.publishers.values()
         ros.spin_until(lambda: all(each.get_subscription_count() for each in publishers), 'the outputs of guidance')
         ros.spin_until(lambda: bool(self.commands.get_subscription_count()), 'the command')
 
@@ -84,6 +86,29 @@ def test_a_node_that_is_a_predictor_only_publishes_no_guidance(ros: Graph) -> No
     bench.wait_for('prediction', 1)
     assert not bench.wrenches
     assert figures(bench.health())['guidance'] == 'disabled'
+
+
+def test_guidance_updates_only_while_it_is_enabled(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
+    updates, update = [], guidance_loop.GuidanceLoop.update
+
+    def count(self: guidance_loop.GuidanceLoop, now_s: float) -> None:
+        updates.append(now_s)
+        update(self, now_s)
+
+    monkeypatch.setattr(guidance_loop.GuidanceLoop, 'update', count)
+    bench = Guided(ros, **{'guidance.enabled': False})
+    bench.publish_scene()
+    bench.drive(60)
+    assert not updates
+    bench.node.set_parameters([Parameter('guidance.enabled', value=True)])
+    bench.drive(40, 60)
+    assert updates and bench.forces.any()
+    bench.node.set_parameters([Parameter('guidance.enabled', value=False)])
+    ros.spin_until(lambda: not bench.forces[-2:].any(), 'a force of zero, twice')
+    ros.spin_for(0.1)
+    updates.clear()
+    bench.drive(20, 100)
+    assert not updates
 
 
 def test_the_outputs_agree_with_each_other(ros: Graph) -> None:
@@ -135,7 +160,7 @@ def test_deactivation_releases_the_hand_and_clean_up_ends_the_thread(ros: Graph)
     bench.node.trigger_deactivate()
     ros.spin_until(lambda: not bench.forces[-1].any(), 'the force is zero')
     bench.node.trigger_cleanup()
-    assert bench.node._guidance._thread is None
+    assert bench.node._guidance.loop._thread is None
 
 
 def test_commands_are_blended_and_pass_unchanged_without_guidance(ros: Graph) -> None:
@@ -176,8 +201,6 @@ def test_a_slow_prediction_does_not_delay_guidance(ros: Graph, monkeypatch: pyte
 
 
 def test_an_error_of_guidance_is_reported_and_guidance_goes_on(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
-    from foc_ros.ros import guidance_loop
-
     bench, guide, failures = begin(ros), guidance_loop.guide, [ValueError('for this test')]
 
     def fail_once(*arguments: object):

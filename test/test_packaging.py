@@ -46,6 +46,8 @@ def test_package_xml_agrees_with_the_wheel(package_xml: ET.Element, wheel: zipfi
     assert package_xml.get('format') == '3'
     assert text['name'] == metadata['Name'] == ROOT.joinpath('resource', 'foc_ros').name
     assert text['version'] == metadata['Version'] == foc_ros.__version__
+    assert yaml.safe_load((ROOT / 'CITATION.cff').read_text('utf-8'))['version'] == foc_ros.__version__
+    assert f'\n{foc_ros.__version__} (' in (ROOT / 'CHANGELOG.rst').read_text('utf-8')
     assert text['license'] == metadata['License'] == 'Apache-2.0'
     assert text['description'] == metadata['Summary']
     assert package_xml.find('maintainer').get('email') == metadata['Maintainer-email']
@@ -80,7 +82,7 @@ def test_own_rosdep_rules_are_used(package_xml: ET.Element) -> None:
 
 def test_wheel_contains_all_files_of_the_program(wheel: zipfile.ZipFile) -> None:
     names = set(wheel.namelist())
-    data = 'foc_ros-0.1.0.data/data/'.replace('0.1.0', foc_ros.__version__)
+    data = f'foc_ros-{foc_ros.__version__}.data/data/'
     assert f'{data}share/ament_index/resource_index/packages/foc_ros' in names
     assert f'{data}share/foc_ros/package.xml' in names
     for name in ('foc.yaml', 'foc.rviz', 'foxglove.json', 'sros2_policy.xml'):

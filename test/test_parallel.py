@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 import worker_tasks
 
-from foc_ros.analysis.parallel import Failure, IsolatedProcessPool, add_worker_arguments, open_executor, run
+from foc_ros.analysis.parallel import Failure, IsolatedProcessPool, open_executor, run
+from foc_ros.cli.arguments import add_worker_arguments
 from foc_ros.core.errors import InputError
 
 ITEMS = [(f'r{number}', number) for number in range(8)]
@@ -93,7 +94,7 @@ def _run_interrupted() -> None:
 @pytest.mark.parametrize('given', [('--workers', '0'), ('--workers', '2000')])
 def test_a_wrong_number_of_workers_is_refused(given: tuple[str, ...]) -> None:
     with pytest.raises(InputError, match=r'--workers: expected a whole number in \[1, 1024\], got'):
-        open_executor(_arguments(*given))
+        _arguments(*given)
 
 
 def test_a_scheduler_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

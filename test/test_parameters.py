@@ -98,9 +98,9 @@ foc: {ros__parameters: {rate_hz: 25}}
 @pytest.mark.parametrize(
     ('text', 'words'),
     [
-        ('/**: {ros__parameters: {rate: 5}}', 'rate: expected a known parameter, got 5'),
+        ('/**: {ros__parameters: {rate: 5}}', 'rate: expected a known parameter (did you mean rate_hz?), got 5'),
         ('/**: {ros__parameters: {foc: {eta: {low: 1}}}}', 'foc.eta: expected a finite number'),
-        ('/**: {ros__parameters: {foc: {etta: 0.5}}}', 'foc.etta: expected a known parameter, got 0.5'),
+        ('/**: {ros__parameters: {foc: {etta: 0.5}}}', 'foc.etta: expected a known parameter (did you mean foc.eta?), got 0.5'),
         ('/**: {ros__parameters: {foc: 5}}', 'foc: expected a group of parameters, got 5'),
         ('/**: {ros__parameters: {foc: {eta: 1.5}}}', 'foc.eta: expected a number in [0, 0.999], got 1.5'),
         ('/**: {ros__parameters: {foc: {eta: .nan}}}', 'foc.eta: expected a finite number in [0, 0.999], got nan'),
@@ -204,7 +204,7 @@ def test_a_node_reads_the_file_that_replay_reads(tmp_path: Path) -> None:
 def test_an_unknown_parameter_of_a_node_is_refused_with_a_similar_one(ros: Graph) -> None:
     from foc_ros.ros.node_parameters import declare_parameters
 
-    with pytest.raises(ParameterError, match=r'foc\.etta: expected a known parameter, perhaps foc\.eta, got 0\.5'):
+    with pytest.raises(ParameterError, match=r'foc\.etta: expected a known parameter \(did you mean foc\.eta\?\), got 0\.5'):
         declare_parameters(node_with(ros, foc__etta=0.5), Config())
 
 

@@ -115,6 +115,34 @@ def test_a_candidate_can_be_highlighted(browser: Any, report: Path) -> None:
     assert len(browser.find_elements('css selector', '#candidates tr.faded')) == 2
 
 
+def test_a_warning_leads_to_its_first_moment(browser: Any, tmp_path: Path) -> None:
+    made = samples()
+    snapshots = [build_snapshot(each) for each in predictions(made)]
+    # only from the eleventh prediction on is a candidate lost
+    snapshots[:10] = [replace(each, unsolved=()) for each in snapshots[:10]]
+    write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {'rejected': 'hand_late 3', 'hand poses': '150'})
+    assert show(browser, tmp_path / 'index.html') == []
+    (button,) = browser.find_elements('css selector', '.warning button.moment')
+    assert button.text == 'first at 0.40 s'
+    browser.execute_script('arguments[0].click()', button)
+    assert browser.find_element('id', 'clock').text == '0.40 s'
+    counters = browser.find_element('css selector', 'details')
+    assert counters.get_attribute('open') is None and 'hand_late 3' in counters.get_attribute('textContent')
+
+
+def test_the_page_begins_where_the_filter_has_settled(browser: Any, tmp_path: Path) -> None:
+    made = samples()
+    snapshots = [build_snapshot(each) for each in predictions(made)]
+    for row in range(4):
+        candidates = snapshots[row].candidates
+        wide = tuple(replace(each, covariance=100.0 * each.covariance, motor_covariance=each.covariance) for each in candidates)
+        snapshots[row] = replace(snapshots[row], candidates=wide)
+    write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {})
+    assert show(browser, tmp_path / 'index.html') == []
+    slider = browser.find_element('id', 'time')
+    assert (slider.get_attribute('min'), slider.get_attribute('value')) == ('0', '4')
+
+
 def changed(report: Path, copy: Path, old: str, new: str) -> Path:
     """Return a copy of a report with one text of its page replaced."""
     page = (report / 'index.html').read_text(encoding='utf-8')

@@ -14,7 +14,7 @@ import pytest
 
 from foc_ros.core.checks import check_number, check_vector
 from foc_ros.core.config import Config
-from foc_ros.core.errors import FocError, ParameterError, RecordingError, SceneError
+from foc_ros.core.errors import FocError, ParameterError, RecordingError, SceneError, list_messages
 from foc_ros.core.obstacles.shapes import Box, Circle, Hull, collect_obstacles
 from foc_ros.io.documents import _check_keys as check_keys
 from foc_ros.io.scene_file import guess_path, load_scene, parse_scene
@@ -124,7 +124,7 @@ def obstacle(count: int = 1, **fields: Any) -> dict[str, Any]:
     [
         ([], r'scene: expected a mapping of fields, got \[\]'),
         (None, 'scene: expected a mapping of fields, got None'),
-        ({**SCENE, 'etta': 0.9}, "scene: expected only the fields start, start_velocity, .*, got 'etta'"),
+        ({**SCENE, 'etta': 0.9}, r'etta: expected a known field \(did you mean eta\?\), got 0\.9'),
         (without('start'), 'start: expected two numbers, got nothing'),
         ({**SCENE, 'start': 0.1}, 'start: expected a list of 2 numbers, got 0.1'),
         ({**SCENE, 'start': [0.1]}, r'start: expected a list of 2 numbers, got \[0.1\]'),
@@ -165,7 +165,7 @@ def obstacle(count: int = 1, **fields: Any) -> dict[str, Any]:
         ({**SCENE, 'obstacles': [{'size': [1, 1], 'y': 1}]}, r'obstacles\[0\].x: expected a number, got nothing'),
         ({**SCENE, 'obstacles': [{'x': 0, 'y': 0.1, 'size': [1, 0.1]}]}, 'start: expected a point outside obstacle 0'),
         ({**SCENE, 'hand_radius': -1}, r'hand_radius: expected a number in \[0, 1\] m, got -1'),
-        (obstacle(r=1), r"obstacles\[0\]: expected only the fields x, .*, got 'r'"),
+        (obstacle(r=1), r"obstacles\[0\]\.r: expected a known field: x, .*, got 1"),
         (obstacle(2, id=3), r'obstacles\[1\].id: expected another id .*, got 3'),
         (obstacle(id='a;b'), r"obstacles\[0\].id: expected .*, got 'a;b'"),
         ({**SCENE, 'start': [0.1, 0.02]}, r'start: expected a point outside obstacle cup, of radius 0.03 m, got .*, 0.02 m from'),
@@ -178,7 +178,7 @@ def obstacle(count: int = 1, **fields: Any) -> dict[str, Any]:
         ({**SCENE, 'guess': 0.1}, 'guess: expected a mapping of fields, got 0.1'),
         ({**SCENE, 'guess': {}}, 'guess.amplitude: expected a number, got nothing'),
         ({**SCENE, 'guess': {'amplitude': 'big'}}, r"guess.amplitude: expected a number in .*, got 'big'"),
-        ({**SCENE, 'guess': {'amplitude': 0.1, 'side': 1}}, "guess: expected only the fields amplitude, kind, got 'side'"),
+        ({**SCENE, 'guess': {'amplitude': 0.1, 'side': 1}}, r"guess\.side: expected a known field: amplitude, kind, got 1"),
         ({**SCENE, 'guess': [[0, 0], [0]]}, r'guess\[1\]: expected a list of 2 numbers, got \[0\]'),
         ({**without('goal'), 'goals': [[1, 0], [1, 1]], 'guess': {'amplitude': 0}}, 'guess: expected one goal, .*, got 2 goals'),
         ({'start': [0, 0], 'goal': [0, 0], 'guess': {'amplitude': 0.1}}, 'guess: expected a goal away from the start, got both'),
@@ -313,3 +313,11 @@ def test_the_plant_is_a_field() -> None:
     assert (foc.plant, foc.plant_mass, foc.plant_damping) == ('damped_mass', 2.0, 3.0)
     with pytest.raises(SceneError, match=r'^plant: expected one of triple_integrator, damped_mass'):
         parse_scene({'start': [0, 0], 'goal': [0.3, 0], 'plant': 'spring'})
+
+
+def test_all_errors_of_a_scene_are_found_at_once() -> None:
+    obstacles = [{'x': 0.1, 'y': 'a', 'radius': 0.02}, {'x': 0.1, 'y': 0.0, 'radius': 0.02}, {'x': 0.1, 'y': 0.0, 'radius': -1}]
+    with pytest.raises(SceneError) as raised:
+        parse_scene({**SCENE, 'etta': 0.9, 'steps': 1, 'strategy': 'hcc', 'goal': [1], 'obstacles': obstacles})
+    fields = [message.partition(':')[0] for message in list_messages(raised.value)]
+    assert fields == ['etta', 'steps', 'strategy', 'obstacles[0].y', 'obstacles[2].radius', 'goal']

@@ -138,8 +138,8 @@ def test_nothing_solved_is_exit_3_with_one_line(tmp_path: Path, capsys: pytest.C
     ('scene', 'options', 'line'),
     [
         ({**SCENE, 'eta': 2}, (), 'foc_ros solve: eta: expected a number in [0, 0.999], got 2'),
-        (SCENE, ('--monte-carlo', '0'), 'foc_ros solve: --monte-carlo: expected a number in [1, 10000000], got 0'),
-        (SCENE, ('--monte-carlo', 'x'), "foc_ros solve: argument --monte-carlo: invalid int value: 'x'"),
+        (SCENE, ('--monte-carlo', '0'), 'foc_ros solve: --monte-carlo: expected a whole number in [1, 10000000], got 0'),
+        (SCENE, ('--monte-carlo', 'x'), 'foc_ros solve: --monte-carlo: expected a whole number in [1, 10000000], got x'),
     ],
 )
 def test_wrong_input_is_exit_2_with_one_line(

@@ -20,15 +20,13 @@ from typing import Any, TypeVar
 
 from pebble import ProcessExpired, ProcessPool
 
-from foc_ros.core.errors import FocError, InputError, RecordingError
+from foc_ros.core.errors import FocError, RecordingError
 from foc_ros.io.terminal import show_progress
 
 from .dask_cluster import DaskExecutor
 
 T = TypeVar('T')
 R = TypeVar('R')
-
-MAX_WORKERS = 1024
 
 
 @dataclass(frozen=True)
@@ -152,18 +150,8 @@ def _run_alone(function: Callable[[T], R], item: T, futures: Sequence[Future[R |
         return Failure(f'its worker was lost: {type(error).__name__}: {" ".join(str(error).split())}')
 
 
-def add_worker_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare `--workers` and `--scheduler`."""
-    group = parser.add_mutually_exclusive_group()
-    words = 'worker processes (default: one for each core that this process may use)'
-    group.add_argument('--workers', type=int, default=len(os.sched_getaffinity(0)), metavar='N', help=words)
-    group.add_argument('--scheduler', metavar='ADDRESS', help='use the workers of this Dask scheduler instead (extra: cluster)')
-
-
 def open_executor(arguments: argparse.Namespace) -> Executor:
-    """Return the executor that `add_worker_arguments` declared, to be used as a context; raise InputError where there is none."""
+    """Return the executor of the arguments `workers` and `scheduler`, as a context; raise InputError where there is none."""
     if arguments.scheduler is not None:
         return DaskExecutor(arguments.scheduler)
-    if not 1 <= arguments.workers <= MAX_WORKERS:
-        raise InputError('--workers', f'a whole number in [1, {MAX_WORKERS}]', arguments.workers)
     return IsolatedProcessPool(arguments.workers)

@@ -4,22 +4,11 @@ from __future__ import annotations
 
 import argparse
 import re
-from pathlib import Path
 
 from foc_ros.analysis.csv_recordings import Movement, RecordedScene, read_movements, read_scenes, write_movement
 from foc_ros.analysis.recordings import read_tables
 from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.io.terminal import show_progress
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
-    words = 'recordings: columns recording, t_s, x_m, y_m[, z_m]; or a folder of all tables, as evaluate takes it'
-    parser.add_argument('csv', type=Path, metavar='CSV', help=words)
-    words = 'columns x_m, y_m, radius_m[, radius_stddev_m, id, z_m, recording], for boxes size_x_m, size_y_m[, yaw_rad]'
-    parser.add_argument('--obstacles', type=Path, metavar='CSV', help=words)
-    parser.add_argument('--goals', type=Path, metavar='CSV', help='columns x_m, y_m[, z_m, recording]')
-    parser.add_argument('--output', type=Path, metavar='DIR', required=True, help='directory for the bags, one per recording')
 
 
 def run(arguments: argparse.Namespace) -> int:

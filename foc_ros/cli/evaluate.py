@@ -6,38 +6,23 @@ import argparse
 import json
 import sys
 from functools import partial
-from pathlib import Path
 
 from foc_ros.analysis.evaluation.evaluate import evaluate, find_label_mismatches
 from foc_ros.analysis.evaluation.observations import observe
 from foc_ros.analysis.evaluation.tables import make_tables
-from foc_ros.analysis.parallel import add_worker_arguments, collect, open_executor
+from foc_ros.analysis.parallel import collect, open_executor
 from foc_ros.analysis.recordings import find_recordings
-from foc_ros.core.errors import InputError
-from foc_ros.io.outputs import check_replaceable
-from foc_ros.io.terminal import show_table
-from foc_ros.ros.parameters import load_optional_config
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
-    words = 'folder of bags, or of recordings.csv, goals.csv and obstacles.csv'
-    parser.add_argument('data', type=Path, metavar='DATA', help=words)
-    parser.add_argument('--params', type=Path, metavar='YAML', help="the node's parameter file")
-    parser.add_argument('--json', action='store_true', help='print one JSON object')
-    parser.add_argument('--report', type=Path, metavar='DIR', help='write a page with plots')
-    add_worker_arguments(parser)
+from foc_ros.io.outputs import check_page
+from foc_ros.io.terminal import show_table, show_text
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Evaluate; return 2 where a recording failed, 3 where all did."""
-    config = load_optional_config(arguments.params)
-    if arguments.report is not None and arguments.report.is_file():
-        raise InputError('--report', 'a folder', arguments.report)
+    config = arguments.config
     if arguments.report is not None:
         from foc_ros.reporting.evaluation_report import PAGE, write_report
 
-        check_replaceable('--report', arguments.report / PAGE)
+        check_page('--report', arguments.report, PAGE)
     found = find_recordings(arguments.data)
     with open_executor(arguments) as executor:
         recordings, failed = collect(partial(observe, config=config), list(found.items()), executor, 'replay')
@@ -58,4 +43,6 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         for title, columns, lines in make_tables(answer):
             show_table(columns, lines, title)
+        for sentence in answer['verdict']:
+            show_text(sentence)
     return 2 if failed else 0

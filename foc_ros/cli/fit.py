@@ -5,49 +5,49 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from foc_ros.analysis.fitting.comparison import find_worse_positions
 from foc_ros.analysis.fitting.estimates import Fit
 from foc_ros.analysis.fitting.fit import fit_parameters
-from foc_ros.analysis.fitting.tables import PARAMETER_COLUMNS, SCORE_COLUMNS, format_parameters, format_scores
-from foc_ros.analysis.parallel import add_worker_arguments, open_executor
+from foc_ros.analysis.fitting.tables import (
+    COMPARISON_COLUMNS,
+    PARAMETER_COLUMNS,
+    SCORE_COLUMNS,
+    format_comparison,
+    format_parameters,
+    format_scores,
+    make_verdict,
+)
+from foc_ros.analysis.parallel import open_executor
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.core.config import Config, flatten
 from foc_ros.core.errors import InputError
-from foc_ros.io.outputs import check_replaceable
-from foc_ros.io.terminal import show_table
-from foc_ros.ros.parameters import load_optional_config, write_parameter_file
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
-    words = 'folder of bags, or of recordings.csv, goals.csv and, where there are obstacles, obstacles.csv'
-    parser.add_argument('data', type=Path, metavar='DATA', help=words)
-    parser.add_argument('--output', type=Path, metavar='YAML', required=True, help='parameter file to write')
-    parser.add_argument('--params', type=Path, metavar='FILE', help='parameter file with the values to start from')
-    parser.add_argument('--json', action='store_true', help='print one JSON object')
-    parser.add_argument('--report', type=Path, metavar='DIR', help='write a page with plots')
-    add_worker_arguments(parser)
+from foc_ros.io.outputs import check_page
+from foc_ros.io.terminal import show_table, show_text
+from foc_ros.ros.parameters import write_parameter_file
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Fit, write and show; return 2 where a recording could not be used, and the others were."""
-    config, output = load_optional_config(arguments.params), arguments.output
+    config, output = arguments.config, arguments.output
     # before the work, not after it
     if output.is_dir() or not output.resolve().parent.is_dir():
         raise InputError('--output', 'a file in a directory that exists', output)
-    if arguments.report is not None and arguments.report.is_file():
-        raise InputError('--report', 'a folder', arguments.report)
     if arguments.report is not None:
         from foc_ros.reporting.fit_report import PAGE, write_report
 
-        check_replaceable('--report', arguments.report / PAGE)
+        check_page('--report', arguments.report, PAGE)
     recordings = find_recordings(arguments.data)
     with open_executor(arguments) as executor:
-        fit = fit_parameters(recordings, config, executor)
-    write_parameter_file('--output', output, fit.config)
+        fit = fit_parameters(recordings, config, executor, may_lower_eta=arguments.allow == 'eta')
     answer = make_answer(fit, config, output)
+    if not _confirm(find_worse_positions(fit.comparison), output):
+        print(f'foc_ros fit: {output} is not written', file=sys.stderr)
+        return 2
+    write_parameter_file('--output', output, fit.config)
     if arguments.report is not None:
         write_report(arguments.report, arguments.data.resolve().name, answer)
     if arguments.json:
@@ -68,16 +68,29 @@ def make_answer(fit: Fit, given: Config, output: Path) -> dict[str, Any]:
         'parameters': {name: {**each.as_json(), 'given': before[name]} for name, each in fit.estimates.items()},
         'chosen': {name: {'value': value, 'given': before[name]} for name, value in fit.chosen.items()},
         'scores': fit.scores,
+        'comparison': fit.comparison,
         'warnings': fit.warnings,
         'output': str(output),
         'node': [f'python -m foc_ros node {options}', f'ros2 run foc_ros foc_node {options}'],
     }
 
 
+def _confirm(losses: Sequence[str], output: Path) -> bool:
+    """Say what becomes worse before the file is written; on a terminal, return whether the user wants it all the same."""
+    for loss in losses:
+        print(f'foc_ros fit: {loss}', file=sys.stderr)
+    if not losses or not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return True
+    return input(f'Write {output} all the same? [y/N] ').strip().lower() in ('y', 'yes')
+
+
 def _show(answer: dict[str, Any]) -> None:
     show_table(PARAMETER_COLUMNS, format_parameters(answer))
     show_table(SCORE_COLUMNS, format_scores(answer))
+    show_table(COMPARISON_COLUMNS, format_comparison(answer))
     for warning in answer['warnings']:
-        print(f'note: {warning}')
+        show_text(f'note: {warning}')
+    for sentence in make_verdict(answer):
+        show_text(sentence)
     words = f'{answer["recordings"]} recordings; parameters written to {answer["output"]}. Run the node with them:'
     print('\n  '.join((words, *answer['node'])))

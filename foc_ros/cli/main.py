@@ -1,23 +1,27 @@
 """The program `foc_ros` and its commands. A command's module is imported only when the command is run.
 
-Exit codes: 0 done; 2 the input is wrong, and one line on standard error names field, value and bound; 3 no candidate could be
-solved; 130 after an interrupt and 141 if the reader of standard output has closed it, both as in a shell. If standard output
-cannot be written, for example because its disk is full, the code is 2.
+Exit codes: 0 done; 2 the input is wrong, and a line on standard error for each error names field, value and bound; 3 no candidate
+could be solved; 130 after an interrupt and 141 if the reader of standard output has closed it, both as in a shell. If standard
+output cannot be written, for example because its disk is full, the code is 2.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from importlib import import_module
 from io import TextIOWrapper
 from pathlib import Path
 from typing import Any, NoReturn
 
-from foc_ros.core.errors import FocError
+from foc_ros.core.errors import FocError, list_messages, suggest
 
+from . import arguments as declarations
+from .compiling import show_compilation
 from .interrupts import INTERRUPTED, handle_interrupts
 
 COMMANDS = {
@@ -33,8 +37,10 @@ COMMANDS = {
     'convert': 'convert motion capture in CSV tables to bags',
     'warm-up': 'compile the solver for this machine and keep it, so that nothing else has to',
 }
-"""Purpose of each command. The module of that name (with an underscore for a hyphen) defines `add_arguments(parser)` and
-`run(arguments) -> exit code`."""
+"""Purpose of each command. With an underscore for a hyphen, `arguments` declares its arguments in `add_NAME_arguments(parser)`,
+and the module of its name defines `run(arguments) -> exit code`."""
+COMPUTING = ('paper', 'solve', 'replay', 'fit', 'evaluate', 'simulate')
+"""Commands whose modules import the solver; `demo`, `node` and `warm-up` show its compilation themselves."""
 
 
 class _StoreOnce(argparse.Action):
@@ -60,6 +66,11 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         self.exit(2, f'{self.prog}: {" ".join(message.split())}\n')
 
+    def reject(self, words: Sequence[str]) -> NoReturn:
+        """End with an error that names words that are no arguments, each with the most similar option."""
+        options = re.findall(r'--[a-z-]+', self.format_help())
+        self.error(f'unrecognized arguments: {" ".join(f"{each}{suggest(each, options)}" for each in words)}')
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return the exit code; arguments: those of the process by default, without its name."""
@@ -76,7 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _discard_lost_output()
         if isinstance(error, BrokenPipeError):
             return 141
-        print(f'{" ".join(["foc_ros", *given[:1]])}: {_format_line(error)}', file=sys.stderr)
+        print(f'{" ".join(["foc_ros", *given[:1]])}: {_format_line(str(error))}', file=sys.stderr)
         return 2
     return code
 
@@ -96,27 +107,30 @@ def _parse_and_run(given: list[str]) -> int:
     commands = parser.add_subparsers(dest='command', required=True)
     for name, purpose in COMMANDS.items():
         command = commands.add_parser(name, help=purpose, description=f'{purpose[0].upper()}{purpose[1:]}.')
-        if given[:1] == [name]:
-            _import_command(name).add_arguments(command)
+        getattr(declarations, f'add_{_get_module_name(name)}_arguments')(command)
     try:
+        if given and not given[0].startswith('-') and given[0] not in COMMANDS:
+            parser.error(f'there is no command {given[0]}{suggest(given[0], COMMANDS)}; {", ".join(COMMANDS)} are the commands')
         parsed, rest = parser.parse_known_args(given)
         if rest and parsed.command != 'node':
-            commands.choices[parsed.command].error(f'unrecognized arguments: {" ".join(rest)}')
+            commands.choices[parsed.command].reject(rest)
+        parsed.rest = rest
+        with show_compilation() if parsed.command in COMPUTING else nullcontext():
+            module = import_module(f'.{_get_module_name(parsed.command)}', __package__)
+        return int(module.run(parsed))
     except SystemExit as leaving:  # after --help, or wrong arguments
         return int(leaving.code or 0)
-    parsed.rest = rest
-    try:
-        return int(_import_command(parsed.command).run(parsed))
     except FocError as error:
-        print(f'foc_ros {parsed.command}: {_format_line(error)}', file=sys.stderr)
+        for message in list_messages(error):
+            print(f'foc_ros {given[0]}: {_format_line(message)}', file=sys.stderr)
         return 2
 
 
-def _import_command(name: str) -> Any:
-    return import_module(f'.{name.replace("-", "_")}', __package__)
+def _get_module_name(command: str) -> str:
+    return command.replace('-', '_')
 
 
-def _format_line(error: Exception) -> str:
-    """Return the message in one line; a character from a file that would control the terminal is escaped."""
-    line = ' '.join(str(error).split())
+def _format_line(message: str) -> str:
+    """Return a message in one line; a character from a file that would control the terminal is escaped."""
+    line = ' '.join(message.split())
     return ''.join(each if each.isprintable() else ascii(each)[1:-1] for each in line)

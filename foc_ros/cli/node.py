@@ -8,11 +8,6 @@ from importlib.util import find_spec
 from foc_ros.core.errors import FocError
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare no arguments: rclpy parses them."""
-    parser.usage = '%(prog)s [-h] [--ros-args ...]'
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Run the node until it is stopped."""
     if find_spec('rclpy') is None:

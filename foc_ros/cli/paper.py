@@ -17,12 +17,6 @@ NUMBERS, TABLE = 'numbers.json', 'table.md'
 COLUMNS = ('study', 'what the paper shows', 'paper', 'here', 'holds here')
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
-    words = 'folder for figures, numbers and table (default: %(default)s); files of the same names are replaced'
-    parser.add_argument('--output', type=Path, default=Path('paper_output'), metavar='DIR', help=words)
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Compute, draw, write and show."""
     studies = perform(arguments.output)

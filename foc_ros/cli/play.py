@@ -7,46 +7,32 @@ import asyncio
 import signal
 import sys
 from importlib.util import find_spec
-from pathlib import Path
 
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, InputError
-from foc_ros.ros.parameters import load_optional_config
 
-HOST, PORT = '127.0.0.1', 8420
+from .compiling import show_compilation
+
 SWITCH_S = 0.001
 """Longest time for which a thread keeps Python's global lock while another one waits for it [s]."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
-    words = 'address to serve on (default: %(default)s, this computer only); any other lets everybody there steer the hand'
-    parser.add_argument('--host', default=HOST, metavar='HOST', help=words)
-    parser.add_argument('--port', type=int, default=PORT, metavar='PORT', help='port (default: %(default)s; 0: a free one)')
-    parser.add_argument('--no-ros', action='store_true', help='predict with the library, without a node and DDS')
-    words = 'folder for recordings, reports and fitted parameters (default: %(default)s)'
-    parser.add_argument('--data', type=Path, default=Path('play_data'), metavar='DIR', help=words)
-    parser.add_argument('--params', type=Path, metavar='YAML', help="the node's parameter file to begin with")
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Serve the page until an interrupt."""
-    if not 0 <= arguments.port <= 65535:
-        raise InputError('--port', 'a whole number in [0, 65535]', arguments.port)
     if not arguments.no_ros and find_spec('rclpy') is None:
         raise FocError('rclpy is not installed: use --no-ros, or source a ROS 2 installation, or install the extra `ros`')
     if arguments.data.exists() and not arguments.data.is_dir():
         raise InputError('--data', 'a folder', arguments.data)
-    config = load_optional_config(arguments.params)
     sys.setswitchinterval(SWITCH_S)
-    asyncio.run(_serve(arguments, config))
+    asyncio.run(_serve(arguments, arguments.config))
     return 0
 
 
 async def _serve(arguments: argparse.Namespace, config: Config) -> None:
-    from foc_ros.play.predictors import LibraryPredictor, LivePredictor, Receive
-    from foc_ros.play.server import is_loopback, listen, serve
-    from foc_ros.play.session import Session
+    with show_compilation():
+        from foc_ros.play.predictors import LibraryPredictor, LivePredictor, Receive
+        from foc_ros.play.server import is_loopback, listen, serve
+        from foc_ros.play.session import Session
 
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

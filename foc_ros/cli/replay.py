@@ -8,7 +8,6 @@ import shutil
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
-from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TextIO
 
@@ -24,7 +23,7 @@ from foc_ros.io.terminal import show_progress, show_table
 from foc_ros.ros.messages.encode_guidance import GUIDANCE_OUTPUTS
 from foc_ros.ros.messages.encode_prediction import encode_outputs
 from foc_ros.ros.messages.types import RosbagsTypes
-from foc_ros.ros.parameters import load_optional_config, write_parameter_file
+from foc_ros.ros.parameters import write_parameter_file
 
 NODE = '/foc'
 """Name of the node in the topics of the output bag."""
@@ -34,26 +33,9 @@ GuidanceConsumer = Callable[[Step, GuidanceStep], None]
 """Function that receives every update of guidance, with the step before which it happens."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
-    parser.add_argument('bag', type=Path, metavar='BAG', help='bag directory, or a .mcap or .db3 file')
-    parser.add_argument('--output', type=Path, metavar='NEW_BAG', help='write inputs and predictions to a new bag')
-    parser.add_argument('--report', type=Path, metavar='DIR', help='write a page with pictures')
-    parser.add_argument('--params', type=Path, metavar='YAML', help="the node's parameter file")
-    words = 'add the demonstrated homotopy classes to a class library, for homotopy.library'
-    parser.add_argument('--learn', type=Path, metavar='FILE', help=words)
-    words = 'write the parameters with the durations of this operator, for --params'
-    parser.add_argument('--operator', type=Path, metavar='FILE', help=words)
-    words = 'compute guidance as well, at guidance.rate_hz: into the output bag and, with --json, as a list `guidance`'
-    parser.add_argument('--guidance', action='store_true', help=words)
-    parser.add_argument('--json', action='store_true', help='print one JSON object')
-    words = 'take an input from a topic, as in hand_pose:=/PSM1/measured_cp (default: by name, else by type)'
-    parser.add_argument('--remap', action='append', default=[], metavar='INPUT:=TOPIC', help=words)
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Replay the recording; return 3 if no prediction has a solved candidate."""
-    replay, summary = Replay(load_optional_config(arguments.params)), Summary()
+    replay, summary = Replay(arguments.config), Summary()
     consumers: list[Consumer] = [summary.add]
     report = learner = None
     if arguments.report is not None:

@@ -6,10 +6,8 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
-from foc_ros.core.errors import InputError
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.reaching_scene import build_scene_problems, solve_scene
@@ -19,7 +17,6 @@ from foc_ros.io.outputs import check_replaceable
 from foc_ros.io.scene_file import load_scene
 from foc_ros.io.terminal import show_table
 
-MOST_SAMPLES = 10_000_000
 COLUMNS = {
     'label': '{}',
     'description': '{}',
@@ -38,22 +35,9 @@ COLUMNS = {
 """Columns of the table and the formats of their values."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
-    parser.add_argument('scene', type=Path, metavar='SCENE', help='YAML or JSON file')
-    parser.add_argument('--json', action='store_true', help='print one JSON object')
-    words = 'estimate the probability of avoidance from N noisy movements'
-    parser.add_argument('--monte-carlo', type=int, metavar='N', help=words)
-    parser.add_argument(
-        '--plot', type=Path, metavar='FILE', help='draw the candidates (PNG, PDF or SVG); a picture that foc_ros drew is replaced'
-    )
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Solve the scene; return 3 if no candidate could be solved."""
     samples = arguments.monte_carlo
-    if samples is not None and not 1 <= samples <= MOST_SAMPLES:
-        raise InputError('--monte-carlo', f'a number in [1, {MOST_SAMPLES}]', samples)
     if arguments.plot is not None:
         check_replaceable('--plot', arguments.plot)
     scene = load_scene(arguments.scene)

@@ -11,10 +11,6 @@ from foc_ros.core.registry import import_all
 from foc_ros.io.terminal import show_counter
 
 
-def add_arguments(_: argparse.ArgumentParser) -> None:
-    """Declare no arguments."""
-
-
 def run(_: argparse.Namespace) -> int:
     """Compile every kernel that is not kept yet, and print how many there were."""
     began = monotonic()

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, cast
 
-from .errors import ParameterError
+from .errors import ParameterError, join_errors, suggest
 from .registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
 
 PLANES = ('xy', 'xz', 'yz')
@@ -190,14 +190,17 @@ class GuidanceConfig:
     mode: str = _p(
         'path', 'path: no force along the path, the operator sets the pace; trajectory: also along it', choices=GUIDANCE_MODES
     )
-    k_max: float = _p(300.0, 'largest stiffness in any direction', 'N/m', 0.0, 5000.0)
+    k_max: float = _p(150.0, 'largest stiffness in any direction', 'N/m', 0.0, 5000.0)
     f_max: float = _p(3.0, 'largest force; it is also at most what `slew` reduces to zero within `ramp_s`', 'N', 0.0, 100.0)
     slew: float = _p(300.0, 'largest rate of change of the force', 'N/s', 0.1, 1e5)
     lookahead_s: float = _p(
-        0.15, 'longest time ahead at which a path is compared with where the hand goes by its velocity', 's', 0.0, 2.0
+        0.25, 'longest time ahead at which a path is compared with where the hand goes by its velocity', 's', 0.0, 2.0
     )
     clearance: float = _p(
-        0.015, 'distance that guidance keeps the hand from obstacles: no force farther away; 0: force everywhere', 'm', 0.0, 1.0
+        0.012, 'distance that guidance keeps the hand from obstacles: no force farther away; 0: force everywhere', 'm', 0.0, 1.0
+    )
+    sharpness: float = _p(
+        3.0, 'exponent of the likelihoods as weights: the larger, the more the likeliest candidate leads', '', 0.1, 10.0
     )
     precision_low: float = _p(
         100.0, 'precision, an inverse variance of position, up to which there is no stiffness', '1/m^2', 0.0, 1e9
@@ -298,15 +301,29 @@ def flatten(config: Config) -> dict[str, float | int | str | bool]:
 
 
 def replace_values(config: Config, values: Mapping[str, object]) -> Config:
-    """Return the config with some values changed, by dotted name: `Config.with_values`."""
+    """Return the config with some values changed, by dotted name: `Config.with_values`. An error names all wrong values."""
     known = {parameter.name: parameter for parameter in list_parameters()}
+    errors = []
     for name, value in values.items():
-        if name not in known:
-            raise ParameterError(name, 'a known parameter', repr(value))
         group, _, leaf = name.rpartition('.')
-        checked = _check_value(known[name], value)
+        try:
+            checked = _check_value(_find_parameter(name, value, known), value)
+        except ParameterError as error:
+            errors.append(error)
+            continue
         config = replace(config, **({group: replace(getattr(config, group), **{leaf: checked})} if group else {leaf: checked}))
+    if errors:
+        raise join_errors(errors)
     return config
+
+
+def _find_parameter(name: str, value: object, known: Mapping[str, Parameter]) -> Parameter:
+    """Return the parameter of a name; raise ParameterError for a name that is unknown or that of a group."""
+    if name in known:
+        return known[name]
+    groups = {each.partition('.')[0] for each in known if '.' in each}
+    expected = 'a group of parameters' if name in groups else f'a known parameter{suggest(name, (*known, *groups))}'
+    raise ParameterError(name, expected, repr(value))
 
 
 def _check_value(parameter: Parameter, value: object) -> float | int | str | bool:

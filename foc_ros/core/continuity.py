@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
@@ -196,19 +197,19 @@ def _smooth_path(candidate: PredictedCandidate, answer: Answer, stamp_ns: int, g
         return candidate
     earlier, total_s = answer.predicted.solution, float(solution.times[-1])
     before = interpolate_rest(earlier.mean, age_s / earlier.dt)
-    s = solution.times / total_s
-    fall = np.stack(
-        (
-            1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2),
-            -30.0 * s**2 * (1.0 - s) ** 2 / total_s,
-            -60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / total_s**2,
-        )
-    )
     difference = before - solution.mean
-    now = difference[0, :2].copy()
+    now, fall = difference[0, :2].copy(), _fall_as_minimum_jerk(len(solution.control))
     for state in range(difference.shape[1] // 2):
-        difference[:, 2 * state : 2 * state + 2] -= fall[state][:, None] * now
+        difference[:, 2 * state : 2 * state + 2] -= fall[state] * (now / total_s**state)
     return replace(candidate, solution=replace(solution, mean=as_readonly(solution.mean + (1.0 - gain) * difference)))
+
+
+@cache
+def _fall_as_minimum_jerk(steps: int) -> Array:
+    """Return phi = 1 - s^3 (10 - 15 s + 6 s^2) and its first two derivatives at s = 0..1 in steps, (3, steps + 1, 1)."""
+    s = np.linspace(0.0, 1.0, steps + 1)[:, None]
+    slope, bend = -30.0 * s**2 * (1.0 - s) ** 2, -60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
+    return np.stack((1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2), slope, bend))
 
 
 def make_continuous(

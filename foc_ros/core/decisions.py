@@ -48,5 +48,6 @@ def find_decisions(sides: NDArray[np.int8], obstacles: Obstacles, hand: HandStat
         members = np.flatnonzero(row == number)
         gaps.append(is_left[:, members[np.argsort(across[members], kind='stable')]])
         woven += (gaps[-1][:, 1:] > gaps[-1][:, :-1]).any(axis=1)
-    next_gap = np.unique(gaps[0], axis=0, return_inverse=True)[1].ravel() if gaps else np.zeros(len(sides), dtype=np.intp)
-    return Decisions(next_gap, woven)
+    numbers = dict[bytes, int]()
+    next_gap = [numbers.setdefault(each.tobytes(), len(numbers)) for each in gaps[0]] if gaps else [0] * len(sides)
+    return Decisions(np.array(next_gap, dtype=np.intp), woven)

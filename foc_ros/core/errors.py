@@ -5,6 +5,10 @@ An expected failure (infeasible, unreachable, out of time) is a :class:`foc_ros.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+from typing import TypeVar
+
 _LONGEST = 200
 """Characters of a value in a message."""
 
@@ -48,3 +52,25 @@ class MessageError(InputError):
 
 class RecordingError(FocError):
     """A file that cannot be read or written; the message names the file and the reason."""
+
+
+E = TypeVar('E', bound=InputError)
+
+
+def join_errors(errors: Sequence[E]) -> E:
+    """Return the first of several errors of one input, at least one, with the messages of the others as its notes."""
+    for each in errors[1:]:
+        for message in list_messages(each):
+            errors[0].add_note(message)
+    return errors[0]
+
+
+def list_messages(error: Exception) -> tuple[str, ...]:
+    """Return the message of an error and its notes."""
+    return str(error), *getattr(error, '__notes__', ())
+
+
+def suggest(name: object, known: Iterable[str]) -> str:
+    """Return a hint at the known name that is most similar to an unknown one, for a message; empty if none is similar."""
+    similar = get_close_matches(str(name)[:_LONGEST], known, 1)
+    return f' (did you mean {similar[0]}?)' if similar else ''

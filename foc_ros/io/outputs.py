@@ -10,6 +10,13 @@ MARK = 'made by foc_ros'
 """Text that every picture and page contains that a command writes."""
 
 
+def check_page(option: str, directory: Path, page: str) -> None:
+    """Raise InputError, which names the option, if a page cannot be written into a directory without harm to another file."""
+    if directory.is_file():
+        raise InputError(option, 'a folder', f'{directory}, which is a file')
+    check_replaceable(option, directory / page)
+
+
 def check_replaceable(option: str, *files: Path) -> None:
     """Raise InputError, which names the option, if a file exists that does not contain `MARK`."""
     for file in files:

@@ -12,20 +12,21 @@ from __future__ import annotations
 import math
 import re
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Callable, Container, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.errors import ParameterError, SceneError
+from foc_ros.core.errors import ParameterError, SceneError, join_errors, suggest
 from foc_ros.core.obstacles.shapes import Box, Hull, Shape
 from foc_ros.core.reaching_scene import ReachingScene, check_outside
 from foc_ros.core.types import Array, HandState, Obstacles, make_obstacles
 
 from .documents import read_document
 
+T = TypeVar('T')
 FARTHEST = 1e4
 """Bound of every length, velocity and acceleration of a scene, in SI units."""
 MOST_OBSTACLES, MOST_GOALS, MOST_POINTS = 20_000, 256, 10_000
@@ -62,17 +63,30 @@ def load_scene(file: Path | str) -> ReachingScene:
 
 
 def parse_scene(document: object) -> ReachingScene:
-    """Return the scene of a document of mappings, lists and numbers; raises SceneError."""
-    scene = _read_mapping('scene', document, FIELDS)
-    config = _read_config(scene)
-    obstacles = _read_obstacles(scene.get('obstacles', []))
-    hand, goals, avoided = _read_hand(scene), _read_goals(scene), obstacles.grow(config.scene.hand_radius)
+    """Return the scene of a document of mappings, lists and numbers; raises SceneError, with a note for every further error."""
+    scene = _read_mapping('scene', document)
+    errors = _find_unknown_fields('', scene, FIELDS)
+    config = _collect(errors, _read_config, scene)
+    obstacles = _collect(errors, _read_obstacles, scene.get('obstacles', []))
+    hand, goals = _collect(errors, _read_hand, scene), _collect(errors, _read_goals, scene)
+    if config is None or obstacles is None or hand is None or goals is None or errors:
+        raise join_errors(errors)
+    avoided = obstacles.grow(config.scene.hand_radius)
     check_outside('start', hand.mean[:2], avoided)
     for goal in goals:
         check_outside('goal' if 'goal' in scene else 'goals', goal, avoided)
     noise = np.array([config.foc.noise_x, config.foc.noise_y])
     guess = _read_guess(scene['guess'], hand.mean[:2], goals, config.foc.steps) if 'guess' in scene else None
     return ReachingScene(hand, goals, obstacles, noise, guess, config)
+
+
+def _collect(errors: list[SceneError], read: Callable[..., T], *arguments: Any) -> T | None:
+    """Return what a function reads; where it raises SceneError, add this with its notes to a list and return None."""
+    try:
+        return read(*arguments)
+    except SceneError as error:
+        errors.append(error)
+        return None
 
 
 def guess_path(start: Array, goal: Array, steps: int, amplitude: float = 0.0, via: Array | None = None) -> Array:
@@ -104,12 +118,14 @@ def _read_config(scene: Mapping[str, Any]) -> Config:
     if 'noise' in scene:
         x, y = _read_list('noise', scene['noise'], 2)
         given += [('noise', 'foc.noise_x', x), ('noise', 'foc.noise_y', y)]
-    config = replace_values(Config(), {'duration.model': 'fixed'})
+    config, errors = replace_values(Config(), {'duration.model': 'fixed'}), []
     for field, parameter, value in given:
         try:
             config = replace_values(config, {parameter: _convert_numeral(value)})
         except ParameterError as error:
-            raise SceneError(field, error.expected, error.got) from error
+            errors.append(SceneError(field, error.expected, error.got))
+    if errors:
+        raise join_errors(errors)
     for field in ('tau', 'lambda'):
         if field in scene and config.foc.strategy != 'fixed':
             raise SceneError(field, 'to be given with strategy fixed only', f'strategy {config.foc.strategy}')
@@ -139,19 +155,31 @@ def _read_goals(scene: Mapping[str, Any]) -> Array:
 
 def _read_obstacles(given: object) -> Obstacles:
     rows: dict[str, tuple[Array, Array, float, float]] = {}
+    errors: list[SceneError] = []
     for place, each in enumerate(_read_rows('obstacles', given, MOST_OBSTACLES)):
-        field = f'obstacles[{place}]'
-        obstacle = _read_mapping(field, each, OBSTACLE_FIELDS)
-        identity = obstacle.get('id', place)
-        if type(identity) not in (int, str) or not _ID.fullmatch(str(identity)):
-            expected = 'a whole number, or a name of letters, digits, _ and ., of at most 40 characters'
-            raise SceneError(f'{field}.id', expected, reprlib.repr(identity))
-        if str(identity) in rows:
-            raise SceneError(f'{field}.id', 'another id than the obstacles before it', reprlib.repr(identity))
-        radius, stddev = (_read_number(f'{field}.{name}', obstacle.get(name, 0.0), 0.0) for name in ('radius', 'radius_stddev'))
-        rows[str(identity)] = (*_read_polygon(field, obstacle, radius), radius, stddev)
+        row = _collect(errors, _read_obstacle, place, each, rows)
+        if row is not None:
+            rows[row[0]] = row[1]
+    if errors:
+        raise join_errors(errors)
     centres, polygons, radii, stddevs = zip(*rows.values(), strict=True) if rows else ((), (), (), 0.0)
     return make_obstacles(centres, radii, stddevs, tuple(rows), polygons=polygons)
+
+
+def _read_obstacle(place: int, given: object, before: Container[str]) -> tuple[str, tuple[Array, Array, float, float]]:
+    """Return the id of an obstacle, which must differ from those before it, and its centre, polygon, radius and deviation."""
+    field = f'obstacles[{place}]'
+    obstacle = _read_mapping(field, given)
+    if errors := _find_unknown_fields(f'{field}.', obstacle, OBSTACLE_FIELDS):
+        raise join_errors(errors)
+    identity = obstacle.get('id', place)
+    if type(identity) not in (int, str) or not _ID.fullmatch(str(identity)):
+        expected = 'a whole number, or a name of letters, digits, _ and ., of at most 40 characters'
+        raise SceneError(f'{field}.id', expected, reprlib.repr(identity))
+    if str(identity) in before:
+        raise SceneError(f'{field}.id', 'another id than the obstacles before it', reprlib.repr(identity))
+    radius, stddev = (_read_number(f'{field}.{name}', obstacle.get(name, 0.0), 0.0) for name in ('radius', 'radius_stddev'))
+    return str(identity), (*_read_polygon(field, obstacle, radius), radius, stddev)
 
 
 def _read_polygon(field: str, obstacle: Mapping[str, Any], radius: float) -> tuple[Array, Array]:
@@ -186,19 +214,28 @@ def _read_guess(given: object, start: Array, goals: Array, steps: int) -> Array:
         rows = _read_rows('guess', given, MOST_POINTS)
         points = np.array([_read_point(f'guess[{row}]', point) for row, point in enumerate(rows)]).reshape(-1, 2)
         return guess_path(start, goals[0], steps, via=points)
-    mapping = _read_mapping('guess', given, ('amplitude', 'kind'))
+    mapping = _read_mapping('guess', given)
+    if errors := _find_unknown_fields('guess.', mapping, ('amplitude', 'kind')):
+        raise join_errors(errors)
     if 'amplitude' not in mapping:
         raise SceneError('guess.amplitude', 'a number', 'nothing')
     return guess_path(start, goals[0], steps, amplitude=_read_number('guess.amplitude', mapping['amplitude']))
 
 
-def _read_mapping(field: str, value: object, known: tuple[str, ...]) -> Mapping[str, Any]:
+def _read_mapping(field: str, value: object) -> Mapping[str, Any]:
     if not isinstance(value, dict):
         raise SceneError(field, 'a mapping of fields', reprlib.repr(value))
-    for name in value:
-        if name not in known:
-            raise SceneError(field, f'only the fields {", ".join(known)}', reprlib.repr(name))
     return value
+
+
+def _find_unknown_fields(prefix: str, fields: Mapping[str, Any], known: tuple[str, ...]) -> list[SceneError]:
+    """Return an error for each unknown field."""
+    names = ', '.join(known)
+    return [
+        SceneError(f'{prefix}{str(name)[:40]}', f'a known field{suggest(name, known) or f": {names}"}', reprlib.repr(value))
+        for name, value in fields.items()
+        if name not in known
+    ]
 
 
 def _read_list(field: str, value: object, length: int) -> list[Any]:

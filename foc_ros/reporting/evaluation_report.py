@@ -7,17 +7,20 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
+
 from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PUBLISHED, REFITTED, UNIFORM
 from foc_ros.analysis.evaluation.metrics import TENTHS
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS
 from foc_ros.analysis.evaluation.tables import GAP_TITLE, make_tables
 
 from .drawing import open_figure
-from .page import render_page, render_picture, render_pictures, render_table, write_page
+from .page import render_list, render_page, render_picture, render_pictures, render_table, write_page
 from .plots import save_figure
 
 PAGE = 'evaluation.html'
 WIDTH_IN, HEIGHT_IN = 6.4, 4.2
+COUNTS = f'with intervals of 95 % by bootstrap over recordings, and the numbers of predictions of {PUBLISHED}'
 CAPTIONS = {
     PATH_CLASS: 'Homotopy class through the obstacles still ahead: mean log-likelihood of the true class above a uniform guess.',
     GOAL: 'Goal: mean log-likelihood of the true goal above a uniform guess.',
@@ -29,7 +32,8 @@ def write_report(directory: Path, title: str, answer: Mapping[str, Any]) -> None
     """Write the page; answer: as of `evaluate --json`. Raises InputError where that cannot be done."""
     tables = ''.join(render_table(columns, rows, heading) for heading, columns, rows in make_tables(answer))
     warnings = [f'{name}: {reason}' for name, reason in answer['failed'].items()]
-    page = render_page(f'Evaluation: {title}', render_pictures(_draw_questions(answer['questions'])) + tables, warnings)
+    body = render_list(answer['verdict']) + render_pictures(_draw_questions(answer['questions'])) + tables
+    page = render_page(f'Evaluation: {title}', body, warnings)
     write_page(directory, PAGE, page)
 
 
@@ -38,7 +42,7 @@ def _draw_questions(questions: Mapping[str, Any]) -> Iterator[str]:
     with TemporaryDirectory() as scratch:
         for name, caption in CAPTIONS.items():
             if name in questions:
-                reliability = f'{name}: how often the likeliest answer is true, over its probability.'
+                reliability = f'{name}: how often the likeliest answer is true, over its probability, {COUNTS}.'
                 for draw, words in ((_draw_tenths, caption), (_draw_reliability, reliability)):
                     with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
                         draw(figure.subplots(), name, questions[name])
@@ -65,8 +69,12 @@ def _draw_reliability(axes: Any, _: str, by_predictor: Mapping[str, Any]) -> Non
     axes.plot([0.0, 1.0], [0.0, 1.0], color='0.4', linewidth=0.8)
     for predictor in (PUBLISHED, REFITTED, BOLTZMANN):
         bins = [each for each in by_predictor[predictor]['reliability'] if each['count']]
-        axes.plot(
-            [each['confidence'] for each in bins], [each['right'] for each in bins], marker='o', markersize=4, label=predictor
-        )
+        shares = np.array([each['right'] for each in bins])
+        errors = np.abs(np.array([each['interval'] for each in bins]).reshape(-1, 2).T - shares)
+        look = {'marker': 'o', 'markersize': 4, 'capsize': 2, 'label': predictor}
+        (line, *_) = axes.errorbar([each['confidence'] for each in bins], shares, errors, **look)
+        for each in bins if predictor == PUBLISHED else ():
+            place = {'xy': (each['confidence'], each['right']), 'xytext': (5, -9), 'textcoords': 'offset points'}
+            axes.annotate(str(each['count']), **place, fontsize=7, color=line.get_color())
     axes.set(xlabel='probability of the likeliest answer', ylabel='share of true answers', aspect='equal')
     axes.legend(fontsize='small')

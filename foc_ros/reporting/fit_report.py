@@ -7,10 +7,18 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from foc_ros.analysis.fitting.tables import PARAMETER_COLUMNS, SCORE_COLUMNS, format_parameters, format_scores
+from foc_ros.analysis.fitting.tables import (
+    COMPARISON_COLUMNS,
+    PARAMETER_COLUMNS,
+    SCORE_COLUMNS,
+    format_comparison,
+    format_parameters,
+    format_scores,
+    make_verdict,
+)
 
 from .drawing import get_class_style, open_figure
-from .page import render_page, render_picture, render_pictures, render_table, write_page
+from .page import render_list, render_page, render_picture, render_pictures, render_table, write_page
 from .plots import save_figure
 
 PAGE = 'fit.html'
@@ -25,7 +33,9 @@ def write_report(directory: Path, title: str, answer: Mapping[str, Any]) -> None
     warnings = [*answer['warnings'], *(f'{name}: {reason}' for name, reason in answer['failed'].items())]
     commands = [('parameter file', answer['output']), *zip(('without ROS', 'with ROS'), answer['node'], strict=True)]
     body = (
-        _draw_parameters(answer['parameters'])
+        render_list(make_verdict(answer))
+        + render_table(COMPARISON_COLUMNS, format_comparison(answer), 'Before and after')
+        + _draw_parameters(answer['parameters'])
         + render_table(PARAMETER_COLUMNS, format_parameters(answer))
         + render_table(SCORE_COLUMNS, format_scores(answer), 'Scores')
         + render_table((), commands, 'Run the node with these parameters')

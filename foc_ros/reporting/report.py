@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -33,8 +33,18 @@ FRACTION = 0.3
 ONSET_SPEED = 0.05
 """Speed [m/s] above which the hand counts as moving."""
 FILES, OVERVIEW = ('index.html', 'predictions.json'), 'overview.png'
+COUNTERS = ('rejected', 'candidates compromised', 'candidates not solved', 'counters of the node')
+"""Facts that the page folds: raw counts, of which the warnings name what matters."""
 Span = tuple[int, int]
 """Start and end of a movement [ns]."""
+
+
+@dataclass(frozen=True)
+class PageWarning:
+    """What went wrong, and the first moment of it: seconds after the first hand sample, None if there is none."""
+
+    text: str
+    time_s: float | None = None
 
 
 class ReportCollector:
@@ -76,14 +86,16 @@ def write_report(
         raise InputError('report', 'a recording with a hand pose', 'none')
     spans = hand.find_movements(ONSET_SPEED) or [(int(hand.stamps_ns[0]), int(hand.stamps_ns[-1]))]
     tracks = build_candidate_tracks(snapshots)
-    facts, warnings = {**_collect_facts(snapshots), **summary}, _collect_warnings(snapshots)
+    facts, warnings = {**_collect_facts(snapshots), **summary}, _collect_warnings(snapshots, int(hand.stamps_ns[0]))
     data = PageData(hand, tracks).build(spans, compute_recording_bounds(hand, snapshots))
-    html = render('report.html', title=title, warnings=warnings, facts=facts, data=data)
+    folded = {name: facts[name] for name in COUNTERS if name in facts}
+    shown = {name: text for name, text in facts.items() if name not in folded}
+    html = render('report.html', title=title, warnings=warnings, facts=shown, counters=folded, data=data)
     numbers = {
         'generator': MARK,
         'title': title,
         'summary': facts,
-        'warnings': warnings,
+        'warnings': [each.text for each in warnings],
         'hand_samples': len(hand.stamps_ns),
         'predictions': [_encode_snapshot(each, int(hand.stamps_ns[0])) for each in snapshots],
     }
@@ -137,18 +149,21 @@ def _collect_facts(snapshots: Sequence[Snapshot]) -> dict[str, str]:
     return facts
 
 
-def _collect_warnings(snapshots: Sequence[Snapshot]) -> list[str]:
-    empty = sum(not each.candidates for each in snapshots)
-    statuses = Counter(lost.status for each in snapshots for lost in each.unsolved)
-    compromised = sum(view.is_compromised for each in snapshots for view in each.candidates)
-    if compromised:
-        statuses[Status.COMPROMISED.value] = compromised
-    warnings = [] if snapshots else ['There is no prediction.']
-    warnings += [f'In {empty} of {len(snapshots)} predictions no candidate could be solved.'] if empty else []
-    return warnings + [
-        f'{count} candidate{"s" if count > 1 else ""} ended with status {status}. Remedy: {Status(status).remedy}.'
-        for status, count in sorted(statuses.items())
-    ]
+def _collect_warnings(snapshots: Sequence[Snapshot], origin_ns: int) -> list[PageWarning]:
+    times_s = [round((each.stamp_ns - origin_ns) / NANOSECONDS, 4) for each in snapshots]
+    empty = [time_s for time_s, each in zip(times_s, snapshots, strict=True) if not each.candidates]
+    ended: dict[str, list[float]] = {}
+    for time_s, each in zip(times_s, snapshots, strict=True):
+        lost = [view.status for view in each.unsolved]
+        for status in lost + [Status.COMPROMISED.value for view in each.candidates if view.is_compromised]:
+            ended.setdefault(status, []).append(time_s)
+    warnings = [] if snapshots else [PageWarning('There is no prediction.')]
+    if empty:
+        warnings.append(PageWarning(f'In {len(empty)} of {len(snapshots)} predictions no candidate could be solved.', empty[0]))
+    for status, at in sorted(ended.items()):
+        words = f'{len(at)} candidate{"s" if len(at) > 1 else ""} ended with status {status}. Remedy: {Status(status).remedy}.'
+        warnings.append(PageWarning(words, at[0]))
+    return warnings
 
 
 def _encode_snapshot(snapshot: Snapshot, origin_ns: int) -> dict[str, Any]:

@@ -1,12 +1,11 @@
 """The thread of guidance: updates at `guidance.rate_hz` by the steady clock, whatever the executor and the predictions do.
 
 The executor tells the thread what is new by replacing one record; the thread reads it at each update. So neither waits for the
-other. In between, Python's global lock passes from one to the other after `SWITCH_S` at most.
+other. While guidance is disabled, the thread waits without updates.
 """
 
 from __future__ import annotations
 
-import sys
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -19,8 +18,6 @@ from foc_ros.core.types import Prediction
 
 from .messages.encode_guidance import Place
 
-SWITCH_S = 0.0005
-"""Longest time for which a thread keeps Python's global lock while another one waits for it [s]; 0.005 is Python's own."""
 ZEROS = 2
 """Number of outputs without any force that are published after the hand has been released."""
 END_S = 1.0
@@ -41,11 +38,17 @@ class Newest:
     prediction_s: float = 0.0
     is_released: bool = True
 
+    @property
+    def place(self) -> Place | None:
+        """Where the hand is, None without one."""
+        hand = self.hand
+        return None if hand is None else Place(hand.stamp_ns, hand.frame_id, hand.height, self.config.plane)
+
 
 class GuidanceLoop:
     """Updates guidance, and publishes it until the force has become zero, and then once more.
 
-    Attributes: output, the last one, None before the first; newest.
+    Attributes: newest; output, the last one, and place, that of the last one that was published, None before the first.
 
     Parameters
     ----------
@@ -62,10 +65,10 @@ class GuidanceLoop:
     ) -> None:
         self.newest = Newest(config)
         self.output: GuidanceOutput | None = None
-        self._place: Place | None = None
+        self.place: Place | None = None
         self._publish, self._report = publish, report
         self._state, self._zeros = GuidanceState(), ZEROS
-        self._end = threading.Event()
+        self._end, self._enabled = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
 
     def note_hand(self, hand: FilterState | None, now_s: float) -> None:
@@ -83,17 +86,19 @@ class GuidanceLoop:
     def reconfigure(self, config: Config) -> None:
         """Use other parameters."""
         self.newest = replace(self.newest, config=config)
+        self._wake()
 
     def start(self) -> None:
         """Begin to update."""
-        sys.setswitchinterval(SWITCH_S)
         self._end.clear()
+        self._wake()
         self._thread = threading.Thread(target=self._run, name='guidance', daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
         """End the thread. Nothing is published after that."""
         self._end.set()
+        self._enabled.set()
         if self._thread is not None:
             self._thread.join(END_S)
             self._thread = None
@@ -114,19 +119,8 @@ class GuidanceLoop:
             'force_N': f'{float((output.force @ output.force) ** 0.5):.3f}',
         }
 
-    def _run(self) -> None:
-        """Update at fixed instants; those that are missed are left out."""
-        due_s = monotonic()
-        while not self._end.wait(max(due_s - monotonic(), 0.0)):
-            try:
-                self._update(monotonic())
-            except Exception as error:
-                self._state = GuidanceState()
-                self._report(error)
-            period_s = 1.0 / self.newest.config.guidance.rate_hz
-            due_s = max(due_s + period_s, monotonic())
-
-    def _update(self, now_s: float) -> None:
+    def update(self, now_s: float) -> None:
+        """Compute guidance at a time by the steady clock, and publish it; called in the thread."""
         newest = self.newest
         is_released = newest.is_released or not newest.config.guidance.enabled
         position = newest.hand.mean[:2] if newest.hand is not None else self._state.position
@@ -138,10 +132,33 @@ class GuidanceLoop:
         given = GuidanceInput(now_s, position, velocity, newest.prediction, *ages, is_released=is_released)
         self.output, self._state = guide(newest.config, self._state, given)
         self._zeros = self._zeros + 1 if _has_ended(self.output) else 0
-        if self._zeros <= ZEROS and newest.hand is not None:
-            self._place = Place(newest.hand.stamp_ns, newest.hand.frame_id, newest.hand.height, newest.config.plane)
-        if self._zeros <= ZEROS and self._place is not None:
-            self._publish(self.output, self._place)
+        if self._zeros <= ZEROS:
+            self.place = newest.place or self.place
+            if self.place is not None:
+                self._publish(self.output, self.place)
+
+    def _wake(self) -> None:
+        """Let the thread update if guidance is enabled."""
+        if self.newest.config.guidance.enabled:
+            self._enabled.set()
+        else:
+            self._enabled.clear()
+
+    def _run(self) -> None:
+        """Update at fixed instants; those that are missed are left out."""
+        due_s = monotonic()
+        while not self._end.wait(max(due_s - monotonic(), 0.0)):
+            if self._zeros >= ZEROS and not self._enabled.is_set():
+                self._enabled.wait()
+                self._state = GuidanceState()
+                continue
+            try:
+                self.update(monotonic())
+            except Exception as error:
+                self._state = GuidanceState()
+                self._report(error)
+            period_s = 1.0 / self.newest.config.guidance.rate_hz
+            due_s = max(due_s + period_s, monotonic())
 
 
 def _has_ended(output: GuidanceOutput) -> bool:

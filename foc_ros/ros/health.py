@@ -35,6 +35,8 @@ OVER_BUDGET_S = 0.002
 """Time beyond `budget_s` after which a prediction is counted as over budget [s]."""
 BUSY_S = 0.5
 """Time that a prediction is computed after which the node is reported as busy [s]."""
+THROTTLE_S = 5.0
+"""Shortest time between two log lines of one kind [s]."""
 REPORTED_NOTES = ('goal_inside', 'hand_inside', 'no_way')
 """Notes of an incomplete prediction, each counted as `scene_` and its name."""
 

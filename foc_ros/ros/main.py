@@ -12,13 +12,14 @@ from types import FrameType
 from typing import Any
 
 from foc_ros.core.compilation import count_kernels, follow_compilation
-from foc_ros.core.errors import FocError
+from foc_ros.core.errors import FocError, list_messages
 from foc_ros.core.registry import import_all
 
 SPIN_S = 0.1
 """Longest time between two checks of the stop flag [s]."""
-SWITCH_S = 0.001
-"""Longest time for which the thread of the predictions keeps the others waiting for the interpreter [s]."""
+SWITCH_S = 0.0002
+"""Longest time for which the thread of the predictions keeps the others waiting for the interpreter [s]. An update of guidance
+gives the interpreter away several times, so with 0.001 it took up to 12 ms (`scripts/measure_guidance.py`)."""
 LOGGED_KERNELS = 10
 """Number of compiled kernels after which the log says so again."""
 END_S = 0.5
@@ -76,7 +77,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         node = FocNode(context=context)
     except (FocError, RuntimeError, ValueError) as error:
         context.try_shutdown()
-        print(f'foc_node: {" ".join(str(error).split())}', file=sys.stderr)
+        for message in list_messages(error):
+            print(f'foc_node: {" ".join(message.split())}', file=sys.stderr)
         return 2
     sys.setswitchinterval(SWITCH_S)
     gc.collect()

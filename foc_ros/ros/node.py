@@ -5,9 +5,8 @@ the same messages, apart from candidates for which `budget_s` left no time. The 
 an input that has fallen silent, and publishes none that has become too old.
 
 A prediction is computed in another thread, guidance in a third one (`guidance_loop`), and all else in that of the executor. What
-is received or asked for
-meanwhile is done at once: after a reset, a release of the clutch, a change of parameters or of the state of the managed node,
-nothing that was computed before is published.
+is received or asked for meanwhile is done at once: after a reset, a release of the clutch, a change of parameters or of the state
+of the managed node, nothing that was computed before is published.
 
 It is a managed node. Once configured it subscribes and keeps the scene; it predicts only while it is active, from the first hand
 pose after its activation. With `autostart`, the default, it is active at once.
@@ -31,7 +30,6 @@ from std_srvs.srv import SetBool, Trigger
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import FocError
-from foc_ros.core.guidance.step import GuidanceOutput
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predictor import warm_up
 from foc_ros.io.class_library import load_library
@@ -40,18 +38,16 @@ from foc_ros.io.topics import CLOUD, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MAR
 from .endpoints import (
     INPUTS,
     create_command_subscription,
-    create_guidance_publishers,
     create_publishers,
     create_subscriptions,
     describe_incompatible_publishers,
     find_missing_packages,
     take_queued,
 )
-from .guidance_loop import GuidanceLoop
-from .health import SOURCE_TOPICS, Freshness, Monitor, encode_diagnostics
+from .guidance_topics import GuidanceTopics
+from .health import SOURCE_TOPICS, THROTTLE_S, Freshness, Monitor, encode_diagnostics
 from .intake import Intake
 from .lifecycle import answer_refused_transitions
-from .messages.encode_guidance import GUIDANCE_OUTPUTS, TWIST, Place, blend_twist, encode_guidance_markers
 from .messages.encode_prediction import encode_outputs
 from .messages.types import RclpyTypes
 from .node_parameters import LiveParameters, declare_autostart, declare_parameters
@@ -62,8 +58,6 @@ from .worker import Computation, Worker
 
 RETRY_S = 0.01
 """Time between two checks of messages that are held until their transform is known [s]."""
-THROTTLE_S = 5.0
-"""Shortest time between two log lines of one kind [s]."""
 COMPLETE = (GOALS, GOAL, CLOUD, DETECTIONS)
 """Inputs of which each message replaces the one before: of several in the queue, the newest that is accepted is used."""
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -79,15 +73,14 @@ class FocNode(LifecycleNode):
         self._live_parameters = LiveParameters(self, declare_parameters(self, Config()), self._reconfigure)
         self._library = load_library(self._live_parameters.config.homotopy.library)
         autostart = declare_autostart(self)
-        self._types, self._guidance_types = RclpyTypes(), RclpyTypes()  # one for each thread
+        self._types = RclpyTypes()
         # a logger throttles each line of code by itself: with one logger per input, no input suppresses the lines of another
         self._loggers = {role: self.get_logger().get_child(role) for role in INPUTS}
         self._state, self._is_engaged, self._start_error = 'unconfigured', True, ''
         self._has_predicted = False
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
-        self._guidance_outputs: dict[str, Any] = {}
-        self._guidance = GuidanceLoop(self._live_parameters.config, self._publish_guidance, self.report)
+        self._guidance = GuidanceTopics(self, self._live_parameters.config, self.report)
         self._incompatible: set[str] = set()
         try:
             self._tf: TfListener | None = TfListener(self, self._take_held)
@@ -110,10 +103,10 @@ class FocNode(LifecycleNode):
         self._create_pipeline()
         try:
             warm_up(self._live_parameters.config)
-            self._outputs, self._guidance_outputs = create_publishers(self), create_guidance_publishers(self)
+            self._outputs = create_publishers(self)
             self._inputs = create_subscriptions(self, self._receive, self._incompatible.add, self._polling)
             self._inputs[COMMAND] = create_command_subscription(self, self._blend_command)
-            self._guidance.start()
+            self._guidance.create()
         except Exception as error:
             self._destroy_topics()
             self._start_error = ' '.join(str(error).split())
@@ -156,7 +149,7 @@ class FocNode(LifecycleNode):
 
     def destroy_node(self) -> None:
         """Destroy the node; a prediction that is being computed ends at the next check of its deadline."""
-        self._guidance.stop()
+        self._guidance.loop.stop()
         self._worker.stop()
         super().destroy_node()
 
@@ -177,22 +170,22 @@ class FocNode(LifecycleNode):
         self._transforms = Transforms(self._tf)
 
     def _destroy_topics(self) -> None:
-        self._guidance.stop()
+        self._guidance.destroy()
         for subscription in self._inputs.values():
             self.destroy_subscription(subscription)
-        for publisher in (*self._outputs.values(), *self._guidance_outputs.values()):
+        for publisher in self._outputs.values():
             self.destroy_publisher(publisher)
-        self._inputs, self._outputs, self._guidance_outputs = {}, {}, {}
+        self._inputs, self._outputs = {}, {}
 
     def _enter(self, state: str) -> TransitionCallbackReturn:
         self._state = state
         self.pipeline.set_engaged(self._is_engaged and state == 'active')
-        self._guidance.set_released(not self.pipeline.is_engaged)
+        self._guidance.loop.set_released(not self.pipeline.is_engaged)
         return SUCCESS
 
     def _reconfigure(self, config: Config) -> None:
         self.pipeline.reconfigure(config)
-        self._guidance.reconfigure(config)
+        self._guidance.loop.reconfigure(config)
 
     def _receive(self, role: str, message: Any) -> None:
         """Take a message and those in the queue behind it, and predict once, from the newest hand pose.
@@ -243,7 +236,7 @@ class FocNode(LifecycleNode):
             return False
         self._freshness.note_received(role, arrival.received_s)
         if role == HAND:
-            self._guidance.note_hand(self.pipeline.hand_state, arrival.received_s)
+            self._guidance.loop.note_hand(self.pipeline.hand_state, arrival.received_s)
         if role == HAND and self.intake.sample is not None:
             clock_ns, timeout_s = self.get_clock().now().nanoseconds, self.pipeline.config.estimator.hand_timeout_s
             self._freshness.note_pose(self.intake.sample.stamp_ns, clock_ns, timeout_s, is_restart=status.is_restart)
@@ -295,8 +288,9 @@ class FocNode(LifecycleNode):
         if reason is not None:
             self._monitor.note_late(reason)
             return
-        self._guidance.note_prediction(prediction, ended.received_s)
-        self._add_guidance_markers(messages)
+        self._guidance.loop.note_prediction(prediction, ended.received_s)
+        if 'markers' in messages:
+            messages['markers'].markers.extend(self._guidance.encode_markers(self._types))
         for name, message in messages.items():
             self._publish(self._outputs[name], message)
         self._monitor.note_prediction(prediction, ended.start_s, monotonic())
@@ -304,36 +298,14 @@ class FocNode(LifecycleNode):
             self._has_predicted = True
             self.get_logger().info(f'predicting in frame {self.pipeline.frame_id}, plane {config.plane}')
 
-    def _publish_guidance(self, output: GuidanceOutput, place: Place) -> None:
-        """Publish an output of guidance; this happens in the thread of guidance."""
-        for name, (_, encode) in GUIDANCE_OUTPUTS.items():
-            if self._guidance_outputs[name].get_subscription_count():
-                self._publish(self._guidance_outputs[name], encode(output, place, self._guidance_types))
-
-    def _add_guidance_markers(self, messages: dict[str, Any]) -> None:
-        output, hand = self._guidance.output, self.pipeline.hand_state
-        if 'markers' in messages and output is not None and hand is not None and self.pipeline.config.guidance.enabled:
-            place = Place(hand.stamp_ns, hand.frame_id, hand.height, self.pipeline.config.plane)
-            messages['markers'].markers.extend(encode_guidance_markers(output, place, self._types))
-
     def _blend_command(self, command: Any) -> None:
-        """Publish the operator's command with the share of guidance in it; without guidance, the command as it is."""
-        output, config = self._guidance.output, self.pipeline.config
-        if not config.guidance.enabled or self._state != 'active':
-            return
-        frame_id = command.header.frame_id
-        is_fresh = output is not None and monotonic() - output.t <= config.guidance.hold_s
-        if output is not None and is_fresh and frame_id == self.pipeline.frame_id:
-            command = blend_twist(output, command, config.plane, self._types)
-        elif is_fresh:
-            text = f'{COMMAND}: frame {frame_id!r} is not the working frame {self.pipeline.frame_id!r}: not blended'
-            self.get_logger().warning(text, throttle_duration_sec=THROTTLE_S)
-        self._publish(self._guidance_outputs[TWIST], command)
+        if self._state == 'active':
+            self._guidance.blend_command(command, self._types)
 
     def _recover(self, error: Exception) -> None:
         self.report(error)
         self.pipeline.reset()
-        self._guidance.note_hand(None, monotonic())
+        self._guidance.loop.note_hand(None, monotonic())
 
     def _publish_health(self) -> None:
         self._take_queued_poses()  # a hand whose poses wait here is not silent
@@ -343,7 +315,7 @@ class FocNode(LifecycleNode):
         busy_s = monotonic() - present.start_s if present is not None else 0.0
         unheard = self._report_incompatible_publishers()
         health = self._monitor.report(monotonic(), self.intake, self._state, not_ready_reason, busy_s, unheard)
-        health.values.update(self._guidance.describe())
+        health.values.update(self._guidance.loop.describe())
         name, stamp_ns = self.get_fully_qualified_name(), self.get_clock().now().nanoseconds
         self._publish(self._diagnostics, encode_diagnostics(health, name, stamp_ns, self._types))
 
@@ -384,7 +356,7 @@ class FocNode(LifecycleNode):
         for source in silent:
             self.intake.remove_source(source)
         self.pipeline.reset()
-        self._guidance.note_hand(None, monotonic())
+        self._guidance.loop.note_hand(None, monotonic())
         self._freshness.forget_clock()
         removed = ' and '.join(SOURCE_TOPICS[source] for source in silent)
         without = f' without the obstacles of {removed}, which fell silent' if silent else ''

@@ -6,7 +6,6 @@ Parameters that are set together are checked together, and all of them are appli
 from __future__ import annotations
 
 from collections.abc import Callable
-from difflib import get_close_matches
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
@@ -14,7 +13,7 @@ from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.parameter import Parameter as RosParameter
 
 from foc_ros.core.config import Config, Parameter, flatten, replace_values
-from foc_ros.core.errors import ParameterError
+from foc_ros.core.errors import ParameterError, suggest
 
 from .parameters import AUTOSTART, KNOWN, NODE_ONLY
 
@@ -30,9 +29,7 @@ def declare_parameters(node: Any, config: Config) -> Config:
         if name in KNOWN:
             node.undeclare_parameter(name)
         elif name.split('.')[0] not in NODE_ONLY:
-            similar = get_close_matches(name, (*KNOWN, *NODE_ONLY), 1)
-            hint = f', perhaps {similar[0]}' if similar else ''
-            raise ParameterError(name, f'a known parameter{hint}', repr(given[name]))
+            raise ParameterError(name, f'a known parameter{suggest(name, (*KNOWN, *NODE_ONLY))}', repr(given[name]))
     config = replace_values(config, {name: value for name, value in given.items() if name in KNOWN})
     values = flatten(config)
     rows = [(name, values[name], _build_descriptor(parameter)) for name, parameter in KNOWN.items()]

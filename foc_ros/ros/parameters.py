@@ -26,16 +26,12 @@ KNOWN = {parameter.name: parameter for parameter in list_parameters()}
 _WIDTH = 100
 
 
-def load_optional_config(file: Path | None) -> Config:
-    """Return the configuration of an optional parameter file; raises the errors of `load_parameter_file`."""
-    return Config() if file is None else load_parameter_file(file)
-
-
 def load_parameter_file(path: Path | str) -> Config:
     """Return the configuration of a ROS 2 parameter file; parameters that it does not contain have their defaults.
 
     Later sections override earlier ones; sections of other nodes and parameters of the node alone are skipped. Raises
-    ParameterError, naming the parameter, for one that is unknown or out of bounds, and RecordingError if the file is no YAML.
+    ParameterError, naming the parameter, for one that is unknown or out of bounds, with a note for every further one, and
+    RecordingError if the file is no YAML.
     """
     document = read_document(Path(path))
     if not isinstance(document, Mapping) or not any(key in NODE_KEYS for key in document):
@@ -60,14 +56,10 @@ def _flatten_group(group: Mapping[Any, object], prefix: str = '') -> Iterator[tu
         name = f'{prefix}{key}'
         if name.split('.')[0] in NODE_ONLY:
             continue
-        if name in KNOWN:
-            yield name, value
-        elif not any(known.startswith(f'{name}.') for known in KNOWN):
-            raise ParameterError(name, 'a known parameter', repr(value)[:_WIDTH])
-        elif isinstance(value, Mapping):
+        if isinstance(value, Mapping) and any(known.startswith(f'{name}.') for known in KNOWN):
             yield from _flatten_group(value, f'{name}.')
         else:
-            raise ParameterError(name, 'a group of parameters', repr(value)[:_WIDTH])
+            yield name, value
 
 
 def dump_parameter_file(config: Config) -> str:

@@ -16,12 +16,13 @@ from foc_ros.core.config import Config, flatten
 from foc_ros.core.types import LEFT, Array
 from foc_ros.io.csv_tables import read_rows
 
-from .baselines import Baseline, make_baselines
+from .baselines import PLAIN, PUBLISHED, REFITTED, Baseline, make_baselines
 from .cross_validation import choose_held_out, compute_log_likelihoods
 from .metrics import Scores, score_forecasts, summarise
 from .observations import Observation, ObservedRecording
 from .position_metrics import compute_position_scores
 from .questions import GAP, GOAL, PATH_CLASS, ask_all
+from .verdict import compare_scores, make_verdict
 
 FITTED_TO = {PATH_CLASS: PATH_CLASS, GAP: PATH_CLASS, GOAL: GOAL}
 """The question by whose answers the settings of a predictor are chosen, for each question that it is scored by."""
@@ -34,20 +35,27 @@ def evaluate(recordings: Sequence[ObservedRecording], config: Config, executor: 
 
     What is fitted is scored on recordings that it was not fitted to. `questions`: values of `metrics.summarise` by question and
     predictor; for `gap`, tenths and `right_from_half_way` count from row to row, else over the whole movement. `settings`: by
-    question and predictor, the best for all recordings. `positions`: values of `position_metrics.compute_position_scores`.
+    question and predictor, the best for all recordings. `comparisons`: of the published predictions with each baseline, by
+    question. `positions`: values of `position_metrics.compute_position_scores`. `verdict`: sentences.
     """
     baselines = make_baselines(recordings, config.likelihood)
     items = [(recording.name, (recording, baselines)) for recording in recordings]
     tables = collect_all(_tabulate_log_likelihoods, items, executor, 'compare')
     table = {key: np.array([each[key] for each in tables]) for key in tables[0]}
     asked = [name for name in FITTED_TO if any(ask_all(recording, name) for recording in recordings)]
-    return {
+    scores = {
+        name: {each.name: _score_held_out(each, table[FITTED_TO[name], each.name], recordings, name) for each in baselines}
+        for name in asked
+    }
+    answer = {
         'recordings': len(recordings),
         'predictions': sum(len(recording.observations) for recording in recordings),
-        'questions': {
+        'questions': {name: {other: summarise(each) for other, each in scores[name].items()} for name in asked},
+        'comparisons': {
             name: {
-                each.name: summarise(_score_held_out(each, table[FITTED_TO[name], each.name], recordings, name))
-                for each in baselines
+                other: compare_scores(scores[name][PUBLISHED], each, is_share=name == GAP)
+                for other, each in scores[name].items()
+                if other not in (PUBLISHED, REFITTED, PLAIN)
             }
             for name in asked
         },
@@ -59,6 +67,7 @@ def evaluate(recordings: Sequence[ObservedRecording], config: Config, executor: 
         'positions': compute_position_scores(recordings),
         'parameters': flatten(config),
     }
+    return answer | {'verdict': make_verdict(answer)}
 
 
 def _tabulate_log_likelihoods(item: tuple[ObservedRecording, Sequence[Baseline]]) -> Table:

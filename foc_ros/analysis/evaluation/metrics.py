@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from foc_ros.core.types import Array
 
+from .bootstrap import compute_mean_interval
 from .forecasts import Forecast
 from .questions import Question
 
@@ -76,17 +77,22 @@ def find_tenths(progress: Array) -> NDArray[np.int64]:
 
 
 def compute_reliability(scores: Scores) -> list[dict[str, Any]]:
-    """Return count, mean confidence and share of correct answers for each bin of the confidence in the likeliest answer."""
+    """Return count, mean confidence and share of correct answers for each bin of the confidence in the likeliest answer.
+
+    interval: of the share, 95 % by bootstrap over the recordings; None without a prediction.
+    """
     number = np.minimum((scores.confidence * BINS).astype(int), BINS - 1)
     return [
         {
             'from': each / BINS,
             'to': (each + 1) / BINS,
-            'count': int((number == each).sum()),
-            'confidence': _mean(scores.confidence[number == each]),
-            'right': _mean(scores.correct[number == each]),
+            'count': int(inside.sum()),
+            'confidence': _mean(scores.confidence[inside]),
+            'right': _mean(scores.correct[inside]),
+            'interval': compute_mean_interval(scores.correct[inside], scores.recording[inside]) if inside.any() else None,
         }
         for each in range(BINS)
+        for inside in [number == each]
     ]
 
 

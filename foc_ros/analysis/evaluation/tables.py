@@ -12,9 +12,10 @@ Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 """Title, columns, rows."""
 
 GAIN_TITLES = {
-    PATH_CLASS: 'Homotopy class through the rows ahead: log-likelihood above uniform [nat], by tenths of the movement',
-    GOAL: 'Goal: log-likelihood above uniform [nat], by tenths of the movement',
+    PATH_CLASS: 'Homotopy class: log-likelihood above uniform [nat]',
+    GOAL: 'Goal: log-likelihood above uniform [nat]',
 }
+TOTALS = ('', 'gain', 'ECE', 'Brier', 'correct [%]', 'leads from [%]')
 GAP_TITLE = 'Gap in the next row: correct [%], by tenths of the distance from row to row'
 REGIONS = {
     'inside': 'ellipse of the most likely candidate',
@@ -29,22 +30,27 @@ def make_tables(answer: Mapping[str, Any]) -> Iterator[Table]:
     tenths = ('', *(str(tenth + 1) for tenth in range(TENTHS)))
     for name, title in GAIN_TITLES.items():
         if name in questions:
-            columns = (*tenths, 'all', 'ECE', 'Brier', 'correct [%]', 'leads from [%]')
-            yield title, columns, [_format_gains(predictor, scores) for predictor, scores in questions[name].items()]
+            by_predictor = questions[name].items()
+            lines = [_format_tenths(predictor, each, 'gain') for predictor, each in by_predictor]
+            yield f'{title}, by tenths of the movement', tenths, lines
+            yield f'{title}, of all', TOTALS, [_format_totals(predictor, each) for predictor, each in by_predictor]
     if GAP in questions:
-        lines = [
-            (predictor, *(_percent(each['right']) for each in (*scores['by_tenth'], {'right': scores['right_from_half_way']})))
-            for predictor, scores in questions[GAP].items()
-        ]
-        yield GAP_TITLE, (*tenths, 'second half'), lines
+        by_predictor = questions[GAP].items()
+        yield GAP_TITLE, tenths, [_format_tenths(predictor, each, 'right') for predictor, each in by_predictor]
+        halves: list[tuple[str, ...]] = [(predictor, _percent(each['right_from_half_way'])) for predictor, each in by_predictor]
+        yield 'Gap in the next row', ('', 'correct in the second half [%]'), halves
     yield from _make_position_tables(answer['positions'])
     yield '', ('', ''), list(_list_facts(answer))
 
 
-def _format_gains(predictor: str, scores: Mapping[str, Any]) -> tuple[str, ...]:
-    tenths = [_number(each['gain'], 2) for each in scores['by_tenth']]
-    rest = [_number(scores[name], 3) for name in ('gain', 'expected_calibration_error', 'brier')]
-    return (predictor, *tenths, *rest, _percent(scores['right']), _percent(scores['leads_for_good_from']))
+def _format_tenths(predictor: str, scores: Mapping[str, Any], score: str) -> tuple[str, ...]:
+    shown = [_percent(each[score], 0) if score == 'right' else _number(each[score], 2) for each in scores['by_tenth']]
+    return (predictor, *shown)
+
+
+def _format_totals(predictor: str, scores: Mapping[str, Any]) -> tuple[str, ...]:
+    numbers = [_number(scores[name], 3) for name in ('gain', 'expected_calibration_error', 'brier')]
+    return (predictor, *numbers, _percent(scores['right']), _percent(scores['leads_for_good_from']))
 
 
 def _make_position_tables(positions: Mapping[str, Any]) -> Iterator[Table]:
@@ -53,7 +59,7 @@ def _make_position_tables(positions: Mapping[str, Any]) -> Iterator[Table]:
         (name, *(_number(each if each is None else 1e3 * each, 1) for by in kinds.values() for each in by.values()))
         for name, kinds in positions['displacement_m'].items()
     ]
-    columns = ('', *(f'{kind} {each} s' for kind in ('average', 'final') for each in horizons))
+    columns = ('', *(f'{kind}\n{each} s' for kind in ('average', 'final') for each in horizons))
     yield 'Displacement error [mm]', columns, errors
     densities = [(name, *(_number(by[each], 2) for each in horizons)) for name, by in positions['nlpd'].items()]
     yield 'Negative log-density of the true position [nat, metres]', ('', *(f'{each} s' for each in horizons)), densities
@@ -71,7 +77,7 @@ def _list_facts(answer: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     for question, by_predictor in answer['settings'].items():
         for name, setting in by_predictor.items():
             if setting is not None:
-                yield f'best setting for {question}: {name}', _format_setting(setting)
+                yield f'{question}, best setting\n{name}', _format_setting(setting)
 
 
 def _format_setting(setting: Any) -> str:
@@ -86,5 +92,5 @@ def _number(value: float | None, digits: int) -> str:
     return '-' if value is None else f'{value:.{digits}f}'
 
 
-def _percent(value: float | None) -> str:
-    return '-' if value is None else f'{100 * value:.1f}'
+def _percent(value: float | None, digits: int = 1) -> str:
+    return _number(None if value is None else 100 * value, digits)

@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize
 
+from foc_ros.analysis.evaluation.bootstrap import CENTRAL, RESAMPLES, SEED, draw_resamples
 from foc_ros.analysis.evaluation.ground_truth import RecordedPath
 from foc_ros.analysis.goal_reached import has_covered_distance
 from foc_ros.core.config import Config, DurationConfig, replace_values
@@ -23,9 +24,8 @@ from foc_ros.core.estimation.duration import CONSTANTS as MODEL_CONSTANTS
 from foc_ros.core.estimation.duration import estimate_times_to_go
 from foc_ros.core.types import NANOSECONDS, Array, HandState
 
-from .estimates import CENTRAL, Estimate, Estimates, apply_estimates, clip_to_bounds
+from .estimates import Estimate, Estimates, apply_estimates, clip_to_bounds
 from .recorded_hand import RecordedHand
-from .resampling import RESAMPLES, SEED, draw_resamples
 
 CONSTANTS = {model: {f'duration.{name}': power for name, power in powers.items()} for model, powers in MODEL_CONSTANTS.items()}
 """By model, the constants that determine durations by dotted name, each with its power in a factor on all durations."""

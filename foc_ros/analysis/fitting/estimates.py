@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from foc_ros.analysis.evaluation.bootstrap import CENTRAL
 from foc_ros.core.config import Config, list_parameters, replace_values
 from foc_ros.core.types import Array
 
-CENTRAL = (2.5, 97.5)
-"""Percentiles of an interval of 95 %."""
 BOUNDS = {parameter.name: parameter.bound for parameter in list_parameters()}
 
 
@@ -60,7 +59,7 @@ class Fit:
     """The state of a fit.
 
     config; recordings: how many are used; estimates by name; chosen: values that are no numbers, by name; warnings in words;
-    failed recordings with reasons; scores as plain values.
+    failed recordings with reasons; scores as plain values; comparison: of the given parameters with the fitted ones.
     """
 
     config: Config
@@ -70,6 +69,7 @@ class Fit:
     warnings: list[str] = field(default_factory=list)
     failed: dict[str, str] = field(default_factory=dict)
     scores: dict[str, Any] = field(default_factory=dict)
+    comparison: dict[str, dict[str, float | None]] = field(default_factory=dict)
 
     def take(self, estimates: Estimates, warnings: Sequence[str] = ()) -> None:
         """Take estimates into the configuration, and warnings."""

@@ -23,14 +23,15 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import minimize
 
+from foc_ros.analysis.evaluation.bootstrap import CENTRAL, draw_resamples
 from foc_ros.analysis.evaluation.ground_truth import HORIZONS_S
 from foc_ros.core.config import Config
 from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition
 from foc_ros.core.types import Array
 
-from .estimates import CENTRAL, Estimate, Estimates, clip_to_bounds
+from .estimates import Estimate, Estimates, clip_to_bounds
 from .recorded_hand import RecordedHand
-from .resampling import draw_resamples, expand_quadratic
+from .resampling import expand_quadratic
 
 NAMES = ('estimator.position_stddev', 'estimator.jerk_density')
 LOW, HIGH = np.log([1e-5, 1e-3]), np.log([0.1, 1e4])

@@ -14,13 +14,14 @@ from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import RecordingError
 
 from . import covariance_fit, likelihood_fit
+from .comparison import compare_configs, find_worse_positions
 from .duration_fit import fit_duration, fit_wait
 from .estimates import Fit, clip_to_bounds
 from .estimator_fit import fit_estimator, fit_fading
 from .plan_fit import Reach, fit_plans, make_reach
 from .predictor_settings import fit_max_candidates, make_eta_settings, make_movement_settings, make_noise_settings
 from .recorded_hand import RecordedHand, read_hand
-from .setting_search import Replays, observe_by_motor_noise, search_settings
+from .setting_search import Replays, observe_by_motor_noise, sample_names, search_settings
 
 PREDICTIONS = 10
 """About as many predictions are made in each recording, because neighbours say the same."""
@@ -28,8 +29,11 @@ MIN_FOLDS = 3
 """Recordings below which there is no cross-validation."""
 
 
-def fit_parameters(recordings: Mapping[str, Recording], config: Config, executor: Executor) -> Fit:
-    """Fit all parameters to recordings; raises RecordingError where no recording can be used."""
+def fit_parameters(recordings: Mapping[str, Recording], config: Config, executor: Executor, may_lower_eta: bool = False) -> Fit:
+    """Fit all parameters to recordings; raises RecordingError where no recording can be used.
+
+    may_lower_eta: whether obstacles may be avoided with less certainty than the configuration wants.
+    """
     fit = Fit(config)
     hands = _read_hands(recordings, fit, executor)
     usable = {each.name: recordings[each.name] for each in hands}
@@ -42,12 +46,15 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, executor
         fit.take(*fit_plans(_make_reaches(hands, fit), fit.config))
     duration_s = float(np.median([each.times[-1] for each in hands]))
     thinned = {'rate_hz': clip_to_bounds('rate_hz', min(config.rate_hz, PREDICTIONS / max(duration_s, 1e-3)))}
-    _search(hands, fit, Replays(usable, thinned, executor))
+    _search(hands, fit, Replays(usable, thinned, executor), may_lower_eta)
     _fit_to_one_replay(usable, fit, thinned, executor)
+    compared = {name: usable[name] for name in sample_names(list(usable))}
+    fit.comparison = compare_configs(compared, (config, fit.config), thinned, executor)
+    fit.warnings[:0] = find_worse_positions(fit.comparison)
     return fit
 
 
-def _search(hands: Sequence[RecordedHand], fit: Fit, replays: Replays) -> None:
+def _search(hands: Sequence[RecordedHand], fit: Fit, replays: Replays, may_lower_eta: bool) -> None:
     """Fit the parameters that need replays."""
     if not any(len(each.obstacles) for each in hands):
         fit.warnings.append(
@@ -57,7 +64,9 @@ def _search(hands: Sequence[RecordedHand], fit: Fit, replays: Replays) -> None:
     elif fit.config.foc.strategy != 'fixed':
         # with strategy `fixed` eta has no effect, and lambda was found for the noise as it is
         search_settings('noise', make_noise_settings(fit.config), replays, fit)
-        search_settings('eta', make_eta_settings(fit.config), replays, fit)
+        search_settings('eta', make_eta_settings(fit.config, may_lower_eta), replays, fit)
+        if not may_lower_eta:
+            fit.warnings.append('foc.eta: values below the given one were not tried; --allow eta tries them')
     search_settings('movement', make_movement_settings(hands, fit.config), replays, fit)
 
 

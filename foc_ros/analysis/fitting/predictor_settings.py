@@ -32,9 +32,10 @@ def make_noise_settings(config: Config) -> list[Config]:
     return [config, *(_scale(config, {'foc.noise_x': 1.0, 'foc.noise_y': 1.0}, factor) for factor in NOISES)]
 
 
-def make_eta_settings(config: Config) -> list[Config]:
-    """Return the configuration, and it with other probabilities of avoiding."""
-    return list(dict.fromkeys([config, *(replace_values(config, {'foc.eta': eta}) for eta in ETAS)]))
+def make_eta_settings(config: Config, may_be_lower: bool) -> list[Config]:
+    """Return the configuration, and it with other probabilities of avoiding; may_be_lower: than the given one."""
+    etas = [eta for eta in ETAS if may_be_lower or eta > config.foc.eta]
+    return list(dict.fromkeys([config, *(replace_values(config, {'foc.eta': eta}) for eta in etas)]))
 
 
 def make_movement_settings(hands: Sequence[RecordedHand], config: Config) -> list[Config]:

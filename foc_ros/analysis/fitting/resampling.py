@@ -18,13 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from foc_ros.analysis.evaluation.bootstrap import CENTRAL, draw_resamples
 from foc_ros.analysis.evaluation.cross_validation import choose_held_out
 from foc_ros.core.types import Array, Record
 
-from .estimates import CENTRAL
-
-RESAMPLES = 1000
-SEED = 1
 STEP = 0.05
 """Step of the finite differences: the parameters are logarithms, or of that order."""
 FLAT = 1.0
@@ -33,11 +30,6 @@ FARTHEST = 2.0
 """Step beyond which no quadratic is trusted."""
 RIDGE = 1e-3
 """Least curvature along every parameter [nat], so that a resample without any stays where it is."""
-
-
-def draw_resamples(n: int) -> NDArray[np.int64]:
-    """Return how often each of n recordings is drawn in every resample, (RESAMPLES, n)."""
-    return np.random.default_rng(SEED).multinomial(n, np.full(n, 1.0 / n), RESAMPLES)
 
 
 @dataclass(frozen=True)

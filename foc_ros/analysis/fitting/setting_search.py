@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.analysis.evaluation.baselines import make_plain
+from foc_ros.analysis.evaluation.bootstrap import CENTRAL, RESAMPLES, SEED
 from foc_ros.analysis.evaluation.forecasts import Forecast, power_rule_shares
 from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
 from foc_ros.analysis.evaluation.questions import GAP, ask_all, ask_main
@@ -33,8 +34,7 @@ from foc_ros.core.types import Array
 
 from .covariance_fit import FEW_WIDENINGS, NO_WIDENING, compute_log_densities
 from .duration_fit import CONSTANTS
-from .estimates import CENTRAL, Estimate, Fit
-from .resampling import RESAMPLES, SEED
+from .estimates import Estimate, Fit
 
 FIRST = 6
 """Recordings that all settings predict."""
@@ -193,9 +193,7 @@ def search_settings(kind: str, settings: Sequence[Config], replays: Replays, fit
 
 def race(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[list[Config], Array, Array]:
     """Return the finalists, in the given order, with their scores as of `compare_settings`, and all scores of the first round."""
-    names = list(replays.recordings)
-    # every beginning of the list is a fair sample of the recordings, however they were ordered
-    names = [names[index] for index in np.random.default_rng(SEED).permutation(len(names))[:MAX_RECORDINGS]]
+    names = sample_names(list(replays.recordings))
     left, count = list(settings), FIRST
     first_scores = scores = replays.score(left, names[:count], f'{kind} {len(left)}')
     while count < len(names) and len(left) > 1:
@@ -204,6 +202,11 @@ def race(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[list[
         left, count = [left[index] for index in sorted(kept)], 2 * count
         scores = replays.score(left, names[:count], f'{kind} {len(left)}')
     return left, scores, first_scores
+
+
+def sample_names(names: Sequence[str]) -> list[str]:
+    """Return at most `MAX_RECORDINGS` names, of which every beginning is a fair sample, however the recordings were ordered."""
+    return [names[index] for index in np.random.default_rng(SEED).permutation(len(names))[:MAX_RECORDINGS]]
 
 
 def rank(scores: Array) -> list[int]:

@@ -5,8 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from .comparison import SMALLER_IS_BETTER
+from .covariance_fit import COVERAGE_LEVEL
+
 PARAMETER_COLUMNS = ('parameter', 'given', 'fitted', '95 %', 'data')
 SCORE_COLUMNS = ('score', 'setting', 'value')
+CHANGES = ('better', 'worse')
+COMPARISON_COLUMNS = ('with the same recordings', 'before', 'after', '')
+COMPARISON_TITLES = {
+    'class_gain': ('log-likelihood of the answer taken, above uniform [nat]', 1.0, 3),
+    'gap_right': ('next gap correct [%]', 100.0, 1),
+    'error_m 0.25': ('error of positions 0.25 s ahead [mm]', 1e3, 1),
+    'error_m 0.5': ('error of positions 0.5 s ahead [mm]', 1e3, 1),
+    'error_m 1': ('error of positions 1 s ahead [mm]', 1e3, 1),
+    'nlpd': ('negative log-density of positions 0.5 s ahead [nat]', 1.0, 2),
+    'inside_90': ('positions in the region of 90 %, 0.5 s ahead [%]', 100.0, 1),
+}
+"""Words, factor and digits of each measure."""
 SCORE_TITLES = {
     'ways': 'log-likelihood of the class taken [nat]',
     'positions': 'log-density of true positions [nat]',
@@ -20,10 +35,39 @@ def format_parameters(answer: Mapping[str, Any]) -> Rows:
     """Return the rows of the parameters in an answer of `fit --json`."""
     rows: Rows = []
     for name, each in answer['parameters'].items():
-        low, high = ('-' if end is None else f'{end:.4g}' for end in each['interval'])
-        rows.append((name, f'{each["given"]:.4g}', f'{each["value"]:.4g}', f'{low} to {high}', each['how']))
+        low, high = ('-' if end is None else f'{end:.3g}' for end in each['interval'])
+        rows.append((name, f'{each["given"]:.3g}', f'{each["value"]:.3g}', f'{low} to {high}', each['how']))
     chosen = answer.get('chosen', {}).items()
     return rows + [(name, each['given'], each['value'], '', 'predicted positions and classes') for name, each in chosen]
+
+
+def format_comparison(answer: Mapping[str, Any]) -> Rows:
+    """Return the rows of the measures before and after a fit in an answer of `fit --json`, with a word for each change."""
+    rows: Rows = []
+    for name, each in answer['comparison'].items():
+        words, factor, digits = COMPARISON_TITLES[name]
+        before, after = each['before'], each['after']
+        if before is None or after is None:
+            continue
+        shown = [f'{factor * value:.{digits}f}' for value in (before, after)]
+        rows.append((words, *shown, '' if shown[0] == shown[1] else 'better' if _is_better(name, before, after) else 'worse'))
+    return rows
+
+
+def _is_better(name: str, before: float, after: float) -> bool:
+    if name == 'inside_90':
+        return abs(after - COVERAGE_LEVEL) < abs(before - COVERAGE_LEVEL)
+    return after < before if name.startswith(SMALLER_IS_BETTER) else after > before
+
+
+def make_verdict(answer: Mapping[str, Any]) -> list[str]:
+    """Return sentences that say what a fit makes better, and what worse."""
+    rows = format_comparison(answer)
+    found = {
+        change: [f'{words} {before} to {after}' for words, before, after, each in rows if each == change] for change in CHANGES
+    }
+    judged = [f'{change.capitalize()} with the fitted parameters: {"; ".join(each)}.' for change, each in found.items() if each]
+    return judged or ['The fitted parameters change no measure.']
 
 
 def format_scores(answer: Mapping[str, Any]) -> Rows:

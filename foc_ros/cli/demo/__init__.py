@@ -1,5 +1,15 @@
 """`demo`: plays the packaged recording over DDS in real time to the real node, which runs in a process of its own."""
 
-from .command import add_arguments, run
+from __future__ import annotations
 
-__all__ = ['add_arguments', 'run']
+import argparse
+
+from foc_ros.cli.compiling import show_compilation
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the demo; return 1 if the node fails, 130 after an interrupt."""
+    print('A recorded hand moves among a box, three posts and a wall; the node predicts where it goes. Starting ...', flush=True)
+    with show_compilation():
+        from .command import run as run_command  # not before: its import takes seconds
+    return run_command(arguments)

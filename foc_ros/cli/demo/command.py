@@ -20,21 +20,16 @@ from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import BagReader, BagWriter, Item
-from foc_ros.io.terminal import show_table
+from foc_ros.io.terminal import show_table, show_text
 from foc_ros.reporting.snapshots import build_hand_trajectory
 from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, free_domain, private_environment, set_environment
 
 from .recorder import Recorder, show_live
+from .summary import describe_lead
 
 RECORDING = Path(__file__).resolve().parents[2] / 'recordings' / 'reaching.mcap'
 MARK = '.foc_ros_demo'
 """File that marks the output directory of a demo: the next demo may replace its bag and report."""
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
-    words = "directory for bag and report (default: %(default)s); an earlier demo's are replaced, other files are kept"
-    parser.add_argument('--output', type=Path, default=Path('demo_output'), metavar='DIR', help=words)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -71,7 +66,9 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf, d
     title, hand = 'Reaching among obstacles, live', build_hand_trajectory(recorder.samples)
     write_report(output / 'report', title, hand, recorder.snapshots, facts)
     show_table(('', str(output)), [('predictions', str(len(recorder.snapshots))), *facts.items()])
-    print(f'written to {output}: bag (inputs and outputs, MCAP), report/index.html')
+    print(f'written to {output}: bag (inputs and outputs, MCAP) and the report')
+    print(f'report: {(output / "report" / "index.html").resolve().as_uri()}')
+    show_text(describe_lead(hand, recorder.snapshots))
     return 0
 
 

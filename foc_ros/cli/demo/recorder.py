@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 from rich.bar import Bar
-from rich.console import Console
+from rich.box import SIMPLE_HEAD
+from rich.console import Console, Group
 from rich.live import Live
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from foc_ros.core.config import Config
 from foc_ros.core.obstacles.scene import Scene
@@ -20,9 +22,12 @@ from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
 from foc_ros.io.bags import Item
+from foc_ros.reporting.drawing import Bounds
 from foc_ros.reporting.snapshots import CandidateView, Snapshot, is_same_prediction, read_snapshot
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.decode_poses import decode_stamp
+
+from .scene_text import LEGEND, draw_scene, extend_bounds
 
 WINDOW_S = 1.0
 """Seconds over which rates are counted."""
@@ -104,16 +109,18 @@ class Recorder:
 def show_live(
     recorder: Recorder, first_ns: int, duration_s: float, console: Console | None = None
 ) -> Iterator[Callable[[float], None]]:
-    """Yield a function that shows the newest snapshot: as a live table on a terminal, else as a line of text each second.
+    """Yield a function that shows the newest snapshot: as a live scene and table on a terminal, else as a line each second.
 
     The function takes the time [s] of the recorder's clock and may be called often; first_ns and duration_s: of the recording.
     """
     console = console or Console()
-    live = Live(console=console, auto_refresh=False) if console.is_terminal else None
-    next_update = -np.inf
+    waiting = 'Waiting for the first prediction of the node ...'
+    live = Live(waiting, console=console, auto_refresh=False) if console.is_terminal else None
+    next_update: float = -np.inf
+    bounds: Bounds | None = None
 
     def update(now: float) -> None:
-        nonlocal next_update
+        nonlocal next_update, bounds
         if now < next_update or not recorder.snapshots:
             return
         next_update = now + (LINE_S if live is None else REDRAW_S)
@@ -122,7 +129,10 @@ def show_live(
         progress = f'{(snapshot.stamp_ns - first_ns) / NANOSECONDS:4.1f} of {duration_s:.1f} s'
         heading = f'{progress}   {rates}, delay {delay_ms:.0f} ms'
         if live is not None:
-            live.update(_make_table(snapshot, heading), refresh=True)
+            hand = recorder.samples[-1].position
+            bounds = extend_bounds(snapshot, hand, bounds)
+            drawing = Text(draw_scene(snapshot, hand, bounds))
+            live.update(Group(drawing, Text(LEGEND), _make_table(snapshot, heading)), refresh=True)
             return
         shares = '   '.join(_describe(each) for each in snapshot.candidates)
         console.print(f'{heading}   {shares or "no solved candidate"}', highlight=False, soft_wrap=True, markup=False)
@@ -136,12 +146,12 @@ def _describe(candidate: CandidateView) -> str:
 
 
 def _make_table(snapshot: Snapshot, title: str) -> Table:
-    table = Table(title=title, title_justify='left', caption_justify='left', expand=False)
+    table = Table(title=title, title_justify='left', caption_justify='left', box=SIMPLE_HEAD, padding=(0, 0))
     table.caption = '* compromised: eta is below the wanted one'
-    table.add_column('candidate', width=20, no_wrap=True)
-    table.add_column('passes', width=26, no_wrap=True)
-    table.add_column('likelihood', width=12)
-    for name, width in (('', 5), ('effort', 8), ('cost', 7), ('eta', 6)):
+    table.add_column('candidate', width=15, no_wrap=True)
+    table.add_column('passes', width=23, no_wrap=True)
+    table.add_column('likelihood', width=10)
+    for name, width in (('', 5), ('effort', 6), ('cost', 6), ('eta', 5)):
         table.add_column(name, justify='right', width=width)
     for each in snapshot.candidates[:ROWS]:
         bar = Bar(1.0, 0.0, each.likelihood, color='bright_blue')
@@ -149,5 +159,5 @@ def _make_table(snapshot: Snapshot, title: str) -> Table:
         eta = f'{each.eta:.2f}' + '*' * each.is_compromised
         table.add_row(escape(each.label), escape(each.description), bar, share, f'{each.effort:.3g}', ratio, eta)
     for row in range(len(snapshot.candidates), ROWS):
-        table.add_row('' if row else 'no solved candidate')
+        table.add_row('', '' if row else 'no solved candidate')
     return table

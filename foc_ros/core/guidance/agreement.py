@@ -24,15 +24,18 @@ def remember_likelihoods(prediction: Prediction, known: Known) -> dict[str, tupl
     return kept | {each.label: (each.likelihood, prediction.t) for each in prediction.candidates_with_likelihood}
 
 
-def weigh_candidates(labels: tuple[str, ...], likelihoods: Array, known: Known) -> Array:
-    """Return the weights (c,) of candidates with a likelihood p_i.
+def weigh_candidates(labels: tuple[str, ...], likelihoods: Array, known: Known, sharpness: float) -> Array:
+    """Return the weights w_i (c,) of candidates with a likelihood p_i.
 
-    Candidates that could not be solved take part with the likelihood q_j that they had last, and without a force of their own:
-    p_i / (sum_i p_i + sum_j q_j). The force of the others does not grow because one is missing.
+    Candidates that could not be solved take part with the likelihood q_j that they had last, and without a force of their own,
+    so that the force of the others does not grow because one is missing. With the sharpness g,
+
+        w_i = p_i^g / (sum_i p_i^g + sum_j q_j^g).
     """
-    missing = sum(likelihood for label, (likelihood, _) in known.items() if label not in labels)
-    total = float(likelihoods.sum()) + missing
-    weights: Array = likelihoods / total if total > 0.0 else np.zeros(len(likelihoods))
+    missing = sum(likelihood**sharpness for label, (likelihood, _) in known.items() if label not in labels)
+    powers = likelihoods**sharpness
+    total = float(powers.sum()) + missing
+    weights: Array = powers / total if total > 0.0 else np.zeros(len(powers))
     return weights
 
 

@@ -13,17 +13,15 @@ from foc_ros.core.types import Array, Obstacles
 
 INSTANTS = 13
 """Number of instants within the look-ahead at which the distance from the obstacles is computed."""
-FULL_SHARE = 0.5
-"""Share of the clearance up to which the need is complete."""
 
 
 def find_need(settings: GuidanceConfig, obstacles: Obstacles, position: Array, velocity: Array) -> tuple[float, float]:
     """Return how far ahead help is needed [s], and how much, in [0, 1].
 
     The hand goes on at its velocity v for the look-ahead h at most. It is nearest to an obstacle at the time t*, at the distance
-    d. The need is 0 at the clearance D and beyond, and grows linearly to 1 at D / 2:
+    d. The need is the share of the clearance D that it lacks by then:
 
-        t* = argmin_{0 <= t <= h} min_j d_j(x + t v),    need = clip((D - d) / (D / 2), 0, 1).
+        t* = argmin_{0 <= t <= h} min_j d_j(x + t v),    n = clip((D - d) / D, 0, 1).
     """
     if not settings.clearance:
         return settings.lookahead_s, 1.0
@@ -33,7 +31,7 @@ def find_need(settings: GuidanceConfig, obstacles: Obstacles, position: Array, v
     points = position + times[:, None] * velocity
     heights = (measure_offsets(points, obstacles)[1] - obstacles.radius).min(axis=1)
     nearest = int(heights.argmin())
-    need = (settings.clearance - float(heights[nearest])) / ((1.0 - FULL_SHARE) * settings.clearance)
+    need = 1.0 - float(heights[nearest]) / settings.clearance
     return float(times[nearest]), min(max(need, 0.0), 1.0)
 
 
@@ -54,13 +52,14 @@ def keep_clear(settings: GuidanceConfig, obstacles: Obstacles, points: Array) ->
     return moved
 
 
-def saturate(settings: GuidanceConfig, errors: Array) -> Array:
-    """Return errors e_i (c, 2) [m] of at most the clearance D in length: e <- e min(1, D / |e|).
+def saturate(settings: GuidanceConfig, errors: Array, need: float) -> Array:
+    """Return errors e_i (c, 2) [m] that are not longer than what the hand lacks of the clearance D: e <- e min(1, n D / |e|).
 
-    Otherwise an unlikely candidate far away, such as that on the other side of an obstacle, would outweigh a likely one nearby.
+    A longer force would lead the hand farther than it has to go. An unlikely candidate far away, such as that on the other side
+    of an obstacle, does not outweigh a likely one nearby.
     """
     if not settings.clearance:
         return errors
     sizes = np.maximum(np.hypot(errors[:, 0], errors[:, 1]), 1e-12)
-    saturated: Array = errors * np.minimum(settings.clearance / sizes, 1.0)[:, None]
+    saturated: Array = errors * np.minimum(need * settings.clearance / sizes, 1.0)[:, None]
     return saturated

@@ -220,13 +220,13 @@ def _compute_wish(settings: GuidanceConfig, followed: Followed, given: GuidanceI
     if settings.mode == 'path':
         stiffness = project_out(stiffness, normalize(given.velocity + SLOW * paths.find_tangents(progress)))
     points = keep_clear(settings, followed.obstacles, paths.interpolate(paths.points, ahead))
-    errors = saturate(settings, points - given.position - times[:, None] * given.velocity)
-    weights = weigh_candidates(paths.labels, paths.likelihoods, followed.known)
+    errors = saturate(settings, points - given.position - times[:, None] * given.velocity, need)
+    weights = weigh_candidates(paths.labels, paths.likelihoods, followed.known, settings.sharpness)
     force, agreement = combine(weights, (stiffness @ errors[..., None])[..., 0])
     reference = given.position + weights @ errors
     heading, target = _find_heading(paths, np.maximum(ahead, progress + HEADING_M), weights, given.position)
     return _Wish(
-        need * turn_along(followed.margins, given.position, reference, force),
+        turn_along(followed.margins, given.position, reference, force),
         need * agreement * np.einsum('c,cab->ab', weights, stiffness),
         agreement,
         settings.authority * min(float(np.hypot(*heading)), 1.0),

@@ -69,6 +69,11 @@ def render_table(columns: Sequence[str], rows: Iterable[Sequence[str]], heading:
     return str(_PARTS.table(columns, rows, heading))
 
 
+def render_list(sentences: Iterable[str]) -> str:
+    """Return sentences as HTML, one below the other."""
+    return str(_PARTS.list(sentences))
+
+
 def render_picture(file: Path, caption: str) -> str:
     """Return a figure as HTML that contains a PNG file."""
     return str(_PARTS.picture(base64.b64encode(file.read_bytes()).decode('ascii'), caption))

@@ -13,6 +13,8 @@ const slotOf = (track) => data.tracks[track].slot;
 const letterOf = (track) => (slotOf(track) === null ? '' : String.fromCharCode(65 + slotOf(track)));
 // Above this number of points, the likelihoods are drawn without marks.
 const MOST_MARKS = 3000;
+// Size of an ellipse, in parts of the median, up to which the filter counts as settled.
+const MOST_USUAL = 1.5;
 const state = { frame: 0, from: 0, to: 0, playing: false, focus: null };
 
 // The row of the first value that is not below a bound.
@@ -87,7 +89,7 @@ function candidateTraces(frame, candidate) {
   const path = {
     x, y, type: 'scatter', mode: 'lines', line: { color: colour, dash: lineOf(candidate), width: 1.5 + 4 * share, shape: 'spline' },
     opacity: weight, hoverinfo: 'text', meta: { candidate: candidate.track },
-    text: plain(`${letterOf(candidate.track)} ${percent(share)} ${data.labels[candidate.label]} ${data.labels[candidate.description]}`),
+    text: plain(`${letterOf(candidate.track)} ${percent(share)} ${wordsOf(candidate)} (${data.labels[candidate.label]})`),
   };
   const tag = {
     x: [x[middle]], y: [y[middle]], type: 'scatter', mode: 'markers+text', text: letterOf(candidate.track), textfont: { size: 11, color: ink('--ink') },
@@ -101,6 +103,9 @@ const unsolvedTrace = (lost) => ({
   x: sums(lost.x, LENGTH), y: sums(lost.y, LENGTH), type: 'scatter', mode: 'lines', line: { color: ink('--soft'), width: 1.2, shape: 'spline' },
   opacity: 0.6, hoverinfo: 'text', text: plain(`${data.labels[lost.label]}: ${data.labels[lost.reason]}`), meta: { unsolved: lost.label },
 });
+
+// Returns the class of a candidate in words, for a person who reads no labels.
+const wordsOf = (candidate) => data.labels[candidate.description] || 'no obstacle in the way';
 
 const nothing = { x: [], y: [], type: 'scatter', mode: 'lines', hoverinfo: 'skip' };
 const filled = (list, most = mostCandidates) => [...list, ...Array(most - list.length).fill(nothing)];
@@ -207,7 +212,7 @@ function drawSpeeds() {
   const measured = { type: 'scatter', mode: 'lines', hoverinfo: 'skip' };
   const predicted = filled([...frame.candidates].reverse().map((candidate) => ({
     x: sums(candidate.t, TIME).map((t) => t + data.times[frame.at]), y: sums(candidate.v, SPEED), type: 'scatter', mode: 'lines', hoverinfo: 'text',
-    text: plain(`${letterOf(candidate.track)} ${data.labels[candidate.label]}`), opacity: faded(candidate.track) ? 0.15 : 1,
+    text: plain(`${letterOf(candidate.track)} ${wordsOf(candidate)}`), opacity: faded(candidate.track) ? 0.15 : 1,
     line: { color: colourOf(slotOf(candidate.track)), dash: lineOf(candidate), width: 1.2 + 2.5 * shareOf(candidate.track, frame.at) },
   })));
   Plotly.react(byId('speeds'), [
@@ -262,7 +267,7 @@ function fillTable() {
     bar.append(filling);
     cell(row, '').append(bar);
     cell(row, data.labels[candidate.label]);
-    cell(row, data.labels[candidate.description]);
+    cell(row, wordsOf(candidate));
     cell(row, candidate.ratio === null ? '' : candidate.ratio.toFixed(2), 'number');
     cell(row, candidate.eta === null ? '' : `${candidate.eta.toFixed(3)}${candidate.compromised ? ' *' : ''}`, 'number');
   }
@@ -287,13 +292,20 @@ function show(frame) {
   }
 }
 
+// Returns the first frame of a span whose largest ellipse is of the usual size: before it, the filter of the hand has not settled.
+function settledFrame(from, to) {
+  const sizes = data.frames.slice(from, to + 1).map((frame) => Math.max(0, ...frame.candidates.flatMap((each) => (each.total.length ? each.total : each.motor).map((ellipse) => ellipse[2]))));
+  const usual = [...sizes].sort((a, b) => a - b)[Math.floor(sizes.length / 2)];
+  return from + Math.max(0, sizes.findIndex((size) => size > 0 && size <= MOST_USUAL * usual));
+}
+
 function choose(movement) {
   const [from, to] = movement < 0 ? [-Infinity, Infinity] : data.movements[movement];
   const inside = frameTimes.flatMap((time, row) => (time >= from && time <= to ? [row] : []));
   [state.from, state.to] = inside.length ? [inside[0], inside[inside.length - 1]] : [0, frameTimes.length - 1];
   state.focus = null;
   [byId('time').min, byId('time').max] = [state.from, state.to];
-  state.frame = state.from;
+  state.frame = settledFrame(state.from, state.to);
   drawAll();
 }
 
@@ -341,6 +353,16 @@ for (const name of ['likelihoods', 'speeds', 'times']) {
       show(Math.min(row, state.to));
     });
   }
+}
+// A warning leads to its first moment.
+for (const button of document.querySelectorAll('.moment')) {
+  button.addEventListener('click', () => {
+    if (state.playing) { play(); }
+    choice.value = -1;
+    choose(-1);
+    show(Math.min(first(frameTimes, Number(button.dataset.time)), state.to));
+    byId('scene').scrollIntoView({ block: 'center' });
+  });
 }
 redraws.push(drawAll);
 document.body.dataset.ready = 'yes';

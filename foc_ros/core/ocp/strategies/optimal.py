@@ -21,6 +21,7 @@ import numpy as np
 from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
 from foc_ros.core.homotopy import compute_swept_angles
+from foc_ros.core.kernels import freeze
 from foc_ros.core.ocp.contacts.contacts import Contacts
 from foc_ros.core.ocp.contacts.kkt_point import compute_class_angles
 from foc_ros.core.ocp.contacts.surrogate_newton import Preference
@@ -47,23 +48,27 @@ FOLLOW_SHARE = 0.5
 """Part of the time left that an earlier solution may take; then the search begins again."""
 NEARLY = 0.6
 """Part of the slope that is worth it from which Newton steps are tried that have k as an unknown."""
-WARM_TRIES, COLD_TRIES = 2, 4
+WARM_TRIES, COLD_TRIES = 2, 8
 """Values of k that are tried from an earlier solution, and from the least effort, if the next prediction goes on from there."""
-WARM_STRIDE = 0.3
-"""The longest first stride in k from an earlier solution; it is shorter, the nearer the slope is to the one that is worth it."""
+WARM_STRIDE, COLD_STRIDE = 0.3, 0.4
+"""First strides in k, if they are not too long; from an earlier solution it is shorter, the nearer the slope is to that which is
+worth it."""
 NARROW = 0.02
 """Bracket in k at which the search ends."""
 
 
 def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadline = NEVER) -> StrategyResult:
-    """Find a local minimum from a start."""
-    search = _Search(problem, deadline)
+    """Find a local minimum from a start.
+
+    Where the next prediction goes on from the result, a search that runs out of time has the k that it has reached.
+    """
+    search, is_late = _Search(problem, deadline), False
     try:
         status = search.run(start)
     except OutOfTimeError:
         if search.best is None:
             raise
-        status = Status.DEADLINE
+        status, is_late = search.judge() if search.is_followed else Status.DEADLINE, True
     point = search.best
     if status is Status.ITERATION_LIMIT:
         assert start.control is not None
@@ -74,13 +79,13 @@ def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadli
         return find_best_effort(problem, start, qp_solves=search.qp_solves, deadline=deadline)
     minimum, found = find_minimum_safety_factor(problem, point.control, between_steps=True), problem.risk
     reached = found.find_probability(minimum.k)
-    message = {
+    messages = {
         Status.SOLVED: 'solved',
         Status.ETA_UNREACHABLE: f'eta {problem.eta:g} is out of reach: the largest found is {reached:.4g}'
         if search.is_hard
         else f'eta {reached:.4g} only: more would cost more than likelihood.shortfall, or is out of reach',
-        Status.DEADLINE: f'out of time, with eta {reached:.4g} reached',
-    }[status]
+    }
+    message = f'out of time, with eta {reached:.4g} reached' if is_late else messages[status]
     weights = compute_equivalent_weights(point)
     return StrategyResult(
         status, message, point.control, point.contacts, qp_solves=search.qp_solves, minimum=minimum, equivalent_weights=weights
@@ -95,6 +100,22 @@ def compute_equivalent_weights(point: SurrogatePoint) -> list[tuple[float, float
     """
     lams = point.contacts.multiplier * point.k * point.distance / point.stddev
     return list(zip((point.k * point.stddev).tolist(), lams.tolist(), strict=True))
+
+
+def extrapolate(before: SurrogatePoint, last: SurrogatePoint, k: float) -> tuple[Array, Contacts]:
+    """Return the control and contacts for a k on the secant through two points: the predictor of a numerical continuation.
+
+    Contacts are those of the last point, extrapolated where both points have the same ones and multipliers stay positive.
+    """
+    if last.k == before.k:
+        return last.control, last.contacts
+    share, (obstacle, time, multiplier) = (k - last.k) / (last.k - before.k), last.contacts
+    control = last.control + share * (last.control - before.control)
+    if not np.array_equal(obstacle, before.contacts.obstacle):
+        return control, last.contacts
+    times = np.clip(time + share * (time - before.contacts.time), 1.0, len(control) // 2)
+    multipliers = multiplier + share * (multiplier - before.contacts.multiplier)
+    return control, freeze(Contacts(obstacle, times, np.where(multipliers > 0.0, multipliers, multiplier)))
 
 
 class _Search:
@@ -119,7 +140,8 @@ class _Search:
                 return Status.ITERATION_LIMIT
             return self.judge() if self.begin(start) else Status.INFEASIBLE
         assert self.best is not None
-        if self.is_cheap(self.best) and not (self.is_hard and start.safety_factor < self.problem.wanted_k):
+        is_known = self.is_hard and start.safety_factor < self.problem.wanted_k and not start.is_unfinished
+        if self.is_cheap(self.best) and not is_known:  # that no larger k is in reach
             self.raise_k(WARM_TRIES, WARM_STRIDE * (1.0 - self.slope(self.best) / self.rate))
         return self.judge()
 
@@ -175,7 +197,7 @@ class _Search:
             found = self.solve_below(control, contacts, min(max(minimum.k, 0.0), self.wanted), COLD_SHARES)
             if found is not None:
                 self.best = self.lower_k(found)
-                is_stuck = self.raise_k(COLD_TRIES)
+                is_stuck = self.raise_k(COLD_TRIES, COLD_STRIDE)
                 tried.append(self.best)
                 if not is_stuck:
                     break
@@ -207,23 +229,26 @@ class _Search:
             return point
         return self.weigh(point.control, point.contacts, point.k) or point
 
-    def raise_k(self, tries: float, stride: float = math.inf) -> bool:
+    def raise_k(self, tries: float, stride: float) -> bool:
         """Raise k to the wanted one, or to the one that is worth its effort; tell whether no larger k could be reached.
 
-        tries: values of k that are tried if the next prediction goes on from the result; stride: the longest in k at first.
+        tries: values of k that are tried if the next prediction goes on from the result; stride: the first one in k.
         """
         assert self.best is not None
         low, high = self.best, math.inf  # the k of a point that costs too much
+        before = low
         stride, tries = min(self.wanted - low.k, stride), tries if self.is_followed else math.inf
         shortest = min(NARROW, stride / 4.0) / 2.0
         while self.is_cheap(low) and stride > shortest and tries > 0:
             tries -= 1
-            point = self.solve(low.control, low.contacts, min(low.k + stride, self.wanted))
+            k = min(low.k + stride, self.wanted)
+            point = self.solve(*extrapolate(before, low, k), k)
             if point is None:
                 stride /= 2
                 continue
             if self.slope(point) <= self.rate:
-                low = self.best = point
+                before, low = low, point
+                self.best = low
                 stride *= 2
             else:
                 high = point.k
