@@ -137,12 +137,13 @@ def test_the_clutch_releases_the_hand_within_the_ramp_and_guidance_falls_silent(
     bench.drive(40, 60)
     after = [(at, force) for (at, _), force in zip(bench.wrenches, bench.forces, strict=True) if at > released]
     zeros = [at - released for at, force in after if not force.any()]
-    assert 1 <= len(zeros) <= 3, 'zero is published, and then nothing'
     assert zeros[0] <= RAMP_S + 0.2  # the target of 20 ms beyond the ramp is measured by scripts/measure_guidance.py
+    count = len(bench.wrenches)
+    bench.drive(60, 80)
+    assert len(bench.wrenches) == count, 'zero is published until the ramp ends, and then nothing'
     assert figures(bench.health())['guidance'] == 'released'
     bench.node._engage(SetBool.Request(data=True), SetBool.Response())
-    count = len(bench.wrenches)
-    bench.drive(40, 100)
+    bench.drive(80, 120)
     assert len(bench.wrenches) > count
 
 
