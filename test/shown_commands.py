@@ -67,8 +67,8 @@ NOT_RUN = {
     '.venv/bin/python scripts/make_accuracy_figures.py': f'{LONG}; test_accuracy_page.py checks the page',
     'foc_ros paper --output paper_output': 'takes half a minute; test_paper.py runs the studies on a coarser grid',
     # guidance
-    'foc_ros simulate --operators noisy,laggy,unannounced_goal --trials 200 --params rate.yaml': f'{LONG}; test_simulation.py '
-    'runs a part',
+    'foc_ros simulate --operators accurate,noisy,laggy,changes_way,unannounced_goal --trials 200 --params rate.yaml': f'{LONG}; '
+    'test_simulation.py runs a part',
     'foc_ros simulate --operators human_paths --trials 48 --recordings recordings --params rate.yaml': f'{LONG}; '
     'test_simulation.py runs a part',
     # CONTRIBUTING
