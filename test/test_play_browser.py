@@ -80,12 +80,11 @@ def check_steering(browser: Any) -> None:
     assert [each for each in browser.get_log('browser') if each['level'] == 'SEVERE'] == []
     steer(browser, (0.0, 0.0))
     wait_for(browser, 'play.view.candidates.length > 1', 'candidates at the start', 20)
-    shares = [share_above(browser)]
-    for target in ABOVE:
-        steer(browser, target, speed=0.2)
-        shares.append(share_above(browser))
-    assert shares[0] < 0.25 < shares[1] < 1.0
-    assert shares[2] > 0.99
+    until(lambda: 0.0 < share_above(browser) < 0.25, 'a likelihood of the way above at the start', 20)
+    steer(browser, ABOVE[0], speed=0.2)
+    until(lambda: 0.25 < share_above(browser) < 1.0, 'a larger likelihood of the way above', 20)
+    steer(browser, ABOVE[1], speed=0.2)
+    until(lambda: share_above(browser) > 0.99, 'no doubt of the way taken', 20)
     steer(browser, *ON)
     wait_for(browser, 'Math.abs(play.view.hand.position[0] - 0.3) < 0.003', 'the hand at the goal', 20)
     wait_for(browser, 'play.measured.delayMs > 0 && play.measured.fps > 0 && play.measured.delays.length > 5', 'numbers', 20)
