@@ -100,7 +100,7 @@ def test_ten_thousand_obstacles_at_50_hz(ros: Graph) -> None:
 
 def test_poses_at_1_khz(ros: Graph) -> None:
     feeder = Feeder(ros)
-    with running(ros, 'module', *parameters(*LIGHT, *RELIABLE)) as process:
+    with running(ros, 'module', *parameters(*LIGHT, *RELIABLE, 'budget_s:=0.0')) as process:
         feeder.connect()
         feeder.play(2.0, 1000.0)
         ros.spin_until(feeder.all_heard, f'{feeder.sent} poses in the diagnostics')
