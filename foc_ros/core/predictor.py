@@ -25,8 +25,9 @@ from .obstacles.culling import cull_obstacles
 from .ocp.problem import Problem, rest_to_goal
 from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Prediction, make_obstacles
 
-SEARCH_SHARE, SOLVE_SHARE = 0.3, 0.9
-"""Parts of the time left that the search and then the solves may take before they begin no further step."""
+SEARCH_SHARE, RAISE_SHARE, SOLVE_SHARE = 0.3, 0.4, 0.7
+"""Parts of the time left that the search, and then raising safety factors further and all solves, may take before they begin no
+further step. A step may take a fifth of the budget."""
 RESERVE_S = 5e-5
 """Time besides that for each candidate, to keep, rank and smooth it [s]."""
 
@@ -76,8 +77,8 @@ def predict(
     candidates = recall_demonstrations(library, *scene, found.candidates, memory.candidates)
     problems = Problems(config, hand, obstacles, goals, candidates, durations)
     costs, earlier = make_cost_model(hand.effort_spent, config), memory.find_earlier(candidates)
-    until = deadline.take_share(SOLVE_SHARE, RESERVE_S * len(candidates))
-    solved = solve_candidates(candidates, problems, config.foc, costs, earlier, until)
+    until = [deadline.take_share(share, RESERVE_S * len(candidates)) for share in (SOLVE_SHARE, RAISE_SHARE)]
+    solved = solve_candidates(candidates, problems, config.foc, costs, earlier, *until)
     widened = _widen_covariances(solved, problems, hand, config)
     kept = keep_answers(candidates, widened, past, hand.stamp_ns, config.likelihood.hold_s, costs)
     ranked = rank_candidates(kept, config.likelihood, obstacles, hand, goals)
