@@ -226,7 +226,7 @@ class _Search:
                 yield point
 
     def settle_k(self, point: SurrogatePoint) -> SurrogatePoint:
-        """Return a point with the k that is worth its effort if that is smaller, or near enough for Newton steps from the point."""
+        """Return a point with the k that is worth its effort if that is smaller, or near enough for Newton steps to it."""
         slope = self.slope(point)
         is_too_large = slope > self.rate * (1.0 + CLOSE)
         if not is_too_large and not (self.is_cheap(point) and slope > NEARLY * self.rate):
