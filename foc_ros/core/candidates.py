@@ -163,8 +163,8 @@ def rank_candidates(
     taken = [each for each in candidates if each.has_likelihood]
     branch_times = compute_branch_times(taken, obstacles) if likelihood.lookahead_s > 0.0 else None
     costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))
-    decisions = None
-    if len(taken) > 1:
+    decisions, has_far_choices = None, likelihood.weaving > 0.0 or likelihood.beta_beyond != likelihood.beta
+    if len(taken) > 1 and has_far_choices:
         decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), obstacles, hand, goals)
     shares = compute_likelihoods(costs, likelihood, branch_times, shortfalls, decisions)
     pairs = zip(taken, shares.tolist(), strict=True)
