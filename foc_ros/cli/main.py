@@ -22,6 +22,7 @@ from foc_ros.core.errors import FocError, list_messages, suggest
 
 from . import arguments as declarations
 from .compiling import show_compilation
+from .inputs import read_inputs
 from .interrupts import INTERRUPTED, handle_interrupts
 
 COMMANDS = {
@@ -115,6 +116,7 @@ def _parse_and_run(given: list[str]) -> int:
         if rest and parsed.command != 'node':
             commands.choices[parsed.command].reject(rest)
         parsed.rest = rest
+        read_inputs(parsed)
         with show_compilation() if parsed.command in COMPUTING else nullcontext():
             module = import_module(f'.{_get_module_name(parsed.command)}', __package__)
         return int(module.run(parsed))

@@ -55,7 +55,7 @@ class Session:
 
     def __init__(self, make_predictor: Callable[[Config, Receive], LivePredictor], config: Config, data: Path) -> None:
         self._standard = replace_values(config, OWN_VALUES)
-        self._after = AfterSession(self._say, self._use_operator)
+        self._after = AfterSession(self._say, self._note_fitted)
         self._parameters, self._is_guided = 'standard', config.guidance.enabled
         self._data = data
         self.predictor = make_predictor(self._config, self._receive)
@@ -253,8 +253,8 @@ class Session:
             raise InputError('job', 'a session that has ended', message.name)
         self._after.begin(message.name)
 
-    def _use_operator(self) -> None:
-        self._parameters = 'mine'
+    def _note_fitted(self, is_used: bool) -> None:
+        self._parameters = 'mine' if is_used else 'standard'
         self._configure()
 
     # the predictor
