@@ -37,10 +37,9 @@ class AfterSession:
         self._reported = SessionReport()
         self._job: asyncio.Task[None] | None = None
 
-    def begin_session(self, folder: Path) -> SessionReport:
-        """Work on a new session from now on; return what collects its report."""
-        self.folder, self._reported = folder, SessionReport()
-        return self._reported
+    def begin_session(self, folder: Path, report: SessionReport) -> None:
+        """Work on a new session from now on; report: what collects its report."""
+        self.folder, self._reported = folder, report
 
     def begin(self, name: str) -> None:
         """Begin a job by its name; raises InputError where it is impossible."""
