@@ -87,10 +87,10 @@ def add_evaluate_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_simulate_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `simulate`."""
-    words = 'some of the simulated operators (default: all; human_paths with --recordings only)'
+    words = f'some of the simulated operators {", ".join(OPERATORS)} (default: all; human_paths with --recordings only)'
     parser.add_argument('--operators', type=_Names('--operators', OPERATORS), metavar='A,B', help=words)
     names = _Names('--assistance', ASSISTANCE)
-    words = 'some of the assistance rules (default: all)'
+    words = f'some of the assistance rules {", ".join(ASSISTANCE)} (default: all)'
     parser.add_argument('--assistance', type=names, default=ASSISTANCE, metavar='A,B', help=words)
     number = _WholeNumber('--trials', 1, MOST_TRIALS)
     parser.add_argument('--trials', type=number, default=20, metavar='N', help='paired trials of each operator (default: 20)')

@@ -28,7 +28,7 @@ from .interrupts import INTERRUPTED, handle_interrupts
 COMMANDS = {
     'demo': 'play the packaged recording to the node and show its predictions',
     'node': 'run the node; further arguments are passed to ROS, as in --ros-args -r hand_pose:=/PSM1/measured_cp',
-    'play': "try it with one's own hand, on a page in the browser",
+    'play': 'steer the hand yourself, on a page in the browser',
     'paper': "repeat the paper's studies: figures, numbers, a table",
     'solve': 'solve one scene from a YAML or JSON file',
     'replay': 'compute predictions from a recording, without ROS and faster than real time',
