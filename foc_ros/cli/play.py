@@ -1,4 +1,4 @@
-"""`play`: try the predictor with one's own hand, on a page in the browser."""
+"""`play`: steer the hand oneself, on a page in the browser."""
 
 from __future__ import annotations
 
