@@ -20,6 +20,7 @@ from std_srvs.srv import SetBool, Trigger  # noqa: E402
 from test_node_faults import set_on  # noqa: E402
 
 from foc_ros.core import pipeline as computation  # noqa: E402
+from foc_ros.core.deadline import Deadline
 from foc_ros.ros import health  # noqa: E402
 
 OK, WARN = b'\x00', b'\x01'
@@ -33,7 +34,7 @@ class Gate:
         self._real, self._open = computation.predict, threading.Event()
 
     def __call__(self, *arguments: Any) -> Any:
-        self.deadlines.append(arguments[-1])
+        self.deadlines.append(next(each for each in arguments if isinstance(each, Deadline)))
         assert self._open.wait(60.0)
         return self._real(*arguments)
 

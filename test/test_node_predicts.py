@@ -64,7 +64,8 @@ def test_every_output_carries_the_stamp_and_frame_of_the_hand(ros: Graph) -> Non
     assert {each.header.stamp.nanosec for each in bench.wait_for('markers', 1)[0].markers} == {7}
     path = bench.received['path'][0].poses
     assert path
-    assert {pose.pose.position.z for pose in path} == {0.25}
+    heights = [pose.pose.position.z for pose in path]
+    assert heights[0] == pytest.approx(0.25) and heights[-1] == pytest.approx(0.0, abs=1e-9), 'from the hand to the goal'
 
 
 def test_markers_and_a_single_goal_make_a_scene(ros: Graph) -> None:

@@ -171,5 +171,5 @@ def test_output_that_cannot_be_written_exits_2_before_anything_is_computed(tmp_p
     root = Path(__file__).resolve().parents[1]
     result = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False, cwd=root)
     assert (result.returncode, result.stdout) == (2, '')
-    assert result.stderr == f'foc_ros paper: --output: expected a directory that can be written, got {file}: File exists\n'
+    assert result.stderr == f'foc_ros paper: --output: expected a folder, got {file}, which is a file\n'
     assert file.read_text(encoding='utf-8') == 'mine'

@@ -66,7 +66,7 @@ class Shape:
     velocity: ArrayLike
     name: str
     centre_stddev: float
-    heights: ArrayLike | None
+    heights: ArrayLike | None = None
 
     @property
     def polygon(self) -> Array:
