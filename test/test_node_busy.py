@@ -20,7 +20,7 @@ from std_srvs.srv import SetBool, Trigger  # noqa: E402
 from test_node_faults import set_on  # noqa: E402
 
 from foc_ros.core import pipeline as computation  # noqa: E402
-from foc_ros.core.deadline import Deadline
+from foc_ros.core.deadline import Deadline  # noqa: E402
 from foc_ros.ros import health  # noqa: E402
 
 OK, WARN = b'\x00', b'\x01'
