@@ -36,8 +36,9 @@ class Recorder:
         memory: Memory,
         library: tuple[Demonstration, ...],
         deadline: Deadline,
+        goal_heights: Array | None,
     ) -> tuple[Prediction, Memory]:
-        assert library == ()
+        assert library == () and goal_heights is None
         assert deadline is NEVER
         self.calls.append((config, hand, obstacles, goals, memory))
         label = f'call{len(self.calls)}'
@@ -491,7 +492,7 @@ def test_samples_and_scenes_of_the_meantime_do_not_change_a_prediction_that_was_
     assert task is not None
     pipeline.add_hand_sample(hand(40.0, 0.01))
     pipeline.set_obstacles('cloud', make_obstacles(), START, 'world')
-    recorder(task.config, task.hand, task.obstacles, task.goals, task.memory, (), NEVER)
+    recorder(task.config, task.hand, task.obstacles, task.goals, task.memory, (), NEVER, None)
     prediction = pipeline.finish(task, lambda: (Prediction(task.hand.stamp_ns, 'world', 0.3, (), 'made'), Memory('made')))
     assert prediction is not None and prediction.stamp_ns == START
     assert recorder.calls[0][2].ids == ('0',)
