@@ -21,16 +21,16 @@ from foc_ros.analysis.evaluation.cross_validation import choose_held_out, comput
 from foc_ros.analysis.evaluation.forecasts import power_rule_shares, published_shares
 from foc_ros.analysis.evaluation.ground_truth import HORIZONS_S
 from foc_ros.analysis.evaluation.metrics import Scores, score_forecasts, summarise
-from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
+from foc_ros.analysis.evaluation.observations import ObservedRecording, observe_in_order
 from foc_ros.analysis.evaluation.position_metrics import compute_position_scores
 from foc_ros.analysis.evaluation.questions import PATH_CLASS, ask_all
 from foc_ros.analysis.fitting.duration_fit import find_samples
 from foc_ros.analysis.fitting.recorded_hand import RecordedHand, read_hand
 from foc_ros.analysis.parallel import collect, collect_all, open_executor
-from foc_ros.analysis.recordings import Recording, find_recordings
-from foc_ros.analysis.replay import Replay
+from foc_ros.analysis.recordings import Recording, find_recordings, group_by_operator
 from foc_ros.cli.arguments import add_worker_arguments
 from foc_ros.core.config import Config
+from foc_ros.core.errors import RecordingError
 from foc_ros.core.estimation.adaptation import Operator
 from foc_ros.core.estimation.duration import estimate_times_to_go
 from foc_ros.ros.parameters import load_parameter_file
@@ -49,7 +49,7 @@ SETTINGS = {
 CURVE = (0, 1, 2, 4, 8)
 """Numbers of earlier movements after which the time to go is scored."""
 
-Persons = dict[str, dict[str, Recording]]
+Persons = dict[str, list[Recording]]
 
 
 def find_persons(data: Path) -> Persons:
@@ -57,19 +57,10 @@ def find_persons(data: Path) -> Persons:
 
     Settings were chosen on the recordings of D3IL with odd numbers, and on every other person of HLP from the first.
     """
-    found: Persons = {}
-    for name, recording in find_recordings(data).items():
-        person = name.rpartition('_')[0]
-        if person or int(name) % 2 == 0:
-            found.setdefault(person, {})[name] = recording
-    return found if len(found) == 1 else {person: found[person] for person in sorted(found)[1::2]}
-
-
-def observe_person(item: tuple[Sequence[Recording], Config]) -> list[ObservedRecording]:
-    """Replay the recordings of a person in their order, with what is learnt from one to the next."""
-    recordings, config = item
-    replayed = Replay(config)
-    return [observe(recording, config, replayed) for recording in recordings]
+    found = group_by_operator(find_recordings(data))
+    if len(found) == 1:
+        return {person: [each for each in recordings if int(each.name) % 2 == 0] for person, recordings in found.items()}
+    return {person: found[person] for person in sorted(found)[1::2]}
 
 
 def score_ways(recordings: Sequence[ObservedRecording], baseline: Baseline, chosen: Sequence[int]) -> Scores:
@@ -120,7 +111,7 @@ def measure_pace(persons: Persons, executor: Executor) -> list[tuple[str, ...]]:
     """Return the rows of the learning curve."""
     found = []
     for recordings in persons.values():
-        hands, _ = collect(partial(read_hand, config=Config()), list(recordings.items()), executor, 'read')
+        hands, _ = collect(partial(read_hand, config=Config()), [(each.name, each) for each in recordings], executor, 'read')
         found += list(compare_pace(hands))
     table, rows = np.array(found), []
     for low, high in zip(CURVE, (*CURVE[1:], np.inf), strict=True):
@@ -142,9 +133,11 @@ def main() -> None:
     with open_executor(arguments) as executor:
         for (data, setting), config in SETTINGS.items():
             persons = find_persons(SHARED / data)
-            items = [(each, (list(found.values())[:: arguments.every], config)) for each, found in persons.items()]
-            observed = collect_all(observe_person, items, executor, f'{data}: {setting}')
-            recordings = [recording for each in observed for recording in each]
+            items = [(person, found[:: arguments.every]) for person, found in persons.items()]
+            observed = collect_all(partial(observe_in_order, config=config), items, executor, f'{data}: {setting}')
+            recordings = [recording for each, _ in observed for recording in each]
+            for name, reason in [failure for _, failed in observed for failure in failed.items()]:
+                raise RecordingError(f'{name}: {reason}')
             ways.append((data, setting, *format_ways(score_ways(recordings, published, [0] * len(recordings)))))
             positions.append((data, setting, *format_positions(recordings)))
             if data == HLP:
