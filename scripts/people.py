@@ -1,4 +1,4 @@
-"""Measure predictions of people: ways, positions, persons left out and the pace that is learnt; `make people` runs it.
+"""Measure predictions of people: ways, positions, persons left out and what is learnt of them; `make people` runs it.
 
 It uses D3IL and HLP, which have to be beside the checkout (`shared/data`), and writes the tables of doc/people.md. Each setting
 is scored on those recordings of D3IL and persons of HLP that no setting was chosen on.
@@ -39,10 +39,13 @@ PAGE, EXAMPLES = ROOT / 'doc' / 'people.md', ROOT / 'doc' / 'examples'
 D3IL, HLP = 'd3il_avoiding', 'hlp_reaching'
 ROOM = Config().with_values({'homotopy.max_candidates': 24, 'rate_hz': 4.0})
 HAND = Config().with_values({'scene.hand_radius': 0.0125, 'rate_hz': 4.0})
+UNLEARNT = {'duration.adaptation': 'none', 'likelihood.adaptation': 'none'}
 SETTINGS = {
-    (D3IL, 'defaults, pace not learnt'): ROOM.with_values({'duration.adaptation': 'none'}),
+    (D3IL, 'defaults, nothing learnt'): ROOM.with_values(UNLEARNT),
+    (D3IL, 'defaults, pace learnt'): ROOM.with_values({'likelihood.adaptation': 'none'}),
     (D3IL, 'defaults'): ROOM,
     (D3IL, 'thumb_stick.yaml'): load_parameter_file(EXAMPLES / 'thumb_stick.yaml').with_values({'rate_hz': 4.0}),
+    (HLP, 'defaults, nothing learnt'): HAND.with_values(UNLEARNT),
     (HLP, 'defaults'): HAND,
     (HLP, 'free_hand.yaml'): load_parameter_file(EXAMPLES / 'free_hand.yaml').with_values({'rate_hz': 4.0}),
 }
