@@ -41,6 +41,8 @@ from foc_ros.core.types import (
 LATEST_S = 9e9
 """Bound on a time [s]: stamps are 64-bit numbers of nanoseconds."""
 MOST_SAMPLES = 10_000_000
+PLANE, SPACE = 2, 3
+"""Number of coordinates of a position in the task plane, and of one with its height over the plane."""
 
 
 class Prediction(types.Prediction):
@@ -51,11 +53,14 @@ class Prediction(types.Prediction):
     t, solve_s : float
         Time of the hand sample, and wall time of the prediction [s].
     candidates : tuple of PredictedCandidate
-        Solved ones first, the most likely first; then those that could not be solved, with their status.
+        Solved ones first, the most likely first; then those that could not be solved, with their status. The `height` of a
+        candidate has `mean` and `covariance` of the height over the plane and its derivatives, None where it is not predicted.
     most_likely : str or None
         Label of the most likely class, which changes only when another one leads by `likelihood.margin`; None if none was solved.
     obstacles, goals : Obstacles, ndarray of shape (g, 2)
         The scene at time `t`.
+    cleared : tuple of bool
+        For each obstacle, whether the hand is predicted to pass above or below it, so that it does not block.
     notes : dict
         Counts of events such as merged classes and culled obstacles.
     """
@@ -188,6 +193,7 @@ class Predictor:
         if self.config.budget_s:
             warm_up(self.config)  # imports are no part of the time of the first update
         self._goals: types.Array | None = None
+        self._goal_heights: types.Array | None = None
         self._obstacles = ObstacleSource(make_obstacles(), None, '')
         self._hand: FilterState | None = None
         self._memory = Memory()
@@ -202,13 +208,15 @@ class Predictor:
 
         Parameters
         ----------
-        goals : array_like of shape (g, 2)
-            Positions [m], at least one. Labels number them in this order. `SceneError` is raised for anything else.
+        goals : array_like of shape (g, 2) or (g, 3)
+            Positions [m], at least one, in the plane or also with the height over it. Labels number them in this order. If they
+            have heights, the height of the hand is predicted. `SceneError` is raised for anything else.
         """
-        points = check_array('goals', goals, (None, 2))
+        has_heights = _find_shape(goals)[1:] == (SPACE,)
+        points = check_array('goals', goals, (None, SPACE if has_heights else PLANE))
         if not len(points):
             raise SceneError('goals', 'at least one position', 'none')
-        self._goals = points
+        self._goals, self._goal_heights = points[:, :PLANE], points[:, PLANE] if has_heights else None
 
     def set_obstacles(self, obstacles: Iterable[Shape] | Obstacles) -> None:
         """Replace the obstacles. Their positions hold at the next update; from then on each moves on at its velocity.
@@ -229,8 +237,8 @@ class Predictor:
         ----------
         t : float
             Time of the measurement [s].
-        position : array_like of shape (2,)
-            Position of the hand [m].
+        position : array_like of shape (2,) or (3,)
+            Position of the hand [m], in the plane, and with the height over it if the goals have heights.
 
         Returns
         -------
@@ -245,7 +253,9 @@ class Predictor:
             For a time that is not after the last one, a number that is not finite or a wrong shape. Nothing is changed then.
         """
         stamp_ns = round(check_number('t', t, -LATEST_S, LATEST_S) * NANOSECONDS)
-        sample = HandSample(stamp_ns, check_vector('position', position, 2), frame_id=self.config.frame_id)
+        point = check_vector('position', position, PLANE if self._goal_heights is None else SPACE)
+        height = 0.0 if self._goal_heights is None else float(point[PLANE])
+        sample = HandSample(stamp_ns, point[:PLANE], height, self.config.frame_id)
         if self._goals is None:
             raise SceneError('goals', 'at least one, by set_goals', 'none')
         updated = update(self._hand, sample, self.config.estimator)
@@ -259,7 +269,8 @@ class Predictor:
             self._obstacles = replace(self._obstacles, stamp_ns=stamp_ns)
         obstacles = self._obstacles.at(stamp_ns)
         deadline = Deadline(self.config.budget_s or None)
-        prediction, self._memory = predict(self.config, self._hand, obstacles, self._goals, self._memory, self._library, deadline)
+        known = self._memory, self._library, deadline, self._goal_heights
+        prediction, self._memory = predict(self.config, self._hand, obstacles, self._goals, *known)
         return Prediction(**vars(prediction))
 
     def reset(self) -> None:
@@ -404,7 +415,7 @@ def solve_classes(
 
 def _build_scene(start: ArrayLike, goals: types.Array, obstacles: Iterable[Shape] | Obstacles, config: Config) -> ReachingScene:
     expected = 'a position (2,) or a state (6,) x, y, vx, vy, ax, ay'
-    size = np.shape(np.asarray(start, dtype=object))
+    size = _find_shape(start)
     if size not in ((2,), (6,)):
         raise SceneError('start', expected, f'{start!r} of shape {size}')
     state, table = np.zeros(6), collect_obstacles(obstacles)
@@ -417,6 +428,11 @@ def _build_scene(start: ArrayLike, goals: types.Array, obstacles: Iterable[Shape
 def _fix_parameters(config: Config | None, eta: float | None, strategy: str | None, duration_s: float) -> Config:
     given = {'foc.eta': eta, 'foc.strategy': strategy, 'duration.fixed_s': duration_s, 'duration.model': 'fixed'}
     return _check_config(config).with_values({name: value for name, value in given.items() if value is not None})
+
+
+def _find_shape(given: object) -> tuple[int, ...]:
+    """Return the shape of anything that may be an array, without a check of its numbers."""
+    return np.shape(np.asarray(given, dtype=object))
 
 
 def _check_config(config: Config | None) -> Config:

@@ -120,7 +120,7 @@ def test_without_goals_there_is_no_prediction():
         foc_ros.Predictor(FAST).update(0.0, (0.0, 0.0))
 
 
-@pytest.mark.parametrize('goals', [[], [(0.3, 0.0, 0.1)], [(0.3, float('inf'))], 0.3])
+@pytest.mark.parametrize('goals', [[], [(0.3, 0.0, 0.1, 0.0)], [(0.3, float('inf'))], [(0.3, 0.0, float('nan'))], 0.3])
 def test_goals_that_cannot_be_used_are_refused(goals):
     with pytest.raises(foc_ros.SceneError, match='goals'):
         foc_ros.Predictor().set_goals(goals)

@@ -77,16 +77,18 @@ def test_a_wrong_stamp_is_refused(types: MessageTypes, sec: int, nanosec: int, w
 
 @both_kinds
 def test_goals_need_no_stamp(types: MessageTypes) -> None:
-    goals, frame_id = decode_goal(pose_stamped(types, (1.0, 2.0, 3.0), 0, 'base'), 'yz')
+    goals, frame_id, heights = decode_goal(pose_stamped(types, (1.0, 2.0, 3.0), 0, 'base'), 'yz')
     assert frame_id == 'base'
     np.testing.assert_array_equal(goals, [[2.0, 3.0]])
+    np.testing.assert_array_equal(heights, [1.0])
 
 
 @both_kinds
 def test_goals_keep_their_order(types: MessageTypes) -> None:
-    goals, frame_id = decode_goals(pose_array(types, [(1.0, 2.0, 3.0), (4.0, 5.0, 6.0)]), 'xy')
+    goals, frame_id, heights = decode_goals(pose_array(types, [(1.0, 2.0, 3.0), (4.0, 5.0, 6.0)]), 'xy')
     assert frame_id == 'world'
     np.testing.assert_array_equal(goals, [[1.0, 2.0], [4.0, 5.0]])
+    np.testing.assert_array_equal(heights, [3.0, 6.0])
 
 
 @both_kinds

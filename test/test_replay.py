@@ -60,9 +60,10 @@ def test_json_has_the_promised_names(bag: Path, capsys: pytest.CaptureFixture[st
         assert solved and sum(each['likelihood'] for each in solved) == pytest.approx(1)
         assert prediction['candidates'][0]['label'] == prediction['most_likely']
         for each in prediction['candidates']:
-            assert (
-                ' '.join(each)
-                == 'label description goal sides status effort cost eta tau lambda likelihood qp_solves mean stddev'
+            assert ' '.join(
+                each
+            ) == 'label description goal sides status effort cost eta tau lambda likelihood qp_solves mean stddev' + (
+                ' height height_velocity height_stddev' if each['likelihood'] else ''
             )
             assert each['goal'] == 0 and set(each['sides'].values()) <= {'left', 'right'}
             assert np.shape(each['mean']) == np.shape(each['stddev']) == (CONFIG.foc.steps + 1, 2)

@@ -23,13 +23,14 @@ class Summary:
     """Counts over the steps of one replay.
 
     samples: hand poses read; predictions; solved: predictions with a candidate that has a likelihood; compromised: candidates;
-    seconds: wall time of each prediction.
+    cleared_by_height: obstacles that a predicted height cleared, over all predictions; seconds: wall time of each prediction.
     """
 
     samples: int = 0
     predictions: int = 0
     solved: int = 0
     compromised: int = 0
+    cleared_by_height: int = 0
     seconds: list[float] = field(default_factory=list)
 
     def add(self, step: Step) -> None:
@@ -39,6 +40,7 @@ class Summary:
             self.predictions += 1
             self.solved += bool(step.prediction.candidates_with_likelihood)
             self.compromised += sum(not each.is_solved for each in step.prediction.candidates_with_likelihood)
+            self.cleared_by_height += sum(step.prediction.cleared)
             self.seconds.append(step.prediction.solve_s)
 
     def answer(self, counts: Mapping[str, int], duration_s: float) -> dict[str, Any]:
@@ -55,6 +57,7 @@ class Summary:
             'refused': {name: count for name, count in sorted(counts.items()) if not name.startswith(FAILED)},
             'compromised': self.compromised,
             'failures': dict(sorted(failures.items())),
+            'cleared_by_height': self.cleared_by_height,
             'prediction_ms': {'p50': p50, 'p99': p99},
             'duration_s': duration_s,
         }
@@ -70,6 +73,7 @@ def facts(answer: Mapping[str, Any]) -> dict[str, str]:
         'rejected': _list_counts(answer['refused']),
         'candidates compromised': _list_failures({Status.COMPROMISED.value: answer['compromised']}),
         'candidates not solved': _list_failures(answer['failures']),
+        'obstacles cleared by height': f'{answer["cleared_by_height"]} over all predictions',
         **({'demonstrations learned': str(answer['learned'])} if 'learned' in answer else {}),
         'time per prediction': '-' if times['p50'] is None else f'{times["p50"]:.1f} ms median, {times["p99"]:.1f} ms p99',
     }

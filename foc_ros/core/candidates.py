@@ -21,6 +21,8 @@ from .ocp.warm_start import cold_start, warm_start
 from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Solution, Status
 
 EFFORT_ONLY = CostModel()
+SETTLED = 0.02
+"""Change of a safety factor from one prediction to the next up to which no larger one is looked for."""
 
 
 class ProblemTable(Protocol):
@@ -59,11 +61,13 @@ def solve_candidates(
     costs: CostModel = EFFORT_ONLY,
     earlier: EarlierSolutions = NOTHING,
     deadline: Deadline = NEVER,
+    deadline_of_raises: Deadline = NEVER,
 ) -> list[PredictedCandidate]:
     """Solve the candidates in turn; return those for which there was time in their own order, with likelihoods 0.
 
     problems: one for each candidate; costs: parts of the cost besides the effort to go; earlier: results of the prediction
-    before, to start from. The first one is begun whatever the time. One that the deadline stops gets the status DEADLINE.
+    before, to start from. The first one is begun whatever the time. One that the deadline stops gets the status DEADLINE. Then
+    safety factors that are not settled are raised as far as they go, until the deadline of raises.
     """
     solved: dict[int, PredictedCandidate] = {}
     for row in earlier.sort_by_turn(candidates):
@@ -72,7 +76,22 @@ def solve_candidates(
         previous = earlier.solutions.get(candidates[row].label)
         given = candidates[row], problems[row], settings, costs, previous, deadline
         solved[row] = _solve_candidate(*given, is_followed=earlier is not NOTHING)
+    unsettled = [row for row, each in solved.items() if earlier is not NOTHING and _is_unsettled(each, earlier.solutions)]
+    for row in unsettled:
+        if deadline_of_raises.allows():
+            first, problem = solved[row], problems[row]
+            start = replace(warm_start(first.solution, problem), is_followed=True, is_thorough=True)
+            solution = solve_problem(problem, start, settings, deadline_of_raises)
+            solution = replace(solution, qp_solves=first.solution.qp_solves + solution.qp_solves)
+            raised = _check_class(candidates[row], problem, solution, costs)
+            solved[row] = raised if raised.has_likelihood else first
     return [solved[row] for row in sorted(solved)]
+
+
+def _is_unsettled(result: PredictedCandidate, before: Mapping[str, Solution]) -> bool:
+    """Tell whether a safety factor below the wanted one is new or has changed, so that a larger one may be in reach."""
+    previous, k = before.get(result.label), result.solution.safety_factor
+    return result.status is Status.COMPROMISED and (previous is None or abs(k - previous.safety_factor) > SETTLED)
 
 
 def _solve_candidate(
@@ -87,7 +106,7 @@ def _solve_candidate(
 ) -> PredictedCandidate:
     """Solve from the previous solution; where a likelihood comes or goes, also from the candidate's own guess.
 
-    is_followed: whether the next prediction goes on from the result.
+    is_followed: whether another search goes on from the result.
 
     A candidate that was unreachable and is solved now may have come from far beyond the least effort: the result with the smaller
     loss counts.
@@ -140,17 +159,20 @@ def rank_candidates(
     """Return the distinct candidates: solved and compromised ones, most likely first, then the others, with likelihood 0.
 
     obstacles: grown by the radius of the hand; goals (g, 2) [m]. The choice is that between the candidates with a likelihood,
-    None where there are fewer than two.
+    None where there are fewer than two or nothing is learnt from choices.
     """
     candidates = drop_duplicates(candidates)
     taken = [each for each in candidates if each.has_likelihood]
     branch_times = compute_branch_times(taken, obstacles) if likelihood.lookahead_s > 0.0 else None
     costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))
     decisions = choice = None
-    if len(taken) > 1:
+    is_learnt = likelihood.adaptation == 'online'
+    has_far_choices = likelihood.weaving > 0.0 or likelihood.beta_beyond != likelihood.beta
+    if len(taken) > 1 and (has_far_choices or is_learnt):
         decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), obstacles, hand, goals)
-        goal, sides = np.array([each.candidate.goal for each in taken], dtype=np.intp), tuple(each.sides for each in taken)
-        choice = Choice(hand.stamp_ns, obstacles, goals, goal, sides, costs, shortfalls, branch_times, decisions)
+        if is_learnt:
+            goal, sides = np.array([each.candidate.goal for each in taken], dtype=np.intp), tuple(each.sides for each in taken)
+            choice = Choice(hand.stamp_ns, obstacles, goals, goal, sides, costs, shortfalls, branch_times, decisions)
     shares = compute_likelihoods(costs, likelihood, branch_times, shortfalls, decisions)
     pairs = zip(taken, shares.tolist(), strict=True)
     ranked = [replace(each, likelihood=share) for each, share in pairs]

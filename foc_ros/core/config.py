@@ -175,6 +175,13 @@ class SceneConfig:
         0.0, 'standard deviation of the radius of obstacles from markers, collision objects and detections', 'm', 0.0, 1.0
     )
     hand_radius: float = _p(0.0, 'added to the radius of every obstacle: hands and tools are not points', 'm', 0.0, 1.0)
+    height_stddevs: float = _p(
+        2.0,
+        'standard deviations of the predicted height by which it has to clear an obstacle that is to be ignored',
+        '',
+        0.0,
+        10.0,
+    )
 
 
 Group = TypeVar('Group', DurationConfig, LikelihoodConfig)
@@ -246,6 +253,9 @@ class Config:
     )
     plane: str = _p('xy', 'task plane of the working frame', choices=PLANES, read_only=True)
     frame_id: str = _p('', 'working frame; empty: the frame of the first hand pose', read_only=True)
+    predict_height: bool = _p(
+        True, "whether the height over the plane moves to that of the goal; without it the hand's height is predicted to stay"
+    )
     foc: FocConfig = field(default_factory=FocConfig)
     duration: DurationConfig = field(default_factory=DurationConfig)
     estimator: EstimatorConfig = field(default_factory=EstimatorConfig)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .homotopy import compute_swept_angles
 from .obstacles.chance_constraint import centre_trajectories
-from .rows import find_direction, find_rows, locate_rows
+from .rows import WALL, find_direction, find_rows, locate_rows
 from .types import LEFT, RIGHT, Array, HandState, Obstacles, Solution
 
 
@@ -39,15 +39,18 @@ def find_decisions(sides: NDArray[np.int8], obstacles: Obstacles, hand: HandStat
     """Find the decisions of classes that pass obstacles on sides (k, n); goals (g, 2) [m]."""
     here, start = hand.mean[:2], hand.mean[:2] if hand.onset_position is None else hand.onset_position
     direction = find_direction(start, goals)
-    open_rows = np.flatnonzero((sides != sides[:1]).any(axis=0))
-    obstacles, is_left = obstacles.take(open_rows), sides[:, open_rows] == LEFT
+    is_open = (sides != sides[:1]).any(axis=0)
+    obstacles, is_left = obstacles.take(np.flatnonzero(is_open)), sides[:, is_open] == LEFT
     row, along = find_rows(obstacles, direction, start, goals), obstacles.centre @ direction
-    across = obstacles.centre @ np.array([-direction[1], direction[0]])
-    gaps, woven = list[NDArray[np.bool_]](), np.zeros(len(sides), dtype=np.intp)
-    for number in np.flatnonzero(locate_rows(along, row) > here @ direction):
-        members = np.flatnonzero(row == number)
-        gaps.append(is_left[:, members[np.argsort(across[members], kind='stable')]])
-        woven += (gaps[-1][:, 1:] > gaps[-1][:, :-1]).any(axis=1)
+    is_ahead = np.append(locate_rows(along, row) > here @ direction, False)[row]  # a wall is in the last row here
+    order = np.lexsort((obstacles.centre @ np.array([-direction[1], direction[0]]), row))
+    order = order[is_ahead[order]]
+    if not len(order):
+        return Decisions(np.zeros(len(sides), dtype=np.intp), np.zeros(len(sides), dtype=np.intp))
+    row, is_left = row[order], is_left[:, order]
+    turns_back = np.zeros_like(is_left)
+    turns_back[:, 1:] = (is_left[:, 1:] > is_left[:, :-1]) & (row[1:] == row[:-1])
+    woven = np.logical_or.reduceat(turns_back, np.flatnonzero(np.diff(row, prepend=WALL)), axis=1).sum(axis=1)
     numbers = dict[bytes, int]()
-    next_gap = [numbers.setdefault(each.tobytes(), len(numbers)) for each in gaps[0]] if gaps else [0] * len(sides)
+    next_gap = [numbers.setdefault(gap.tobytes(), len(numbers)) for gap in is_left[:, row == row[0]]]
     return Decisions(np.array(next_gap, dtype=np.intp), woven)

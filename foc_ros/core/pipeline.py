@@ -35,10 +35,12 @@ class PredictionTask:
     memory: Memory
     library: Sequence[Demonstration]
     deadline: Deadline
+    goal_heights: Array | None
 
     def run(self) -> tuple[Prediction, Memory]:
         """Compute the prediction and the memory for the next one; this may happen in another thread."""
-        return predict(self.config, self.hand, self.obstacles, self.goals, self.memory, self.library, self.deadline)
+        scene = self.hand, self.obstacles, self.goals
+        return predict(self.config, *scene, self.memory, self.library, self.deadline, self.goal_heights)
 
 
 class Pipeline:
@@ -139,11 +141,11 @@ class Pipeline:
         self.scene = self.scene.with_source(source, ObstacleSource(obstacles, stamp_ns or None, frame_id))
         return SampleStatus.ACCEPTED
 
-    def set_goals(self, goals: Array, frame_id: str) -> SampleStatus:
-        """Replace all goals, (g, 2) [m]; an empty array removes them."""
+    def set_goals(self, goals: Array, frame_id: str, heights: Array | None = None) -> SampleStatus:
+        """Replace all goals, (g, 2) [m]; an empty array removes them. heights (g,): where they are known [m]."""
         if not self._rejections.accept_frame('goals_wrong_frame', 'goals', frame_id, self.frame_id):
             return SampleStatus.WRONG_FRAME
-        self.scene = self.scene.with_goals(goals, frame_id)
+        self.scene = self.scene.with_goals(goals, frame_id, heights)
         return SampleStatus.ACCEPTED
 
     def predict(self, deadline: Deadline = NEVER) -> Prediction | None:
@@ -168,9 +170,9 @@ class Pipeline:
         assert self.scene.goals is not None
         self._is_new, self._predicted_ns = False, self.hand_state.stamp_ns
         obstacles = self.scene.obstacles(self.hand_state.stamp_ns)
-        self._task = PredictionTask(
-            self.adapted_config, self.hand_state, obstacles, self.scene.goals, self._memory, self._library, deadline
-        )
+        scene = self.hand_state, obstacles, self.scene.goals
+        heights = self.scene.goal_heights
+        self._task = PredictionTask(self.adapted_config, *scene, self._memory, self._library, deadline, heights)
         return self._task
 
     def finish(self, task: PredictionTask, compute: Callable[[], tuple[Prediction, Memory]]) -> Prediction | None:
@@ -262,4 +264,4 @@ class Pipeline:
         for name, source in before.sources.items():
             self.set_obstacles(name, source.obstacles, source.stamp_ns, source.frame_id)
         if before.goals is not None:
-            self.set_goals(before.goals, before.goals_frame)
+            self.set_goals(before.goals, before.goals_frame, before.goal_heights)

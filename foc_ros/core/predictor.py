@@ -14,8 +14,9 @@ from .continuity import Past, keep_answers, make_continuous, smooth_paths
 from .deadline import NEVER, Deadline
 from .dynamics.noise import scale_noise
 from .dynamics.plant_models import make_plant_model
-from .dynamics.predictive_covariance import compute_predictive_covariance, timing_covariances
+from .dynamics.predictive_covariance import compute_predictive_covariance, widen_covariance
 from .estimation.duration import choose_candidate_durations, estimate_times_to_go, is_passing, limit_change
+from .height import HeightPredictor
 from .homotopy import Turn, search
 from .homotopy.demonstrations import Demonstration, GuessTiming, recall_demonstrations
 from .likelihood import make_cost_model, make_preference, select_most_likely
@@ -25,8 +26,9 @@ from .obstacles.culling import cull_obstacles
 from .ocp.problem import Problem, rest_to_goal
 from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Prediction, make_obstacles
 
-SEARCH_SHARE, SOLVE_SHARE = 0.3, 0.9
-"""Parts of the time left that the search and then the solves may take before they begin no further step."""
+SEARCH_SHARE, RAISE_SHARE, SOLVE_SHARE = 0.3, 0.4, 0.7
+"""Parts of the time left that the search, and then raising safety factors further and all solves, may take before they begin no
+further step. A step may take a fifth of the budget."""
 RESERVE_S = 5e-5
 """Time besides that for each candidate, to keep, rank and smooth it [s]."""
 
@@ -39,6 +41,7 @@ def predict(
     memory: Memory,
     library: Sequence[Demonstration] = (),
     deadline: Deadline = NEVER,
+    goal_heights: Array | None = None,
 ) -> tuple[Prediction, Memory]:
     """Predict where a hand goes.
 
@@ -59,6 +62,8 @@ def predict(
     deadline
         When the prediction has to be ready. Classes for which there is no time keep their last answer (`continuity`), and have
         their turn later.
+    goal_heights
+        Heights of the goals (g,) [m]; None where they are not known, and the height of the hand is not predicted.
 
     Returns
     -------
@@ -69,15 +74,18 @@ def predict(
     hand = _simplify_start(hand, config.estimator.acceleration_time_s)
     durations = _find_durations(hand, goals, past, config)
     given, grown = obstacles, obstacles.grow(config.scene.hand_radius)
-    obstacles = cull_obstacles(grown, hand.mean[:2], goals, max(durations), config.scene.max_obstacles)
+    heights = HeightPredictor(config, hand, goal_heights)
+    cleared = heights.find_cleared(grown, goals, durations)
+    blocking = grown.take(np.flatnonzero(~cleared)) if cleared.any() else grown
+    obstacles = cull_obstacles(blocking, hand.mean[:2], goals, max(durations), config.scene.max_obstacles)
     timing, turn = GuessTiming(durations, config.foc.steps), Turn(deadline.take_share(SEARCH_SHARE), memory.next_goal)
     found = search(hand.mean, goals, obstacles, config.homotopy, *timing, memory.candidates, turn)
     scene = hand, goals, obstacles, config.homotopy, timing
     candidates = recall_demonstrations(library, *scene, found.candidates, memory.candidates)
     problems = Problems(config, hand, obstacles, goals, candidates, durations)
     costs, earlier = make_cost_model(hand.effort_spent, config), memory.find_earlier(candidates)
-    until = deadline.take_share(SOLVE_SHARE, RESERVE_S * len(candidates))
-    solved = solve_candidates(candidates, problems, config.foc, costs, earlier, until)
+    until = [deadline.take_share(share, RESERVE_S * len(candidates)) for share in (SOLVE_SHARE, RAISE_SHARE)]
+    solved = solve_candidates(candidates, problems, config.foc, costs, earlier, *until)
     widened = _widen_covariances(solved, problems, hand, config)
     kept = keep_answers(candidates, widened, past, hand.stamp_ns, config.likelihood.hold_s, costs)
     ranked, choice = rank_candidates(kept, config.likelihood, obstacles, hand, goals)
@@ -85,15 +93,21 @@ def predict(
     continuous = make_continuous(smooth, past, hand.stamp_ns, config.likelihood)
     numbers = memory.numbers.keep_goals(past.durations_s)
     predicted, numbers = numbers.number(continuous, hand.stamp_ns, config.likelihood.hold_s)
+    predicted = heights.add_to(predicted)
     likelihoods = {each.label: each.likelihood for each in predicted if each.has_likelihood}
     shares = {each.candidate: each.likelihood for each in predicted if each.has_likelihood}
     best = select_most_likely(likelihoods, past.find_renamed(memory.most_likely, shares), config.likelihood.margin)
-    counts = {'merged': len(kept) - len(ranked), 'culled': len(given) - len(obstacles)}
+    counts = {
+        'merged': len(kept) - len(ranked),
+        'culled': len(blocking) - len(obstacles),
+        'cleared_by_height': int(cleared.sum()),
+    }
     counts |= {'recalled': len(candidates) - len(found.candidates), 'kept': sum(each.age_s > 0.0 for each in predicted)}
     counts['waiting'] = len(candidates) - len({each.label for each in candidates} & {each.label for each in kept})
     notes = dict(found.notes) | {name: count for name, count in counts.items() if count}
     hand_at = hand.stamp_ns, hand.frame_id, hand.height
-    prediction = Prediction(*hand_at, predicted, best, notes, time.perf_counter() - began, given, goals)
+    scene_then = given, goals, tuple(cleared.tolist())
+    prediction = Prediction(*hand_at, predicted, best, notes, time.perf_counter() - began, *scene_then)
     earlier, followed = memory.remember(candidates, solved, earlier, likelihoods, hand.stamp_ns)
     present = past.follow(prediction, durations, config.likelihood.hold_s)
     return prediction, Memory(best, candidates, earlier, followed, present, found.next_goal, numbers, choice)
@@ -165,33 +179,33 @@ def build_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: A
 def _simplify_start(hand: HandState, acceleration_time_s: float) -> HandState:
     """Return the state that a prediction starts from.
 
-    Speed and acceleration of a hand that has not begun to move are set to zero, because they are noise: with 1 mm of it at 100
-    Hz, the efforts of a hand at rest would differ by a factor of three from one sample to the next, and the classes of a
-    symmetric obstacle would swap their ranks 24 times a second.
+    Speed and acceleration of a hand that has not begun to move, those of its height too, are set to zero, because they are noise:
+    with 1 mm of it at 100 Hz, the efforts of a hand at rest would differ by a factor of three from one sample to the next, and
+    the classes of a symmetric obstacle would swap their ranks 24 times a second.
 
     An acceleration a that decays as exp(-t / tau) leads from the speed v to v + tau a. Where the operator commands speed, as with
     a thumb stick, tau is short, and a plan that starts from v + tau a without acceleration is nearer to what follows.
     """
     if hand.onset_ns is None:
-        return replace(hand, mean=np.concatenate([hand.mean[:2], np.zeros(4)]))
+        height_at_rest = np.array([hand.height_mean[0], 0.0, 0.0])
+        return replace(hand, mean=np.concatenate([hand.mean[:2], np.zeros(4)]), height_mean=height_at_rest)
     if not acceleration_time_s:
         return hand
     final_velocity = hand.mean[2:4] + acceleration_time_s * hand.mean[4:]
-    return replace(hand, mean=np.concatenate([hand.mean[:2], final_velocity, np.zeros(2)]))
+    height, velocity, acceleration = hand.height_mean.tolist()
+    height_then = np.array([height, velocity + acceleration_time_s * acceleration, 0.0])
+    return replace(hand, mean=np.concatenate([hand.mean[:2], final_velocity, np.zeros(2)]), height_mean=height_then)
 
 
 def _widen_covariances(
     candidates: Sequence[PredictedCandidate], problems: Problems, hand: HandState, config: Config
 ) -> list[PredictedCandidate]:
     """Add the predictive covariance, and that of the timing, to the covariance that motor noise causes."""
-    plant, shared = make_plant_model(config.foc), dict[float, Array]()
-    widened = []
+    shared, widened = dict[float, Array](), []
     for each in candidates:
         dt = problems.find(each.label).horizon.dt
         if dt not in shared:
             shared[dt] = compute_predictive_covariance(hand, dt, config.foc.steps, config)
-        covariance = each.solution.covariance + shared[dt]
-        for added in timing_covariances(each.solution, hand.onset_ns is None, config.duration, plant):
-            covariance += added
+        covariance = widen_covariance(each.solution, shared[dt], hand.onset_ns is None, config)
         widened.append(replace(each, solution=each.solution.with_covariance(covariance)))
     return widened

@@ -28,15 +28,10 @@ def find_rows(obstacles: Obstacles, direction: Array, start: Array, goals: Array
     """Return the row (n,) of each obstacle, counted along a unit vector (2,), or WALL; start (2,), goals (g, 2) [m]."""
     low, high = _find_extents(obstacles, direction)
     row = np.full(len(obstacles), WALL, dtype=np.int64)
-    number, end = -1, -np.inf
-    is_wall = find_walls(obstacles, np.vstack([start, goals]))
-    for each in np.argsort(low, kind='stable'):
-        if is_wall[each]:
-            continue
-        if low[each] > end:
-            number += 1
-        end = max(end, high[each])
-        row[each] = number
+    standing = np.flatnonzero(~find_walls(obstacles, np.vstack([start, goals])))
+    order = standing[np.argsort(low[standing], kind='stable')]
+    is_first = np.append(True, low[order[1:]] > np.maximum.accumulate(high[order])[:-1])
+    row[order] = np.cumsum(is_first[: len(order)]) - 1
     return row
 
 
@@ -61,4 +56,6 @@ def _find_extents(obstacles: Obstacles, direction: Array) -> tuple[Array, Array]
 
 def locate_rows(position: Array, row: Rows) -> Array:
     """Return the position (r,) [m] of each row: the mean of its obstacles; position (n,) [m] and row (n,) of the obstacles."""
-    return np.array([position[row == each].mean() for each in range(int(row.max(initial=-1)) + 1)])
+    row, position = row[row != WALL], position[row != WALL]
+    located: Array = np.bincount(row, position) / np.bincount(row)
+    return located

@@ -28,6 +28,10 @@ def as_readonly(array: Array) -> Array:
     return array
 
 
+UNKNOWN_HEIGHTS = as_readonly(np.array([-np.inf, np.inf]))
+"""Lowest and highest point of an obstacle whose height is not known [m]: it blocks at every height."""
+
+
 class Record:
     """Base of the records: after construction every array field is read-only and C-contiguous."""
 
@@ -88,8 +92,9 @@ class HandState(Record):
     """The estimated state of the hand at a stamp.
 
     mean (6,): x, y, vx, vy, ax, ay [m, m/s, m/s^2]; covariance (6, 6) in the same order;
-    onset_ns: stamp at which the present movement began, None at rest; onset_position (2,): where it began [m];
-    effort_spent: integral of squared jerk since onset [m^2/s^5].
+    height: as measured, along the plane's normal [m]; onset_ns: stamp at which the present movement began, None at rest;
+    onset_position (2,): where it began [m]; effort_spent: integral of squared jerk since onset [m^2/s^5]; height_mean (3,):
+    height, its velocity and its acceleration, with the covariance that x, vx and ax have.
     """
 
     stamp_ns: int
@@ -100,6 +105,7 @@ class HandState(Record):
     onset_ns: int | None = None
     onset_position: Array | None = None
     effort_spent: float = 0.0
+    height_mean: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -108,7 +114,8 @@ class Obstacles(Record):
 
     ids: name of each, used in labels; centre (n, 2): a point inside [m]; radius (n,): mean distance of the boundary from the
     polygon [m]; radius_stddev (n,) [m]; velocity (n, 2) [m/s]; centre_covariance (n, 2, 2) [m^2]; vertices (n, V, 2): of the
-    polygons, anticlockwise, relative to the centre [m]; corners (n,): number of vertices of each, rows beyond are not used.
+    polygons, anticlockwise, relative to the centre [m]; corners (n,): number of vertices of each, rows beyond are not used;
+    heights (n, 2): lowest and highest point of each along the plane's normal [m], UNKNOWN_HEIGHTS where they are not known.
     """
 
     ids: tuple[str, ...]
@@ -119,6 +126,7 @@ class Obstacles(Record):
     centre_covariance: Array
     vertices: Array
     corners: NDArray[np.intp]
+    heights: Array
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -140,6 +148,7 @@ class Obstacles(Record):
             self.centre_covariance[index],
             self.vertices[index],
             self.corners[index],
+            self.heights[index],
         )
 
     @property
@@ -167,10 +176,11 @@ def make_obstacles(
     velocity: ArrayLike = 0.0,
     centre_covariance: ArrayLike = 0.0,
     polygons: Sequence[Array] | None = None,
+    heights: ArrayLike = UNKNOWN_HEIGHTS,
 ) -> Obstacles:
     """Build `Obstacles` from array-likes; scalars hold for every row, and ids default to the numbers of the rows.
 
-    polygons: vertices of each (v, 2), anticlockwise, relative to the centre [m]; circles if not given.
+    polygons: vertices of each (v, 2), anticlockwise, relative to the centre [m]; circles if not given. heights: (n, 2) or (2,).
     """
     centres = np.asarray(centre, dtype=float).reshape(-1, 2)
     n = len(centres)
@@ -187,6 +197,7 @@ def make_obstacles(
         np.full((n, 2, 2), centre_covariance, dtype=float),
         vertices,
         corners,
+        np.full((n, 2), heights, dtype=float),
     )
 
 
@@ -328,6 +339,25 @@ class Solution(Record):
         return self.dt * np.arange(len(self.mean), dtype=np.float64)
 
 
+@dataclass(frozen=True, eq=False)
+class HeightTrajectory(Record):
+    """The predicted movement along the normal of the task plane, at steps 0..N of a candidate.
+
+    mean (N + 1, m): height [m], its velocity [m/s] and what else one axis of the plant has; covariance, motor_covariance
+    (N + 1, m, m): of these, in total and the part that motor noise causes. Height and position in the plane are independent.
+    """
+
+    mean: Array
+    covariance: Array
+    motor_covariance: Array
+
+    @property
+    def stddev(self) -> Array:
+        """Standard deviation of the height, (N + 1,) [m]."""
+        stddev: Array = np.sqrt(np.maximum(self.covariance[:, 0, 0], 0.0))
+        return stddev
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class PredictedCandidate:
     """One candidate with its solution and likelihood.
@@ -336,7 +366,8 @@ class PredictedCandidate:
     by id. cost: effort to go, time cost, and the share of the effort since onset that all classes have in common [m^2/s^5];
     likelihood in [0, 1]: 0 unless solved or compromised. age_s: 0, or how long ago the solution was found, of which this is the
     rest, if there was no time for a new one or it failed [s]. way: a number that stays the same for as long as the class is
-    followed, whatever its label and its rank are.
+    followed, whatever its label and its rank are. height: the movement along the normal of the plane, None where it is not
+    predicted: the hand then stays at its height.
     """
 
     candidate: Candidate
@@ -346,6 +377,7 @@ class PredictedCandidate:
     likelihood: float
     age_s: float = 0.0
     way: int = 0
+    height: HeightTrajectory | None = None
 
     def __repr__(self) -> str:
         """Say label, status and likelihood."""
@@ -421,7 +453,8 @@ class Prediction(Record):
     candidates: solved and compromised ones, most likely first; then those without a likelihood, with their status.
     most_likely: label after hysteresis, None where no candidate has a likelihood. notes: facts for diagnostics (relaxed margins,
     merged classes, culled obstacles), as counts by name. solve_s: wall time of the whole prediction [s]. obstacles: all that were
-    given, at the stamp of the hand; goals (g, 2) [m].
+    given, at the stamp of the hand; goals (g, 2) [m]. cleared (n,): whether the predicted height clears each obstacle, which
+    therefore does not block.
     """
 
     stamp_ns: int
@@ -433,6 +466,7 @@ class Prediction(Record):
     solve_s: float = 0.0
     obstacles: Obstacles = field(default_factory=make_obstacles)
     goals: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    cleared: tuple[bool, ...] = ()
 
     def __repr__(self) -> str:
         """Say time, number of candidates and the most likely one."""
@@ -445,6 +479,13 @@ class Prediction(Record):
     def t(self) -> float:
         """Time of the hand sample [s]."""
         return self.stamp_ns / NANOSECONDS
+
+    @property
+    def blocking_obstacles(self) -> Obstacles:
+        """The obstacles that the predicted height does not clear."""
+        if not any(self.cleared):
+            return self.obstacles
+        return self.obstacles.take([row for row, is_cleared in enumerate(self.cleared) if not is_cleared])
 
     @property
     def solved_candidates(self) -> tuple[PredictedCandidate, ...]:

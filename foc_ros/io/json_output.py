@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.guidance.step import GuidanceOutput
-from foc_ros.core.types import LEFT, Array, PredictedCandidate, Prediction, Solution
+from foc_ros.core.types import LEFT, Array, HeightTrajectory, PredictedCandidate, Prediction, Solution
 
 
 def encode_prediction(prediction: Prediction) -> dict[str, Any]:
@@ -25,7 +25,8 @@ def encode_candidate(candidate: PredictedCandidate) -> dict[str, Any]:
     """Return the class, status, costs and path of a candidate.
 
     goal: row of its goal; effort [m^2/s^6], cost [m^2/s^5], tau [m^2], lambda [1/s^6]; mean and stddev (N + 1, 2) of the position
-    [m] at steps 0..N. Numbers that are not finite become null.
+    [m] at steps 0..N. Where the height over the plane is predicted, also height, height_velocity and height_stddev (N + 1,) [m,
+    m/s]. Numbers that are not finite become null.
     """
     solution = candidate.solution
     variances = np.diagonal(solution.covariance[:, :2, :2], axis1=1, axis2=2)
@@ -44,7 +45,14 @@ def encode_candidate(candidate: PredictedCandidate) -> dict[str, Any]:
         'qp_solves': solution.qp_solves,
         'mean': encode_table(solution.path),
         'stddev': encode_table(np.sqrt(np.maximum(variances, 0.0))),
+        **({} if candidate.height is None else _encode_height(candidate.height)),
     }
+
+
+def _encode_height(height: HeightTrajectory) -> dict[str, Any]:
+    columns = height.mean[:, 0], height.mean[:, 1], height.stddev
+    names = 'height', 'height_velocity', 'height_stddev'
+    return {name: [encode_number(value) for value in column.tolist()] for name, column in zip(names, columns, strict=True)}
 
 
 def encode_solution(solution: Solution) -> dict[str, Any]:

@@ -60,6 +60,14 @@ def timing_covariances(
         yield compute_onset_delay_covariance(solution, config.wait_s)
 
 
+def widen_covariance(solution: Solution, shared: Array, at_rest: bool, config: Config) -> Array:
+    """Return the total covariance (N + 1, n, n): of motor noise, of the timing, and what all plans of one duration share."""
+    total: Array = solution.covariance + shared
+    for added in timing_covariances(solution, at_rest, config.duration, make_plant_model(config.foc)):
+        total += added
+    return total
+
+
 def compute_onset_delay_covariance(solution: Solution, wait_s: float) -> Array:
     """Return the covariance (N + 1, n, n) about a plan from rest if it begins after an exponential time of mean wait_s [s]."""
     states = solution.mean - solution.mean[0]

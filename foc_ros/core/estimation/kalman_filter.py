@@ -5,8 +5,8 @@ Per axis the state is x = (position, velocity, acceleration), driven by white je
     x(t + dt) = A(dt) x(t) + w,  A = [[1, dt, dt^2/2], [0, 1, dt], [0, 0, 1]],  w ~ N(0, q^2 G(dt)),
     G(dt) = [[dt^5/20, dt^4/8, dt^3/6], [dt^4/8, dt^3/3, dt^2/2], [dt^3/6, dt^2/2, dt]],
 
-the exact discretisation for any dt, so that irregular stamps need no resampling. Both axes are measured equally well, so they
-share one 3 x 3 covariance P and one gain.
+the exact discretisation for any dt, so that irregular stamps need no resampling. The two axes of the task plane and the height
+over it are measured equally well, so they share one 3 x 3 covariance P and one gain.
 
 The filter propagates the lower triangular root L of P = L L'. The time update makes the columns [A L, q C] triangular, with C C'
 = G(dt). The measurement update, for a position of standard deviation r, involves only the first row of L, which is (l, 0, 0):
@@ -17,9 +17,10 @@ stay. The covariance is therefore symmetric and positive for all deviations and 
 The first sample gives the position. Velocity and acceleration start at zero, with the covariance that the jerk would give a hand
 at rest within `gap_s`, the longest time for which the filter trusts an old state.
 
-A movement begins when the speed exceeds both `onset_speed` and three of its own standard deviations, and ends below half of
-`onset_speed`. Measured at rest with 1 mm of noise and the default jerk density, the second condition reduces the false onsets
-from several per second to at most one in 45 s, and delays a true one (0.3 m in 1 s) by 0.03 s at 200 Hz and 0.09 s at 15 Hz.
+A movement begins when the speed in the plane exceeds both `onset_speed` and three of its own standard deviations, and ends below
+half of `onset_speed`. Measured at rest with 1 mm of noise and the default jerk density, the second condition reduces the false
+onsets from several per second to at most one in 45 s, and delays a true one (0.3 m in 1 s) by 0.03 s at 200 Hz and 0.09 s at
+15 Hz.
 """
 
 from __future__ import annotations
@@ -128,7 +129,7 @@ def triangularise(columns: Matrix) -> Matrix:
 
 @compiled
 def expand_to_both_axes(covariance: Matrix) -> Matrix:
-    """Return the covariance (6, 6) of x, y, vx, vy, ax, ay from the one (3, 3) that both axes share."""
+    """Return the covariance (6, 6) of x, y, vx, vy, ax, ay from the one (3, 3) that all axes share."""
     both = np.zeros((6, 6))
     for i in range(3):
         for j in range(3):
@@ -140,7 +141,10 @@ def expand_to_both_axes(covariance: Matrix) -> Matrix:
 def filter_step(
     mean: Vector, root: Matrix, dt: float, jerk_density: float, stddev: float, position: Vector
 ) -> tuple[Vector, Matrix, Matrix]:
-    """Return mean (6,), covariance (6, 6) and root (3, 3) after dt [s] and a position (2,) of a standard deviation [m]."""
+    """Return mean (9,), covariance (6, 6) and root (3, 3) after dt [s] and a position (3,) of a standard deviation [m].
+
+    mean: position, velocity and acceleration, of the two axes of the plane and the height each; covariance: of the two axes.
+    """
     step, columns = compute_transition(dt), np.empty((3, 6))
     columns[:, :3] = multiply(step, root)
     for i in range(3):
@@ -148,7 +152,7 @@ def filter_step(
     corrected = triangularise(columns)
     first = corrected[0, 0]
     deviation = np.hypot(first, stddev)
-    states = multiply(step, mean.reshape(3, 2))
+    states = multiply(step, mean.reshape(3, 3))
     innovation = position - states[0]
     for i in range(3):
         states[i] += corrected[i, 0] * (first / deviation / deviation) * innovation
@@ -161,17 +165,22 @@ def _start_state(sample: HandSample, config: EstimatorConfig) -> FilterState:
     root = np.zeros((3, 3))
     root[0, 0] = config.position_stddev
     root[1:, 1:] = config.jerk_density * np.linalg.cholesky(compute_gramian(config.gap_s)[1:, 1:])
-    mean = np.concatenate([sample.position, np.zeros(4)])
-    return FilterState(sample.stamp_ns, mean, expand_to_both_axes(root @ root.T), sample.height, sample.frame_id, root=root)
+    mean, height_mean = np.concatenate([sample.position, np.zeros(4)]), np.array([sample.height, 0.0, 0.0])
+    hand = sample.stamp_ns, mean, expand_to_both_axes(root @ root.T), sample.height, sample.frame_id
+    return FilterState(*hand, height_mean=height_mean, root=root)
 
 
 def _update_state(state: FilterState, sample: HandSample, dt: float, config: EstimatorConfig) -> FilterState:
     """Propagate a state to the stamp of the sample, correct it by the position, and update the movement."""
     settings = config.jerk_density, config.position_stddev
-    mean, covariance, root = map(as_readonly, filter_step(state.mean, state.root, dt, *settings, sample.position))
+    before = np.empty((3, 3))
+    before[:, :2], before[:, 2] = state.mean.reshape(3, 2), state.height_mean
+    measured = np.array([*sample.position.tolist(), sample.height])
+    after, covariance, root = map(as_readonly, filter_step(before.ravel(), state.root, dt, *settings, measured))
+    mean, height_mean = as_readonly(after.reshape(3, 3)[:, :2].ravel()), after[2::3]
     onset_ns, onset_position, effort = _update_movement(state, sample, mean, covariance, config)
     hand = sample.stamp_ns, mean, covariance, sample.height, sample.frame_id
-    return FilterState(*hand, onset_ns, onset_position, effort.spent, root, effort)
+    return FilterState(*hand, onset_ns, onset_position, effort.spent, height_mean, root, effort)
 
 
 def _update_movement(

@@ -185,8 +185,8 @@ def _follow_prediction(config: Config, before: Followed, given: GuidanceInput) -
     if prediction is None or prediction is before.prediction:
         return before
     known, obstacles, margins = remember_likelihoods(prediction, before.known), before.obstacles, before.margins
-    if before.prediction is None or prediction.obstacles is not before.prediction.obstacles:
-        obstacles = prediction.obstacles.grow(config.scene.hand_radius)
+    if before.prediction is None or not _is_blocked_alike(prediction, before.prediction):
+        obstacles = prediction.blocking_obstacles.grow(config.scene.hand_radius)
         margins = build_margins(obstacles, config.guidance.margin)
     if not prediction.candidates_with_likelihood:
         return Followed(prediction, obstacles=obstacles, margins=margins, known=known)
@@ -197,6 +197,10 @@ def _follow_prediction(config: Config, before: Followed, given: GuidanceInput) -
     travelled = float(np.hypot(*given.velocity)) * max(given.prediction_age_s, 0.0)
     progress = transfer_progress(paths, references, given.position, travelled)
     return Followed(prediction, paths, progress, obstacles, margins, known)
+
+
+def _is_blocked_alike(prediction: Prediction, other: Prediction) -> bool:
+    return prediction.obstacles is other.obstacles and prediction.cleared == other.cleared
 
 
 def _compute_wish(settings: GuidanceConfig, followed: Followed, given: GuidanceInput) -> _Wish:

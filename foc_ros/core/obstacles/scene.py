@@ -24,11 +24,15 @@ class ObstacleSource:
 
 @dataclass(frozen=True, eq=False)
 class Scene(Record):
-    """Obstacles by source, in order of arrival, and the goals (g, 2) [m], None until some were received."""
+    """Obstacles by source, in order of arrival, and the goals (g, 2) [m], None until some were received.
+
+    goal_heights (g,): of the goals, along the plane's normal [m]; None where they are not known.
+    """
 
     sources: dict[str, ObstacleSource] = field(default_factory=dict)
     goals: Array | None = None
     goals_frame: str = ''
+    goal_heights: Array | None = None
 
     def with_source(self, name: str, source: ObstacleSource) -> Scene:
         """Return the scene with the obstacles of one source replaced; this source is now the latest."""
@@ -38,9 +42,9 @@ class Scene(Record):
         """Return the scene without the obstacles of one source."""
         return replace(self, sources={other: part for other, part in self.sources.items() if other != name})
 
-    def with_goals(self, goals: Array, frame_id: str) -> Scene:
+    def with_goals(self, goals: Array, frame_id: str, heights: Array | None = None) -> Scene:
         """Return the scene with all goals replaced."""
-        return replace(self, goals=np.array(goals, dtype=float).reshape(-1, 2), goals_frame=frame_id)
+        return replace(self, goals=np.array(goals, dtype=float).reshape(-1, 2), goals_frame=frame_id, goal_heights=heights)
 
     def obstacles(self, stamp_ns: int) -> Obstacles:
         """Return all obstacles at a stamp [ns]: the union over the sources, in which the latest source of an id counts."""
@@ -83,4 +87,5 @@ def _concatenate(tables: list[Obstacles], ids: list[str]) -> Obstacles:
         np.concatenate([table.centre_covariance for table in tables]),
         np.concatenate(vertices),
         np.concatenate([table.corners for table in tables]),
+        np.concatenate([table.heights for table in tables]),
     )

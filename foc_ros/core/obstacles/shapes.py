@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from foc_ros.core.checks import check_array, check_number, check_vector
 from foc_ros.core.errors import SceneError
-from foc_ros.core.types import Array, Obstacles, make_obstacles
+from foc_ros.core.types import UNKNOWN_HEIGHTS, Array, Obstacles, make_obstacles
 
 MOST_VERTICES = 16
 """Most vertices of a convex hull that a user gives."""
@@ -56,7 +56,7 @@ def make_hull_polygon(points: Array) -> tuple[Array, Array]:
 
 
 class Shape:
-    """What the shapes have in common: an uncertain radius, a velocity, a name, an uncertain centre."""
+    """What the shapes have in common: an uncertain radius, a velocity, a name, an uncertain centre, heights."""
 
     kind: ClassVar[str] = 'shape'
     centre: ArrayLike
@@ -65,6 +65,7 @@ class Shape:
     velocity: ArrayLike
     name: str
     centre_stddev: float
+    heights: ArrayLike | None
 
     @property
     def polygon(self) -> Array:
@@ -77,6 +78,11 @@ class Shape:
             object.__setattr__(self, field, tuple(vector.tolist()))
         for field in ('radius', 'radius_stddev', 'centre_stddev'):
             object.__setattr__(self, field, check_number(f'obstacle.{field}', getattr(self, field), low=0.0))
+        if self.heights is not None:
+            lowest, highest = check_vector('obstacle.heights', self.heights, 2).tolist()
+            if lowest >= highest:
+                raise SceneError('obstacle.heights', 'the lowest point below the highest', [lowest, highest])
+            object.__setattr__(self, 'heights', (lowest, highest))
         if not isinstance(self.name, str):
             raise SceneError('obstacle.name', 'a text', repr(self.name))
         if self.radius == 0.0 and len(self.polygon) == 1:
@@ -106,6 +112,8 @@ class Circle(Shape):
         Name used in labels such as ``goal0:+post``; by default the number of the obstacle in its list.
     centre_stddev : float
         Standard deviation of the centre along each axis [m].
+    heights : array_like of shape (2,), optional
+        Lowest and highest point along the normal of the plane [m]. Without them the obstacle blocks at every height.
 
     Raises
     ------
@@ -126,6 +134,7 @@ class Circle(Shape):
     velocity: ArrayLike = (0.0, 0.0)
     name: str = ''
     centre_stddev: float = 0.0
+    heights: ArrayLike | None = None
 
     def __post_init__(self) -> None:
         self._check('centre')
@@ -153,6 +162,8 @@ class Box(Shape):
         Name used in labels such as ``goal0:+post``; by default the number of the obstacle in its list.
     centre_stddev : float
         Standard deviation of the centre along each axis [m].
+    heights : array_like of shape (2,), optional
+        Lowest and highest point along the normal of the plane [m]. Without them the obstacle blocks at every height.
 
     Raises
     ------
@@ -175,6 +186,7 @@ class Box(Shape):
     velocity: ArrayLike = (0.0, 0.0)
     name: str = ''
     centre_stddev: float = 0.0
+    heights: ArrayLike | None = None
 
     def __post_init__(self) -> None:
         size = check_vector('obstacle.size', self.size, 2)
@@ -230,6 +242,8 @@ class Capsule(_HullOfPoints):
         Name used in labels such as ``goal0:+post``; by default the number of the obstacle in its list.
     centre_stddev : float
         Standard deviation of the centre along each axis [m].
+    heights : array_like of shape (2,), optional
+        Lowest and highest point along the normal of the plane [m]. Without them the obstacle blocks at every height.
 
     Raises
     ------
@@ -251,6 +265,7 @@ class Capsule(_HullOfPoints):
     velocity: ArrayLike = (0.0, 0.0)
     name: str = ''
     centre_stddev: float = 0.0
+    heights: ArrayLike | None = None
 
     def __post_init__(self) -> None:
         self._check('start', 'end')
@@ -277,6 +292,8 @@ class Hull(_HullOfPoints):
         Name used in labels such as ``goal0:+post``; by default the number of the obstacle in its list.
     centre_stddev : float
         Standard deviation of the centre along each axis [m].
+    heights : array_like of shape (2,), optional
+        Lowest and highest point along the normal of the plane [m]. Without them the obstacle blocks at every height.
 
     Raises
     ------
@@ -297,6 +314,7 @@ class Hull(_HullOfPoints):
     velocity: ArrayLike = (0.0, 0.0)
     name: str = ''
     centre_stddev: float = 0.0
+    heights: ArrayLike | None = None
 
     def __post_init__(self) -> None:
         points = check_array('obstacle.points', self.points, (None, 2))
@@ -334,4 +352,5 @@ def collect_obstacles(shapes: Iterable[Shape] | Obstacles) -> Obstacles:
         np.array([each.velocity for each in given], dtype=float).reshape(-1, 2),
         np.array([each.centre_stddev**2 * np.eye(2) for each in given]).reshape(-1, 2, 2),
         [each.polygon for each in given],
+        np.array([UNKNOWN_HEIGHTS if each.heights is None else each.heights for each in given]).reshape(-1, 2),
     )

@@ -31,8 +31,9 @@ class Start:
 
     positions (N, 2): at steps 1..N, to linearise at [m]. A start from an earlier solution also has its stacked control (2N,), its
     contacts, safety factor, lambda, and slope dk/ds (0 where not known). lam is None for a cold start, which has none of these.
-    is_unfinished: whether the deadline stopped the earlier solution. is_followed: whether the next prediction goes on from
-    the result, so that a long search may end in that one.
+    is_unfinished: whether the deadline stopped the earlier solution. is_followed: whether another search goes on from the
+    result, in this prediction or the next one, so that this one may be short. is_thorough: whether this is the other
+    search, which is not short.
     """
 
     positions: Array
@@ -43,6 +44,7 @@ class Start:
     safety_factor_slope: float = 0.0
     is_unfinished: bool = False
     is_followed: bool = False
+    is_thorough: bool = False
 
 
 def cold_start(guess: Array) -> Start:

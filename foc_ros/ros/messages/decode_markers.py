@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.errors import MessageError
-from foc_ros.core.types import NANOSECONDS, Array, Obstacles, make_obstacles
+from foc_ros.core.types import NANOSECONDS, UNKNOWN_HEIGHTS, Array, Obstacles, make_obstacles
 
 from .decode_objects import encode_name
 from .decode_point_cloud import MAX_ROWS
 from .decode_poses import MAX_COORDINATE, check_coordinate, decode_stamp
-from .plane import compute_rotation, project, project_box
+from .plane import compute_rotation, make_heights, project, project_box
 
 ADD, DELETE, DELETE_ALL = 0, 2, 3
 CUBE, SPHERE, CYLINDER = 1, 2, 3
@@ -32,12 +32,16 @@ Key = tuple[str, int]
 
 @dataclass(frozen=True)
 class MarkerObstacle:
-    """A rounded polygon in the task plane [m]; expires_ns: the end of its lifetime, None if it does not expire."""
+    """A rounded polygon in the task plane [m], with its lowest and highest point, heights (2,), along the normal of the plane.
+
+    expires_ns: the end of its lifetime, None if it does not expire.
+    """
 
     centre: Array
     polygon: Array
     radius: float
     radius_stddev: float
+    heights: Array
     expires_ns: int | None
 
     def exists(self, now_ns: int) -> bool:
@@ -64,11 +68,12 @@ class MarkerTable:
         now_ns: start of the lifetime of an unstamped marker; 0 if unknown, and the marker does not expire. radius_stddev: [m].
 
         The radius of a sphere is half its largest scale, that of a cylinder half the larger of scale.x and scale.y; their
-        orientation is not used. A cube is the convex hull of the projections of its corners, with the radius 0. A marker with a
-        number that is not finite is dropped, and the marker that it would replace stays. A marker of another type replaces an
-        obstacle, but is none; both are counted. Raises MessageError, and then nothing is changed, for an unknown action, a
-        negative scale or lifetime, a cube without an extent in the plane, a coordinate beyond MAX_COORDINATE, two frames, or more
-        markers than MAX_ROWS.
+        orientation is not used. A cylinder stands on the plane, with the height scale.z; the height of a sphere, and of any
+        marker without an extent along the normal, is not known. A cube is the convex hull of its corners, with the radius 0. A
+        marker with a number that is not finite is dropped, and the marker that it would replace stays. A marker of another type
+        replaces an obstacle, but is none; both are counted. Raises MessageError, and then nothing is changed, for an unknown
+        action, a negative scale or lifetime, a cube without an extent in the plane, a coordinate beyond MAX_COORDINATE, two
+        frames, or more markers than MAX_ROWS.
         """
         held = self._find_existing(now_ns)
         frame_id, newest_ns, dropped = self.frame_id, 0, Counter[str]()
@@ -104,6 +109,7 @@ class MarkerTable:
             [marker.radius_stddev for marker in held.values()] or 0.0,
             tuple(encode_name(key[0], str(key[1])) for key in held),
             polygons=[marker.polygon for marker in held.values()],
+            heights=np.array([marker.heights for marker in held.values()]).reshape(-1, 2),
         )
 
     def find_unchanged_interval(self, now_ns: int) -> tuple[float, float]:
@@ -139,9 +145,12 @@ def _decode_marker(marker: Any, name: str, start_ns: int, plane: str, radius_std
     expires_ns = start_ns + lifetime_ns if lifetime_ns and start_ns else None
     place, size = (position.x, position.y, position.z), (scale.x, scale.y, scale.z)
     if marker.type == CUBE:
-        centre, polygon = project_box(place, size, compute_rotation(marker.pose.orientation), plane)
+        centre, polygon, heights = project_box(place, size, compute_rotation(marker.pose.orientation), plane)
         if len(polygon) == 1:
             raise MessageError(f'{name}.scale', 'a size > 0 m along an axis of the plane', '{:g} x {:g} x {:g} m'.format(*size))
-        return MarkerObstacle(centre, polygon, 0.0, radius_stddev, expires_ns)
-    diameter = max(size) if marker.type == SPHERE else max(size[:2])
-    return MarkerObstacle(project(place, plane)[0], POINT, float(diameter) / 2.0, radius_stddev, expires_ns)
+        return MarkerObstacle(centre, polygon, 0.0, radius_stddev, heights, expires_ns)
+    centre, height = project(place, plane)
+    if marker.type == SPHERE:
+        return MarkerObstacle(centre, POINT, float(max(size)) / 2.0, radius_stddev, UNKNOWN_HEIGHTS, expires_ns)
+    heights = make_heights(height, scale.z)
+    return MarkerObstacle(centre, POINT, float(max(size[:2])) / 2.0, radius_stddev, heights, expires_ns)

@@ -16,18 +16,18 @@ import numpy as np
 
 from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacles.shapes import make_hull_polygon
-from foc_ros.core.types import Array, Obstacles, make_obstacles
+from foc_ros.core.types import UNKNOWN_HEIGHTS, Array, Obstacles, make_obstacles
 
 from .decode_point_cloud import MAX_ROWS, DecodedCloud
 from .decode_poses import MAX_COORDINATE, check_coordinate, decode_stamp
-from .plane import compute_rotation, project, project_box
+from .plane import compute_rotation, make_heights, project, project_box
 
 ADD, REMOVE, APPEND, MOVE = range(4)
 BOX, SPHERE, CYLINDER = 1, 2, 3
 DIMENSIONS = {BOX: 3, SPHERE: 1, CYLINDER: 2}
 """Number of dimensions of each shape_msgs/SolidPrimitive that becomes an obstacle."""
-Outline = tuple[Array, Array, float]
-"""Centre (2,), polygon (v, 2) and radius of an obstacle in the task plane [m]."""
+Outline = tuple[Array, Array, float, Array]
+"""Centre (2,), polygon (v, 2) and radius of an obstacle in the task plane, and its lowest and highest point (2,) [m]."""
 
 
 @dataclass(frozen=True)
@@ -172,18 +172,23 @@ def _check_size(name: str, length: float) -> None:
 
 
 def _outline(kind: int, size: tuple[float, ...], pose: Pose, plane: str, name: str = 'primitives') -> Outline:
-    """Return a primitive in the plane: a sphere as a circle, a cylinder as all within its radius of its axis."""
+    """Return a primitive in the plane: a sphere is a circle of unknown height, a cylinder all within its radius of its axis."""
     if kind == SPHERE:
-        return project(pose.place, plane)[0], np.zeros((1, 2)), size[0]
+        return project(pose.place, plane)[0], np.zeros((1, 2)), size[0], UNKNOWN_HEIGHTS
     if kind == CYLINDER:
+        upright = float(project(pose.rotation[:, 2], plane)[1])
         ends = pose.place + np.outer([0.5, -0.5], size[0] * pose.rotation[:, 2])
-        return (*make_hull_polygon(project(ends, plane)[0]), size[1])
-    centre, polygon = project_box(pose.place, size, pose.rotation, plane)
+        extent = size[0] * abs(upright) + 2.0 * size[1] * math.sqrt(max(1.0 - upright**2, 0.0))
+        heights = make_heights(project(pose.place, plane)[1], extent)
+        return (*make_hull_polygon(project(ends, plane)[0]), size[1], heights)
+    centre, polygon, heights = project_box(pose.place, size, pose.rotation, plane)
     if len(polygon) == 1:
         raise MessageError(name, 'a size > 0 m along an axis of the plane', ' x '.join(f'{length:g}' for length in size))
-    return centre, polygon, 0.0
+    return centre, polygon, 0.0, heights
 
 
 def _collect(outlines: Mapping[str, Outline], radius_stddev: float) -> Obstacles:
-    centres, polygons, radii = zip(*outlines.values(), strict=True) if outlines else ((), (), ())
-    return make_obstacles(centres, radii, radius_stddev, tuple(outlines), polygons=polygons)
+    if not outlines:
+        return make_obstacles()
+    centres, polygons, radii, heights = zip(*outlines.values(), strict=True)
+    return make_obstacles(centres, radii, radius_stddev, tuple(outlines), polygons=polygons, heights=heights)

@@ -14,11 +14,11 @@ from foc_ros.core.obstacles.shapes import tabulate_boxes
 from foc_ros.core.types import Array, Obstacles, make_obstacles
 
 from .decode_poses import MAX_COORDINATE, decode_stamp
-from .plane import project
+from .plane import make_heights, project
 
 REQUIRED = ('x', 'y', 'z', 'radius')
-COLUMNS = (*REQUIRED, 'radius_stddev', 'vx', 'vy', 'vz', 'size_x', 'size_y', 'yaw')
-BOX = COLUMNS[8:]
+COLUMNS = (*REQUIRED, 'radius_stddev', 'vx', 'vy', 'vz', 'size_x', 'size_y', 'yaw', 'size_z')
+BOX = COLUMNS[8:11]
 """Columns of which any makes the rows boxes: full lengths along its own axes [m] and its angle to the plane's first axis."""
 IDENTITY = 'id'
 MAX_ROWS = 20_000
@@ -42,7 +42,8 @@ class DecodedCloud:
 def decode_point_cloud(message: Any, plane: str) -> DecodedCloud:
     """Decode the obstacles of a PointCloud2 and project them onto the task plane; a cloud without rows is an empty scene.
 
-    An obstacle is a circle, or a box with rounded corners if its `size_x` or `size_y` is larger than 0.
+    An obstacle is a circle, or a box with rounded corners if its `size_x` or `size_y` is larger than 0. `size_z` is its full
+    length along the normal of the plane; the height of an obstacle without it, or that moves along the normal, is not known.
 
     Coordinates, sizes and radii are floats of 4 or 8 bytes, `id` is an integer of any size (without it, the row number is the
     id), in either byte order, organised or not; other fields are skipped. A row with a number that is not finite is dropped and
@@ -65,9 +66,11 @@ def decode_point_cloud(message: Any, plane: str) -> DecodedCloud:
     latest = dict(zip(identities[rows].tolist(), rows.tolist(), strict=True))
     kept = sorted(latest.items(), key=itemgetter(1))
     dropped = {'not_finite': len(table) - len(rows), 'duplicate_id': len(rows) - len(kept)}
-    x_y_z, (radius, radius_stddev), velocity, box = np.split(columns[:, [row for _, row in kept]], (3, 5, 8))
+    x_y_z, (radius, radius_stddev), v_xyz, box, (size_z,) = np.split(columns[:, [row for _, row in kept]], (3, 5, 8, 11))
     ids = tuple(str(identity) for identity, _ in kept)
-    obstacles = make_obstacles(project(x_y_z.T, plane)[0], radius, radius_stddev, ids, project(velocity.T, plane)[0])
+    (centre, height), (velocity, climb) = project(x_y_z.T, plane), project(v_xyz.T, plane)
+    heights = make_heights(height, np.where(climb == 0.0, size_z, 0.0))
+    obstacles = make_obstacles(centre, radius, radius_stddev, ids, velocity, heights=heights)
     if is_box:
         vertices, corners = tabulate_boxes(box[:2].T, box[2])
         obstacles = replace(obstacles, vertices=vertices, corners=corners)
@@ -117,7 +120,7 @@ def _read_layout(message: Any, step: int) -> np.dtype[np.void]:
 
 
 def _read_columns(table: NDArray[np.void]) -> Array:
-    """Return the numbers of the rows, (11, n), in the order of COLUMNS; columns that the message does not have are 0."""
+    """Return the numbers of the rows, (12, n), in the order of COLUMNS; columns that the message does not have are 0."""
     columns = np.zeros((len(COLUMNS), len(table)))
     with np.errstate(invalid='ignore'):  # numpy warns of a signalling NaN, whose row is dropped like that of any other NaN
         for name in table.dtype.names or ():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,17 +30,27 @@ def decode_hand_sample(message: Any, plane: str) -> HandSample:
     return HandSample(stamp_ns, as_readonly(position), float(height), str(message.header.frame_id))
 
 
-def decode_goals(message: Any, plane: str) -> tuple[Array, str]:
-    """Decode a geometry_msgs/PoseArray as goals (g, 2) [m] and their frame; an array without poses gives g = 0."""
+class DecodedGoals(NamedTuple):
+    """Goals (g, 2) in the plane, their frame, and their heights over the plane (g,) [m]."""
+
+    goals: Array
+    frame_id: str
+    heights: Array
+
+
+def decode_goals(message: Any, plane: str) -> DecodedGoals:
+    """Decode a geometry_msgs/PoseArray; an array without poses gives no goals."""
     if len(message.poses) > MAX_GOALS:
         raise MessageError('poses', f'at most {MAX_GOALS} goals', len(message.poses))
     points = [_decode_point(pose.position, f'poses[{i}].position') for i, pose in enumerate(message.poses)]
-    return project(np.array(points, dtype=float).reshape(-1, 3), plane)[0], str(message.header.frame_id)
+    goals, heights = project(np.array(points, dtype=float).reshape(-1, 3), plane)
+    return DecodedGoals(goals, str(message.header.frame_id), heights)
 
 
-def decode_goal(message: Any, plane: str) -> tuple[Array, str]:
-    """Decode a geometry_msgs/PoseStamped as one goal (1, 2) [m] and its frame; the stamp is not used."""
-    return project([_decode_point(message.pose.position, 'pose.position')], plane)[0], str(message.header.frame_id)
+def decode_goal(message: Any, plane: str) -> DecodedGoals:
+    """Decode a geometry_msgs/PoseStamped as one goal; the stamp is not used."""
+    goals, heights = project([_decode_point(message.pose.position, 'pose.position')], plane)
+    return DecodedGoals(goals, str(message.header.frame_id), heights)
 
 
 def decode_stamp(header: Any, field: str = 'header.stamp') -> int:

@@ -1,7 +1,8 @@
 """Encoding of a prediction as a MarkerArray: paths, ellipses and labels of all candidates, and the uncertain obstacles.
 
 Each candidate has two ellipses of one standard deviation at a place: an inner one of the motor noise, which eta is about, and an
-outer one of the total uncertainty. The names of their namespaces and a legend say so.
+outer one of the total uncertainty. The names of their namespaces and a legend say so. Where the height is predicted, they are
+cylinders of one standard deviation of it up and down.
 
 Every array first deletes the markers of the one before, and all markers expire after LIFETIME_S, so that the drawing of a
 prediction that is not renewed disappears.
@@ -85,26 +86,32 @@ class _MarkerEncoder:
             red, green, blue = UNLIKELY + likelihood * (LIKELY - UNLIKELY)
             colour, text = (red, green, blue, 0.4 + 0.6 * likelihood), f'{100 * likelihood:.0f} %'
             text += '' if outcome.is_solved else f', compromised: eta {outcome.eta:.3f}'
-            for name, covariance in ((MOTOR, outcome.motor_covariance), (TOTAL, outcome.covariance)):
-                yield from self._encode_ellipses(name, index, outcome.solution.path, covariance, colour)
+            for name in ELLIPSE_STYLES:
+                yield from self._encode_ellipses(name, index, outcome, colour)
         else:
             colour, text = GREY, outcome.reason
-        points = self._lift(find_drawn_curve(outcome))
+        points = self._lift_curve(find_drawn_curve(outcome), outcome)
         width = 0.002 + 0.004 * likelihood
         yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=[self._encode_point(*p) for p in points])
         label = f'{outcome.label} ({describe_candidate(outcome, len(self.prediction.goals))}) {text}'
         yield self.encode('label', index, TEXT, colour, (0, 0, TEXT_HEIGHT), points[len(points) // 2], text=label)
 
-    def _encode_ellipses(self, name: str, index: int, path: Array, covariance: Array, colour: Colour) -> Iterator[Any]:
+    def _encode_ellipses(self, name: str, index: int, outcome: PredictedCandidate, colour: Colour) -> Iterator[Any]:
         """Yield ellipses of one standard deviation about the mean, spread over the path."""
+        path = outcome.solution.path
         steps = _spread_steps(len(path))
+        covariance = outcome.motor_covariance if name == MOTOR else outcome.covariance
         variances, axes = np.linalg.eigh(covariance[steps, :2, :2])
         diameters = (2.0 * np.sqrt(np.maximum(variances, 0.0))).tolist()
         angles = np.arctan2(axes[:, 1, 0], axes[:, 0, 0]).tolist()
         opacity, thickness = ELLIPSE_STYLES[name]
+        thick = np.full(len(steps), thickness)
+        if outcome.height is not None:
+            variance = (outcome.height.motor_covariance if name == MOTOR else outcome.height.covariance)[steps, 0, 0]
+            thick = np.maximum(thick, 2.0 * np.sqrt(np.maximum(variance, 0.0)))
         faint = (*colour[:3], opacity * colour[3])
-        for i, centre in enumerate(self._lift(path[steps])):
-            yield self.encode(name, 1000 * index + i, CYLINDER, faint, (*diameters[i], thickness), centre, angles[i])
+        for i, centre in enumerate(self._lift_curve(path, outcome, steps)):
+            yield self.encode(name, 1000 * index + i, CYLINDER, faint, (*diameters[i], float(thick[i])), centre, angles[i])
 
     def encode_legend(self) -> Iterator[Any]:
         """Yield the legend of the ellipses, below the hand, if any are drawn."""
@@ -165,8 +172,17 @@ class _MarkerEncoder:
         )
 
     def _lift(self, positions: Array) -> list[list[float]]:
-        """Return positions in the plane (m, 2) as points in space."""
+        """Return positions in the plane (m, 2) as points in space, at the height of the hand."""
         points: list[list[float]] = lift(positions, self.prediction.height, self.plane).tolist()
+        return points
+
+    def _lift_curve(self, curve: Array, outcome: PredictedCandidate, rows: Any = slice(None)) -> list[list[float]]:
+        """Return rows of a curve (m, 2) along the whole way of a candidate as points in space, at its predicted heights."""
+        if outcome.height is None:
+            return self._lift(curve[rows])
+        heights = outcome.height.mean[:, 0]
+        between = np.interp(np.linspace(0.0, 1.0, len(curve)), np.linspace(0.0, 1.0, len(heights)), heights)
+        points: list[list[float]] = lift(curve[rows], between[rows], self.plane).tolist()
         return points
 
     def _encode_point(self, x: float, y: float, z: float) -> Any:

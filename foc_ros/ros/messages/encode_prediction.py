@@ -57,7 +57,7 @@ def _build_table(prediction: Prediction, plane: str) -> NDArray[np.void]:
     mean = np.concatenate([solution.mean for solution in solutions])
     for place, axis in enumerate(plane):
         rows[axis], rows['v' + axis] = mean[:, place], mean[:, 2 + place]
-    rows[next(axis for axis in 'xyz' if axis not in plane)] = prediction.height
+    _fill_heights(rows, prediction, next(axis for axis in 'xyz' if axis not in plane))
     for prefix, name in (('', 'covariance'), (_MOTOR, 'motor_covariance')):
         covariance = np.concatenate([getattr(outcome, name)[:, :2, :2] for outcome in outcomes])
         rows[prefix + 2 * plane[0]], rows[prefix + 2 * plane[1]] = covariance[:, 0, 0], covariance[:, 1, 1]
@@ -69,6 +69,16 @@ def _build_table(prediction: Prediction, plane: str) -> NDArray[np.void]:
     rows['way'] = np.repeat([outcome.way for outcome in outcomes], lengths)
     rows['compromised'] = np.repeat([not outcome.is_solved for outcome in outcomes], lengths)
     return rows
+
+
+def _fill_heights(rows: NDArray[np.void], prediction: Prediction, normal: str) -> None:
+    """Fill in the columns of the normal of the plane; its covariances with the axes of the plane are zero."""
+    rows[normal] = prediction.height
+    heights = [outcome.height for outcome in order_candidates(prediction) if outcome.height is not None]
+    if heights:
+        rows[normal], rows['v' + normal] = np.concatenate([each.mean[:, :2] for each in heights]).T
+        rows[2 * normal] = np.concatenate([each.covariance[:, 0, 0] for each in heights])
+        rows[_MOTOR + 2 * normal] = np.concatenate([each.motor_covariance[:, 0, 0] for each in heights])
 
 
 def encode_likelihoods(prediction: Prediction, types: MessageTypes) -> Any:
@@ -98,7 +108,8 @@ def encode_path(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
     stamp_ns, frame_id = prediction.stamp_ns, prediction.frame_id
     poses: list[Any] = []
     for outcome in order_candidates(prediction)[:1]:
-        points = lift(outcome.solution.path, prediction.height, plane).tolist()
+        height = prediction.height if outcome.height is None else outcome.height.mean[:, 0]
+        points = lift(outcome.solution.path, height, plane).tolist()
         for seconds, point in zip(outcome.solution.times.tolist(), points, strict=True):
             poses.append(encode_hand_pose(types, stamp_ns + round(seconds * NANOSECONDS), frame_id, point))
     return types.make('nav_msgs/msg/Path', header=make_header(types, stamp_ns, frame_id), poses=poses)

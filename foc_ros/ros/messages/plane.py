@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from foc_ros.core.obstacles.shapes import make_hull_polygon
+from foc_ros.core.obstacles.shapes import FLAT, make_hull_polygon
 from foc_ros.core.types import Array
 
 _AXES = {'xy': (slice(0, 2), 2), 'xz': (slice(0, 3, 2), 1), 'yz': (slice(1, 3), 0)}
@@ -36,14 +36,25 @@ def compute_rotation(quaternion: Any) -> Array:
     return rotation
 
 
-def project_box(centre: ArrayLike, size: ArrayLike, rotation: Array, plane: str) -> tuple[Array, Array]:
-    """Return the middle (2,) of the outline of a box in space, and its vertices (v, 2) from there, anticlockwise [m].
+def project_box(centre: ArrayLike, size: ArrayLike, rotation: Array, plane: str) -> tuple[Array, Array, Array]:
+    """Return the outline of a box in space and its heights (2,): lowest and highest point along the normal [m].
 
-    The outline is the convex hull of the projections of the eight corners. centre (3,), size (3,) of full lengths [m]; rotation
-    (3, 3): of the box.
+    The outline, the convex hull of the projections of the eight corners, is given by its middle (2,) and its vertices (v, 2) from
+    there, anticlockwise [m]. centre (3,), size (3,) of full lengths [m]; rotation (3, 3): of the box.
     """
     corners = np.asarray(centre, dtype=float) + CORNERS * np.asarray(size, dtype=float) / 2.0 @ rotation.T
-    return make_hull_polygon(project(corners, plane)[0])
+    places, heights = project(corners, plane)
+    return *make_hull_polygon(places), make_heights((heights.min() + heights.max()) / 2.0, np.ptp(heights))
+
+
+def make_heights(middle: ArrayLike, size: ArrayLike) -> Array:
+    """Return the lowest and the highest point (..., 2) of bodies of sizes (...) about their middles (...) along the normal [m].
+
+    The height of a body without a size is not known: it is unbounded.
+    """
+    half = np.where(np.asarray(size) >= FLAT, np.asarray(size) / 2.0, np.inf)
+    heights: Array = np.stack((middle - half, middle + half), axis=-1)
+    return heights
 
 
 def lift(positions: ArrayLike, height: ArrayLike, plane: str) -> Array:

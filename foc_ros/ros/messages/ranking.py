@@ -25,7 +25,8 @@ def order_candidates(prediction: Prediction) -> tuple[PredictedCandidate, ...]:
     """
     for outcome in prediction.candidates_with_likelihood:
         solution = outcome.solution
-        arrays = solution.mean, solution.covariance
+        heights = () if outcome.height is None else (outcome.height.mean, outcome.height.covariance)
+        arrays = solution.mean, solution.covariance, *heights
         numbers = solution.effort, solution.eta, outcome.cost, outcome.likelihood
         # the maximum of an array with a NaN is NaN, and no comparison with NaN is true
         if not all(largest <= MAX_NUMBER for largest in (*(np.abs(each).max() for each in arrays), *map(abs, numbers))):

@@ -131,7 +131,10 @@ def _transform_cloud(message: Any, rotation: Array, shift: Array, plane: str) ->
     Raises MessageError for boxes that would not lie in the plane any more, or whose yaw has no field.
     """
     rows = read_table(message).copy()
-    if {'size_x', 'size_y'} & set(rows.dtype.names or ()):
+    sizes = [name for name in ('size_x', 'size_y', 'size_z') if name in (rows.dtype.names or ())]
+    if sizes:
+        _check_tilt(rotation, plane, sizes[0])
+    if {'size_x', 'size_y'} & set(sizes):
         with np.errstate(invalid='ignore'):
             rows['yaw'] = _turn_boxes(rows, rotation, plane)
     for names, offset in ((('x', 'y', 'z'), shift), (('vx', 'vy', 'vz'), np.zeros(3))):
@@ -146,11 +149,15 @@ def _transform_cloud(message: Any, rotation: Array, shift: Array, plane: str) ->
     return made
 
 
-def _turn_boxes(rows: Any, rotation: Array, plane: str) -> Array:
-    """Return the yaw (n,) [rad] of boxes after a rotation, which has to leave them in the plane."""
+def _check_tilt(rotation: Array, plane: str, field: str) -> None:
+    """Raise MessageError for a rotation that tilts the sizes of obstacles against the plane."""
     tilt = float(np.abs(project((rotation @ lift(np.eye(2), 0.0, plane).T).T, plane)[1]).max())
     if tilt > MOST_TILT:
-        raise MessageError('fields[size_x]', 'boxes that the transform leaves in the task plane', f'a tilt of {tilt:.3g}')
+        raise MessageError(f'fields[{field}]', 'boxes that the transform leaves in the task plane', f'a tilt of {tilt:.3g}')
+
+
+def _turn_boxes(rows: Any, rotation: Array, plane: str) -> Array:
+    """Return the yaw (n,) [rad] of boxes after a rotation that leaves them in the plane."""
     if 'yaw' not in rows.dtype.names:
         raise MessageError('fields', 'a field yaw, because the transform turns the boxes', ', '.join(rows.dtype.names))
     yaw = rows['yaw'].astype(float)

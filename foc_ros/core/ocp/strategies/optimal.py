@@ -48,9 +48,10 @@ FOLLOW_SHARE = 0.5
 """Part of the time left that an earlier solution may take; then the search begins again."""
 NEARLY = 0.6
 """Part of the slope that is worth it from which Newton steps are tried that have k as an unknown."""
-WARM_TRIES, COLD_TRIES = 2, 8
-"""Values of k that are tried from an earlier solution, and from the least effort, if the next prediction goes on from there."""
-WARM_STRIDE, COLD_STRIDE = 0.3, 0.4
+WARM_TRIES, COLD_TRIES = 1, 8
+"""Values of k that are tried from an earlier solution, and from the least effort, if another search goes on from there. Such a
+search ends with the first k that it has raised, so that the other classes have their turn."""
+WARM_STRIDE, COLD_STRIDE = 0.6, 0.4
 """First strides in k, if they are not too long; from an earlier solution it is shorter, the nearer the slope is to that which is
 worth it."""
 NARROW = 0.02
@@ -60,7 +61,7 @@ NARROW = 0.02
 def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadline = NEVER) -> StrategyResult:
     """Find a local minimum from a start.
 
-    Where the next prediction goes on from the result, a search that runs out of time has the k that it has reached.
+    Where another search goes on from the result, one that runs out of time has the k that it has reached.
     """
     search, is_late = _Search(problem, deadline), False
     try:
@@ -125,7 +126,7 @@ class _Search:
         self.problem, self.deadline, self.qp_solves = problem, deadline, 0
         self.best: SurrogatePoint | None = None
         self.wanted = problem.wanted_k * (1.0 + CLOSE)
-        self.is_followed = False
+        self.is_followed = self.is_thorough = False
         wish = problem.preference
         self.is_hard = math.isinf(wish.shortfall)
         rate = wish.shortfall / wish.beta if wish.beta > 0.0 else math.inf
@@ -134,7 +135,7 @@ class _Search:
 
     def run(self, start: Start) -> Status:
         """Leave the best point in `best`; return how the search ended."""
-        self.is_followed = start.is_followed and not self.is_hard
+        self.is_followed, self.is_thorough = start.is_followed and not self.is_hard, start.is_thorough
         if not self.follow_in_time(start):
             if start.control is not None and not start.is_unfinished:
                 return Status.ITERATION_LIMIT
@@ -142,7 +143,8 @@ class _Search:
         assert self.best is not None
         is_known = self.is_hard and start.safety_factor < self.problem.wanted_k and not start.is_unfinished
         if self.is_cheap(self.best) and not is_known:  # that no larger k is in reach
-            self.raise_k(WARM_TRIES, WARM_STRIDE * (1.0 - self.slope(self.best) / self.rate))
+            begin = (COLD_TRIES, COLD_STRIDE) if self.is_thorough else (WARM_TRIES, WARM_STRIDE)
+            self.raise_k(begin[0], begin[1] * (1.0 - self.slope(self.best) / self.rate))
         return self.judge()
 
     def judge(self) -> Status:
@@ -171,7 +173,7 @@ class _Search:
         contacts = start.contacts.merge(problem.first_alike)
         control = correct_to_goal(problem, start.control, start.positions, contacts.time)
         point = self.solve_below(control, contacts, min(start.safety_factor, self.wanted), WARM_SHARES)
-        point = None if point is None else self.lower_k(point)
+        point = None if point is None else self.settle_k(point)
         if point is None or not 0.0 <= point.k <= self.wanted:
             return False
         self.best = point
@@ -196,7 +198,7 @@ class _Search:
                 self.best = SurrogatePoint(control, contacts, minimum.k, 0.0, float(control @ control), unknown, unknown)
             found = self.solve_below(control, contacts, min(max(minimum.k, 0.0), self.wanted), COLD_SHARES)
             if found is not None:
-                self.best = self.lower_k(found)
+                self.best = self.settle_k(found)
                 is_stuck = self.raise_k(COLD_TRIES, COLD_STRIDE)
                 tried.append(self.best)
                 if not is_stuck:
@@ -223,16 +225,19 @@ class _Search:
             if point is not None:
                 yield point
 
-    def lower_k(self, point: SurrogatePoint) -> SurrogatePoint:
-        """Return a point with the k that is worth its effort, if a point has a larger one."""
-        if self.slope(point) <= self.rate * (1.0 + CLOSE):
+    def settle_k(self, point: SurrogatePoint) -> SurrogatePoint:
+        """Return a point with the k that is worth its effort if that is smaller, or near enough for Newton steps to it."""
+        slope = self.slope(point)
+        is_too_large = slope > self.rate * (1.0 + CLOSE)
+        if not is_too_large and not (self.is_cheap(point) and slope > NEARLY * self.rate):
             return point
-        return self.weigh(point.control, point.contacts, point.k) or point
+        worth = self.weigh(point.control, point.contacts, point.k)
+        return point if worth is None or not (is_too_large or point.k <= worth.k <= self.wanted) else worth
 
     def raise_k(self, tries: float, stride: float) -> bool:
         """Raise k to the wanted one, or to the one that is worth its effort; tell whether no larger k could be reached.
 
-        tries: values of k that are tried if the next prediction goes on from the result; stride: the first one in k.
+        tries: values of k that are tried if another search goes on from the result; stride: the first one in k.
         """
         assert self.best is not None
         low, high = self.best, math.inf  # the k of a point that costs too much
@@ -249,7 +254,7 @@ class _Search:
             if self.slope(point) <= self.rate:
                 before, low = low, point
                 self.best = low
-                stride *= 2
+                stride, tries = stride * 2, 0 if self.is_followed and not self.is_thorough else tries
             else:
                 high = point.k
             is_near = low.k < self.wanted and self.slope(point) > NEARLY * self.rate

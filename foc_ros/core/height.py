@@ -1,0 +1,132 @@
+"""The third axis: the height over the task plane, predicted by the stochastic control of the plane without obstacles.
+
+The height moves to that of the goal in the time of the candidate, with the plant of the plane's first axis, least effort, and the
+same condition at the goal. With the state z of this axis (height, velocity, acceleration), its control u (N,), the noise c, the
+response R of the states that the goal fixes at step N, whose first row S is that of the height, and the weight w of
+`foc.goal_weight`, the problem
+
+    minimise sum_k (1 + w c^2 S_k^2) u_k^2  subject to  A^N z(0) + R u = z_goal
+
+is linear-quadratic, and its answer is closed: with W = diag(1 + w c^2 S^2),
+
+    u = W^-1 R' (R W^-1 R')^-1 (z_goal - A^N z(0)).
+
+The covariance has the parts that it has in the plane (`dynamics.predictive_covariance`). c is the root mean square of
+`foc.noise_x` and `foc.noise_y`. Time to go, onset and likelihoods are those of the plane.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .config import REFERENCE_STEP_S, Config
+from .dynamics.impulse_response import apply_impulse_response
+from .dynamics.noise import propagate_covariance, scale_noise, stack_noise
+from .dynamics.plant_models import make_plant_model
+from .dynamics.plants import find_states_at_goal
+from .dynamics.predictive_covariance import compute_predictive_covariance, widen_covariance
+from .estimation.duration import is_passing
+from .obstacles.height_clearance import find_cleared
+from .types import Array, HandState, HeightTrajectory, Obstacles, PredictedCandidate, Solution, Status
+
+
+class HeightPredictor:
+    """Predicts the height of a hand on its way to any of its goals.
+
+    Parameters
+    ----------
+    config
+        All parameters.
+    hand
+        The state from which the predictions start.
+    goal_heights
+        Height of each goal, (g,) [m]. Nothing is predicted if they are not known, or with `predict_height` false.
+    """
+
+    def __init__(self, config: Config, hand: HandState, goal_heights: Array | None) -> None:
+        self._config, self._hand = config, hand
+        self._goal_heights = goal_heights if config.predict_height else None
+        self._known: dict[tuple[int, float], HeightTrajectory] = {}
+
+    def add_to(self, candidates: Sequence[PredictedCandidate]) -> tuple[PredictedCandidate, ...]:
+        """Return the candidates, those with a likelihood with the height on their way."""
+        return tuple(
+            replace(each, height=self._predict(each.candidate.goal, each.solution.dt) if each.has_likelihood else None)
+            for each in candidates
+        )
+
+    def find_cleared(self, obstacles: Obstacles, goals: Array, durations_s: Sequence[float]) -> NDArray[np.bool_]:
+        """Return which obstacles are passed above or below on the way to every goal, (n,).
+
+        obstacles: grown by the radius of the hand; goals (g, 2) [m], with the times to go [s].
+        """
+        has_height = np.isfinite(obstacles.heights).any()
+        is_cleared = np.full(len(obstacles), has_height and self._goal_heights is not None)
+        if not is_cleared.any():
+            return is_cleared
+        scene, place = self._config.scene, self._hand.mean[:2]
+        for row, (goal, duration_s) in enumerate(zip(goals, durations_s, strict=True)):
+            dt = duration_s / self._config.foc.steps
+            height = self._predict(row, dt)
+            assert height is not None
+            margin = scene.hand_radius + scene.height_stddevs * height.stddev
+            band = height.mean[:, 0] + np.stack((-margin, margin))
+            is_cleared &= find_cleared(obstacles, place, goal, self.compute_progress(goal, dt), band, dt)
+        return is_cleared
+
+    def _predict(self, goal: int, dt: float) -> HeightTrajectory | None:
+        """Return the height on the way to the goal of a row, at steps 0..N of dt [s]; equal ones are computed once."""
+        if self._goal_heights is None:
+            return None
+        if (goal, dt) not in self._known:
+            self._known[goal, dt] = predict_height(self._config, self._hand, float(self._goal_heights[goal]), dt)
+        return self._known[goal, dt]
+
+    def compute_progress(self, goal: Array, dt: float) -> Array:
+        """Return how far the free movement in the plane has come on the line to a goal (2,) at steps 0..N, (N + 1,) [m]."""
+        axes = self._hand.mean.reshape(3, 2)
+        offset = goal - axes[0]
+        distance = math.hypot(*offset)
+        start = axes @ (offset / distance) if distance else np.zeros(3)
+        start[0] = 0.0
+        progress: Array = reach_along_axis(self._config, start, distance, dt).mean[:, 0]
+        return progress
+
+
+def predict_height(config: Config, hand: HandState, goal_height: float, dt: float) -> HeightTrajectory:
+    """Return the height of a hand on its way to a goal at a height [m], at steps 0..N of dt [s]."""
+    solution = reach_along_axis(config, hand.height_mean, goal_height, dt)
+    shared = compute_predictive_covariance(hand, dt, config.foc.steps, config)
+    covariance = widen_covariance(solution, shared, hand.onset_ns is None, config)
+    return HeightTrajectory(solution.mean[:, ::2], covariance[:, ::2, ::2], solution.covariance[:, ::2, ::2])
+
+
+def reach_along_axis(config: Config, start: Array, target: float, dt: float) -> Solution:
+    """Return the movement of least effort of one axis, without obstacles, in N steps of dt [s].
+
+    start (3,): position, velocity and acceleration; target: position at the end [m]. The axis is the first one of the solution,
+    whose second one rests at zero. The covariance is that of motor noise.
+    """
+    foc, plant = config.foc, make_plant_model(config.foc)
+    horizon = plant.build_horizon(dt, foc.steps)
+    is_fixed = find_states_at_goal(plant.states, is_passing(config.duration))[::2]
+    now = plant.project_mean(np.column_stack((start, np.zeros(3))).ravel())
+    goal = np.zeros(plant.states)
+    goal[0] = target
+    noise = scale_noise(np.array([math.hypot(foc.noise_x, foc.noise_y) / math.sqrt(2.0), 0.0]), REFERENCE_STEP_S, dt)
+    last, missing = horizon.last[::2, : foc.steps], (goal - horizon.powers[-1] @ now)[::2]
+    roots = np.sqrt(1.0 + foc.goal_weight * (noise[0] * last[0]) ** 2)
+    rows = last[is_fixed] / roots
+    # the rows have different units (m, m/s, ...), so they are scaled to unit length
+    scale = 1.0 / np.linalg.norm(rows, axis=1)
+    control = np.zeros((2, foc.steps))
+    control[0] = np.linalg.pinv(scale[:, None] * rows) @ (scale * missing[is_fixed]) / roots
+    stacked = control.ravel()
+    mean = horizon.powers @ now + apply_impulse_response(horizon.states, stacked).T
+    covariance = propagate_covariance(horizon, np.zeros_like(horizon.powers), stack_noise(noise**2, foc.steps), stacked)
+    return Solution(Status.SOLVED, '', dt, mean, covariance, control.T, float(stacked @ stacked), {}, 0.0, 0.0, 1.0)
