@@ -74,9 +74,9 @@ $(STAMP): setup.py setup.cfg pyproject.toml
 	@$(PYTHON) -c '' 2>/dev/null || { $(EXPLAIN_PYTHON); exit 1; }
 	@echo "setup: creating .venv with $$($(PYTHON) -V)"
 	@test -e $@ || $(PYTHON) -m venv --clear $(VENV_OPTIONS) $(VENV) || { echo 'make: no venv in $(PYTHON); on Debian and Ubuntu: apt install python3-venv' >&2; exit 1; }
-	@echo 'setup: installing foc_ros[$(EXTRAS)], one to three minutes'
+	@echo 'setup: installing foc_ros[$(EXTRAS)], some minutes'
 	@$(PIP) install --progress-bar off --editable '.[$(EXTRAS)]' | sed -un 's/^Collecting \([^ ]*\).*/  \1/p; s/^Installing collected packages.*/  installing them/p'
-	@echo "setup: compiling the solver's kernels, one to three minutes once"
+	@echo "setup: compiling the solver's kernels once, two to ten minutes"
 	@$(BIN)/python -m foc_ros warm-up
 	@touch $@
 

@@ -25,8 +25,9 @@ from foc_ros.core.ocp import monte_carlo as sampling
 from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.predictor import predict, warm_up
-from foc_ros.core.reaching_scene import ReachingScene, build_scene_problems, check_outside, solve_scene
+from foc_ros.core.reaching_scene import ReachingScene, check_outside
 from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
+from foc_ros.core.scene_solver import build_scene_problems, solve_scene
 from foc_ros.core.types import (
     NANOSECONDS,
     Candidate,

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measure `foc_ros play` in a headless Chromium: frames per second, and the time from a pointer event to the drawn prediction.
 
-    python scripts/measure_play.py [--no-ros] [--seconds 20] [--budget 0.01]
+    python scripts/measure_play.py [--no-ros] [--scene grid|rows] [--seconds 20] [--budget 0.01]
 
 The scene has 16 obstacles, and 8 ways are followed. Synthetic pointer events move the hand to and fro. The page measures both
 numbers: frames by the times of the browser, and the delay from the time stamp of an event until the prediction for the hand that
@@ -26,15 +26,22 @@ from foc_ros.core.config import Config
 from foc_ros.ros.parameters import dump_parameter_file
 
 WAYS, OBSTACLES = 8, 16
-SCENE = """
-const obstacles = [];
+SCENES = {
+    'grid': """
 for (let row = 0; row < 16; row += 1) {
   const [x, y] = [0.1 + 0.05 * (row % 4), 0.066 * Math.floor(row / 4) - 0.1 + 0.016 * (row % 2)];
   obstacles.push({ kind: row % 4 ? 'circle' : 'box', x, y,
     ...(row % 4 ? { radius: 0.01 } : { size_x: 0.02, size_y: 0.014, yaw: 0.3 }) });
 }
-play.setScene({ obstacles, goals: play.view.scene.goals });
-"""
+""",
+    'rows': """
+for (let row = 0; row < 16; row += 1) {
+  const [x, y] = [0.15 + 0.1 * (row % 2), 0.05 * (Math.floor(row / 2) - 3.5) + 0.025 * (row % 2)];
+  obstacles.push({ kind: 'circle', x, y, radius: 0.01 });
+}
+""",
+}
+"""Obstacles: four rows of boxes and posts close together, or two rows of posts."""
 TURNS = ((0.05, 0.03), (0.0, -0.03))
 """Points between which the hand moves, before the obstacles [m]."""
 
@@ -46,6 +53,7 @@ def main() -> None:
     parser.add_argument('--seconds', type=float, default=20.0, help='time to measure (default: %(default)s)')
     words = 'budget_s of the predictions [s] (default: %(default)s)'
     parser.add_argument('--budget', type=float, default=Config().budget_s, help=words)
+    parser.add_argument('--scene', choices=SCENES, default='grid', help='arrangement of the obstacles (default: %(default)s)')
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -56,7 +64,8 @@ def main() -> None:
         options = ['--no-ros'] if given.no_ros else []
         with play(folder, '--params', str(file), *options) as started, chromium(folder / 'profile') as browser:
             visit(browser, started)
-            browser.execute_script(SCENE)
+            scene = f'const obstacles = []; {SCENES[given.scene]} play.setScene({{ obstacles, goals: play.view.scene.goals }});'
+            browser.execute_script(scene)
             wait_for(browser, f'play.view.scene.obstacles.length === {OBSTACLES} && play.view.candidates.length > 1', 'ways')
             start = 'play.measured.delays.length = 0; return [performance.now(), play.measured.predictions]'
             begun = browser.execute_script(start)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -77,6 +78,70 @@ def test_all_errors_of_a_parameter_file_are_listed_before_anything_is_imported(t
         'foc_ros replay: foc.steps: expected a number in [5, 400], got 1',
         "foc_ros replay: likelihod: expected a known parameter (did you mean likelihood?), got {'beta': 3}",
     ]
+
+
+SCENE = 'start: [0, 0]\ngoal: [0.3, a]\nstepz: 5\nobstacles: [{x: 0.1, y: 0, radios: 0.1, id: 1.5}, {x: b, y: c, radius: -1}]\n'
+WRONG_SCENE = (
+    'stepz: expected a known field (did you mean steps?), got 5',
+    'obstacles[0].radios: expected a known field (did you mean radius?), got 0.1',
+    'obstacles[0].id: expected a whole number, or a name of letters, digits, _ and ., of at most 40 characters, got 1.5',
+    "obstacles[1].x: expected a number in [-10000, 10000], got 'b'",
+    "obstacles[1].y: expected a number in [-10000, 10000], got 'c'",
+    'obstacles[1].radius: expected a number in [0, 10000], got -1',
+    "goal: expected a number in [-10000, 10000], got 'a'",
+)
+NAMES = 'accurate, noisy, laggy, changes_way, unannounced_goal, human_paths'
+INPUTS = 'hand_pose, obstacles, obstacle_markers, collision_objects, detections, goals, goal_pose'
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'lines'),
+    [
+        (['solve', 'scene.yaml'], WRONG_SCENE),
+        (['solve', 'scene.yaml', '--plot', 'a.gif'], ['--plot: expected a name that ends in .png, .pdf, .svg, got a.gif']),
+        (
+            ['simulate', '--operators', 'noisi,x'],
+            [
+                f'--operators: expected names of {NAMES} (did you mean noisy?), got noisi',
+                f'--operators: expected names of {NAMES}, got x',
+            ],
+        ),
+        (['simulate', '--report', 'scene.yaml'], ['--report: expected a folder, got scene.yaml, which is a file']),
+        (
+            ['replay', 'bag.mcap', '--remap', 'hand_pos:=/a'],
+            [f'--remap: expected one of the inputs {INPUTS} (did you mean hand_pose?), got hand_pos'],
+        ),
+        (
+            ['replay', 'bag.mcap', '--remap', 'goals:=/a', '--remap', 'goals:=/b'],
+            ['--remap: expected INPUT:=TOPIC, once for an input, got goals, goals'],
+        ),
+        (['replay', 'scene.yaml'], ['scene.yaml: expected a bag directory, a .mcap or a .db3 file']),
+        (['replay', 'bag.mcap', '--report', 'scene.yaml'], ['--report: expected a folder, got scene.yaml, which is a file']),
+        (['replay', 'bag.mcap', '--learn', 'no/a'], ['--learn: expected a file in a directory that exists, got no/a']),
+        (['evaluate', 'scene.yaml'], ['scene.yaml: expected a bag directory, a .mcap or a .db3 file']),
+        (['fit', '.', '--output', 'no/a'], ['--output: expected a file in a directory that exists, got no/a']),
+        (
+            ['fit', '.', '--output', 'a', '--allow', 'etta'],
+            ['--allow: expected names of eta, positions (did you mean eta?), got etta'],
+        ),
+        (
+            ['evaluate', '.', '--scheduler', 'here'],
+            ['--scheduler: expected the address of a Dask scheduler, as in tcp://host:8786, got here'],
+        ),
+        (['paper', '--output', 'scene.yaml'], ['--output: expected a folder, got scene.yaml, which is a file']),
+    ],
+)  # fmt: skip
+def test_wrong_inputs_are_answered_before_the_solver_is_imported(
+    tmp_path: Path, arguments: list[str], lines: Sequence[str]
+) -> None:
+    (tmp_path / 'scene.yaml').write_text(SCENE)
+    (tmp_path / 'bag.mcap').write_bytes(b'x')
+    program = 'import sys\nfrom foc_ros.cli.main import main\nmain(sys.argv[1:])\nprint("numba" in sys.modules)'
+    command = [sys.executable, '-c', program, *arguments]
+    environment = {**os.environ, 'PYTHONPATH': str(ROOT)}
+    result = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=100, check=False)
+    assert result.stdout == 'False\n'
+    assert result.stderr.splitlines() == [f'foc_ros {arguments[0]}: {line}' for line in lines]
 
 
 class Fake:

@@ -228,3 +228,33 @@ def test_human_recordings(tmp_path: Path) -> None:
         with BagReader(bag) as reader:
             hands += sum(item.role == 'hand_pose' for item in reader)
     assert hands == len(Path(tables['recordings']).read_text('utf-8').splitlines()) - 1
+
+
+def test_all_errors_of_a_table_are_found_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = 'recording,t_s,x_m,y_m\na,0,x,y\na,1,0\na,2,0,0\na,1,0,0\n'
+    assert convert(tmp_path, rows) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.partition('r.csv: ')[2].partition(',')[0].partition(':')[0] for line in lines] == ['row 3']
+    assert convert(tmp_path, rows.replace('a,1,0\n', '')) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.partition('r.csv: ')[2].partition(':')[0] for line in lines] == [
+        'row 2, column x_m', 'row 2, column y_m', 'row 4, column t_s',
+    ]  # fmt: skip
+    assert convert(tmp_path, obstacles='x_m,y_m,radius_m,id\n0,0,-1,0\n0,a,1,1\n0,0,1,1\n0,0,1,1\n') == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.partition('o.csv: ')[2].partition(':')[0] for line in lines] == [
+        'row 2, column radius_m', 'row 3, column y_m', 'row 5, column id',
+    ]  # fmt: skip
+
+
+def test_a_table_is_not_read_beyond_a_hundred_wrong_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert convert(tmp_path, obstacles='x_m,y_m,radius_m\n' + 20_000 * '0,0,-1\n') == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 101 and lines[-1].endswith('o.csv: the rows after row 101 were not checked')
+
+
+@pytest.mark.parametrize('name', ['radius_stdev_m', 'radius_std_m'])
+def test_a_misspelt_column_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    assert convert(tmp_path, obstacles=f'x_m,y_m,radius_m,{name},yaw_deg\n0,0,1,0,0\n') == 2
+    error = capsys.readouterr().err
+    assert error.endswith(f'o.csv: row 1: unknown column {name} (did you mean radius_stddev_m?)\n')

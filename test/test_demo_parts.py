@@ -116,8 +116,8 @@ def test_without_a_terminal_a_line_is_printed_each_second() -> None:
     lines = shown(filled(), False, np.arange(0.0, 3.0, 0.01)).splitlines()
     assert len(lines) == 3
     assert lines[0].startswith(' 0.1 of 5.0 s   hand samples 5/s, predictions 5/s, delay 5 ms')
-    assert '56 % goal0:-1' in lines[0]
-    assert '34 % goal0:+1 (goal0: left of 1)' in lines[0]
+    assert '56 % goal0: right of 1' in lines[0]
+    assert '34 % goal0: left of 1' in lines[0]
     assert '\x1b' not in ''.join(lines)
 
 

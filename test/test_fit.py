@@ -33,7 +33,8 @@ def use_few_predictions(monkeypatch: pytest.MonkeyPatch) -> None:
 def _fit(folder: Path, capsys: pytest.CaptureFixture[str], *arguments: str, **parameters: Any) -> tuple[dict[str, Any], Config]:
     given, output = folder.parent / 'given.yaml', folder.parent / 'fitted.yaml'
     given.write_text(dump_parameter_file(replace_values(Config(), {**QUICK, **parameters})))
-    code = main(['fit', str(folder), '--output', str(output), '--params', str(given), '--workers', '1', '--json', *arguments])
+    options = ['--params', str(given), '--workers', '1', '--json', '--allow', 'eta,positions', *arguments]
+    code = main(['fit', str(folder), '--output', str(output), *options])
     printed = capsys.readouterr()
     assert code == (2 if 'bad: ' in printed.err else 0), printed.err
     return json.loads(printed.out), load_parameter_file(output)
@@ -45,7 +46,7 @@ def past_an_obstacle(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_everything_is_fitted_and_written_for_the_node(past_an_obstacle: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    answer, config = _fit(past_an_obstacle, capsys, '--allow', 'eta')
+    answer, config = _fit(past_an_obstacle, capsys)
     assert answer['recordings'] == 6 and answer['failed'] == {}
     values = flatten(config)
     fitted = {'estimator.position_stddev', 'estimator.jerk_density', 'duration.fitts_a_s', 'duration.fitts_b_s'}

@@ -19,6 +19,8 @@ from foc_ros.analysis.fitting.setting_search import Replays
 from foc_ros.analysis.fitting.tables import make_verdict
 from foc_ros.analysis.parallel import IsolatedProcessPool
 from foc_ros.analysis.recordings import find_recordings
+from foc_ros.cli import fit as fit_command
+from foc_ros.cli.main import main
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.estimation.kalman_filter import compute_transition
 from foc_ros.core.types import Array, make_obstacles
@@ -195,3 +197,18 @@ def test_worse_positions_are_named_with_both_errors() -> None:
     assert find_worse_positions(comparison) == [words]
     (sentence,) = make_verdict({'comparison': {name: comparison[name] for name in ('error_m 0.5', 'error_m 1')}})
     assert sentence == 'Worse with the fitted parameters: error of positions 0.5 s ahead [mm] 63.0 to 96.0.'
+
+
+@pytest.mark.parametrize(('options', 'code'), [([], 2), (['--allow', 'positions'], 0)])
+def test_without_a_terminal_worse_positions_are_written_only_if_allowed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], options: list[str], code: int
+) -> None:
+    fit, output = Fit(CONFIG), tmp_path / 'operator.yaml'
+    fit.comparison = {'error_m 0.5': {'before': 0.063, 'after': 0.096}}
+    monkeypatch.setattr(fit_command, 'fit_parameters', lambda *_, **__: fit)
+    data = write_tables(tmp_path / 'data', count=1)
+    assert main(['fit', str(data), '--output', str(output), '--workers', '1', *options]) == code
+    error = capsys.readouterr().err
+    assert 'predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm\n' in error
+    assert output.exists() == (code == 0)
+    assert (f'{output} is not written; --allow positions writes it all the same' in error) == (code == 2)

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import foc_ros
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.deadline import Deadline
+from foc_ros.core.dynamics.predictive_covariance import SharedCovariances
 from foc_ros.core.estimation.kalman_filter import update
 from foc_ros.core.height import HeightPredictor, predict_height, reach_along_axis
 from foc_ros.core.memory import Memory
@@ -79,7 +80,7 @@ def test_the_variance_is_that_of_noisy_movements_that_are_replanned():
     root = np.diag([0.004, 0.03, 0.2])
     covariance = np.kron(root @ root, np.eye(2))
     hand = replace(hand_at(0.1), height_mean=START, covariance=covariance)
-    found = predict_height(config, hand, 0.4, DT)
+    found = predict_height(config, hand, 0.4, DT, SharedCovariances(hand, config)[DT])
     control = reach_along_axis(config, START, 0.4, DT).control[:, 0]
     A, B = np.array([[1.0, DT, DT**2 / 2], [0.0, 1.0, DT], [0.0, 0.0, 1.0]]), np.array([DT**3 / 6, DT**2 / 2, DT])
     noise = np.zeros((samples, STEPS + 1, 3))
@@ -209,7 +210,9 @@ def test_the_likeliest_ways_have_about_the_progress_of_the_free_movement():
         centres = generator.uniform([0.05, -0.1], [0.35, 0.1], (4, 2))
         prediction = predict(CONFIG, hand_at(0.0), make_obstacles(centres, 0.02, 0.002), GOAL, Memory())[0]
         for each in prediction.candidates_with_likelihood:
-            free = HeightPredictor(CONFIG, hand_at(0.0), None).compute_progress(GOAL[0], each.solution.dt)
+            free = HeightPredictor(CONFIG, hand_at(0.0), None, SharedCovariances(hand_at(0.0), CONFIG)).compute_progress(
+                GOAL[0], each.solution.dt
+            )
             if each.likelihood > 0.3:
                 deviations.append(np.abs(each.mean[:, 0] - free).max() / GOAL[0, 0])
     assert len(deviations) > 50

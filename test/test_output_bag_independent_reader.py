@@ -85,7 +85,10 @@ def test_rows_of_the_prediction_are_read_by_field_name(decoded: dict[str, list[o
         for index, label in enumerate(labels):
             part, solution = table[table['candidate'] == index], by_label[label].solution
             assert np.allclose(np.column_stack([part['x'], part['y']]), solution.path, atol=1e-6)
-            assert np.allclose(part['t'], solution.times, atol=1e-6) and np.allclose(part['z'], 0.1)
+            height = by_label[label].height
+            assert height is not None and np.allclose(height.mean[[0, -1], 0], [0.1, 0.0], atol=1e-6)
+            assert np.allclose(part['t'], solution.times, atol=1e-6) and np.allclose(part['z'], height.mean[:, 0], atol=1e-6)
+            assert np.allclose(part['zz'], height.stddev**2, rtol=1e-5, atol=1e-12)
             assert np.allclose(part['xx'], solution.covariance[:, 0, 0], rtol=1e-6)
             assert np.allclose(part['likelihood'], by_label[label].likelihood)
             assert np.allclose([part['x'][-1], part['y'][-1]], GOAL[0, :2], atol=1e-6)

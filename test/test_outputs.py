@@ -15,10 +15,10 @@ from report_samples import START_NS, prediction, predictions, samples, scene
 
 from foc_ros.cli.main import main
 from foc_ros.core.errors import InputError
-from foc_ros.io.outputs import check_replaceable
+from foc_ros.io.outputs import check_replaceable, check_report
 from foc_ros.reporting.page import write_page
 from foc_ros.reporting.plots import plot_outcomes
-from foc_ros.reporting.report import check_report, write_report
+from foc_ros.reporting.report import write_report
 from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
 
 SCENE = '{"start": [0, 0], "goal": [0.3, 0], "duration_s": 1, "steps": 10, "noise": [0.05, 0.05], "eta": 0.9, "obstacles": []}'
@@ -54,9 +54,9 @@ def test_a_report_is_replaced_by_the_next_one(tmp_path: Path) -> None:
 def test_a_report_overwrites_no_other_file(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text('mine', 'utf-8')
     with pytest.raises(InputError, match='--report: expected a new file, or one that foc_ros has made'):
-        check_report(tmp_path)
+        check_report('--report', tmp_path)
     (tmp_path / name).rename(tmp_path / 'other.html')
-    check_report(tmp_path)
+    check_report('--report', tmp_path)
 
 
 def test_a_page_overwrites_no_other_file(tmp_path: Path) -> None:

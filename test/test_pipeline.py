@@ -36,8 +36,9 @@ class Recorder:
         memory: Memory,
         library: tuple[Demonstration, ...],
         deadline: Deadline,
+        goal_heights: Array | None,
     ) -> tuple[Prediction, Memory]:
-        assert library == ()
+        assert library == () and goal_heights is None
         assert deadline is NEVER
         self.calls.append((config, hand, obstacles, goals, memory))
         label = f'call{len(self.calls)}'

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foc_ros.analysis.simulation import operators as people
-from foc_ros.analysis.simulation.assistance import ASSISTANCE, make_assistance
+from foc_ros.analysis.simulation.assistance import make_assistance
 from foc_ros.analysis.simulation.intended_path import DT, FREE_M, interpolate_minimum_jerk, plan_path
-from foc_ros.analysis.simulation.operators import OPERATORS, Arm, SimulatedArm, Task, draw_task
+from foc_ros.analysis.simulation.names import ASSISTANCE, NOISY, OPERATORS, UNANNOUNCED_GOAL
+from foc_ros.analysis.simulation.operators import Arm, SimulatedArm, Task, draw_task
 from foc_ros.analysis.simulation.peers import (
     ASSISTANCE_N,
     FULL_FORCE_M,
@@ -100,7 +100,7 @@ def test_operators_intend_what_their_names_say(operator: str) -> None:
     task = draw_task(operator, np.random.default_rng(4))
     assert np.hypot(*(task.path.position[-1] - task.goal)) < 1e-9
     is_announced = bool((np.hypot(*(task.goals - task.goal).T) < 1e-9).any())
-    assert is_announced == (operator != people.UNANNOUNCED_GOAL) == (task.goal_row >= 0)
+    assert is_announced == (operator != UNANNOUNCED_GOAL) == (task.goal_row >= 0)
     jumps = np.hypot(*np.diff(task.path.position, axis=0).T) / DT
     assert jumps.max() < 1.5, 'the path is continuous'
 
@@ -132,7 +132,7 @@ def test_measures_of_a_trial_with_known_answers() -> None:
 
 @pytest.mark.parametrize('rule', ASSISTANCE)
 def test_every_rule_keeps_force_and_slew_within_the_limits(rule: str) -> None:
-    task = draw_task(people.NOISY, np.random.default_rng(2))
+    task = draw_task(NOISY, np.random.default_rng(2))
     noise = np.random.default_rng(3).normal(size=(900, 2, 2))
     trial = run_trial(task, rule, QUICK, noise)
     sizes = np.hypot(*trial.assistance.T)

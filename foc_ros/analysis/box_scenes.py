@@ -12,12 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from foc_ros.core.errors import RecordingError
-from foc_ros.io.csv_tables import read_rows
+from foc_ros.io.csv_tables import Column, Row, parse_rows, read_rows
 
 from .csv_recordings import RecordedScene
 
 TARGET = 'Target'
-CENTRE, SIZE = ('x_m', 'y_m', 'z_m'), ('width_m', 'depth_m', 'height_m')
+COLUMNS = tuple(Column(name) for name in ('x_m', 'y_m', 'z_m')) + tuple(
+    Column(name, 0.0) for name in ('width_m', 'depth_m', 'height_m')
+)
 
 
 class BoxScenes:
@@ -39,12 +41,15 @@ class BoxScenes:
 def read_boxes(file: Path) -> Mapping[str, Mapping[str, tuple[float, ...]]]:
     """Return centre (3) and full lengths (3) [m] of each object by recording and name."""
     found: dict[str, dict[str, tuple[float, ...]]] = {}
-    for row in read_rows(file, ('recording', 'object', *CENTRE, *SIZE)):
+
+    def parse(row: Row) -> None:
         for column in ('recording', 'object'):
             if not row.cells[column]:
                 raise row.make_error(column, 'a name')
         boxes, name = found.setdefault(row.cells['recording'], {}), row.cells['object']
         if name in boxes:
             raise row.make_error('object', 'another name than the rows above of this recording')
-        boxes[name] = (*map(row.read_number, CENTRE), *(row.read_number(column, 0.0) for column in SIZE))
+        boxes[name] = tuple(row.read_numbers(*COLUMNS))
+
+    parse_rows(read_rows(file, ('recording', 'object', *(each.name for each in COLUMNS))), parse)
     return found

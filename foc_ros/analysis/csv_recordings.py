@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sized
 from dataclasses import dataclass, field
 from heapq import merge
 from pathlib import Path
@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.errors import RecordingError
+from foc_ros.core.errors import RecordingError, collect_all
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.bags import TYPESTORE, BagWriter
-from foc_ros.io.csv_tables import Row, read_rows
+from foc_ros.io.csv_tables import Column, Row, parse_rows, read_rows
 from foc_ros.ros.messages.decode_point_cloud import MAX_ROWS
 from foc_ros.ros.messages.decode_poses import MAX_GOALS
 from foc_ros.ros.messages.encode_inputs import encode_boxes, encode_goals, encode_hand_pose, encode_obstacles
@@ -21,6 +21,9 @@ from foc_ros.ros.messages.types import RosbagsTypes
 
 FRAME = 'world'
 SIZES = ('size_x_m', 'size_y_m')
+POSITION = (Column('x_m'), Column('y_m'), Column('z_m', default=0.0))
+EXTENT = tuple(Column(name, 0.0, default=0.0) for name in ('radius_m', 'radius_stddev_m', *SIZES))
+YAW = Column('yaw_rad', default=0.0)
 EPOCH_NS = NANOSECONDS
 """Stamp of t_s = 0. It is not 0, which means `not set` in a message."""
 LATEST_S, LONGEST_S = 2e9, 86400.0
@@ -40,16 +43,16 @@ class Movement:
 
 def read_movements(file: Path) -> list[Movement]:
     """Return the recordings in the order of their first rows; within one recording, time must not run backward."""
-    return [parse_movement(name, table) for name, table in read_movement_rows(file).items()]
+    return collect_all(parse_movement, read_movement_rows(file).items())
 
 
 def read_movement_rows(file: Path) -> dict[str, list[Row]]:
     """Return the rows of each recording, at least one, in the order of their first rows."""
     found: dict[str, list[Row]] = {}
-    for row in read_rows(file, ('recording', 't_s', 'x_m', 'y_m')):
-        if not row.cells['recording']:
-            raise row.make_error('recording', 'a name')
-        found.setdefault(row.cells['recording'], []).append(row)
+    parse_rows(
+        read_rows(file, ('recording', 't_s', 'x_m', 'y_m'), ('z_m',)),
+        lambda row: found.setdefault(_read_recording(row), []).append(row),
+    )
     _check_not_empty(file, found)
     return found
 
@@ -57,9 +60,12 @@ def read_movement_rows(file: Path) -> dict[str, list[Row]]:
 def parse_movement(name: str, table: Iterable[Row]) -> Movement:
     """Return one recording from its rows; raises RecordingError for a cell out of bounds and for time that runs backward."""
     samples: list[tuple[float, ...]] = []
-    for row in table:
+
+    def parse(row: Row) -> None:
         bounds = (samples[-1][0], samples[0][0] + LONGEST_S) if samples else (0.0, LATEST_S)
-        samples.append((row.read_number('t_s', *bounds), *_parse_position(row)))
+        samples.append(tuple(row.read_numbers(Column('t_s', *bounds), *POSITION)))
+
+    parse_rows(table, parse)
     return Movement(name, tuple(EPOCH_NS + round(each[0] * NANOSECONDS) for each in samples), np.array(samples)[:, 1:])
 
 
@@ -110,27 +116,31 @@ def read_obstacles(file: Path) -> dict[str, tuple[tuple[float, ...], ...]]:
     Ids default to the position in the rows of the recording. There are at most as many as a message may contain.
     """
     found: dict[str, dict[int, tuple[float, ...]]] = {}
-    for row in read_rows(file, ('x_m', 'y_m', 'radius_m'), {'radius_m': SIZES}):
+
+    def parse(row: Row) -> None:
         rows = found.setdefault(_read_recording(row), {})
+        x, y, z, radius, stddev, *size, yaw = row.read_numbers(*POSITION, *EXTENT, YAW)
         identity = row.read_integer('id', -(2**31), 2**31 - 1, default=len(rows))
         if identity in rows:
             raise row.make_error('id', 'another id than the rows above')
-        radius, stddev = (row.read_number(name, 0.0, default=0.0) for name in ('radius_m', 'radius_stddev_m'))
-        size = [row.read_number(name, 0.0, default=0.0) for name in SIZES]
         if SIZES[0] in row.cells and not any((radius, *size)):
             raise row.make_error(SIZES[0], 'a size or a radius > 0')
-        rows[identity] = (*_parse_position(row), radius, stddev, identity, *size, row.read_number('yaw_rad', default=0.0))
-        _check_length(file, len(rows), MAX_ROWS)
+        rows[identity] = (x, y, z, radius, stddev, identity, *size, yaw)
+
+    optional = ('recording', 'z_m', 'radius_stddev_m', *SIZES, 'yaw_rad', 'id')
+    parse_rows(read_rows(file, ('x_m', 'y_m', 'radius_m'), optional, {'radius_m': SIZES}), parse)
+    _check_length(file, found, MAX_ROWS)
     return {name: tuple(rows.values()) for name, rows in found.items()}
 
 
 def read_goals(file: Path) -> dict[str, Array]:
     """Return goals (g, 3) [m] by recording, at least one and at most as many as a message may contain."""
     found: dict[str, list[tuple[float, ...]]] = {}
-    for row in read_rows(file, ('x_m', 'y_m')):
-        goals = found.setdefault(_read_recording(row), [])
-        goals.append(_parse_position(row))
-        _check_length(file, len(goals), MAX_GOALS)
+    parse_rows(
+        read_rows(file, ('x_m', 'y_m'), ('recording', 'z_m')),
+        lambda row: found.setdefault(_read_recording(row), []).append(tuple(row.read_numbers(*POSITION))),
+    )
+    _check_length(file, found, MAX_GOALS)
     _check_not_empty(file, found)
     return {name: np.array(goals) for name, goals in found.items()}
 
@@ -169,12 +179,8 @@ def _read_recording(row: Row) -> str:
     return row.cells.get('recording', '')
 
 
-def _parse_position(row: Row) -> tuple[float, float, float]:
-    return row.read_number('x_m'), row.read_number('y_m'), row.read_number('z_m', default=0.0)
-
-
-def _check_length(file: Path, length: int, most: int) -> None:
-    if length > most:
+def _check_length(file: Path, found: Mapping[str, Sized], most: int) -> None:
+    if any(len(rows) > most for rows in found.values()):
         raise RecordingError(f'{file}: expected at most {most:,} rows, got more')
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from foc_ros.core.errors import RecordingError
-from foc_ros.io.bags import BagReader, Item
+from foc_ros.io.bags import BagReader, Item, check_bag
 from foc_ros.io.csv_tables import Row
 
 from .box_scenes import BoxScenes
@@ -71,6 +71,7 @@ def find_recordings(data: Path) -> dict[str, Recording]:
     if (data / RECORDINGS).exists():
         return dict(read_tables(data))
     if data.is_file() or (data / 'metadata.yaml').exists():
+        check_bag(data)
         bags = [data.resolve()]
     elif data.is_dir():
         bags = [path for path in sorted(data.iterdir()) if _may_be_bag(path)]

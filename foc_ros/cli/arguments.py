@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 from pathlib import Path
 
+from foc_ros.analysis.simulation.names import ASSISTANCE, OPERATORS
 from foc_ros.core.config import Config
-from foc_ros.core.errors import InputError, RecordingError
+from foc_ros.core.errors import InputError, RecordingError, collect_all, suggest
+from foc_ros.io.topics import TYPES
 from foc_ros.ros.parameters import load_parameter_file
 
 MOST_SAMPLES, MOST_TRIALS, MOST_WORKERS = 10_000_000, 100_000, 1024
 DATA = 'folder of bags, or of recordings.csv, goals.csv and, where there are obstacles, obstacles.csv'
 HOST, PORT, LARGEST_PORT = '127.0.0.1', 8420, 65535
-ALLOWED = ('eta',)
-"""What `fit` does only if it is allowed to."""
+ALLOWED = ('eta', 'positions')
+"""What `fit` lowers or makes worse only if it is allowed to."""
+_ADDRESS = re.compile(r'(\w+://)?[^\s/]+:\d{1,5}')
 
 
 def add_demo_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,7 +62,7 @@ def add_replay_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--guidance', action='store_true', help=words)
     parser.add_argument('--json', action='store_true', help='print one JSON object')
     words = 'take an input from a topic, as in hand_pose:=/PSM1/measured_cp (default: by name, else by type)'
-    parser.add_argument('--remap', action='append', default=[], metavar='INPUT:=TOPIC', help=words)
+    parser.add_argument('--remap', action='append', type=_read_remap, default=[], metavar='INPUT:=TOPIC', help=words)
 
 
 def add_fit_arguments(parser: argparse.ArgumentParser) -> None:
@@ -66,8 +70,11 @@ def add_fit_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('data', type=_read_existing_path, metavar='DATA', help=DATA)
     parser.add_argument('--output', type=Path, metavar='YAML', required=True, help='parameter file to write')
     _add_parameter_file(parser)
-    words = 'eta: values of foc.eta below the given one, with which obstacles are avoided with less certainty, may be taken'
-    parser.add_argument('--allow', choices=ALLOWED, help=words)
+    words = (
+        'eta: values of foc.eta below the given one, with which obstacles are avoided with less certainty, may be taken; '
+        'positions: parameters with which predicted positions become worse are written'
+    )
+    parser.add_argument('--allow', type=_Names('--allow', ALLOWED), default=(), metavar='A,B', help=words)
     _add_evaluation_arguments(parser)
 
 
@@ -82,9 +89,11 @@ def add_evaluate_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_simulate_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `simulate`."""
-    words = 'some of the simulated operators (default: all; human_paths with --recordings only)'
-    parser.add_argument('--operators', metavar='A,B', help=words)
-    parser.add_argument('--assistance', metavar='A,B', help='some of the assistance rules (default: all)')
+    words = f'some of the simulated operators {", ".join(OPERATORS)} (default: all; human_paths with --recordings only)'
+    parser.add_argument('--operators', type=_Names('--operators', OPERATORS), metavar='A,B', help=words)
+    names = _Names('--assistance', ASSISTANCE)
+    words = f'some of the assistance rules {", ".join(ASSISTANCE)} (default: all)'
+    parser.add_argument('--assistance', type=names, default=ASSISTANCE, metavar='A,B', help=words)
     number = _WholeNumber('--trials', 1, MOST_TRIALS)
     parser.add_argument('--trials', type=number, default=20, metavar='N', help='paired trials of each operator (default: 20)')
     number = _WholeNumber('--seed', 0, MOST_TRIALS)
@@ -139,7 +148,8 @@ def add_worker_arguments(parser: argparse.ArgumentParser) -> None:
     words = 'worker processes (default: one for each core that this process may use)'
     number, cores = _WholeNumber('--workers', 1, MOST_WORKERS), len(os.sched_getaffinity(0))
     group.add_argument('--workers', type=number, default=cores, metavar='N', help=words)
-    group.add_argument('--scheduler', metavar='ADDRESS', help='use the workers of this Dask scheduler instead (extra: cluster)')
+    words = 'use the workers of this Dask scheduler instead (extra: cluster)'
+    group.add_argument('--scheduler', type=_read_address, metavar='ADDRESS', help=words)
 
 
 class _WholeNumber:
@@ -154,6 +164,38 @@ class _WholeNumber:
         if value is None or not self._low <= value <= self._high:
             raise InputError(self._option, f'a whole number in [{self._low}, {self._high}]', text)
         return value
+
+
+class _Names:
+    """Converts the text of an option, names with commas between them, to these names."""
+
+    def __init__(self, option: str, known: tuple[str, ...]) -> None:
+        self._option, self._known = option, known
+
+    def __call__(self, text: str) -> tuple[str, ...]:
+        """Return the names, each once; raise InputError for unknown ones."""
+        return tuple(collect_all(self._read_name, [(name,) for name in dict.fromkeys(text.split(','))]))
+
+    def _read_name(self, name: str) -> str:
+        if name not in self._known:
+            raise InputError(self._option, f'names of {", ".join(self._known)}{suggest(name, self._known)}', name)
+        return name
+
+
+def _read_address(text: str) -> str:
+    if not _ADDRESS.fullmatch(text):
+        raise InputError('--scheduler', 'the address of a Dask scheduler, as in tcp://host:8786', text)
+    return text
+
+
+def _read_remap(text: str) -> tuple[str, str]:
+    """Return the name of an input and the topic from which it is taken."""
+    role, separator, topic = text.partition(':=')
+    if not separator or not topic:
+        raise InputError('--remap', 'INPUT:=TOPIC', text)
+    if role not in TYPES:
+        raise InputError('--remap', f'one of the inputs {", ".join(TYPES)}{suggest(role, TYPES)}', role)
+    return role, topic
 
 
 def _read_existing_path(text: str) -> Path:

@@ -6,8 +6,8 @@ import argparse
 import re
 
 from foc_ros.analysis.csv_recordings import Movement, RecordedScene, read_movements, read_scenes, write_movement
-from foc_ros.analysis.recordings import read_tables
-from foc_ros.core.errors import InputError, RecordingError
+from foc_ros.analysis.recordings import TableRecording, read_tables
+from foc_ros.core.errors import InputError, RecordingError, collect_all
 from foc_ros.io.terminal import show_progress
 
 
@@ -31,7 +31,9 @@ def _read(arguments: argparse.Namespace) -> tuple[dict[str, RecordedScene], list
     """Return the scene of each recording by its name, and all movements."""
     if arguments.obstacles is None and arguments.csv.is_dir():
         tables = read_tables(arguments.csv)
-        return {name: each.scene for name, each in tables.items()}, [each.read_movement() for each in tables.values()]
+        return {name: each.scene for name, each in tables.items()}, collect_all(
+            TableRecording.read_movement, [(each,) for each in tables.values()]
+        )
     if arguments.obstacles is None:
         raise InputError('--obstacles', 'a table of obstacles, which may be without rows', 'nothing')
     movements, tables_of_scenes = read_movements(arguments.csv), read_scenes(arguments.obstacles, arguments.goals)

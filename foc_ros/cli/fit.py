@@ -22,10 +22,7 @@ from foc_ros.analysis.fitting.tables import (
     make_verdict,
 )
 from foc_ros.analysis.parallel import open_executor
-from foc_ros.analysis.recordings import find_recordings
 from foc_ros.core.config import Config, flatten
-from foc_ros.core.errors import InputError
-from foc_ros.io.outputs import check_page
 from foc_ros.io.terminal import show_table, show_text
 from foc_ros.ros.parameters import write_parameter_file
 
@@ -33,19 +30,13 @@ from foc_ros.ros.parameters import write_parameter_file
 def run(arguments: argparse.Namespace) -> int:
     """Fit, write and show; return 2 where a recording could not be used, and the others were."""
     config, output = arguments.config, arguments.output
-    # before the work, not after it
-    if output.is_dir() or not output.resolve().parent.is_dir():
-        raise InputError('--output', 'a file in a directory that exists', output)
     if arguments.report is not None:
-        from foc_ros.reporting.fit_report import PAGE, write_report
-
-        check_page('--report', arguments.report, PAGE)
-    recordings = find_recordings(arguments.data)
+        from foc_ros.reporting.fit_report import write_report  # a missing library is reported before the work
     with open_executor(arguments) as executor:
-        fit = fit_parameters(recordings, config, executor, may_lower_eta=arguments.allow == 'eta')
+        fit = fit_parameters(arguments.found, config, executor, may_lower_eta='eta' in arguments.allow)
     answer = make_answer(fit, config, output)
-    if not _confirm(find_worse_positions(fit.comparison), output):
-        print(f'foc_ros fit: {output} is not written', file=sys.stderr)
+    if not _confirm(find_worse_positions(fit.comparison), 'positions' in arguments.allow, output):
+        print(f'foc_ros fit: {output} is not written; --allow positions writes it all the same', file=sys.stderr)
         return 2
     write_parameter_file('--output', output, fit.config)
     if arguments.report is not None:
@@ -75,12 +66,14 @@ def make_answer(fit: Fit, given: Config, output: Path) -> dict[str, Any]:
     }
 
 
-def _confirm(losses: Sequence[str], output: Path) -> bool:
-    """Say what becomes worse before the file is written; on a terminal, return whether the user wants it all the same."""
+def _confirm(losses: Sequence[str], is_allowed: bool, output: Path) -> bool:
+    """Say what becomes worse before the file is written; return whether that is allowed, which a terminal is asked for."""
     for loss in losses:
         print(f'foc_ros fit: {loss}', file=sys.stderr)
-    if not losses or not (sys.stdin.isatty() and sys.stdout.isatty()):
+    if not losses or is_allowed:
         return True
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return False
     return input(f'Write {output} all the same? [y/N] ').strip().lower() in ('y', 'yes')
 
 

@@ -22,12 +22,13 @@ from foc_ros.core.errors import FocError, list_messages, suggest
 
 from . import arguments as declarations
 from .compiling import show_compilation
+from .inputs import read_inputs
 from .interrupts import INTERRUPTED, handle_interrupts
 
 COMMANDS = {
     'demo': 'play the packaged recording to the node and show its predictions',
     'node': 'run the node; further arguments are passed to ROS, as in --ros-args -r hand_pose:=/PSM1/measured_cp',
-    'play': "try it with one's own hand, on a page in the browser",
+    'play': 'steer the hand yourself, on a page in the browser',
     'paper': "repeat the paper's studies: figures, numbers, a table",
     'solve': 'solve one scene from a YAML or JSON file',
     'replay': 'compute predictions from a recording, without ROS and faster than real time',
@@ -115,6 +116,7 @@ def _parse_and_run(given: list[str]) -> int:
         if rest and parsed.command != 'node':
             commands.choices[parsed.command].reject(rest)
         parsed.rest = rest
+        read_inputs(parsed)
         with show_compilation() if parsed.command in COMPUTING else nullcontext():
             module = import_module(f'.{_get_module_name(parsed.command)}', __package__)
         return int(module.run(parsed))

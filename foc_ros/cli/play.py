@@ -1,4 +1,4 @@
-"""`play`: try the predictor with one's own hand, on a page in the browser."""
+"""`play`: steer the hand oneself, on a page in the browser."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import sys
 from importlib.util import find_spec
 
 from foc_ros.core.config import Config
-from foc_ros.core.errors import FocError, InputError
+from foc_ros.core.errors import FocError
 
 from .compiling import show_compilation
 
@@ -21,8 +21,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Serve the page until an interrupt."""
     if not arguments.no_ros and find_spec('rclpy') is None:
         raise FocError('rclpy is not installed: use --no-ros, or source a ROS 2 installation, or install the extra `ros`')
-    if arguments.data.exists() and not arguments.data.is_dir():
-        raise InputError('--data', 'a folder', arguments.data)
     sys.setswitchinterval(SWITCH_S)
     asyncio.run(_serve(arguments, arguments.config))
     return 0

@@ -15,7 +15,6 @@ from foc_ros.analysis.learn_demonstrations import Learner
 from foc_ros.analysis.replay import Replay, Step
 from foc_ros.analysis.replay_guidance import GuidanceReplay, GuidanceStep
 from foc_ros.analysis.replay_summary import Summary, facts
-from foc_ros.core.errors import InputError
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
 from foc_ros.io.class_library import load_library, save_library
 from foc_ros.io.json_output import encode_guidance, encode_prediction
@@ -39,9 +38,8 @@ def run(arguments: argparse.Namespace) -> int:
     consumers: list[Consumer] = [summary.add]
     report = learner = None
     if arguments.report is not None:
-        from foc_ros.reporting.report import ReportCollector, check_report  # what is wrong is said before the work
+        from foc_ros.reporting.report import ReportCollector  # a missing library is reported before the work
 
-        check_report(arguments.report)
         report = ReportCollector()
         consumers.append(report.add)
     if arguments.learn is not None:
@@ -84,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _play(arguments: argparse.Namespace, replay: Replay, consumers: list[Consumer], guided: list[GuidanceConsumer]) -> float:
     """Pass every step to the consumers and to the output bag, if there is one; return the recording's duration [s]."""
     with ExitStack() as stack:
-        reader = stack.enter_context(BagReader(arguments.bag, _parse_remaps(arguments.remap)))
+        reader = stack.enter_context(BagReader(arguments.bag, dict(arguments.remap)))
         if arguments.output is not None:
             writer = stack.enter_context(BagWriter(arguments.output))
             consumers = [*consumers, _bag_writer(reader, writer, replay.pipeline.config.plane)]
@@ -144,13 +142,3 @@ def _json_writer(file: TextIO) -> Consumer:
             file.write(separator + json.dumps(encode_prediction(step.prediction), allow_nan=False))
 
     return write
-
-
-def _parse_remaps(remaps: list[str]) -> dict[str, str]:
-    topics: dict[str, str] = {}
-    for remap in remaps:
-        role, separator, topic = remap.partition(':=')
-        if not separator or not topic or role in topics:
-            raise InputError('--remap', 'INPUT:=TOPIC, once for an input', remap)
-        topics[role] = topic
-    return topics

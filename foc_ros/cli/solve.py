@@ -10,15 +10,12 @@ from typing import Any
 
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.reaching_scene import build_scene_problems, solve_scene
+from foc_ros.core.scene_solver import build_scene_problems, solve_scene
 from foc_ros.core.types import PredictedCandidate
 from foc_ros.io.json_output import encode_candidate, encode_solution
-from foc_ros.io.outputs import check_replaceable
-from foc_ros.io.scene_file import load_scene
-from foc_ros.io.terminal import show_table
+from foc_ros.io.terminal import show_table, show_text
 
 COLUMNS = {
-    'label': '{}',
     'description': '{}',
     'status': '{}',
     'likelihood': '{:.3f}',
@@ -38,9 +35,7 @@ COLUMNS = {
 def run(arguments: argparse.Namespace) -> int:
     """Solve the scene; return 3 if no candidate could be solved."""
     samples = arguments.monte_carlo
-    if arguments.plot is not None:
-        check_replaceable('--plot', arguments.plot)
-    scene = load_scene(arguments.scene)
+    scene = arguments.problem
     problems = build_scene_problems(scene)
     candidates = solve_scene(scene, problems)
     encoded = [_encode(each, problems[each.candidate.goal], samples) for each in candidates]
@@ -53,10 +48,11 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         _show(encoded)
     if any(each.has_likelihood for each in candidates):
-        if not arguments.json:
-            print(*(f'{each.label}: {each.reason}\n' for each in candidates if not each.is_solved), sep='', end='')
+        for each in candidates if not arguments.json else ():
+            if not each.is_solved:
+                show_text(f'{each.description}: {each.reason}')
         return 0
-    reasons = '; '.join(f'{each.label}: {each.reason}' for each in candidates)
+    reasons = '; '.join(f'{each.description}: {each.reason}' for each in candidates)
     reason = f'no candidate could be solved: {reasons}' if reasons else 'no path was found between the start and any goal'
     print(f'foc_ros solve: {reason}', file=sys.stderr)
     return 3

@@ -5,9 +5,9 @@ An expected failure (infeasible, unreachable, out of time) is a :class:`foc_ros.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
-from typing import TypeVar
+from typing import Any, TypeVar
 
 _LONGEST = 200
 """Characters of a value in a message."""
@@ -54,7 +54,26 @@ class RecordingError(FocError):
     """A file that cannot be read or written; the message names the file and the reason."""
 
 
-E = TypeVar('E', bound=InputError)
+E = TypeVar('E', bound=FocError)
+T = TypeVar('T')
+
+
+def collect(errors: list[FocError], read: Callable[..., T], *arguments: Any) -> T | None:
+    """Return what a function reads; where it raises FocError, append this to a list and return None."""
+    try:
+        return read(*arguments)
+    except FocError as error:
+        errors.append(error)
+        return None
+
+
+def collect_all(read: Callable[..., T], rows: Iterable[Sequence[Any]]) -> list[T]:
+    """Return what a function reads from each row of arguments; raise one error for all rows for which it raises FocError."""
+    errors: list[FocError] = []
+    values = [collect(errors, read, *row) for row in rows]
+    if errors:
+        raise join_errors(errors)
+    return values  # type: ignore[return-value]  # None stands for an error only
 
 
 def join_errors(errors: Sequence[E]) -> E:
@@ -70,7 +89,10 @@ def list_messages(error: Exception) -> tuple[str, ...]:
     return str(error), *getattr(error, '__notes__', ())
 
 
-def suggest(name: object, known: Iterable[str]) -> str:
-    """Return a hint at the known name that is most similar to an unknown one, for a message; empty if none is similar."""
-    similar = get_close_matches(str(name)[:_LONGEST], known, 1)
+def suggest(name: object, known: Iterable[str], similarity: float = 0.6) -> str:
+    """Return a hint at the known name that is most similar to an unknown one, for a message; empty if none is similar.
+
+    similarity: the least one, from 0 to 1, as :mod:`difflib` measures it.
+    """
+    similar = get_close_matches(str(name)[:_LONGEST], known, 1, similarity)
     return f' (did you mean {similar[0]}?)' if similar else ''

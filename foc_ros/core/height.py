@@ -29,7 +29,7 @@ from .dynamics.impulse_response import apply_impulse_response
 from .dynamics.noise import propagate_covariance, scale_noise, stack_noise
 from .dynamics.plant_models import make_plant_model
 from .dynamics.plants import find_states_at_goal
-from .dynamics.predictive_covariance import compute_predictive_covariance, widen_covariance
+from .dynamics.predictive_covariance import SharedCovariances, widen_covariance
 from .estimation.duration import is_passing
 from .obstacles.height_clearance import find_cleared
 from .types import Array, HandState, HeightTrajectory, Obstacles, PredictedCandidate, Solution, Status
@@ -46,10 +46,12 @@ class HeightPredictor:
         The state from which the predictions start.
     goal_heights
         Height of each goal, (g,) [m]. Nothing is predicted if they are not known, or with `predict_height` false.
+    shared
+        What all plans from this state share of their covariance.
     """
 
-    def __init__(self, config: Config, hand: HandState, goal_heights: Array | None) -> None:
-        self._config, self._hand = config, hand
+    def __init__(self, config: Config, hand: HandState, goal_heights: Array | None, shared: SharedCovariances) -> None:
+        self._config, self._hand, self._shared = config, hand, shared
         self._goal_heights = goal_heights if config.predict_height else None
         self._known: dict[tuple[int, float], HeightTrajectory] = {}
 
@@ -84,7 +86,8 @@ class HeightPredictor:
         if self._goal_heights is None:
             return None
         if (goal, dt) not in self._known:
-            self._known[goal, dt] = predict_height(self._config, self._hand, float(self._goal_heights[goal]), dt)
+            goal_height = float(self._goal_heights[goal])
+            self._known[goal, dt] = predict_height(self._config, self._hand, goal_height, dt, self._shared[dt])
         return self._known[goal, dt]
 
     def compute_progress(self, goal: Array, dt: float) -> Array:
@@ -98,10 +101,12 @@ class HeightPredictor:
         return progress
 
 
-def predict_height(config: Config, hand: HandState, goal_height: float, dt: float) -> HeightTrajectory:
-    """Return the height of a hand on its way to a goal at a height [m], at steps 0..N of dt [s]."""
+def predict_height(config: Config, hand: HandState, goal_height: float, dt: float, shared: Array) -> HeightTrajectory:
+    """Return the height of a hand on its way to a goal at a height [m], at steps 0..N of dt [s].
+
+    shared (N + 1, n, n): of `SharedCovariances`.
+    """
     solution = reach_along_axis(config, hand.height_mean, goal_height, dt)
-    shared = compute_predictive_covariance(hand, dt, config.foc.steps, config)
     covariance = widen_covariance(solution, shared, hand.onset_ns is None, config)
     return HeightTrajectory(solution.mean[:, ::2], covariance[:, ::2, ::2], solution.covariance[:, ::2, ::2])
 
@@ -125,7 +130,8 @@ def reach_along_axis(config: Config, start: Array, target: float, dt: float) -> 
     # the rows have different units (m, m/s, ...), so they are scaled to unit length
     scale = 1.0 / np.linalg.norm(rows, axis=1)
     control = np.zeros((2, foc.steps))
-    control[0] = np.linalg.pinv(scale[:, None] * rows) @ (scale * missing[is_fixed]) / roots
+    rows *= scale[:, None]
+    control[0] = rows.T @ np.linalg.solve(rows @ rows.T, scale * missing[is_fixed]) / roots
     stacked = control.ravel()
     mean = horizon.powers @ now + apply_impulse_response(horizon.states, stacked).T
     covariance = propagate_covariance(horizon, np.zeros_like(horizon.powers), stack_noise(noise**2, foc.steps), stacked)

@@ -14,7 +14,7 @@ from .continuity import Past, keep_answers, make_continuous, smooth_paths
 from .deadline import NEVER, Deadline
 from .dynamics.noise import scale_noise
 from .dynamics.plant_models import make_plant_model
-from .dynamics.predictive_covariance import compute_predictive_covariance, widen_covariance
+from .dynamics.predictive_covariance import SharedCovariances, widen_covariance
 from .estimation.duration import choose_candidate_durations, estimate_times_to_go, is_passing, limit_change
 from .height import HeightPredictor
 from .homotopy import Turn, search
@@ -74,7 +74,8 @@ def predict(
     hand = _simplify_start(hand, config.estimator.acceleration_time_s)
     durations = _find_durations(hand, goals, past, config)
     given, grown = obstacles, obstacles.grow(config.scene.hand_radius)
-    heights = HeightPredictor(config, hand, goal_heights)
+    shared = SharedCovariances(hand, config)
+    heights = HeightPredictor(config, hand, goal_heights, shared)
     cleared = heights.find_cleared(grown, goals, durations)
     blocking = grown.take(np.flatnonzero(~cleared)) if cleared.any() else grown
     obstacles = cull_obstacles(blocking, hand.mean[:2], goals, max(durations), config.scene.max_obstacles)
@@ -86,7 +87,7 @@ def predict(
     costs, earlier = make_cost_model(hand.effort_spent, config), memory.find_earlier(candidates)
     until = [deadline.take_share(share, RESERVE_S * len(candidates)) for share in (SOLVE_SHARE, RAISE_SHARE)]
     solved = solve_candidates(candidates, problems, config.foc, costs, earlier, *until)
-    widened = _widen_covariances(solved, problems, hand, config)
+    widened = [_widen_covariance(each, shared, hand, config) for each in solved]
     kept = keep_answers(candidates, widened, past, hand.stamp_ns, config.likelihood.hold_s, costs)
     ranked, choice = rank_candidates(kept, config.likelihood, obstacles, hand, goals)
     smooth = smooth_paths(ranked, past, hand.stamp_ns, config.likelihood.smoothing_s)
@@ -142,7 +143,7 @@ class Problems:
         self._scene = config, hand, obstacles
         times = choose_candidate_durations(hand, candidates, goal_times, config.duration)
         self._kinds = [(each.goal, duration_s) for each, duration_s in zip(candidates, times, strict=True)]
-        self._goals, self._rows = goals, {each.label: row for row, each in enumerate(candidates)}
+        self._goals = goals
         self._built: dict[tuple[int, float], Problem] = {}
 
     def __getitem__(self, row: int) -> Problem:
@@ -151,10 +152,6 @@ class Problems:
         if kind not in self._built:
             self._built[kind] = build_problem(*self._scene, self._goals[goal], duration_s)
         return self._built[kind]
-
-    def find(self, label: str) -> Problem:
-        """Return the problem of the candidate with a label."""
-        return self[self._rows[label]]
 
 
 def build_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: Array, duration_s: float) -> Problem:
@@ -197,15 +194,10 @@ def _simplify_start(hand: HandState, acceleration_time_s: float) -> HandState:
     return replace(hand, mean=np.concatenate([hand.mean[:2], final_velocity, np.zeros(2)]), height_mean=height_then)
 
 
-def _widen_covariances(
-    candidates: Sequence[PredictedCandidate], problems: Problems, hand: HandState, config: Config
-) -> list[PredictedCandidate]:
+def _widen_covariance(
+    candidate: PredictedCandidate, shared: SharedCovariances, hand: HandState, config: Config
+) -> PredictedCandidate:
     """Add the predictive covariance, and that of the timing, to the covariance that motor noise causes."""
-    shared, widened = dict[float, Array](), []
-    for each in candidates:
-        dt = problems.find(each.label).horizon.dt
-        if dt not in shared:
-            shared[dt] = compute_predictive_covariance(hand, dt, config.foc.steps, config)
-        covariance = widen_covariance(each.solution, shared[dt], hand.onset_ns is None, config)
-        widened.append(replace(each, solution=each.solution.with_covariance(covariance)))
-    return widened
+    solution = candidate.solution
+    covariance = widen_covariance(solution, shared[solution.dt], hand.onset_ns is None, config)
+    return replace(candidate, solution=solution.with_covariance(covariance))

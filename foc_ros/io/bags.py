@@ -157,8 +157,7 @@ class BagWriter:
 
     def __enter__(self) -> BagWriter:
         with self._named_errors():
-            if self.path.exists():
-                raise RecordingError(f'{self.path}: exists already and is not overwritten; choose another name')
+            check_new_bag(self.path)
             self._writer = Writer(self.path, version=9, storage_plugin=StoragePlugin.MCAP)
             self._writer.open()
         return self
@@ -201,6 +200,18 @@ class BagWriter:
             yield
         except (OSError, WriterError) as error:
             raise RecordingError(f'{self.path}: cannot be written: {error}') from error
+
+
+def check_bag(path: Path) -> None:
+    """Raise RecordingError for a path that is clearly no bag, without opening it."""
+    with _named_errors(path):
+        _refuse_unreadable(path)
+
+
+def check_new_bag(path: Path) -> None:
+    """Raise RecordingError if a bag cannot be written to a path because it exists."""
+    if path.exists():
+        raise RecordingError(f'{path}: exists already and is not overwritten; choose another name')
 
 
 def _build_typestore(connections: Iterable[Connection]) -> Typestore:

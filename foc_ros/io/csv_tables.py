@@ -1,20 +1,37 @@
-"""CSV tables of measured numbers, checked cell by cell: every error names file, row, column, value and bound."""
+"""CSV tables of measured numbers, checked cell by cell: every error names file, row, column, value and bound.
+
+The errors of all rows are raised together, as one error with notes.
+"""
 
 from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
+from typing import NamedTuple
 
-from foc_ros.core.errors import RecordingError
+from foc_ros.core.errors import FocError, RecordingError, collect, collect_all, join_errors, suggest
 
 FARTHEST_M = 1e4
 """Bound of coordinates and radii [m]; a larger one has a wrong unit or is in the wrong column."""
 MAX_BYTES = 1_000_000_000
 """Size of a day of motion capture at 200 Hz."""
+MOST_ERRORS = 100
+"""Wrong rows after which a table is not read further."""
+SIMILARITY = 0.8
+"""Similarity to a missing column from which an unknown one is taken for a misspelt one: `radius_stdev_m` is, `yaw_deg` is not."""
+
+
+class Column(NamedTuple):
+    """A column of numbers in [low, high]; default: the value in a table without the column, None where it is needed."""
+
+    name: str
+    low: float = -FARTHEST_M
+    high: float = FARTHEST_M
+    default: float | None = None
 
 
 @dataclass(frozen=True)
@@ -24,6 +41,10 @@ class Row:
     file: Path
     line: int
     cells: dict[str, str]
+
+    def read_numbers(self, *columns: Column) -> list[float]:
+        """Return the cells of some columns; raises RecordingError, with a note for every further wrong cell."""
+        return collect_all(self.read_number, columns)
 
     def read_number(self, column: str, low: float = -FARTHEST_M, high: float = FARTHEST_M, default: float | None = None) -> float:
         """Return a cell as a number in [low, high]; default: if the table does not have the column."""
@@ -49,27 +70,51 @@ class Row:
         return RecordingError(f'{self.file}: row {self.line}, column {column}: expected {expected}, got {self.cells[column]!r}')
 
 
+def parse_rows(rows: Iterable[Row], parse: Callable[[Row], None]) -> None:
+    """Call a function with every row; raise one RecordingError for all rows for which it does so."""
+    errors: list[FocError] = []
+    try:
+        for row in rows:
+            collect(errors, parse, row)
+            if len(errors) == MOST_ERRORS:
+                errors.append(RecordingError(f'{row.file}: the rows after row {row.line} were not checked'))
+                break
+    except RecordingError as error:  # of the file itself
+        errors.append(error)
+    if errors:
+        raise join_errors(errors)
+
+
 def read_rows(
-    file: Path, needed: tuple[str, ...], instead: Mapping[str, tuple[str, ...]] = MappingProxyType({})
+    file: Path,
+    needed: tuple[str, ...],
+    optional: tuple[str, ...] = (),
+    instead: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
 ) -> Iterator[Row]:
-    """Yield the rows of a CSV file with a header; empty lines are skipped, and columns beside the needed ones are allowed.
+    """Yield the rows of a CSV file with a header; empty lines are skipped, and other columns are allowed.
 
-    instead: columns that together replace a needed one.
+    optional: columns that may be missing; instead: columns that together replace a needed one.
 
-    Raises RecordingError for a file that cannot be read, lacks a needed column or names one twice, and for a row with more or
-    fewer cells than the header.
+    Raises RecordingError for a file that cannot be read, for one that lacks a needed column, names a column twice or has a
+    misspelt one, and after the last row for rows with more or fewer cells than the header.
     """
     try:
         with file.open(newline='', encoding='utf-8-sig') as stream:
             if file.stat().st_size > MAX_BYTES:
                 raise RecordingError(f'{file}: expected at most {MAX_BYTES:,} bytes, got {file.stat().st_size:,}')
             reader = csv.reader(stream, strict=True)
-            header = _read_header(file, next(reader, []), needed, instead)
+            header = _check_header(file, next(reader, []), needed, optional, instead)
+            errors: list[RecordingError] = []
             for cells in reader:
-                if any(cell.strip() for cell in cells):
-                    if len(cells) != len(header):
-                        raise RecordingError(f'{file}: row {reader.line_num}: expected {len(header)} cells, got {len(cells)}')
+                if len(errors) == MOST_ERRORS:
+                    break
+                if any(cell.strip() for cell in cells) and len(cells) != len(header):
+                    words = f'expected {len(header)} cells, got {len(cells)}'
+                    errors.append(RecordingError(f'{file}: row {reader.line_num}: {words}'))
+                elif any(cell.strip() for cell in cells):
                     yield Row(file, reader.line_num, {name: cell.strip() for name, cell in zip(header, cells, strict=True)})
+            if errors:
+                raise join_errors(errors)
     except OSError as error:
         raise RecordingError(f'{file}: cannot be read: {error.strerror}') from error
     except UnicodeDecodeError as error:
@@ -78,7 +123,10 @@ def read_rows(
         raise RecordingError(f'{file}: not a CSV table: {error}') from error
 
 
-def _read_header(file: Path, cells: list[str], needed: tuple[str, ...], instead: Mapping[str, tuple[str, ...]]) -> list[str]:
+def _check_header(
+    file: Path, cells: list[str], needed: tuple[str, ...], optional: tuple[str, ...], instead: Mapping[str, tuple[str, ...]]
+) -> list[str]:
+    """Return the names of the columns; see `read_rows`."""
     header = [name.strip() for name in cells]
     if not header:
         raise RecordingError(f'{file}: the file is empty: expected columns {", ".join(needed)}')
@@ -87,4 +135,10 @@ def _read_header(file: Path, cells: list[str], needed: tuple[str, ...], instead:
         raise RecordingError(f'{file}: row 1: no column {", ".join(missing)}; it has {", ".join(header)}')
     if len(set(header)) < len(header):
         raise RecordingError(f'{file}: row 1: a column is named twice: {", ".join(header)}')
+    absent = [name for name in optional if name not in header]
+    misspelt = [
+        (name, hint) for name in header if name not in (*needed, *optional) and (hint := suggest(name, absent, SIMILARITY))
+    ]
+    if misspelt:
+        raise join_errors([RecordingError(f'{file}: row 1: unknown column {name}{hint}') for name, hint in misspelt])
     return header

@@ -8,13 +8,44 @@ from foc_ros.core.errors import InputError
 
 MARK = 'made by foc_ros'
 """Text that every picture and page contains that a command writes."""
+EVALUATION_PAGE, FIT_PAGE, SIMULATION_PAGE = 'evaluation.html', 'fit.html', 'simulation.html'
+REPORT_FILES, OVERVIEW = ('index.html', 'predictions.json'), 'overview.png'
+"""Files of the report of a recording, beside the pictures `moment_NN.png`."""
+PICTURE_SUFFIXES = ('.png', '.pdf', '.svg')
+
+
+def check_file(option: str, file: Path) -> None:
+    """Raise InputError, which names the option, if a file cannot be written because its folder does not exist."""
+    if file.is_dir() or not file.resolve().parent.is_dir():
+        raise InputError(option, 'a file in a directory that exists', file)
+
+
+def check_folder(option: str, directory: Path) -> None:
+    """Raise InputError, which names the option, if a folder cannot be made because a file has its name."""
+    file = next((each for each in (directory, *directory.parents) if each.exists()), directory)
+    if file.is_file():
+        raise InputError(option, 'a folder', f'{file}, which is a file')
+
+
+def check_picture(option: str, file: Path) -> None:
+    """Raise InputError, which names the option, if a picture has an unknown format, or would replace another file."""
+    if file.suffix.lower() not in PICTURE_SUFFIXES:
+        raise InputError(option, f'a name that ends in {", ".join(PICTURE_SUFFIXES)}', file)
+    check_file(option, file)
+    check_replaceable(option, file)
 
 
 def check_page(option: str, directory: Path, page: str) -> None:
     """Raise InputError, which names the option, if a page cannot be written into a directory without harm to another file."""
-    if directory.is_file():
-        raise InputError(option, 'a folder', f'{directory}, which is a file')
+    check_folder(option, directory)
     check_replaceable(option, directory / page)
+
+
+def check_report(option: str, directory: Path) -> None:
+    """Raise InputError, which names the option, if a report would overwrite a file that is no part of an earlier report."""
+    check_folder(option, directory)
+    pictures = directory / OVERVIEW, *directory.glob('moment_[0-9][0-9].png')
+    check_replaceable(option, *(directory / name for name in REPORT_FILES), *pictures)
 
 
 def check_replaceable(option: str, *files: Path) -> None:

@@ -12,21 +12,20 @@ from __future__ import annotations
 import math
 import re
 import reprlib
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Container, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.errors import ParameterError, SceneError, join_errors, suggest
-from foc_ros.core.obstacles.shapes import Box, Hull, Shape
+from foc_ros.core.errors import FocError, ParameterError, SceneError, collect, collect_all, join_errors, suggest
+from foc_ros.core.obstacles.shapes import Box, Hull
 from foc_ros.core.reaching_scene import ReachingScene, check_outside
 from foc_ros.core.types import Array, HandState, Obstacles, make_obstacles
 
 from .documents import read_document
 
-T = TypeVar('T')
 FARTHEST = 1e4
 """Bound of every length, velocity and acceleration of a scene, in SI units."""
 MOST_OBSTACLES, MOST_GOALS, MOST_POINTS = 20_000, 256, 10_000
@@ -53,7 +52,9 @@ PARAMETERS = {
 
 STATE_FIELDS = ('start', 'start_velocity', 'start_acceleration', 'start_stddev')
 FIELDS = (*STATE_FIELDS, 'goal', 'goals', 'noise', 'obstacles', 'guess', *PARAMETERS)
-OBSTACLE_FIELDS = ('x', 'y', 'radius', 'radius_stddev', 'id', 'size', 'yaw', 'points')
+OBSTACLE_NUMBERS = {'x': -FARTHEST, 'y': -FARTHEST, 'radius': 0.0, 'radius_stddev': 0.0, 'yaw': -FARTHEST}
+"""Fields of an obstacle that are numbers, with their lower bounds."""
+OBSTACLE_FIELDS = (*OBSTACLE_NUMBERS, 'id', 'size', 'points')
 _NUMERAL = re.compile(r'[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+')
 
 
@@ -66,27 +67,21 @@ def parse_scene(document: object) -> ReachingScene:
     """Return the scene of a document of mappings, lists and numbers; raises SceneError, with a note for every further error."""
     scene = _read_mapping('scene', document)
     errors = _find_unknown_fields('', scene, FIELDS)
-    config = _collect(errors, _read_config, scene)
-    obstacles = _collect(errors, _read_obstacles, scene.get('obstacles', []))
-    hand, goals = _collect(errors, _read_hand, scene), _collect(errors, _read_goals, scene)
+    config = collect(errors, _read_config, scene)
+    obstacles = collect(errors, _read_obstacles, scene.get('obstacles', []))
+    hand, goals = collect(errors, _read_hand, scene), collect(errors, _read_goals, scene)
+    guess = collect(errors, _read_guess, scene['guess']) if 'guess' in scene else None
     if config is None or obstacles is None or hand is None or goals is None or errors:
         raise join_errors(errors)
-    avoided = obstacles.grow(config.scene.hand_radius)
-    check_outside('start', hand.mean[:2], avoided)
-    for goal in goals:
-        check_outside('goal' if 'goal' in scene else 'goals', goal, avoided)
+    start = hand.mean[:2]
+    avoided, field = obstacles.grow(config.scene.hand_radius), 'goal' if 'goal' in scene else 'goals'
+    collect_all(check_outside, [('start', start, avoided), *((field, goal, avoided) for goal in goals)])
     noise = np.array([config.foc.noise_x, config.foc.noise_y])
-    guess = _read_guess(scene['guess'], hand.mean[:2], goals, config.foc.steps) if 'guess' in scene else None
-    return ReachingScene(hand, goals, obstacles, noise, guess, config)
-
-
-def _collect(errors: list[SceneError], read: Callable[..., T], *arguments: Any) -> T | None:
-    """Return what a function reads; where it raises SceneError, add this with its notes to a list and return None."""
-    try:
-        return read(*arguments)
-    except SceneError as error:
-        errors.append(error)
-        return None
+    if guess is None:
+        return ReachingScene(hand, goals, obstacles, noise, None, config)
+    if len(goals) > 1:
+        raise SceneError('guess', 'one goal, which it leads to', f'{len(goals)} goals')
+    return ReachingScene(hand, goals, obstacles, noise, guess_path(start, goals[0], config.foc.steps, *guess), config)
 
 
 def guess_path(start: Array, goal: Array, steps: int, amplitude: float = 0.0, via: Array | None = None) -> Array:
@@ -124,22 +119,22 @@ def _read_config(scene: Mapping[str, Any]) -> Config:
             config = replace_values(config, {parameter: _convert_numeral(value)})
         except ParameterError as error:
             errors.append(SceneError(field, error.expected, error.got))
+    if not errors and config.foc.strategy != 'fixed':
+        words = 'to be given with strategy fixed only', f'strategy {config.foc.strategy}'
+        errors = [SceneError(field, *words) for field in ('tau', 'lambda') if field in scene]
     if errors:
         raise join_errors(errors)
-    for field in ('tau', 'lambda'):
-        if field in scene and config.foc.strategy != 'fixed':
-            raise SceneError(field, 'to be given with strategy fixed only', f'strategy {config.foc.strategy}')
     return config
 
 
 def _read_hand(scene: Mapping[str, Any]) -> HandState:
     if 'start' not in scene:
         raise SceneError('start', 'two numbers', 'nothing')
-    mean = [number for field in STATE_FIELDS[:3] for number in _read_point(field, scene.get(field, [0.0, 0.0]))]
     stddev = scene.get('start_stddev', 0.0)
-    pair = _read_list('start_stddev', stddev, 2) if isinstance(stddev, list) else [stddev, stddev]
-    variance = [_read_number('start_stddev', each, 0.0) ** 2 for each in pair]
-    return HandState(0, np.array(mean), np.diag([*variance, 0.0, 0.0, 0.0, 0.0]))
+    pair = stddev if isinstance(stddev, list) else [stddev, stddev]
+    points = [(field, scene.get(field, [0.0, 0.0])) for field in STATE_FIELDS[:3]]
+    *mean, deviations = collect_all(_read_point, [*points, ('start_stddev', pair, 0.0)])
+    return HandState(0, np.ravel(mean), np.diag([*np.square(deviations), 0.0, 0.0, 0.0, 0.0]))
 
 
 def _read_goals(scene: Mapping[str, Any]) -> Array:
@@ -147,17 +142,17 @@ def _read_goals(scene: Mapping[str, Any]) -> Array:
         raise SceneError('goal', 'either goal or goals', 'both' if 'goal' in scene else 'neither')
     if 'goal' in scene:
         return np.array([_read_point('goal', scene['goal'])])
-    goals = _read_rows('goals', scene['goals'], MOST_GOALS)
+    goals = _read_points('goals', scene['goals'], MOST_GOALS)
     if not goals:
         raise SceneError('goals', 'at least one point', '[]')
-    return np.array([_read_point(f'goals[{row}]', goal) for row, goal in enumerate(goals)])
+    return np.array(goals)
 
 
 def _read_obstacles(given: object) -> Obstacles:
     rows: dict[str, tuple[Array, Array, float, float]] = {}
-    errors: list[SceneError] = []
+    errors: list[FocError] = []
     for place, each in enumerate(_read_rows('obstacles', given, MOST_OBSTACLES)):
-        row = _collect(errors, _read_obstacle, place, each, rows)
+        row = collect(errors, _read_obstacle, place, each, rows)
         if row is not None:
             rows[row[0]] = row[1]
     if errors:
@@ -170,56 +165,67 @@ def _read_obstacle(place: int, given: object, before: Container[str]) -> tuple[s
     """Return the id of an obstacle, which must differ from those before it, and its centre, polygon, radius and deviation."""
     field = f'obstacles[{place}]'
     obstacle = _read_mapping(field, given)
-    if errors := _find_unknown_fields(f'{field}.', obstacle, OBSTACLE_FIELDS):
+    errors = _find_unknown_fields(f'{field}.', obstacle, OBSTACLE_FIELDS)
+    identity = collect(errors, _read_identity, f'{field}.id', obstacle.get('id', place), before)
+    numbers = collect(errors, _read_obstacle_numbers, field, obstacle)
+    if identity is None or numbers is None or errors:
         raise join_errors(errors)
-    identity = obstacle.get('id', place)
+    return identity, (*_read_polygon(field, obstacle, numbers), numbers['radius'], numbers['radius_stddev'])
+
+
+def _read_obstacle_numbers(field: str, obstacle: Mapping[str, Any]) -> dict[str, float]:
+    """Return the numbers of an obstacle by field; those that it may lack are 0."""
+    given = [name for name in OBSTACLE_NUMBERS if name in obstacle]
+    numbers = collect_all(_read_number, [(f'{field}.{name}', obstacle[name], OBSTACLE_NUMBERS[name]) for name in given])
+    return {'radius': 0.0, 'radius_stddev': 0.0, 'yaw': 0.0} | dict(zip(given, numbers, strict=True))
+
+
+def _read_identity(field: str, identity: object, before: Container[str]) -> str:
     if type(identity) not in (int, str) or not _ID.fullmatch(str(identity)):
         expected = 'a whole number, or a name of letters, digits, _ and ., of at most 40 characters'
-        raise SceneError(f'{field}.id', expected, reprlib.repr(identity))
+        raise SceneError(field, expected, reprlib.repr(identity))
     if str(identity) in before:
-        raise SceneError(f'{field}.id', 'another id than the obstacles before it', reprlib.repr(identity))
-    radius, stddev = (_read_number(f'{field}.{name}', obstacle.get(name, 0.0), 0.0) for name in ('radius', 'radius_stddev'))
-    return str(identity), (*_read_polygon(field, obstacle, radius), radius, stddev)
+        raise SceneError(field, 'another id than the obstacles before it', reprlib.repr(identity))
+    return str(identity)
 
 
-def _read_polygon(field: str, obstacle: Mapping[str, Any], radius: float) -> tuple[Array, Array]:
-    """Return centre and polygon, as `Obstacles` has them: a hull where there are points, a box where there is a size."""
+def _read_polygon(field: str, obstacle: Mapping[str, Any], numbers: Mapping[str, float]) -> tuple[Array, Array]:
+    """Return centre and polygon, as `Obstacles` has them: a hull where there are points, a box where there is a size.
+
+    numbers: those of the obstacle, by field.
+    """
     kind = next((name for name in ('points', 'size') if name in obstacle), 'radius')
     needed, unused = {'points': ((), 'xy'), 'size': ('xy', ''), 'radius': (('x', 'y', 'radius'), ('yaw',))}[kind]
-    for name in needed:
-        if name not in obstacle:
-            raise SceneError(f'{field}.{name}', 'a number', 'nothing')
-    for name in (*unused, *(('size', 'yaw') if kind == 'points' else ())):
-        if name in obstacle:
-            raise SceneError(f'{field}.{name}', 'to be given with a size, and without points', reprlib.repr(obstacle[name]))
+    errors = [SceneError(f'{field}.{name}', 'a number', 'nothing') for name in needed if name not in obstacle]
+    errors += [
+        SceneError(f'{field}.{name}', 'to be given with a size, and without points', reprlib.repr(obstacle[name]))
+        for name in (*unused, *(('size', 'yaw') if kind == 'points' else ()))
+        if name in obstacle
+    ]
+    if errors:
+        raise join_errors(errors)
+    centre, radius = np.array([numbers.get(axis, 0.0) for axis in 'xy']), numbers['radius']
+    if kind == 'radius':
+        return centre, np.zeros((1, 2))
+    points = _read_points(f'{field}.points', obstacle['points']) if kind == 'points' else []
+    size = _read_point(f'{field}.size', obstacle['size'], 0.0) if kind == 'size' else []
     try:
-        if kind == 'points':
-            rows = _read_rows(f'{field}.points', obstacle['points'], MOST_POINTS)
-            shape: Shape = Hull([_read_point(f'{field}.points[{row}]', point) for row, point in enumerate(rows)], radius)
-            return np.array(shape.centre), shape.polygon
-        centre = np.array([_read_number(f'{field}.{axis}', obstacle[axis]) for axis in 'xy'])
-        if kind == 'radius':
-            return centre, np.zeros((1, 2))
-        size = [_read_number(f'{field}.size', each, 0.0) for each in _read_list(f'{field}.size', obstacle['size'], 2)]
-        shape = Box(centre, size, _read_number(f'{field}.yaw', obstacle.get('yaw', 0.0)), radius)
-        return centre, shape.polygon
+        shape = Box(centre, size, numbers['yaw'], radius) if kind == 'size' else Hull(points, radius)
     except SceneError as error:
         raise SceneError(error.field.replace('obstacle.', f'{field}.', 1), error.expected, error.got) from error
+    return np.array(shape.centre), shape.polygon
 
 
-def _read_guess(given: object, start: Array, goals: Array, steps: int) -> Array:
-    if len(goals) > 1:
-        raise SceneError('guess', 'one goal, which it leads to', f'{len(goals)} goals')
+def _read_guess(given: object) -> tuple[float, Array | None]:
+    """Return amplitude [m] and points of a guess, as `guess_path` takes them."""
     if isinstance(given, list):
-        rows = _read_rows('guess', given, MOST_POINTS)
-        points = np.array([_read_point(f'guess[{row}]', point) for row, point in enumerate(rows)]).reshape(-1, 2)
-        return guess_path(start, goals[0], steps, via=points)
+        return 0.0, np.array(_read_points('guess', given)).reshape(-1, 2)
     mapping = _read_mapping('guess', given)
     if errors := _find_unknown_fields('guess.', mapping, ('amplitude', 'kind')):
         raise join_errors(errors)
     if 'amplitude' not in mapping:
         raise SceneError('guess.amplitude', 'a number', 'nothing')
-    return guess_path(start, goals[0], steps, amplitude=_read_number('guess.amplitude', mapping['amplitude']))
+    return _read_number('guess.amplitude', mapping['amplitude']), None
 
 
 def _read_mapping(field: str, value: object) -> Mapping[str, Any]:
@@ -228,7 +234,7 @@ def _read_mapping(field: str, value: object) -> Mapping[str, Any]:
     return value
 
 
-def _find_unknown_fields(prefix: str, fields: Mapping[str, Any], known: tuple[str, ...]) -> list[SceneError]:
+def _find_unknown_fields(prefix: str, fields: Mapping[str, Any], known: tuple[str, ...]) -> list[FocError]:
     """Return an error for each unknown field."""
     names = ', '.join(known)
     return [
@@ -252,8 +258,13 @@ def _read_rows(field: str, value: object, most: int) -> list[Any]:
     return value
 
 
-def _read_point(field: str, value: object) -> list[float]:
-    return [_read_number(field, each) for each in _read_list(field, value, 2)]
+def _read_point(field: str, value: object, low: float = -FARTHEST) -> list[float]:
+    return [_read_number(field, each, low) for each in _read_list(field, value, 2)]
+
+
+def _read_points(field: str, value: object, most: int = MOST_POINTS) -> list[list[float]]:
+    points = _read_rows(field, value, most)
+    return collect_all(_read_point, [(f'{field}[{row}]', point) for row, point in enumerate(points)])
 
 
 def _read_number(field: str, value: object, low: float = -FARTHEST) -> float:

@@ -16,11 +16,11 @@ from rich.table import Table
 
 T = TypeVar('T')
 COLUMNS = 80
-"""Width of a terminal, into which tables fit where only their first and last columns are long [characters]."""
+"""Width of a terminal, into which all tables fit [characters]."""
 PRINTED = 20
 """A counter is printed each time that it has grown by this, where there is no terminal."""
-LEAST = 12
-"""Width to which the last column of a wide table is folded [characters]."""
+LONGEST_FIRST, LEAST_LAST = 32, 12
+"""Widths to which the first and the last column of a wide table are folded [characters]."""
 
 
 class _Console(Console):
@@ -69,23 +69,43 @@ def show_counter(words: str, total: int) -> Iterator[Counter]:
 
 
 def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:
-    """Print a table on standard output; its texts are shown as they are, without rich's markup.
+    """Print a table on standard output, with at most `COLUMNS` characters in a line; texts are shown without rich's markup.
 
-    Long texts of its first and last columns are folded, those of the first between words. The table is wider than `COLUMNS` only
-    where the others need it.
+    Long texts of its first and last columns are folded, those of the first between words where these are short. If that is not
+    enough, the table is divided into parts, each with the first column and as many others as fit.
     """
     cells = [[*each] for each in rows]
-    widths = [max(map(_measure, column)) for column in zip(columns, *cells, strict=True)]
-    is_wide = sum(widths) + 2 * len(widths) > COLUMNS
-    padding = (0, 0 if is_wide else 1, 0, 0)
-    table = Table(title=title, title_justify='left', box=SIMPLE_HEAD, show_edge=False, padding=padding)
-    words = [word for row in (columns, *cells) for word in row[0].split()]
-    least = [max(map(_measure, words), default=0), *widths[1:-1], min(widths[-1], LEAST)]
-    for number, column in enumerate(columns):
-        table.add_column(column, no_wrap=0 < number < len(columns) - 1, overflow='fold', min_width=least[number])
-    for row in cells:
-        table.add_row(*row)
-    _Console(width=max(COLUMNS, sum(least) + len(least)), markup=False, emoji=False).print(table)
+    first, *widths = [max(map(_measure, column)) for column in zip(columns, *cells, strict=True)]
+    if first + sum(each + 2 for each in widths) <= COLUMNS:
+        _show_part(range(len(columns)), columns, cells, title)
+        return
+    widths[-1:] = [min(each, LEAST_LAST) for each in widths[-1:]]
+    longest_word = max((len(word) for row in (columns, *cells) for word in row[0].split()), default=0)
+    if min(longest_word, LONGEST_FIRST) + sum(each + 1 for each in widths) <= COLUMNS:
+        _show_part(range(len(columns)), columns, cells, title, gap=0)
+        return
+    parts: list[list[int]] = []
+    left = 0
+    for number, width in enumerate(widths, 1):
+        if width >= left:
+            parts.append([0])
+            left = COLUMNS - min(first, LONGEST_FIRST)
+        parts[-1].append(number)
+        left -= width + 1
+    for part in parts:
+        _show_part(part, columns, cells, title if part is parts[0] else '', gap=0)
+
+
+def _show_part(
+    part: Sequence[int], columns: Sequence[str], rows: Sequence[Sequence[str]], title: str | None, gap: int = 1
+) -> None:
+    """Print some columns of a table, of which the first one and the last one of all may be folded; gap: between two, beside 1."""
+    table = Table(title=title, title_justify='left', box=SIMPLE_HEAD, show_edge=False, padding=(0, gap, 0, 0))
+    for number in part:
+        table.add_column(columns[number], no_wrap=0 < number < len(columns) - 1, overflow='fold')
+    for row in rows:
+        table.add_row(*(row[number] for number in part))
+    _Console(width=COLUMNS, markup=False, emoji=False).print(table)
 
 
 def _measure(text: str) -> int:

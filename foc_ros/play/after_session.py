@@ -26,10 +26,10 @@ class AfterSession:
     say
         Sends the page a message of a kind, with values.
     note_fitted
-        Called when there are new fitted parameters.
+        Called when there are new fitted parameters, with whether they are to be used: no position becomes worse.
     """
 
-    def __init__(self, say: Callable[..., None], note_fitted: Callable[[], None]) -> None:
+    def __init__(self, say: Callable[..., None], note_fitted: Callable[[bool], None]) -> None:
         self.folder: Path | None = None
         self.report: Path | None = None
         self.operator: Path | None = None
@@ -37,10 +37,9 @@ class AfterSession:
         self._reported = SessionReport()
         self._job: asyncio.Task[None] | None = None
 
-    def begin_session(self, folder: Path) -> SessionReport:
-        """Work on a new session from now on; return what collects its report."""
-        self.folder, self._reported = folder, SessionReport()
-        return self._reported
+    def begin_session(self, folder: Path, report: SessionReport) -> None:
+        """Work on a new session from now on; report: what collects its report."""
+        self.folder, self._reported = folder, report
 
     def begin(self, name: str) -> None:
         """Begin a job by its name; raises InputError where it is impossible."""
@@ -76,10 +75,13 @@ class AfterSession:
         return {'text': 'The report is ready.'}
 
     async def _fit(self, folder: Path) -> dict[str, Any]:
-        rows = await jobs.fit_operator(folder)
+        rows, losses = await jobs.fit_operator(folder)
         self.operator = folder / jobs.OPERATOR
-        self._note_fitted()
-        return {'text': 'Predictions now use your parameters.', 'columns': jobs.FITTED_COLUMNS, 'rows': rows}
+        self._note_fitted(not losses)
+        text = 'Predictions now use your parameters.'
+        if losses:
+            text = f'{"; ".join(losses)}. Predictions use your parameters if you choose them above.'
+        return {'text': text[0].upper() + text[1:], 'columns': jobs.FITTED_COLUMNS, 'rows': rows}
 
     async def _compare(self, folder: Path) -> dict[str, Any]:
         assert self.operator is not None

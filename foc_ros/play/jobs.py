@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from foc_ros.analysis.fitting.comparison import find_worse_positions
 from foc_ros.core.errors import FocError
 
 from .recorder import UNGUIDED
@@ -50,13 +51,16 @@ async def run_command(*arguments: str | Path) -> str:
     return output.decode()
 
 
-async def fit_operator(folder: Path) -> list[tuple[str, str, str]]:
-    """Fit the parameters to the trials without guidance, write OPERATOR, and return the rows of FITTED_COLUMNS."""
-    answer = json.loads(
-        await run_command('fit', folder / UNGUIDED, '--params', folder / PARAMETERS, '--output', folder / OPERATOR, '--json')
-    )
+async def fit_operator(folder: Path) -> tuple[list[tuple[str, str, str]], list[str]]:
+    """Fit the parameters to the trials without guidance, and write OPERATOR.
+
+    Return the rows of FITTED_COLUMNS, and a sentence for each horizon at which positions become worse with OPERATOR.
+    """
+    options = '--params', folder / PARAMETERS, '--output', folder / OPERATOR, '--allow', 'positions', '--json'
+    answer = json.loads(await run_command('fit', folder / UNGUIDED, *options))
     changed = {**answer['parameters'], **answer['chosen']}
-    return [(name, _format(each['given']), _format(each['value'])) for name, each in changed.items()]
+    rows = [(name, _format(each['given']), _format(each['value'])) for name, each in changed.items()]
+    return rows, find_worse_positions(answer['comparison'])
 
 
 async def compare_parameters(folder: Path, operator: Path) -> list[tuple[str, str, str]]:

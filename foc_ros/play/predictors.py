@@ -29,10 +29,12 @@ from foc_ros.ros.messages.types import RosbagsTypes
 
 NODE = '/foc'
 """Name of the node in the topics."""
-KINDS = {f'{NODE}/{name}': kind for name, (kind, _) in {**OUTPUTS, **GUIDANCE_OUTPUTS}.items()}
-"""Message type of every output by its topic."""
 SENT = ('prediction', 'likelihoods')
-"""Outputs that are encoded without ROS; markers and path say nothing more."""
+"""Outputs of a prediction that are used; markers and path say nothing more, and to encode them takes several times as long."""
+KINDS = {f'{NODE}/{name}': OUTPUTS[name][0] for name in SENT} | {
+    f'{NODE}/{name}': kind for name, (kind, _) in GUIDANCE_OUTPUTS.items()
+}
+"""Message type by topic of every output that is used."""
 
 Receive = Callable[[str, bytes], None]
 """Takes topic and bytes of an output, in any thread."""

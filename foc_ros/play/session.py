@@ -1,9 +1,9 @@
-"""A session: what the page asks for, the predictor behind it, the tasks and the bags, all in one thread."""
+"""A session: what the page asks for, the predictor behind it and the tasks, all in one thread."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from time import monotonic, time_ns
 from typing import Any
@@ -14,20 +14,20 @@ from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.io.topics import CLOUD, GOALS, HAND
-from foc_ros.reporting.drawing import CLASS_COLOURS
 from foc_ros.ros.messages.decode_poses import decode_stamp
 from foc_ros.ros.messages.encode_inputs import encode_hand_pose
 from foc_ros.ros.messages.types import RosbagsTypes
-from foc_ros.ros.parameters import load_parameter_file, write_parameter_file
+from foc_ros.ros.parameters import load_parameter_file
 
-from . import jobs, page_messages, scene, tasks
+from . import page_messages, scene, tasks
 from .after_session import AfterSession
+from .page_answers import make_hello, make_task
 from .page_clock import PageClock
 from .page_messages import HandMessage, Message, TasksMessage
 from .prediction_view import Slots, view_candidates
 from .predictors import KINDS, NODE, LivePredictor, Receive, State
-from .recorder import Recorder, make_session_folder
-from .session_report import PREDICTION, SessionReport
+from .session_recording import SessionRecording
+from .session_report import PREDICTION
 
 OWN_VALUES = {'plane': 'xy', 'frame_id': ''}
 """Parameters that the page fixes."""
@@ -55,17 +55,15 @@ class Session:
 
     def __init__(self, make_predictor: Callable[[Config, Receive], LivePredictor], config: Config, data: Path) -> None:
         self._standard = replace_values(config, OWN_VALUES)
-        self._after = AfterSession(self._say, self._use_operator)
+        self._after = AfterSession(self._say, self._note_fitted)
         self._parameters, self._is_guided = 'standard', config.guidance.enabled
-        self._data = data
+        self._recording = SessionRecording(data, self._note_lost_recording)
         self.predictor = make_predictor(self._config, self._receive)
         self._types = RosbagsTypes(TYPESTORE)
         self._scene = scene.FIRST_SCENE
         self._page: Send | None = None
         self._clock, self._slots = PageClock(), Slots()
         self._hands: deque[tuple[int, HandMessage]] = deque(maxlen=REMEMBERED_HANDS)
-        self._recorder: Recorder | None = None
-        self._reported = SessionReport()
         self._tasks: tasks.Tasks | None = None
         self._force_s, self._touched = 0.0, 0
         self._handlers: dict[type, Callable[[Any], None]] = {
@@ -89,20 +87,7 @@ class Session:
         """Serve a page from now on, in place of the one before."""
         self._say('replaced')
         self._page, self._clock = page, PageClock()
-        self._say(
-            'hello',
-            predictor=self.predictor.name,
-            colours=CLASS_COLOURS,
-            bounds=scene.BOUNDS,
-            start=scene.START,
-            target_radius=scene.TARGET_RADIUS,
-            radius_stddev=scene.RADIUS_STDDEV,
-            first_scene=scene.FIRST_SCENE.as_json(),
-            most={'obstacles': scene.MOST_OBSTACLES, 'goals': scene.MOST_GOALS},
-            max_speed=self._standard.guidance.max_speed,
-            # with a spring that is as stiff as guidance at most, the loop of cursor and guidance is stable at any delay
-            coupling=max(self._standard.guidance.k_max, 1.0),
-        )
+        page(make_hello(self.predictor.name, self._standard))
         self._say_settings()
         self._say_scene()
         self._say_task()
@@ -136,10 +121,8 @@ class Session:
         if stamp_ns is None:
             return
         self._hands.append((stamp_ns, message))
-        position = (*message.position, 0.0)
-        if self._recorder is not None:
-            self._reported.add_hand(stamp_ns, message.position)
-        self._send(HAND, encode_hand_pose(self._types, stamp_ns, scene.FRAME, position))
+        self._recording.add_hand(stamp_ns, message.position)
+        self._send(HAND, encode_hand_pose(self._types, stamp_ns, scene.FRAME, (*message.position, 0.0)))
         if self._tasks is not None:
             self._follow_tasks(self._tasks, stamp_ns * 1e-9, message.position)
 
@@ -165,7 +148,7 @@ class Session:
 
     def _switch_recording(self, message: page_messages.RecordMessage) -> None:
         self._refuse_during_tasks('recording')
-        if message.is_on and self._recorder is None:
+        if message.is_on and not self._recording.is_running:
             self._begin_recording()
         elif not message.is_on:
             self._end_recording()
@@ -200,9 +183,9 @@ class Session:
         if phase is None:
             return
         if phase is tasks.Phase.REACH:
-            self._record(lambda recorder: recorder.begin_trial(time_ns()))
+            self._recording.begin_trial()
         elif len(running.scores) > scored:
-            self._record(lambda recorder: recorder.end_trial(trial.is_guided))
+            self._recording.end_trial(trial.is_guided)
         if phase is tasks.Phase.OVER:
             self._end_tasks()
         elif phase is tasks.Phase.RETURN:
@@ -222,39 +205,29 @@ class Session:
     # recordings, and what is made of them
 
     def _begin_recording(self) -> None:
-        folder = make_session_folder(self._data)
-        write_parameter_file('--data', folder / jobs.PARAMETERS, self._standard)
         messages = {role: _serialize(message) for role, message in self._scene.encode(self._types, time_ns()).items()}
-        self._recorder = Recorder(folder, messages, time_ns())
-        self._reported = self._after.begin_session(folder)
+        self._after.begin_session(*self._recording.begin(self._standard, messages))
         self._say_settings()
 
     def _end_recording(self) -> None:
-        if self._recorder is not None:
-            recorder, self._recorder = self._recorder, None
-            recorder.close()
+        if self._recording.is_running:
+            self._recording.end()
             self._say_settings()
 
-    def _record(self, add: Callable[[Recorder], None]) -> None:
-        """Add to the recording, if there is one; a recording that cannot be written ends, and the tasks with it."""
-        if self._recorder is None:
-            return
-        try:
-            add(self._recorder)
-        except RecordingError as error:
-            self._recorder.discard(error)
-            self._recorder, self._tasks = None, None
-            self._say('error', text=str(error))
-            self._say_settings()
-            self._say_task()
+    def _note_lost_recording(self, error: RecordingError) -> None:
+        """End the tasks with the recording that cannot be written."""
+        self._tasks = None
+        self._say('error', text=str(error))
+        self._say_settings()
+        self._say_task()
 
     def _begin_job(self, message: page_messages.JobMessage) -> None:
-        if self._recorder is not None:
+        if self._recording.is_running:
             raise InputError('job', 'a session that has ended', message.name)
         self._after.begin(message.name)
 
-    def _use_operator(self) -> None:
-        self._parameters = 'mine'
+    def _note_fitted(self, is_used: bool) -> None:
+        self._parameters = 'mine' if is_used else 'standard'
         self._configure()
 
     # the predictor
@@ -287,13 +260,11 @@ class Session:
     def _send(self, role: str, message: Any) -> None:
         raw = _serialize(message)
         self.predictor.send(role, raw)
-        self._record(lambda recorder: recorder.add_input(role, raw, time_ns()))
+        self._recording.add_input(role, raw)
 
     def _receive(self, topic: str, raw: bytes) -> None:
         """Take an output of the predictor."""
-        if self._recorder is not None:
-            self._reported.add_output(topic, raw, self._scene, time_ns())
-        self._record(lambda recorder: recorder.add_output(topic, KINDS[topic], raw, time_ns()))
+        self._recording.add_output(topic, raw, self._scene)
         if topic == PREDICTION:
             self._receive_prediction(TYPESTORE.deserialize_cdr(raw, KINDS[topic]))
         elif topic == WRENCH:
@@ -334,21 +305,13 @@ class Session:
             guided=self._is_guided and not self._is_blind,
             parameters=self._parameters,
             fitted=self._after.operator is not None,
-            recording=self._recorder is not None,
+            recording=self._recording.is_running,
             session='' if self._after.folder is None else str(self._after.folder),
         )
 
     def _say_task(self) -> None:
-        running: Mapping[str, Any] = {}
-        if self._tasks is not None:
-            given = self._tasks
-            running = {
-                'trial': given.number + 1,
-                'trials': len(given.trials),
-                'goal': given.trial.goal if given.phase is tasks.Phase.REACH else None,
-                'blinded': given.settings.is_blinded,
-            }
-        self._say('task', phase='none' if self._tasks is None else self._tasks.phase.value, **running)
+        if self._page is not None:
+            self._page(make_task(self._tasks))
 
 
 def _serialize(message: Any) -> bytes:

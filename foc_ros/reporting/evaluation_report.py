@@ -13,12 +13,12 @@ from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PUBLISHED, REFITTED
 from foc_ros.analysis.evaluation.metrics import TENTHS
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS
 from foc_ros.analysis.evaluation.tables import GAP_TITLE, make_tables
+from foc_ros.io.outputs import EVALUATION_PAGE
 
 from .drawing import open_figure
 from .page import render_list, render_page, render_picture, render_pictures, render_table, write_page
 from .plots import save_figure
 
-PAGE = 'evaluation.html'
 WIDTH_IN, HEIGHT_IN = 6.4, 4.2
 COUNTS = f'with intervals of 95 % by bootstrap over recordings, and the numbers of predictions of {PUBLISHED}'
 CAPTIONS = {
@@ -34,7 +34,7 @@ def write_report(directory: Path, title: str, answer: Mapping[str, Any]) -> None
     warnings = [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     body = render_list(answer['verdict']) + render_pictures(_draw_questions(answer['questions'])) + tables
     page = render_page(f'Evaluation: {title}', body, warnings)
-    write_page(directory, PAGE, page)
+    write_page(directory, EVALUATION_PAGE, page)
 
 
 def _draw_questions(questions: Mapping[str, Any]) -> Iterator[str]:

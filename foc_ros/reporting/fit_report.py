@@ -16,12 +16,12 @@ from foc_ros.analysis.fitting.tables import (
     format_scores,
     make_verdict,
 )
+from foc_ros.io.outputs import FIT_PAGE
 
 from .drawing import get_class_style, open_figure
 from .page import render_list, render_page, render_picture, render_pictures, render_table, write_page
 from .plots import save_figure
 
-PAGE = 'fit.html'
 WIDTH_IN, LINE_IN = 6.4, 0.34
 CAPTION = (
     'Fitted values as multiples of the given ones, with 95 % intervals by bootstrap over recordings; the line is the given value.'
@@ -40,7 +40,7 @@ def write_report(directory: Path, title: str, answer: Mapping[str, Any]) -> None
         + render_table(SCORE_COLUMNS, format_scores(answer), 'Scores')
         + render_table((), commands, 'Run the node with these parameters')
     )
-    write_page(directory, PAGE, render_page(f'Fit: {title}', body, warnings))
+    write_page(directory, FIT_PAGE, render_page(f'Fit: {title}', body, warnings))
 
 
 def _draw_parameters(parameters: Mapping[str, Any]) -> str:

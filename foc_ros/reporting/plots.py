@@ -11,7 +11,7 @@ import numpy as np
 from foc_ros.core.errors import InputError
 from foc_ros.core.obstacles.outline import find_limits
 from foc_ros.core.types import NANOSECONDS, Array, Obstacles, PredictedCandidate, Prediction
-from foc_ros.io.outputs import MARK
+from foc_ros.io.outputs import MARK, PICTURE_SUFFIXES
 
 from .drawing import (
     CLASSES,
@@ -210,8 +210,8 @@ def compute_bounds(
 def save_figure(figure: Figure, file: Path | str) -> None:
     """Write a figure as PNG, PDF or SVG, by the file's suffix; raises InputError if that is not possible."""
     suffix = Path(file).suffix.lower()
-    if suffix not in METADATA:
-        raise InputError('picture file', f'a name that ends in {", ".join(METADATA)}', str(file))
+    if suffix not in PICTURE_SUFFIXES:
+        raise InputError('picture file', f'a name that ends in {", ".join(PICTURE_SUFFIXES)}', str(file))
     try:
         figure.savefig(file, bbox_inches='tight', pad_inches=0.08, metadata=METADATA[suffix])
     except OSError as error:

@@ -14,7 +14,7 @@ import numpy as np
 from foc_ros.analysis.replay import Step
 from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.types import NANOSECONDS, HandSample, Status
-from foc_ros.io.outputs import MARK, check_replaceable
+from foc_ros.io.outputs import MARK, OVERVIEW, REPORT_FILES, check_report
 
 from .page import render
 from .plots import make_recording_figure, make_snapshot_figure, save_figure
@@ -32,7 +32,6 @@ FRACTION = 0.3
 """Fraction of its duration at which each of several movements is pictured."""
 ONSET_SPEED = 0.05
 """Speed [m/s] above which the hand counts as moving."""
-FILES, OVERVIEW = ('index.html', 'predictions.json'), 'overview.png'
 COUNTERS = ('rejected', 'candidates compromised', 'candidates not solved', 'counters of the node')
 """Facts that the page folds: raw counts, of which the warnings name what matters."""
 Span = tuple[int, int]
@@ -66,13 +65,6 @@ class ReportCollector:
         write_report(directory, title, build_hand_trajectory(self.samples), self.snapshots, summary)
 
 
-def check_report(directory: Path) -> None:
-    """Raise InputError if a report would overwrite a file that is no part of an earlier report."""
-    check_replaceable(
-        '--report', *(directory / name for name in FILES), directory / OVERVIEW, *directory.glob('moment_[0-9][0-9].png')
-    )
-
-
 def write_report(
     directory: Path, title: str, hand: HandTrajectory, snapshots: Sequence[Snapshot], summary: Mapping[str, str]
 ) -> list[Path]:
@@ -81,7 +73,7 @@ def write_report(
     hand: the measured movement; snapshots: the predictions in order of their stamps; summary: facts for a table of the page.
     Raises InputError if the directory cannot be written or contains other files of those names, or if the hand has no sample.
     """
-    check_report(directory)
+    check_report('--report', directory)
     if not len(hand.stamps_ns):
         raise InputError('report', 'a recording with a hand pose', 'none')
     spans = hand.find_movements(ONSET_SPEED) or [(int(hand.stamps_ns[0]), int(hand.stamps_ns[-1]))]
@@ -99,7 +91,7 @@ def write_report(
         'hand_samples': len(hand.stamps_ns),
         'predictions': [_encode_snapshot(each, int(hand.stamps_ns[0])) for each in snapshots],
     }
-    page_file, numbers_file = (directory / name for name in FILES)
+    page_file, numbers_file = (directory / name for name in REPORT_FILES)
     try:
         directory.mkdir(parents=True, exist_ok=True)
         pictures = _write_pictures(directory, hand, tracks, spans)

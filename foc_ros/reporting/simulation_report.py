@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.analysis.simulation.assistance import FOC, NONE
+from foc_ros.analysis.simulation.names import FOC, NONE
 from foc_ros.analysis.simulation.operators import Task
 from foc_ros.analysis.simulation.study import PairResult
 from foc_ros.analysis.simulation.tables import COLUMNS, make_tables
 from foc_ros.analysis.simulation.trial import Trial
+from foc_ros.io.outputs import SIMULATION_PAGE
 
 from .drawing import draw_scene, get_class_style, open_figure
 from .page import render_page, render_picture, render_pictures, render_table, write_page
 from .plots import save_figure
 
-PAGE = 'simulation.html'
 DRAWN = ('collision_rate', 'completion_s', 'opposing_impulse')
 """Measures with a figure."""
 WIDTH_IN, HEIGHT_IN = 6.4, 4.2
@@ -38,7 +38,7 @@ def write_report(directory: Path, cells: Sequence[Mapping[str, Any]], results: S
         figures = render_pictures(_render_measures(cells, file))
         trials = render_pictures(_render_trials(results, file))
     body = f'{figures}{tables}<h2>Single trials</h2>{trials}'
-    write_page(directory, PAGE, render_page('Closed-loop study of guidance', body))
+    write_page(directory, SIMULATION_PAGE, render_page('Closed-loop study of guidance', body))
 
 
 def _render_measures(cells: Sequence[Mapping[str, Any]], file: Path) -> Iterator[str]:

@@ -56,30 +56,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments: ROS arguments (`--ros-args ...`) without the program's name; by default those of the process.
     """
     stop = StopSignals()
+    given = ['foc_node', *(sys.argv[1:] if arguments is None else arguments)]
     import rclpy
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
     from rclpy.logging import get_logger
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
 
+    try:
+        extra = remove_ros_args(given)[1:]
+        if extra:
+            raise FocError(f'unrecognized arguments: {" ".join(extra)} (those of ROS follow --ros-args)')
+    except (FocError, RuntimeError, ValueError) as error:
+        return _reject(error)
+
     from .node import FocNode
 
     with follow_compilation(partial(_log_compilation, get_logger('foc'))):
         import_all()
     stop.defer()
-    given = ['foc_node', *(sys.argv[1:] if arguments is None else arguments)]
     context = rclpy.Context()
     try:
-        extra = remove_ros_args(given)[1:]
-        if extra:
-            raise FocError(f'unrecognized arguments: {" ".join(extra)} (those of ROS follow --ros-args)')
         rclpy.init(args=given, context=context, signal_handler_options=SignalHandlerOptions.NO)
         node = FocNode(context=context)
     except (FocError, RuntimeError, ValueError) as error:
         context.try_shutdown()
-        for message in list_messages(error):
-            print(f'foc_node: {" ".join(message.split())}', file=sys.stderr)
-        return 2
+        return _reject(error)
     sys.setswitchinterval(SWITCH_S)
     gc.collect()
     gc.freeze()  # these objects stay alive: a full collection over them would delay a prediction by 80 ms
@@ -98,6 +100,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if node.is_busy_after(END_S):
         os._exit(0)  # otherwise the interpreter waits for the computation
     return 0
+
+
+def _reject(error: Exception) -> int:
+    """Print why the node does not start, and return the exit code."""
+    for message in list_messages(error):
+        print(f'foc_node: {" ".join(message.split())}', file=sys.stderr)
+    return 2
 
 
 def _log_compilation(logger: Any, done: int) -> None:

@@ -282,16 +282,16 @@ class FocNode(LifecycleNode):
         config = ended.task.config
         self._monitor.note_computed(prediction, config.budget_s)
         wanted = [name for name, publisher in self._outputs.items() if publisher.get_subscription_count()]
-        messages = encode_outputs(prediction, ended.task.obstacles, config.plane, self._types, wanted)
         now_s, clock_ns = monotonic(), self.get_clock().now().nanoseconds
         reason = self._freshness.find_late_reason(prediction.stamp_ns, ended.received_s, now_s, clock_ns, config)
         if reason is not None:
             self._monitor.note_late(reason)
             return
         self._guidance.loop.note_prediction(prediction, ended.received_s)
-        if 'markers' in messages:
-            messages['markers'].markers.extend(self._guidance.encode_markers(self._types))
-        for name, message in messages.items():
+        for name in wanted:  # one after the other: the markers of 8 candidates take longer than all else, and come last
+            (message,) = encode_outputs(prediction, ended.task.obstacles, config.plane, self._types, [name]).values()
+            if name == 'markers':
+                message.markers.extend(self._guidance.encode_markers(self._types))
             self._publish(self._outputs[name], message)
         self._monitor.note_prediction(prediction, ended.start_s, monotonic())
         if not self._has_predicted:

@@ -13,7 +13,7 @@ from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.parameter import Parameter as RosParameter
 
 from foc_ros.core.config import Config, Parameter, flatten, replace_values
-from foc_ros.core.errors import ParameterError, suggest
+from foc_ros.core.errors import FocError, ParameterError, collect, join_errors, suggest
 
 from .parameters import AUTOSTART, KNOWN, NODE_ONLY
 
@@ -22,16 +22,19 @@ def declare_parameters(node: Any, config: Config) -> Config:
     """Declare every parameter on a node and return the configuration with which it starts.
 
     config: the defaults. The node must be created with `automatically_declare_parameters_from_overrides`: the values that it was
-    started with are checked together. Raises ParameterError, also for a name that is unknown.
+    started with are checked together. Raises ParameterError, also for an unknown name, with a note for every further error.
     """
     given = {name: parameter.value for name, parameter in node.get_parameters_by_prefix('').items()}
+    errors: list[FocError] = []
     for name in given:
         if name in KNOWN:
             node.undeclare_parameter(name)
         elif name.split('.')[0] not in NODE_ONLY:
-            raise ParameterError(name, f'a known parameter{suggest(name, (*KNOWN, *NODE_ONLY))}', repr(given[name]))
-    config = replace_values(config, {name: value for name, value in given.items() if name in KNOWN})
-    values = flatten(config)
+            errors.append(ParameterError(name, f'a known parameter{suggest(name, (*KNOWN, *NODE_ONLY))}', repr(given[name])))
+    checked = collect(errors, replace_values, config, {name: value for name, value in given.items() if name in KNOWN})
+    if checked is None or errors:
+        raise join_errors(errors)
+    config, values = checked, flatten(checked)
     rows = [(name, values[name], _build_descriptor(parameter)) for name, parameter in KNOWN.items()]
     node.declare_parameters('', rows, ignore_override=True)
     return config

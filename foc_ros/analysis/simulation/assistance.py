@@ -18,11 +18,10 @@ from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Prediction
 
 from .intended_path import DT
+from .names import BLEND, FOC, HINDSIGHT, NONE, POTENTIAL_FIELD
 from .operators import Task
 from .peers import GoalInference, compute_blending_force, compute_field_force, compute_hindsight_force
 
-NONE, FOC, HINDSIGHT, BLEND, POTENTIAL_FIELD = 'none', 'foc', 'hindsight', 'blend', 'potential_field'
-ASSISTANCE = (NONE, FOC, HINDSIGHT, BLEND, POTENTIAL_FIELD)
 POSE_STEPS = 2
 """Time steps between two measured poses: 100 Hz."""
 SOURCE = 'simulation'

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterable
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from foc_ros.analysis.recordings import Recording, find_recordings
+from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.core.obstacles.rounded_polygon import measure_offsets
@@ -17,16 +17,17 @@ from foc_ros.io.topics import HAND
 from foc_ros.ros.intake import Intake
 
 from .intended_path import DT, IntendedPath
-from .operators import ARMS, HUMAN_PATHS, Task
+from .names import HUMAN_PATHS
+from .operators import ARMS, Task
 
 FEWEST_SAMPLES = 8
 
 
-def read_tasks(data: Path, config: Config) -> list[Task]:
-    """Return a task for each recording of a folder, as `evaluate` takes it; raise InputError if there is none with a goal."""
-    tasks = [task for recording in find_recordings(data).values() if (task := read_task(recording, config)) is not None]
+def read_tasks(recordings: Iterable[Recording], config: Config) -> list[Task]:
+    """Return a task for each recording that can be used, in their order; raise InputError if there is none."""
+    tasks = [task for recording in recordings if (task := read_task(recording, config)) is not None]
     if not tasks:
-        raise InputError('--recordings', 'recordings with goals', data)
+        raise InputError('--recordings', 'recordings with goals', 'none')
     return tasks
 
 

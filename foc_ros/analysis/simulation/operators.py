@@ -11,10 +11,8 @@ from foc_ros.core.obstacles.rounded_polygon import measure_offsets
 from foc_ros.core.types import Array, Obstacles, Record, make_obstacles
 
 from .intended_path import DT, IntendedPath, plan_path
+from .names import ACCURATE, CHANGES_WAY, HUMAN_PATHS, LAGGY, NOISY, UNANNOUNCED_GOAL
 
-ACCURATE, NOISY, LAGGY = 'accurate', 'noisy', 'laggy'
-CHANGES_WAY, UNANNOUNCED_GOAL, HUMAN_PATHS = 'changes_way', 'unannounced_goal', 'human_paths'
-OPERATORS = (ACCURATE, NOISY, LAGGY, CHANGES_WAY, UNANNOUNCED_GOAL, HUMAN_PATHS)
 OBSTACLES = 6
 GAP_M = 0.03
 """Smallest gap between two obstacles, and between an obstacle and the start or a goal."""

@@ -14,8 +14,8 @@ from foc_ros.analysis.parallel import collect_all
 from foc_ros.core.config import Config
 from foc_ros.core.types import Array
 
-from .assistance import NONE
-from .operators import HUMAN_PATHS, OPERATORS, Task, draw_task
+from .names import HUMAN_PATHS, NONE, OPERATORS
+from .operators import Task, draw_task
 from .trial import Trial, count_steps, measure_trial, run_trial
 
 MEASURES = (

@@ -35,6 +35,8 @@ REDRAW_S, LINE_S = 0.125, 1.0
 """Seconds between two updates of the table on a terminal, and between two lines of text elsewhere."""
 ROWS = 4
 """Rows of the table: the default number of candidates, so that its height stays the same."""
+LISTED = 2
+"""Number of candidates in a line of text."""
 
 
 class Recorder:
@@ -134,7 +136,7 @@ def show_live(
             drawing = Text(draw_scene(snapshot, hand, bounds))
             live.update(Group(drawing, Text(LEGEND), _make_table(snapshot, heading)), refresh=True)
             return
-        shares = '   '.join(_describe(each) for each in snapshot.candidates)
+        shares = '   '.join(_describe(each) for each in snapshot.candidates[:LISTED])
         console.print(f'{heading}   {shares or "no solved candidate"}', highlight=False, soft_wrap=True, markup=False)
 
     with live or nullcontext():
@@ -142,7 +144,7 @@ def show_live(
 
 
 def _describe(candidate: CandidateView) -> str:
-    return f'{100 * candidate.likelihood:.0f} % {candidate.label}' + f' ({candidate.description})' * bool(candidate.description)
+    return f'{100 * candidate.likelihood:.0f} % {candidate.description or candidate.label}'
 
 
 def _make_table(snapshot: Snapshot, title: str) -> Table:

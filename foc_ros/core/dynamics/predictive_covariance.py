@@ -49,6 +49,20 @@ def compute_predictive_covariance(hand: HandState, dt: float, steps: int, config
     return covariance
 
 
+class SharedCovariances:
+    """The covariances that plans from one state of the hand share, by the length of their steps; each is computed once."""
+
+    def __init__(self, hand: HandState, config: Config) -> None:
+        self._hand, self._config = hand, config
+        self._known: dict[float, Array] = {}
+
+    def __getitem__(self, dt: float) -> Array:
+        """Return what `compute_predictive_covariance` does for steps of dt [s]."""
+        if dt not in self._known:
+            self._known[dt] = compute_predictive_covariance(self._hand, dt, self._config.foc.steps, self._config)
+        return self._known[dt]
+
+
 def timing_covariances(
     solution: Solution, at_rest: bool, config: DurationConfig, plant: PlantModel = TRIPLE_INTEGRATOR
 ) -> Iterator[Array]:

@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from foc_ros.core.checks import check_array, check_number, check_vector
 from foc_ros.core.errors import SceneError
@@ -43,6 +42,8 @@ def make_box_polygon(size: ArrayLike, yaw: float) -> Array:
 
 def make_hull_polygon(points: Array) -> tuple[Array, Array]:
     """Return the mean of the corners of the convex hull of points (q, 2) [m], and these (v, 2), anticlockwise, from there [m]."""
+    from scipy.spatial import ConvexHull, QhullError  # its import takes longer than to read a scene without hulls
+
     try:
         corners = points[ConvexHull(points).vertices]
         corners = corners[np.hypot(*(corners - np.roll(corners, 1, axis=0)).T) >= FLAT]  # points that differ by rounding alone

@@ -1,0 +1,83 @@
+"""What commands print fits into a terminal of 80 columns."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import pytest
+from fit_recordings import write_tables
+
+from foc_ros.analysis.fitting.tables import COMPARISON_TITLES
+from foc_ros.cli import fit, paper
+from foc_ros.cli.main import main
+from foc_ros.io.terminal import COLUMNS, show_table
+
+ROOT = Path(__file__).parents[1]
+NAMES = ('front_left_post', 'front_right_post_of_the_shelf', 'a_name_that_is_longer_than_a_column_40')
+POSTS = [
+    f'{{x: {x}, y: {y}, radius: 0.02, id: {name}}}'
+    for name, x, y in zip(NAMES, (0.15, 0.2, 0.25), (0.01, 0.05, -0.02), strict=True)
+]
+SCENE = f'start: [0, 0]\ngoals: [[0.3, 0.0], [0.3, 0.1]]\nobstacles: [{", ".join(POSTS)}]\n'
+
+
+def find_widest(printed: str) -> int:
+    return max(map(len, printed.splitlines()))
+
+
+@pytest.mark.parametrize(
+    'arguments',
+    [
+        ['solve', 'scene.yaml', '--monte-carlo', '100'],
+        ['replay', str(ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap')],
+        ['simulate', '--operators', 'unannounced_goal', '--trials', '1', '--workers', '1'],
+        ['evaluate', 'data', '--workers', '1'],
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_the_output_of_a_command_fits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: list[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path('scene.yaml').write_text(SCENE)
+    if 'data' in arguments:
+        write_tables(Path('data'), count=2)
+    assert main(arguments) == 0
+    assert 0 < find_widest(capsys.readouterr().out) <= COLUMNS
+
+
+def test_the_table_of_the_paper_fits(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = [('7', 'a statement', 'ratio of LV to HC is far above one at every eta', '1.234 to 5.678 at eta 0.90 to 0.99', 'yes')]
+    monkeypatch.setattr(paper, 'perform', lambda _: {})
+    monkeypatch.setattr(paper, 'check_trends', lambda _: rows)
+    monkeypatch.setattr(paper, '_format_cells', lambda cells: cells)
+    assert paper.run(argparse.Namespace(output=Path('output'))) == 0
+    assert 0 < find_widest(capsys.readouterr().out) <= COLUMNS
+
+
+def test_the_tables_of_a_fit_fit(capsys: pytest.CaptureFixture[str]) -> None:
+    estimate = {'given': 0.123456, 'value': 1234.56, 'interval': [1.23456e-7, 1.23456e7], 'how': 'covariance of the predictions'}
+    measures = {name: {'before': 0.0634, 'after': 0.0961} for name in COMPARISON_TITLES}
+    answer = {
+        'recordings': 6,
+        'parameters': {'guidance.progress_speed_of_the_reference': estimate},
+        'chosen': {'duration.model': {'given': 'fitts', 'value': 'cost_of_time'}},
+        'scores': {'inside_all_90': {'without the recording': 0.9}},
+        'comparison': measures,
+        'warnings': ['a long warning ' * 10],
+        'output': 'o.yaml',
+        'node': ['python -m foc_ros node --ros-args --params-file o.yaml'],
+    }
+    fit._show(answer)
+    assert 0 < find_widest(capsys.readouterr().out) <= COLUMNS
+
+
+def test_a_wide_table_is_divided_and_loses_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    columns = ['rule', *(f'column {number} of a wide table' for number in range(7)), 'last']
+    rows = [[f'rule {row}', *(f'{row}.{number} (1 to 2)' for number in range(7)), f'end {row}'] for row in range(3)]
+    show_table(columns, rows, 'title')
+    printed = capsys.readouterr().out
+    assert find_widest(printed) <= COLUMNS
+    assert all(printed.count(text) == 1 for text in ('title', *columns[1:], *(cell for row in rows for cell in row[1:])))
+    assert printed.count('rule 2') == 4
