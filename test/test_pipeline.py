@@ -492,7 +492,7 @@ def test_samples_and_scenes_of_the_meantime_do_not_change_a_prediction_that_was_
     assert task is not None
     pipeline.add_hand_sample(hand(40.0, 0.01))
     pipeline.set_obstacles('cloud', make_obstacles(), START, 'world')
-    recorder(task.config, task.hand, task.obstacles, task.goals, task.memory, (), NEVER)
+    recorder(task.config, task.hand, task.obstacles, task.goals, task.memory, (), NEVER, None)
     prediction = pipeline.finish(task, lambda: (Prediction(task.hand.stamp_ns, 'world', 0.3, (), 'made'), Memory('made')))
     assert prediction is not None and prediction.stamp_ns == START
     assert recorder.calls[0][2].ids == ('0',)
