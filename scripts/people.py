@@ -1,4 +1,4 @@
-"""Measure predictions of people: ways, positions, persons left out and the pace that is learnt; `make people` runs it.
+"""Measure predictions of people: ways, positions, persons left out and what is learnt of them; `make people` runs it.
 
 It uses D3IL and HLP, which have to be beside the checkout (`shared/data`), and writes the tables of doc/people.md. Each setting
 is scored on those recordings of D3IL and persons of HLP that no setting was chosen on.
@@ -21,16 +21,16 @@ from foc_ros.analysis.evaluation.cross_validation import choose_held_out, comput
 from foc_ros.analysis.evaluation.forecasts import power_rule_shares, published_shares
 from foc_ros.analysis.evaluation.ground_truth import HORIZONS_S
 from foc_ros.analysis.evaluation.metrics import Scores, score_forecasts, summarise
-from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
+from foc_ros.analysis.evaluation.observations import ObservedRecording, observe_in_order
 from foc_ros.analysis.evaluation.position_metrics import compute_position_scores
 from foc_ros.analysis.evaluation.questions import PATH_CLASS, ask_all
 from foc_ros.analysis.fitting.duration_fit import find_samples
 from foc_ros.analysis.fitting.recorded_hand import RecordedHand, read_hand
 from foc_ros.analysis.parallel import collect, collect_all, open_executor
-from foc_ros.analysis.recordings import Recording, find_recordings
-from foc_ros.analysis.replay import Replay
+from foc_ros.analysis.recordings import Recording, find_recordings, group_by_operator
 from foc_ros.cli.arguments import add_worker_arguments
 from foc_ros.core.config import Config
+from foc_ros.core.errors import RecordingError
 from foc_ros.core.estimation.adaptation import Operator
 from foc_ros.core.estimation.duration import estimate_times_to_go
 from foc_ros.ros.parameters import load_parameter_file
@@ -39,17 +39,20 @@ PAGE, EXAMPLES = ROOT / 'doc' / 'people.md', ROOT / 'doc' / 'examples'
 D3IL, HLP = 'd3il_avoiding', 'hlp_reaching'
 ROOM = Config().with_values({'homotopy.max_candidates': 24, 'rate_hz': 4.0})
 HAND = Config().with_values({'scene.hand_radius': 0.0125, 'rate_hz': 4.0})
+UNLEARNT = {'duration.adaptation': 'none', 'likelihood.adaptation': 'none'}
 SETTINGS = {
-    (D3IL, 'defaults, pace not learnt'): ROOM.with_values({'duration.adaptation': 'none'}),
+    (D3IL, 'defaults, nothing learnt'): ROOM.with_values(UNLEARNT),
+    (D3IL, 'defaults, pace learnt'): ROOM.with_values({'likelihood.adaptation': 'none'}),
     (D3IL, 'defaults'): ROOM,
     (D3IL, 'thumb_stick.yaml'): load_parameter_file(EXAMPLES / 'thumb_stick.yaml').with_values({'rate_hz': 4.0}),
+    (HLP, 'defaults, nothing learnt'): HAND.with_values(UNLEARNT),
     (HLP, 'defaults'): HAND,
     (HLP, 'free_hand.yaml'): load_parameter_file(EXAMPLES / 'free_hand.yaml').with_values({'rate_hz': 4.0}),
 }
 CURVE = (0, 1, 2, 4, 8)
 """Numbers of earlier movements after which the time to go is scored."""
 
-Persons = dict[str, dict[str, Recording]]
+Persons = dict[str, list[Recording]]
 
 
 def find_persons(data: Path) -> Persons:
@@ -57,19 +60,10 @@ def find_persons(data: Path) -> Persons:
 
     Settings were chosen on the recordings of D3IL with odd numbers, and on every other person of HLP from the first.
     """
-    found: Persons = {}
-    for name, recording in find_recordings(data).items():
-        person = name.rpartition('_')[0]
-        if person or int(name) % 2 == 0:
-            found.setdefault(person, {})[name] = recording
-    return found if len(found) == 1 else {person: found[person] for person in sorted(found)[1::2]}
-
-
-def observe_person(item: tuple[Sequence[Recording], Config]) -> list[ObservedRecording]:
-    """Replay the recordings of a person in their order, with what is learnt from one to the next."""
-    recordings, config = item
-    replayed = Replay(config)
-    return [observe(recording, config, replayed) for recording in recordings]
+    found = group_by_operator(find_recordings(data))
+    if len(found) == 1:
+        return {person: [each for each in recordings if int(each.name) % 2 == 0] for person, recordings in found.items()}
+    return {person: found[person] for person in sorted(found)[1::2]}
 
 
 def score_ways(recordings: Sequence[ObservedRecording], baseline: Baseline, chosen: Sequence[int]) -> Scores:
@@ -120,7 +114,7 @@ def measure_pace(persons: Persons, executor: Executor) -> list[tuple[str, ...]]:
     """Return the rows of the learning curve."""
     found = []
     for recordings in persons.values():
-        hands, _ = collect(partial(read_hand, config=Config()), list(recordings.items()), executor, 'read')
+        hands, _ = collect(partial(read_hand, config=Config()), [(each.name, each) for each in recordings], executor, 'read')
         found += list(compare_pace(hands))
     table, rows = np.array(found), []
     for low, high in zip(CURVE, (*CURVE[1:], np.inf), strict=True):
@@ -142,9 +136,11 @@ def main() -> None:
     with open_executor(arguments) as executor:
         for (data, setting), config in SETTINGS.items():
             persons = find_persons(SHARED / data)
-            items = [(each, (list(found.values())[:: arguments.every], config)) for each, found in persons.items()]
-            observed = collect_all(observe_person, items, executor, f'{data}: {setting}')
-            recordings = [recording for each in observed for recording in each]
+            items = [(person, found[:: arguments.every]) for person, found in persons.items()]
+            observed = collect_all(partial(observe_in_order, config=config), items, executor, f'{data}: {setting}')
+            recordings = [recording for each, _ in observed for recording in each]
+            for name, reason in [failure for _, failed in observed for failure in failed.items()]:
+                raise RecordingError(f'{name}: {reason}')
             ways.append((data, setting, *format_ways(score_ways(recordings, published, [0] * len(recordings)))))
             positions.append((data, setting, *format_positions(recordings)))
             if data == HLP:

@@ -56,6 +56,18 @@ def test_reaches_past_an_obstacle_are_scored_by_class(tables: Path, capsys: pyte
     assert found['parameters']['foc.steps'] == 20
 
 
+def test_in_order_a_recording_is_evaluated_with_what_was_learnt_in_those_before(
+    tables: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    apart, learnt = answer(tables, capsys), answer(tables, capsys, '--in-order')
+    assert learnt['recordings'] == apart['recordings'] and learnt == answer(tables, capsys, '--in-order')
+    assert learnt['questions']['way']['foc'] != apart['questions']['way']['foc']
+    assert learnt['questions']['way']['uniform'] == apart['questions']['way']['uniform']
+    (tables / 'recordings.csv').write_text((tables / 'recordings.csv').read_text() + 'short,0.0,nan,0.0\n')
+    failed = answer(tables, capsys, '--in-order', code=2)
+    assert list(failed['failed']) == ['short'] and failed['recordings'] == 3
+
+
 def forecast_first(observation: Observation, question: Question, confidence: float) -> Forecast:
     """Name the first answer of the candidates, whatever the hand does."""
     return Forecast.from_answer(question.answers[question.given[0]], confidence, question)

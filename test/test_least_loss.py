@@ -130,7 +130,9 @@ def predict_shares(strategy: str, values: dict[str, float]) -> tuple[float, set[
     """Return the likelihood of passing on the left, and the statuses, for a hand that moves at (vx, vy) towards one obstacle."""
     given = {'eta': 0.9, 'y': 0.0, 'vx': 0.0, 'vy': 0.0} | values
     parameters = {'foc.noise_x': 0.15, 'foc.noise_y': 0.15, 'foc.eta': given['eta'], 'foc.strategy': strategy}
-    config = replace_values(Config(), parameters | {'duration.model': 'fixed', 'likelihood.shortfall': 1.0})
+    config = replace_values(
+        Config(), parameters | {'duration.model': 'fixed', 'likelihood.beta': 0.5, 'likelihood.shortfall': 1.0}
+    )
     mean = np.array([0.0, 0.0, given['vx'], given['vy'], 0.0, 0.0])
     hand = HandState(0, mean, np.zeros((6, 6)), onset_ns=0, onset_position=np.zeros(2))
     obstacle = make_obstacles([[0.15, given['y']]], 0.03, 0.003)

@@ -46,8 +46,8 @@ def test_a_class_that_misses_eta_takes_part_with_less_weight():
     assert {each.status for each in found} == {Status.COMPROMISED}
     assert all(each.has_likelihood and not each.is_solved and 0 < each.eta < 0.99 for each in found)
     assert sum(each.likelihood for each in found) == pytest.approx(1.0)
-    price = foc_ros.Config().likelihood.shortfall
-    weights = [each.cost**-0.5 * math.exp(-price * each.solution.safety_shortfall) for each in found]
+    likelihood = foc_ros.Config().likelihood
+    weights = [each.cost**-likelihood.beta * math.exp(-likelihood.shortfall * each.solution.safety_shortfall) for each in found]
     np.testing.assert_allclose([each.likelihood for each in found], np.array(weights) / sum(weights))
 
 

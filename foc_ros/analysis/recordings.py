@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -80,6 +80,14 @@ def find_recordings(data: Path) -> dict[str, Recording]:
     if not bags:
         raise RecordingError(f'{data}: expected bags, or {RECORDINGS} with {GOALS} or {SCENES}, got neither')
     return {path.name: BagRecording(path.name, path) for path in bags}
+
+
+def group_by_operator(found: Mapping[str, Recording]) -> dict[str, list[Recording]]:
+    """Return the recordings of each operator, whose name is that of the recording up to its last underscore, in their order."""
+    groups: dict[str, list[Recording]] = {}
+    for name, recording in found.items():
+        groups.setdefault(name.rpartition('_')[0], []).append(recording)
+    return groups
 
 
 def read_tables(data: Path) -> dict[str, TableRecording]:

@@ -81,6 +81,8 @@ def add_fit_arguments(parser: argparse.ArgumentParser) -> None:
 def add_evaluate_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `evaluate`."""
     parser.add_argument('data', type=_read_existing_path, metavar='DATA', help=DATA)
+    words = 'replay the recordings of an operator one after the other, with what is learnt from one to the next'
+    parser.add_argument('--in-order', action='store_true', help=words)
     _add_parameter_file(parser)
     _add_evaluation_arguments(parser)
 

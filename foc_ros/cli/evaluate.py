@@ -8,9 +8,10 @@ import sys
 from functools import partial
 
 from foc_ros.analysis.evaluation.evaluate import evaluate, find_label_mismatches
-from foc_ros.analysis.evaluation.observations import observe
+from foc_ros.analysis.evaluation.observations import observe, observe_in_order
 from foc_ros.analysis.evaluation.tables import make_tables
 from foc_ros.analysis.parallel import collect, open_executor
+from foc_ros.analysis.recordings import group_by_operator
 from foc_ros.io.terminal import show_table, show_text
 
 
@@ -20,7 +21,13 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.report is not None:
         from foc_ros.reporting.evaluation_report import write_report  # a missing library is reported before the work
     with open_executor(arguments) as executor:
-        recordings, failed = collect(partial(observe, config=config), list(arguments.found.items()), executor, 'replay')
+        if arguments.in_order:
+            operators = list(group_by_operator(arguments.found).items())
+            parts, failed = collect(partial(observe_in_order, config=config), operators, executor, 'replay')
+            recordings = [each for observed, _ in parts for each in observed]
+            failed |= {name: reason for _, reasons in parts for name, reason in reasons.items()}
+        else:
+            recordings, failed = collect(partial(observe, config=config), list(arguments.found.items()), executor, 'replay')
         for name, reason in failed.items():
             print(f'foc_ros evaluate: {name}: {reason}', file=sys.stderr)
         if not recordings:

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from .choices import Choice
 from .config import FocConfig, LikelihoodConfig
 from .deadline import NEVER, Deadline
 from .decisions import find_decisions, tabulate_sides
@@ -154,20 +155,26 @@ def _identify_class(candidate: PredictedCandidate) -> tuple[int, frozenset[tuple
 
 def rank_candidates(
     candidates: Sequence[PredictedCandidate], likelihood: LikelihoodConfig, obstacles: Obstacles, hand: HandState, goals: Array
-) -> list[PredictedCandidate]:
+) -> tuple[list[PredictedCandidate], Choice | None]:
     """Return the distinct candidates: solved and compromised ones, most likely first, then the others, with likelihood 0.
 
-    obstacles: grown by the radius of the hand; goals (g, 2) [m].
+    obstacles: grown by the radius of the hand; goals (g, 2) [m]. The choice is that between the candidates with a likelihood,
+    None where there are fewer than two or nothing is learnt from choices.
     """
     candidates = drop_duplicates(candidates)
     taken = [each for each in candidates if each.has_likelihood]
     branch_times = compute_branch_times(taken, obstacles) if likelihood.lookahead_s > 0.0 else None
     costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))
-    decisions, has_far_choices = None, likelihood.weaving > 0.0 or likelihood.beta_beyond != likelihood.beta
-    if len(taken) > 1 and has_far_choices:
+    decisions = choice = None
+    is_learnt = likelihood.adaptation == 'online'
+    has_far_choices = likelihood.weaving > 0.0 or likelihood.beta_beyond != likelihood.beta
+    if len(taken) > 1 and (has_far_choices or is_learnt):
         decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), obstacles, hand, goals)
+        if is_learnt:
+            goal, sides = np.array([each.candidate.goal for each in taken], dtype=np.intp), tuple(each.sides for each in taken)
+            choice = Choice(hand.stamp_ns, obstacles, goals, goal, sides, costs, shortfalls, branch_times, decisions)
     shares = compute_likelihoods(costs, likelihood, branch_times, shortfalls, decisions)
     pairs = zip(taken, shares.tolist(), strict=True)
     ranked = [replace(each, likelihood=share) for each, share in pairs]
     ranked.sort(key=lambda each: (-each.likelihood, each.label))
-    return ranked + [each for each in candidates if not each.has_likelihood]
+    return ranked + [each for each in candidates if not each.has_likelihood], choice

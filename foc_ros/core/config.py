@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 from .errors import ParameterError, join_errors, suggest
 from .registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
@@ -135,7 +135,7 @@ class LikelihoodConfig:
     """Conversion of costs to likelihoods."""
 
     rule: str = _p('cost_ratio', 'rule that gives the weight of a class from its cost', choices=LIKELIHOOD_RULES)
-    beta: float = _p(0.5, 'exponent of the cost ratio', '', 0.0, 100.0)
+    beta: float = _p(1.0, 'exponent of the cost ratio', '', 0.0, 100.0)
     shortfall: float = _p(
         3.0,
         'log-likelihood that a class loses per standard deviation below the wanted eta; .inf: left out',
@@ -147,9 +147,14 @@ class LikelihoodConfig:
     lookahead_s: float = _p(
         0.0, 'mean look-ahead of the operator: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
     )
-    beta_beyond: float = _p(0.5, 'exponent of the cost ratio for what lies beyond the next row of obstacles', '', 0.0, 100.0)
+    beta_beyond: float = _p(0.3, 'exponent of the cost ratio for what lies beyond the next row of obstacles', '', 0.0, 100.0)
     weaving: float = _p(
         4.0, 'log-likelihood that a class loses for each row through several gaps of which it leads', '', 0.0, 100.0
+    )
+    adaptation: str = _p(
+        'online',
+        "whether `beta`, `shortfall` and `beta_beyond` follow the operator's earlier choices, by factors",
+        choices=ADAPTATIONS,
     )
     hold_s: float = _p(
         0.2, 'longest time for which a class keeps its last answer if there is no time for a new one or it fails', 's', 0.0, 10.0
@@ -177,6 +182,9 @@ class SceneConfig:
         0.0,
         10.0,
     )
+
+
+Group = TypeVar('Group', DurationConfig, LikelihoodConfig)
 
 
 @dataclass(frozen=True)
@@ -297,6 +305,12 @@ def list_parameters(group: type = Config, prefix: str = '') -> Iterator[Paramete
             yield Parameter(prefix + item.name, item.default, item.metadata['bound'])
         else:
             yield from list_parameters(cast('type', item.default_factory), f'{prefix}{item.name}.')
+
+
+def clip_values(group: Group, values: Mapping[str, float]) -> Group:
+    """Return a group of parameters with other numbers, each of which stays within its bounds."""
+    bounds = {item.name: item.metadata['bound'] for item in fields(group)}
+    return replace(group, **{name: min(max(value, bounds[name].low), bounds[name].high) for name, value in values.items()})
 
 
 def flatten(config: Config) -> dict[str, float | int | str | bool]:

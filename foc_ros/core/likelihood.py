@@ -23,7 +23,10 @@ These p_i give the probabilities of the gaps of the next row. What lies beyond t
 beta' = `likelihood.beta_beyond`. A class that weaves through w_i rows (`decisions`) has a weight that is smaller by
 exp(-`likelihood.weaving` w_i), in both. With G the classes that take the same gap in the next row, those of class i,
 
-    p_i <- sum_{j in G} p_j  r_i / sum_{j in G} r_j,  r_i = J_i^-beta' exp(-shortfall (k_wanted - k) - weaving w_i).
+    p_i <- sum_{j in G} p_j  r_i / sum_{j in G} r_j,
+    log r_i = -beta' log J_i - (beta' / beta) shortfall (k_wanted - k) - weaving w_i,
+
+so that far choices follow the same losses as near ones, less precisely if beta' < beta.
 """
 
 from __future__ import annotations
@@ -105,9 +108,10 @@ def compute_likelihoods(
     if config.lookahead_s > 0.0 and branch_times is not None and len(logs):
         logs = _weigh_by_lookahead(logs - logs.max(), branch_times, config.lookahead_s)
     if decisions is not None and len(logs):
-        losses = losses + config.weaving * decisions.woven
-        beyond = rule(values, replace(config, beta=config.beta_beyond)) - losses
-        logs = _share_next_gaps(logs - config.weaving * decisions.woven, beyond, decisions.next_gap)
+        woven = config.weaving * decisions.woven
+        precision = config.beta_beyond / config.beta if config.beta > 0.0 else 1.0
+        beyond = rule(values, replace(config, beta=config.beta_beyond)) - precision * losses
+        logs = _share_next_gaps(logs - woven, beyond - woven, decisions.next_gap)
     return normalise_logs(np.ascontiguousarray(logs, dtype=float))
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from .candidates import NOTHING, EarlierSolutions
+from .choices import Choice
 from .class_numbers import NO_NUMBERS, ClassNumbers, is_renamed
 from .continuity import NO_PAST, Past
 from .types import Candidate, PredictedCandidate, Solution, Status
@@ -24,7 +25,7 @@ class Memory:
 
     most_likely: label; candidates: the homotopy classes followed; earlier: their solutions, likelihoods and turns; followed: for
     how many predictions in a row each has been followed without being solved; past: what continuity needs; next_goal: row of the
-    goal at which the search begins; numbers: of the classes.
+    goal at which the search begins; numbers: of the classes; choice: the last one, from which preferences are learnt.
     """
 
     most_likely: str | None = None
@@ -34,6 +35,7 @@ class Memory:
     past: Past = NO_PAST
     next_goal: int = 0
     numbers: ClassNumbers = NO_NUMBERS
+    choice: Choice | None = None
 
     def forget(self) -> Memory:
         """Return the memory with which a new movement begins: empty, but no number of a class is given again."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from .choices import Preferences
 from .config import Config
 from .deadline import NEVER, Deadline
 from .errors import FocError
@@ -47,7 +48,7 @@ class Pipeline:
 
     library: demonstrated paths. Attributes: config; hand_state, None before the first hand sample; scene, obstacles and goals;
     engaged, whether predictions are made; frame_id, the working frame, None until the parameter or the first hand sample fixes
-    it; operator, what was learnt from the movements so far.
+    it; operator and preferences, what was learnt from the movements so far of durations and of choices.
     """
 
     def __init__(self, config: Config, library: Sequence[Demonstration] = ()) -> None:
@@ -56,7 +57,7 @@ class Pipeline:
         self.hand_state: FilterState | None = None
         self.scene = Scene()
         self.is_engaged = True
-        self.operator = Operator()
+        self.operator, self.preferences = Operator(), Preferences()
         self.frame_id = config.frame_id or None
         self._rejections = Rejections()
         self._memory = Memory()
@@ -68,8 +69,10 @@ class Pipeline:
     @property
     def adapted_config(self) -> Config:
         """The parameters with which the next prediction is made: those given, adapted to the operator."""
-        adapted = self.operator.adapt(self.config.duration)
-        return self.config if adapted is self.config.duration else replace(self.config, duration=adapted)
+        config = self.config
+        duration, likelihood = self.operator.adapt(config.duration), self.preferences.adapt(config.likelihood)
+        is_same = duration is config.duration and likelihood is config.likelihood
+        return config if is_same else replace(config, duration=duration, likelihood=likelihood)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -118,6 +121,8 @@ class Pipeline:
             return SampleStatus.DISENGAGED
         if self.config.duration.adaptation == 'online':
             self.operator = self.operator.follow(self.hand_state, self.scene.goals, self.config.duration)
+        if self.config.likelihood.adaptation == 'online':
+            self.preferences = self.preferences.follow(self.hand_state, self.config.likelihood)
         return status
 
     def set_obstacles(self, source: str, obstacles: Obstacles, stamp_ns: int | None, frame_id: str) -> SampleStatus:
@@ -184,6 +189,7 @@ class Pipeline:
         except FocError as error:
             self._rejections.reject('predict_failed', str(error))
             return None
+        self.preferences = self.preferences.add(self._memory.choice)
         for candidate in prediction.candidates:
             if not candidate.has_likelihood:
                 self._rejections.count(f'candidate_{candidate.status.value}')
@@ -201,6 +207,7 @@ class Pipeline:
         if on != self.is_engaged:
             self._forget_predictions()
             self._is_new, self.operator = False, replace(self.operator, states=())
+            self.preferences = self.preferences.interrupt()
         self.is_engaged = on
 
     def remove_source(self, source: str) -> None:
@@ -209,7 +216,7 @@ class Pipeline:
 
     def reset(self) -> None:
         """Forget the movement and the operator; keep the scene, the working frame and the counts."""
-        self.hand_state, self._is_new, self.operator = None, False, Operator()
+        self.hand_state, self._is_new, self.operator, self.preferences = None, False, Operator(), Preferences()
         self._forget_predictions()
 
     def reconfigure(self, config: Config) -> None:
@@ -225,6 +232,8 @@ class Pipeline:
             self._fix_frame(config.frame_id)
         if config.duration != self.config.duration:
             self.operator = Operator()
+        if config.likelihood != self.config.likelihood:
+            self.preferences = Preferences()
         self.config = config
         if self._task is not None:
             self._abandon_task()

@@ -89,7 +89,7 @@ def predict(
     solved = solve_candidates(candidates, problems, config.foc, costs, earlier, *until)
     widened = [_widen_covariance(each, shared, hand, config) for each in solved]
     kept = keep_answers(candidates, widened, past, hand.stamp_ns, config.likelihood.hold_s, costs)
-    ranked = rank_candidates(kept, config.likelihood, obstacles, hand, goals)
+    ranked, choice = rank_candidates(kept, config.likelihood, obstacles, hand, goals)
     smooth = smooth_paths(ranked, past, hand.stamp_ns, config.likelihood.smoothing_s)
     continuous = make_continuous(smooth, past, hand.stamp_ns, config.likelihood)
     numbers = memory.numbers.keep_goals(past.durations_s)
@@ -111,7 +111,7 @@ def predict(
     prediction = Prediction(*hand_at, predicted, best, notes, time.perf_counter() - began, *scene_then)
     earlier, followed = memory.remember(candidates, solved, earlier, likelihoods, hand.stamp_ns)
     present = past.follow(prediction, durations, config.likelihood.hold_s)
-    return prediction, Memory(best, candidates, earlier, followed, present, found.next_goal, numbers)
+    return prediction, Memory(best, candidates, earlier, followed, present, found.next_goal, numbers, choice)
 
 
 def warm_up(config: Config) -> None:

@@ -197,7 +197,7 @@ class Monitor:
             'working frame': pipeline.frame_id if pipeline.frame_id is not None else 'not known yet',
             **{f'obstacles of {source}': str(len(part.obstacles)) for source, part in pipeline.scene.sources.items()},
             'goals': 'none yet' if pipeline.scene.goals is None else str(len(pipeline.scene.goals)),
-            'operator': f'{pipeline.operator.movements} movements, durations x {pipeline.operator.duration_factor:.2f}',
+            'operator': _describe_operator(pipeline),
             **self._describe_inputs(now_s, seconds),
             'prediction rate [Hz]': f'{recent["predictions"] / seconds:.1f}',
             'prediction age [s]': 'none yet' if self._predicted_s is None else f'{now_s - self._predicted_s:.3f}',
@@ -244,6 +244,14 @@ class Monitor:
             values[f'{role} refused'] = f'{entry.refused} of {entry.received}'
             values[f'{role} rate [Hz]'] = f'{(entry.received - entry.received_before) / seconds:.1f}'
         return values
+
+
+def _describe_operator(pipeline: Pipeline) -> str:
+    """Return what was learnt of the operator: the movements judged, and the factors on durations and on near and far choices."""
+    operator, preferences = pipeline.operator, pipeline.preferences
+    near, beyond = preferences.factors
+    durations = f'{operator.movements} movements, durations x {operator.duration_factor:.2f}'
+    return f'{durations}; {preferences.movements} choices, near x {near:.2f}, far x {beyond:.2f}'
 
 
 def _describe_prediction(prediction: Prediction | None) -> dict[str, str]:

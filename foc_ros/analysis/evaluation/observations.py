@@ -5,6 +5,7 @@ A recording is replayed once. How costs become likelihoods can then be tried on 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,7 @@ from foc_ros.analysis.replay import Replay, Step
 from foc_ros.core.config import Config
 from foc_ros.core.decisions import Decisions, find_decisions
 from foc_ros.core.dynamics.predictive_covariance import compute_duration_sensitivity
-from foc_ros.core.errors import RecordingError
+from foc_ros.core.errors import FocError, RecordingError
 from foc_ros.core.estimation.duration import get_time_price, is_passing
 from foc_ros.core.homotopy.branch_times import BranchTimes, compute_branch_times
 from foc_ros.core.obstacles.chance_constraint import centre_trajectories
@@ -133,6 +134,20 @@ def observe(recording: Recording, config: Config, replayed: Replay | None = None
     if not found:
         raise RecordingError(f'{recording.name}: nothing was predicted before its goal was reached')
     return ObservedRecording(recording.name, tuple(found), path)
+
+
+def observe_in_order(recordings: Sequence[Recording], config: Config) -> tuple[list[ObservedRecording], dict[str, str]]:
+    """Replay the recordings of an operator in their order, each with what was learnt of the operator in those before.
+
+    Return what was observed, and the reason by name for each recording that cannot be used.
+    """
+    replayed, observed, failed = Replay(config), list[ObservedRecording](), dict[str, str]()
+    for recording in recordings:
+        try:
+            observed.append(observe(recording, config, replayed))
+        except FocError as error:
+            failed[recording.name] = ' '.join(str(error).split())
+    return observed, failed
 
 
 def make_observation(step: Step, hand: HandState, path: RecordedPath, config: Config) -> Observation:

@@ -13,7 +13,9 @@ goals alone, so that equal input gives equal factors.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -32,6 +34,29 @@ MOST_STATES, JUDGED = 1000, 10
 """Numbers of states of a movement that are kept and, spread evenly over it, judged at most."""
 LEAST_LEFT_S = 0.1
 """Least time to the end of a state that is judged, because the end itself is known no better [s]."""
+
+T = TypeVar('T')
+S = TypeVar('S', bound='Stamped')
+
+
+class Stamped(Protocol):
+    """What belongs to a stamp [ns]."""
+
+    @property
+    def stamp_ns(self) -> int:
+        """The stamp [ns]."""
+
+
+def sample_movement(kept: tuple[S, ...], following: S) -> tuple[S, ...]:
+    """Return what is kept of a movement after what follows in it, at most `MOST_STATES` that are `SAMPLE_S` apart."""
+    if len(kept) >= MOST_STATES or (kept and following.stamp_ns - kept[-1].stamp_ns < SAMPLE_S * NANOSECONDS):
+        return kept
+    return (*kept, following)
+
+
+def choose_judged(kept: Sequence[T]) -> list[T]:
+    """Return at most `JUDGED` of what was kept of a movement, spread evenly over it."""
+    return [kept[row] for row in np.unique(np.linspace(0, len(kept) - 1, min(JUDGED, len(kept))).astype(int))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +85,10 @@ class Operator(Record):
         operator = self
         if self.states and self.states[0].onset_ns != hand.onset_ns:
             operator = replace(self, states=()) if goals is None or not len(goals) else self._judge(goals, config)
-        if hand.onset_ns is None or len(operator.states) >= MOST_STATES:
+        if hand.onset_ns is None:
             return operator
-        if operator.states and hand.stamp_ns - operator.states[-1].stamp_ns < SAMPLE_S * NANOSECONDS:
-            return operator
-        return replace(operator, states=(*operator.states, hand))
+        states = sample_movement(operator.states, hand)
+        return operator if states is operator.states else replace(operator, states=states)
 
     def _judge(self, goals: Array, config: DurationConfig) -> Operator:
         """Return the operator after the end of the present movement, which counts if it covered the distance to a goal."""
@@ -78,7 +102,7 @@ class Operator(Record):
         judged = [(each, seconds) for each, seconds in left if seconds > LEAST_LEFT_S]
         if not judged or distance.min() > REMAINING_SHARE * float(np.hypot(*(first - goal))):
             return ended
-        judged = [judged[row] for row in np.unique(np.linspace(0, len(judged) - 1, JUDGED).astype(int))]
+        judged = choose_judged(judged)
         scaled = [scale_durations(config, factor) for factor in FACTORS.tolist()]
         errors = [[abs(estimate_times_to_go(hand, goal[None], each)[0] - seconds) for hand, seconds in judged] for each in scaled]
         losses = self.losses + np.mean(errors, axis=1) * NANOSECONDS / (end_ns - onset_ns)

@@ -23,11 +23,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import fields, replace
 
 import numpy as np
 
-from foc_ros.core.config import DurationConfig
+from foc_ros.core.config import DurationConfig, clip_values
 from foc_ros.core.types import NANOSECONDS, Array, Candidate, HandState
 
 from .time_cost import find_least_cost_time
@@ -58,12 +57,8 @@ def compute_movement_time(distance: float, config: DurationConfig) -> float:
 
 def scale_durations(config: DurationConfig, factor: float) -> DurationConfig:
     """Return the configuration by which all movements take longer by a factor; constants stay within their bounds."""
-    scaled = {}
-    for item in fields(config):
-        if item.name in (powers := CONSTANTS[config.model]):
-            bound = item.metadata['bound']
-            scaled[item.name] = min(max(getattr(config, item.name) * factor ** powers[item.name], bound.low), bound.high)
-    return replace(config, **scaled)
+    powers = CONSTANTS[config.model]
+    return clip_values(config, {name: getattr(config, name) * factor**power for name, power in powers.items()})
 
 
 def limit_change(expected_s: float, before_s: float, elapsed_s: float) -> float:

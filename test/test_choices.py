@@ -1,0 +1,152 @@
+"""The precision of choices is learnt from choices: causally, equally for equal input, until a reset, and in bounds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from foc_ros.core.choices import FACTORS, Choice, Preferences
+from foc_ros.core.config import Config, LikelihoodConfig, replace_values
+from foc_ros.core.decisions import Decisions
+from foc_ros.core.likelihood import compute_likelihoods
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.types import LEFT, NANOSECONDS, RIGHT, HandSample, HandState, make_obstacles
+from foc_ros.ros.parameters import load_parameter_file, write_parameter_file
+
+LIKELIHOOD = Config().likelihood
+OBSTACLES = make_obstacles([[0.1, 0.0], [0.2, 0.0]], 0.02, 0.001)
+GOALS = np.array([[0.3, 0.0]])
+CLASSES = [(LEFT, LEFT), (LEFT, RIGHT), (RIGHT, LEFT), (RIGHT, RIGHT)]
+STEP_NS = NANOSECONDS // 10
+CONFIG = replace_values(Config(), {'rate_hz': 10.0, 'foc.steps': 15, 'estimator.position_stddev': 1e-4})
+
+
+def choose(costs: list[float], stamp_ns: int, goals: np.ndarray = GOALS, goal: tuple[int, ...] = (0, 0, 0, 0)) -> Choice:
+    """Return a choice between the four classes about two obstacles in a row of one each."""
+    sides = tuple(dict(zip(OBSTACLES.ids, each, strict=True)) for each in CLASSES)
+    decisions = Decisions(np.array([0, 0, 1, 1]), np.zeros(4, dtype=np.intp))
+    return Choice(stamp_ns, OBSTACLES, goals, np.array(goal), sides, np.array(costs), np.zeros(4), None, decisions)
+
+
+def move(preferences: Preferences, sides: tuple[int, int], costs: list[float], start_s: float = 1.0) -> Preferences:
+    """Follow a movement that passes both obstacles on given sides, with a choice at every state, and the rest after it."""
+    start_ns = int(start_s * NANOSECONDS)
+    for row, x in enumerate(np.linspace(0.0, 0.3, 13)):
+        y = np.interp(x, [0.0, 0.1, 0.2, 0.3], [0.0, *(0.05 if each == LEFT else -0.05 for each in sides), 0.0])
+        mean = np.array([x, y, 0.3, 0.0, 0.0, 0.0])
+        hand = HandState(start_ns + row * STEP_NS, mean, np.eye(6), onset_ns=start_ns, onset_position=np.zeros(2))
+        preferences = preferences.follow(hand, LIKELIHOOD).add(choose(costs, hand.stamp_ns))
+    return preferences.follow(HandState(start_ns + 14 * STEP_NS, np.zeros(6), np.eye(6)), LIKELIHOOD)
+
+
+def test_near_and_far_choices_are_learnt_apart() -> None:
+    """The next gap is always the cheap one, the far one is even: near choices become more precise, far ones less."""
+    preferences = Preferences()
+    for number in range(20):
+        preferences = move(preferences, (LEFT, (LEFT, RIGHT)[number % 2]), [1.0, 2.0, 4.0, 8.0], 10.0 * number + 1.0)
+    near, beyond = preferences.factors
+    assert preferences.movements == 20 and near > 1.5 and beyond < 0.7
+    adapted = preferences.adapt(LIKELIHOOD)
+    assert adapted.beta == pytest.approx(near * LIKELIHOOD.beta)
+    assert adapted.shortfall == pytest.approx(near * LIKELIHOOD.shortfall)
+    assert adapted.beta_beyond == pytest.approx(beyond * LIKELIHOOD.beta_beyond)
+
+
+def test_choices_against_the_costs_lower_the_precision() -> None:
+    preferences = Preferences()
+    for number in range(10):
+        preferences = move(preferences, CLASSES[number % 4], [1.0, 2.0, 4.0, 8.0], 10.0 * number + 1.0)
+    assert max(preferences.factors) < 1.0
+
+
+def test_the_score_is_the_likelihood_of_the_classes_that_agree() -> None:
+    choice, agrees = choose([1.0, 2.0, 4.0, 8.0], 0), np.array([False, True, False, False])
+    likelihoods = [replace(LIKELIHOOD, beta=0.5, beta_beyond=2.0), replace(LIKELIHOOD, beta=3.0, beta_beyond=0.1)]
+    found = choice.score(agrees, likelihoods)
+    for row, near in enumerate(likelihoods):
+        for column, beyond in enumerate(likelihoods):
+            mixed = replace(near, beta_beyond=beyond.beta_beyond)
+            shares = compute_likelihoods(choice.costs, mixed, None, choice.shortfalls, choice.decisions)
+            assert found[row, column] == pytest.approx(np.log(0.99 * shares[1] + 0.01 / 4))
+
+
+def test_a_movement_counts_from_its_end_on_and_rest_and_interruptions_do_not() -> None:
+    judged = move(Preferences(), (LEFT, LEFT), [1.0, 2.0, 4.0, 8.0])
+    assert judged.movements == 1 and not judged.choices
+    hand = HandState(0, np.zeros(6), np.eye(6))
+    resting = Preferences().follow(hand, LIKELIHOOD).add(choose([1.0, 2.0, 4.0, 8.0], 0))
+    assert resting.choices and resting.follow(replace(hand, stamp_ns=STEP_NS), LIKELIHOOD).movements == 0
+    assert not resting.interrupt().states and not resting.interrupt().choices
+    assert Preferences().add(choose([1.0, 2.0, 4.0, 8.0], 0)).choices == ()
+    assert Preferences().adapt(LIKELIHOOD) is LIKELIHOOD
+
+
+def test_the_goal_that_is_reached_counts_and_an_unclear_one_does_not() -> None:
+    goals, states = np.array([[0.3, 0.1], [0.3, -0.1]]), [HandState(0, np.zeros(6), np.eye(6))]
+    choice = choose([1.0] * 4, 0, goals, (0, 1, 0, 1))
+    for end, expected in (((0.3, 0.09), [True, False, True, False]), ((0.3, 0.0), [True] * 4)):
+        ends = HandState(1, np.array([*end, 0, 0, 0, 0]), np.eye(6))
+        beyond_obstacles = replace(choice, obstacles=make_obstacles([[9.0, 9.0]], 0.02, 0.001), sides=({},) * 4)
+        assert beyond_obstacles.find_agreeing([*states, ends]).tolist() == expected
+
+
+def test_exponents_stay_within_the_bounds_of_the_parameters() -> None:
+    extreme = LikelihoodConfig(beta=100.0, beta_beyond=100.0, shortfall=np.inf)
+    adapted = replace(Preferences(), movements=1, factors=(float(FACTORS[-1]), float(FACTORS[-1]))).adapt(extreme)
+    assert (adapted.beta, adapted.beta_beyond, adapted.shortfall) == (100.0, 100.0, np.inf)
+
+
+@pytest.mark.parametrize('costs', [[0.0] * 4, [1e300, 1.0, 1e-300, 0.0]])
+def test_extreme_costs_give_finite_factors(costs: list[float]) -> None:
+    preferences = move(move(Preferences(), (RIGHT, LEFT), costs), (LEFT, LEFT), costs, 11.0)
+    assert preferences.movements == 2 and np.isfinite(preferences.scores).all() and np.isfinite(preferences.factors).all()
+
+
+def reach(pipeline: Pipeline, aside: float, start_s: float) -> None:
+    """Pass a reach past one obstacle through a pipeline that predicts, with rests before and after it."""
+    pipeline.set_obstacles('cloud', make_obstacles([[0.15, 0.0]], 0.03, 0.001), int(start_s * NANOSECONDS), 'world')
+    pipeline.set_goals(np.array([[0.3, 0.0]]), 'world')
+    for t in np.arange(0.0, 1.6, 0.05):
+        s = np.clip((t - 0.3) / 0.8, 0.0, 1.0)
+        x = 0.3 * (10 * s**3 - 15 * s**4 + 6 * s**5)
+        stamp_ns = int((start_s + t) * NANOSECONDS)
+        pipeline.add_hand_sample(HandSample(stamp_ns, np.array([x, aside * np.sin(np.pi * x / 0.3)]), 0.0, 'world'))
+        if pipeline.is_due:
+            pipeline.predict()
+
+
+def make_operator(config: Config) -> Pipeline:
+    """Return a pipeline after three reaches."""
+    pipeline = Pipeline(config)
+    for number in range(3):
+        reach(pipeline, 0.06, 1.0 + 10.0 * number)
+    return pipeline
+
+
+def test_equal_messages_give_equal_factors_and_a_reset_forgets_them() -> None:
+    one, other = make_operator(CONFIG), make_operator(CONFIG)
+    assert one.preferences.movements >= 2 and one.preferences.factors != (1.0, 1.0)
+    np.testing.assert_array_equal(one.preferences.scores, other.preferences.scores)
+    assert one.adapted_config.likelihood == one.preferences.adapt(CONFIG.likelihood) != CONFIG.likelihood
+    one.reset()
+    assert one.preferences.movements == 0 and one.adapted_config is CONFIG
+
+
+def test_it_can_be_switched_off_and_new_parameters_begin_anew() -> None:
+    off = replace_values(CONFIG, {'likelihood.adaptation': 'none', 'duration.adaptation': 'none'})
+    pipeline = make_operator(off)
+    assert pipeline.preferences.movements == 0 and not pipeline.preferences.choices and pipeline.adapted_config is off
+    pipeline = make_operator(CONFIG)
+    pipeline.reconfigure(replace_values(CONFIG, {'rate_hz': 20.0}))
+    assert pipeline.preferences.movements >= 2
+    pipeline.reconfigure(replace_values(CONFIG, {'likelihood.beta': 2.0}))
+    assert pipeline.preferences.movements == 0
+
+
+def test_what_was_learnt_is_exported_and_imported_as_a_parameter_file(tmp_path: Path) -> None:
+    adapted = make_operator(CONFIG).adapted_config
+    write_parameter_file('--operator', tmp_path / 'operator.yaml', adapted)
+    assert load_parameter_file(tmp_path / 'operator.yaml') == adapted
