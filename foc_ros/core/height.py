@@ -67,8 +67,10 @@ class HeightPredictor:
 
         obstacles: grown by the radius of the hand; goals (g, 2) [m], with the times to go [s].
         """
-        has_height = np.isfinite(obstacles.heights).any()
-        is_cleared = np.full(len(obstacles), has_height and self._goal_heights is not None)
+        if self._goal_heights is None:
+            return np.zeros(len(obstacles), dtype=bool)
+        ends, (bottom, top) = np.append(self._goal_heights, self._hand.height_mean[0]), obstacles.heights.T
+        is_cleared: NDArray[np.bool_] = (top < ends.max()) | (bottom > ends.min())  # the others reach over all heights of the way
         if not is_cleared.any():
             return is_cleared
         scene, place = self._config.scene, self._hand.mean[:2]

@@ -26,7 +26,7 @@ from .obstacles.culling import cull_obstacles
 from .ocp.problem import Problem, rest_to_goal
 from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Prediction, make_obstacles
 
-SEARCH_SHARE, RAISE_SHARE, SOLVE_SHARE = 0.3, 0.4, 0.7
+SEARCH_SHARE, RAISE_SHARE, SOLVE_SHARE = 0.3, 0.3, 0.7
 """Parts of the time left that the search, and then raising safety factors further and all solves, may take before they begin no
 further step. A step may take a fifth of the budget."""
 RESERVE_S = 5e-5
