@@ -16,8 +16,9 @@ from .dynamics.noise import scale_noise
 from .dynamics.plant_models import make_plant_model
 from .dynamics.predictive_covariance import compute_predictive_covariance, timing_covariances
 from .estimation.duration import choose_candidate_durations, estimate_times_to_go, is_passing, limit_change
+from .experience import NO_LIBRARY, Experience, Library
 from .homotopy import Turn, search
-from .homotopy.demonstrations import Demonstration, GuessTiming, recall_demonstrations
+from .homotopy.demonstrations import GuessTiming, recall_demonstrations
 from .likelihood import make_cost_model, make_preference, select_most_likely
 from .memory import Memory
 from .obstacles.chance_constraint import RiskBound, count_events
@@ -37,7 +38,7 @@ def predict(
     obstacles: Obstacles,
     goals: Array,
     memory: Memory,
-    library: Sequence[Demonstration] = (),
+    library: Library = NO_LIBRARY,
     deadline: Deadline = NEVER,
 ) -> tuple[Prediction, Memory]:
     """Predict where a hand goes.
@@ -55,7 +56,7 @@ def predict(
     memory
         What the previous prediction returned, or an empty `Memory`.
     library
-        Demonstrated paths, which become candidates where they fit the scene.
+        Demonstrated paths, which become candidates where they fit the scene, and recordings, which are evidence (`experience`).
     deadline
         When the prediction has to be ready. Classes for which there is no time keep their last answer (`continuity`), and have
         their turn later.
@@ -73,14 +74,15 @@ def predict(
     timing, turn = GuessTiming(durations, config.foc.steps), Turn(deadline.take_share(SEARCH_SHARE), memory.next_goal)
     found = search(hand.mean, goals, obstacles, config.homotopy, *timing, memory.candidates, turn)
     scene = hand, goals, obstacles, config.homotopy, timing
-    candidates = recall_demonstrations(library, *scene, found.candidates, memory.candidates)
+    candidates = recall_demonstrations(library.demonstrations, *scene, found.candidates, memory.candidates)
     problems = Problems(config, hand, obstacles, goals, candidates, durations)
     costs, earlier = make_cost_model(hand.effort_spent, config), memory.find_earlier(candidates)
     until = deadline.take_share(SOLVE_SHARE, RESERVE_S * len(candidates))
     solved = solve_candidates(candidates, problems, config.foc, costs, earlier, until)
     widened = _widen_covariances(solved, problems, hand, config)
     kept = keep_answers(candidates, widened, past, hand.stamp_ns, config.likelihood.hold_s, costs)
-    ranked = rank_candidates(kept, config.likelihood, obstacles, hand, goals)
+    experience = Experience(library, hand, grown, goals, config.experience)
+    ranked = experience.pool_likelihoods(rank_candidates(kept, config.likelihood, obstacles, hand, goals))
     smooth = smooth_paths(ranked, past, hand.stamp_ns, config.likelihood.smoothing_s)
     continuous = make_continuous(smooth, past, hand.stamp_ns, config.likelihood)
     numbers = memory.numbers.keep_goals(past.durations_s)
@@ -96,6 +98,7 @@ def predict(
     prediction = Prediction(*hand_at, predicted, best, notes, time.perf_counter() - began, given, goals)
     earlier, followed = memory.remember(candidates, solved, earlier, likelihoods, hand.stamp_ns)
     present = past.follow(prediction, durations, config.likelihood.hold_s)
+    prediction = replace(prediction, candidates=experience.pool_paths(predicted), solve_s=time.perf_counter() - began)
     return prediction, Memory(best, candidates, earlier, followed, present, found.next_goal, numbers)
 
 
