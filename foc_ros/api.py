@@ -16,6 +16,7 @@ from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import InputError, SceneError
 from foc_ros.core.estimation.kalman_filter import FilterState, update
+from foc_ros.core.experience import make_library
 from foc_ros.core.guidance.step import GuidanceInput, GuidanceOutput, GuidanceState, guide
 from foc_ros.core.homotopy.demonstrations import Demonstration
 from foc_ros.core.memory import Memory
@@ -190,7 +191,7 @@ class Predictor:
             from foc_ros.io.class_library import load_library
 
             source = load_library(str(source))
-        self._library = tuple(source)
+        self._library = make_library(tuple(source))
         if self.config.budget_s:
             warm_up(self.config)  # imports are no part of the time of the first update
         self._goals: types.Array | None = None

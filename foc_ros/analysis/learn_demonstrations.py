@@ -1,4 +1,4 @@
-"""Demonstrations in a recording: each movement that ends at a goal becomes an entry of the class library."""
+"""Demonstrations in recordings: a movement that ends at a goal becomes an entry of the class library."""
 
 from __future__ import annotations
 
@@ -6,16 +6,47 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from foc_ros.core.config import Config
+from foc_ros.core.errors import RecordingError
 from foc_ros.core.homotopy.demonstrations import Demonstration, is_same_demonstration, record_demonstration
 from foc_ros.core.obstacles.scene import Scene
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import Array
+from foc_ros.core.types import NANOSECONDS, Array
 
-from .goal_reached import AT_GOAL_M, find_goal_at_end
+from .fitting.recorded_hand import read_hand
+from .goal_reached import AT_GOAL_M, find_goal_at_end, find_reached_goal
+from .recordings import Recording
 from .replay import Step
 
 SHORTEST_M = 0.05
 """Shorter movements demonstrate nothing [m]."""
+
+
+def learn_recording(recording: Recording, config: Config) -> Demonstration:
+    """Return the movement of a recording, from its onset to where it is nearest to its goal, with the goal as its last point.
+
+    The goal is reached at the last speed, or at that of an onset if this is larger. Raises RecordingError where the recording
+    cannot be read, or contains no movement of at least SHORTEST_M that ends within AT_GOAL_M of a goal.
+    """
+    hand = read_hand(recording, config)
+    last = find_reached_goal(hand.positions, hand.goals)[1]
+    states = hand.estimate_states(config)[: last + 1]
+    onset = next((row for row, each in enumerate(states) if each.onset_ns is not None), len(states))
+    moving = states[onset:]
+    if len(moving) < 2:
+        raise RecordingError(
+            f'{recording.name}: no movement: the hand was never faster than {config.estimator.onset_speed:g} m/s'
+        )
+    path = np.array([each.mean[:2] for each in moving])
+    goal, distance_m = find_goal_at_end(path, hand.goals)
+    length_m = float(np.hypot(*np.diff(path, axis=0).T).sum())
+    if length_m < SHORTEST_M or distance_m > AT_GOAL_M:
+        wanted = f'expected a movement of at least {SHORTEST_M:g} m that ends within {AT_GOAL_M:g} m of a goal'
+        raise RecordingError(f'{recording.name}: {wanted}, got {length_m:.3g} m that end {distance_m:.3g} m from the nearest')
+    times_s = np.array([(each.stamp_ns - moving[0].stamp_ns) / NANOSECONDS for each in moving])
+    speed = max(float(np.hypot(*moving[-1].mean[2:4])), config.estimator.onset_speed)
+    whole, times_s = np.vstack([path, hand.goals[goal]]), np.append(times_s, times_s[-1] + distance_m / speed)
+    return record_demonstration(hand.frame_id, whole, hand.obstacles, times_s)
 
 
 class Learner:

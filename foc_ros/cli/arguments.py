@@ -65,6 +65,15 @@ def add_replay_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--remap', action='append', type=_read_remap, default=[], metavar='INPUT:=TOPIC', help=words)
 
 
+def add_learn_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `learn`."""
+    parser.add_argument('data', type=_read_existing_path, metavar='DATA', help=DATA)
+    words = 'class library to write, for homotopy.library; an earlier one is replaced'
+    parser.add_argument('--output', type=Path, metavar='LIBRARY', required=True, help=words)
+    _add_parameter_file(parser)
+    parser.add_argument('--json', action='store_true', help='print one JSON object')
+
+
 def add_fit_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `fit`."""
     parser.add_argument('data', type=_read_existing_path, metavar='DATA', help=DATA)

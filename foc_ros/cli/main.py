@@ -32,6 +32,7 @@ COMMANDS = {
     'paper': "repeat the paper's studies: figures, numbers, a table",
     'solve': 'solve one scene from a YAML or JSON file',
     'replay': 'compute predictions from a recording, without ROS and faster than real time',
+    'learn': 'write the recordings of a scene as experience for predictions in this scene',
     'fit': 'find the parameters that explain recordings best',
     'evaluate': 'compare predictions with recordings of people, beside simple baselines',
     'simulate': 'compare guidance with other assistance for simulated operators',

@@ -127,7 +127,7 @@ class HomotopyConfig:
         4, 'number of homotopy classes to solve, over all goals; each goal gets at least one', '', 1, MOST_CANDIDATES
     )
     clearance: float = _p(0.005, 'distance that the hand needs from every obstacle: narrower gaps are closed', 'm', 0.0, 1.0)
-    library: str = _p('', 'file of demonstrated paths that replay --learn wrote; empty: none', read_only=True)
+    library: str = _p('', 'file of paths that learn or replay --learn wrote; empty: none', read_only=True)
 
 
 @dataclass(frozen=True)
@@ -161,6 +161,17 @@ class LikelihoodConfig:
     )
     smoothing_s: float = _p(0.1, 'time constant of the filter of the likelihoods; 0: none', 's', 0.0, 10.0)
     margin: float = _p(0.05, 'lead in likelihood that another class needs to become the most likely one', '', 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class ExperienceConfig:
+    """Use of the recordings in the class library (`homotopy.library`) as evidence."""
+
+    prior_count: float = _p(0.5, 'number of recordings as which the prediction without recordings counts', '', 1e-3, 1e6)
+    position_stddev: float = _p(0.03, 'distance from the hand at which a recording counts less', 'm', 1e-4, 10.0)
+    velocity_stddev: float = _p(
+        0.04, 'difference from the velocity of the hand at which a recording counts less', 'm/s', 1e-4, 10.0
+    )
 
 
 @dataclass(frozen=True)
@@ -261,6 +272,7 @@ class Config:
     estimator: EstimatorConfig = field(default_factory=EstimatorConfig)
     homotopy: HomotopyConfig = field(default_factory=HomotopyConfig)
     likelihood: LikelihoodConfig = field(default_factory=LikelihoodConfig)
+    experience: ExperienceConfig = field(default_factory=ExperienceConfig)
     scene: SceneConfig = field(default_factory=SceneConfig)
     frames: FramesConfig = field(default_factory=FramesConfig)
     guidance: GuidanceConfig = field(default_factory=GuidanceConfig)

@@ -14,6 +14,7 @@ from .deadline import NEVER, Deadline
 from .errors import FocError
 from .estimation.adaptation import Operator
 from .estimation.kalman_filter import FilterState, update
+from .experience import Library, make_library
 from .homotopy.demonstrations import Demonstration
 from .memory import Memory
 from .obstacles.scene import ObstacleSource, Scene
@@ -33,7 +34,7 @@ class PredictionTask:
     obstacles: Obstacles
     goals: Array
     memory: Memory
-    library: Sequence[Demonstration]
+    library: Library
     deadline: Deadline
     goal_heights: Array | None
 
@@ -53,7 +54,7 @@ class Pipeline:
 
     def __init__(self, config: Config, library: Sequence[Demonstration] = ()) -> None:
         self.config = config
-        self._library = tuple(library)
+        self._library = make_library(library)
         self.hand_state: FilterState | None = None
         self.scene = Scene()
         self.is_engaged = True

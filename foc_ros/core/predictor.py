@@ -16,9 +16,10 @@ from .dynamics.noise import scale_noise
 from .dynamics.plant_models import make_plant_model
 from .dynamics.predictive_covariance import SharedCovariances, widen_covariance
 from .estimation.duration import choose_candidate_durations, estimate_times_to_go, is_passing, limit_change
+from .experience import NO_LIBRARY, Experience, Library
 from .height import HeightPredictor
 from .homotopy import Turn, search
-from .homotopy.demonstrations import Demonstration, GuessTiming, recall_demonstrations
+from .homotopy.demonstrations import GuessTiming, recall_demonstrations
 from .likelihood import make_cost_model, make_preference, select_most_likely
 from .memory import Memory
 from .obstacles.chance_constraint import RiskBound, count_events
@@ -39,7 +40,7 @@ def predict(
     obstacles: Obstacles,
     goals: Array,
     memory: Memory,
-    library: Sequence[Demonstration] = (),
+    library: Library = NO_LIBRARY,
     deadline: Deadline = NEVER,
     goal_heights: Array | None = None,
 ) -> tuple[Prediction, Memory]:
@@ -58,7 +59,7 @@ def predict(
     memory
         What the previous prediction returned, or an empty `Memory`.
     library
-        Demonstrated paths, which become candidates where they fit the scene.
+        Demonstrated paths, which become candidates where they fit the scene, and recordings, which are evidence (`experience`).
     deadline
         When the prediction has to be ready. Classes for which there is no time keep their last answer (`continuity`), and have
         their turn later.
@@ -82,7 +83,7 @@ def predict(
     timing, turn = GuessTiming(durations, config.foc.steps), Turn(deadline.take_share(SEARCH_SHARE), memory.next_goal)
     found = search(hand.mean, goals, obstacles, config.homotopy, *timing, memory.candidates, turn)
     scene = hand, goals, obstacles, config.homotopy, timing
-    candidates = recall_demonstrations(library, *scene, found.candidates, memory.candidates)
+    candidates = recall_demonstrations(library.demonstrations, *scene, found.candidates, memory.candidates)
     problems = Problems(config, hand, obstacles, goals, candidates, durations)
     costs, earlier = make_cost_model(hand.effort_spent, config), memory.find_earlier(candidates)
     until = [deadline.take_share(share, RESERVE_S * len(candidates)) for share in (SOLVE_SHARE, RAISE_SHARE)]
@@ -90,6 +91,8 @@ def predict(
     widened = [_widen_covariance(each, shared, hand, config) for each in solved]
     kept = keep_answers(candidates, widened, past, hand.stamp_ns, config.likelihood.hold_s, costs)
     ranked, choice = rank_candidates(kept, config.likelihood, obstacles, hand, goals)
+    experience = Experience(library, hand, grown, goals, config.experience)
+    ranked = experience.pool_likelihoods(ranked)
     smooth = smooth_paths(ranked, past, hand.stamp_ns, config.likelihood.smoothing_s)
     continuous = make_continuous(smooth, past, hand.stamp_ns, config.likelihood)
     numbers = memory.numbers.keep_goals(past.durations_s)
@@ -111,6 +114,7 @@ def predict(
     prediction = Prediction(*hand_at, predicted, best, notes, time.perf_counter() - began, *scene_then)
     earlier, followed = memory.remember(candidates, solved, earlier, likelihoods, hand.stamp_ns)
     present = past.follow(prediction, durations, config.likelihood.hold_s)
+    prediction = replace(prediction, candidates=experience.pool_paths(predicted), solve_s=time.perf_counter() - began)
     return prediction, Memory(best, candidates, earlier, followed, present, found.next_goal, numbers, choice)
 
 

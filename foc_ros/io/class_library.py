@@ -19,6 +19,8 @@ SIDES = {'left': LEFT, 'right': RIGHT}
 MOST_WAYS, MOST_OBSTACLES = 500, 4096
 FARTHEST = 1e6
 """Largest coordinate [m]."""
+LONGEST_S = 1e4
+"""Longest recording [s]."""
 
 
 def load_library(name: str) -> tuple[Demonstration, ...]:
@@ -59,12 +61,13 @@ def _dump_demonstration(way: Demonstration) -> dict[str, Any]:
         {'id': identity, 'x': x, 'y': y, 'side': sides[side]}
         for identity, (x, y), side in zip(way.ids, way.centre.tolist(), way.sides, strict=True)
     ]
-    return {'frame_id': way.frame_id, 'passed': passed, 'path': way.path.tolist()}
+    times = {} if way.times_s is None else {'times_s': way.times_s.tolist()}
+    return {'frame_id': way.frame_id, 'passed': passed, 'path': way.path.tolist(), **times}
 
 
 def _read_demonstration(field: str, way: object) -> Demonstration:
-    if not isinstance(way, Mapping) or set(way) != {'frame_id', 'passed', 'path'}:
-        raise InputError(field, 'exactly frame_id, passed and path', _shorten(way))
+    if not isinstance(way, Mapping) or set(way) - {'times_s'} != {'frame_id', 'passed', 'path'}:
+        raise InputError(field, 'exactly frame_id, passed, path and, for a recording, times_s', _shorten(way))
     frame_id, passed, path = way['frame_id'], way['passed'], way['path']
     if not isinstance(frame_id, str):
         raise InputError(f'{field}.frame_id', 'a text', _shorten(frame_id))
@@ -78,7 +81,16 @@ def _read_demonstration(field: str, way: object) -> Demonstration:
         raise InputError(f'{field}.passed', 'each obstacle once', _shorten(ids))
     points = np.array([_read_point(f'{field}.path[{k}]', point) for k, point in enumerate(path)])
     centre: Array = np.array([point for _, point, _ in rows], dtype=float).reshape(-1, 2)
-    return Demonstration(frame_id, ids, tuple(side for _, _, side in rows), centre, points)
+    times_s = _read_times(f'{field}.times_s', way['times_s']) if 'times_s' in way else None
+    return Demonstration(frame_id, ids, tuple(side for _, _, side in rows), centre, points, times_s)
+
+
+def _read_times(field: str, times: object) -> Array:
+    if not isinstance(times, list) or len(times) != POINTS:
+        raise InputError(field, f'{POINTS} times', _shorten(times))
+    if not all(_is_number(value, LONGEST_S) for value in times) or times[0] != 0 or not (np.diff(times) >= 0.0).all():
+        raise InputError(field, f'numbers that rise from 0 to at most {LONGEST_S:g} s', _shorten(times))
+    return np.array(times, dtype=float)
 
 
 def _read_passed(field: str, row: object) -> tuple[str, tuple[float, float], int]:
@@ -90,13 +102,13 @@ def _read_passed(field: str, row: object) -> tuple[str, tuple[float, float], int
 
 
 def _read_point(field: str, point: object) -> tuple[float, float]:
-    if isinstance(point, list) and len(point) == 2 and all(_is_coordinate(value) for value in point):
+    if isinstance(point, list) and len(point) == 2 and all(_is_number(value, FARTHEST) for value in point):
         return float(point[0]), float(point[1])
     raise InputError(field, f'two numbers within {FARTHEST:g} m', _shorten(point))
 
 
-def _is_coordinate(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and -FARTHEST <= value <= FARTHEST
+def _is_number(value: object, largest: float) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and -largest <= value <= largest
 
 
 def _shorten(value: object) -> str:

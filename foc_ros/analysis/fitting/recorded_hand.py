@@ -20,13 +20,14 @@ MIN_SAMPLES = 10
 
 @dataclass(frozen=True, eq=False)
 class RecordedHand(Record):
-    """One recording: stamps_ns (m,), rising; positions (m, 2) [m]; obstacles at the first stamp; goals (g, 2) [m]."""
+    """One recording: stamps_ns (m,), rising; positions (m, 2) [m]; obstacles at the first stamp; goals (g, 2) [m]; frame_id."""
 
     name: str
     stamps_ns: NDArray[np.int64]
     positions: Array
     obstacles: Obstacles
     goals: Array
+    frame_id: str = ''
 
     @cached_property
     def times(self) -> Array:
@@ -37,7 +38,7 @@ class RecordedHand(Record):
         """Return the state that the estimator of a configuration gives at each sample."""
         state, states = None, list[HandState]()
         for stamp_ns, position in zip(self.stamps_ns.tolist(), self.positions, strict=True):
-            state = update(state, HandSample(stamp_ns, position), config.estimator).state
+            state = update(state, HandSample(stamp_ns, position, frame_id=self.frame_id), config.estimator).state
             states.append(state)
         return states
 
@@ -58,4 +59,5 @@ def read_hand(recording: Recording, config: Config) -> RecordedHand:
         raise RecordingError(f'{recording.name}: expected at least {MIN_SAMPLES} hand poses, got {len(samples)}')
     stamps_ns = np.array([sample.stamp_ns for sample in samples])
     positions = np.array([sample.position for sample in samples])
-    return RecordedHand(recording.name, stamps_ns, positions, replayed.pipeline.scene.obstacles(samples[0].stamp_ns), goals)
+    obstacles = replayed.pipeline.scene.obstacles(samples[0].stamp_ns)
+    return RecordedHand(recording.name, stamps_ns, positions, obstacles, goals, samples[0].frame_id)

@@ -36,13 +36,17 @@ MOST = 2
 
 @dataclass(frozen=True, eq=False)
 class Demonstration(Record):
-    """A demonstrated path (m, 2) [m] in a frame, and the obstacles that it passed: ids, sides and centre (n, 2) [m]."""
+    """A demonstrated path (m, 2) [m] in a frame, and the obstacles that it passed: ids, sides and centre (n, 2) [m].
+
+    times_s (m,): seconds from the first point on, rising; None for a class that is only recalled.
+    """
 
     frame_id: str
     ids: tuple[str, ...]
     sides: tuple[int, ...]
     centre: Array
     path: Array
+    times_s: Array | None = None
 
     def matches(self, frame_id: str, obstacles: Obstacles) -> bool:
         """Tell whether all obstacles that the path passed are present, by id, within NEAR of where they were."""
@@ -59,15 +63,19 @@ class GuessTiming(NamedTuple):
     steps: int
 
 
-def record_demonstration(frame_id: str, path: Array, obstacles: Obstacles) -> Demonstration:
-    """Record a path (m, 2) [m], m >= 2, as POINTS points at equal distances, with the sides on which it passes the obstacles."""
+def record_demonstration(frame_id: str, path: Array, obstacles: Obstacles, times_s: Array | None = None) -> Demonstration:
+    """Record a path (m, 2) [m], m >= 2, as POINTS points at equal distances, with the sides on which it passes the obstacles.
+
+    times_s (m,): of its points [s], rising, if they are to be kept.
+    """
     length = compute_path_lengths(path)
     at = np.linspace(0.0, length[-1], POINTS)
     evenly = np.column_stack([np.interp(at, length, axis) for axis in path.T]).round(DIGITS)
     sides = find_path_sides(evenly, obstacles)
     ids = tuple(sorted(sides))
     centre = obstacles.centre[[obstacles.ids.index(identity) for identity in ids]]
-    return Demonstration(frame_id, ids, tuple([sides[identity] for identity in ids]), centre.round(DIGITS), evenly)
+    passed = frame_id, ids, tuple([sides[identity] for identity in ids]), centre.round(DIGITS)
+    return Demonstration(*passed, evenly, None if times_s is None else np.interp(at, length, times_s - times_s[0]).round(DIGITS))
 
 
 def is_same_demonstration(one: Demonstration, other: Demonstration) -> bool:
@@ -101,7 +109,7 @@ def recall_demonstrations(
             continue
         for goal in np.flatnonzero(np.hypot(*(goals - demonstration.path[-1]).T) <= NEAR).tolist():
             rest = _deform(demonstration.path, hand.mean[:2], goals[goal])
-            if rest is None or not _is_free(rest, obstacles):
+            if rest is None or not is_free(rest, obstacles):
                 continue
             guess = timed(rest, hand.mean[2:4], timing.durations_s[goal], timing.steps)
             sides, shown = find_path_sides(guess, obstacles), dict(zip(demonstration.ids, demonstration.sides, strict=True))
@@ -131,7 +139,7 @@ def _deform(path: Array, hand: Array, goal: Array) -> Array | None:
     return moved
 
 
-def _is_free(path: Array, obstacles: Obstacles) -> bool:
+def is_free(path: Array, obstacles: Obstacles) -> bool:
     """Tell whether no segment of a path runs through an obstacle, other than those that hold its first point."""
     squares = find_segment_squares(np.ascontiguousarray(path), obstacles.centre, tabulate_polygons(obstacles))
     _, distance = measure_offsets(path[:1], obstacles)
