@@ -8,6 +8,7 @@ from test_demonstrations import GOAL, OBSTACLES, bow
 
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config, ExperienceConfig
+from foc_ros.core.errors import InputError
 from foc_ros.core.experience import NO_LIBRARY, find_evidence, make_library
 from foc_ros.core.homotopy.demonstrations import record_demonstration
 from foc_ros.core.memory import Memory
@@ -62,7 +63,7 @@ def test_many_recordings_lead_the_mean_along_their_path():
         [replace(ABOVE, times_s=None)],
         [replace(ABOVE, frame_id='elsewhere')],
         [replace(ABOVE, centre=ABOVE.centre + 0.03)],
-        [replace(ABOVE, path=ABOVE.path + [0.0, 1.0])],
+        [replace(ABOVE, path=ABOVE.path + np.array([0.0, 1.0]))],
     ],
     ids=['none', 'without times', 'another frame', 'obstacles moved', 'far from the hand'],
 )
@@ -96,13 +97,13 @@ def test_times_are_read_as_they_were_written(tmp_path):
     assert plain.times_s is None
 
 
-@pytest.mark.parametrize('times', ['[0]', '1', '[%s]' % ', '.join(['0'] * 64 + ['-1']), '[%s]' % ', '.join(['0'] * 64 + ['"x"'])])
+@pytest.mark.parametrize('times', ['[0]', '1', f'[{"0, " * 64}-1]', f'[{"0, " * 64}"x"]'])
 def test_wrong_times_name_the_field(tmp_path, times, capsys):
     file = tmp_path / 'ways.json'
     save_library(file, [ABOVE])
     text = file.read_text()
     file.write_text(text[: text.index('"times_s": ') + 11] + times + '}]}')
-    with pytest.raises(ValueError, match=r'ways\[0\]\.times_s'):
+    with pytest.raises(InputError, match=r'ways\[0\]\.times_s'):
         load_library(str(file))
 
 

@@ -5,10 +5,14 @@ A recording r counts by how near its path comes to the position p [m] and the ve
     w_r = max_m exp(-|p - p_rm|^2 / 2 a^2 - |v - v_rm|^2 / 2 b^2),  a = `position_stddev`,  b = `velocity_stddev`,
 
 without the second term for a hand that has not begun to move. From the point m of this maximum on, it passes obstacles on the
-sides of a class i towards the goal at its end. With n_i = sum of the w_r of class i, the likelihoods p_i of the model are the mean
-of a Dirichlet distribution that counts as n_0 = `prior_count` recordings, and the recordings are observations of it:
+sides of a class i towards the goal at its end. With G the classes that take the same gap in the next row, n_i = sum of the w_r
+of class i, and n_G = sum of the n_i in G, the likelihoods p_i of the model are means of two Dirichlet distributions, of the gap
+and of the class beyond it. They count as n_0 = `prior_count` and n_1 = `prior_count_beyond` recordings; the recordings are
+observations:
 
-    p_i <- (n_0 p_i + n_i) / (n_0 + sum_j n_j).
+    p_G <- (n_0 p_G + n_G) / (n_0 + sum n),    p_i <- p_G (n_1 p_i / p_G + n_i) / (n_1 + n_G),
+
+with the p_G of the model in the last fraction.
 
 The recordings of a class also say where it leads. Their displacements from m on, moved to the hand, have the weighted mean and
 covariance c_i(t), C_i(t), where b^2 t^2 is added because a velocity that differs by b leads b t away. They are pooled with the
@@ -29,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .config import ExperienceConfig
+from .decisions import find_decisions, tabulate_sides
 from .homotopy.demonstrations import NEAR, POINTS, Demonstration, is_free, is_same_demonstration
 from .types import LEFT, RIGHT, Array, HandState, Obstacles, PredictedCandidate, Record, Solution, as_readonly
 
@@ -119,11 +124,11 @@ def find_evidence(library: Library, hand: HandState, obstacles: Obstacles, confi
 class Experience:
     """What a library says in one prediction.
 
-    Attributes: evidence; count: sum n_i of the weights of the recordings of each class, by label.
+    Attributes: evidence.
     """
 
     def __init__(self, library: Library, hand: HandState, obstacles: Obstacles, goals: Array, config: ExperienceConfig) -> None:
-        self._library, self._hand, self._obstacles, self._config = library, hand, obstacles, config
+        self._library, self._hand, self._obstacles, self._goals, self._config = library, hand, obstacles, goals, config
         self.evidence = find_evidence(library, hand, obstacles, config)
         self._passed = [
             (
@@ -151,13 +156,14 @@ class Experience:
         """Return candidates with the likelihoods that the recordings change, the most likely first."""
         if not len(self.evidence.row):
             return list(candidates)
-        counts = [self.evidence.weight[self.find_members(each)].sum() if each.has_likelihood else 0.0 for each in candidates]
-        prior, total = self._config.prior_count, self._config.prior_count + sum(counts)
-        pooled = [
-            replace(each, likelihood=float((prior * each.likelihood + count) / total))
-            for each, count in zip(candidates, counts, strict=True)
-        ]
-        return sorted(pooled, key=lambda each: (not each.has_likelihood, -each.likelihood, each.label))
+        taken = [each for each in candidates if each.has_likelihood]
+        counts = np.array([self.evidence.weight[self.find_members(each)].sum() for each in taken])
+        sides = tabulate_sides([each.solution for each in taken], self._obstacles)
+        gap = find_decisions(sides, self._obstacles, self._hand, self._goals).next_gap
+        likelihoods = _count_gaps_and_classes(np.array([each.likelihood for each in taken]), counts, gap, self._config)
+        pooled = [replace(each, likelihood=share) for each, share in zip(taken, likelihoods.tolist(), strict=True)]
+        pooled.sort(key=lambda each: (-each.likelihood, each.label))
+        return pooled + [each for each in candidates if not each.has_likelihood]
 
     def pool_paths(self, candidates: Sequence[PredictedCandidate]) -> tuple[PredictedCandidate, ...]:
         """Return candidates with the positions that the recordings change.
@@ -195,6 +201,16 @@ class Experience:
         covariance = np.einsum('r,rhi,rhj->hij', weight, offset, offset)
         covariance += (self._config.velocity_stddev * times_s)[:, None, None] ** 2 * np.eye(2)
         return mean + self._hand.mean[:2], covariance
+
+
+def _count_gaps_and_classes(likelihoods: Array, counts: Array, gap: NDArray[np.intp], config: ExperienceConfig) -> Array:
+    """Return likelihoods (k,) that counts (k,) change, first those of the gaps (k,) and then those of the classes in each gap."""
+    of_gap, counts_of_gap = np.bincount(gap, likelihoods), np.bincount(gap, counts)
+    near, beyond = config.prior_count, config.prior_count_beyond
+    of_gap_now = (near * of_gap + counts_of_gap) / (near + counts.sum())
+    within = np.divide(likelihoods, of_gap[gap], out=np.zeros(len(gap)), where=of_gap[gap] > 0.0)
+    pooled: Array = of_gap_now[gap] * (beyond * within + counts) / (beyond + counts_of_gap[gap])
+    return pooled / pooled.sum()
 
 
 def _change_positions(solution: Solution, path: Array, covariance: Array) -> Solution:
