@@ -210,7 +210,8 @@ def _count_gaps_and_classes(likelihoods: Array, counts: Array, gap: NDArray[np.i
     of_gap_now = (near * of_gap + counts_of_gap) / (near + counts.sum())
     within = np.divide(likelihoods, of_gap[gap], out=np.zeros(len(gap)), where=of_gap[gap] > 0.0)
     pooled: Array = of_gap_now[gap] * (beyond * within + counts) / (beyond + counts_of_gap[gap])
-    return pooled / pooled.sum()
+    pooled /= pooled.sum()
+    return pooled
 
 
 def _change_positions(solution: Solution, path: Array, covariance: Array) -> Solution:
