@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from foc_ros.core.config import Config, HomotopyConfig, replace_values
 from foc_ros.core.errors import FocError
+from foc_ros.core.experience import make_library
 from foc_ros.core.homotopy import find_path_sides
 from foc_ros.core.homotopy.demonstrations import (
     MOST,
@@ -56,7 +57,7 @@ def test_a_demonstration_contains_the_obstacles_that_it_passed():
 def test_a_demonstrated_class_longer_than_the_candidates_is_solved_too():
     config = replace_values(Config(), {'homotopy.max_candidates': 2})
     without, _ = predict(config, hand(), OBSTACLES, GOAL, Memory())
-    prediction, memory = predict(config, hand(), OBSTACLES, GOAL, Memory(), [DEMONSTRATION])
+    prediction, memory = predict(config, hand(), OBSTACLES, GOAL, Memory(), make_library([DEMONSTRATION]))
     labels = {one.candidate.label for one in prediction.solved_candidates}
     assert 'goal0:+0+1+2' in labels - {one.candidate.label for one in without.candidates}
     assert prediction.notes['recalled'] == 1
@@ -140,7 +141,7 @@ def make_document(tmp_path):
 @pytest.mark.parametrize(
     ('break_it', 'words'),
     [
-        (lambda way: way.pop('path'), r'ways\[0\]: expected exactly frame_id, passed and path'),
+        (lambda way: way.pop('path'), r'ways\[0\]: expected exactly frame_id, passed, path and'),
         (lambda way: way['path'].pop(), r'ways\[0\].path: expected 65 points'),
         (lambda way: way['path'].__setitem__(3, [0, float('nan')]), r'ways\[0\].path\[3\]: expected two numbers within 1e\+06 m'),
         (lambda way: way['path'].__setitem__(3, [0, 10**400]), r'path\[3\]'),
@@ -185,7 +186,7 @@ def test_hysteresis_gives_found_and_recalled_candidates_the_same_names():
     rng, memory = np.random.default_rng(4), Memory()
     for x in np.linspace(0.14, 0.16, 80):
         state = hand(rng.normal((x, 0.1), 0.001))
-        _, memory = predict(config, state, OBSTACLES, GOAL, memory, demonstrations)
+        _, memory = predict(config, state, OBSTACLES, GOAL, memory, make_library(demonstrations))
         names = {frozenset(identity for identity, _ in one.sides) for one in memory.candidates}
         assert len(names) == 1
         assert len({one.label for one in memory.candidates}) == len(memory.candidates)

@@ -195,7 +195,7 @@ def test_a_kept_answer_begins_where_the_hand_is():
     _, memory = predict(config, hand_at(0.1), obstacles, GOAL, memory, goal_heights=np.array([0.3]))
     later = replace(hand_at(0.12), stamp_ns=100_000_000)
     deadline = Deadline(1e-9)
-    prediction, _ = predict(config, later, obstacles, GOAL, memory, (), deadline, np.array([0.3]))
+    prediction, _ = predict(config, later, obstacles, GOAL, memory, deadline=deadline, goal_heights=np.array([0.3]))
     kept = [each for each in prediction.candidates if each.age_s > 0.0]
     assert kept
     for each in kept:

@@ -11,7 +11,7 @@ from foc_ros.core import pipeline as module
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.errors import SceneError
-from foc_ros.core.homotopy.demonstrations import Demonstration
+from foc_ros.core.experience import NO_LIBRARY, Library
 from foc_ros.core.memory import Memory
 from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction, make_obstacles
@@ -34,11 +34,11 @@ class Recorder:
         obstacles: Obstacles,
         goals: Array,
         memory: Memory,
-        library: tuple[Demonstration, ...],
+        library: Library,
         deadline: Deadline,
         goal_heights: Array | None,
     ) -> tuple[Prediction, Memory]:
-        assert library == () and goal_heights is None
+        assert not library.demonstrations and goal_heights is None
         assert deadline is NEVER
         self.calls.append((config, hand, obstacles, goals, memory))
         label = f'call{len(self.calls)}'
@@ -492,7 +492,7 @@ def test_samples_and_scenes_of_the_meantime_do_not_change_a_prediction_that_was_
     assert task is not None
     pipeline.add_hand_sample(hand(40.0, 0.01))
     pipeline.set_obstacles('cloud', make_obstacles(), START, 'world')
-    recorder(task.config, task.hand, task.obstacles, task.goals, task.memory, (), NEVER, None)
+    recorder(task.config, task.hand, task.obstacles, task.goals, task.memory, NO_LIBRARY, NEVER, None)
     prediction = pipeline.finish(task, lambda: (Prediction(task.hand.stamp_ns, 'world', 0.3, (), 'made'), Memory('made')))
     assert prediction is not None and prediction.stamp_ns == START
     assert recorder.calls[0][2].ids == ('0',)

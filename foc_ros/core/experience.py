@@ -1,23 +1,20 @@
-"""Recordings of a scene as evidence: they change the likelihoods of the candidates and where the candidates lead.
+"""Recordings of a scene as evidence: they change the likelihoods of the candidates.
 
 A recording r counts by how near its path comes to the position p [m] and the velocity v [m/s] of the hand,
 
     w_r = max_m exp(-|p - p_rm|^2 / 2 a^2 - |v - v_rm|^2 / 2 b^2),  a = `position_stddev`,  b = `velocity_stddev`,
 
 without the second term for a hand that has not begun to move. From the point m of this maximum on, it passes obstacles on the
-sides of a class i towards the goal at its end. With n_i = sum of the w_r of class i, the likelihoods p_i of the model are the
-mean of a Dirichlet distribution that counts as n_0 = `prior_count` recordings, and the recordings are observations of it:
+sides of a class i towards the goal at its end. With G the classes that take the same gap in the next row, n_i = sum of the w_r
+of class i, and n_G = sum of the n_i in G, the likelihoods p_i of the model are means of two Dirichlet distributions, of the gap
+and of the class beyond it. They count as n_0 = `prior_count` and n_1 = `prior_count_beyond` recordings; the recordings are
+observations:
 
-    p_i <- (n_0 p_i + n_i) / (n_0 + sum_j n_j).
+    p_G <- (n_0 p_G + n_G) / (n_0 + sum n),    p_i <- p_G (n_1 p_i / p_G + n_i) / (n_1 + n_G),
 
-The recordings of a class also say where it leads. Their displacements from m on, moved to the hand, have the weighted mean and
-covariance c_i(t), C_i(t), where b^2 t^2 is added because a velocity that differs by b leads b t away. They are pooled with the
-mean and covariance mu_i(t), P_i(t) of the candidate by the logarithmic pool of two Gaussians (Genest and Zidek 1986,
-doi:10.1214/ss/1177013825):
+with the p_G of the model in the last fraction.
 
-    S^-1 = (1 - s) P_i^-1 + s C_i^-1,  S^-1 c = (1 - s) P_i^-1 mu_i + s C_i^-1 c_i,  s = n_i / (n_0 + n_i).
-
-Without recordings near the hand, both are the model.
+Paths and covariances stay those of the model, because eta holds for them. Without recordings near the hand, all is the model.
 """
 
 from __future__ import annotations
@@ -29,15 +26,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .config import ExperienceConfig
-from .homotopy.demonstrations import NEAR, POINTS, Demonstration, is_free, is_same_demonstration
-from .types import LEFT, RIGHT, Array, HandState, Obstacles, PredictedCandidate, Record, Solution, as_readonly
+from .decisions import find_decisions, tabulate_sides
+from .homotopy.demonstrations import NEAR, POINTS, Demonstration, is_same_demonstration
+from .types import LEFT, RIGHT, Array, HandState, Obstacles, PredictedCandidate, Record
 
 MOST_NEAR = 64
 """Number of recordings, the nearest ones, that count in one prediction: its time is bounded whatever the size of the library."""
 LEAST_WEIGHT = 1e-6
 """Weight below which a recording does not count."""
-EXACT = 1e-12
-"""Variance of a position that is known [m^2]: that of a micrometre."""
 LEAST_STEP_S = 1e-3
 """Shortest time between two points of a recording, for its velocity [s]."""
 
@@ -47,7 +43,7 @@ class Library(Record):
     """The class library.
 
     demonstrations: one of each class, to recall; recordings: those with times, r of them; position and velocity (r, m, 2) [m,
-    m/s] and times_s (r, m) of their paths; sides: for each recording the sides (m, n) of the n obstacles that it passed on which
+    m/s] of their paths; sides: for each recording the sides (m, n) of the n obstacles that it passed on which
     the rest of its path from each point runs; scene (r,): equal numbers for recordings in the same scene.
     """
 
@@ -55,7 +51,6 @@ class Library(Record):
     recordings: tuple[Demonstration, ...]
     position: Array
     velocity: Array
-    times_s: Array
     sides: tuple[NDArray[np.int8], ...]
     scene: tuple[int, ...]
 
@@ -84,7 +79,7 @@ def make_library(found: Sequence[Demonstration]) -> Library:
         velocity = np.gradient(position, axis=1) / steps_s[..., None]
     sides, numbers = tuple(_find_rest_sides(each) for each in recordings), dict[tuple[object, ...], int]()
     scene = tuple(numbers.setdefault((each.frame_id, each.ids, each.centre.tobytes()), len(numbers)) for each in recordings)
-    return Library(tuple(distinct), recordings, position, velocity, times_s, sides, scene)
+    return Library(tuple(distinct), recordings, position, velocity, sides, scene)
 
 
 def _find_rest_sides(recording: Demonstration) -> NDArray[np.int8]:
@@ -119,11 +114,11 @@ def find_evidence(library: Library, hand: HandState, obstacles: Obstacles, confi
 class Experience:
     """What a library says in one prediction.
 
-    Attributes: evidence; count: sum n_i of the weights of the recordings of each class, by label.
+    Attributes: evidence.
     """
 
     def __init__(self, library: Library, hand: HandState, obstacles: Obstacles, goals: Array, config: ExperienceConfig) -> None:
-        self._library, self._hand, self._obstacles, self._config = library, hand, obstacles, config
+        self._library, self._hand, self._obstacles, self._goals, self._config = library, hand, obstacles, goals, config
         self.evidence = find_evidence(library, hand, obstacles, config)
         self._passed = [
             (
@@ -149,66 +144,24 @@ class Experience:
 
     def pool_likelihoods(self, candidates: Sequence[PredictedCandidate]) -> list[PredictedCandidate]:
         """Return candidates with the likelihoods that the recordings change, the most likely first."""
-        if not len(self.evidence.row):
+        taken = [each for each in candidates if each.has_likelihood]
+        if not taken or not len(self.evidence.row):
             return list(candidates)
-        counts = [self.evidence.weight[self.find_members(each)].sum() if each.has_likelihood else 0.0 for each in candidates]
-        prior, total = self._config.prior_count, self._config.prior_count + sum(counts)
-        pooled = [
-            replace(each, likelihood=float((prior * each.likelihood + count) / total))
-            for each, count in zip(candidates, counts, strict=True)
-        ]
-        return sorted(pooled, key=lambda each: (not each.has_likelihood, -each.likelihood, each.label))
-
-    def pool_paths(self, candidates: Sequence[PredictedCandidate]) -> tuple[PredictedCandidate, ...]:
-        """Return candidates with the positions that the recordings change.
-
-        A pooled mean path that runs through an obstacle is not taken: that candidate keeps its own path.
-        """
-        if not len(self.evidence.row):
-            return tuple(candidates)
-        return tuple(replace(each, solution=self._pool_path(each)) if each.has_likelihood else each for each in candidates)
-
-    def _pool_path(self, candidate: PredictedCandidate) -> Solution:
-        members, solution = self.find_members(candidate), candidate.solution
-        count = float(self.evidence.weight[members].sum())
-        if not count:
-            return solution
-        mean, covariance = self._forecast(members, solution.times)
-        share = count / (self._config.prior_count + count)
-        own, given = np.linalg.inv(solution.covariance[1:, :2, :2] + EXACT * np.eye(2)), np.linalg.inv(covariance[1:])
-        pooled = np.linalg.inv((1.0 - share) * own + share * given)
-        towards = (1.0 - share) * own @ solution.path[1:, :, None] + share * given @ mean[1:, :, None]
-        path = np.vstack([solution.path[:1], (pooled @ towards)[..., 0]])
-        return _change_positions(solution, path, pooled) if is_free(path, self._obstacles) else solution
-
-    def _forecast(self, members: NDArray[np.intp], times_s: Array) -> tuple[Array, Array]:
-        """Return mean (h, 2) [m] and covariance (h, 2, 2) [m^2] of the recordings at times from now (h,) [s]."""
-        weight = self.evidence.weight[members] / self.evidence.weight[members].sum()
-        positions = np.empty((len(members), len(times_s), 2))
-        for number, member in enumerate(members.tolist()):
-            row, point = self.evidence.row[member], self.evidence.point[member]
-            at, path = self._library.times_s[row, point] + times_s, self._library.position[row]
-            for axis in range(2):
-                positions[number, :, axis] = np.interp(at, self._library.times_s[row], path[:, axis]) - path[point, axis]
-        mean = np.tensordot(weight, positions, 1)
-        offset = positions - mean
-        covariance = np.einsum('r,rhi,rhj->hij', weight, offset, offset)
-        covariance += (self._config.velocity_stddev * times_s)[:, None, None] ** 2 * np.eye(2)
-        return mean + self._hand.mean[:2], covariance
+        counts = np.array([self.evidence.weight[self.find_members(each)].sum() for each in taken])
+        sides = tabulate_sides([each.solution for each in taken], self._obstacles)
+        gap = find_decisions(sides, self._obstacles, self._hand, self._goals).next_gap
+        likelihoods = _count_gaps_and_classes(np.array([each.likelihood for each in taken]), counts, gap, self._config)
+        pooled = [replace(each, likelihood=share) for each, share in zip(taken, likelihoods.tolist(), strict=True)]
+        pooled.sort(key=lambda each: (-each.likelihood, each.label))
+        return pooled + [each for each in candidates if not each.has_likelihood]
 
 
-def _change_positions(solution: Solution, path: Array, covariance: Array) -> Solution:
-    """Return a solution with other mean positions (N + 1, 2) [m] and position covariances (N, 2, 2) [m^2] from the first step on.
-
-    The conditional distribution of the other states given the position stays what it was, and the mean velocity follows the path.
-    """
-    mean, total = solution.mean.copy(), solution.covariance.copy()
-    mean[:, 2:4] += np.gradient(path - solution.path, solution.dt, axis=0)
-    mean[:, :2] = path
-    before, cross, rest = total[1:, :2, :2], total[1:, 2:, :2], total[1:, 2:, 2:]
-    gain = cross @ np.linalg.inv(before + EXACT * np.eye(2))
-    total[1:, 2:, 2:] = rest + gain @ (covariance - before) @ gain.transpose(0, 2, 1)
-    total[1:, 2:, :2] = gain @ covariance
-    total[1:, :2, 2:] = total[1:, 2:, :2].transpose(0, 2, 1)
-    total[1:, :2, :2] = covariance
-    return replace(solution.with_covariance(total), mean=as_readonly(mean))
+def _count_gaps_and_classes(likelihoods: Array, counts: Array, gap: NDArray[np.intp], config: ExperienceConfig) -> Array:
+    """Return likelihoods (k,) that counts (k,) change, first those of the gaps (k,) and then those of the classes in each gap."""
+    of_gap, counts_of_gap = np.bincount(gap, likelihoods), np.bincount(gap, counts)
+    near, beyond = config.prior_count, config.prior_count_beyond
+    of_gap_now = (near * of_gap + counts_of_gap) / (near + counts.sum())
+    within = np.divide(likelihoods, of_gap[gap], out=np.zeros(len(gap)), where=of_gap[gap] > 0.0)
+    pooled: Array = of_gap_now[gap] * (beyond * within + counts) / (beyond + counts_of_gap[gap])
+    pooled /= pooled.sum()
+    return pooled

@@ -114,7 +114,6 @@ def predict(
     prediction = Prediction(*hand_at, predicted, best, notes, time.perf_counter() - began, *scene_then)
     earlier, followed = memory.remember(candidates, solved, earlier, likelihoods, hand.stamp_ns)
     present = past.follow(prediction, durations, config.likelihood.hold_s)
-    prediction = replace(prediction, candidates=experience.pool_paths(predicted), solve_s=time.perf_counter() - began)
     return prediction, Memory(best, candidates, earlier, followed, present, found.next_goal, numbers, choice)
 
 
