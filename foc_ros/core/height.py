@@ -27,11 +27,12 @@ from numpy.typing import NDArray
 from .config import REFERENCE_STEP_S, Config
 from .dynamics.impulse_response import apply_impulse_response
 from .dynamics.noise import propagate_covariance, scale_noise, stack_noise
-from .dynamics.plant_models import make_plant_model
+from .dynamics.plant_models import HAND_STATES, make_plant_model
 from .dynamics.plants import find_states_at_goal
 from .dynamics.predictive_covariance import SharedCovariances, widen_covariance
 from .estimation.duration import is_passing
 from .obstacles.height_clearance import find_cleared
+from .ocp.qp import solve_goal
 from .types import Array, HandState, HeightTrajectory, Obstacles, PredictedCandidate, Solution, Status
 
 
@@ -122,19 +123,15 @@ def reach_along_axis(config: Config, start: Array, target: float, dt: float) -> 
     foc, plant = config.foc, make_plant_model(config.foc)
     horizon = plant.build_horizon(dt, foc.steps)
     is_fixed = find_states_at_goal(plant.states, is_passing(config.duration))[::2]
-    now = plant.project_mean(np.column_stack((start, np.zeros(3))).ravel())
-    goal = np.zeros(plant.states)
-    goal[0] = target
+    now, goal = np.zeros(HAND_STATES), np.zeros(plant.states)
+    now[::2], goal[0] = start, target
+    free = horizon.powers @ plant.project_mean(now)
+    rows, missing = horizon.last[::2, : foc.steps][is_fixed], (goal - free[-1])[::2][is_fixed]
     noise = scale_noise(np.array([math.hypot(foc.noise_x, foc.noise_y) / math.sqrt(2.0), 0.0]), REFERENCE_STEP_S, dt)
-    last, missing = horizon.last[::2, : foc.steps], (goal - horizon.powers[-1] @ now)[::2]
-    roots = np.sqrt(1.0 + foc.goal_weight * (noise[0] * last[0]) ** 2)
-    rows = last[is_fixed] / roots
-    # the rows have different units (m, m/s, ...), so they are scaled to unit length
-    scale = 1.0 / np.linalg.norm(rows, axis=1)
+    hessian = 1.0 + foc.goal_weight * (noise[0] * rows[0]) ** 2
     control = np.zeros((2, foc.steps))
-    rows *= scale[:, None]
-    control[0] = rows.T @ np.linalg.solve(rows @ rows.T, scale * missing[is_fixed]) / roots
+    control[0] = solve_goal(hessian, np.zeros(foc.steps), rows, missing, np.zeros(len(rows))).control
     stacked = control.ravel()
-    mean = horizon.powers @ now + apply_impulse_response(horizon.states, stacked).T
+    mean = free + apply_impulse_response(horizon.states, stacked).T
     covariance = propagate_covariance(horizon, np.zeros_like(horizon.powers), stack_noise(noise**2, foc.steps), stacked)
     return Solution(Status.SOLVED, '', dt, mean, covariance, control.T, float(stacked @ stacked), {}, 0.0, 0.0, 1.0)
