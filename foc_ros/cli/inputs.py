@@ -24,7 +24,7 @@ from foc_ros.io.outputs import (
 def read_inputs(arguments: argparse.Namespace) -> None:
     """Check the arguments of a command, and add what is read; raises FocError.
 
-    `solve` gets `problem`, the reaching scene; `evaluate`, `fit` and `simulate` get `found`, the recordings by name.
+    `solve` gets `problem`, the reaching scene; `evaluate`, `fit`, `learn` and `simulate` get `found`, the recordings by name.
     """
     if arguments.command in READERS:
         READERS[arguments.command](arguments)
@@ -52,6 +52,13 @@ def _read_replay(arguments: argparse.Namespace) -> None:
     check_bag(arguments.bag)
     if arguments.output is not None:
         check_new_bag(arguments.output)
+
+
+def _read_learn(arguments: argparse.Namespace) -> None:
+    from foc_ros.analysis.recordings import find_recordings
+
+    check_file('--output', arguments.output)
+    arguments.found = find_recordings(arguments.data)
 
 
 def _read_fit(arguments: argparse.Namespace) -> None:
@@ -98,6 +105,7 @@ READERS: dict[str, Callable[[argparse.Namespace], None]] = {
     'paper': _check_folder_of_output,
     'solve': _read_solve,
     'replay': _read_replay,
+    'learn': _read_learn,
     'fit': _read_fit,
     'evaluate': _read_evaluate,
     'simulate': _read_simulate,

@@ -7,7 +7,6 @@ import json
 import sys
 
 from foc_ros.analysis.learn_demonstrations import learn_recording
-from foc_ros.analysis.recordings import find_recordings
 from foc_ros.core.errors import FocError, InputError, RecordingError
 from foc_ros.core.homotopy.demonstrations import Demonstration
 from foc_ros.io.class_library import MOST_WAYS, save_library
@@ -16,9 +15,7 @@ from foc_ros.io.terminal import show_progress
 
 def run(arguments: argparse.Namespace) -> int:
     """Learn all recordings and write the library; return 2 where a recording could not be used, and the others were."""
-    recordings, output = find_recordings(arguments.data), arguments.output
-    if output.is_dir() or not output.resolve().parent.is_dir():
-        raise InputError('--output', 'a file in a directory that exists', output)
+    recordings, output = arguments.found, arguments.output
     if len(recordings) > MOST_WAYS:
         raise InputError(f'{arguments.data}', f'at most {MOST_WAYS} recordings', len(recordings))
     learnt, failed = list[Demonstration](), dict[str, str]()

@@ -17,7 +17,7 @@ from .homotopy.branch_times import compute_branch_times
 from .likelihood import CostModel, compute_likelihoods
 from .ocp.problem import Problem
 from .ocp.solve import solve_problem
-from .ocp.warm_start import cold_start, warm_start
+from .ocp.warm_start import Start, cold_start, warm_start
 from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Solution, Status
 
 EFFORT_ONLY = CostModel()
@@ -81,9 +81,9 @@ def solve_candidates(
         if deadline_of_raises.allows():
             first, problem = solved[row], problems[row]
             start = replace(warm_start(first.solution, problem), is_followed=True, is_thorough=True)
-            solution = solve_problem(problem, start, settings, deadline_of_raises)
-            solution = replace(solution, qp_solves=first.solution.qp_solves + solution.qp_solves)
-            raised = _check_class(candidates[row], problem, solution, costs)
+            raised = _solve_from(start, candidates[row], problem, settings, costs, deadline_of_raises)
+            qp_solves = first.solution.qp_solves + raised.solution.qp_solves
+            raised = replace(raised, solution=replace(raised.solution, qp_solves=qp_solves))
             solved[row] = raised if raised.has_likelihood else first
     return [solved[row] for row in sorted(solved)]
 
@@ -114,14 +114,13 @@ def _solve_candidate(
     warm = None
     if previous is not None:
         start = replace(warm_start(previous, problem), is_followed=is_followed)
-        solution = solve_problem(problem, start, settings, deadline)
-        warm = _check_class(candidate, problem, solution, costs)
+        warm = _solve_from(start, candidate, problem, settings, costs, deadline)
         # a solution that continues one stopped by the deadline has skipped nothing
         is_continued = warm.has_likelihood and (previous.status is Status.DEADLINE or previous.status.has_likelihood)
         if warm.status in (previous.status, Status.DEADLINE) or is_continued:
             return warm
     start = replace(cold_start(candidate.guess), is_followed=is_followed)
-    cold = _check_class(candidate, problem, solve_problem(problem, start, settings, deadline), costs)
+    cold = _solve_from(start, candidate, problem, settings, costs, deadline)
     if warm is None or not warm.has_likelihood:
         return cold
     return cold if cold.has_likelihood and _compute_loss(cold, problem) < _compute_loss(warm, problem) else warm
@@ -133,8 +132,11 @@ def _compute_loss(candidate: PredictedCandidate, problem: Problem) -> float:
     return problem.preference.compute_loss(solution.effort, k, wanted)
 
 
-def _check_class(candidate: Candidate, problem: Problem, solution: Solution, costs: CostModel) -> PredictedCandidate:
-    """Find the homotopy class in which a solution really is, and its cost; the status says if it left the candidate's class."""
+def _solve_from(
+    start: Start, candidate: Candidate, problem: Problem, settings: FocConfig, costs: CostModel, deadline: Deadline
+) -> PredictedCandidate:
+    """Solve from a start; find the class in which the solution is, and its cost. The status says if it left the candidate's."""
+    solution = solve_problem(problem, start, settings, deadline)
     sides = find_path_sides(solution.path, problem.obstacles, problem.centre_trajectories)
     if solution.status.has_likelihood and any(sides.get(identity, side) != side for identity, side in candidate.sides):
         solution = replace(solution, status=Status.LEFT_CLASS, message='the solution moved into another homotopy class')

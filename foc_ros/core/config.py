@@ -167,9 +167,7 @@ class LikelihoodConfig:
 class ExperienceConfig:
     """Use of the recordings in the class library (`homotopy.library`) as evidence."""
 
-    prior_count: float = _p(
-        1.0, 'number of recordings as which the model counts, for the gap in the next row and for positions', '', 1e-3, 1e6
-    )
+    prior_count: float = _p(1.0, 'number of recordings as which the model counts, for the gap in the next row', '', 1e-3, 1e6)
     prior_count_beyond: float = _p(30.0, 'the same, for what lies beyond the next row of obstacles', '', 1e-3, 1e6)
     position_stddev: float = _p(0.03, 'distance from the hand at which a recording counts less', 'm', 1e-4, 10.0)
     velocity_stddev: float = _p(

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from .config import ExperienceConfig
 from .decisions import find_decisions, tabulate_sides
 from .homotopy.demonstrations import NEAR, POINTS, Demonstration, is_same_demonstration
-from .types import LEFT, RIGHT, Array, HandState, Obstacles, PredictedCandidate, Record
+from .types import LEFT, RIGHT, Array, Candidate, HandState, Obstacles, PredictedCandidate, Record
 
 MOST_NEAR = 64
 """Number of recordings, the nearest ones, that count in one prediction: its time is bounded whatever the size of the library."""
@@ -43,8 +43,8 @@ class Library(Record):
     """The class library.
 
     demonstrations: one of each class, to recall; recordings: those with times, r of them; position and velocity (r, m, 2) [m,
-    m/s] of their paths; sides: for each recording the sides (m, n) of the n obstacles that it passed on which
-    the rest of its path from each point runs; scene (r,): equal numbers for recordings in the same scene.
+    m/s] of their paths; sides: for each recording, LEFT or RIGHT (m, n) on which the rest of its path from each point passes its
+    n obstacles; scene (r,): equal numbers for recordings in the same scene.
     """
 
     demonstrations: tuple[Demonstration, ...]
@@ -111,49 +111,40 @@ def find_evidence(library: Library, hand: HandState, obstacles: Obstacles, confi
     return Evidence(weight[rows], np.array(rows, dtype=np.intp), point[rows])
 
 
-class Experience:
-    """What a library says in one prediction.
+def pool_likelihoods(
+    candidates: Sequence[PredictedCandidate],
+    library: Library,
+    hand: HandState,
+    obstacles: Obstacles,
+    goals: Array,
+    config: ExperienceConfig,
+) -> list[PredictedCandidate]:
+    """Return candidates with the likelihoods that the recordings of a library change, the most likely first; goals (g, 2) [m]."""
+    taken = [each for each in candidates if each.has_likelihood]
+    if not taken or not library.recordings:
+        return list(candidates)
+    evidence = find_evidence(library, hand, obstacles, config)
+    if not len(evidence.row):
+        return list(candidates)
+    counts = np.array([_count_recordings(each.candidate, library, evidence, goals) for each in taken])
+    sides = tabulate_sides([each.solution for each in taken], obstacles)
+    gap = find_decisions(sides, obstacles, hand, goals).next_gap
+    likelihoods = _count_gaps_and_classes(np.array([each.likelihood for each in taken]), counts, gap, config)
+    pooled = [replace(each, likelihood=share) for each, share in zip(taken, likelihoods.tolist(), strict=True)]
+    pooled.sort(key=lambda each: (-each.likelihood, each.label))
+    return pooled + [each for each in candidates if not each.has_likelihood]
 
-    Attributes: evidence.
-    """
 
-    def __init__(self, library: Library, hand: HandState, obstacles: Obstacles, goals: Array, config: ExperienceConfig) -> None:
-        self._library, self._hand, self._obstacles, self._goals, self._config = library, hand, obstacles, goals, config
-        self.evidence = find_evidence(library, hand, obstacles, config)
-        self._passed = [
-            (
-                self._find_goals(row, goals),
-                dict(zip(library.recordings[row].ids, library.sides[row][point].tolist(), strict=True)),
-            )
-            for row, point in zip(self.evidence.row.tolist(), self.evidence.point.tolist(), strict=True)
-        ]
-
-    def _find_goals(self, row: int, goals: Array) -> frozenset[int]:
-        """Return the goals (g, 2) [m] at the end of a recording."""
-        return frozenset(np.flatnonzero(np.hypot(*(goals - self._library.position[row, -1]).T) <= NEAR).tolist())
-
-    def find_members(self, candidate: PredictedCandidate) -> NDArray[np.intp]:
-        """Return which recordings that count lead to the goal of a candidate, on its sides of all obstacles in its label."""
-        goal, named = candidate.candidate.goal, candidate.candidate.sides
-        members = [
-            number
-            for number, (ends, sides) in enumerate(self._passed)
-            if goal in ends and all(sides.get(name) == side for name, side in named)
-        ]
-        return np.array(members, dtype=np.intp)
-
-    def pool_likelihoods(self, candidates: Sequence[PredictedCandidate]) -> list[PredictedCandidate]:
-        """Return candidates with the likelihoods that the recordings change, the most likely first."""
-        taken = [each for each in candidates if each.has_likelihood]
-        if not taken or not len(self.evidence.row):
-            return list(candidates)
-        counts = np.array([self.evidence.weight[self.find_members(each)].sum() for each in taken])
-        sides = tabulate_sides([each.solution for each in taken], self._obstacles)
-        gap = find_decisions(sides, self._obstacles, self._hand, self._goals).next_gap
-        likelihoods = _count_gaps_and_classes(np.array([each.likelihood for each in taken]), counts, gap, self._config)
-        pooled = [replace(each, likelihood=share) for each, share in zip(taken, likelihoods.tolist(), strict=True)]
-        pooled.sort(key=lambda each: (-each.likelihood, each.label))
-        return pooled + [each for each in candidates if not each.has_likelihood]
+def _count_recordings(candidate: Candidate, library: Library, evidence: Evidence, goals: Array) -> float:
+    """Return the weight of the recordings that lead to the goal of a candidate, on its sides of all obstacles in its label."""
+    at_goal = np.hypot(*(library.position[evidence.row, -1] - goals[candidate.goal]).T) <= NEAR
+    count = 0.0
+    for number in np.flatnonzero(at_goal).tolist():
+        row = evidence.row[number]
+        sides = dict(zip(library.recordings[row].ids, library.sides[row][evidence.point[number]].tolist(), strict=True))
+        if all(sides.get(name) == side for name, side in candidate.sides):
+            count += float(evidence.weight[number])
+    return count
 
 
 def _count_gaps_and_classes(likelihoods: Array, counts: Array, gap: NDArray[np.intp], config: ExperienceConfig) -> Array:

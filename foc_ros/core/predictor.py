@@ -16,7 +16,7 @@ from .dynamics.noise import scale_noise
 from .dynamics.plant_models import make_plant_model
 from .dynamics.predictive_covariance import SharedCovariances, widen_covariance
 from .estimation.duration import choose_candidate_durations, estimate_times_to_go, is_passing, limit_change
-from .experience import NO_LIBRARY, Experience, Library
+from .experience import NO_LIBRARY, Library, pool_likelihoods
 from .height import HeightPredictor
 from .homotopy import Turn, search
 from .homotopy.demonstrations import GuessTiming, recall_demonstrations
@@ -28,8 +28,8 @@ from .ocp.problem import Problem, rest_to_goal
 from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Prediction, make_obstacles
 
 SEARCH_SHARE, RAISE_SHARE, SOLVE_SHARE = 0.3, 0.3, 0.7
-"""Parts of the time left that the search, and then raising safety factors further and all solves, may take before they begin no
-further step. A step may take a fifth of the budget."""
+"""Parts of the time left that the search may take, and then raising safety factors further, and all solves. They begin no step
+after that, and the last step ends later."""
 RESERVE_S = 5e-5
 """Time besides that for each candidate, to keep, rank and smooth it [s]."""
 
@@ -91,8 +91,7 @@ def predict(
     widened = [_widen_covariance(each, shared, hand, config) for each in solved]
     kept = keep_answers(candidates, widened, past, hand.stamp_ns, config.likelihood.hold_s, costs)
     ranked, choice = rank_candidates(kept, config.likelihood, obstacles, hand, goals)
-    experience = Experience(library, hand, grown, goals, config.experience)
-    ranked = experience.pool_likelihoods(ranked)
+    ranked = pool_likelihoods(ranked, library, hand, grown, goals, config.experience)
     smooth = smooth_paths(ranked, past, hand.stamp_ns, config.likelihood.smoothing_s)
     continuous = make_continuous(smooth, past, hand.stamp_ns, config.likelihood)
     numbers = memory.numbers.keep_goals(past.durations_s)

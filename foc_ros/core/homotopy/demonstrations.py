@@ -109,7 +109,7 @@ def recall_demonstrations(
             continue
         for goal in np.flatnonzero(np.hypot(*(goals - demonstration.path[-1]).T) <= NEAR).tolist():
             rest = _deform(demonstration.path, hand.mean[:2], goals[goal])
-            if rest is None or not is_free(rest, obstacles):
+            if rest is None or not _is_free(rest, obstacles):
                 continue
             guess = timed(rest, hand.mean[2:4], timing.durations_s[goal], timing.steps)
             sides, shown = find_path_sides(guess, obstacles), dict(zip(demonstration.ids, demonstration.sides, strict=True))
@@ -139,7 +139,7 @@ def _deform(path: Array, hand: Array, goal: Array) -> Array | None:
     return moved
 
 
-def is_free(path: Array, obstacles: Obstacles) -> bool:
+def _is_free(path: Array, obstacles: Obstacles) -> bool:
     """Tell whether no segment of a path runs through an obstacle, other than those that hold its first point."""
     squares = find_segment_squares(np.ascontiguousarray(path), obstacles.centre, tabulate_polygons(obstacles))
     _, distance = measure_offsets(path[:1], obstacles)

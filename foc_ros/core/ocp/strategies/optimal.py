@@ -143,8 +143,8 @@ class _Search:
         assert self.best is not None
         is_known = self.is_hard and start.safety_factor < self.problem.wanted_k and not start.is_unfinished
         if self.is_cheap(self.best) and not is_known:  # that no larger k is in reach
-            begin = (COLD_TRIES, COLD_STRIDE) if self.is_thorough else (WARM_TRIES, WARM_STRIDE)
-            self.raise_k(begin[0], begin[1] * (1.0 - self.slope(self.best) / self.rate))
+            tries, stride = (COLD_TRIES, COLD_STRIDE) if self.is_thorough else (WARM_TRIES, WARM_STRIDE)
+            self.raise_k(tries, stride * (1.0 - self.slope(self.best) / self.rate))
         return self.judge()
 
     def judge(self) -> Status:
@@ -254,7 +254,9 @@ class _Search:
             if self.slope(point) <= self.rate:
                 before, low = low, point
                 self.best = low
-                stride, tries = stride * 2, 0 if self.is_followed and not self.is_thorough else tries
+                stride *= 2
+                if self.is_followed and not self.is_thorough:
+                    tries = 0
             else:
                 high = point.k
             is_near = low.k < self.wanted and self.slope(point) > NEARLY * self.rate
