@@ -107,7 +107,7 @@ def test_one_bag_and_a_broken_one(tmp_path: Path, capsys: pytest.CaptureFixture[
 def test_the_result_is_printed_as_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag, given, output = write_bag(tmp_path / 'bag'), tmp_path / 'given.yaml', tmp_path / 'out.yaml'
     given.write_text(dump_parameter_file(replace_values(Config(), {**QUICK, 'foc.strategy': 'hc'})))
-    assert main(['fit', str(bag), '--output', str(output), '--params', str(given), '--workers', '1']) == 0
+    assert main(['fit', str(bag), '--output', str(output), '--params', str(given), '--workers', '1', '--allow', 'positions']) == 0
     words = capsys.readouterr().out
     assert 'log-likelihood of the class taken' in words and 'note: ' in words
     assert 'with the fitted parameters: ' in words
