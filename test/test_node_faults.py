@@ -249,7 +249,7 @@ def test_a_publisher_that_cannot_be_heard_is_named(ros: Graph) -> None:
 
     bench, perception = Bench(ros, outputs=[]), ros.node('perception')
     publisher = perception.create_publisher(MarkerArray, 'obstacle_markers', qos_profile_sensor_data)
-    ros.spin_until(lambda: bench.node._incompatible == {'obstacle_markers'}, 'the event')
+    ros.spin_until(lambda: len(bench.node.get_publishers_info_by_topic('obstacle_markers')) == 2, 'the publisher')
     status = bench.health()
     assert status.level == b'\x01'
     assert status.message.startswith(
@@ -259,6 +259,21 @@ def test_a_publisher_that_cannot_be_heard_is_named(ros: Graph) -> None:
     perception.destroy_publisher(publisher)
     ros.spin_until(lambda: len(bench.node.get_publishers_info_by_topic('obstacle_markers')) == 1, 'its end')
     assert bench.health().message == 'no prediction: no hand pose yet'
+
+
+def test_a_subscription_that_cannot_receive_an_output_is_named(ros: Graph) -> None:
+    from nav_msgs.msg import Path
+    from rclpy.qos import QoSDurabilityPolicy, QoSProfile
+
+    from foc_ros.ros.endpoints import describe_incompatible_subscriptions
+
+    bench, planner = Bench(ros, outputs=[]), ros.node('planner')
+    latched = QoSProfile(depth=1, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL)
+    planner.create_subscription(Path, 'foc/path', lambda _: None, latched)
+    ros.spin_until(lambda: bench.node.get_subscriptions_info_by_topic('foc/path'), 'the subscription')
+    (text,) = describe_incompatible_subscriptions(bench.node, bench.node._outputs['path'])
+    assert text.startswith('planner cannot hear /foc/path, incompatible QoS: ')
+    assert text.endswith('(see qos_overrides./foc/path.publisher)')
 
 
 def test_parameters_change_together_and_without_a_missed_prediction(ros: Graph) -> None:

@@ -87,6 +87,19 @@ def test_one_prediction_for_every_sample_that_is_due(recorder: Recorder) -> None
     assert pipeline.counts == {'predict_nothing_solved': 10}
 
 
+@pytest.mark.parametrize(('period_ms', 'expected'), [(1.0, 50), (7.0, 50), (14.0, 48), (19.9, 50), (21.0, 48), (30.0, 34)])
+def test_the_rate_is_reached_whatever_the_period_of_the_samples(recorder: Recorder, period_ms: float, expected: int) -> None:
+    pipeline, stamps = ready(), []
+    for ms in np.arange(0.0, 1000.0, period_ms):
+        pipeline.add_hand_sample(hand(ms))
+        if pipeline.is_due:
+            prediction = pipeline.predict()
+            assert prediction is not None
+            stamps.append(prediction.stamp_ns)
+    assert abs(len(stamps) - expected) <= 1
+    assert np.diff(stamps).min() >= 10 * MS
+
+
 def test_a_period_may_be_a_fraction_of_a_nanosecond(recorder: Recorder) -> None:
     pipeline = ready(replace_values(CONFIG, {'rate_hz': 30.0}))
     pipeline.add_hand_sample(hand(0.0))
@@ -398,7 +411,7 @@ class Driver:
         assert self.is_new
         assert self.pipeline.is_engaged
         assert prediction.stamp_ns == self.now_ns
-        assert self.last_ns is None or prediction.stamp_ns - self.last_ns >= int(1e9 / self.pipeline.config.rate_hz)
+        assert self.last_ns is None or prediction.stamp_ns - self.last_ns >= int(1e9 / self.pipeline.config.rate_hz) // 2
         for outcome in prediction.solved_candidates:
             assert np.all(np.isfinite(outcome.solution.mean))
             assert np.isfinite(outcome.likelihood)

@@ -65,6 +65,7 @@ class Pipeline:
         self._is_new = False
         self._was_tried = False
         self._predicted_ns: int | None = None
+        self._late_ns = 0  # how much later than due the last prediction was
         self._task: PredictionTask | None = None
 
     @property
@@ -92,11 +93,20 @@ class Pipeline:
 
     @property
     def is_due(self) -> bool:
-        """Whether there is a new hand sample at least 1 / rate_hz after the last prediction (or any, after a restart)."""
+        """Whether there is a new hand sample, and its stamp is due (or any, after a restart).
+
+        Stamps are due every 1 / rate_hz. A sample that comes later than that, by up to half of this period, does not postpone the
+        ones after it, so that `rate_hz` is reached whatever the period of the samples is.
+        """
         if self.hand_state is None or not self._is_new or not self.is_engaged:
             return False
+        return self._due_ns is None or self.hand_state.stamp_ns >= self._due_ns
+
+    @property
+    def _due_ns(self) -> int | None:
+        """Stamp from which on the next prediction is due; None if any stamp is."""
         period_ns = int(NANOSECONDS / self.config.rate_hz)
-        return self._predicted_ns is None or self.hand_state.stamp_ns - self._predicted_ns >= period_ns
+        return None if self._predicted_ns is None else self._predicted_ns + period_ns - min(self._late_ns, period_ns // 2)
 
     def add_hand_sample(self, sample: HandSample) -> SampleStatus:
         """Take a hand sample. The first one fixes the working frame if the parameter does not."""
@@ -163,13 +173,15 @@ class Pipeline:
         self._was_tried = True
         reason = self._find_not_ready_reason()
         if reason is None and not self.is_due:
-            reason = ('not_due', 'no hand pose since the last prediction that is 1/rate_hz after it')
+            reason = ('not_due', 'no hand pose since the last prediction whose stamp is due by rate_hz')
         if reason is not None:
             self._rejections.reject(f'predict_{reason[0]}', reason[1])
             return None
         assert self.hand_state is not None
         assert self.scene.goals is not None
-        self._is_new, self._predicted_ns = False, self.hand_state.stamp_ns
+        stamp_ns, due_ns = self.hand_state.stamp_ns, self._due_ns
+        self._late_ns = 0 if due_ns is None else stamp_ns - due_ns
+        self._is_new, self._predicted_ns = False, stamp_ns
         obstacles = self.scene.obstacles(self.hand_state.stamp_ns)
         scene = self.hand_state, obstacles, self.scene.goals
         heights = self.scene.goal_heights

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
-from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import (
     QoSCompatibility,
@@ -39,16 +39,16 @@ OVERRIDABLE = QoSOverridingOptions(
 )
 
 
-def create_subscriptions(
-    node: Node, receive: Callable[[str, Any], None], note_incompatible: Callable[[str], None], hand_group: CallbackGroup
-) -> dict[str, Any]:
+def create_subscriptions(node: Node, receive: Callable[[str, Any], None], hand_group: CallbackGroup) -> dict[str, Any]:
     """Create the subscriptions, by topic; each calls `receive(topic, message)`.
 
     A message of `BEST_EFFORT` is a complete state; those of the other inputs are changes, or are sent once, and are received
-    reliably. `note_incompatible(topic)` is called when a publisher appears that a subscription cannot hear:
-    `describe_incompatible_publishers` then tells which. A scene that was published once, before the start of the node, is
-    received with `qos_overrides./obstacles.subscription.durability: transient_local`, reliably, but then not from volatile or
-    best-effort publishers. Inputs of `find_missing_packages` have no subscription. hand_group: callback group of the hand.
+    reliably. A scene that was published once, before the start of the node, is received with
+    `qos_overrides./obstacles.subscription.durability: transient_local`, reliably, but then not from volatile or best-effort
+    publishers. Inputs of `find_missing_packages` have no subscription. hand_group: callback group of the hand.
+
+    The endpoints here have no event callbacks, because each of them lengthens every wake-up of the executor:
+    `describe_incompatible_publishers` and `describe_incompatible_subscriptions` find the same in the graph.
     """
     subscriptions = {}
     missing = find_missing_packages()
@@ -63,7 +63,7 @@ def create_subscriptions(
             partial(receive, role),
             _build_qos(reliability, HAND_DEPTH if role == HAND else SCENE_DEPTH),
             callback_group=hand_group if role == HAND else None,
-            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=lambda _, role=role: note_incompatible(role)),
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
             qos_overriding_options=OVERRIDABLE,
         )
     return subscriptions
@@ -77,20 +77,33 @@ def _is_kept_by_publishers(node: Node, role: str) -> bool:
 
 def describe_incompatible_publishers(node: Node, role: str, subscription: Any) -> list[str]:
     """Return a text for each present publisher of an input that its subscription cannot hear."""
-    texts = []
-    for info in node.get_publishers_info_by_topic(subscription.topic_name):
-        compatibility, reason = qos_check_compatible(info.qos_profile, subscription.qos_profile)
-        if compatibility == QoSCompatibility.ERROR:
-            why = reason.removeprefix('ERROR: ').rstrip('; ')
-            remedy = f'qos_overrides.{subscription.topic_name}.subscription'
-            texts.append(f'{role} is not heard from {info.node_name}, incompatible QoS: {why} (see {remedy})')
-    return texts
+    found = node.get_publishers_info_by_topic(subscription.topic_name)
+    reasons = [(each.node_name, _find_incompatibility(each.qos_profile, subscription.qos_profile)) for each in found]
+    remedy = f'(see qos_overrides.{subscription.topic_name}.subscription)'
+    return [f'{role} is not heard from {name}, incompatible QoS: {reason} {remedy}' for name, reason in reasons if reason]
+
+
+def describe_incompatible_subscriptions(node: Node, publisher: Any) -> list[str]:
+    """Return a text for each present subscription of an output that cannot receive its messages."""
+    found = node.get_subscriptions_info_by_topic(publisher.topic_name)
+    reasons = [(each.node_name, _find_incompatibility(publisher.qos_profile, each.qos_profile)) for each in found]
+    topic = publisher.topic_name
+    remedy = f'(see qos_overrides.{topic}.publisher)'
+    return [f'{name} cannot hear {topic}, incompatible QoS: {reason} {remedy}' for name, reason in reasons if reason]
+
+
+def _find_incompatibility(publisher: QoSProfile, subscription: QoSProfile) -> str:
+    """Return why a subscription cannot receive the messages of a publisher; empty if it can."""
+    compatibility, reason = qos_check_compatible(publisher, subscription)
+    return reason.removeprefix('ERROR: ').rstrip('; ') if compatibility == QoSCompatibility.ERROR else ''
 
 
 def create_command_subscription(node: Node, receive: Callable[[Any], None]) -> Any:
     """Create the subscription of the operator's velocity command, of which only the newest counts."""
     qos = _build_qos(QoSReliabilityPolicy.BEST_EFFORT, 1)
-    return node.create_subscription(find_message_class(TWIST_TYPE), COMMAND, receive, qos, qos_overriding_options=OVERRIDABLE)
+    events = SubscriptionEventCallbacks(use_default_callbacks=False)
+    kind = find_message_class(TWIST_TYPE)
+    return node.create_subscription(kind, COMMAND, receive, qos, event_callbacks=events, qos_overriding_options=OVERRIDABLE)
 
 
 def create_guidance_publishers(node: Node) -> dict[str, Any]:
@@ -112,7 +125,9 @@ def create_publishers(node: Node) -> dict[str, Any]:
 
 def _create_publisher(node: Node, name: str, kind: str) -> Any:
     qos = _build_qos(QoSReliabilityPolicy.RELIABLE, OUTPUT_DEPTH)
-    return node.create_publisher(find_message_class(kind), f'~/{name}', qos, qos_overriding_options=OVERRIDABLE)
+    events = PublisherEventCallbacks(use_default_callbacks=False)
+    message_class = find_message_class(kind)
+    return node.create_publisher(message_class, f'~/{name}', qos, event_callbacks=events, qos_overriding_options=OVERRIDABLE)
 
 
 def take_queued(subscription: Any) -> list[Any]:

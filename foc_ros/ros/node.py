@@ -41,6 +41,7 @@ from .endpoints import (
     create_publishers,
     create_subscriptions,
     describe_incompatible_publishers,
+    describe_incompatible_subscriptions,
     find_missing_packages,
     take_queued,
 )
@@ -81,7 +82,6 @@ class FocNode(LifecycleNode):
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
         self._guidance = GuidanceTopics(self, self._live_parameters.config, self.report)
-        self._incompatible: set[str] = set()
         try:
             self._tf: TfListener | None = TfListener(self, self._take_held)
         except ImportError:  # tf2 is optional
@@ -104,7 +104,7 @@ class FocNode(LifecycleNode):
         try:
             warm_up(self._live_parameters.config)
             self._outputs = create_publishers(self)
-            self._inputs = create_subscriptions(self, self._receive, self._incompatible.add, self._polling)
+            self._inputs = create_subscriptions(self, self._receive, self._polling)
             self._inputs[COMMAND] = create_command_subscription(self, self._blend_command)
             self._guidance.create()
         except Exception as error:
@@ -313,7 +313,7 @@ class FocNode(LifecycleNode):
         clock_reason, present = self._find_clock_reason(), self._worker.present
         not_ready_reason = self.pipeline.not_ready_reason() or (clock_reason and clock_reason[1])
         busy_s = monotonic() - present.start_s if present is not None else 0.0
-        unheard = self._report_incompatible_publishers()
+        unheard = self._report_incompatible_endpoints()
         health = self._monitor.report(monotonic(), self.intake, self._state, not_ready_reason, busy_s, unheard)
         health.values.update(self._guidance.loop.describe())
         name, stamp_ns = self.get_fully_qualified_name(), self.get_clock().now().nanoseconds
@@ -326,19 +326,17 @@ class FocNode(LifecycleNode):
                 text = f'{role} is published, but cannot be received: the package {package} is not installed'
                 self._loggers[role].error(text, throttle_duration_sec=THROTTLE_S)
 
-    def _report_incompatible_publishers(self) -> list[str]:
-        """Log and return which inputs are published with a quality of service that their subscription cannot receive."""
-        texts = {
-            role: describe_incompatible_publishers(self, role, self._inputs[role])
-            for role in INPUTS
-            if role in self._incompatible and role in self._inputs
-        }
-        for role, found in texts.items():
-            if found:
-                self._loggers[role].warning('; '.join(found), throttle_duration_sec=THROTTLE_S)
-            else:
-                self._incompatible.discard(role)
-        return [text for found in texts.values() for text in found]
+    def _report_incompatible_endpoints(self) -> list[str]:
+        """Log which endpoints have an incompatible quality of service; return a text for each publisher that is not heard."""
+        unheard = []
+        for role, subscription in self._inputs.items():
+            if role in INPUTS and (texts := describe_incompatible_publishers(self, role, subscription)):
+                self._loggers[role].warning('; '.join(texts), throttle_duration_sec=THROTTLE_S)
+                unheard += texts
+        publishers = (*self._outputs.values(), *self._guidance.publishers.values())
+        if unserved := [text for each in publishers for text in describe_incompatible_subscriptions(self, each)]:
+            self.get_logger().warning('; '.join(unserved), throttle_duration_sec=THROTTLE_S)
+        return unheard
 
     def _publish(self, publisher: Any, message: Any) -> None:
         if self.context.ok():
