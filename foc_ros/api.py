@@ -116,7 +116,14 @@ class Guidance:
         """Say mode and force."""
         return f'<Guidance of mode {self.config.guidance.mode}, force {np.hypot(*self._state.force):.3g} N>'
 
-    def update(self, t: float, position: ArrayLike, velocity: ArrayLike, prediction: types.Prediction | None) -> GuidanceOutput:
+    def update(
+        self,
+        t: float,
+        position: ArrayLike,
+        velocity: ArrayLike,
+        prediction: types.Prediction | None,
+        acceleration: ArrayLike = (0.0, 0.0),
+    ) -> GuidanceOutput:
         """Return the guidance for a hand.
 
         Parameters
@@ -129,6 +136,8 @@ class Guidance:
             Velocity of the hand [m/s].
         prediction : Prediction or None
             The newest prediction; None to release the hand.
+        acceleration : array_like of shape (2,), optional
+            Acceleration of the hand [m/s^2]; zero if not given, and then the force does not yield to it.
 
         Returns
         -------
@@ -146,9 +155,9 @@ class Guidance:
         if prediction is not None and not isinstance(prediction, types.Prediction):
             raise InputError('prediction', 'a Prediction or None', repr(prediction))
         age_s = 0.0 if prediction is None else time - prediction.t
-        given = GuidanceInput(
-            time, check_vector('position', position, 2), check_vector('velocity', velocity, 2), prediction, 0.0, age_s
-        )
+        hand = {'position': position, 'velocity': velocity, 'acceleration': acceleration}
+        checked = {name: check_vector(name, value, 2) for name, value in hand.items()}
+        given = GuidanceInput(time, prediction=prediction, prediction_age_s=age_s, **checked)
         output, self._state = guide(self.config, self._state, given)
         return output
 

@@ -124,7 +124,8 @@ def run_hostile(rng: np.random.Generator, ticks: int = 24, *, has_jumps: bool = 
             newest = None if rng.random() < 0.1 else random_prediction(rng, t - late, position, scene)
         velocity = rng.normal(0.0, 10.0 ** rng.uniform(-2, 4), 2) if is_wrong else (position - state.position) / PERIOD
         age = 0.0 if newest is None else t - newest.t
-        given = GuidanceInput(t, position, velocity, newest, 0.0, age, is_released=bool(rng.random() < 0.02))
+        acceleration = rng.normal(0.0, 2.0, 2)
+        given = GuidanceInput(t, position, velocity, newest, 0.0, age, bool(rng.random() < 0.02), acceleration)
         output, state = guide(config, state, given)
         run.outputs.append(output)
         run.positions.append(position)

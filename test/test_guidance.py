@@ -12,8 +12,8 @@ from prediction_samples import outcome, prediction, three_ways
 
 import foc_ros
 from foc_ros.core.config import Config, GuidanceConfig
-from foc_ros.core.guidance.agreement import MISSING_S, combine, remember_likelihoods, weigh_candidates
-from foc_ros.core.guidance.clearance import find_need, keep_clear, saturate
+from foc_ros.core.guidance.agreement import MISSING_S, combine, remember_likelihoods, weigh_candidates, yield_to_hand
+from foc_ros.core.guidance.clearance import find_crossing, find_need, keep_clear, saturate
 from foc_ros.core.guidance.energy_tank import limit_by_energy, update_energy
 from foc_ros.core.guidance.limits import find_largest_force, step_force
 from foc_ros.core.guidance.obstacle_margin import TOLERANCE, build_margins, measure_opposing_distance, turn_along
@@ -70,12 +70,22 @@ def test_a_deflection_gives_its_force_where_there_is_stiffness() -> None:
 
 
 def test_forces_that_agree_add_up_and_those_that_cancel_vanish() -> None:
-    force, agreement = combine(np.array([0.7, 0.3]), np.array([[1.0, 0.0], [2.0, 0.0]]))
+    none = np.zeros(2, dtype=bool)
+    force, agreement = combine(np.array([0.7, 0.3]), np.array([[1.0, 0.0], [2.0, 0.0]]), none)
     assert (force[0], agreement) == (pytest.approx(1.3), 1.0)
-    force, agreement = combine(np.array([0.5, 0.5]), np.array([[0.0, 1.0], [0.0, -1.0]]))
+    force, agreement = combine(np.array([0.5, 0.5]), np.array([[0.0, 1.0], [0.0, -1.0]]), none)
     assert (force.tolist(), agreement) == ([0.0, 0.0], 0.0)
-    force, agreement = combine(np.array([0.75, 0.25]), np.array([[0.0, 1.0], [0.0, -1.0]]))
+    force, agreement = combine(np.array([0.75, 0.25]), np.array([[0.0, 1.0], [0.0, -1.0]]), none)
     assert (force[1], agreement) == (pytest.approx(0.25), pytest.approx(0.5))
+    force, agreement = combine(np.array([0.75, 0.25]), np.array([[0.0, 1.0], [0.0, -1.0]]), np.array([False, True]))
+    assert (force[1], agreement) == (pytest.approx(0.75 * 0.75), pytest.approx(0.75))
+
+
+@pytest.mark.parametrize(('across', 'share'), [(0.0, 1.0), (0.5, 1.0), (-0.2, 0.6), (-0.5, 0.0), (-3.0, 0.0)])
+def test_a_force_yields_to_a_hand_that_accelerates_against_it(across: float, share: float) -> None:
+    force = yield_to_hand(np.array([0.0, 2.0]), np.array([5.0, across]), 0.5)
+    assert force == pytest.approx([0.0, 2.0 * share])
+    assert yield_to_hand(np.array([0.0, 2.0]), np.array([0.0, across]), 0.0).tolist() == [0.0, 2.0]
 
 
 def test_a_missing_candidate_keeps_its_likelihood_for_a_moment() -> None:
@@ -210,12 +220,24 @@ def test_the_look_ahead_damps_movement_across_the_path() -> None:
 def test_help_is_needed_where_the_hand_would_come_too_near_to_an_obstacle() -> None:
     settings = GuidanceConfig(clearance=0.02, lookahead_s=0.2)
     velocity = np.array([0.4, 0.0])
-    assert find_need(settings, ROUND, np.zeros(2), velocity) == (0.2, 1.0)  # 80 mm ahead lies inside
-    assert find_need(settings, ROUND, np.array([0.0, 0.051]), velocity)[1] == 0.0
-    time, need = find_need(settings, ROUND, np.array([0.06, 0.045]), velocity)
-    assert (time, need) == (pytest.approx(0.1), pytest.approx(0.25))
-    assert find_need(settings, make_obstacles(), np.zeros(2), velocity) == (0.0, 0.0)
-    assert find_need(replace(settings, clearance=0.0), ROUND, np.zeros(2), velocity) == (0.2, 1.0)
+    assert find_need(settings, ROUND, np.zeros(2), velocity)[:2] == (0.2, 1.0)  # 80 mm ahead lies inside
+    assert find_need(settings, ROUND, np.array([0.0, 0.051]), velocity).share == 0.0
+    need = find_need(settings, ROUND, np.array([0.06, 0.045]), velocity)
+    assert (need.time_s, need.share) == (pytest.approx(0.1), pytest.approx(0.25))
+    assert need.normal == pytest.approx([0.0, 1.0])
+    assert find_need(settings, make_obstacles(), np.zeros(2), velocity)[:2] == (0.0, 0.0)
+    assert find_need(replace(settings, clearance=0.0), ROUND, np.zeros(2), velocity)[:2] == (0.2, 1.0)
+
+
+def test_no_force_leads_across_an_obstacle_to_the_other_side() -> None:
+    need = find_need(GuidanceConfig(clearance=0.02, lookahead_s=0.2), ROUND, np.array([0.06, 0.045]), np.array([0.4, 0.0]))
+    assert find_crossing(need, np.array([[0.0, 0.01], [0.0, -0.01], [0.01, 0.0]])).tolist() == [False, True, False]
+    settings = replace(SETTINGS, clearance=0.02)
+    position, velocity = (0.01, 0.01), (0.5, 0.0)
+    same = prediction(bent('goal0:+0', 1.0, 0.2), stamp_ns=0, obstacles=ROUND)
+    other = prediction(bent('goal0:-0', 1.0, -0.2), stamp_ns=0, obstacles=ROUND)
+    assert guide_hand(Config(guidance=settings), same, position, velocity).force[1] > 0.5
+    assert guide_hand(Config(guidance=settings), other, position, velocity).force.tolist() == [0.0, 0.0]
 
 
 def test_references_are_moved_out_to_the_clearance() -> None:

@@ -65,4 +65,4 @@ class GuidanceReplay:
         ages = (now_ns - hand.stamp_ns) / NANOSECONDS, (now_ns - prediction_ns) / NANOSECONDS
         # seconds since the epoch would be rounded to a quarter of a microsecond
         t = (now_ns - self._first_ns) / NANOSECONDS
-        return GuidanceInput(t, hand.mean[:2], hand.mean[2:4], prediction, *ages)
+        return GuidanceInput(t, hand.mean[:2], hand.mean[2:4], prediction, *ages, acceleration=hand.mean[4:6])

@@ -229,6 +229,9 @@ class GuidanceConfig:
     sharpness: float = _p(
         3.0, 'exponent of the likelihoods as weights: the larger, the more the likeliest candidate leads', '', 0.1, 10.0
     )
+    yield_acceleration: float = _p(
+        0.7, 'acceleration of the hand against the force from which on there is no force; 0: no limit', 'm/s^2', 0.0, 1e3
+    )
     precision_low: float = _p(
         100.0, 'precision, an inverse variance of position, up to which there is no stiffness', '1/m^2', 0.0, 1e9
     )

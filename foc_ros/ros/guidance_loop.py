@@ -11,6 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import monotonic
 
+import numpy as np
+
 from foc_ros.core.config import Config
 from foc_ros.core.estimation.kalman_filter import FilterState
 from foc_ros.core.guidance.step import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
@@ -123,13 +125,13 @@ class GuidanceLoop:
         """Compute guidance at a time by the steady clock, and publish it; called in the thread."""
         newest = self.newest
         is_released = newest.is_released or not newest.config.guidance.enabled
-        position = newest.hand.mean[:2] if newest.hand is not None else self._state.position
-        velocity = newest.hand.mean[2:4] if newest.hand is not None else 0.0 * position
+        mean = newest.hand.mean if newest.hand is not None else np.concatenate([self._state.position, np.zeros(4)])
+        position, velocity, acceleration = mean.reshape(3, 2)
         if self._zeros >= ZEROS and (is_released or newest.prediction is None):
             self._state = replace(self._state, t=now_s, position=position)
             return
         ages = now_s - newest.hand_s, now_s - newest.prediction_s
-        given = GuidanceInput(now_s, position, velocity, newest.prediction, *ages, is_released=is_released)
+        given = GuidanceInput(now_s, position, velocity, newest.prediction, *ages, is_released, acceleration)
         self.output, self._state = guide(newest.config, self._state, given)
         self._zeros = self._zeros + 1 if _has_ended(self.output) else 0
         if self._zeros <= ZEROS:

@@ -43,21 +43,21 @@ class Assistance(ABC):
             self.pipeline.add_hand_sample(HandSample(round((1.0 + step * DT) * NANOSECONDS), measured))
         assert self.pipeline.hand_state is not None
         mean = self.pipeline.hand_state.mean
-        target = self.compute_force(step, mean[:2], mean[2:4])
+        target = self.compute_force(step, *mean.reshape(3, 2))
         settings = self.config.guidance
         change = shorten(shorten(target, find_largest_force(settings)) - self._force, settings.slew * DT)
         self._force = self._force + change
         return self._force
 
     @abstractmethod
-    def compute_force(self, step: int, position: Array, velocity: Array) -> Array:
-        """Return the wanted force (2,) [N] for the estimated position [m] and velocity [m/s], (2,) each."""
+    def compute_force(self, step: int, position: Array, velocity: Array, acceleration: Array) -> Array:
+        """Return the wanted force (2,) [N] for the estimated position [m], velocity [m/s] and acceleration [m/s^2], (2,) each."""
 
 
 class NoAssistance(Assistance):
     """The operator alone."""
 
-    def compute_force(self, step: int, position: Array, velocity: Array) -> Array:  # noqa: ARG002
+    def compute_force(self, step: int, position: Array, velocity: Array, acceleration: Array) -> Array:  # noqa: ARG002
         """Return no force."""
         return np.zeros(2)
 
@@ -72,7 +72,7 @@ class FocAssistance(Assistance):
         self._next: Prediction | None = None
         self._is_next_wrong = False
 
-    def compute_force(self, step: int, position: Array, velocity: Array) -> Array:
+    def compute_force(self, step: int, position: Array, velocity: Array, acceleration: Array) -> Array:
         """Return the force of the guidance."""
         t = 1.0 + step * DT
         if self.pipeline.is_due:
@@ -80,7 +80,7 @@ class FocAssistance(Assistance):
             self._next = self.pipeline.predict()
             self._is_next_wrong = self._next is not None and is_wrong_way(self._next, self.task, step)
         age_s = 0.0 if self._newest is None else t - self._newest.t
-        given = GuidanceInput(t, position, velocity, self._newest, 0.0, age_s)
+        given = GuidanceInput(t, position, velocity, self._newest, 0.0, age_s, acceleration=acceleration)
         output, self._state = guide(self.config, self._state, given)
         return output.force
 
@@ -92,7 +92,7 @@ class _GoalAssistance(Assistance):
         super().__init__(task, config)
         self._rule, self._inference = rule, GoalInference(task.goals, task.path.position[0])
 
-    def compute_force(self, step: int, position: Array, velocity: Array) -> Array:  # noqa: ARG002
+    def compute_force(self, step: int, position: Array, velocity: Array, acceleration: Array) -> Array:  # noqa: ARG002
         """Return the force of the rule for the present probabilities of the goals."""
         probabilities = self._inference.update(position)
         self.is_wrong = int(probabilities.argmax()) != self.task.goal_row
@@ -102,7 +102,7 @@ class _GoalAssistance(Assistance):
 class _FieldAssistance(Assistance):
     """The potential field of the obstacles."""
 
-    def compute_force(self, step: int, position: Array, velocity: Array) -> Array:  # noqa: ARG002
+    def compute_force(self, step: int, position: Array, velocity: Array, acceleration: Array) -> Array:  # noqa: ARG002
         """Return the force of the field."""
         grown = self.task.obstacles.grow(self.task.hand_radius)
         return compute_field_force(position, grown, self.config.guidance.f_max)

@@ -5,34 +5,52 @@ All functions do nothing with a clearance of 0: then guidance draws to the paths
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from foc_ros.core.config import GuidanceConfig
 from foc_ros.core.obstacles.rounded_polygon import measure_offsets
 from foc_ros.core.types import Array, Obstacles
 
+from .reference import normalize
+
 INSTANTS = 13
 """Number of instants within the look-ahead at which the distance from the obstacles is computed."""
 
 
-def find_need(settings: GuidanceConfig, obstacles: Obstacles, position: Array, velocity: Array) -> tuple[float, float]:
-    """Return how far ahead help is needed [s], and how much, in [0, 1].
+class Need(NamedTuple):
+    """Where help is needed, and how much.
+
+    time_s: how far ahead [s]; share in [0, 1]: of the clearance, which the hand lacks by then; normal (2,): outward unit normal
+    of the obstacle that is nearest there, zeros without one.
+    """
+
+    time_s: float
+    share: float
+    normal: Array
+
+
+def find_need(settings: GuidanceConfig, obstacles: Obstacles, position: Array, velocity: Array) -> Need:
+    """Return where help is needed, and how much.
 
     The hand goes on at its velocity v for the look-ahead h at most. It is nearest to an obstacle at the time t*, at the distance
-    d. The need is the share of the clearance D that it lacks by then:
+    d. The share of the clearance D that it lacks by then is
 
         t* = argmin_{0 <= t <= h} min_j d_j(x + t v),    n = clip((D - d) / D, 0, 1).
     """
     if not settings.clearance:
-        return settings.lookahead_s, 1.0
+        return Need(settings.lookahead_s, 1.0, np.zeros(2))
     if not len(obstacles):
-        return 0.0, 0.0
+        return Need(0.0, 0.0, np.zeros(2))
     times = np.linspace(0.0, settings.lookahead_s, INSTANTS)
     points = position + times[:, None] * velocity
-    heights = (measure_offsets(points, obstacles)[1] - obstacles.radius).min(axis=1)
-    nearest = int(heights.argmin())
-    need = 1.0 - float(heights[nearest]) / settings.clearance
-    return float(times[nearest]), min(max(need, 0.0), 1.0)
+    offsets, distances = measure_offsets(points, obstacles)
+    heights = distances - obstacles.radius
+    instant, row = np.unravel_index(heights.argmin(), heights.shape)
+    share = 1.0 - float(heights[instant, row]) / settings.clearance
+    return Need(float(times[instant]), min(max(share, 0.0), 1.0), normalize(offsets[instant, row]))
 
 
 def keep_clear(settings: GuidanceConfig, obstacles: Obstacles, points: Array) -> Array:
@@ -50,6 +68,16 @@ def keep_clear(settings: GuidanceConfig, obstacles: Obstacles, points: Array) ->
     lacking = np.maximum(settings.clearance - (distances - obstacles.radius), 0.0)
     moved: Array = points + (lacking[..., None] * normals).sum(axis=1)
     return moved
+
+
+def find_crossing(need: Need, errors: Array) -> NDArray[np.bool_]:
+    """Return which errors e_i (c, 2) [m] lead across the nearest obstacle: e_i . m < 0 for its outward normal m.
+
+    The hand, going straight on, passes that obstacle on one side, and the candidate on the other one. Before the obstacle is
+    crossed a force to the other side leads into it. So it is the operator who changes the side.
+    """
+    crossing: NDArray[np.bool_] = errors @ need.normal < 0.0
+    return crossing
 
 
 def saturate(settings: GuidanceConfig, errors: Array, need: float) -> Array:

@@ -10,8 +10,8 @@ import numpy as np
 from foc_ros.core.config import Config, GuidanceConfig
 from foc_ros.core.types import Array, Obstacles, Prediction, Record, make_obstacles
 
-from .agreement import combine, remember_likelihoods, weigh_candidates
-from .clearance import find_need, keep_clear, saturate
+from .agreement import combine, remember_likelihoods, weigh_candidates, yield_to_hand
+from .clearance import find_crossing, find_need, keep_clear, saturate
 from .energy_tank import limit_by_energy, update_energy
 from .limits import find_largest_force, shorten, step_force
 from .obstacle_margin import NEAR_M, Margins, build_margins, measure_opposing_distance, turn_along
@@ -45,7 +45,7 @@ class GuidanceInput(Record):
 
     t: time of the update, of any clock that does not run backward [s]; position (2,) [m] and velocity (2,) [m/s] of the hand;
     prediction: the newest one, None if there is none. pose_age_s, prediction_age_s: time since the hand was measured, and since
-    the stamp of the prediction [s]. is_released: whether guidance is switched off.
+    the stamp of the prediction [s]. is_released: whether guidance is switched off. acceleration (2,): of the hand [m/s^2].
     """
 
     t: float
@@ -55,6 +55,7 @@ class GuidanceInput(Record):
     pose_age_s: float = 0.0
     prediction_age_s: float = 0.0
     is_released: bool = False
+    acceleration: Array = field(default_factory=lambda: np.zeros(2))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -217,21 +218,22 @@ def _compute_wish(settings: GuidanceConfig, followed: Followed, given: GuidanceI
     """
     paths, progress, speed = followed.paths, followed.progress, float(np.hypot(*given.velocity))
     assert paths is not None
-    lookahead_s, need = find_need(settings, followed.obstacles, given.position, given.velocity)
-    ahead = np.minimum(progress + lookahead_s * speed, paths.lengths[:, -1])
-    times = np.minimum(lookahead_s, (ahead - progress) / max(speed, 1e-9))
+    need = find_need(settings, followed.obstacles, given.position, given.velocity)
+    ahead = np.minimum(progress + need.time_s * speed, paths.lengths[:, -1])
+    times = np.minimum(need.time_s, (ahead - progress) / max(speed, 1e-9))
     stiffness = compute_stiffness(paths.interpolate(paths.covariances, ahead), settings)
     if settings.mode == 'path':
         stiffness = project_out(stiffness, normalize(given.velocity + SLOW * paths.find_tangents(progress)))
     points = keep_clear(settings, followed.obstacles, paths.interpolate(paths.points, ahead))
-    errors = saturate(settings, points - given.position - times[:, None] * given.velocity, need)
+    errors = saturate(settings, points - given.position - times[:, None] * given.velocity, need.share)
     weights = weigh_candidates(paths.labels, paths.likelihoods, followed.known, settings.sharpness)
-    force, agreement = combine(weights, (stiffness @ errors[..., None])[..., 0])
+    force, agreement = combine(weights, (stiffness @ errors[..., None])[..., 0], find_crossing(need, errors))
+    force = yield_to_hand(force, given.acceleration, settings.yield_acceleration)
     reference = given.position + weights @ errors
     heading, target = _find_heading(paths, np.maximum(ahead, progress + HEADING_M), weights, given.position)
     return _Wish(
         turn_along(followed.margins, given.position, reference, force),
-        need * agreement * np.einsum('c,cab->ab', weights, stiffness),
+        need.share * agreement * np.einsum('c,cab->ab', weights, stiffness),
         agreement,
         settings.authority * min(float(np.hypot(*heading)), 1.0),
         turn_along(followed.margins, given.position, target, normalize(heading)),
