@@ -155,9 +155,11 @@ class Guidance:
         if prediction is not None and not isinstance(prediction, types.Prediction):
             raise InputError('prediction', 'a Prediction or None', repr(prediction))
         age_s = 0.0 if prediction is None else time - prediction.t
-        hand = {'position': position, 'velocity': velocity, 'acceleration': acceleration}
-        checked = {name: check_vector(name, value, 2) for name, value in hand.items()}
-        given = GuidanceInput(time, prediction=prediction, prediction_age_s=age_s, **checked)
+        place, motion, change = (
+            check_vector(name, value, 2)
+            for name, value in (('position', position), ('velocity', velocity), ('acceleration', acceleration))
+        )
+        given = GuidanceInput(time, place, motion, prediction, 0.0, age_s, acceleration=change)
         output, self._state = guide(self.config, self._state, given)
         return output
 

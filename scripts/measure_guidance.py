@@ -1,9 +1,9 @@
 """Measure the period of the wrench while predictions take long, and the time from the clutch to a force of zero.
 
 The node runs in a process of its own, where every prediction first keeps Python's global lock for `--load` seconds. This process
-plays a hand at 100 Hz and notes when wrenches arrive. The node says for how long its updates of guidance waited: for a processor
-that was taken by other programs, as Linux counts it, and otherwise, which is for Python's global lock.
-Run `.venv/bin/python scripts/measure_guidance.py`.
+plays a hand at 100 Hz and notes when wrenches arrive. The node says when its updates of guidance began, and for how long they
+computed and waited: for a processor that was taken by other programs, as Linux counts it, and otherwise, which is for Python's
+global lock. Run `.venv/bin/python scripts/measure_guidance.py`.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ GUIDED_S = 1.0
 
 
 class Waits:
-    """For how long each update of guidance waited [s]: for a processor, and otherwise."""
+    """When each update of guidance began, and for how long it computed and waited [s]: for a processor, and otherwise."""
 
     def __init__(self) -> None:
-        self._rows: list[tuple[float, float]] = []
+        self._rows: list[tuple[float, ...]] = []
 
     def time(self, update: Callable[..., None]) -> Callable[..., None]:
         """Return an update whose waits are noted."""
@@ -46,14 +46,16 @@ class Waits:
                 begin = self._read(counts)
                 update(*arguments)
                 wall, processor, queue = self._read(counts) - begin
-            self._rows.append((queue, wall - processor - queue))
+            self._rows.append((begin[0], processor, queue, wall - processor - queue))
 
         return timed
 
     def summarise(self) -> dict[str, float]:
-        """Return the 99th percentiles [s]."""
-        queue, lock = np.percentile(np.array(self._rows or [(np.nan, np.nan)]), 99, axis=0)
-        return {'wait_processor_p99_s': float(queue), 'wait_lock_p99_s': float(lock)}
+        """Return 99th percentiles: of the period between updates, in nominal periods, and of times [s]."""
+        table = np.array(self._rows or [(np.nan,) * 4] * 2)
+        names = 'computing_p99_s', 'wait_processor_p99_s', 'wait_lock_p99_s'
+        times = dict(zip(names, np.percentile(table[:, 1:], 99, axis=0).tolist(), strict=True))
+        return {'update_period_p99': float(RATE_HZ * np.percentile(np.diff(table[:, 0]), 99)), **times}
 
     @staticmethod
     def _read(counts: Any) -> Any:

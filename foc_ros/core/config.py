@@ -221,7 +221,7 @@ class GuidanceConfig:
     f_max: float = _p(3.0, 'largest force; it is also at most what `slew` reduces to zero within `ramp_s`', 'N', 0.0, 100.0)
     slew: float = _p(300.0, 'largest rate of change of the force', 'N/s', 0.1, 1e5)
     lookahead_s: float = _p(
-        0.25, 'longest time ahead at which a path is compared with where the hand goes by its velocity', 's', 0.0, 2.0
+        0.3, 'longest time ahead at which a path is compared with where the hand goes by its velocity', 's', 0.0, 2.0
     )
     clearance: float = _p(
         0.012, 'distance that guidance keeps the hand from obstacles: no force farther away; 0: force everywhere', 'm', 0.0, 1.0
@@ -230,7 +230,7 @@ class GuidanceConfig:
         3.0, 'exponent of the likelihoods as weights: the larger, the more the likeliest candidate leads', '', 0.1, 10.0
     )
     yield_acceleration: float = _p(
-        0.7, 'acceleration of the hand against the force from which on there is no force; 0: no limit', 'm/s^2', 0.0, 1e3
+        0.6, 'acceleration of the hand against the force from which on there is no force; 0: it does not yield', 'm/s^2', 0.0, 1e3
     )
     precision_low: float = _p(
         100.0, 'precision, an inverse variance of position, up to which there is no stiffness', '1/m^2', 0.0, 1e9
