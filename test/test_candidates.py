@@ -38,7 +38,7 @@ def test_a_candidate_that_becomes_reachable_takes_its_cheaper_solution(monkeypat
     np.testing.assert_allclose(outcome.cost, solutions[counts].effort * cold.dt)
 
 
-def test_a_safety_factor_that_had_no_time_to_rise_is_not_settled_and_rises_later():
+def test_a_safety_factor_that_had_no_time_to_rise_rises_later():
     """The effort rises with k, so that a search that may not try a larger one ends with less of both."""
     problem = replace(one_obstacle(), preference=SafetyPreference(1.0, 100.0, 0.0, 0.02))
     late = Deadline(0.0)
@@ -48,8 +48,8 @@ def test_a_safety_factor_that_had_no_time_to_rise_is_not_settled_and_rises_later
     given = [CANDIDATE], [problem], FocConfig(), outcomes.EFFORT_ONLY, earlier
     (waiting,), (risen,) = solve_candidates(*given, NEVER, late), solve_candidates(*given)
     assert waiting.status is Status.COMPROMISED
-    assert not waiting.solution.is_settled
+    assert not waiting.solution.is_complete
     assert risen.status is Status.SOLVED
-    assert risen.solution.is_settled
+    assert risen.solution.is_complete
     assert waiting.solution.effort < risen.solution.effort
     assert solve_candidates(*given[:4], EarlierSolutions({CANDIDATE.label: waiting.solution}))[0].status is Status.SOLVED
