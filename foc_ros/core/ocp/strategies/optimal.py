@@ -52,7 +52,7 @@ WARM_STRIDE, COLD_STRIDE = 0.6, 0.4
 """First strides in k, if they are not too long; from an earlier solution it is shorter, the nearer the slope is to that which is
 worth it."""
 TRIES, WARM_TRIES = 8, 1
-"""Larger k that are tried in vain if another search goes on from the result, and of these from an earlier solution for one raise."""
+"""Larger k that are tried in vain if another search goes on from the result; the same from an earlier solution, for one raise."""
 NARROW = 0.02
 """Bracket in k at which the search ends."""
 
