@@ -9,6 +9,8 @@ from reach_helpers import bowed, one_obstacle, solved
 from foc_ros.core import candidates as outcomes
 from foc_ros.core.candidates import EarlierSolutions, solve_candidates
 from foc_ros.core.config import FocConfig
+from foc_ros.core.deadline import NEVER, Deadline
+from foc_ros.core.safety_preference import SafetyPreference
 from foc_ros.core.types import LEFT, Candidate, Status
 
 GUESS = bowed((0.0, 0.0), (0.3, 0.0), 50, 0.06)
@@ -34,3 +36,20 @@ def test_a_candidate_that_becomes_reachable_takes_its_cheaper_solution(monkeypat
     (outcome,) = solve_candidates([CANDIDATE], [problem], FocConfig(), earlier=earlier)
     assert outcome.solution is solutions[counts]
     np.testing.assert_allclose(outcome.cost, solutions[counts].effort * cold.dt)
+
+
+def test_a_safety_factor_that_had_no_time_to_rise_rises_later():
+    """The effort rises with k, so that a search that may not try a larger one ends with less of both."""
+    problem = replace(one_obstacle(), preference=SafetyPreference(1.0, 100.0, 0.0, 0.02))
+    late = Deadline(0.0)
+    least = solved(problem, GUESS)
+    low = replace(least, safety_factor=0.5 * least.safety_factor, status=Status.COMPROMISED)
+    earlier = EarlierSolutions({CANDIDATE.label: low})
+    given = [CANDIDATE], [problem], FocConfig(), outcomes.EFFORT_ONLY, earlier
+    (waiting,), (risen,) = solve_candidates(*given, NEVER, late), solve_candidates(*given)
+    assert waiting.status is Status.COMPROMISED
+    assert not waiting.solution.is_complete
+    assert risen.status is Status.SOLVED
+    assert risen.solution.is_complete
+    assert waiting.solution.effort < risen.solution.effort
+    assert solve_candidates(*given[:4], EarlierSolutions({CANDIDATE.label: waiting.solution}))[0].status is Status.SOLVED

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
@@ -21,8 +22,10 @@ from .ocp.warm_start import Start, cold_start, warm_start
 from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Solution, Status
 
 EFFORT_ONLY = CostModel()
+FIRST_RAISES, FURTHER_RAISES = 1, 8
+"""How often the safety factor of a candidate that is followed is raised: first of each, then of those that are not settled."""
 SETTLED = 0.02
-"""Change of a safety factor from one prediction to the next up to which no larger one is looked for."""
+"""Change of a safety factor from one prediction to the next up to which it is settled."""
 
 
 class ProblemTable(Protocol):
@@ -66,21 +69,22 @@ def solve_candidates(
     """Solve the candidates in turn; return those for which there was time in their own order, with likelihoods 0.
 
     problems: one for each candidate; costs: parts of the cost besides the effort to go; earlier: results of the prediction
-    before, to start from. The first one is begun whatever the time. One that the deadline stops gets the status DEADLINE. Then
-    safety factors that are not settled are raised as far as they go, until the deadline of raises.
+    before, to start from. The first one is begun whatever the time. One that the deadline stops gets the status DEADLINE. Until
+    the deadline of raises, safety factors are raised: once that of each candidate, then those that are not settled.
     """
     solved: dict[int, PredictedCandidate] = {}
     for row in earlier.sort_by_turn(candidates):
         if solved and not deadline.allows():
             break
-        previous = earlier.solutions.get(candidates[row].label)
-        given = candidates[row], problems[row], settings, costs, previous, deadline
-        solved[row] = _solve_candidate(*given, is_followed=earlier is not NOTHING)
+        previous, raises = earlier.solutions.get(candidates[row].label), math.inf
+        if earlier is not NOTHING:
+            raises = FIRST_RAISES if deadline_of_raises.allows() else 0
+        solved[row] = _solve_candidate(candidates[row], problems[row], settings, costs, previous, deadline, raises)
     unsettled = [row for row, each in solved.items() if earlier is not NOTHING and _is_unsettled(each, earlier.solutions)]
     for row in unsettled:
         if deadline_of_raises.allows():
             first, problem = solved[row], problems[row]
-            start = replace(warm_start(first.solution, problem), is_followed=True, is_thorough=True)
+            start = replace(warm_start(first.solution, problem), raises=FURTHER_RAISES)
             raised = _solve_from(start, candidates[row], problem, settings, costs, deadline_of_raises)
             qp_solves = first.solution.qp_solves + raised.solution.qp_solves
             raised = replace(raised, solution=replace(raised.solution, qp_solves=qp_solves))
@@ -101,25 +105,24 @@ def _solve_candidate(
     costs: CostModel,
     previous: Solution | None,
     deadline: Deadline,
-    *,
-    is_followed: bool,
+    raises: float,
 ) -> PredictedCandidate:
     """Solve from the previous solution; where a likelihood comes or goes, also from the candidate's own guess.
 
-    is_followed: whether another search goes on from the result.
+    raises: how often the safety factor may be raised, as in `Start`.
 
     A candidate that was unreachable and is solved now may have come from far beyond the least effort: the result with the smaller
     loss counts.
     """
     warm = None
     if previous is not None:
-        start = replace(warm_start(previous, problem), is_followed=is_followed)
+        start = replace(warm_start(previous, problem), raises=raises)
         warm = _solve_from(start, candidate, problem, settings, costs, deadline)
         # a solution that continues one stopped by the deadline has skipped nothing
         is_continued = warm.has_likelihood and (previous.status is Status.DEADLINE or previous.status.has_likelihood)
         if warm.status in (previous.status, Status.DEADLINE) or is_continued:
             return warm
-    start = replace(cold_start(candidate.guess), is_followed=is_followed)
+    start = replace(cold_start(candidate.guess), raises=raises)
     cold = _solve_from(start, candidate, problem, settings, costs, deadline)
     if warm is None or not warm.has_likelihood:
         return cold

@@ -27,7 +27,7 @@ from .obstacles.culling import cull_obstacles
 from .ocp.problem import Problem, rest_to_goal
 from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Prediction, make_obstacles
 
-SEARCH_SHARE, RAISE_SHARE, SOLVE_SHARE = 0.3, 0.3, 0.7
+SEARCH_SHARE, RAISE_SHARE, SOLVE_SHARE = 0.3, 0.25, 0.65
 """Parts of the time left that the search may take, and then raising safety factors further, and all solves. They begin no step
 after that, and the last step ends later."""
 RESERVE_S = 5e-5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,9 +32,8 @@ class Start:
 
     positions (N, 2): at steps 1..N, to linearise at [m]. A start from an earlier solution also has its stacked control (2N,), its
     contacts, safety factor, lambda, and slope dk/ds (0 where not known). lam is None for a cold start, which has none of these.
-    is_unfinished: whether the deadline stopped the earlier solution. is_followed: whether another search goes on from the
-    result, in this prediction or the next one, so that this one may be short. is_thorough: whether this is the other
-    search, which is not short.
+    is_unfinished: whether the deadline stopped the earlier solution. raises: how often the safety factor may be raised; finite
+    where another search goes on from the result, in this prediction or the next one.
     """
 
     positions: Array
@@ -43,8 +43,7 @@ class Start:
     lam: float | None = None
     safety_factor_slope: float = 0.0
     is_unfinished: bool = False
-    is_followed: bool = False
-    is_thorough: bool = False
+    raises: float = math.inf
 
 
 def cold_start(guess: Array) -> Start:

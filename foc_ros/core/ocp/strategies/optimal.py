@@ -40,20 +40,19 @@ ROUNDINGS = (1.0, 0.25, 0.05)
 """Parts of the clearance for the wanted k with which Newton steps begin where they do not lead on from the least effort."""
 CLOSE = 5e-6
 """Relative excess over the wanted k that is aimed at."""
-WARM_SHARES, COLD_SHARES = (1.0, 0.75), (1.0, 0.75, 0.5, 0.35, 0.25)
-"""Parts of k that are tried from an earlier solution, and from the least effort: k rises again from there."""
+SHARES = 1.0, 0.75, 0.5, 0.35, 0.25
+"""Parts of k that are tried from the least effort: k rises again from there."""
 EVEN = 1e-4
 """Relative difference of the slope from the one that is worth it at which both are the same."""
 FOLLOW_SHARE = 0.5
 """Part of the time left that an earlier solution may take; then the search begins again."""
 NEARLY = 0.6
 """Part of the slope that is worth it from which Newton steps are tried that have k as an unknown."""
-WARM_TRIES, COLD_TRIES = 1, 8
-"""Values of k that are tried from an earlier solution, and from the least effort, if another search goes on from there. Such a
-search ends with the first k that it has raised, so that the other classes have their turn."""
 WARM_STRIDE, COLD_STRIDE = 0.6, 0.4
 """First strides in k, if they are not too long; from an earlier solution it is shorter, the nearer the slope is to that which is
 worth it."""
+TRIES, WARM_TRIES = 8, 1
+"""Larger k that are tried in vain if another search goes on from the result; the same from an earlier solution, for one raise."""
 NARROW = 0.02
 """Bracket in k at which the search ends."""
 
@@ -69,7 +68,7 @@ def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadli
     except OutOfTimeError:
         if search.best is None:
             raise
-        status, is_late = search.judge() if search.is_followed else Status.DEADLINE, True
+        status, is_late = search.judge() if search.raises < math.inf else Status.DEADLINE, True
     point = search.best
     if status is Status.ITERATION_LIMIT:
         assert start.control is not None
@@ -89,7 +88,14 @@ def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadli
     message = f'out of time, with eta {reached:.4g} reached' if is_late else messages[status]
     weights = compute_equivalent_weights(point)
     return StrategyResult(
-        status, message, point.control, point.contacts, qp_solves=search.qp_solves, minimum=minimum, equivalent_weights=weights
+        status,
+        message,
+        point.control,
+        point.contacts,
+        qp_solves=search.qp_solves,
+        minimum=minimum,
+        equivalent_weights=weights,
+        is_complete=search.is_complete,
     )
 
 
@@ -126,7 +132,7 @@ class _Search:
         self.problem, self.deadline, self.qp_solves = problem, deadline, 0
         self.best: SurrogatePoint | None = None
         self.wanted = problem.wanted_k * (1.0 + CLOSE)
-        self.is_followed = self.is_thorough = False
+        self.raises, self.tries, self.is_complete = math.inf, math.inf, True
         wish = problem.preference
         self.is_hard = math.isinf(wish.shortfall)
         rate = wish.shortfall / wish.beta if wish.beta > 0.0 else math.inf
@@ -135,7 +141,8 @@ class _Search:
 
     def run(self, start: Start) -> Status:
         """Leave the best point in `best`; return how the search ended."""
-        self.is_followed, self.is_thorough = start.is_followed and not self.is_hard, start.is_thorough
+        if not self.is_hard and start.raises < math.inf:
+            self.raises, self.tries = start.raises, TRIES if start.control is None or start.raises > 1 else WARM_TRIES
         if not self.follow_in_time(start):
             if start.control is not None and not start.is_unfinished:
                 return Status.ITERATION_LIMIT
@@ -143,8 +150,7 @@ class _Search:
         assert self.best is not None
         is_known = self.is_hard and start.safety_factor < self.problem.wanted_k and not start.is_unfinished
         if self.is_cheap(self.best) and not is_known:  # that no larger k is in reach
-            tries, stride = (COLD_TRIES, COLD_STRIDE) if self.is_thorough else (WARM_TRIES, WARM_STRIDE)
-            self.raise_k(tries, stride * (1.0 - self.slope(self.best) / self.rate))
+            self.raise_k(WARM_STRIDE * (1.0 - self.slope(self.best) / self.rate))
         return self.judge()
 
     def judge(self) -> Status:
@@ -172,7 +178,7 @@ class _Search:
         self.angles = compute_swept_angles(positions, problem.centre_trajectories)
         contacts = start.contacts.merge(problem.first_alike)
         control = correct_to_goal(problem, start.control, start.positions, contacts.time)
-        point = self.solve_below(control, contacts, min(start.safety_factor, self.wanted), WARM_SHARES)
+        point = self.solve(control, contacts, min(start.safety_factor, self.wanted))
         point = None if point is None else self.settle_k(point)
         if point is None or not 0.0 <= point.k <= self.wanted:
             return False
@@ -196,10 +202,10 @@ class _Search:
             if at is first:
                 unknown = np.full(len(contacts.time), np.nan)
                 self.best = SurrogatePoint(control, contacts, minimum.k, 0.0, float(control @ control), unknown, unknown)
-            found = self.solve_below(control, contacts, min(max(minimum.k, 0.0), self.wanted), COLD_SHARES)
+            found = self.solve_below(control, contacts, min(max(minimum.k, 0.0), self.wanted))
             if found is not None:
                 self.best = self.settle_k(found)
-                is_stuck = self.raise_k(COLD_TRIES, COLD_STRIDE)
+                is_stuck = self.raise_k(COLD_STRIDE)
                 tried.append(self.best)
                 if not is_stuck:
                     break
@@ -234,29 +240,27 @@ class _Search:
         worth = self.weigh(point.control, point.contacts, point.k)
         return point if worth is None or not (is_too_large or point.k <= worth.k <= self.wanted) else worth
 
-    def raise_k(self, tries: float, stride: float) -> bool:
+    def raise_k(self, stride: float) -> bool:
         """Raise k to the wanted one, or to the one that is worth its effort; tell whether no larger k could be reached.
 
-        tries: values of k that are tried if another search goes on from the result; stride: the first one in k.
+        stride: the first one in k.
         """
         assert self.best is not None
         low, high = self.best, math.inf  # the k of a point that costs too much
         before = low
-        stride, tries = min(self.wanted - low.k, stride), tries if self.is_followed else math.inf
-        shortest = min(NARROW, stride / 4.0) / 2.0
-        while self.is_cheap(low) and stride > shortest and tries > 0:
-            tries -= 1
+        stride = min(self.wanted - low.k, stride)
+        shortest, tries, raises = min(NARROW, stride / 4.0) / 2.0, self.tries, self.raises
+        self.is_complete = raises > 0 or not self.is_cheap(low)
+        while self.is_cheap(low) and stride > shortest and tries > 0 and raises > 0:
             k = min(low.k + stride, self.wanted)
             point = self.solve(*extrapolate(before, low, k), k)
             if point is None:
-                stride /= 2
+                stride, tries = stride / 2, tries - 1
                 continue
             if self.slope(point) <= self.rate:
                 before, low = low, point
                 self.best = low
-                stride *= 2
-                if self.is_followed and not self.is_thorough:
-                    tries = 0
+                stride, raises = 2 * stride, raises - 1
             else:
                 high = point.k
             is_near = low.k < self.wanted and self.slope(point) > NEARLY * self.rate
@@ -277,9 +281,9 @@ class _Search:
         self.deadline.check()
         return solve_surrogate_point(self.problem, near, contacts, k, self.angles)
 
-    def solve_below(self, near: Array, contacts: Contacts, k: float, shares: tuple[float, ...]) -> SurrogatePoint | None:
-        """Find the point near another one at the first of the shares of k that Newton steps lead to."""
-        for share in shares if k > NARROW else (1.0,):
+    def solve_below(self, near: Array, contacts: Contacts, k: float) -> SurrogatePoint | None:
+        """Find the point near another one at the first of `SHARES` of k that Newton steps lead to."""
+        for share in SHARES if k > NARROW else (1.0,):
             point = self.solve(near, contacts, share * k)
             if point is not None:
                 return point
