@@ -29,8 +29,8 @@ from foc_ros.analysis.learn_demonstrations import learn_recording
 from foc_ros.analysis.parallel import collect, collect_all, open_executor
 from foc_ros.analysis.recordings import Recording, find_recordings
 from foc_ros.cli.arguments import add_worker_arguments
-from foc_ros.core.config import Config, ExperienceConfig
-from foc_ros.core.experience import ALL_OF_IT, Library, find_evidence, follow_recordings, make_library
+from foc_ros.core.config import ExperienceConfig
+from foc_ros.core.experience import Library, find_evidence, follow_recordings, make_library
 from foc_ros.core.homotopy.demonstrations import Demonstration
 from foc_ros.core.types import Array, HandState, make_obstacles
 from foc_ros.io.class_library import save_library
@@ -40,7 +40,7 @@ CONFIG = load_parameter_file(EXAMPLES / 'thumb_stick.yaml').with_values({'rate_h
 NUMBERS = (0, 8, 16, 24)
 """Numbers of recordings; the last one is that of all with odd numbers."""
 SPREAD_M, DRIFT = 0.001, 0.02
-"""Standard deviation about the path of a near recording, at once [m] and for each second more [m/s], the best of 10, 20 and 30 mm/s."""
+"""Standard deviation about the path of a recording, at once [m] and for each second more [m/s], of 10, 20 and 30 mm/s the best."""
 PUBLISHED = Baseline('published', partial(forecast_shares, published_shares), (None,))
 
 
@@ -59,7 +59,7 @@ def predict_by_nearest(observation: Observation, library: Library, frame_id: str
         evidence = find_evidence(library, hand, obstacles, observation.goals, wide)
         if len(evidence.row):
             break
-    recorded = follow_recordings(library, evidence, ALL_OF_IT, hand, np.array(HORIZONS_S))
+    recorded = follow_recordings(library, evidence, np.full(len(evidence.row), np.inf), hand, np.array(HORIZONS_S))
     return evidence.weight / evidence.weight.sum(), recorded.paths
 
 

@@ -23,7 +23,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +75,8 @@ class Evidence(Record):
     is_at_goal: NDArray[np.bool_]
 
 
-class Agreement(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Agreement(Record):
     """Of a class and e recordings: is_same (e,): whether they are of it; until_s (e,) [s]: how long they may lead its path."""
 
     is_same: NDArray[np.bool_]
@@ -166,7 +166,7 @@ def pool_recordings(
     likelihoods = _count_gaps_and_classes(np.array([each.likelihood for each in taken]), counts, choice, config)
     pooled = []
     for each, share, agreement in zip(taken, likelihoods.tolist(), agreements, strict=True):
-        recorded = follow_recordings(library, evidence, agreement, hand, each.times)
+        recorded = follow_recordings(library, evidence, agreement.until_s, hand, each.times)
         pooled.append(replace(each, likelihood=share, solution=_pool_path(each, recorded, agreement, hand, obstacles, config)))
     pooled.sort(key=lambda each: (-each.likelihood, each.label))
     return pooled + [each for each in candidates if not each.has_likelihood]
@@ -191,15 +191,18 @@ def compare_with_class(candidate: Candidate, evidence: Evidence, obstacles: Obst
     return Agreement(is_at_goal & ~is_other.any(axis=1), until_s)
 
 
-def follow_recordings(library: Library, evidence: Evidence, agreement: Agreement, hand: HandState, times: Array) -> RecordedPaths:
-    """Return where recordings lead the hand at times (m,) [s] from now, by linear interpolation; the last point afterwards."""
+def follow_recordings(library: Library, evidence: Evidence, until_s: Array, hand: HandState, times: Array) -> RecordedPaths:
+    """Return where recordings lead the hand at times (m,) [s] from now, each with its weight up to until_s (e,) [s].
+
+    Paths are linear between states, and stay at the last one.
+    """
     row, ends = evidence.row[:, None], library.ends[evidence.row]
     at = np.minimum(evidence.state[:, None] + times / STEP_S, ends[:, None])
     before = np.minimum(at.astype(np.intp), ends[:, None] - 1)
     share = (at - before)[..., None]
     paths = (1.0 - share) * library.states[row, before, :2] + share * library.states[row, before + 1, :2]
     paths += (hand.mean[:2] - library.states[evidence.row, evidence.state, :2])[:, None]
-    left_s = np.minimum(STEP_S * (ends - evidence.state), agreement.until_s)
+    left_s = np.minimum(STEP_S * (ends - evidence.state), until_s)
     return RecordedPaths(paths, fade_weights(evidence.weight, left_s, times))
 
 

@@ -17,8 +17,7 @@ Velocity and acceleration change by the derivatives of m' - m. Given the positio
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +25,7 @@ from numpy.typing import NDArray
 from .homotopy import find_path_sides
 from .obstacles.chance_constraint import centre_trajectories
 from .obstacles.rounded_polygon import measure_offsets
-from .types import Array, Obstacles, PredictedCandidate, Solution, as_readonly
+from .types import Array, Obstacles, PredictedCandidate, Record, Solution, as_readonly
 
 FADE_S = 0.25
 """Time over which the weight of a recording falls to zero before its end [s]."""
@@ -36,7 +35,8 @@ EXACT = 1e-12
 """Variance of a position that is known [m^2]: that of a micrometre."""
 
 
-class RecordedPaths(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class RecordedPaths(Record):
     """What e recordings do from now on, at m times: paths (e, m, 2) [m] that begin at the hand, and their weights (e, m)."""
 
     paths: Array
@@ -105,14 +105,14 @@ def _differentiate(positions: Array, dt: float, orders: int) -> Array:
 
 
 def is_same_way(planned: PredictedCandidate, pooled: Solution, obstacles: Obstacles) -> bool:
-    """Tell whether a pooled path passes the obstacles on the sides of the plan, and enters none more deeply than the plan does.
+    """Tell whether a pooled path passes all obstacles that the plan does, on its sides, and enters none more deeply.
 
     obstacles: grown by the radius of the hand.
     """
     solution = planned.solution
     centres = centre_trajectories(obstacles.centre, pooled.dt * obstacles.velocity, len(pooled.mean) - 1)
     sides = find_path_sides(pooled.path, obstacles, centres)
-    if any(sides.get(identity, side) != side for identity, side in planned.sides.items()):
+    if any(sides.get(identity) != side for identity, side in planned.sides.items()):
         return False
     nearest = [_measure_clearance(each.path, obstacles, pooled.dt) for each in (solution, pooled)]
     return nearest[1] >= min(nearest[0], 0.0)
