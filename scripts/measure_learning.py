@@ -40,7 +40,7 @@ CONFIG = load_parameter_file(EXAMPLES / 'thumb_stick.yaml').with_values({'rate_h
 NUMBERS = (0, 8, 16, 24)
 """Numbers of recordings; the last one is that of all with odd numbers."""
 SPREAD_M, DRIFT = 0.001, 0.02
-"""Standard deviation about the path of a recording, at once [m] and for each second more [m/s], of 10, 20 and 30 mm/s the best."""
+"""Standard deviation about the path of a recording, at once [m] and for each second more [m/s], the best one of three."""
 PUBLISHED = Baseline('published', partial(forecast_shares, published_shares), (None,))
 
 
