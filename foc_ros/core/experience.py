@@ -35,7 +35,7 @@ from .types import LEFT, RIGHT, Array, Candidate, HandState, Obstacles, Predicte
 
 MOST_NEAR = 64
 """Number of recordings, the nearest ones, that count in one prediction: its time is bounded whatever the size of the library."""
-LEAST_WEIGHT = 1e-6
+LEAST_WEIGHT = 1e-3
 """Weight below which a recording does not count."""
 
 

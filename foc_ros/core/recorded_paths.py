@@ -109,13 +109,12 @@ def is_same_way(planned: PredictedCandidate, pooled: Solution, obstacles: Obstac
 
     obstacles: grown by the radius of the hand.
     """
-    solution = planned.solution
     centres = centre_trajectories(obstacles.centre, pooled.dt * obstacles.velocity, len(pooled.mean) - 1)
     sides = find_path_sides(pooled.path, obstacles, centres)
     if any(sides.get(identity) != side for identity, side in planned.sides.items()):
         return False
-    nearest = [_measure_clearance(each.path, obstacles, pooled.dt) for each in (solution, pooled)]
-    return nearest[1] >= min(nearest[0], 0.0)
+    clearance = _measure_clearance(pooled.path, obstacles, pooled.dt)
+    return clearance >= 0.0 or clearance >= _measure_clearance(planned.solution.path, obstacles, pooled.dt)
 
 
 def _measure_clearance(path: Array, obstacles: Obstacles, dt: float) -> float:
