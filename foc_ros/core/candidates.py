@@ -70,7 +70,8 @@ def solve_candidates(
 
     problems: one for each candidate; costs: parts of the cost besides the effort to go; earlier: results of the prediction
     before, to start from. The first one is begun whatever the time. One that the deadline stops gets the status DEADLINE. Until
-    the deadline of raises, safety factors are raised: once that of each candidate, then those that are not settled.
+    the deadline of raises, safety factors are raised: once that of each candidate, of the first one in any case, then those that
+    are not settled.
     """
     solved: dict[int, PredictedCandidate] = {}
     for row in earlier.sort_by_turn(candidates):
@@ -78,7 +79,7 @@ def solve_candidates(
             break
         previous, raises = earlier.solutions.get(candidates[row].label), math.inf
         if earlier is not NOTHING:
-            raises = FIRST_RAISES if deadline_of_raises.allows() else 0
+            raises = FIRST_RAISES if not solved or deadline_of_raises.allows() else 0
         solved[row] = _solve_candidate(candidates[row], problems[row], settings, costs, previous, deadline, raises)
     unsettled = [row for row, each in solved.items() if earlier is not NOTHING and _is_unsettled(each, earlier.solutions)]
     for row in unsettled:
