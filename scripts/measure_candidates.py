@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Measure how many candidates take part in predictions, how likely the class really taken was, and the CPU time.
 
-    python scripts/measure_candidates.py [DATA ...] [--set NAME=VALUE ...] [--every N]
+    python scripts/measure_candidates.py [DATA ...] [--set NAME=VALUE ...] [--every N] [--budget S]
 
 DATA: bags, or folders as `foc_ros evaluate` reads them; by default the packaged recording, and D3IL and HLP where they are beside
-the checkout. `--set rate_hz=10` predicts ten times a second.
+the checkout. `--set rate_hz=10` predicts ten times a second; `--budget 0.01` limits the time of each prediction to 10 ms.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from foc_ros.core.types import Array, HandState
 from foc_ros.io.topics import HAND
 
 HEAD = (
-    'data', 'predictions', 'candidates', 'take part [%]', 'solved [%]', 'empty [%]',
+    'data', 'predictions', 'candidates', 'take part [%]', 'solved [%]', 'empty [%]', 'way taken is a candidate [%]',
     'log-likelihood [nat]', 'missing as 0', 'best beta', 'log-likelihood with it', 'with it, missing as 0',
     'uniform', 'CPU [ms]', '99 %',
 )  # fmt: skip
@@ -77,13 +77,13 @@ class Measured:
         return beta, best
 
 
-def measure(data: DataSet, config: Config) -> Measured:
+def measure(data: DataSet, config: Config, budget_s: float | None = None) -> Measured:
     """Replay all recordings of a data set."""
     counts: list[tuple[int, int, int]] = []
     seconds: list[float] = []
     asked: list[tuple[Observation, Question]] = []
     for recording in data.recordings.values():
-        for movement in _replay(recording, config, seconds):
+        for movement in _replay(recording, Replay(config, budget_s), seconds):
             path = RecordedPath(np.array(movement.stamps), np.array(movement.positions), movement.goals)
             for step, hand in movement.made:
                 assert step.prediction is not None
@@ -107,9 +107,9 @@ class Movement:
     made: list[tuple[Step, HandState]] = field(default_factory=list)
 
 
-def _replay(recording: Recording, config: Config, seconds: list[float]) -> list[Movement]:
+def _replay(recording: Recording, replayed: Replay, seconds: list[float]) -> list[Movement]:
     """Return the movements of a recording; append the CPU time of each prediction."""
-    replayed, movements = Replay(config), [Movement(np.zeros((0, 2)))]
+    movements = [Movement(np.zeros((0, 2)))]
     for step in _time_steps(replayed, recording, seconds):
         if step.sample is None:
             continue
@@ -141,6 +141,7 @@ def summarise(name: str, measured: Measured, config: Config) -> list[str]:
     found, takes_part, solved = measured.counts.sum(axis=0)
     cells = [name, str(len(measured.counts)), f'{found:.0f}', f'{100 * takes_part / found:.2f}', f'{100 * solved / found:.2f}']
     cells.append(f'{100 * np.mean(measured.counts[:, 1] == 0):.2f}')
+    cells.append(f'{100 * np.mean([bool((each.given == each.truth).any()) for _, each in measured.asked]):.2f}')
     betas = []
     for average in (True, False):
         likelihood = measured.compute_log_likelihood(config, is_refit=False, is_missing_average=average)
@@ -157,11 +158,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument('data', nargs='*', type=Path, help='bags or folders')
     parser.add_argument('--set', action='append', default=[], type=parse_setting, metavar='NAME=VALUE', help='a parameter')
     parser.add_argument('--every', type=int, default=1, metavar='N', help='every n-th recording only')
+    parser.add_argument('--budget', type=float, metavar='S', help='time limit of each prediction [s]')
     chosen = parser.parse_args(arguments)
     config = Config().with_values(dict(chosen.set))
     print(config)
     sets = (load_data_set(path).thin(chosen.every) for path in chosen.data or find_data_sets())
-    print_table(HEAD, (summarise(data.name, measure(data, config), config) for data in sets))
+    print_table(HEAD, (summarise(data.name, measure(data, config, chosen.budget), config) for data in sets))
 
 
 if __name__ == '__main__':

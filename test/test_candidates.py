@@ -38,18 +38,18 @@ def test_a_candidate_that_becomes_reachable_takes_its_cheaper_solution(monkeypat
     np.testing.assert_allclose(outcome.cost, solutions[counts].effort * cold.dt)
 
 
-def test_a_safety_factor_that_had_no_time_to_rise_is_not_settled_and_rises_later():
-    """The effort rises with k, so that a search that may not try a larger one ends with less of both."""
+def test_the_first_safety_factor_rises_and_those_without_time_do_so_later():
+    """The effort rises with k. The most likely class is always the first one, the other one is first among the rest."""
     problem = replace(one_obstacle(), preference=SafetyPreference(1.0, 100.0, 0.0, 0.02))
-    late = Deadline(0.0)
     least = solved(problem, GUESS)
     low = replace(least, safety_factor=0.5 * least.safety_factor, status=Status.COMPROMISED)
-    earlier = EarlierSolutions({CANDIDATE.label: low})
-    given = [CANDIDATE], [problem], FocConfig(), outcomes.EFFORT_ONLY, earlier
-    (waiting,), (risen,) = solve_candidates(*given, NEVER, late), solve_candidates(*given)
+    pair = [CANDIDATE, replace(CANDIDATE, label='goal1:+0', goal=1)]
+    solutions, likelihoods = {each.label: low for each in pair}, {CANDIDATE.label: 1.0}
+    given = pair, [problem, problem], FocConfig(), outcomes.EFFORT_ONLY, EarlierSolutions(solutions, likelihoods)
+    risen, waiting = solve_candidates(*given, NEVER, Deadline(0.0))
     assert waiting.status is Status.COMPROMISED
-    assert not waiting.solution.is_settled
-    assert risen.status is Status.SOLVED
-    assert risen.solution.is_settled
+    assert not waiting.solution.is_complete
+    assert risen.solution.is_complete
+    assert waiting.solution.safety_factor < risen.solution.safety_factor
     assert waiting.solution.effort < risen.solution.effort
-    assert solve_candidates(*given[:4], EarlierSolutions({CANDIDATE.label: waiting.solution}))[0].status is Status.SOLVED
+    assert [each.status for each in solve_candidates(*given)] == 2 * [Status.SOLVED]

@@ -4,21 +4,39 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import CubicHermiteSpline
 from test_demonstrations import GOAL, OBSTACLES, bow
 
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config, ExperienceConfig
 from foc_ros.core.errors import InputError
-from foc_ros.core.experience import NO_LIBRARY, find_evidence, make_library
-from foc_ros.core.homotopy.demonstrations import record_demonstration
+from foc_ros.core.experience import NO_LIBRARY, compare_with_class, find_evidence, make_library
+from foc_ros.core.homotopy import find_path_sides
+from foc_ros.core.homotopy.demonstrations import STEP_S, record_demonstration
 from foc_ros.core.memory import Memory
+from foc_ros.core.obstacles.rounded_polygon import measure_offsets
 from foc_ros.core.predictor import predict
-from foc_ros.core.types import HandState
+from foc_ros.core.types import LEFT, RIGHT, Candidate, HandState, make_obstacles
 from foc_ros.io.class_library import load_library, save_library
 
 CONFIG = Config().with_values({'foc.steps': 20})
-TIMES_S = np.linspace(0.0, 2.0, 40)
-ABOVE = record_demonstration('world', bow(0.03), OBSTACLES, TIMES_S)
+
+
+def move(path, rest_s=0.5, moving_s=2.0):
+    """Return the states of a hand that rests at both ends of a path."""
+    at = np.arange(0.0, moving_s + 2.0 * rest_s, STEP_S)
+    times = rest_s + np.linspace(0.0, moving_s, len(path))
+    positions = np.column_stack([np.interp(at, times, axis) for axis in path.T])
+    return np.column_stack([positions, np.gradient(positions, STEP_S, axis=0)])
+
+
+def record(path):
+    return record_demonstration('world', path, OBSTACLES, move(path))
+
+
+ABOVE = record(bow(0.03))
 HAND = HandState(1, np.zeros(6), 1e-6 * np.eye(6), frame_id='world')
 
 
@@ -45,23 +63,74 @@ def test_likelihoods_are_those_of_a_dirichlet_distribution():
             assert after[label].likelihood == pytest.approx(expected, abs=1e-9)
 
 
-def test_paths_stay_those_of_the_model():
-    known, model = by_label(ask(make_library([ABOVE] * 20))), by_label(ask(NO_LIBRARY))
+MOVING = replace(HAND, mean=np.array([*ABOVE.states[20], 0.0, 0.0]), onset_ns=0)
+"""The hand of a recording one second after it began, half a second after the onset."""
+
+
+def find_taken(prediction):
+    """Return the candidate on the sides of the recording."""
+    return next(each for each in prediction.candidates if dict(each.candidate.sides).items() <= sides_of(ABOVE).items())
+
+
+def test_a_path_approaches_the_recordings_with_their_number():
+    times = find_taken(ask(NO_LIBRARY, MOVING)).times
+    at = 1.0 + times
+    recorded = np.column_stack([np.interp(at, STEP_S * np.arange(len(ABOVE.states)), axis) for axis in ABOVE.states[:, :2].T])
+    distances, stddevs = [], []
+    for number in (0, 1, 4, 16):
+        taken = find_taken(ask(make_library([ABOVE] * number), MOVING))
+        distances.append(np.hypot(*(taken.mean[:, :2] - recorded).T).mean())
+        stddevs.append(np.sqrt(taken.covariance[1:, 0, 0]).mean())
+        assert np.linalg.eigvalsh(taken.covariance).min() > -1e-9
+    assert (np.diff(distances) < 0.0).all() and distances[-1] < 0.1 * distances[0]
+    assert (np.diff(stddevs) < 0.0).all()
+
+
+def test_velocities_are_the_derivative_of_the_path():
+    taken = find_taken(ask(make_library([ABOVE] * 4), MOVING))
+    path = CubicHermiteSpline(taken.times, taken.mean[:, :2], taken.mean[:, 2:4])
+    middle = 0.5 * (taken.times[2:] + taken.times[1:-1])
+    expected = np.diff(taken.mean[:, :2], axis=0)[1:] / taken.solution.dt
+    assert np.hypot(*(path(middle, 1) - expected).T).max() < 0.05
+
+
+def test_other_classes_effort_and_eta_stay_those_of_the_plan():
+    known, model = by_label(ask(make_library([ABOVE] * 20), MOVING)), by_label(ask(NO_LIBRARY, MOVING))
+    others = [label for label, each in model.items() if not dict(each.candidate.sides).items() <= sides_of(ABOVE).items()]
+    assert others
+    for label in others:
+        np.testing.assert_array_equal(known[label].mean, model[label].mean)
+        np.testing.assert_array_equal(known[label].covariance, model[label].covariance)
     for label, each in model.items():
-        np.testing.assert_array_equal(known[label].mean, each.mean)
-        np.testing.assert_array_equal(known[label].covariance, each.covariance)
+        assert known[label].eta == each.eta and known[label].effort == each.effort
+        np.testing.assert_array_equal(known[label].motor_covariance, each.motor_covariance)
+
+
+@given(st.floats(0.012, 0.05), st.floats(-0.01, 0.01), st.floats(0.0, 0.9))
+@settings(max_examples=10, deadline=None)
+def test_a_pooled_path_stays_in_its_class_and_out_of_obstacles(height, beside, share):
+    recording = record(bow(height))
+    state = recording.states[int(share * (len(recording.states) - 1))]
+    hand = replace(MOVING, mean=np.array([state[0], state[1] + beside, *state[2:], 0.0, 0.0]))
+    before = by_label(ask(NO_LIBRARY, hand))
+    for label, each in by_label(ask(make_library([recording] * 8), hand)).items():
+        if not each.has_likelihood:
+            continue
+        assert find_path_sides(each.mean[:, :2], OBSTACLES).items() >= each.sides.items()
+        nearest = [measure_offsets(one.mean[:, :2], OBSTACLES)[1].min() for one in (before[label], each)]
+        assert nearest[1] >= min(nearest[0], OBSTACLES.radius[0]) - 1e-9
 
 
 @pytest.mark.parametrize(
     'library',
     [
         [],
-        [replace(ABOVE, times_s=None)],
+        [replace(ABOVE, states=None)],
         [replace(ABOVE, frame_id='elsewhere')],
         [replace(ABOVE, centre=ABOVE.centre + 0.03)],
-        [replace(ABOVE, path=ABOVE.path + np.array([0.0, 1.0]))],
+        [replace(ABOVE, states=ABOVE.states + 1.0)],
     ],
-    ids=['none', 'without times', 'another frame', 'obstacles moved', 'far from the hand'],
+    ids=['none', 'without states', 'another frame', 'obstacles moved', 'far from the hand'],
 )
 def test_without_a_recording_that_agrees_it_is_the_model(library):
     known, model = ask(make_library(library)), ask(NO_LIBRARY)
@@ -78,29 +147,51 @@ def test_equal_input_gives_equal_answers():
         np.testing.assert_array_equal(each.mean, same.mean)
 
 
-def test_a_velocity_excludes_recordings_only_while_the_hand_moves():
-    library, settings = make_library([ABOVE]), ExperienceConfig()
+def test_recordings_count_by_position_and_velocity():
+    library, experience = make_library([ABOVE]), ExperienceConfig()
     away = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
-    moving = HandState(1, away, np.eye(6), frame_id='world', onset_ns=0)
-    assert not len(find_evidence(library, moving, OBSTACLES, settings).row)
-    assert find_evidence(library, HAND, OBSTACLES, settings).weight == pytest.approx([1.0])
+    assert not len(find_evidence(library, replace(HAND, mean=away), OBSTACLES, GOAL, experience).row)
+    assert find_evidence(library, HAND, OBSTACLES, GOAL, experience).weight == pytest.approx([1.0])
+    beside = replace(HAND, mean=HAND.mean - [experience.position_stddev, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert find_evidence(library, beside, OBSTACLES, GOAL, experience).weight == pytest.approx([np.exp(-0.5)])
 
 
-def test_times_are_read_as_they_were_written(tmp_path):
-    save_library(tmp_path / 'ways.json', [ABOVE, replace(ABOVE, times_s=None)])
+def test_a_recording_of_another_class_leads_until_it_passes_there():
+    obstacles = make_obstacles([[0.1, 0.0], [0.2, 0.0]], 0.015)
+    path = np.column_stack([np.linspace(0.0, 0.3, 61), 0.04 * np.sin(np.linspace(0.0, 2.0 * np.pi, 61))])
+    recording = record_demonstration('world', path, obstacles, move(path))
+    evidence = find_evidence(make_library([recording]), HAND, obstacles, GOAL, ExperienceConfig())
+    compared = {}
+    for sides in ((LEFT, RIGHT), (LEFT, LEFT), (RIGHT, RIGHT)):
+        candidate = Candidate('goal0', 0, tuple(zip(obstacles.ids, sides, strict=True)), path, 0.3)
+        compared[sides] = compare_with_class(candidate, evidence, obstacles, np.array([0]))
+    assert [bool(each.is_same[0]) for each in compared.values()] == [True, False, False]
+    until_s = [each.until_s[0] for each in compared.values()]
+    assert until_s[0] == np.inf and until_s[1] == pytest.approx(0.5 + 2.0 * 2.0 / 3.0, abs=0.2) and until_s[2] == 0.0
+
+
+def test_states_are_read_as_they_were_written(tmp_path):
+    save_library(tmp_path / 'ways.json', [ABOVE, replace(ABOVE, states=None)])
     timed, plain = load_library(str(tmp_path / 'ways.json'))
-    np.testing.assert_array_equal(timed.times_s, ABOVE.times_s)
-    assert plain.times_s is None
+    np.testing.assert_array_equal(timed.states, ABOVE.states)
+    assert plain.states is None
 
 
-@pytest.mark.parametrize('times', ['[0]', '1', f'[{"0, " * 64}-1]', f'[{"0, " * 64}"x"]'])
-def test_wrong_times_name_the_field(tmp_path, times, capsys):
+@pytest.mark.parametrize('states', ['[[0, 0, 0, 0]]', '1', '[[0, 0], [0, 0]]', '[[0, 0, 0, 0], [0, 0, 0, "x"]]'])
+def test_wrong_states_name_the_field(tmp_path, states):
     file = tmp_path / 'ways.json'
     save_library(file, [ABOVE])
     text = file.read_text()
-    file.write_text(text[: text.index('"times_s": ') + 11] + times + '}]}')
-    with pytest.raises(InputError, match=r'ways\[0\]\.times_s'):
+    file.write_text(text[: text.index('"states": ') + 10] + states + '}]}')
+    with pytest.raises(InputError, match=r'ways\[0\]\.states'):
         load_library(str(file))
+
+
+def test_a_library_that_could_not_be_read_is_not_written(tmp_path):
+    long = replace(ABOVE, states=np.full((400, 4), np.pi))
+    with pytest.raises(InputError, match=r'expected at most 5,000,000 bytes'):
+        save_library(tmp_path / 'ways.json', [long] * 400)
+    assert not list(tmp_path.iterdir())
 
 
 HEADS = {'goals.csv': 'goal,x_m,y_m\n0,0.3,0.0\n', 'obstacles.csv': 'obstacle,x_m,y_m,radius_m\na,0.15,0.0,0.015\n'}
@@ -122,7 +213,10 @@ def test_learn_writes_a_library_of_recordings(tmp_path):
     assert main(['learn', str(tmp_path), '--output', str(tmp_path / 'ways.json')]) == 0
     recordings = load_library(str(tmp_path / 'ways.json'))
     assert len(recordings) == 2
-    assert all(0.5 < each.times_s[-1] < 1.5 and (np.diff(each.times_s) > 0.0).all() for each in recordings)
+    for each in recordings:
+        assert 0.5 < STEP_S * len(each.states) < 1.5
+        assert np.diff(each.states[:, 0]).min() > -1e-3
+        assert each.states[-1, :2] == pytest.approx([0.3, 0.0], abs=0.02)
 
 
 def test_a_recording_that_does_not_reach_its_goal_is_named(tmp_path, capsys):

@@ -1,6 +1,7 @@
 """The memory between predictions: solutions by label, under changed labels, and after a deadline."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -105,3 +106,14 @@ def test_an_unreachable_candidate_is_followed_and_restarted_at_intervals(monkeyp
         assert {outcome.solution.status for outcome in prediction.candidates} == {Status.ETA_UNREACHABLE}
         begun.append(any(starts))
     assert [tick for tick, restarted in enumerate(begun) if restarted] == [0, RETRY_AFTER + 1, 2 * RETRY_AFTER + 2]
+
+
+def test_a_class_whose_safety_factor_had_no_time_to_rise_keeps_its_turn():
+    state = HandState(0, np.zeros(6), np.zeros((6, 6)))
+    prediction, memory = predict(CONFIG, state, make_obstacles([[0.15, 0.0]], 0.03, 0.003), np.array([[0.3, 0.0]]), Memory())
+    complete, waiting = prediction.candidates
+    waiting = replace(waiting, solution=replace(waiting.solution, is_complete=False))
+    earlier, _ = memory.remember([complete.candidate, waiting.candidate], [complete, waiting], memory.earlier, {}, 20_000_000)
+    assert earlier.turns == {complete.label: 20_000_000, waiting.label: memory.earlier.turns[waiting.label]}
+    assert memory.earlier.turns[waiting.label] == 0
+    assert [earlier.sort_by_turn(each) for each in ([complete, waiting], [waiting, complete])] == [[1, 0], [0, 1]]

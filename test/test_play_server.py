@@ -26,9 +26,10 @@ from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
+from foc_ros.play.address import is_loopback, open_sockets
 from foc_ros.play.page_messages import LONGEST_MESSAGE
 from foc_ros.play.predictors import LibraryPredictor
-from foc_ros.play.server import FILES, is_loopback, is_own_host, listen
+from foc_ros.play.server import FILES, is_own_host, listen
 from foc_ros.play.session import Session
 
 HAND = {'type': 'hand', 't': 10.0, 'x': 0.1, 'y': 0.0, 'event': None}
@@ -48,9 +49,10 @@ def serve(tmp_path: Path, test: Callable[[str], Awaitable[None]]) -> None:
 
     async def run() -> None:
         session = Session(LibraryPredictor, Config(), tmp_path)
-        server, port = listen(session, '127.0.0.1', 0)
+        sockets = open_sockets('127.0.0.1', 0)
+        server = listen(session, '127.0.0.1', sockets)
         try:
-            await test(f'127.0.0.1:{port}')
+            await test(f'127.0.0.1:{sockets[0].getsockname()[1]}')
         finally:
             server.stop()
             await server.close_all_connections()

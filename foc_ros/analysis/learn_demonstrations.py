@@ -8,10 +8,16 @@ import numpy as np
 
 from foc_ros.core.config import Config
 from foc_ros.core.errors import RecordingError
-from foc_ros.core.homotopy.demonstrations import Demonstration, is_same_demonstration, record_demonstration
+from foc_ros.core.homotopy.demonstrations import (
+    MOST_STATES,
+    STEP_S,
+    Demonstration,
+    is_same_demonstration,
+    record_demonstration,
+)
 from foc_ros.core.obstacles.scene import Scene
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import NANOSECONDS, Array
+from foc_ros.core.types import Array
 
 from .fitting.recorded_hand import read_hand
 from .goal_reached import AT_GOAL_M, find_goal_at_end, find_reached_goal
@@ -20,19 +26,22 @@ from .replay import Step
 
 SHORTEST_M = 0.05
 """Shorter movements demonstrate nothing [m]."""
+AROUND_S = 1.0
+"""Time before the onset and after the goal that a recording keeps [s]: predictions near both look as far."""
 
 
 def learn_recording(recording: Recording, config: Config) -> Demonstration:
     """Return the movement of a recording, from its onset to where it is nearest to its goal, with the goal as its last point.
 
-    The goal is reached at the last speed, or at that of an onset if this is larger. Raises RecordingError where the recording
-    cannot be read, or contains no movement of at least SHORTEST_M that ends within AT_GOAL_M of a goal.
+    The states begin up to AROUND_S before the onset and end up to AROUND_S after that place. Raises RecordingError where the
+    recording cannot be read, contains no movement of at least SHORTEST_M that ends within AT_GOAL_M of a goal, or takes longer
+    than MOST_STATES allow.
     """
     hand = read_hand(recording, config)
     last = find_reached_goal(hand.positions, hand.goals)[1]
-    states = hand.estimate_states(config)[: last + 1]
-    onset = next((row for row, each in enumerate(states) if each.onset_ns is not None), len(states))
-    moving = states[onset:]
+    states = hand.estimate_states(config)
+    onset = next((row for row, each in enumerate(states[: last + 1]) if each.onset_ns is not None), len(states))
+    moving = states[onset : last + 1]
     if len(moving) < 2:
         raise RecordingError(
             f'{recording.name}: no movement: the hand was never faster than {config.estimator.onset_speed:g} m/s'
@@ -43,10 +52,16 @@ def learn_recording(recording: Recording, config: Config) -> Demonstration:
     if length_m < SHORTEST_M or distance_m > AT_GOAL_M:
         wanted = f'expected a movement of at least {SHORTEST_M:g} m that ends within {AT_GOAL_M:g} m of a goal'
         raise RecordingError(f'{recording.name}: {wanted}, got {length_m:.3g} m that end {distance_m:.3g} m from the nearest')
-    times_s = np.array([(each.stamp_ns - moving[0].stamp_ns) / NANOSECONDS for each in moving])
-    speed = max(float(np.hypot(*moving[-1].mean[2:4])), config.estimator.onset_speed)
-    whole, times_s = np.vstack([path, hand.goals[goal]]), np.append(times_s, times_s[-1] + distance_m / speed)
-    return record_demonstration(hand.frame_id, whole, hand.obstacles, times_s)
+    first_s, last_s = max(hand.times[onset] - AROUND_S, 0.0), min(hand.times[last] + AROUND_S, hand.times[-1])
+    if last_s - first_s > STEP_S * (MOST_STATES - 1):
+        longest_s = STEP_S * (MOST_STATES - 1) - 2.0 * AROUND_S
+        raise RecordingError(
+            f'{recording.name}: expected a movement of at most {longest_s:g} s, got {hand.times[last] - hand.times[onset]:.3g} s'
+        )
+    at = np.arange(first_s, last_s, STEP_S)
+    means = np.array([each.mean[:4] for each in states])
+    kept = np.column_stack([np.interp(at, hand.times, axis) for axis in means.T])
+    return record_demonstration(hand.frame_id, np.vstack([path, hand.goals[goal]]), hand.obstacles, kept)
 
 
 class Learner:

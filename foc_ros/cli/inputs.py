@@ -24,7 +24,8 @@ from foc_ros.io.outputs import (
 def read_inputs(arguments: argparse.Namespace) -> None:
     """Check the arguments of a command, and add what is read; raises FocError.
 
-    `solve` gets `problem`, the reaching scene; `evaluate`, `fit`, `learn` and `simulate` get `found`, the recordings by name.
+    `solve` gets `problem`, the reaching scene; `play` gets `sockets`, which are open; `evaluate`, `fit`,
+    `learn` and `simulate` get `found`, the recordings by name.
     """
     if arguments.command in READERS:
         READERS[arguments.command](arguments)
@@ -95,13 +96,16 @@ def _check_folder_of_output(arguments: argparse.Namespace) -> None:
     check_folder('--output', arguments.output)
 
 
-def _check_folder_of_data(arguments: argparse.Namespace) -> None:
+def _read_play(arguments: argparse.Namespace) -> None:
+    from foc_ros.play.address import open_sockets
+
     check_folder('--data', arguments.data)
+    arguments.sockets = open_sockets(arguments.host, arguments.port)
 
 
 READERS: dict[str, Callable[[argparse.Namespace], None]] = {
     'demo': _check_folder_of_output,
-    'play': _check_folder_of_data,
+    'play': _read_play,
     'paper': _check_folder_of_output,
     'solve': _read_solve,
     'replay': _read_replay,

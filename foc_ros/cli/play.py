@@ -28,8 +28,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 async def _serve(arguments: argparse.Namespace, config: Config) -> None:
     with show_compilation():
+        from foc_ros.play.address import is_loopback
         from foc_ros.play.predictors import LibraryPredictor, LivePredictor, Receive
-        from foc_ros.play.server import is_loopback, listen, serve
+        from foc_ros.play.server import listen, serve
         from foc_ros.play.session import Session
 
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
@@ -47,7 +48,7 @@ async def _serve(arguments: argparse.Namespace, config: Config) -> None:
         return NodePredictor(given, pass_on)
 
     session = Session(make_predictor, config, arguments.data)
-    server, port = listen(session, arguments.host, arguments.port)
+    server, port = listen(session, arguments.host, arguments.sockets), arguments.sockets[0].getsockname()[1]
     try:
         session.predictor.start()
         if not is_loopback(arguments.host):

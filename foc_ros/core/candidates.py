@@ -22,8 +22,10 @@ from .ocp.warm_start import Start, cold_start, warm_start
 from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Solution, Status
 
 EFFORT_ONLY = CostModel()
-FIRST_TRIES, FURTHER_TRIES = 1, 8
-"""Larger safety factors that are tried for a candidate that is followed: first for each, then for those that are not settled."""
+FIRST_RAISES, FURTHER_RAISES = 1, 8
+"""How often the safety factor of a candidate that is followed is raised: first of each, then of those that are not settled."""
+SETTLED = 0.02
+"""Change of a safety factor from one prediction to the next up to which it is settled."""
 
 
 class ProblemTable(Protocol):
@@ -68,25 +70,33 @@ def solve_candidates(
 
     problems: one for each candidate; costs: parts of the cost besides the effort to go; earlier: results of the prediction
     before, to start from. The first one is begun whatever the time. One that the deadline stops gets the status DEADLINE. Until
-    the deadline of raises, larger safety factors are tried: one for each candidate, then more for those that are not settled.
+    the deadline of raises, safety factors are raised: once that of each candidate, of the first one in any case, then those that
+    are not settled.
     """
     solved: dict[int, PredictedCandidate] = {}
     for row in earlier.sort_by_turn(candidates):
         if solved and not deadline.allows():
             break
-        previous, tries = earlier.solutions.get(candidates[row].label), math.inf
+        previous, raises = earlier.solutions.get(candidates[row].label), math.inf
         if earlier is not NOTHING:
-            tries = FIRST_TRIES if deadline_of_raises.allows() else 0
-        solved[row] = _solve_candidate(candidates[row], problems[row], settings, costs, previous, deadline, tries)
-    for row in [row for row, each in solved.items() if each.has_likelihood and not each.solution.is_settled]:
+            raises = FIRST_RAISES if not solved or deadline_of_raises.allows() else 0
+        solved[row] = _solve_candidate(candidates[row], problems[row], settings, costs, previous, deadline, raises)
+    unsettled = [row for row, each in solved.items() if earlier is not NOTHING and _is_unsettled(each, earlier.solutions)]
+    for row in unsettled:
         if deadline_of_raises.allows():
             first, problem = solved[row], problems[row]
-            start = replace(warm_start(first.solution, problem), tries=FURTHER_TRIES)
+            start = replace(warm_start(first.solution, problem), raises=FURTHER_RAISES)
             raised = _solve_from(start, candidates[row], problem, settings, costs, deadline_of_raises)
             qp_solves = first.solution.qp_solves + raised.solution.qp_solves
             raised = replace(raised, solution=replace(raised.solution, qp_solves=qp_solves))
             solved[row] = raised if raised.has_likelihood else first
     return [solved[row] for row in sorted(solved)]
+
+
+def _is_unsettled(result: PredictedCandidate, before: Mapping[str, Solution]) -> bool:
+    """Tell whether a safety factor below the wanted one is new or has changed, so that a larger one may be in reach."""
+    previous, k = before.get(result.label), result.solution.safety_factor
+    return result.status is Status.COMPROMISED and (previous is None or abs(k - previous.safety_factor) > SETTLED)
 
 
 def _solve_candidate(
@@ -96,24 +106,24 @@ def _solve_candidate(
     costs: CostModel,
     previous: Solution | None,
     deadline: Deadline,
-    tries: float,
+    raises: float,
 ) -> PredictedCandidate:
     """Solve from the previous solution; where a likelihood comes or goes, also from the candidate's own guess.
 
-    tries: how many larger safety factors may be tried, as in `Start`.
+    raises: how often the safety factor may be raised, as in `Start`.
 
     A candidate that was unreachable and is solved now may have come from far beyond the least effort: the result with the smaller
     loss counts.
     """
     warm = None
     if previous is not None:
-        start = replace(warm_start(previous, problem), tries=tries)
+        start = replace(warm_start(previous, problem), raises=raises)
         warm = _solve_from(start, candidate, problem, settings, costs, deadline)
         # a solution that continues one stopped by the deadline has skipped nothing
         is_continued = warm.has_likelihood and (previous.status is Status.DEADLINE or previous.status.has_likelihood)
         if warm.status in (previous.status, Status.DEADLINE) or is_continued:
             return warm
-    start = replace(cold_start(candidate.guess), tries=tries)
+    start = replace(cold_start(candidate.guess), raises=raises)
     cold = _solve_from(start, candidate, problem, settings, costs, deadline)
     if warm is None or not warm.has_likelihood:
         return cold

@@ -169,9 +169,10 @@ class ExperienceConfig:
 
     prior_count: float = _p(1.0, 'number of recordings as which the model counts, for the gap in the next row', '', 1e-3, 1e6)
     prior_count_beyond: float = _p(30.0, 'the same, for what lies beyond the next row of obstacles', '', 1e-3, 1e6)
-    position_stddev: float = _p(0.03, 'distance from the hand at which a recording counts less', 'm', 1e-4, 10.0)
+    prior_count_path: float = _p(0.3, 'the same, for the path to the next row and as far as recordings reach', '', 1e-3, 1e6)
+    position_stddev: float = _p(0.02, 'distance from the hand at which a recording counts less', 'm', 1e-4, 10.0)
     velocity_stddev: float = _p(
-        0.04, 'difference from the velocity of the hand at which a recording counts less', 'm/s', 1e-4, 10.0
+        0.03, 'difference from the velocity of the hand at which a recording counts less', 'm/s', 1e-4, 10.0
     )
 
 

@@ -18,12 +18,18 @@ from .obstacles.chance_constraint import centre_trajectories
 from .rows import WALL, find_direction, find_rows, locate_rows
 from .types import LEFT, RIGHT, Array, HandState, Obstacles, Solution
 
+NO_OBSTACLES = np.zeros(0, dtype=np.intp)
+
 
 class Decisions(NamedTuple):
-    """Of k classes: the number (k,) of the gap that each takes in the next row, and the number (k,) of rows it weaves through."""
+    """Of k classes: the number (k,) of the gap that each takes in the next row, and the number (k,) of rows it weaves through.
+
+    next_row (m,): the obstacles of the next row, none where no row is ahead.
+    """
 
     next_gap: NDArray[np.intp]
     woven: NDArray[np.intp]
+    next_row: NDArray[np.intp] = NO_OBSTACLES
 
 
 def tabulate_sides(solutions: Sequence[Solution], obstacles: Obstacles) -> NDArray[np.int8]:
@@ -40,7 +46,8 @@ def find_decisions(sides: NDArray[np.int8], obstacles: Obstacles, hand: HandStat
     here, start = hand.mean[:2], hand.mean[:2] if hand.onset_position is None else hand.onset_position
     direction = find_direction(start, goals)
     is_open = (sides != sides[:1]).any(axis=0)
-    obstacles, is_left = obstacles.take(np.flatnonzero(is_open)), sides[:, is_open] == LEFT
+    open_obstacles, is_left = np.flatnonzero(is_open), sides[:, is_open] == LEFT
+    obstacles = obstacles.take(open_obstacles)
     row, along = find_rows(obstacles, direction, start, goals), obstacles.centre @ direction
     is_ahead = np.append(locate_rows(along, row) > here @ direction, False)[row]  # a wall is in the last row here
     order = np.lexsort((obstacles.centre @ np.array([-direction[1], direction[0]]), row))
@@ -53,4 +60,4 @@ def find_decisions(sides: NDArray[np.int8], obstacles: Obstacles, hand: HandStat
     woven = np.logical_or.reduceat(turns_back, np.flatnonzero(np.diff(row, prepend=WALL)), axis=1).sum(axis=1)
     numbers = dict[bytes, int]()
     next_gap = [numbers.setdefault(gap.tobytes(), len(numbers)) for gap in is_left[:, row == row[0]]]
-    return Decisions(np.array(next_gap, dtype=np.intp), woven)
+    return Decisions(np.array(next_gap, dtype=np.intp), woven, open_obstacles[order[row == row[0]]])

@@ -1,20 +1,22 @@
-"""Recordings of a scene as evidence: they change the likelihoods of the candidates.
+"""Recordings of a scene as evidence: they change the likelihoods of the candidates, and their paths.
 
-A recording r counts by how near its path comes to the position p [m] and the velocity v [m/s] of the hand,
+A recording r counts by how near its states come to the position p [m] and the velocity v [m/s] of the hand,
 
-    w_r = max_m exp(-|p - p_rm|^2 / 2 a^2 - |v - v_rm|^2 / 2 b^2),  a = `position_stddev`,  b = `velocity_stddev`,
+    w_r = max_m exp(-|p - p_rm|^2 / 2 a^2 - |v - v_rm|^2 / 2 b^2),  a = `position_stddev`,  b = `velocity_stddev`.
 
-without the second term for a hand that has not begun to move. From the point m of this maximum on, it passes obstacles on the
-sides of a class i towards the goal at its end. With G the classes that take the same gap in the next row, n_i = sum of the w_r
-of class i, and n_G = sum of the n_i in G, the likelihoods p_i of the model are means of two Dirichlet distributions, of the gap
-and of the class beyond it. They count as n_0 = `prior_count` and n_1 = `prior_count_beyond` recordings; the recordings are
-observations:
+From the state m of this maximum on, it passes obstacles on the sides of a class i towards the goal at its end. With G the classes
+that take the same gap in the next row, or lead to the same goal where no row is ahead, n_i = sum of the w_r of class i, and n_G =
+sum of the n_i in G, the likelihoods p_i of the model are means of two Dirichlet distributions, of the gap and of the class beyond
+it. They count as n_0 = `prior_count` and n_1 = `prior_count_beyond` recordings; the recordings are observations:
 
     p_G <- (n_0 p_G + n_G) / (n_0 + sum n),    p_i <- p_G (n_1 p_i / p_G + n_i) / (n_1 + n_G),
 
 with the p_G of the model in the last fraction.
 
-Paths and covariances stay those of the model, because eta holds for them. Without recordings near the hand, all is the model.
+The path of a class is pooled with the recordings that take its gap in the next row, each up to where it passes an obstacle on
+another side than the class (`recorded_paths`). If this path leaves the class or enters an obstacle, only the recordings of the
+class count, and if that one does so too, the path stays that of the plan. Effort and eta are always those of the plan. Without
+recordings near the hand, all is the model.
 """
 
 from __future__ import annotations
@@ -27,78 +29,98 @@ from numpy.typing import NDArray
 
 from .config import ExperienceConfig
 from .decisions import find_decisions, tabulate_sides
-from .homotopy.demonstrations import NEAR, POINTS, Demonstration, is_same_demonstration
-from .types import LEFT, RIGHT, Array, Candidate, HandState, Obstacles, PredictedCandidate, Record
+from .homotopy.demonstrations import NEAR, STEP_S, Demonstration, is_same_demonstration
+from .recorded_paths import RecordedPaths, fade_weights, is_same_way, pool_path
+from .types import LEFT, RIGHT, Array, Candidate, HandState, Obstacles, PredictedCandidate, Record, Solution
 
 MOST_NEAR = 64
 """Number of recordings, the nearest ones, that count in one prediction: its time is bounded whatever the size of the library."""
-LEAST_WEIGHT = 1e-6
+LEAST_WEIGHT = 1e-3
 """Weight below which a recording does not count."""
-LEAST_STEP_S = 1e-3
-"""Shortest time between two points of a recording, for its velocity [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Library(Record):
     """The class library.
 
-    demonstrations: one of each class, to recall; recordings: those with times, r of them; position and velocity (r, m, 2) [m,
-    m/s] of their paths; sides: for each recording, LEFT or RIGHT (m, n) on which the rest of its path from each point passes its
-    n obstacles; scene (r,): equal numbers for recordings in the same scene.
+    demonstrations: one of each class, to recall; recordings: those with states, r of them; states (r, m, 4): x, y, vx, vy [m,
+    m/s], infinite beyond the end of each; ends (r,): the last state of each; sides: for each recording, LEFT or RIGHT (m, n) on
+    which its path from each state to its goal passes its n obstacles; passing: the states (n,) that are nearest to them; scene
+    (r,): equal numbers for recordings in the same scene.
     """
 
     demonstrations: tuple[Demonstration, ...]
     recordings: tuple[Demonstration, ...]
-    position: Array
-    velocity: Array
+    states: Array
+    ends: NDArray[np.intp]
     sides: tuple[NDArray[np.int8], ...]
+    passing: tuple[NDArray[np.intp], ...]
     scene: tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence(Record):
-    """Of recordings that count: their weights (e,), rows in the library (e,) and points (e,) at which they are nearest."""
+    """The e recordings that count, beside the n obstacles and g goals of the prediction.
+
+    weight (e,); row (e,) in the library; state (e,), the nearest one; sides (e, n): LEFT or RIGHT, on which each passes the
+    obstacles from there on, 0 for an obstacle that it does not know; passing_s (e, n): the time until then [s]; is_at_goal (e,
+    g): whether it ends at a goal.
+    """
 
     weight: Array
     row: NDArray[np.intp]
-    point: NDArray[np.intp]
+    state: NDArray[np.intp]
+    sides: NDArray[np.int8]
+    passing_s: Array
+    is_at_goal: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement(Record):
+    """Of a class and e recordings: is_same (e,): whether they are of it; until_s (e,) [s]: how long they may lead its path."""
+
+    is_same: NDArray[np.bool_]
+    until_s: Array
 
 
 def make_library(found: Sequence[Demonstration]) -> Library:
-    """Return the library of demonstrations, of which those with times are recordings."""
+    """Return the library of demonstrations, of which those with states are recordings."""
     distinct: list[Demonstration] = []
     for each in found:
         if not any(is_same_demonstration(each, known) for known in distinct):
             distinct.append(each)
-    recordings = tuple(each for each in found if each.times_s is not None)
-    position = np.array([each.path for each in recordings]).reshape(-1, POINTS, 2)
-    times_s = np.array([each.times_s for each in recordings]).reshape(-1, POINTS)
-    velocity = np.zeros_like(position)
-    if recordings:
-        steps_s = np.maximum(np.gradient(times_s, axis=1), LEAST_STEP_S)
-        velocity = np.gradient(position, axis=1) / steps_s[..., None]
-    sides, numbers = tuple(_find_rest_sides(each) for each in recordings), dict[tuple[object, ...], int]()
+    recordings = tuple(each for each in found if each.states is not None)
+    tables = [each.states for each in recordings if each.states is not None]
+    states = np.full((len(tables), max(map(len, tables), default=0), 4), np.inf)
+    for row, table in enumerate(tables):
+        states[row, : len(table)] = table
+    ends = np.array([len(table) - 1 for table in tables], dtype=np.intp)
+    sides, passing = [], []
+    for recording, table in zip(recordings, tables, strict=True):
+        sides.append(_find_rest_sides(recording, table))
+        passing.append(np.hypot(*(table[:, None, :2] - recording.centre).transpose(2, 0, 1)).argmin(axis=0))
+    numbers = dict[tuple[object, ...], int]()
     scene = tuple(numbers.setdefault((each.frame_id, each.ids, each.centre.tobytes()), len(numbers)) for each in recordings)
-    return Library(tuple(distinct), recordings, position, velocity, sides, scene)
+    return Library(tuple(distinct), recordings, states, ends, tuple(sides), tuple(passing), scene)
 
 
-def _find_rest_sides(recording: Demonstration) -> NDArray[np.int8]:
-    """Return the sides (m, n) on which the rest of a path from each of its m points passes its n obstacles."""
-    offset = recording.path[:, None] - recording.centre
+def _find_rest_sides(recording: Demonstration, states: Array) -> NDArray[np.int8]:
+    """Return the sides (m, n) on which a path from each of its m states to its goal passes its n obstacles."""
+    offset = states[:, None, :2] - recording.centre
     turns = np.unwrap(np.arctan2(offset[..., 1], offset[..., 0]), axis=0)
-    return np.where(turns[-1] - turns < 0.0, LEFT, RIGHT).astype(np.int8)
+    at_goal = int(np.hypot(*(states[:, :2] - recording.path[-1]).T).argmin())
+    return np.where(turns[at_goal] - turns < 0.0, LEFT, RIGHT).astype(np.int8)
 
 
 NO_LIBRARY = make_library(())
 
 
-def find_evidence(library: Library, hand: HandState, obstacles: Obstacles, config: ExperienceConfig) -> Evidence:
+def find_evidence(library: Library, hand: HandState, obstacles: Obstacles, goals: Array, config: ExperienceConfig) -> Evidence:
     """Find the recordings that count: nearest first, at most MOST_NEAR, only those whose obstacles are where they were."""
-    apart = ((library.position - hand.mean[:2]) ** 2).sum(axis=2) / config.position_stddev**2
-    if hand.onset_ns is not None:
-        apart += ((library.velocity - hand.mean[2:4]) ** 2).sum(axis=2) / config.velocity_stddev**2
-    point = apart.argmin(axis=1)
-    weight = np.exp(-0.5 * apart[np.arange(len(apart)), point])
+    scale = np.repeat([config.position_stddev, config.velocity_stddev], 2)
+    apart = (((library.states - hand.mean[:4]) / scale) ** 2).sum(axis=2)
+    state = apart.argmin(axis=1)
+    weight = np.exp(-0.5 * apart[np.arange(len(apart)), state])
     rows, is_same = list[int](), dict[int, bool]()
     for row in np.argsort(-weight, kind='stable').tolist():
         if weight[row] < LEAST_WEIGHT or len(rows) == MOST_NEAR:
@@ -108,10 +130,18 @@ def find_evidence(library: Library, hand: HandState, obstacles: Obstacles, confi
             is_same[scene] = library.recordings[row].matches(hand.frame_id, obstacles)
         if is_same[scene]:
             rows.append(row)
-    return Evidence(weight[rows], np.array(rows, dtype=np.intp), point[rows])
+    sides, passing_s = np.zeros((len(rows), len(obstacles)), dtype=np.int8), np.zeros((len(rows), len(obstacles)))
+    column = {name: number for number, name in enumerate(obstacles.ids)}
+    for number, row in enumerate(rows):
+        columns = [column[name] for name in library.recordings[row].ids]
+        sides[number, columns] = library.sides[row][state[row]]
+        passing_s[number, columns] = STEP_S * (library.passing[row] - state[row])
+    ends = np.array([library.recordings[row].path[-1] for row in rows]).reshape(-1, 1, 2)
+    is_at_goal = np.hypot(*(ends - goals).transpose(2, 0, 1)) <= NEAR
+    return Evidence(weight[rows], np.array(rows, dtype=np.intp), state[rows], sides, passing_s, is_at_goal)
 
 
-def pool_likelihoods(
+def pool_recordings(
     candidates: Sequence[PredictedCandidate],
     library: Library,
     hand: HandState,
@@ -119,32 +149,80 @@ def pool_likelihoods(
     goals: Array,
     config: ExperienceConfig,
 ) -> list[PredictedCandidate]:
-    """Return candidates with the likelihoods that the recordings of a library change, the most likely first; goals (g, 2) [m]."""
+    """Return candidates with likelihoods and paths that the recordings of a library change, the most likely first.
+
+    hand: as estimated; obstacles: grown by the radius of the hand; goals (g, 2) [m].
+    """
     taken = [each for each in candidates if each.has_likelihood]
     if not taken or not library.recordings:
         return list(candidates)
-    evidence = find_evidence(library, hand, obstacles, config)
+    evidence = find_evidence(library, hand, obstacles, goals, config)
     if not len(evidence.row):
         return list(candidates)
-    counts = np.array([_count_recordings(each.candidate, library, evidence, goals) for each in taken])
-    sides = tabulate_sides([each.solution for each in taken], obstacles)
-    gap = find_decisions(sides, obstacles, hand, goals).next_gap
-    likelihoods = _count_gaps_and_classes(np.array([each.likelihood for each in taken]), counts, gap, config)
-    pooled = [replace(each, likelihood=share) for each, share in zip(taken, likelihoods.tolist(), strict=True)]
+    decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), obstacles, hand, goals)
+    agreements = [compare_with_class(each.candidate, evidence, obstacles, decisions.next_row) for each in taken]
+    counts = np.array([evidence.weight[each.is_same].sum() for each in agreements])
+    choice = decisions.next_gap if len(decisions.next_row) else np.array([each.candidate.goal for each in taken])
+    likelihoods = _count_gaps_and_classes(np.array([each.likelihood for each in taken]), counts, choice, config)
+    pooled = []
+    for each, share, agreement in zip(taken, likelihoods.tolist(), agreements, strict=True):
+        recorded = follow_recordings(library, evidence, agreement.until_s, hand, each.times)
+        pooled.append(replace(each, likelihood=share, solution=_pool_path(each, recorded, agreement, hand, obstacles, config)))
     pooled.sort(key=lambda each: (-each.likelihood, each.label))
     return pooled + [each for each in candidates if not each.has_likelihood]
 
 
-def _count_recordings(candidate: Candidate, library: Library, evidence: Evidence, goals: Array) -> float:
-    """Return the weight of the recordings that lead to the goal of a candidate, on its sides of all obstacles in its label."""
-    at_goal = np.hypot(*(library.position[evidence.row, -1] - goals[candidate.goal]).T) <= NEAR
-    count = 0.0
-    for number in np.flatnonzero(at_goal).tolist():
-        row = evidence.row[number]
-        sides = dict(zip(library.recordings[row].ids, library.sides[row][evidence.point[number]].tolist(), strict=True))
-        if all(sides.get(name) == side for name, side in candidate.sides):
-            count += float(evidence.weight[number])
-    return count
+def compare_with_class(candidate: Candidate, evidence: Evidence, obstacles: Obstacles, next_row: NDArray[np.intp]) -> Agreement:
+    """Compare the recordings with the class of a candidate: its goal, and its sides of all obstacles in its label.
+
+    A recording may lead the path until it passes an obstacle on another side, or the last obstacle if its goal is another one;
+    not at all if that obstacle is in the next row, which is empty where only goals differ, or not known to the recording.
+    """
+    column = {name: number for number, name in enumerate(obstacles.ids)}
+    columns = [column[name] for name, _ in candidate.sides if name in column]
+    sides, passing_s = evidence.sides[:, columns], evidence.passing_s[:, columns]
+    is_other = sides != [side for name, side in candidate.sides if name in column]
+    is_at_goal = evidence.is_at_goal[:, candidate.goal]
+    until_s = np.where(is_other, passing_s, np.inf).min(axis=1, initial=np.inf)
+    until_s = np.where(is_at_goal, until_s, np.minimum(until_s, passing_s.max(axis=1, initial=0.0)))
+    until_s[(is_other & (np.isin(columns, next_row) | (sides == 0))).any(axis=1)] = 0.0
+    if not len(next_row):
+        until_s[~is_at_goal] = 0.0
+    return Agreement(is_at_goal & ~is_other.any(axis=1), until_s)
+
+
+def follow_recordings(library: Library, evidence: Evidence, until_s: Array, hand: HandState, times: Array) -> RecordedPaths:
+    """Return where recordings lead the hand at times (m,) [s] from now, each with its weight up to until_s (e,) [s].
+
+    Paths are linear between states, and stay at the last one.
+    """
+    row, ends = evidence.row[:, None], library.ends[evidence.row]
+    at = np.minimum(evidence.state[:, None] + times / STEP_S, ends[:, None])
+    before = np.minimum(at.astype(np.intp), ends[:, None] - 1)
+    share = (at - before)[..., None]
+    paths = (1.0 - share) * library.states[row, before, :2] + share * library.states[row, before + 1, :2]
+    paths += (hand.mean[:2] - library.states[evidence.row, evidence.state, :2])[:, None]
+    left_s = np.minimum(STEP_S * (ends - evidence.state), until_s)
+    return RecordedPaths(paths, fade_weights(evidence.weight, left_s, times))
+
+
+def _pool_path(
+    candidate: PredictedCandidate,
+    recorded: RecordedPaths,
+    agreement: Agreement,
+    hand: HandState,
+    obstacles: Obstacles,
+    config: ExperienceConfig,
+) -> Solution:
+    """Return the solution with the path that recordings change; an answer that is kept was changed when it was found."""
+    for is_used in (agreement.until_s > 0.0, agreement.is_same):
+        if candidate.age_s or not is_used.any():
+            break
+        uncertainty = hand.covariance[:2, :2], 0.5 * config.velocity_stddev
+        pooled = pool_path(candidate.solution, recorded.take(is_used), *uncertainty, config.prior_count_path)
+        if is_same_way(candidate, pooled, obstacles):
+            return pooled
+    return candidate.solution
 
 
 def _count_gaps_and_classes(likelihoods: Array, counts: Array, gap: NDArray[np.intp], config: ExperienceConfig) -> Array:

@@ -90,8 +90,8 @@ class Memory:
                 solutions[label] = result.solution
             elif result.status in (Status.ETA_UNREACHABLE, Status.LEFT_CLASS) and self.followed.get(label, 0) < RETRY_AFTER:
                 solutions[label], followed[label] = result.solution, self.followed.get(label, 0) + 1
-        settled = {label for label, each in results.items() if each.solution.is_settled}
-        turns = {each.label: stamp_ns if each.label in settled else earlier.turns.get(each.label, -1) for each in candidates}
+        complete = {label for label, each in results.items() if each.solution.is_complete}
+        turns = {each.label: stamp_ns if each.label in complete else earlier.turns.get(each.label, -1) for each in candidates}
         return EarlierSolutions(solutions, likelihoods, turns), followed
 
 

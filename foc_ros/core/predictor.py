@@ -16,7 +16,7 @@ from .dynamics.noise import scale_noise
 from .dynamics.plant_models import make_plant_model
 from .dynamics.predictive_covariance import SharedCovariances, widen_covariance
 from .estimation.duration import choose_candidate_durations, estimate_times_to_go, is_passing, limit_change
-from .experience import NO_LIBRARY, Library, pool_likelihoods
+from .experience import NO_LIBRARY, Library, pool_recordings
 from .height import HeightPredictor
 from .homotopy import Turn, search
 from .homotopy.demonstrations import GuessTiming, recall_demonstrations
@@ -72,7 +72,7 @@ def predict(
         The prediction, and the memory for the next one. Without a deadline, equal arguments give equal results, wall times apart.
     """
     began, past = time.perf_counter(), memory.past.keep_goals(goals)
-    hand = _simplify_start(hand, config.estimator.acceleration_time_s)
+    estimated, hand = hand, _simplify_start(hand, config.estimator.acceleration_time_s)
     durations = _find_durations(hand, goals, past, config)
     given, grown = obstacles, obstacles.grow(config.scene.hand_radius)
     shared = SharedCovariances(hand, config)
@@ -91,7 +91,7 @@ def predict(
     widened = [_widen_covariance(each, shared, hand, config) for each in solved]
     kept = keep_answers(candidates, widened, past, hand.stamp_ns, config.likelihood.hold_s, costs)
     ranked, choice = rank_candidates(kept, config.likelihood, obstacles, hand, goals)
-    ranked = pool_likelihoods(ranked, library, hand, grown, goals, config.experience)
+    ranked = pool_recordings(ranked, library, estimated, grown, goals, config.experience)
     smooth = smooth_paths(ranked, past, hand.stamp_ns, config.likelihood.smoothing_s)
     continuous = make_continuous(smooth, past, hand.stamp_ns, config.likelihood)
     numbers = memory.numbers.keep_goals(past.durations_s)

@@ -288,7 +288,7 @@ class Solution(Record):
     multipliers: (obstacle id, step, value) of the active constraints, with `lv`, `hc` and `optimal` at fractions of a step; the
     value is the growth of J_aug for each metre more of required distance [m/s^6]; equivalent_weights: tau [m^2] and lambda
     [1/s^6] of each active constraint. safety_factor_slope: derivative dk/ds along the penalty path of `lv` and `hc`, 0 where
-    unknown. is_settled: False where the search ended before it knew whether a larger safety factor is in reach and worth it.
+    unknown. is_complete: False where there was no time to look for a larger safety factor.
     qp_solves: number of QPs solved; iterations: of `algorithm1`, None for the others; solve_s: wall time [s].
     """
 
@@ -312,7 +312,7 @@ class Solution(Record):
     multipliers: tuple[tuple[str, float, float], ...] = ()
     equivalent_weights: tuple[tuple[float, float], ...] = ()
     safety_factor_slope: float = 0.0
-    is_settled: bool = True
+    is_complete: bool = True
     qp_solves: int = 0
     iterations: int | None = None
     solve_s: float = 0.0

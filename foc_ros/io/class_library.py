@@ -10,17 +10,15 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.errors import InputError, RecordingError
-from foc_ros.core.homotopy.demonstrations import POINTS, Demonstration
+from foc_ros.core.homotopy.demonstrations import MOST_STATES, POINTS, Demonstration
 from foc_ros.core.types import LEFT, RIGHT, Array
 
-from .documents import read_document
+from .documents import MAX_BYTES, read_document
 
 SIDES = {'left': LEFT, 'right': RIGHT}
 MOST_WAYS, MOST_OBSTACLES = 500, 4096
 FARTHEST = 1e6
-"""Largest coordinate [m]."""
-LONGEST_S = 1e4
-"""Longest recording [s]."""
+"""Largest coordinate [m], and largest velocity [m/s]."""
 
 
 def load_library(name: str) -> tuple[Demonstration, ...]:
@@ -41,14 +39,16 @@ def load_library(name: str) -> tuple[Demonstration, ...]:
 def save_library(file: Path, ways: Sequence[Demonstration]) -> None:
     """Write a library, replacing the file.
 
-    Raises RecordingError if the file cannot be written, InputError for too many demonstrations.
+    Raises RecordingError if the file cannot be written, InputError for more demonstrations than a library may hold.
     """
     if len(ways) > MOST_WAYS:
         raise InputError(f'{file}: ways', f'at most {MOST_WAYS}', f'{len(ways)} with the new ones')
-    document = {'ways': [_dump_demonstration(way) for way in ways]}
+    text = json.dumps({'ways': [_dump_demonstration(way) for way in ways]}, allow_nan=False) + '\n'
+    if len(text) > MAX_BYTES:
+        raise InputError(f'{file}: ways', f'at most {MAX_BYTES:,} bytes', f'{len(text):,} of {len(ways)} ways')
     unfinished = file.with_name(file.name + '.unfinished')
     try:
-        unfinished.write_text(json.dumps(document, allow_nan=False) + '\n', encoding='utf-8')
+        unfinished.write_text(text, encoding='utf-8')
         unfinished.replace(file)
     except OSError as error:
         unfinished.unlink(missing_ok=True)
@@ -61,13 +61,13 @@ def _dump_demonstration(way: Demonstration) -> dict[str, Any]:
         {'id': identity, 'x': x, 'y': y, 'side': sides[side]}
         for identity, (x, y), side in zip(way.ids, way.centre.tolist(), way.sides, strict=True)
     ]
-    times = {} if way.times_s is None else {'times_s': way.times_s.tolist()}
-    return {'frame_id': way.frame_id, 'passed': passed, 'path': way.path.tolist(), **times}
+    states = {} if way.states is None else {'states': way.states.tolist()}
+    return {'frame_id': way.frame_id, 'passed': passed, 'path': way.path.tolist(), **states}
 
 
 def _read_demonstration(field: str, way: object) -> Demonstration:
-    if not isinstance(way, Mapping) or set(way) - {'times_s'} != {'frame_id', 'passed', 'path'}:
-        raise InputError(field, 'exactly frame_id, passed, path and, for a recording, times_s', _shorten(way))
+    if not isinstance(way, Mapping) or set(way) - {'states'} != {'frame_id', 'passed', 'path'}:
+        raise InputError(field, 'exactly frame_id, passed, path and, for a recording, states', _shorten(way))
     frame_id, passed, path = way['frame_id'], way['passed'], way['path']
     if not isinstance(frame_id, str):
         raise InputError(f'{field}.frame_id', 'a text', _shorten(frame_id))
@@ -79,32 +79,30 @@ def _read_demonstration(field: str, way: object) -> Demonstration:
     ids = tuple(identity for identity, _, _ in rows)
     if len(set(ids)) != len(ids):
         raise InputError(f'{field}.passed', 'each obstacle once', _shorten(ids))
-    points = np.array([_read_point(f'{field}.path[{k}]', point) for k, point in enumerate(path)])
+    points = np.array([_read_numbers(f'{field}.path[{k}]', point, 2) for k, point in enumerate(path)])
     centre: Array = np.array([point for _, point, _ in rows], dtype=float).reshape(-1, 2)
-    times_s = _read_times(f'{field}.times_s', way['times_s']) if 'times_s' in way else None
-    return Demonstration(frame_id, ids, tuple(side for _, _, side in rows), centre, points, times_s)
+    states = _read_states(f'{field}.states', way['states']) if 'states' in way else None
+    return Demonstration(frame_id, ids, tuple(side for _, _, side in rows), centre, points, states)
 
 
-def _read_times(field: str, times: object) -> Array:
-    if not isinstance(times, list) or len(times) != POINTS:
-        raise InputError(field, f'{POINTS} times', _shorten(times))
-    if not all(_is_number(value, LONGEST_S) for value in times) or times[0] != 0 or not (np.diff(times) >= 0.0).all():
-        raise InputError(field, f'numbers that rise from 0 to at most {LONGEST_S:g} s', _shorten(times))
-    return np.array(times, dtype=float)
+def _read_states(field: str, states: object) -> Array:
+    if not isinstance(states, list) or not 2 <= len(states) <= MOST_STATES:
+        raise InputError(field, f'2 to {MOST_STATES} states', _shorten(states))
+    return np.array([_read_numbers(f'{field}[{k}]', state, 4) for k, state in enumerate(states)])
 
 
-def _read_passed(field: str, row: object) -> tuple[str, tuple[float, float], int]:
+def _read_passed(field: str, row: object) -> tuple[str, tuple[float, ...], int]:
     if not isinstance(row, Mapping) or set(row) != {'id', 'x', 'y', 'side'} or not isinstance(row['id'], str):
         raise InputError(field, 'id (a text), x, y and side', _shorten(row))
     if row['side'] not in ('left', 'right'):
         raise InputError(f'{field}.side', 'left or right', _shorten(row['side']))
-    return row['id'], _read_point(field, [row['x'], row['y']]), SIDES[row['side']]
+    return row['id'], _read_numbers(field, [row['x'], row['y']], 2), SIDES[row['side']]
 
 
-def _read_point(field: str, point: object) -> tuple[float, float]:
-    if isinstance(point, list) and len(point) == 2 and all(_is_number(value, FARTHEST) for value in point):
-        return float(point[0]), float(point[1])
-    raise InputError(field, f'two numbers within {FARTHEST:g} m', _shorten(point))
+def _read_numbers(field: str, values: object, count: int) -> tuple[float, ...]:
+    if isinstance(values, list) and len(values) == count and all(_is_number(value, FARTHEST) for value in values):
+        return tuple(float(value) for value in values)
+    raise InputError(field, f'{count} numbers within {FARTHEST:g}', _shorten(values))
 
 
 def _is_number(value: object, largest: float) -> bool:

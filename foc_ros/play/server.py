@@ -9,23 +9,21 @@ from __future__ import annotations
 import asyncio
 import ipaddress
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from socket import socket
 from typing import Any
 
-from foc_ros.core.errors import FocError, InputError
+from tornado.httpserver import HTTPServer
+from tornado.ioloop import PeriodicCallback
+from tornado.web import Application, HTTPError, RequestHandler
+from tornado.websocket import WebSocketClosedError, WebSocketHandler
+
+from foc_ros.core.errors import FocError
 from foc_ros.reporting import page as report_page
 
 from .page_messages import LONGEST_MESSAGE, parse_message
 from .session import Session
-
-try:
-    from tornado.httpserver import HTTPServer
-    from tornado.ioloop import PeriodicCallback
-    from tornado.netutil import bind_sockets
-    from tornado.web import Application, HTTPError, RequestHandler
-    from tornado.websocket import WebSocketClosedError, WebSocketHandler
-except ImportError as error:
-    raise FocError("play needs tornado: install python3-tornado, or pip install 'foc_ros[play]'") from error
 
 FOLDER = Path(__file__).parent / 'page'
 TYPES = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript'}
@@ -110,14 +108,6 @@ def is_own_host(name: str, host: str) -> bool:
     return True
 
 
-def is_loopback(host: str) -> bool:
-    """Return whether a host is reached from this computer only."""
-    try:
-        return host == 'localhost' or ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
-
-
 def make_application(session: Session, host: str) -> Application:
     """Return the application for a session."""
     given = {'session': session, 'host': host}
@@ -126,20 +116,11 @@ def make_application(session: Session, host: str) -> Application:
     return Application(routes, websocket_max_message_size=LONGEST_MESSAGE, log_function=lambda _: None)
 
 
-def listen(session: Session, host: str, port: int) -> tuple[HTTPServer, int]:
-    """Start to serve on a host and a port, 0 for a free one; return the server and its port.
-
-    Raises InputError where that is impossible.
-    """
+def listen(session: Session, host: str, sockets: Sequence[socket]) -> HTTPServer:
+    """Start to serve on the sockets of a host (`open_sockets`); return the server."""
     server = HTTPServer(make_application(session, host))
-    try:
-        sockets = bind_sockets(port, host)
-    except OSError as error:
-        raise InputError(
-            '--port', 'a free port of this computer, and a host that it has', f'{host}:{port}: {error.strerror}'
-        ) from error
     server.add_sockets(sockets)
-    return server, sockets[0].getsockname()[1]
+    return server
 
 
 async def serve(session: Session, ended: asyncio.Event) -> None:

@@ -28,8 +28,12 @@ ASIDE = 0.1
 """Largest distance of the hand from the demonstrated path [m]."""
 POINTS = 65
 """Number of points of a demonstrated path."""
+STEP_S, MOST_STATES = 0.05, 400
+"""Time from one state of a recording to the next [s], and the largest number of states."""
 DIGITS = 6
 """Decimals of the coordinates: a micrometre is exact enough and keeps the file small."""
+STATE_DIGITS = 5
+"""Decimals of the states of recordings, which are many."""
 MOST = 2
 """Number of recalled candidates that are solved at most, besides the `max_candidates` that the search finds."""
 
@@ -38,7 +42,8 @@ MOST = 2
 class Demonstration(Record):
     """A demonstrated path (m, 2) [m] in a frame, and the obstacles that it passed: ids, sides and centre (n, 2) [m].
 
-    times_s (m,): seconds from the first point on, rising; None for a class that is only recalled.
+    states (t, 4): x, y, vx, vy [m, m/s] of the hand every STEP_S, as they were estimated, from before the path to after it; None
+    for a class that is only recalled.
     """
 
     frame_id: str
@@ -46,7 +51,7 @@ class Demonstration(Record):
     sides: tuple[int, ...]
     centre: Array
     path: Array
-    times_s: Array | None = None
+    states: Array | None = None
 
     def matches(self, frame_id: str, obstacles: Obstacles) -> bool:
         """Tell whether all obstacles that the path passed are present, by id, within NEAR of where they were."""
@@ -63,10 +68,10 @@ class GuessTiming(NamedTuple):
     steps: int
 
 
-def record_demonstration(frame_id: str, path: Array, obstacles: Obstacles, times_s: Array | None = None) -> Demonstration:
+def record_demonstration(frame_id: str, path: Array, obstacles: Obstacles, states: Array | None = None) -> Demonstration:
     """Record a path (m, 2) [m], m >= 2, as POINTS points at equal distances, with the sides on which it passes the obstacles.
 
-    times_s (m,): of its points [s], rising, if they are to be kept.
+    states (t, 4): those of the hand every STEP_S [m, m/s], if they are to be kept.
     """
     length = compute_path_lengths(path)
     at = np.linspace(0.0, length[-1], POINTS)
@@ -75,7 +80,7 @@ def record_demonstration(frame_id: str, path: Array, obstacles: Obstacles, times
     ids = tuple(sorted(sides))
     centre = obstacles.centre[[obstacles.ids.index(identity) for identity in ids]]
     passed = frame_id, ids, tuple([sides[identity] for identity in ids]), centre.round(DIGITS)
-    return Demonstration(*passed, evenly, None if times_s is None else np.interp(at, length, times_s - times_s[0]).round(DIGITS))
+    return Demonstration(*passed, evenly, None if states is None else states.round(STATE_DIGITS))
 
 
 def is_same_demonstration(one: Demonstration, other: Demonstration) -> bool:

@@ -99,7 +99,7 @@ def _evaluate(problem: Problem, result: StrategyResult, minimum: MinimumSafetyFa
         multipliers=tuple(zip(names, contacts.time.tolist(), contacts.multiplier.tolist(), strict=True)),
         equivalent_weights=((result.tau, result.lam),) * len(names) if weights is None else tuple(weights),
         safety_factor_slope=result.safety_factor_slope,
-        is_settled=result.is_settled,
+        is_complete=result.is_complete,
         qp_solves=result.qp_solves,
         iterations=result.iterations,
         solve_s=time.perf_counter() - began,

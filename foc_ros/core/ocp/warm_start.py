@@ -32,7 +32,7 @@ class Start:
 
     positions (N, 2): at steps 1..N, to linearise at [m]. A start from an earlier solution also has its stacked control (2N,), its
     contacts, safety factor, lambda, and slope dk/ds (0 where not known). lam is None for a cold start, which has none of these.
-    is_unfinished: whether the deadline stopped the earlier solution. tries: how many larger safety factors may be tried; finite
+    is_unfinished: whether the deadline stopped the earlier solution. raises: how often the safety factor may be raised; finite
     where another search goes on from the result, in this prediction or the next one.
     """
 
@@ -43,7 +43,7 @@ class Start:
     lam: float | None = None
     safety_factor_slope: float = 0.0
     is_unfinished: bool = False
-    tries: float = math.inf
+    raises: float = math.inf
 
 
 def cold_start(guess: Array) -> Start:

@@ -47,8 +47,8 @@ class StrategyResult:
         (tau, lambda) of each contact, None if these are tau and lam for all.
     aims_at_eta
         Whether a control with less than the wanted eta is no solution.
-    is_settled
-        Whether it is known that no larger safety factor is in reach and worth its effort.
+    is_complete
+        Whether larger safety factors were looked for.
     """
 
     status: Status
@@ -63,7 +63,7 @@ class StrategyResult:
     minimum: MinimumSafetyFactor | None = None
     equivalent_weights: list[tuple[float, float]] | None = None
     aims_at_eta: bool = True
-    is_settled: bool = True
+    is_complete: bool = True
 
 
 class Strategy(Protocol):

@@ -51,6 +51,8 @@ NEARLY = 0.6
 WARM_STRIDE, COLD_STRIDE = 0.6, 0.4
 """First strides in k, if they are not too long; from an earlier solution it is shorter, the nearer the slope is to that which is
 worth it."""
+TRIES, WARM_TRIES = 8, 1
+"""Larger k that are tried in vain if another search goes on from the result; the same from an earlier solution, for one raise."""
 NARROW = 0.02
 """Bracket in k at which the search ends."""
 
@@ -58,8 +60,7 @@ NARROW = 0.02
 def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadline = NEVER) -> StrategyResult:
     """Find a local minimum from a start.
 
-    Where the tries of k are limited, because another search goes on from the result, one that runs out of time has the k that it
-    has reached.
+    Where another search goes on from the result, one that runs out of time has the k that it has reached.
     """
     search, is_late = _Search(problem, deadline), False
     try:
@@ -67,7 +68,7 @@ def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadli
     except OutOfTimeError:
         if search.best is None:
             raise
-        status, is_late = search.judge() if search.tries < math.inf else Status.DEADLINE, True
+        status, is_late = search.judge() if search.raises < math.inf else Status.DEADLINE, True
     point = search.best
     if status is Status.ITERATION_LIMIT:
         assert start.control is not None
@@ -94,7 +95,7 @@ def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadli
         qp_solves=search.qp_solves,
         minimum=minimum,
         equivalent_weights=weights,
-        is_settled=search.is_settled,
+        is_complete=search.is_complete,
     )
 
 
@@ -131,7 +132,7 @@ class _Search:
         self.problem, self.deadline, self.qp_solves = problem, deadline, 0
         self.best: SurrogatePoint | None = None
         self.wanted = problem.wanted_k * (1.0 + CLOSE)
-        self.tries, self.is_settled = math.inf, True
+        self.raises, self.tries, self.is_complete = math.inf, math.inf, True
         wish = problem.preference
         self.is_hard = math.isinf(wish.shortfall)
         rate = wish.shortfall / wish.beta if wish.beta > 0.0 else math.inf
@@ -140,7 +141,8 @@ class _Search:
 
     def run(self, start: Start) -> Status:
         """Leave the best point in `best`; return how the search ended."""
-        self.tries = math.inf if self.is_hard else start.tries
+        if not self.is_hard and start.raises < math.inf:
+            self.raises, self.tries = start.raises, TRIES if start.control is None or start.raises > 1 else WARM_TRIES
         if not self.follow_in_time(start):
             if start.control is not None and not start.is_unfinished:
                 return Status.ITERATION_LIMIT
@@ -241,30 +243,30 @@ class _Search:
     def raise_k(self, stride: float) -> bool:
         """Raise k to the wanted one, or to the one that is worth its effort; tell whether no larger k could be reached.
 
-        stride: the first one in k. Where the tries end with one that has raised k, or there are none, a larger k may be in reach.
+        stride: the first one in k.
         """
         assert self.best is not None
         low, high = self.best, math.inf  # the k of a point that costs too much
         before = low
         stride = min(self.wanted - low.k, stride)
-        shortest, self.is_settled = min(NARROW, stride / 4.0) / 2.0, not self.is_cheap(low)
-        while self.is_cheap(low) and stride > shortest and self.tries > 0:
-            self.tries, self.is_settled = self.tries - 1, True
+        shortest, tries, raises = min(NARROW, stride / 4.0) / 2.0, self.tries, self.raises
+        self.is_complete = raises > 0 or not self.is_cheap(low)
+        while self.is_cheap(low) and stride > shortest and tries > 0 and raises > 0:
             k = min(low.k + stride, self.wanted)
             point = self.solve(*extrapolate(before, low, k), k)
             if point is None:
-                stride /= 2
+                stride, tries = stride / 2, tries - 1
                 continue
             if self.slope(point) <= self.rate:
                 before, low = low, point
-                self.best, self.is_settled = low, not self.is_cheap(low)
-                stride *= 2
+                self.best = low
+                stride, raises = 2 * stride, raises - 1
             else:
                 high = point.k
             is_near = low.k < self.wanted and self.slope(point) > NEARLY * self.rate
             worth = self.weigh(point.control, point.contacts, point.k) if is_near else None
             if worth is not None and low.k <= worth.k <= min(high, self.wanted):
-                self.best, self.is_settled = worth, True
+                self.best = worth
                 return False
             stride = min(stride, (high - low.k) / 2)
         return self.is_cheap(low) and stride <= shortest
