@@ -8,6 +8,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.duration import Infinite
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import (
@@ -85,8 +86,11 @@ def describe_incompatible_publishers(node: Node, role: str, subscription: Any) -
 
 def describe_incompatible_subscriptions(node: Node, publisher: Any) -> list[str]:
     """Return a text for each present subscription of an output that cannot receive its messages."""
-    found = node.get_subscriptions_info_by_topic(publisher.topic_name)
-    reasons = [(each.node_name, _find_incompatibility(publisher.qos_profile, each.qos_profile)) for each in found]
+    found, given = node.get_subscriptions_info_by_topic(publisher.topic_name), publisher.qos_profile
+    # as in the profiles of the graph: durations that the node leaves open would count as shorter than infinite ones
+    endless = {'deadline': Infinite, 'liveliness_lease_duration': Infinite}
+    offered = QoSProfile(reliability=given.reliability, durability=given.durability, depth=given.depth, **endless)
+    reasons = [(each.node_name, _find_incompatibility(offered, each.qos_profile)) for each in found]
     topic = publisher.topic_name
     remedy = f'(see qos_overrides.{topic}.publisher)'
     return [f'{name} cannot hear {topic}, incompatible QoS: {reason} {remedy}' for name, reason in reasons if reason]
