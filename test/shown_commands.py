@@ -63,6 +63,8 @@ NOT_RUN = {
     'ros2 run foc_ros foc_node --ros-args --enclave /foc': ROS,
     # measuring
     '.venv/bin/python scripts/measure_candidates.py': f'{LONG}; test_measure_predictions.py measures a part',
+    '.venv/bin/python scripts/measure_candidates.py ../shared/data/hlp_reaching --set scene.hand_radius=0.0125 --budget 0.01': f'{LONG}; '
+    'test_measure_predictions.py measures a part',
     '.venv/bin/python scripts/measure_flicker.py': f'{LONG}; test_measure_predictions.py measures a part',
     '.venv/bin/python scripts/measure_clutter.py': f'{LONG}; test_measure_clutter.py measures a part',
     '.venv/bin/python scripts/make_accuracy_figures.py': f'{LONG}; test_accuracy_page.py checks the page',
@@ -70,7 +72,9 @@ NOT_RUN = {
     # guidance
     'foc_ros simulate --operators accurate,noisy,laggy,changes_way,unannounced_goal --trials 200 --params rate.yaml': f'{LONG}; '
     'test_simulation.py runs a part',
-    'foc_ros simulate --operators human_paths --trials 48 --recordings recordings --params rate.yaml': f'{LONG}; '
+    'foc_ros simulate --operators human_paths --assistance foc --trials 48 --recordings d3il_avoiding --params rate.yaml': f'{LONG}; '
+    'test_simulation.py runs a part',
+    'foc_ros simulate --operators human_paths --assistance foc --trials 209 --recordings hlp_reaching --params hlp.yaml': f'{LONG}; '
     'test_simulation.py runs a part',
     # CONTRIBUTING
     'make check': BY_CI,
