@@ -17,7 +17,7 @@ SUDO, ROOT_OR_NETWORK = 'needs root', 'needs root or the network'
 ROS = 'needs the commands of a ROS installation'
 BY_CI = '.ci/run runs this line'
 LONG = 'takes minutes'
-SIMULATED, REPLAYED = f'{LONG}; test_simulation.py runs a part', f'{LONG}; test_measure_predictions.py measures a part'
+PARTLY, REPLAYED = f'{LONG}; test_simulation.py runs a part', f'{LONG}; test_measure_predictions.py measures a part'
 FIT = 'takes minutes; test_fit.py and test_evaluate.py run it with few predictions'
 LAUNCH = 'ros2launch is not a package of the index; test_launch.py starts the files where launch_ros is installed'
 SHELL = 'the program is on the path of the test already'
@@ -64,15 +64,15 @@ NOT_RUN = {
     'ros2 run foc_ros foc_node --ros-args --enclave /foc': ROS,
     # measuring
     '.venv/bin/python scripts/measure_candidates.py': REPLAYED,
-    '.venv/bin/python scripts/measure_candidates.py ../shared/data/hlp_reaching --set scene.hand_radius=0.0125 --budget 0.01': REPLAYED,
+    '.venv/bin/python scripts/measure_candidates.py hlp_reaching --set scene.hand_radius=0.0125 --budget 0.01': REPLAYED,
     '.venv/bin/python scripts/measure_flicker.py': REPLAYED,
     '.venv/bin/python scripts/measure_clutter.py': f'{LONG}; test_measure_clutter.py measures a part',
     '.venv/bin/python scripts/make_accuracy_figures.py': f'{LONG}; test_accuracy_page.py checks the page',
     'foc_ros paper --output paper_output': 'takes half a minute; test_paper.py runs the studies on a coarser grid',
     # guidance
-    'foc_ros simulate --operators accurate,noisy,laggy,changes_way,unannounced_goal --trials 200 --params rate.yaml': SIMULATED,
-    'foc_ros simulate --operators human_paths --assistance foc --trials 48 --recordings d3il_avoiding --params rate.yaml': SIMULATED,
-    'foc_ros simulate --operators human_paths --assistance foc --trials 209 --recordings hlp_reaching --params hlp.yaml': SIMULATED,
+    'foc_ros simulate --operators accurate,noisy,laggy,changes_way,unannounced_goal --trials 200 --params rate.yaml': PARTLY,
+    'foc_ros simulate --operators human_paths --assistance foc --trials 48 --recordings d3il_avoiding --params rate.yaml': PARTLY,
+    'foc_ros simulate --operators human_paths --assistance foc --trials 209 --recordings hlp_reaching --params hlp.yaml': PARTLY,
     # CONTRIBUTING
     'make check': BY_CI,
     'make test': BY_CI,
