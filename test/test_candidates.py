@@ -38,18 +38,19 @@ def test_a_candidate_that_becomes_reachable_takes_its_cheaper_solution(monkeypat
     np.testing.assert_allclose(outcome.cost, solutions[counts].effort * cold.dt)
 
 
-def test_the_first_safety_factor_rises_and_those_without_time_do_so_later():
-    """The effort rises with k. The most likely class is always the first one, the other one is first among the rest."""
+def test_the_first_safety_factors_rise_and_those_without_time_do_so_later():
+    """The effort rises with k."""
     problem = replace(one_obstacle(), preference=SafetyPreference(1.0, 100.0, 0.0, 0.02))
     least = solved(problem, GUESS)
     low = replace(least, safety_factor=0.5 * least.safety_factor, status=Status.COMPROMISED)
-    pair = [CANDIDATE, replace(CANDIDATE, label='goal1:+0', goal=1)]
-    solutions, likelihoods = {each.label: low for each in pair}, {CANDIDATE.label: 1.0}
-    given = pair, [problem, problem], FocConfig(), outcomes.EFFORT_ONLY, EarlierSolutions(solutions, likelihoods)
-    risen, waiting = solve_candidates(*given, NEVER, Deadline(0.0))
+    three = [replace(CANDIDATE, label=f'goal{goal}:+0', goal=goal) for goal in range(3)]
+    solutions, likelihoods = {each.label: low for each in three}, {CANDIDATE.label: 1.0}
+    given = three, 3 * [problem], FocConfig(), outcomes.EFFORT_ONLY, EarlierSolutions(solutions, likelihoods)
+    *risen, waiting = solve_candidates(*given, NEVER, Deadline(0.0))
     assert waiting.status is Status.COMPROMISED
     assert not waiting.solution.is_complete
-    assert risen.solution.is_complete
-    assert waiting.solution.safety_factor < risen.solution.safety_factor
-    assert waiting.solution.effort < risen.solution.effort
-    assert [each.status for each in solve_candidates(*given)] == 2 * [Status.SOLVED]
+    for each in risen:
+        assert each.solution.is_complete
+        assert waiting.solution.safety_factor < each.solution.safety_factor
+        assert waiting.solution.effort < each.solution.effort
+    assert [each.status for each in solve_candidates(*given)] == 3 * [Status.SOLVED]

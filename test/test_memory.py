@@ -114,6 +114,5 @@ def test_a_class_whose_safety_factor_had_no_time_to_rise_keeps_its_turn():
     complete, waiting = prediction.candidates
     waiting = replace(waiting, solution=replace(waiting.solution, is_complete=False))
     earlier, _ = memory.remember([complete.candidate, waiting.candidate], [complete, waiting], memory.earlier, {}, 20_000_000)
-    assert earlier.turns == {complete.label: 20_000_000, waiting.label: memory.earlier.turns[waiting.label]}
-    assert memory.earlier.turns[waiting.label] == 0
+    assert earlier.turns == {complete.label: (20_000_000, 20_000_000), waiting.label: (20_000_000, 0)}
     assert [earlier.sort_by_turn(each) for each in ([complete, waiting], [waiting, complete])] == [[1, 0], [0, 1]]

@@ -171,7 +171,8 @@ def test_a_wrong_option_is_refused_in_one_line(tmp_path: Path, capsys: pytest.Ca
         pass
     for arguments, error in (
         (['--port', '70000'], '--port: expected a whole number in [0, 65535], got 70000'),
-        (['--no-ros', '--host', '203.0.113.1', '--port', '0'], '--port: expected a free port of this computer'),
+        (['--no-ros', '--host', '203.0.113.1', '--port', '0'], '--host and --port: expected a free port of this computer'),
+        (['--no-ros', '--host', 'a..b', '--port', '0'], '--host and --port: expected a free port of this computer'),
         (['--no-ros', '--data', str(tmp_path / 'file'), '--port', '0'], '--data: expected a folder'),
     ):
         assert main(['play', *arguments]) == 2

@@ -48,7 +48,8 @@ async def _serve(arguments: argparse.Namespace, config: Config) -> None:
         return NodePredictor(given, pass_on)
 
     session = Session(make_predictor, config, arguments.data)
-    server, port = listen(session, arguments.host, arguments.sockets), arguments.sockets[0].getsockname()[1]
+    server = listen(session, arguments.host, arguments.sockets)
+    port = arguments.sockets[0].getsockname()[1]
     try:
         session.predictor.start()
         if not is_loopback(arguments.host):

@@ -22,6 +22,10 @@ from .ocp.warm_start import Start, cold_start, warm_start
 from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Solution, Status
 
 EFFORT_ONLY = CostModel()
+NO_TURN = -1, -1
+"""The turns of a class that has had none."""
+RAISED_ANYWAY = 2
+"""Number of candidates for which there is always time to raise the safety factor: the most likely one, and the next in turn."""
 FIRST_RAISES, FURTHER_RAISES = 1, 8
 """How often the safety factor of a candidate that is followed is raised: first of each, then of those that are not settled."""
 SETTLED = 0.02
@@ -39,19 +43,20 @@ class ProblemTable(Protocol):
 class EarlierSolutions:
     """Results of earlier predictions by label: solutions to start from, and what gives the order of solving.
 
-    likelihoods; turns: stamps [ns] at which each class had its last turn.
+    likelihoods; turns: two stamps [ns] of each class, of the prediction that solved it last, and of the last one that also had time
+    to raise its safety factor.
     """
 
     solutions: Mapping[str, Solution] = field(default_factory=dict)
     likelihoods: Mapping[str, float] = field(default_factory=dict)
-    turns: Mapping[str, int] = field(default_factory=dict)
+    turns: Mapping[str, tuple[int, int]] = field(default_factory=dict)
 
     def sort_by_turn(self, candidates: Sequence[Candidate]) -> list[int]:
-        """Return the rows of candidates: the one that was most likely, then those whose last turn is the longest time ago."""
+        """Return the rows of candidates: the one that was most likely, then those of which the turns are the longest time ago."""
         labels, rows = [each.label for each in candidates], range(len(candidates))
         most_likely = max(rows, key=lambda row: (self.likelihoods.get(labels[row], 0.0), -row), default=0)
         has_likelihood = any(self.likelihoods.get(label, 0.0) > 0.0 for label in labels)
-        return sorted(rows, key=lambda row: (not has_likelihood or row != most_likely, self.turns.get(labels[row], -1)))
+        return sorted(rows, key=lambda row: (not has_likelihood or row != most_likely, self.turns.get(labels[row], NO_TURN)))
 
 
 NOTHING = EarlierSolutions()
@@ -70,7 +75,7 @@ def solve_candidates(
 
     problems: one for each candidate; costs: parts of the cost besides the effort to go; earlier: results of the prediction
     before, to start from. The first one is begun whatever the time. One that the deadline stops gets the status DEADLINE. Until
-    the deadline of raises, safety factors are raised: once that of each candidate, of the first one in any case, then those that
+    the deadline of raises, safety factors are raised: once that of each candidate, of the first ones in any case, then those that
     are not settled.
     """
     solved: dict[int, PredictedCandidate] = {}
@@ -79,7 +84,7 @@ def solve_candidates(
             break
         previous, raises = earlier.solutions.get(candidates[row].label), math.inf
         if earlier is not NOTHING:
-            raises = FIRST_RAISES if not solved or deadline_of_raises.allows() else 0
+            raises = FIRST_RAISES if len(solved) < RAISED_ANYWAY or deadline_of_raises.allows() else 0
         solved[row] = _solve_candidate(candidates[row], problems[row], settings, costs, previous, deadline, raises)
     unsettled = [row for row, each in solved.items() if earlier is not NOTHING and _is_unsettled(each, earlier.solutions)]
     for row in unsettled:

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from .config import ExperienceConfig
 from .decisions import find_decisions, tabulate_sides
 from .homotopy.demonstrations import NEAR, STEP_S, Demonstration, is_same_demonstration
-from .recorded_paths import RecordedPaths, fade_weights, is_same_way, pool_path
+from .recorded_paths import RecordedPaths, fade_weights, pool_path, stays_in_class
 from .types import LEFT, RIGHT, Array, Candidate, HandState, Obstacles, PredictedCandidate, Record, Solution
 
 MOST_NEAR = 64
@@ -162,8 +162,8 @@ def pool_recordings(
     decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), obstacles, hand, goals)
     agreements = [compare_with_class(each.candidate, evidence, obstacles, decisions.next_row) for each in taken]
     counts = np.array([evidence.weight[each.is_same].sum() for each in agreements])
-    choice = decisions.next_gap if len(decisions.next_row) else np.array([each.candidate.goal for each in taken])
-    likelihoods = _count_gaps_and_classes(np.array([each.likelihood for each in taken]), counts, choice, config)
+    group = decisions.next_gap if len(decisions.next_row) else np.array([each.candidate.goal for each in taken])
+    likelihoods = _update_likelihoods(np.array([each.likelihood for each in taken]), counts, group, config)
     pooled = []
     for each, share, agreement in zip(taken, likelihoods.tolist(), agreements, strict=True):
         recorded = follow_recordings(library, evidence, agreement.until_s, hand, each.times)
@@ -220,12 +220,12 @@ def _pool_path(
             break
         uncertainty = hand.covariance[:2, :2], 0.5 * config.velocity_stddev
         pooled = pool_path(candidate.solution, recorded.take(is_used), *uncertainty, config.prior_count_path)
-        if is_same_way(candidate, pooled, obstacles):
+        if stays_in_class(candidate, pooled, obstacles):
             return pooled
     return candidate.solution
 
 
-def _count_gaps_and_classes(likelihoods: Array, counts: Array, gap: NDArray[np.intp], config: ExperienceConfig) -> Array:
+def _update_likelihoods(likelihoods: Array, counts: Array, gap: NDArray[np.intp], config: ExperienceConfig) -> Array:
     """Return likelihoods (k,) that counts (k,) change, first those of the gaps (k,) and then those of the classes in each gap."""
     of_gap, counts_of_gap = np.bincount(gap, likelihoods), np.bincount(gap, counts)
     near, beyond = config.prior_count, config.prior_count_beyond

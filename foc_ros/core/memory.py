@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from .candidates import NOTHING, EarlierSolutions
+from .candidates import NO_TURN, NOTHING, EarlierSolutions
 from .choices import Choice
 from .class_numbers import NO_NUMBERS, ClassNumbers, is_renamed
 from .continuity import NO_PAST, Past
@@ -59,7 +59,7 @@ class Memory:
                 if same is not None:
                     solutions[candidate.label] = solutions[same.label]
                     likelihoods[candidate.label] = likelihoods.get(same.label, 0.0)
-                    turns[candidate.label] = turns.get(same.label, -1)
+                    turns[candidate.label] = turns.get(same.label, NO_TURN)
         return EarlierSolutions(solutions, likelihoods, turns)
 
     def remember(
@@ -90,8 +90,9 @@ class Memory:
                 solutions[label] = result.solution
             elif result.status in (Status.ETA_UNREACHABLE, Status.LEFT_CLASS) and self.followed.get(label, 0) < RETRY_AFTER:
                 solutions[label], followed[label] = result.solution, self.followed.get(label, 0) + 1
-        complete = {label for label, each in results.items() if each.solution.is_complete}
-        turns = {each.label: stamp_ns if each.label in complete else earlier.turns.get(each.label, -1) for each in candidates}
+        turns = {each.label: earlier.turns.get(each.label, NO_TURN) for each in candidates}
+        for label, result in results.items():
+            turns[label] = stamp_ns, stamp_ns if result.solution.is_complete else turns[label][1]
         return EarlierSolutions(solutions, likelihoods, turns), followed
 
 

@@ -96,7 +96,7 @@ class Pipeline:
         """Whether there is a new hand sample, and its stamp is due (or any, after a restart).
 
         Stamps are due every 1 / rate_hz. A sample that comes later than that, by up to half of this period, does not postpone the
-        ones after it, so that `rate_hz` is reached whatever the period of the samples is.
+        ones after it, so that `rate_hz` is reached if there are at least two samples in a period.
         """
         if self.hand_state is None or not self._is_new or not self.is_engaged:
             return False

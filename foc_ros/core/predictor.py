@@ -28,8 +28,8 @@ from .ocp.problem import Problem, rest_to_goal
 from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Prediction, make_obstacles
 
 SEARCH_SHARE, RAISE_SHARE, SOLVE_SHARE = 0.3, 0.25, 0.65
-"""Parts of the time left that the search may take, and then raising safety factors further, and all solves. They begin no step
-after that, and the last step ends later."""
+"""Shares of the time left after which the search, the raises of safety factors (but those of the first candidates), and the
+solves begin no step. The last step may end later."""
 RESERVE_S = 5e-5
 """Time besides that for each candidate, to keep, rank and smooth it [s]."""
 

@@ -1,7 +1,7 @@
 """Paths of recordings, pooled with the planned path of a candidate.
 
 The recordings e that pass the next row as a candidate does, displaced so that they begin at the hand, are at a time t from now at
-x_e with weights w_e, which fade out over the last FADE_S of a recording. With P the covariance of the position of the hand and b
+x_e with weights w_e, which fade out over the FADE_S before a recording ends or parts from the class. With P the covariance of the position of the hand and b
 = `velocity_stddev`, by which their velocities differ from that of the hand,
 
     n = sum w_e,   r = sum w_e x_e / n,   R = sum w_e (x_e - r) (x_e - r)' / n + P + (b t / 2)^2 I.
@@ -104,7 +104,7 @@ def _differentiate(positions: Array, dt: float, orders: int) -> Array:
     return np.concatenate(found, axis=1)
 
 
-def is_same_way(planned: PredictedCandidate, pooled: Solution, obstacles: Obstacles) -> bool:
+def stays_in_class(planned: PredictedCandidate, pooled: Solution, obstacles: Obstacles) -> bool:
     """Tell whether a pooled path passes all obstacles that the plan does, on its sides, and enters none more deeply.
 
     obstacles: grown by the radius of the hand.

@@ -25,6 +25,6 @@ def open_sockets(host: str, port: int) -> list[socket]:
     """Open the sockets of a host at a port, 0 for a free one; raises InputError where that is impossible."""
     try:
         return bind_sockets(port, host)
-    except OSError as error:
+    except (OSError, UnicodeError) as error:
         wanted = 'a free port of this computer, and a host that it has'
-        raise InputError('--port', wanted, f'{host}:{port}: {error.strerror}') from error
+        raise InputError('--host and --port', wanted, f'{host}:{port}: {error}') from error

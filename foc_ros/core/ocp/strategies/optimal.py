@@ -52,7 +52,8 @@ WARM_STRIDE, COLD_STRIDE = 0.6, 0.4
 """First strides in k, if they are not too long; from an earlier solution it is shorter, the nearer the slope is to that which is
 worth it."""
 TRIES, WARM_TRIES = 8, 1
-"""Larger k that are tried in vain if another search goes on from the result; the same from an earlier solution, for one raise."""
+"""Number of larger k that may fail if another search goes on from the result: in general, and from an earlier solution for one
+raise."""
 NARROW = 0.02
 """Bracket in k at which the search ends."""
 
@@ -95,7 +96,7 @@ def solve_optimal(problem: Problem, start: Start, _: FocConfig, deadline: Deadli
         qp_solves=search.qp_solves,
         minimum=minimum,
         equivalent_weights=weights,
-        is_complete=search.is_complete,
+        is_complete=search.is_complete and not is_late,
     )
 
 
