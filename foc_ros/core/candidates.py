@@ -43,8 +43,8 @@ class ProblemTable(Protocol):
 class EarlierSolutions:
     """Results of earlier predictions by label: solutions to start from, and what gives the order of solving.
 
-    likelihoods; turns: two stamps [ns] of each class, of the prediction that solved it last, and of the last one that also had time
-    to raise its safety factor.
+    likelihoods; turns: two stamps [ns] of each class, of the prediction that solved it last, and of the last one that also had
+    time to raise its safety factor.
     """
 
     solutions: Mapping[str, Solution] = field(default_factory=dict)

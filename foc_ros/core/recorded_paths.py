@@ -1,8 +1,8 @@
 """Paths of recordings, pooled with the planned path of a candidate.
 
 The recordings e that pass the next row as a candidate does, displaced so that they begin at the hand, are at a time t from now at
-x_e with weights w_e, which fade out over the FADE_S before a recording ends or parts from the class. With P the covariance of the position of the hand and b
-= `velocity_stddev`, by which their velocities differ from that of the hand,
+x_e with weights w_e, which fade out over the FADE_S before a recording ends or parts from the class. With P the covariance of the
+position of the hand and b = `velocity_stddev`, by which their velocities differ from that of the hand,
 
     n = sum w_e,   r = sum w_e x_e / n,   R = sum w_e (x_e - r) (x_e - r)' / n + P + (b t / 2)^2 I.
 
