@@ -54,7 +54,8 @@ def test_everything_is_fitted_and_written_for_the_node(past_an_obstacle: Path, c
     assert fitted <= set(answer['parameters'])
     for name, each in answer['parameters'].items():
         assert values[name] == each['value']
-        assert each['interval'][0] <= each['value'] * 1.01 and each['value'] <= each['interval'][1] * 1.01, name
+        if None not in each['interval']:  # the constant of another model of duration has none
+            assert each['interval'][0] <= each['value'] * 1.01 and each['value'] <= each['interval'][1] * 1.01, name
     for name, choice in answer['chosen'].items():
         assert values[name] == choice['value'] != choice['given']
     unfitted = {name: value for name, value in values.items() if name not in answer['parameters'] | answer['chosen']}

@@ -13,6 +13,7 @@ half of them twice as many, and so on. Settings that are hard to tell apart get 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
@@ -188,7 +189,8 @@ def search_settings(kind: str, settings: Sequence[Config], replays: Replays, fit
             _take_choice(name, value, str(given[name]), resampled, fit)
             continue
         alike = [each for each in settings if name not in constants or each.duration.model == best.duration.model]
-        _take_value(name, float(value), alike, [each for each in resampled if each in alike], fit)
+        change = float(given[name]), float(value)
+        _take_value(name, change, alike, [each for each in resampled if each in alike], fit)
 
 
 def race(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[list[Config], Array, Array]:
@@ -232,10 +234,17 @@ def _take_choice(name: str, value: str, given: str, resampled: Sequence[Config],
         fit.warnings.append(f'{name}: {value} is the best, but only in {100 * share:.0f} % of the resamples')
 
 
-def _take_value(name: str, value: float, settings: Sequence[Config], resampled: Sequence[Config], fit: Fit) -> None:
-    """Take a number, if several were tried."""
-    tried = {float(flatten(each)[name]) for each in settings}
+def _take_value(
+    name: str, change: tuple[float, float], settings: Sequence[Config], resampled: Sequence[Config], fit: Fit
+) -> None:
+    """Take a number, if several were tried, or if it was fitted for the model of duration that was chosen.
+
+    change: the number before and after.
+    """
+    tried, (given, value) = {float(flatten(each)[name]) for each in settings}, change
     if len(tried) == 1:
+        if value != given:
+            fit.estimates[name] = Estimate(name, value, math.nan, math.nan, 'measured durations')
         return
     low, high = np.percentile([float(flatten(each)[name]) for each in resampled], CENTRAL).tolist()
     if (low, high) == (min(tried), max(tried)):

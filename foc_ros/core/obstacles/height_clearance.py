@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from foc_ros.core.types import Array, Obstacles
 
-SLACK = 0.4
+SLACK = 0.45
 """Part of the distance to the goal by which a footprint is longer on both sides."""
 
 
