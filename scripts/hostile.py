@@ -13,19 +13,16 @@ Other programs of the machine lengthen all times: run it alone.
 from __future__ import annotations
 
 import argparse
-import os
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from soak import GROWTH, Player, graph_environment, measure_process
+from soak import GROWTH, Player, isolated_graph, measure_process
 
 from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS, Array
@@ -169,8 +166,7 @@ def main() -> int:
     parser.add_argument('--only', choices=CASES, action='append', help='one scene; may be repeated')
     parser.add_argument('--strategy', choices=STRATEGIES, action='append', help='one strategy; may be repeated')
     arguments, failed = parser.parse_args(), 0
-    with tempfile.TemporaryDirectory(prefix='foc_ros_hostile_') as logs:
-        os.environ.update(graph_environment(Path(logs)))
+    with isolated_graph():
         for name in arguments.only or CASES:
             for strategy in arguments.strategy or STRATEGIES:
                 row = measure(CASES[name], strategy, arguments.seconds)

@@ -19,7 +19,6 @@ import os
 import select
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -27,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from soak import graph_environment
+from soak import isolated_graph
 
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
@@ -216,8 +215,7 @@ def main() -> int:
     parser.add_argument('--moving', action='store_true', help='publish in a moving frame, which needs tf2')
     arguments = parser.parse_args()
     parameters = ['frame_id:=world'] if arguments.moving else []
-    with tempfile.TemporaryDirectory(prefix='foc_ros_measure_') as logs:
-        os.environ.update(graph_environment(Path(logs)))
+    with isolated_graph():
         for measure in (measure_predictions, measure_intake):
             player = Player(arguments.moving)
             for name, value in measure(player, arguments.seconds, *parameters).items():

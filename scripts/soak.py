@@ -13,7 +13,6 @@ the growth of the cycle's 99th percentile beyond that of the computation.
 from __future__ import annotations
 
 import argparse
-import os
 import random
 import signal
 import statistics
@@ -21,7 +20,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -29,7 +29,7 @@ from typing import Any, Self
 import numpy as np
 
 from foc_ros.core.types import Array
-from foc_ros.ros.isolated_node import free_domain, private_environment
+from foc_ros.ros.isolated_node import private_environment, reserve_domain, set_environment
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import RclpyTypes
 
@@ -49,9 +49,15 @@ PROBE_TURNS, PROBE_ROUNDS = 25, 400_000
 """Number of periods between two fixed computations, and the length of one: some milliseconds."""
 
 
-def graph_environment(logs: Path) -> dict[str, str]:
-    """Return the environment of a private ROS graph."""
-    return private_environment(free_domain(), logs)
+@contextmanager
+def isolated_graph() -> Iterator[None]:
+    """Join a ROS graph of its own within the context, with the processes that are started there."""
+    with (
+        tempfile.TemporaryDirectory(prefix='foc_ros_graph_') as logs,
+        reserve_domain() as domain,
+        set_environment(private_environment(domain, Path(logs))),
+    ):
+        yield
 
 
 class Player:
@@ -263,8 +269,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument('--minutes', type=float, default=10.0, help='duration (default: %(default)s)')
     seconds = 60.0 * parser.parse_args().minutes
-    with tempfile.TemporaryDirectory(prefix='foc_ros_soak_') as logs:
-        os.environ.update(graph_environment(Path(logs)))
+    with isolated_graph():
         command = [sys.executable, '-m', 'foc_ros.ros.main', '--ros-args', '-p', 'homotopy.max_candidates:=2']
         with Player() as player, subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
             wait_for_node(player)

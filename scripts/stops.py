@@ -7,16 +7,14 @@ ended with exit code 0 and without a traceback.
 from __future__ import annotations
 
 import argparse
-import os
 import random
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
 
-from soak import Player, graph_environment
+from soak import Player, isolated_graph
 
 SPREAD_S = 2.0
 LIMIT_S = 30.0
@@ -57,15 +55,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument('--count', type=int, default=100, help='stops by each signal (default: %(default)s)')
     count, generator, failures = parser.parse_args().count, random.Random(0), 0
-    with tempfile.TemporaryDirectory(prefix='foc_ros_stops_') as logs:
-        os.environ.update(graph_environment(Path(logs)))
-        with Player() as player:
-            for turn in range(count):
-                for number in (signal.SIGTERM, signal.SIGINT):
-                    error = stop_one_node(player, number, generator.uniform(0.0, SPREAD_S))
-                    failures += error is not None
-                    if error is not None or (turn + 1) % 10 == 0:
-                        print(f'{number.name} {turn + 1} of {count}: {error or "no error"}', flush=True)
+    with isolated_graph(), Player() as player:
+        for turn in range(count):
+            for number in (signal.SIGTERM, signal.SIGINT):
+                error = stop_one_node(player, number, generator.uniform(0.0, SPREAD_S))
+                failures += error is not None
+                if error is not None or (turn + 1) % 10 == 0:
+                    print(f'{number.name} {turn + 1} of {count}: {error or "no error"}', flush=True)
     print(f'{2 * count - failures} of {2 * count} stops with exit code 0 and no traceback')
     return min(failures, 1)
 

@@ -5,8 +5,6 @@ Use the `ros` fixture of conftest.py (or :func:`graph`) and :meth:`Graph.spin_un
 
 from __future__ import annotations
 
-import fcntl
-import itertools
 import os
 import tempfile
 import time
@@ -19,13 +17,10 @@ from typing import Any
 
 import pytest
 
-DOMAINS = range(1, 102)
-"""Domains whose ports lie below the ephemeral ones of Linux."""
+from foc_ros.ros.isolated_node import reserve_domain
 
 ASK_AGAIN_S = 3.0
 """Time after which a service's response counts as dropped, and the request is sent again [s]."""
-
-_turn = itertools.count(os.getpid() * 37)
 
 
 def prepare_environment() -> None:
@@ -47,21 +42,6 @@ def require_ros() -> None:
         if os.environ.get('FOC_ROS_REQUIRE_ROS') == '1':
             pytest.fail(f'{reason}; FOC_ROS_REQUIRE_ROS is 1')
         pytest.skip(reason, allow_module_level=True)
-
-
-@contextmanager
-def free_domain() -> Iterator[int]:
-    """Reserve a domain for this test process, by a lock that the end of the process releases."""
-    for turn in itertools.islice(_turn, 10 * len(DOMAINS)):
-        domain = DOMAINS[turn % len(DOMAINS)]
-        with (Path(tempfile.gettempdir()) / f'foc_ros_test_domain_{os.getuid()}_{domain}.lock').open('w') as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                continue
-            yield domain
-            return
-    raise RuntimeError(f'all domains {DOMAINS} are taken')
 
 
 class Graph:
@@ -153,5 +133,5 @@ class Graph:
 def graph(args: list[str] | None = None) -> Iterator[Graph]:
     """Return a graph in a free domain; args: ROS arguments such as ['--ros-args', '-p', 'rate_hz:=20.0']."""
     require_ros()
-    with free_domain() as domain, Graph(domain, args) as made:
+    with reserve_domain() as domain, Graph(domain, args) as made:
         yield made

@@ -9,27 +9,20 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from ros_helpers import free_domain, prepare_environment, require_ros
+from ros_helpers import prepare_environment, require_ros
 from rosbags.highlevel import AnyReader
 
 prepare_environment()
+require_ros()
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 ROOT = Path(__file__).resolve().parents[1]
 LAST_S = 2.0
 OUTPUTS = ('/foc/prediction', '/foc/likelihoods', '/foc/path', '/foc/markers')
 STARTED = 'demo with the node in process '
-
-
-@pytest.fixture
-def domain() -> Iterator[int]:
-    require_ros()
-    with free_domain() as number:
-        yield number
 
 
 def counted(bag: Path) -> Counter[str]:
@@ -43,11 +36,11 @@ def counted(bag: Path) -> Counter[str]:
     return found
 
 
-def test_end_to_end(domain: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from foc_ros.cli.demo.command import perform
 
     before = dict(os.environ)
-    assert perform(tmp_path / 'out', last_s=LAST_S, domain=domain) == 0
+    assert perform(tmp_path / 'out', last_s=LAST_S) == 0
     assert dict(os.environ) == before
     printed = capsys.readouterr().out
     assert 'report/index.html' in printed
@@ -63,11 +56,11 @@ def test_end_to_end(domain: int, tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert 'data:image/png;base64,' in (tmp_path / 'out' / 'report' / 'index.html').read_text(encoding='utf-8')
 
 
-def test_the_live_predictions_are_those_of_the_recording(domain: int, tmp_path: Path) -> None:
+def test_the_live_predictions_are_those_of_the_recording(tmp_path: Path) -> None:
     """Every prediction has the stamp of a hand pose that was sent; the stamps increase."""
     from foc_ros.cli.demo.command import perform
 
-    perform(tmp_path / 'out', last_s=1.0, domain=domain)
+    perform(tmp_path / 'out', last_s=1.0)
     stamps: dict[str, list[int]] = {'/hand_pose': [], '/foc/prediction': []}
     with AnyReader([tmp_path / 'out' / 'bag']) as reader:
         for connection, _, raw in reader.messages():
@@ -79,7 +72,7 @@ def test_the_live_predictions_are_those_of_the_recording(domain: int, tmp_path: 
     assert stamps['/foc/prediction'] == sorted(set(stamps['/foc/prediction']))
 
 
-def start(domain: int, output: Path) -> tuple[subprocess.Popen[str], int]:
+def start(output: Path) -> tuple[subprocess.Popen[str], int]:
     """Start a demo as a process and return it with the process id of its node once the recording plays."""
     program = f"""
 import sys
@@ -92,7 +85,7 @@ def enter(self):
     print({STARTED!r} + str(node.pid), flush=True)
     return node
 isolated_node.NodeProcess.__enter__ = enter
-sys.exit(command.perform(Path({str(output)!r}), domain={domain}))
+sys.exit(command.perform(Path({str(output)!r})))
 """
     demo = subprocess.Popen(
         [sys.executable, '-u', '-c', program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT
@@ -120,8 +113,8 @@ def gone(pid: int) -> bool:
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupt_ends_it_cleanly(domain: int, tmp_path: Path, number: int) -> None:
-    demo, node = start(domain, tmp_path / 'out')
+def test_an_interrupt_ends_it_cleanly(tmp_path: Path, number: int) -> None:
+    demo, node = start(tmp_path / 'out')
     demo.send_signal(number)
     printed, errors = demo.communicate(timeout=60)
     assert (demo.returncode, errors) == (130, '')
@@ -131,8 +124,8 @@ def test_an_interrupt_ends_it_cleanly(domain: int, tmp_path: Path, number: int) 
     assert not (tmp_path / 'out' / 'report').exists()
 
 
-def test_a_node_that_dies_is_told(domain: int, tmp_path: Path) -> None:
-    demo, node = start(domain, tmp_path / 'out')
+def test_a_node_that_dies_is_told(tmp_path: Path) -> None:
+    demo, node = start(tmp_path / 'out')
     os.kill(node, signal.SIGKILL)
     _, errors = demo.communicate(timeout=60)
     assert demo.returncode == 1

@@ -23,7 +23,7 @@ from foc_ros.cli.demo.scene_text import GOAL, HAND, HEIGHT, OBSTACLE, WIDTH, dra
 from foc_ros.cli.demo.summary import describe_lead
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
-from foc_ros.core.errors import InputError
+from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.types import Prediction
 from foc_ros.io.bags import TYPESTORE, Item
 from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
@@ -228,11 +228,16 @@ def test_the_lead_of_the_goal_that_was_reached_is_described() -> None:
     assert describe_lead(build_hand_trajectory(made[:5]), snapshots).endswith('no movement ended at a goal.')
 
 
-def test_a_domain_in_use_is_not_taken() -> None:
-    start = isolated_node.free_domain()
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
-        other.bind(('', 7400 + 250 * start + 10))
-        assert isolated_node.free_domain() != start
+def test_a_domain_in_use_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(isolated_node, 'DOMAINS', range(200, 203))
+    with isolated_node.reserve_domain() as reserved, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as participant:
+        with isolated_node.reserve_domain() as other:
+            pass
+        participant.bind(('', 7400 + 250 * other + 10))
+        with isolated_node.reserve_domain() as last:
+            assert {reserved, other, last} == {200, 201, 202}
+            with pytest.raises(FocError, match='each of the 3 domains'), isolated_node.reserve_domain():
+                pass
 
 
 def test_environment_is_private(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -141,7 +141,7 @@ def test_the_clutch_releases_the_hand_within_the_ramp_and_guidance_falls_silent(
     count = len(bench.wrenches)
     bench.drive(60, 80)
     assert len(bench.wrenches) == count, 'zero is published until the ramp ends, and then nothing'
-    assert figures(bench.health())['guidance'] == 'released'
+    assert figures(bench.health())['guidance'] in ('released', 'stale')
     bench.node._engage(SetBool.Request(data=True), SetBool.Response())
     bench.drive(80, 120)
     assert len(bench.wrenches) > count

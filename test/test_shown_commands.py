@@ -11,8 +11,9 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from ros_helpers import free_domain
 from shown_commands import ENDLESS, NOT_RUN, PAGES, ROOT, find_commands, find_unknown_blocks
+
+from foc_ros.ros.isolated_node import reserve_domain
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 pytest.importorskip('plotly', reason='plotly is not installed')
@@ -77,7 +78,7 @@ def run_lines(clone: Path, lines: list[str]) -> subprocess.CompletedProcess[str]
     ]
     script = '\n'.join(['set -euo pipefail', "trap 'kill $(jobs -p) 2>/dev/null || true; wait' EXIT", *run])
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ['PATH']])
-    with free_domain() as domain:
+    with reserve_domain() as domain:
         environment = os.environ | {'PATH': path, 'ROS_LOG_DIR': str(clone / 'log'), 'ROS_DOMAIN_ID': str(domain)}
         return subprocess.run(
             ['bash', '-c', script], cwd=clone, env=environment, capture_output=True, text=True, timeout=PAGE_S, check=False

@@ -3,8 +3,9 @@
 import subprocess
 
 import pytest
-from ros_helpers import free_domain
 from tiers import LONG, PROCESS, is_listed, list_test_functions, starts_process
+
+from foc_ros.ros.isolated_node import reserve_domain
 
 
 def start() -> None:
@@ -13,7 +14,7 @@ def start() -> None:
 
 @pytest.fixture
 def domain() -> int:
-    with free_domain() as number:
+    with reserve_domain() as number:
         return number
 
 

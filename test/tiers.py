@@ -54,6 +54,7 @@ LONG = (
 
 PROCESS = (
     'test_cluster.py::*',
+    'test_demo.py::*',
     'test_demo_*.py::test_the_node_*',
     'test_fit.py::*',
     'test_fit_*.py::test_a_setting_that_predicts_nothing_*',
@@ -63,7 +64,7 @@ PROCESS = (
     'test_examples.py::test_the_example_runs_and_makes_a_figure',
 )
 
-STARTERS = {'subprocess', 'free_domain', 'chromium', 'worker_tasks'}
+STARTERS = {'subprocess', 'reserve_domain', 'chromium', 'worker_tasks'}
 """Names whose use in a test, a fixture or a helper means that a process, a ROS graph or a browser is started."""
 
 

@@ -19,7 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 from foc_ros.core.config import Config, flatten
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.io.topics import CLOUD, GOALS, HAND, TYPES
-from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, free_domain, private_environment, set_environment
+from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, private_environment, reserve_domain, set_environment
 from foc_ros.ros.messages.types import find_message_class
 from foc_ros.ros.parameters import KNOWN
 
@@ -48,7 +48,7 @@ class NodePredictor(LivePredictor):
     def start(self) -> None:
         """Start the node, and connect to it; it is ready when `check` says so."""
         folder = Path(self._resources.enter_context(tempfile.TemporaryDirectory(prefix='foc_ros_play_')))
-        domain = free_domain()
+        domain = self._resources.enter_context(reserve_domain())
         self._environment, self._log = private_environment(domain, folder), folder / 'node.txt'
         self._resources.enter_context(set_environment(self._environment))
         self._resources.callback(self._process.close)

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
+from itertools import count, islice
 from pathlib import Path
 from types import TracebackType
 
@@ -19,8 +20,13 @@ from foc_ros.core.errors import FocError
 
 DOMAINS = range(1, 102)
 """Domains whose ports are below the ephemeral ports of Linux."""
+FIRST_PORTS, UNUSED_PORT = (0, 10), 5
+"""Ports of a domain, from its first one: for the discovery of all participants and of the first one, and one that DDS leaves free
+(specification of DDSI-RTPS, 9.6.1)."""
 STOP_S = 5.0
 """Seconds after SIGTERM at which a node that is still running is killed."""
+_turns = count(37 * os.getpid())
+"""The domains are taken in turn, and processes that start one after another begin far from each other."""
 _PR_SET_PDEATHSIG = 1
 _PRCTL = ctypes.CDLL(None).prctl if sys.platform == 'linux' else None
 """Loaded here: between fork and exec of a process with threads, a library must not be loaded."""
@@ -44,21 +50,33 @@ def private_environment(domain: int, log_directory: Path) -> dict[str, str]:
     }
 
 
-def free_domain() -> int:
-    """Return a domain without participants on this host: one in which the first ports that DDS uses are free."""
-    start = os.getpid()
-    candidates = [DOMAINS[(start + turn) % len(DOMAINS)] for turn in range(len(DOMAINS))]
-    return next((domain for domain in candidates if _is_free(domain)), candidates[0])
+@contextmanager
+def reserve_domain() -> Iterator[int]:
+    """Yield a domain in which no other program of this host has a participant, and reserve it within the context.
+
+    The first ports of participants have to be free. The reservation is a port of the domain that DDS does not use; it also
+    excludes a program that has chosen this domain and has not joined it yet.
+    """
+    for turn in islice(_turns, len(DOMAINS)):
+        domain = DOMAINS[turn % len(DOMAINS)]
+        base = 7400 + 250 * domain
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as reserved:
+            if _bind(reserved, base + UNUSED_PORT) and all(_is_free(base + port) for port in FIRST_PORTS):
+                yield domain
+                return
+    raise FocError(f'each of the {len(DOMAINS)} domains that can be used on this host has a participant')
 
 
-def _is_free(domain: int) -> bool:
-    base = 7400 + 250 * domain
-    for port in (base, base + 10):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            try:
-                probe.bind(('', port))
-            except OSError:
-                return False
+def _is_free(port: int) -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        return _bind(probe, port)
+
+
+def _bind(endpoint: socket.socket, port: int) -> bool:
+    try:
+        endpoint.bind(('', port))
+    except OSError:
+        return False
     return True
 
 

@@ -22,7 +22,7 @@ from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import BagReader, BagWriter, Item
 from foc_ros.io.terminal import show_table, show_text
 from foc_ros.reporting.snapshots import build_hand_trajectory
-from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, free_domain, private_environment, set_environment
+from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, private_environment, reserve_domain, set_environment
 
 from .recorder import Recorder, show_live
 from .summary import describe_lead
@@ -39,10 +39,10 @@ def run(arguments: argparse.Namespace) -> int:
     return perform(arguments.output)
 
 
-def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf, domain: int | None = None) -> int:
+def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf) -> int:
     """Run the demo and return the exit code.
 
-    last_s: seconds of the recording to play; domain: of the ROS graph, a free one by default.
+    last_s: seconds of the recording to play.
     """
     from foc_ros.reporting.report import write_report  # reports a missing library before the demo, not after it
 
@@ -53,7 +53,7 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf, d
     prepare(output)
     try:
         with _catch_interrupts() as stopped, BagWriter(output / 'bag') as bag:
-            _play(items, bag, recorder, free_domain() if domain is None else domain, stopped)
+            _play(items, bag, recorder, stopped)
         if not recorder.snapshots and not stopped.is_set():
             raise NodeDiedError('the node sent no prediction')
     except NodeDiedError as error:
@@ -86,10 +86,10 @@ def prepare(output: Path) -> None:
         raise InputError('--output', 'a directory that can be written', f'{output}: {error.strerror}') from error
 
 
-def _play(items: list[Item], bag: BagWriter, recorder: Recorder, domain: int, stopped: threading.Event) -> None:
+def _play(items: list[Item], bag: BagWriter, recorder: Recorder, stopped: threading.Event) -> None:
     from .player import Player
 
-    with tempfile.TemporaryDirectory(prefix='foc_ros_demo_') as logs:
+    with tempfile.TemporaryDirectory(prefix='foc_ros_demo_') as logs, reserve_domain() as domain:
         environment = private_environment(domain, Path(logs))
         with (
             set_environment(environment),
