@@ -233,7 +233,7 @@ def test_a_domain_in_use_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     with isolated_node.reserve_domain() as reserved, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as participant:
         with isolated_node.reserve_domain() as other:
             pass
-        participant.bind(('', 7400 + 250 * other + 10))
+        participant.bind(('', 7400 + 250 * other + 12))
         with isolated_node.reserve_domain() as last:
             assert {reserved, other, last} == {200, 201, 202}
             with pytest.raises(FocError, match='each of the 3 domains'), isolated_node.reserve_domain():

@@ -20,9 +20,9 @@ from foc_ros.core.errors import FocError
 
 DOMAINS = range(1, 102)
 """Domains whose ports are below the ephemeral ports of Linux."""
-FIRST_PORTS, UNUSED_PORT = (0, 10), 5
-"""Ports of a domain, from its first one: for the discovery of all participants and of the first one, and one that DDS leaves free
-(specification of DDSI-RTPS, 9.6.1)."""
+USED_PORTS, UNUSED_PORT = (0, *range(10, 30, 2)), 5
+"""Ports of a domain, from its first one: for the discovery of all participants and of each of the first ten, and one that DDS
+leaves free (specification of DDSI-RTPS, 9.6.1)."""
 STOP_S = 5.0
 """Seconds after SIGTERM at which a node that is still running is killed."""
 _turns = count(37 * os.getpid())
@@ -54,14 +54,14 @@ def private_environment(domain: int, log_directory: Path) -> dict[str, str]:
 def reserve_domain() -> Iterator[int]:
     """Yield a domain in which no other program of this host has a participant, and reserve it within the context.
 
-    The first ports of participants have to be free. The reservation is a port of the domain that DDS does not use; it also
+    The ports of its first participants have to be free. The reservation is a port of the domain that DDS does not use; it also
     excludes a program that has chosen this domain and has not joined it yet.
     """
     for turn in islice(_turns, len(DOMAINS)):
         domain = DOMAINS[turn % len(DOMAINS)]
         base = 7400 + 250 * domain
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as reserved:
-            if _bind(reserved, base + UNUSED_PORT) and all(_is_free(base + port) for port in FIRST_PORTS):
+            if _bind(reserved, base + UNUSED_PORT) and all(_is_free(base + port) for port in USED_PORTS):
                 yield domain
                 return
     raise FocError(f'each of the {len(DOMAINS)} domains that can be used on this host has a participant')
