@@ -16,7 +16,7 @@ from foc_ros.core.guidance.agreement import MISSING_S, combine, remember_likelih
 from foc_ros.core.guidance.clearance import find_crossing, find_need, keep_clear, saturate
 from foc_ros.core.guidance.energy_tank import limit_by_energy, update_energy
 from foc_ros.core.guidance.limits import find_largest_force, step_force
-from foc_ros.core.guidance.obstacle_margin import TOLERANCE, build_margins, measure_opposing_distance, turn_along
+from foc_ros.core.guidance.obstacle_margin import TOLERANCE, build_margins, measure_opposing_distance, see_margins, turn_along
 from foc_ros.core.guidance.reference import WINDOW_M, advance_progress, build_paths, transfer_progress
 from foc_ros.core.guidance.step import GuidanceInput, GuidanceState, guide
 from foc_ros.core.guidance.stiffness import compute_stiffness, find_deflection, project_out
@@ -151,22 +151,23 @@ def test_the_largest_force_can_be_released_within_the_ramp() -> None:
 
 
 def test_a_force_is_turned_along_a_margin_that_its_line_crosses() -> None:
-    margins = build_margins(ROUND, 0.002)
-    turned = turn_along(margins, np.zeros(2), np.array([0.2, 0.0]), np.array([1.0, 0.5]))
+    seen = see_margins(build_margins(ROUND, 0.002), np.zeros(2))
+    turned = turn_along(seen, np.array([0.2, 0.0]), np.array([1.0, 0.5]))
     assert turned == pytest.approx([0.0, 0.5], abs=0.1)
     assert abs(turned[0]) <= TOLERANCE * np.hypot(*turned)
-    beside = turn_along(margins, np.zeros(2), np.array([0.2, 0.2]), np.array([1.0, 1.0]))
+    beside = turn_along(seen, np.array([0.2, 0.2]), np.array([1.0, 1.0]))
     assert beside.tolist() == [1.0, 1.0]
-    short = turn_along(margins, np.zeros(2), np.array([0.05, 0.0]), np.array([1.0, 0.0]))
+    short = turn_along(seen, np.array([0.05, 0.0]), np.array([1.0, 0.0]))
     assert short.tolist() == [1.0, 0.0]
 
 
 def test_the_distance_of_a_margin_counts_in_front_of_the_force_only() -> None:
     margins = build_margins(ROUND, 0.0)
-    assert measure_opposing_distance(margins, np.zeros(2), np.array([1.0, 0.0])) == pytest.approx(0.07, abs=5e-4)
-    assert measure_opposing_distance(margins, np.zeros(2), np.array([-1.0, 0.0])) == pytest.approx(np.hypot(0.1, 0.03), abs=5e-3)
-    assert measure_opposing_distance(margins, np.array([0.08, 0.0]), np.array([1.0, 0.0])) == 0.0
-    assert measure_opposing_distance(margins, np.array([0.08, 0.0]), np.array([-1.0, 0.0])) > 0.03
+    outside, inside = see_margins(margins, np.zeros(2)), see_margins(margins, np.array([0.08, 0.0]))
+    assert measure_opposing_distance(outside, np.array([1.0, 0.0])) == pytest.approx(0.07, abs=5e-4)
+    assert measure_opposing_distance(outside, np.array([-1.0, 0.0])) == pytest.approx(np.hypot(0.1, 0.03), abs=5e-3)
+    assert measure_opposing_distance(inside, np.array([1.0, 0.0])) == 0.0
+    assert measure_opposing_distance(inside, np.array([-1.0, 0.0])) > 0.03
 
 
 def test_a_hand_beside_its_only_path_is_drawn_to_it() -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from math import cos, pi, sin
 
 import numpy as np
+from numpy.typing import NDArray
 
 from foc_ros.core.obstacles.outline import trace_obstacle
 from foc_ros.core.types import Array, Obstacles, Record
@@ -49,58 +50,56 @@ def build_margins(obstacles: Obstacles, growth: float) -> Margins:
     return Margins(start, edge, np.stack([edge[..., 1], -edge[..., 0]], axis=-1) / lengths)
 
 
-def turn_along(margins: Margins, position: Array, reference: Array, force: Array) -> Array:
-    """Return a force (2,) without its part into margins that the line from the hand to the reference crosses.
+@dataclass(frozen=True, eq=False)
+class SeenMargins(Record):
+    """The margins as seen from a hand.
+
+    normal (n, k, 2): outward unit normals of the edges. height (n, k): by how much the hand is outside the line of each edge [m].
+    distance (n, k): from each edge [m]; that of the nearest edge is 0 within a margin.
+    """
+
+    normal: Array
+    height: Array
+    distance: Array
+
+
+def see_margins(margins: Margins, position: Array) -> SeenMargins:
+    """Return the margins as seen from a hand at a position (2,) [m]."""
+    offset, edge = position - margins.start, margins.edge
+    height = (offset * margins.normal).sum(axis=-1)
+    share = np.minimum(np.maximum((offset * edge).sum(axis=-1) / (edge * edge).sum(axis=-1), 0.0), 1.0)
+    away = offset - share[..., None] * edge
+    distance = np.hypot(away[..., 0], away[..., 1])
+    is_inside = (height.max(axis=1) < 0.0)[:, None]
+    is_nearest = distance <= distance.min(axis=1)[:, None] + 1e-12
+    return SeenMargins(margins.normal, height, np.where(is_inside & is_nearest, 0.0, distance))
+
+
+def turn_along(seen: SeenMargins, line: Array, force: Array) -> Array:
+    """Return a force (2,) without its part into margins that a line (2,) [m] from the hand crosses.
 
     With n the outward normal of the edge that is nearest to the hand, f <- f + max(-f . n, 0) n for one obstacle after the other.
     """
-    for row in np.flatnonzero(_find_crossed(margins, position, reference - position)):
-        distances = _measure_distances(margins, position)[row]
-        normal = margins.normal[row, distances.argmin()]
+    for row in _find_crossed(seen, line):
+        normal = seen.normal[row, seen.distance[row].argmin()]
         force = force + max(-float(force @ normal), 0.0) * normal
     return force
 
 
-def measure_opposing_distance(margins: Margins, position: Array, force: Array) -> float:
+def measure_opposing_distance(seen: SeenMargins, force: Array) -> float:
     """Return the distance [m] of the hand from the nearest edge into which a force (2,) leads; infinite if there is none.
 
-    Edges whose normal is within `TOLERANCE` of a right angle to the force count as well. Within a margin, the distance of its
-    nearest edge is 0.
+    Edges whose normal is within `TOLERANCE` of a right angle to the force count as well.
     """
-    if not len(margins):
-        return float('inf')
-    outward = margins.normal @ force
-    is_opposing = outward < TOLERANCE * float(np.hypot(*force))
-    distances = _measure_distances(margins, position)
-    is_nearest = distances <= distances.min(axis=1, keepdims=True) + 1e-12
-    is_inside = _measure_heights(margins, position).max(axis=1, keepdims=True) < 0.0
-    distances = np.where(is_inside & is_nearest, 0.0, distances)
-    return float(np.where(is_opposing, distances, np.inf).min())
+    is_opposing = seen.normal @ force < TOLERANCE * float(np.hypot(*force))
+    return float(seen.distance[is_opposing].min(initial=np.inf))
 
 
-def _measure_heights(margins: Margins, position: Array) -> Array:
-    """Return by how much the hand is outside the line of each edge, (n, k) [m]."""
-    heights: Array = ((position - margins.start) * margins.normal).sum(axis=-1)
-    return heights
-
-
-def _measure_distances(margins: Margins, position: Array) -> Array:
-    """Return the distance of the hand from each edge, (n, k) [m]."""
-    offset, edge = position - margins.start, margins.edge
-    share = np.clip((offset * edge).sum(axis=-1) / (edge**2).sum(axis=-1), 0.0, 1.0)
-    away = offset - share[..., None] * edge
-    distances: Array = np.hypot(away[..., 0], away[..., 1])
-    return distances
-
-
-def _find_crossed(margins: Margins, position: Array, line: Array) -> Array:
-    """Return which margins (n,) a line (2,) [m] from the hand crosses (clipping by Cyrus and Beck)."""
-    if not len(margins):
-        return np.zeros(0)
-    heights, slopes = _measure_heights(margins, position), margins.normal @ line
-    at = -heights / np.where(slopes == 0.0, 1.0, slopes)
+def _find_crossed(seen: SeenMargins, line: Array) -> NDArray[np.intp]:
+    """Return the rows of the margins that a line (2,) [m] from the hand crosses (clipping by Cyrus and Beck)."""
+    slopes = seen.normal @ line
+    at = -seen.height / np.where(slopes == 0.0, 1.0, slopes)
     enters = np.where(slopes < 0.0, at, 0.0).max(axis=1)
     leaves = np.where(slopes > 0.0, at, 1.0).min(axis=1)
-    is_beside = ((slopes == 0.0) & (heights > 0.0)).any(axis=1)
-    crossed: Array = (np.maximum(enters, 0.0) < np.minimum(leaves, 1.0)) & ~is_beside
-    return crossed
+    is_beside = ((slopes == 0.0) & (seen.height > 0.0)).any(axis=1)
+    return np.flatnonzero((enters < leaves) & ~is_beside)

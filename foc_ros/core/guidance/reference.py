@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,14 @@ WINDOW_M = 0.02
 """Length of path [m] on both sides of the progress within which the nearest point is sought."""
 CORRECTION_S = 0.05
 """Time constant with which the progress approaches the nearest point [s]."""
+
+
+class Places(NamedTuple):
+    """A place on each of c paths: its row, the sample before it, and its share of the way to the next sample in [0, 1], (c,)."""
+
+    row: NDArray[np.intp]
+    before: NDArray[np.intp]
+    share: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +38,16 @@ class GuidePaths(Record):
     lengths: Array
     covariances: Array
 
-    def interpolate(self, values: Array, at: Array) -> Array:
-        """Return values (c, m, ...) of the samples at a length (c,) [m] of each path."""
+    def locate(self, at: Array) -> Places:
+        """Return where a length (c,) [m] of each path is."""
         rows, before = np.arange(len(at)), self._find_segments(at)
         low, high = self.lengths[rows, before], self.lengths[rows, before + 1]
         share = np.minimum(np.maximum((at - low) / np.where(high > low, high - low, 1.0), 0.0), 1.0)
+        return Places(rows, before, share)
+
+    def interpolate(self, values: Array, places: Places) -> Array:
+        """Return values (c, m, ...) of the samples at a place of each path."""
+        rows, before, share = places
         share = share.reshape(-1, *[1] * (values.ndim - 2))
         found: Array = (1.0 - share) * values[rows, before] + share * values[rows, before + 1]
         return found
@@ -102,7 +116,7 @@ def advance_progress(paths: GuidePaths, progress: Array, position: Array, veloci
     moved = np.minimum(
         np.maximum(progress + dt * np.minimum(np.maximum(paths.find_tangents(progress) @ velocity, -1e3), 1e3), 0.0), ends
     )
-    nearest = paths.find_nearest(np.tile(position, (len(moved), 1)), moved - WINDOW_M, moved + WINDOW_M)
+    nearest = paths.find_nearest(np.broadcast_to(position, (len(moved), 2)), moved - WINDOW_M, moved + WINDOW_M)
     advanced: Array = np.minimum(np.maximum(moved + (1.0 - np.exp(-dt / CORRECTION_S)) * (nearest - moved), 0.0), ends)
     return advanced
 

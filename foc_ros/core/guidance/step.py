@@ -14,7 +14,7 @@ from .agreement import combine, remember_likelihoods, weigh_candidates, yield_to
 from .clearance import find_crossing, find_need, keep_clear, saturate
 from .energy_tank import limit_by_energy, update_energy
 from .limits import find_largest_force, shorten, step_force
-from .obstacle_margin import NEAR_M, Margins, build_margins, measure_opposing_distance, turn_along
+from .obstacle_margin import NEAR_M, Margins, SeenMargins, build_margins, measure_opposing_distance, see_margins, turn_along
 from .reference import GuidePaths, advance_progress, build_paths, normalize, transfer_progress
 from .stiffness import compute_stiffness, find_deflection, project_out
 
@@ -149,15 +149,16 @@ def guide(config: Config, state: GuidanceState, given: GuidanceInput) -> tuple[G
         energy = update_energy(state.energy, state.force, given.position - state.position, settings.tank)
     status = find_status(settings, given)
     followed, wish = _follow_prediction(config, state.followed, given), _Wish()
+    seen = see_margins(followed.margins, given.position)
     if status is GuidanceStatus.GUIDING and followed.paths is not None:
         progress = advance_progress(followed.paths, followed.progress, given.position, given.velocity, dt)
         followed = replace(followed, progress=progress)
-        wish = _compute_wish(settings, followed, given)
+        wish = _compute_wish(settings, followed, seen, given)
     target = wish.force if status is GuidanceStatus.GUIDING else _release(settings, state.force, dt)
     longest = LATE_PERIODS / settings.rate_hz if status is GuidanceStatus.GUIDING else dt  # no sudden force after a gap
 
     def find_bound(force: Array) -> float:
-        return _find_bound(settings, followed.margins, given.position, energy, force)
+        return _find_bound(settings, seen, energy, force)
 
     force = step_force(state.force, target, settings.slew * min(dt, longest), find_bound)
     change = dt / settings.ramp_s
@@ -193,7 +194,7 @@ def _follow_prediction(config: Config, before: Followed, given: GuidanceInput) -
         return Followed(prediction, obstacles=obstacles, margins=margins, known=known)
     paths, references = build_paths(prediction), {}
     if before.paths is not None:
-        points = before.paths.interpolate(before.paths.points, before.progress)
+        points = before.paths.interpolate(before.paths.points, before.paths.locate(before.progress))
         references = dict(zip(before.paths.labels, points, strict=True))
     travelled = float(np.hypot(*given.velocity)) * max(given.prediction_age_s, 0.0)
     progress = transfer_progress(paths, references, given.position, travelled)
@@ -204,7 +205,7 @@ def _is_blocked_alike(prediction: Prediction, other: Prediction) -> bool:
     return prediction.obstacles is other.obstacles and prediction.cleared == other.cleared
 
 
-def _compute_wish(settings: GuidanceConfig, followed: Followed, given: GuidanceInput) -> _Wish:
+def _compute_wish(settings: GuidanceConfig, followed: Followed, seen: SeenMargins, given: GuidanceInput) -> _Wish:
     """Return what the candidates ask for.
 
     A prediction begins at the hand, so what distinguishes a path from the movement of the hand is ahead of both. With the
@@ -221,29 +222,29 @@ def _compute_wish(settings: GuidanceConfig, followed: Followed, given: GuidanceI
     need = find_need(settings, followed.obstacles, given.position, given.velocity)
     ahead = np.minimum(progress + need.time_s * speed, paths.lengths[:, -1])
     times = np.minimum(need.time_s, (ahead - progress) / max(speed, 1e-9))
-    stiffness = compute_stiffness(paths.interpolate(paths.covariances, ahead), settings)
+    places = paths.locate(ahead)
+    stiffness = compute_stiffness(paths.interpolate(paths.covariances, places), settings)
     if settings.mode == 'path':
         stiffness = project_out(stiffness, normalize(given.velocity + SLOW * paths.find_tangents(progress)))
-    points = keep_clear(settings, followed.obstacles, paths.interpolate(paths.points, ahead))
+    points = keep_clear(settings, followed.obstacles, paths.interpolate(paths.points, places))
     errors = saturate(settings, points - given.position - times[:, None] * given.velocity, need.share)
     weights = weigh_candidates(paths.labels, paths.likelihoods, followed.known, settings.sharpness)
     force, agreement = combine(weights, (stiffness @ errors[..., None])[..., 0], find_crossing(need, errors))
     force = yield_to_hand(force, given.acceleration, settings.yield_acceleration)
-    reference = given.position + weights @ errors
-    heading, target = _find_heading(paths, np.maximum(ahead, progress + HEADING_M), weights, given.position)
+    heading, line = _find_heading(paths, np.maximum(ahead, progress + HEADING_M), weights, given.position)
     return _Wish(
-        turn_along(followed.margins, given.position, reference, force),
+        turn_along(seen, weights @ errors, force),
         need.share * agreement * np.einsum('c,cab->ab', weights, stiffness),
         agreement,
         settings.authority * min(float(np.hypot(*heading)), 1.0),
-        turn_along(followed.margins, given.position, target, normalize(heading)),
+        turn_along(seen, line, normalize(heading)),
     )
 
 
 def _find_heading(paths: GuidePaths, ahead: Array, weights: Array, position: Array) -> tuple[Array, Array]:
-    """Return the weighted sum of the unit vectors to a point of each path, and the weighted mean of these points (2,) [m]."""
-    points = paths.interpolate(paths.points, ahead)
-    return weights @ normalize(points - position), weights @ points
+    """Return the weighted sum of the unit vectors from the hand to a point of each path, and the line to their weighted mean."""
+    lines = paths.interpolate(paths.points, paths.locate(ahead)) - position
+    return weights @ normalize(lines), weights @ lines
 
 
 def _release(settings: GuidanceConfig, force: Array, dt: float) -> Array:
@@ -252,13 +253,13 @@ def _release(settings: GuidanceConfig, force: Array, dt: float) -> Array:
     return shorten(force, max(norm - dt * find_largest_force(settings) / settings.ramp_s, 0.0))
 
 
-def _find_bound(settings: GuidanceConfig, margins: Margins, position: Array, energy: float, force: Array) -> float:
+def _find_bound(settings: GuidanceConfig, seen: SeenMargins, energy: float, force: Array) -> float:
     """Return the largest size [N] of a force in a direction (2,): by its limits, the tank and the margins.
 
     At the distance D there is a margin into which the force leads. A hand at the speed w is there after D / w. The force has to
     be so small that the slew limit r makes it zero by then: |f| <= r (D - d) / w, with the distance d of `NEAR_M`.
     """
     slew, speed = settings.slew, settings.max_speed
-    distance = measure_opposing_distance(margins, position, force)
+    distance = measure_opposing_distance(seen, force)
     by_tank = limit_by_energy(energy, slew, speed, LATE_PERIODS / settings.rate_hz)
     return max(min(find_largest_force(settings), by_tank, slew * (distance - NEAR_M) / speed), 0.0)
