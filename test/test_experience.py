@@ -106,6 +106,20 @@ def test_other_classes_effort_and_eta_stay_those_of_the_plan():
         np.testing.assert_array_equal(known[label].motor_covariance, each.motor_covariance)
 
 
+def test_an_obstacle_below_the_hand_does_not_keep_recordings_away():
+    """It stands on the recorded path; without its height it blocks."""
+    library, high = make_library([ABOVE] * 20), replace(MOVING, height=0.3, height_mean=np.array([0.3, 0.0, 0.0]))
+    low = make_obstacles(
+        [*OBSTACLES.centre, ABOVE.states[40, :2]],
+        [*OBSTACLES.radius, 0.02],
+        heights=[(-9.0, 9.0)] * len(OBSTACLES) + [(0.0, 0.05)],
+    )
+    ask_above = lambda obstacles: predict(CONFIG, high, obstacles, GOAL, Memory(), library, goal_heights=np.array([0.3]))[0]  # noqa: E731
+    without, over = find_taken(ask_above(low.take([0, 1, 2]))), find_taken(ask_above(low))
+    np.testing.assert_array_equal(over.mean, without.mean)
+    assert over.likelihood == without.likelihood
+
+
 @given(st.floats(0.012, 0.05), st.floats(-0.01, 0.01), st.floats(0.0, 0.9))
 @settings(max_examples=10, deadline=None)
 def test_a_pooled_path_stays_in_its_class_and_out_of_obstacles(height, beside, share):

@@ -91,7 +91,7 @@ def predict(
     widened = [_widen_covariance(each, shared, hand, config) for each in solved]
     kept = keep_answers(candidates, widened, past, hand.stamp_ns, config.likelihood.hold_s, costs)
     ranked, choice = rank_candidates(kept, config.likelihood, obstacles, hand, goals)
-    ranked = pool_recordings(ranked, library, estimated, grown, goals, config.experience)
+    ranked = pool_recordings(ranked, library, estimated, blocking, goals, config.experience)
     smooth = smooth_paths(ranked, past, hand.stamp_ns, config.likelihood.smoothing_s)
     continuous = make_continuous(smooth, past, hand.stamp_ns, config.likelihood)
     numbers = memory.numbers.keep_goals(past.durations_s)
