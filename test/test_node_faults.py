@@ -261,15 +261,17 @@ def test_a_publisher_that_cannot_be_heard_is_named(ros: Graph) -> None:
     assert bench.health().message == 'no prediction: no hand pose yet'
 
 
-def test_a_subscription_that_cannot_receive_an_output_is_named(ros: Graph) -> None:
+@pytest.mark.parametrize('wanted', [{'durability': 'transient_local'}, {'liveliness': 'manual_by_topic'}])
+def test_a_subscription_that_cannot_receive_an_output_is_named(ros: Graph, wanted: dict[str, str]) -> None:
     from nav_msgs.msg import Path
-    from rclpy.qos import QoSDurabilityPolicy, QoSProfile
+    from rclpy.qos import QoSDurabilityPolicy, QoSLivelinessPolicy, QoSProfile
 
     from foc_ros.ros.endpoints import describe_incompatible_subscriptions
 
     bench, planner = Bench(ros, outputs=[]), ros.node('planner')
-    latched = QoSProfile(depth=1, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL)
-    planner.create_subscription(Path, 'foc/path', lambda _: None, latched)
+    policies = {'durability': QoSDurabilityPolicy, 'liveliness': QoSLivelinessPolicy}
+    profile = QoSProfile(depth=1, **{name: policies[name].get_from_short_key(value) for name, value in wanted.items()})
+    planner.create_subscription(Path, 'foc/path', lambda _: None, profile)
     ros.node('listener').create_subscription(Path, 'foc/path', lambda _: None, 1)
     ros.spin_until(lambda: len(bench.node.get_subscriptions_info_by_topic('foc/path')) == 2, 'the subscriptions')
     (text,) = describe_incompatible_subscriptions(bench.node, bench.node._outputs['path'])

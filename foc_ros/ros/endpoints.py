@@ -15,6 +15,7 @@ from rclpy.qos import (
     QoSCompatibility,
     QoSDurabilityPolicy,
     QoSHistoryPolicy,
+    QoSLivelinessPolicy,
     QoSPolicyKind,
     QoSProfile,
     QoSReliabilityPolicy,
@@ -87,9 +88,9 @@ def describe_incompatible_publishers(node: Node, role: str, subscription: Any) -
 def describe_incompatible_subscriptions(node: Node, publisher: Any) -> list[str]:
     """Return a text for each present subscription of an output that cannot receive its messages."""
     found, given = node.get_subscriptions_info_by_topic(publisher.topic_name), publisher.qos_profile
-    # as in the profiles of the graph: durations that the node leaves open would count as shorter than infinite ones
-    endless = {'deadline': Infinite, 'liveliness_lease_duration': Infinite}
-    offered = QoSProfile(reliability=given.reliability, durability=given.durability, depth=given.depth, **endless)
+    # as in the profiles of the graph: what the node leaves open would count as shorter than infinite, and fit every liveliness
+    rest = {'deadline': Infinite, 'liveliness': QoSLivelinessPolicy.AUTOMATIC, 'liveliness_lease_duration': Infinite}
+    offered = QoSProfile(reliability=given.reliability, durability=given.durability, depth=given.depth, **rest)
     reasons = [(each.node_name, _find_incompatibility(offered, each.qos_profile)) for each in found]
     topic = publisher.topic_name
     remedy = f'(see qos_overrides.{topic}.publisher)'
