@@ -140,6 +140,16 @@ def test_a_node_says_what_it_waits_for_and_when_it_predicts(ros: Graph) -> None:
     ]
 
 
+def test_a_first_start_says_at_once_that_it_compiles(ros: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path))
+    with running(ros, 'module') as process:
+        assert process.stderr is not None
+        line = process.stderr.readline()
+        compiled = list(tmp_path.glob('**/*.nbc'))
+    assert 'compiling the solver for this machine' in line
+    assert not compiled, 'the message comes before the first kernel is compiled'
+
+
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_starting_node_stops_without_an_error_at_any_moment(ros: Graph, number: signal.Signals) -> None:
     watcher = ros.node('watcher')

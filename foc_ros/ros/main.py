@@ -70,9 +70,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (FocError, RuntimeError, ValueError) as error:
         return _reject(error)
 
-    from .node import FocNode
-
     with follow_compilation(partial(_log_compilation, get_logger('foc'))):
+        from .node import FocNode  # imports kernels too
+
         import_all()
     stop.defer()
     context = rclpy.Context()
