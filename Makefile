@@ -106,7 +106,7 @@ $(VENV)/.lint: $(STAMP)
 	@$(PIP) install --quiet --editable '.[lint]'
 	@touch $@
 
-colcon:
+colcon: $(STAMP)
 	PYTHON=$(PYTHON) scripts/colcon_check
 
 dist: $(VENV)/.dist

@@ -126,9 +126,9 @@ class Player:
         position = (0.15 * t, 0.02 * np.sin(6.0 * t), 0.0)
         self._hand.publish(encode_hand_pose(self._types, time.time_ns(), 'world', position))
 
-    def _note(self, message: Any) -> None:
+    def _note(self, message: Any, info: dict[str, int]) -> None:
         force = message.wrench.force
-        self.wrenches.append((time.monotonic(), float(np.hypot(force.x, force.y))))
+        self.wrenches.append((1e-9 * info['received_timestamp'], float(np.hypot(force.x, force.y))))
 
 
 def measure(load_s: float) -> dict[str, float]:
@@ -166,7 +166,7 @@ def _play(player: Player, executor: Any) -> dict[str, float]:
         player.wrenches.clear()
         spin(GUIDED_S)
         periods += np.diff([at for at, _ in player.wrenches]).tolist()
-        asked = time.monotonic()
+        asked = time.time()
         player.engage(False)
         spin(0.5)
         zeros = [at for at, force in player.wrenches if at > asked and force == 0.0]
