@@ -117,5 +117,6 @@ def test_extreme_costs_do_not_overflow() -> None:
 
 
 def test_shared_cost_is_a_share_of_the_effort_spent() -> None:
-    assert compute_shared_cost(3.0, LikelihoodConfig()) == 3.0
+    assert compute_shared_cost(3.0, LikelihoodConfig(spent_share=1.0)) == 3.0
+    assert compute_shared_cost(3.0, LikelihoodConfig()) == 0.0
     assert compute_shared_cost(3.0, LikelihoodConfig(spent_share=0.5)) == 1.5

@@ -143,7 +143,7 @@ class LikelihoodConfig:
         0.0,
         math.inf,
     )
-    spent_share: float = _p(1.0, f'fraction of the effort since onset that every cost contains, for {JERK_ONLY}', '', 0.0, 1.0)
+    spent_share: float = _p(0.0, f'fraction of the effort since onset that every cost contains, for {JERK_ONLY}', '', 0.0, 1.0)
     lookahead_s: float = _p(
         0.0, 'mean look-ahead of the operator: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
     )

@@ -1,14 +1,24 @@
 """What is learnt of an operator: the factor by which their movements take longer than the duration model expects.
 
-When a movement has covered most of its distance to a goal, every factor f of `FACTORS` is judged by the mean error that it would
-have had in this movement, relative to the duration D of the movement:
+When a movement has covered most of its distance to a goal, every factor f of `FACTORS` is judged by the positions that it would
+have led to. At a time t, the time to go T_f(t) is estimated with all expected durations multiplied by f. Where the free movement
+to the goal in T_f(t) would be h = `AHEAD_S` later is compared with where the hand x was then, relative to how far it had moved:
 
-    l_f = mean_t |T_f(t) - T(t)| / D,
+    l_f = sum_t |x_f(t + h) - x(t + h)| / sum_t |x(t + h) - x(t)|.
 
-with the true time to go T(t) and the one T_f(t) that is estimated if all expected durations are multiplied by f. The factor in
-use minimises log(f)^2 + sum l_f over the movements so far, as a regularised leader (Shalev-Shwartz 2012, Foundations and Trends
-in Machine Learning 4(2)): without movements it is 1, and it adapts in the course of about ten. It depends on the samples and
-goals alone, so that equal input gives equal factors.
+The factor in use minimises w log(f)^2 + sum l_f over the movements so far, as a regularised leader (Shalev-Shwartz 2012,
+Foundations and Trends in Machine Learning 4(2)), with the weight w of `PRIOR_WEIGHT`: without movements it is 1, and it adapts in
+the course of a few. It depends on the samples and goals alone, so that equal input gives equal factors.
+
+The free movement has the least integral of squared jerk, and begins at the velocity v without acceleration, as predictions do.
+After the share s = h / T of its time it has come to
+
+    x_f = x + p(s) (goal - x) + q(s) T v,
+    p = 10 s^3 - 15 s^4 + 6 s^5,           q = s - 6 s^3 + 8 s^4 - 3 s^5   if it comes to rest at the goal,
+    p = (20 s^3 - 15 s^4 + 3 s^5) / 8,     q = s - p                       if it passes the goal at any velocity.
+
+The time to go itself is no good measure: people slow down before their goal, or move at a constant speed, and a plan of least
+jerk is nearest to them with another duration than theirs.
 """
 
 from __future__ import annotations
@@ -22,18 +32,20 @@ import numpy as np
 from foc_ros.core.config import DurationConfig
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Record, as_readonly
 
-from .duration import estimate_times_to_go, scale_durations
+from .duration import estimate_times_to_go, is_passing, scale_durations
 
-FACTORS = as_readonly(np.exp(np.linspace(0.0, 1.6, 17)))
-"""Factors that are judged. With those below 1, free hands that stop short of their goal have worse positions (doc/people.md)."""
+FACTORS = as_readonly(np.exp(np.linspace(-0.8, 1.6, 25)))
+"""Factors that are judged."""
+PRIOR_WEIGHT = 0.1
+"""Weight of log(f)^2 against the errors of one movement."""
+AHEAD_S = 0.5
+"""How far ahead positions are judged [s]."""
 REMAINING_SHARE = 0.25
 """A movement that leaves no more than this share of its first distance to a goal has covered the distance."""
 SAMPLE_S = 0.05
 """Interval at which states of a movement are kept [s]."""
 MOST_STATES, JUDGED = 1000, 10
 """Numbers of states of a movement that are kept and, spread evenly over it, judged at most."""
-LEAST_LEFT_S = 0.1
-"""Least time to the end of a state that is judged, because the end itself is known no better [s]."""
 
 T = TypeVar('T')
 S = TypeVar('S', bound='Stamped')
@@ -68,7 +80,7 @@ class Operator(Record):
     """
 
     movements: int = 0
-    losses: Array = field(default_factory=lambda: np.log(FACTORS) ** 2)
+    losses: Array = field(default_factory=lambda: PRIOR_WEIGHT * np.log(FACTORS) ** 2)
     states: tuple[HandState, ...] = ()
 
     @property
@@ -93,17 +105,42 @@ class Operator(Record):
     def _judge(self, goals: Array, config: DurationConfig) -> Operator:
         """Return the operator after the end of the present movement, which counts if it covered the distance to a goal."""
         path, ended = np.array([each.mean[:2] for each in self.states]), replace(self, states=())
-        first, onset_ns = self.states[0].onset_position, self.states[0].onset_ns
-        assert first is not None and onset_ns is not None
+        first = self.states[0].onset_position
+        assert first is not None
         goal = goals[int(np.hypot(*(goals - path[-1]).T).argmin())]
-        distance = np.hypot(*(path - goal).T)
-        end_ns = self.states[int(distance.argmin())].stamp_ns
-        left = [(each, (end_ns - each.stamp_ns) / NANOSECONDS) for each in self.states]
-        judged = [(each, seconds) for each, seconds in left if seconds > LEAST_LEFT_S]
-        if not judged or distance.min() > REMAINING_SHARE * float(np.hypot(*(first - goal))):
+        if np.hypot(*(path - goal).T).min() > REMAINING_SHARE * float(np.hypot(*(first - goal))):
             return ended
-        judged = choose_judged(judged)
-        scaled = [scale_durations(config, factor) for factor in FACTORS.tolist()]
-        errors = [[abs(estimate_times_to_go(hand, goal[None], each)[0] - seconds) for hand, seconds in judged] for each in scaled]
-        losses = self.losses + np.mean(errors, axis=1) * NANOSECONDS / (end_ns - onset_ns)
-        return replace(ended, movements=self.movements + 1, losses=as_readonly(losses))
+        errors, moved = self._sum_errors(path, goal, config)
+        if not moved:
+            return ended
+        return replace(ended, movements=self.movements + 1, losses=as_readonly(self.losses + errors / moved))
+
+    def _sum_errors(self, path: Array, goal: Array, config: DurationConfig) -> tuple[Array, float]:
+        """Return the sum of the errors of positions with each factor (f,), and of the ways of the hand meanwhile [m]."""
+        seconds = np.array([(each.stamp_ns - self.states[0].stamp_ns) / NANOSECONDS for each in self.states])
+        ahead = np.minimum(seconds + AHEAD_S, seconds[-1])
+        reached = np.stack([np.interp(ahead, seconds, axis) for axis in path.T], axis=-1)
+        scaled, errors, moved = [scale_durations(config, factor) for factor in FACTORS.tolist()], np.zeros(len(FACTORS)), 0.0
+        for row in choose_judged(np.flatnonzero(seconds < seconds[-1]).tolist()):
+            hand, later_s = self.states[row], float(ahead[row] - seconds[row])
+            times = np.array([estimate_times_to_go(hand, goal[None], each)[0] for each in scaled])
+            expected = find_free_positions(hand.mean[:4], goal, times, later_s, is_passing(config))
+            errors += np.hypot(*(expected - reached[row]).T)
+            moved += float(np.hypot(*(reached[row] - path[row])))
+        return errors, moved
+
+
+def find_free_positions(start: Array, goal: Array, times: Array, seconds: float, passing: bool) -> Array:
+    """Return the positions (f, 2) [m] some seconds later in movements of least jerk that reach a goal (2,) in times (f,) [s].
+
+    start (4,): position [m] and velocity [m/s]; passing: whether a movement passes the goal, or comes to rest there.
+    """
+    s = np.minimum(seconds / times, 1.0)[:, None]
+    if passing:
+        covered = (20.0 * s**3 - 15.0 * s**4 + 3.0 * s**5) / 8.0
+        kept = s - covered
+    else:
+        covered = 10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5
+        kept = s - 6.0 * s**3 + 8.0 * s**4 - 3.0 * s**5
+    positions: Array = start[:2] + covered * (goal - start[:2]) + kept * times[:, None] * start[2:]
+    return positions
