@@ -3,7 +3,8 @@
 The node runs in a process of its own, where every prediction first keeps Python's global lock for `--load` seconds. This process
 plays a hand at 100 Hz and notes when wrenches arrive. The node says when its updates of guidance began, and for how long they
 computed and waited: for a processor that was taken by other programs, as Linux counts it, and otherwise, which is for Python's
-global lock. Run `.venv/bin/python scripts/measure_guidance.py`.
+global lock. A third process does nothing but wait for each period, as the thread of guidance does between its updates: no program
+in Python has a shorter period on the same machine at the same time. Run `.venv/bin/python scripts/measure_guidance.py`.
 """
 
 from __future__ import annotations
@@ -11,8 +12,10 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -86,6 +89,19 @@ def run_node(load_s: float) -> int:
     return code
 
 
+def run_idle() -> int:
+    """Wait for each period until the process is terminated; print the 99th percentile of the period, in nominal periods."""
+    begun: list[float] = []
+    is_over = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: is_over.set())
+    due_s = time.monotonic()
+    while not is_over.wait(max(due_s - time.monotonic(), 0.0)):
+        begun.append(time.monotonic())
+        due_s = max(due_s + 1.0 / RATE_HZ, begun[-1])
+    print(json.dumps({'idle_period_p99': float(RATE_HZ * np.percentile(np.diff(begun), 99))}))
+    return 0
+
+
 class Player:
     """Plays a hand that passes an obstacle, and keeps the arrival time [s] and the size [N] of every wrench."""
 
@@ -136,18 +152,21 @@ def measure(load_s: float) -> dict[str, float]:
     import rclpy
     from rclpy.executors import SingleThreadedExecutor
 
-    command = [sys.executable, __file__, '--node', '--load', str(load_s)]
-    with rclpy.Context() as context, subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+    def start(*words: str) -> subprocess.Popen[bytes]:
+        return subprocess.Popen([sys.executable, __file__, *words], stdout=subprocess.PIPE)
+
+    with rclpy.Context() as context, start('--node', '--load', str(load_s)) as node_process, start('--idle') as idle_process:
         node = rclpy.create_node('player', context=context)
         executor = SingleThreadedExecutor(context=context)
         executor.add_node(node)
         try:
             played = _play(Player(node), executor)
         finally:
-            process.terminate()
-            said = process.communicate()[0]
-        waits: dict[str, float] = json.loads(said.splitlines()[-1])
-        return played | waits
+            for process in (node_process, idle_process):
+                process.terminate()
+            said = [process.communicate()[0] for process in (node_process, idle_process)]
+        measured: list[dict[str, float]] = [json.loads(each.splitlines()[-1]) for each in said]
+        return played | measured[0] | measured[1]
 
 
 def _play(player: Player, executor: Any) -> dict[str, float]:
@@ -187,7 +206,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--load', type=float, default=0.03, metavar='S', help='time for which each prediction keeps the lock')
     parser.add_argument('--node', action='store_true', help='run the node (used by the script itself)')
+    parser.add_argument('--idle', action='store_true', help='wait for each period (used by the script itself)')
     arguments = parser.parse_args()
+    if arguments.idle:
+        return run_idle()
     if arguments.node:
         return run_node(arguments.load)
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')

@@ -100,7 +100,7 @@ def test_the_duration_shifts_the_end_of_a_damped_mass_as_a_longer_plan_does():
 
 def test_only_effort_of_jerk_is_added_to_effort_of_jerk():
     """The effort since onset and the price of time have the units of jerk: a force-driven class costs its own effort alone."""
-    values = {'duration.model': 'cost_of_time', 'duration.time_cost': 50.0}
+    values = {'duration.model': 'cost_of_time', 'duration.time_cost': 50.0, 'likelihood.spent_share': 1.0}
     scene = make_obstacles([[0.15, 0.01]], 0.03), GOAL
     for config, shared, price in ((Config(), 5.0, 50.0), (MASS_CONFIG, 0.0, 0.0)):
         for each in predict(config.with_values(values), MOVING, *scene, Memory())[0].solved_candidates:
