@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, ForwardRef, TypeAlias, TypeVar, cast
 
 import numpy as np
-from numba import njit, types
+from numba import config, njit, types
 from numpy.typing import NDArray
 
 Vector: TypeAlias = NDArray[np.float64]
@@ -60,6 +60,10 @@ SOURCE_OF_KERNELS = re.compile(rb'@compiled|\(NamedTuple\)')
 """Text in every source of a kernel, or of a NamedTuple that one takes; it occurs in this module too."""
 REORDERED = {'contract', 'reassoc'}
 """What the compiler may change: the order of sums, and fused products. It may not assume that numbers are finite."""
+COMMON: dict[str, Any] = {'error_model': 'numpy', 'no_cfunc_wrapper': True}
+"""Options of all kernels. None is called from C."""
+LEVEL = {'OPT': type(vars(config)['OPT'])(1), 'LOOP_VECTORIZE': 0}
+"""Settings of numba for kernels. Its own, level 3, takes half as long again to compile, for kernels that are not faster."""
 
 
 def forget_outdated(folder: Path) -> None:
@@ -104,17 +108,17 @@ def compiled_with_caller(kernel: Kernel) -> Kernel:
 
     It is inlined: passing on the arrays of a NamedTuple, which are counted references, took as long as the work in some of them.
     """
-    return cast('Kernel', njit(fastmath=REORDERED, error_model='numpy', forceinline=True)(kernel))
+    return cast('Kernel', njit(fastmath=REORDERED, forceinline=True, **COMMON)(kernel))
 
 
 def compiled_exactly_with_caller(kernel: Kernel) -> Kernel:
     """Compile an inner kernel like `compiled_with_caller`, in which each product and sum is rounded as written."""
-    return cast('Kernel', njit(error_model='numpy', forceinline=True)(kernel))
+    return cast('Kernel', njit(forceinline=True, **COMMON)(kernel))
 
 
 def compiled_separately(kernel: Kernel) -> Kernel:
     """Compile an inner kernel for the types of its calls, not inlined: a large one takes long to compile in each caller."""
-    return cast('Kernel', njit(fastmath=REORDERED, error_model='numpy')(kernel))
+    return cast('Kernel', njit(fastmath=REORDERED, **COMMON)(kernel))
 
 
 def freeze(group: Group) -> Group:
@@ -130,12 +134,25 @@ def freeze(group: Group) -> Group:
 def _compile_entry(kernel: Kernel, freedom: set[str]) -> Kernel:
     scope = kernel.__globals__
     signature = tuple(_find_type(each, scope, _TYPES) for name, each in kernel.__annotations__.items() if name != 'return')
+    options = {'nogil': True, 'fastmath': freedom, **COMMON}
+    with _compiler_at_level():
+        try:
+            return cast('Kernel', njit(signature, cache=True, **options)(kernel))
+        except RuntimeError as error:  # no directory to keep machine code in: compile in every process
+            if 'cannot cache' not in str(error):
+                raise
+            return cast('Kernel', njit(signature, **options)(kernel))
+
+
+@contextmanager
+def _compiler_at_level() -> Iterator[None]:
+    """Set numba to the level of kernels, and back again for other code of this process."""
+    before = {name: getattr(config, name) for name in LEVEL}
+    vars(config).update(LEVEL)
     try:
-        return cast('Kernel', njit(signature, cache=True, nogil=True, fastmath=freedom, error_model='numpy')(kernel))
-    except RuntimeError as error:  # no directory to keep machine code in: compile in every process
-        if 'cannot cache' not in str(error):
-            raise
-        return cast('Kernel', njit(signature, nogil=True, fastmath=freedom, error_model='numpy')(kernel))
+        yield
+    finally:
+        vars(config).update(before)
 
 
 def _find_type(annotation: object, scope: dict[str, Any], known: dict[str, types.Type]) -> types.Type:
