@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Measure `foc_ros play` in a headless Chromium: frames per second, and the time from a pointer event to the drawn prediction.
 
-    python scripts/measure_play.py [--no-ros] [--scene grid|rows] [--seconds 20] [--budget 0.01]
+    python scripts/measure_play.py [--no-ros] [--scene rows|grid] [--seconds 20] [--budget 0.01]
 
-The scene has 16 obstacles, and 8 ways are followed. Synthetic pointer events move the hand to and fro. The page measures both
-numbers: frames by the times of the browser, and the delay from the time stamp of an event until the prediction for the hand that
-it moved has been drawn, of the last 200 predictions. Chromium, its driver and selenium are needed, as for the tests.
+The scene has 16 obstacles. Up to 8 ways are followed, and those that were followed before; their mean number is printed.
+Synthetic pointer events move the hand to and fro. The page measures both numbers: frames by the times of the browser, and the
+delay from the time stamp of an event until the prediction for the hand that it moved has been drawn, of the last 200 predictions.
+Chromium, its driver and selenium are needed, as for the tests.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def main() -> None:
     parser.add_argument('--seconds', type=float, default=20.0, help='time to measure (default: %(default)s)')
     words = 'budget_s of the predictions [s] (default: %(default)s)'
     parser.add_argument('--budget', type=float, default=Config().budget_s, help=words)
-    parser.add_argument('--scene', choices=SCENES, default='grid', help='arrangement of the obstacles (default: %(default)s)')
+    parser.add_argument('--scene', choices=SCENES, default='rows', help='arrangement of the obstacles (default: %(default)s)')
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -25,7 +25,7 @@ def started(*arguments: str, **options: object) -> subprocess.CompletedProcess[s
 @pytest.mark.parametrize(
     ('arguments', 'line'),
     [
-        ([], 'foc_ros: the following arguments are required: command'),
+        ([], 'foc_ros: no command is given; demo, '),
         (['fly'], 'foc_ros: there is no command fly; demo, '),
         (['evalute', 'bags'], 'foc_ros: there is no command evalute (did you mean evaluate?)'),
         (['convert'], 'foc_ros convert: the following arguments are required: CSV, --output'),
@@ -53,6 +53,18 @@ def run_without_heavy_imports(*arguments: str) -> subprocess.CompletedProcess[st
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=100, check=False)
     assert 'heavy: []' in result.stdout, result.stderr
     return result
+
+
+def test_wrong_parameters_of_the_node_are_answered_before_anything_is_imported(tmp_path: Path) -> None:
+    file = tmp_path / 'wrong.yaml'
+    file.write_text('/**: {ros__parameters: {foc: {etta: 0.5}, use_sim_time: true}}')
+    given = ['-p', 'rate_hz:=-1', '--params-file', str(file), '-p', 'foc.steps:=1e1', '-p', 'qos_overrides./a.b:=x']
+    result = run_without_heavy_imports('node', '--ros-args', *given)
+    assert result.returncode == 2
+    assert result.stderr.splitlines() == [
+        'foc_node: rate_hz: expected a number in [0.1, 1000] Hz, got -1',
+        'foc_node: foc.etta: expected a known parameter (did you mean foc.eta?), got 0.5',
+    ]
 
 
 def test_help_names_every_command_and_imports_nothing_heavy() -> None:
@@ -129,6 +141,8 @@ INPUTS = 'hand_pose, obstacles, obstacle_markers, collision_objects, detections,
             ['--scheduler: expected the address of a Dask scheduler, as in tcp://host:8786, got here'],
         ),
         (['paper', '--output', 'scene.yaml'], ['--output: expected a folder, got scene.yaml, which is a file']),
+        (['play', '--data', '/proc/sys/a'], ['--data: expected a directory that can be written, got /proc/sys/a']),
+        (['learn', '.', '--output', '/proc/sys/a'], ['--output: expected a file that can be written, got /proc/sys/a']),
     ],
 )  # fmt: skip
 def test_wrong_inputs_are_answered_before_the_solver_is_imported(

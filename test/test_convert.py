@@ -234,17 +234,21 @@ def test_all_errors_of_a_table_are_found_at_once(tmp_path: Path, capsys: pytest.
     rows = 'recording,t_s,x_m,y_m\na,0,x,y\na,1,0\na,2,0,0\na,1,0,0\n'
     assert convert(tmp_path, rows) == 2
     lines = capsys.readouterr().err.splitlines()
-    assert [line.partition('r.csv: ')[2].partition(',')[0].partition(':')[0] for line in lines] == ['row 3']
-    assert convert(tmp_path, rows.replace('a,1,0\n', '')) == 2
-    lines = capsys.readouterr().err.splitlines()
     assert [line.partition('r.csv: ')[2].partition(':')[0] for line in lines] == [
-        'row 2, column x_m', 'row 2, column y_m', 'row 4, column t_s',
+        'row 3', 'row 2, column x_m', 'row 2, column y_m', 'row 5, column t_s',
     ]  # fmt: skip
     assert convert(tmp_path, obstacles='x_m,y_m,radius_m,id\n0,0,-1,0\n0,a,1,1\n0,0,1,1\n0,0,1,1\n') == 2
     lines = capsys.readouterr().err.splitlines()
     assert [line.partition('o.csv: ')[2].partition(':')[0] for line in lines] == [
         'row 2, column radius_m', 'row 3, column y_m', 'row 5, column id',
     ]  # fmt: skip
+
+
+def test_the_errors_of_all_tables_are_found_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    wrong = 'x_m,y_m,radius_m\n0,0,-1\n', 'x_m,y_m\n0,a\n'
+    assert convert(tmp_path, 'recording,t_s,x_m,y_m\na,0,x,0\n', *wrong) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.partition('.csv: ')[0][-1] for line in lines] == ['r', 'o', 'g']
 
 
 def test_a_table_is_not_read_beyond_a_hundred_wrong_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

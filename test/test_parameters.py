@@ -18,7 +18,7 @@ from ros_helpers import Graph
 from foc_ros.core.config import Config, flatten, list_parameters, replace_values
 from foc_ros.core.errors import FocError, ParameterError, RecordingError
 from foc_ros.ros import parameters as module
-from foc_ros.ros.parameters import dump_parameter_file, load_parameter_file
+from foc_ros.ros.parameters import check_parameters, dump_parameter_file, load_parameter_file
 
 ROOT = Path(__file__).parents[1]
 NAMES = [parameter.name for parameter in list_parameters()]
@@ -154,6 +154,41 @@ def node_with(ros: Graph, **overrides: object) -> Any:
 
     given_values = [Parameter(name.replace('__', '.'), value=value) for name, value in overrides.items()]
     return ros.node('foc', parameter_overrides=given_values, automatically_declare_parameters_from_overrides=True)
+
+
+@pytest.mark.parametrize(
+    'arguments',
+    [
+        ['-r', '__ns:=/arm', '-p', 'rate_hz:=-1.0'],
+        ['-r', '__node:=arm', '-p', 'rate_hz:=-1.0'],
+        ['-p', 'arm:rate_hz:=-1.0'],
+        ['-p', 'rate_hz:={'],
+        ['--params-file', 'arm.yaml', '-p', 'rate_hz:=-1.0'],
+        ['--params-file', 'no.yaml'],
+        ['-p', 'budget_s:=1e-3', '-p', 'likelihood.shortfall:=.inf'],
+    ],
+)
+def test_what_depends_on_the_name_of_the_node_is_left_to_the_node(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path('arm.yaml').write_text('arm: {ros__parameters: {rate_hz: 5.0}}')
+    check_parameters(['foc_node', '--ros-args', *arguments])
+
+
+def test_a_later_argument_replaces_an_earlier_one(tmp_path: Path) -> None:
+    file = tmp_path / 'foc.yaml'
+    file.write_text('foc: {ros__parameters: {rate_hz: -1.0}}')
+    check_parameters(['--ros-args', '--params-file', str(file), '-p', 'rate_hz:=5.0'])
+    with pytest.raises(ParameterError, match='rate_hz'):
+        check_parameters(['--ros-args', '-p', 'rate_hz:=5.0', '--params-file', str(file)])
+
+
+def test_numbers_with_an_exponent_need_no_point(tmp_path: Path) -> None:
+    file = tmp_path / 'foc.yaml'
+    file.write_text('foc: {ros__parameters: {budget_s: 1e-3, scene.timeout_s: 2E1}}')
+    config = load_parameter_file(file)
+    assert (config.budget_s, config.scene.timeout_s) == (0.001, 20.0)
 
 
 def test_a_node_declares_every_parameter_with_description_and_range(ros: Graph) -> None:

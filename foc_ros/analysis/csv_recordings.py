@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.errors import RecordingError, collect_all
+from foc_ros.core.errors import FocError, RecordingError, collect, collect_all, join_errors
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.bags import TYPESTORE, BagWriter
 from foc_ros.io.csv_tables import Column, Row, parse_rows, read_rows
@@ -43,18 +43,29 @@ class Movement:
 
 def read_movements(file: Path) -> list[Movement]:
     """Return the recordings in the order of their first rows; within one recording, time must not run backward."""
-    return collect_all(parse_movement, read_movement_rows(file).items())
+    found: dict[str, list[Row]] = {}
+    errors: list[FocError] = []
+    collect(errors, _group_rows, file, found)
+    movements = [collect(errors, parse_movement, name, rows) for name, rows in found.items()]
+    if errors:
+        raise join_errors(errors)
+    return [each for each in movements if each is not None]
 
 
 def read_movement_rows(file: Path) -> dict[str, list[Row]]:
     """Return the rows of each recording, at least one, in the order of their first rows."""
     found: dict[str, list[Row]] = {}
+    _group_rows(file, found)
+    return found
+
+
+def _group_rows(file: Path, found: dict[str, list[Row]]) -> None:
+    """Add the rows of each recording, in the order of their first rows, also where it raises RecordingError for other rows."""
     parse_rows(
         read_rows(file, ('recording', 't_s', 'x_m', 'y_m'), ('z_m',)),
         lambda row: found.setdefault(_read_recording(row), []).append(row),
     )
     _check_not_empty(file, found)
-    return found
 
 
 def parse_movement(name: str, table: Iterable[Row]) -> Movement:
@@ -106,8 +117,13 @@ class SceneTables:
 
 
 def read_scenes(obstacles: Path | None, goals: Path | None) -> SceneTables:
-    """Read the tables of obstacles and of goals; a column `recording` gives each recording its own rows."""
-    return SceneTables({} if obstacles is None else read_obstacles(obstacles), None if goals is None else read_goals(goals))
+    """Read the tables of obstacles and of goals; a column `recording` gives each recording its own rows.
+
+    Raises one RecordingError for the errors of both.
+    """
+    readers = [(read_obstacles, obstacles), (read_goals, goals)]
+    tables = collect_all(lambda read, file: None if file is None else read(file), readers)
+    return SceneTables(tables[0] or {}, tables[1])
 
 
 def read_obstacles(file: Path) -> dict[str, tuple[tuple[float, ...], ...]]:

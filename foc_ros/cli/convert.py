@@ -36,8 +36,9 @@ def _read(arguments: argparse.Namespace) -> tuple[dict[str, RecordedScene], list
         )
     if arguments.obstacles is None:
         raise InputError('--obstacles', 'a table of obstacles, which may be without rows', 'nothing')
-    movements, tables_of_scenes = read_movements(arguments.csv), read_scenes(arguments.obstacles, arguments.goals)
-    return {each.name: tables_of_scenes.find(each.name) for each in movements}, movements
+    reading = [(read_movements, arguments.csv), (read_scenes, arguments.obstacles, arguments.goals)]
+    movements, scenes = collect_all(lambda read, *files: read(*files), reading)
+    return {each.name: scenes.find(each.name) for each in movements}, movements
 
 
 def _name_bags(movements: list[Movement]) -> dict[str, Movement]:

@@ -111,8 +111,11 @@ def _parse_and_run(given: list[str]) -> int:
         command = commands.add_parser(name, help=purpose, description=f'{purpose[0].upper()}{purpose[1:]}.')
         getattr(declarations, f'add_{_get_module_name(name)}_arguments')(command)
     try:
-        if given and not given[0].startswith('-') and given[0] not in COMMANDS:
-            parser.error(f'there is no command {given[0]}{suggest(given[0], COMMANDS)}; {", ".join(COMMANDS)} are the commands')
+        words = f'{", ".join(COMMANDS)} are the commands (foc_ros --help explains them)'
+        if not given:
+            parser.error(f'no command is given; {words}')
+        if not given[0].startswith('-') and given[0] not in COMMANDS:
+            parser.error(f'there is no command {given[0]}{suggest(given[0], COMMANDS)}; {words}')
         parsed, rest = parser.parse_known_args(given)
         if rest and parsed.command != 'node':
             commands.choices[parsed.command].reject(rest)

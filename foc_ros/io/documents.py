@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Hashable, Iterable
 from pathlib import Path
 from typing import Any
@@ -48,6 +49,9 @@ class _StrictLoader(yaml.SafeLoader):
 
 
 _StrictLoader.add_constructor('tag:yaml.org,2002:int', _StrictLoader.construct_yaml_int)
+# as for ROS, and YAML 1.2, 1e-3 is a number; for PyYAML only 1.0e-3 is one
+_EXPONENT = re.compile(r'[-+]?[0-9]+e[-+]?[0-9]+$', re.IGNORECASE)
+_StrictLoader.add_implicit_resolver('tag:yaml.org,2002:float', _EXPONENT, list('-+0123456789'))
 
 
 def read_document(file: Path) -> Any:
@@ -59,7 +63,7 @@ def read_document(file: Path) -> Any:
         if len(held) > MAX_BYTES:
             raise RecordingError(f'{file}: expected at most {MAX_BYTES:,} bytes, got more')
         text = held.decode('utf-8')
-        document = _parse_json(text) if is_json else yaml.load(text, _StrictLoader)  # noqa: S506
+        document = _parse_json(text) if is_json else parse_yaml(text)
         _check_depth(document)
         return document
     except OSError as error:
@@ -68,6 +72,11 @@ def read_document(file: Path) -> Any:
         raise RecordingError(f'{file}: expected at most {MAX_DEPTH} mappings and lists within each other, got more') from error
     except (ValueError, yaml.YAMLError) as error:
         raise RecordingError(f'{file}: not a {"JSON" if is_json else "YAML"} file: {error}') from error
+
+
+def parse_yaml(text: str) -> Any:
+    """Return the content of a YAML text; raises ValueError or YAMLError."""
+    return yaml.load(text, _StrictLoader)  # noqa: S506
 
 
 def _parse_json(text: str) -> Any:

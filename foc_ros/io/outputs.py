@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from foc_ros.core.errors import InputError
@@ -15,16 +16,20 @@ PICTURE_SUFFIXES = ('.png', '.pdf', '.svg')
 
 
 def check_file(option: str, file: Path) -> None:
-    """Raise InputError, which names the option, if a file cannot be written because its folder does not exist."""
+    """Raise InputError, which names the option, if a file cannot be written into its folder, or the folder does not exist."""
     if file.is_dir() or not file.resolve().parent.is_dir():
         raise InputError(option, 'a file in a directory that exists', file)
+    if not os.access(file if file.exists() else file.resolve().parent, os.W_OK):
+        raise InputError(option, 'a file that can be written', file)
 
 
 def check_folder(option: str, directory: Path) -> None:
-    """Raise InputError, which names the option, if a folder cannot be made because a file has its name."""
+    """Raise InputError, which names the option, if a folder cannot be made, or cannot be written."""
     file = next((each for each in (directory, *directory.parents) if each.exists()), directory)
     if file.is_file():
         raise InputError(option, 'a folder', f'{file}, which is a file')
+    if not os.access(file, os.W_OK):
+        raise InputError(option, 'a directory that can be written', directory)
 
 
 def check_picture(option: str, file: Path) -> None:

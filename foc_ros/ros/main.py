@@ -11,9 +11,9 @@ from functools import partial
 from types import FrameType
 from typing import Any
 
-from foc_ros.core.compilation import count_kernels, follow_compilation
-from foc_ros.core.errors import FocError, list_messages
-from foc_ros.core.registry import import_all
+from foc_ros.core.errors import FocError, ParameterError, list_messages
+
+from .parameters import check_parameters
 
 SPIN_S = 0.1
 """Longest time between two checks of the stop flag [s]."""
@@ -57,11 +57,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     stop = StopSignals()
     given = ['foc_node', *(sys.argv[1:] if arguments is None else arguments)]
+    try:
+        check_parameters(given)
+    except ParameterError as error:
+        return _reject(error)
     import rclpy
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
     from rclpy.logging import get_logger
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
+
+    from foc_ros.core.compilation import follow_compilation
+    from foc_ros.core.registry import import_all
 
     try:
         extra = remove_ros_args(given)[1:]
@@ -111,6 +118,8 @@ def _reject(error: Exception) -> int:
 
 def _log_compilation(logger: Any, done: int) -> None:
     """Log that kernels are compiled, and how many of them are."""
+    from foc_ros.core.compilation import count_kernels
+
     total = count_kernels()
     if done == 0:
         logger.info(f'compiling the solver for this machine, up to {total} kernels; this happens once (see foc_ros warm-up)')

@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from foc_ros.core.config import Config, Parameter, flatten, list_parameters, replace_values
-from foc_ros.core.errors import InputError, ParameterError
-from foc_ros.io.documents import read_document
+from foc_ros.core.errors import FocError, InputError, ParameterError
+from foc_ros.io.documents import parse_yaml, read_document
 
 NODE_KEYS = ('/**', 'foc', '/foc')
 """Sections of a parameter file that the node reads under its default name."""
@@ -33,6 +34,34 @@ def load_parameter_file(path: Path | str) -> Config:
     ParameterError, naming the parameter, for one that is unknown or out of bounds, with a note for every further one, and
     RecordingError if the file is no YAML.
     """
+    return replace_values(Config(), _read_values(path))
+
+
+def check_parameters(arguments: Sequence[str]) -> None:
+    """Raise ParameterError for wrong parameters in the ROS arguments of a node, before the node is imported, which takes seconds.
+
+    This leaves to the node what it cannot read as simply as ROS would: a node with another name or namespace, a file without a
+    section for the default name, and parameters of one node among several. The node checks all that it is given.
+    """
+    values: dict[str, object] = {}
+    try:
+        for option, given in pairwise(arguments):
+            if any(rule in given for rule in ('__node:=', '__name:=', '__ns:=')):
+                return
+            if option == '--params-file':
+                values.update(_read_values(given))
+            elif option in ('-p', '--param'):
+                name, _, text = given.partition(':=')
+                if ':' in name:
+                    return
+                values.update(_flatten_group({name: parse_yaml(text)}))
+    except (FocError, ValueError, yaml.YAMLError):
+        return
+    replace_values(Config(), values)
+
+
+def _read_values(path: Path | str) -> dict[str, object]:
+    """Return the values of a parameter file by dotted name; see `load_parameter_file`."""
     document = read_document(Path(path))
     if not isinstance(document, Mapping) or not any(key in NODE_KEYS for key in document):
         keys = ', '.join(map(str, document)) if isinstance(document, Mapping) else type(document).__name__
@@ -47,7 +76,7 @@ def load_parameter_file(path: Path | str) -> Config:
             if len(names) < len(given):
                 raise ParameterError(names.most_common(1)[0][0], f'one value in section {key}', 'two, nested and dotted')
             values.update(given)
-    return replace_values(Config(), values)
+    return values
 
 
 def _flatten_group(group: Mapping[Any, object], prefix: str = '') -> Iterator[tuple[str, object]]:

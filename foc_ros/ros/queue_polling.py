@@ -12,14 +12,13 @@ from rclpy.node import Node
 
 POLL_S = 0.005
 """Time between two polls, and between two messages below which polling begins [s]."""
-EMPTY_POLLS = 20
-"""Number of polls without a message after which polling ends."""
 
 
 class QueuePolling(MutuallyExclusiveCallbackGroup):
     """A callback group whose subscription wakes the executor up while its messages are rare, and is polled while they are not.
 
-    One wake-up of the executor costs more than the processing of several messages.
+    One wake-up of the executor costs more than the processing of several messages. Polling ends with the first poll without a
+    message, because a message waits for up to `POLL_S`.
 
     Parameters
     ----------
@@ -32,7 +31,7 @@ class QueuePolling(MutuallyExclusiveCallbackGroup):
     def __init__(self, node: Node, poll: Callable[[], bool]) -> None:
         super().__init__()
         self._poll = poll
-        self._last_s, self._empty = float('-inf'), 0
+        self._last_s = float('-inf')
         self._timer = node.create_timer(POLL_S, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._timer.cancel()
 
@@ -44,11 +43,9 @@ class QueuePolling(MutuallyExclusiveCallbackGroup):
         """Begin to poll if the message before arrived just now."""
         now_s = monotonic()
         if now_s - self._last_s < POLL_S and self._timer.is_canceled():
-            self._empty = 0
             self._timer.reset()
         self._last_s = now_s
 
     def _tick(self) -> None:
-        self._empty = 0 if self._poll() else self._empty + 1
-        if self._empty >= EMPTY_POLLS:
+        if not self._poll():
             self._timer.cancel()

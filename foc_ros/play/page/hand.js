@@ -11,24 +11,27 @@ const FORCE_MS = 300;
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
 export class Hand {
-  constructor(canvas, toScene) {
+  // moved: called with the time of an event [ms] that has moved the target.
+  constructor(canvas, toScene, moved) {
     this.target = [0, 0];
     this.position = [0, 0];
     this.force = [0, 0];
     this.enabled = true;
     this.event = null;
+    this.seenMs = -1;
     this.followed = [0, 0];
     this.pull = [0, 0];
     this.velocity = [0, 0];
     this.forceMs = 0;
     this.pressed = new Set();
     const point = (event) => {
-      if (this.enabled) {
-        [this.target, this.event] = [toScene(event), event.timeStamp];
+      if (this.enabled && event.timeStamp > this.seenMs) {
+        [this.target, this.event, this.seenMs] = [toScene(event), event.timeStamp, event.timeStamp];
+        moved(event.timeStamp);
       }
     };
-    canvas.addEventListener('pointermove', point);
-    canvas.addEventListener('pointerdown', point);
+    // pointerrawupdate does not wait for the next frame, unlike pointermove, which repeats it
+    for (const name of ['pointerrawupdate', 'pointermove', 'pointerdown']) canvas.addEventListener(name, point);
     canvas.addEventListener('keydown', (event) => {
       if (this.enabled && event.key in KEYS) {
         event.preventDefault();

@@ -8,6 +8,9 @@ const RETRY_MS = 1000;
 // Time over which frames are counted [ms], and the number of delays of which the median is shown.
 const COUNTED_MS = 2000;
 const DELAYS = 200;
+// Time since the last position that was sent [ms] after which an event or a frame sends one.
+const EVENT_MS = 6;
+const FRAME_MS = 12;
 const TASK_WORDS = {
   none: '', return: 'Go to the green start and rest there.', wait: 'Rest at the start until a goal is lit.', reach: 'Reach the lit goal, and stay there.',
   over: '',
@@ -16,7 +19,7 @@ const TASK_WORDS = {
 const canvas = byId('scene');
 const drawing = new Drawing(canvas);
 const toScene = (event) => drawing.toScene(event);
-const hand = new Hand(canvas, toScene);
+const hand = new Hand(canvas, toScene, (time) => moveHand(time, EVENT_MS));
 let isSceneChanged = false;
 const arranging = new Arranging(canvas, toScene, () => { isSceneChanged = true; });
 const view = { scene: arranging.scene, selected: null, goal: null, phase: 'none', candidates: [], hand, hidden: false, touchedMs: -Infinity };
@@ -181,14 +184,21 @@ function measure(time) {
   measured.delayMs = sorted.length ? sorted[Math.floor(sorted.length / 2)] : null;
 }
 
-let shownMs = 0;
-function frame(time) {
-  requestAnimationFrame(frame);
-  if (!settings) return;
+// Moves the hand until a time [ms], and sends its position, if the last one was sent some time before [ms]; for every event, and for
+// every frame, because the hand moves without an event too.
+function moveHand(time, sinceMs) {
+  if (!settings || (lastMs !== null && time - lastMs < sinceMs)) return;
   const seconds = lastMs === null ? 0 : Math.min((time - lastMs) / 1000, 0.1);
   lastMs = time;
   const event = hand.update(time, seconds);
   send({ type: 'hand', t: time, x: hand.position[0], y: hand.position[1], event });
+}
+
+let shownMs = 0;
+function frame(time) {
+  requestAnimationFrame(frame);
+  if (!settings) return;
+  moveHand(time, FRAME_MS);
   if (isSceneChanged) {
     send({ type: 'scene', ...arranging.scene });
     isSceneChanged = false;
