@@ -59,6 +59,7 @@ case "$$(command -v $(PYTHON))" in \
 *) $(PYTHON) -c '' ;; \
 esac
 endef
+CHECK_PYTHON = $(PYTHON) -c '' 2>/dev/null || { $(EXPLAIN_PYTHON); exit 1; }
 
 TEST = ROS_PYTHON_CHECK_FIELDS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
 
@@ -66,12 +67,14 @@ TEST = ROS_PYTHON_CHECK_FIELDS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxproc
 
 setup: $(STAMP)
 ifneq ($(origin PYTHON),file)
+	@$(CHECK_PYTHON)
 	@test "$$($(BIN)/python -V)" = "$$($(PYTHON) -V)" || { echo "make: .venv is $$($(BIN)/python -V), not $$($(PYTHON) -V): make clean first" >&2; exit 1; }
 endif
 	@echo 'setup: ready'
 
 $(STAMP): setup.py setup.cfg pyproject.toml
-	@$(PYTHON) -c '' 2>/dev/null || { $(EXPLAIN_PYTHON); exit 1; }
+	@$(CHECK_PYTHON)
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "make: foc_ros needs Python 3.11 or 3.12, and $(PYTHON) is $$($(PYTHON) -V); choose another, as in make setup PYTHON=python3.12" >&2; exit 1; }
 	@echo "setup: creating .venv with $$($(PYTHON) -V)"
 	@test -e $@ || $(PYTHON) -m venv --clear $(VENV_OPTIONS) $(VENV) || { echo 'make: no venv in $(PYTHON); on Debian and Ubuntu: apt install python3-venv' >&2; exit 1; }
 	@echo 'setup: installing foc_ros[$(EXTRAS)], some minutes'

@@ -105,7 +105,7 @@ def test_recorder_counts_messages_of_the_last_second() -> None:
 
 def shown(recorder: Recorder, terminal: bool, times: np.ndarray) -> str:
     screen = io.StringIO()
-    console = Console(file=screen, force_terminal=terminal, width=110)
+    console = Console(file=screen, force_terminal=terminal, width=80)
     with show_live(recorder, START_NS, 5.0, console) as show:
         for now in times:
             show(float(now))
@@ -123,9 +123,10 @@ def test_without_a_terminal_a_line_is_printed_each_second() -> None:
 
 def test_on_a_terminal_a_table_is_shown() -> None:
     text = shown(filled(), True, np.array([0.2]))
-    for part in ('likelihood', 'effort', 'eta', 'goal0:-1', 'goal0: right of 1', '56 %', 'goal1:+1-post', '0.90', 'x 1.15'):
+    for part in ('likelihood', 'cost', 'eta', 'goal0: right of 1', '56 %', 'goal1: ', '0.90', 'x 1.15'):
         assert part in text
     assert '█' in text
+    assert '…' not in text
 
 
 @pytest.mark.parametrize('terminal', [False, True])
@@ -220,11 +221,11 @@ def test_the_lead_of_the_goal_that_was_reached_is_described() -> None:
     words = describe_lead(build_hand_trajectory(made), snapshots)
     # the most likely candidate always leads to goal0, where the hand arrives
     assert words.startswith(
-        f'{len(snapshots)} predictions were made. In 1 movements to a goal, of 0.8 s, this goal was the most '
+        f'{len(snapshots)} predictions were made. The hand moved to a goal 1 times, for 0.8 s; this goal was the most '
     )
-    assert 'most likely one from 0.8 s before the end' in words
+    assert 'most likely one from 0.8 s before the arrival' in words
     others = [replace(each, most_likely='goal1:+1-post') for each in snapshots]
-    assert 'from 0.0 s before the end' in describe_lead(build_hand_trajectory(made), others)
+    assert 'from 0.0 s before the arrival' in describe_lead(build_hand_trajectory(made), others)
     assert describe_lead(build_hand_trajectory(made[:5]), snapshots).endswith('no movement ended at a goal.')
 
 

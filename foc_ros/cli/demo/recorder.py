@@ -150,16 +150,15 @@ def _describe(candidate: CandidateView) -> str:
 def _make_table(snapshot: Snapshot, title: str) -> Table:
     table = Table(title=title, title_justify='left', caption_justify='left', box=SIMPLE_HEAD, padding=(0, 0))
     table.caption = '* compromised: eta is below the wanted one'
-    table.add_column('candidate', width=15, no_wrap=True)
-    table.add_column('passes', width=23, no_wrap=True)
+    table.add_column('candidate', width=46, no_wrap=True)
     table.add_column('likelihood', width=10)
-    for name, width in (('', 5), ('effort', 6), ('cost', 6), ('eta', 5)):
+    for name, width in (('', 5), ('cost', 6), ('eta', 5)):
         table.add_column(name, justify='right', width=width)
     for each in snapshot.candidates[:ROWS]:
         bar = Bar(1.0, 0.0, each.likelihood, color='bright_blue')
         share, ratio = f'{100 * each.likelihood:.0f} %', f'x {each.cost_ratio:.3g}'
         eta = f'{each.eta:.2f}' + '*' * each.is_compromised
-        table.add_row(escape(each.label), escape(each.description), bar, share, f'{each.effort:.3g}', ratio, eta)
+        table.add_row(escape(each.description or each.label), bar, share, ratio, eta)
     for row in range(len(snapshot.candidates), ROWS):
-        table.add_row('', '' if row else 'no solved candidate')
+        table.add_row('' if row else 'no solved candidate')
     return table

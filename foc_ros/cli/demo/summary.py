@@ -28,8 +28,8 @@ def describe_lead(hand: HandTrajectory, snapshots: Sequence[Snapshot]) -> str:
         return f'{len(snapshots)} predictions were made; no movement ended at a goal.'
     median, duration_s = np.median(leads, axis=0).tolist()
     return (
-        f'{len(snapshots)} predictions were made. In {len(leads)} movements to a goal, of {duration_s:.1f} s, this goal was the '
-        f'most likely one from {median:.1f} s before the end (medians).'
+        f'{len(snapshots)} predictions were made. The hand moved to a goal {len(leads)} times, for {duration_s:.1f} s; this goal '
+        f'was the most likely one from {median:.1f} s before the arrival on (medians).'
     )
 
 

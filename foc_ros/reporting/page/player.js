@@ -266,7 +266,7 @@ function fillTable() {
     filling.style.cssText = `width: ${100 * share}%; background: ${colourOf(slotOf(candidate.track))}`;
     bar.append(filling);
     cell(row, '').append(bar);
-    cell(row, data.labels[candidate.label]);
+    cell(row, data.labels[candidate.label], 'label');
     cell(row, wordsOf(candidate));
     cell(row, candidate.ratio === null ? '' : candidate.ratio.toFixed(2), 'number');
     cell(row, candidate.eta === null ? '' : `${candidate.eta.toFixed(3)}${candidate.compromised ? ' *' : ''}`, 'number');
