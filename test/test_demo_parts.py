@@ -105,7 +105,7 @@ def test_recorder_counts_messages_of_the_last_second() -> None:
 
 def shown(recorder: Recorder, terminal: bool, times: np.ndarray) -> str:
     screen = io.StringIO()
-    console = Console(file=screen, force_terminal=terminal, width=80)
+    console = Console(file=screen, force_terminal=terminal, width=80, height=24)
     with show_live(recorder, START_NS, 5.0, console) as show:
         for now in times:
             show(float(now))
@@ -123,10 +123,10 @@ def test_without_a_terminal_a_line_is_printed_each_second() -> None:
 
 def test_on_a_terminal_a_table_is_shown() -> None:
     text = shown(filled(), True, np.array([0.2]))
-    for part in ('likelihood', 'cost', 'eta', 'goal0: right of 1', '56 %', 'goal1: ', '0.90', 'x 1.15'):
+    for part in ('likelihood', 'cost', 'eta', 'goal0: right of 1', '56 %', 'goal1:+1-post', '0.90', 'x 1.15'):
         assert part in text
     assert '█' in text
-    assert '…' not in text
+    assert '…' not in text and '...  ' not in text
 
 
 @pytest.mark.parametrize('terminal', [False, True])

@@ -10,8 +10,8 @@ from foc_ros.reporting.drawing import Bounds
 from foc_ros.reporting.plots import compute_bounds
 from foc_ros.reporting.snapshots import Snapshot
 
-WIDTH, HEIGHT = 72, 16
-"""Size of the drawing [characters]."""
+WIDTH, HEIGHT = 72, 13
+"""Size of the drawing [characters]; with the table it fits into 24 lines."""
 OBSTACLE, GOAL, HAND = '▒', '*', '@'
 LEGEND = f'{HAND} hand   {GOAL} goal   {OBSTACLE} obstacle   1 2 3 candidates, most likely first'
 
