@@ -205,6 +205,7 @@ def test_tasks_are_recorded_and_reported(page: Any, library: Play, tmp_path: Pat
         wait_for(page, "play.view.phase !== 'reach'", 'the end of the trial', 30)
     assert wait_for(page, "document.querySelectorAll('#score tr').length", 'the score') == 2
     click(page, 'report')
+    wait_for(page, "document.getElementById('job').innerText.startsWith('report: ')", 'what is done')
     wait_for(page, "!document.getElementById('download').hidden", 'the report')
     folder = next(each for each in library.data.iterdir() if (each / 'report').exists())
     link = page.find_element('css selector', '#download a')

@@ -27,7 +27,7 @@ from foc_ros.play import recorder
 from foc_ros.play.page_clock import PageClock
 from foc_ros.play.page_messages import HandMessage, SceneMessage, TasksMessage, parse_message
 from foc_ros.play.prediction_view import Slots
-from foc_ros.play.predictors import LibraryPredictor, LivePredictor, State
+from foc_ros.play.predictors import LibraryPredictor, LivePredictor, State, describe_health
 from foc_ros.play.scene import BOUNDS, FIRST_SCENE, START, TARGET_RADIUS, PlayScene, make_box, make_circle, make_random_scene
 from foc_ros.play.session import Session
 from foc_ros.play.tasks import Phase, Tasks, make_trials, tabulate_scores
@@ -164,6 +164,19 @@ def test_a_trial_is_scored() -> None:
     assert score.ahead_s == pytest.approx(1.85, abs=0.03)
     numbers = f'{score.time_s:.2f}', '1', f'{100.0 * score.path_m:.1f}', f'{score.ahead_s:.2f}'
     assert tabulate_scores([score]) == [('without guidance', '1', *numbers)]
+
+
+@pytest.mark.parametrize(
+    ('message', 'words'),
+    [
+        ('predicting', 'predicting'),
+        ('no prediction: no hand pose yet', 'no prediction: no hand pose yet'),
+        ('hand_superseded 3', 'predicting; 3 positions were passed over, because this computer is busy'),
+        ('busy: a; hand_late 2; predict_nothing_solved 1', 'busy: a; hand_late 2; 1 predictions found no way'),
+    ],
+)
+def test_counters_of_the_node_are_shown_in_words(message: str, words: str) -> None:
+    assert describe_health(message) == words
 
 
 def test_a_class_keeps_its_slot_while_it_is_followed() -> None:

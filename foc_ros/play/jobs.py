@@ -82,9 +82,9 @@ def summarise_evaluation(answer: Mapping[str, Any]) -> dict[str, str]:
             rows[f'{words}: log-likelihood [nat]'] = f'{scores["log_likelihood"]:.2f}'
     positions = answer['positions']
     displacement = positions['displacement_m']['likelihood-weighted']['average']['0.5']
-    rows['mean displacement within 0.5 s [mm]'] = '-' if displacement is None else f'{1e3 * displacement:.0f}'
+    rows['mean displacement within 0.5 s (smaller is better) [mm]'] = '-' if displacement is None else f'{1e3 * displacement:.0f}'
     density = positions['nlpd']['foc']['0.5']
-    rows['negative log-density of the position at 0.5 s [nat]'] = '-' if density is None else f'{density:.2f}'
+    rows['negative log-density of the position at 0.5 s (smaller is better) [nat]'] = '-' if density is None else f'{density:.2f}'
     return rows
 
 

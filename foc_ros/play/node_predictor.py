@@ -23,7 +23,7 @@ from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, private_enviro
 from foc_ros.ros.messages.types import find_message_class
 from foc_ros.ros.parameters import KNOWN
 
-from .predictors import KINDS, NODE, LivePredictor, Receive, State
+from .predictors import KINDS, NODE, LivePredictor, Receive, State, describe_health
 
 DIAGNOSTICS = '/diagnostics'
 DIAGNOSTICS_TYPE = 'diagnostic_msgs/msg/DiagnosticArray'
@@ -111,7 +111,7 @@ class NodePredictor(LivePredictor):
 
     def _note_health(self, _: str, raw: bytes) -> None:
         message: Any = TYPESTORE.deserialize_cdr(raw, DIAGNOSTICS_TYPE)
-        self._health, self._heard_s = '; '.join(each.message for each in message.status), monotonic()
+        self._health, self._heard_s = describe_health('; '.join(each.message for each in message.status)), monotonic()
 
     def _set_parameters(self) -> None:
         if not self._parameters.service_is_ready():

@@ -36,6 +36,13 @@ KINDS = {f'{NODE}/{name}': OUTPUTS[name][0] for name in SENT} | {
 }
 """Message type by topic of every output that is used."""
 
+COUNTERS = {
+    'hand_superseded': 'positions were passed over, because this computer is busy',
+    'predict_over_budget': 'predictions took longer than budget_s, because this computer is busy',
+    'predict_nothing_solved': 'predictions found no way',
+}
+"""What the counters of the diagnostics mean that rise most often, after their number."""
+
 Receive = Callable[[str, bytes], None]
 """Takes topic and bytes of an output, in any thread."""
 
@@ -46,6 +53,14 @@ class State:
 
     is_alive: bool
     text: str
+
+
+def describe_health(message: str) -> str:
+    """Return a message of the diagnostics with its counters, such as `hand_superseded 3`, in words, after what the node does."""
+    parts = message.split('; ')
+    counters = [part.rpartition(' ') for part in parts if part.partition(' ')[0] in COUNTERS]
+    others = [part for part in parts if part.partition(' ')[0] not in COUNTERS]
+    return '; '.join([*(others or ['predicting']), *(f'{count} {COUNTERS[name]}' for name, _, count in counters)])
 
 
 class LivePredictor(ABC):

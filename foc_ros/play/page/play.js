@@ -44,6 +44,7 @@ let lastMs = null;
 let waitingEvents = [];
 const frames = [];
 let task = { phase: 'none' };
+let job = null;
 
 const send = (message) => {
   if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
@@ -123,8 +124,9 @@ const handlers = {
     byId('score').replaceChildren(rows.length ? makeTable(columns, rows) : 'No trial was finished.');
   },
   job({ name, state, text, columns, rows, seconds }) {
-    const isRunning = state === 'running';
-    byId('job').textContent = isRunning ? `${name}: working; you can go on playing` : `${name}: ${text}${seconds ? ` (${seconds} s)` : ''}`;
+    job = state === 'running' ? { name, begunMs: performance.now() } : null;
+    showJob();
+    if (!job) byId('job').textContent = `${name}: ${text}${seconds ? ` (${seconds} s)` : ''}`;
     if (name === 'report') byId('download').hidden = state !== 'done';
     if (columns) byId('result').replaceChildren(makeTable(columns, rows));
   },
@@ -132,6 +134,15 @@ const handlers = {
     byId('job').textContent = `refused: ${text}`;
   },
 };
+
+// Says that a job is running, and every 10 s for how long.
+function showJob() {
+  if (!job) return;
+  const seconds = 10 * Math.floor((performance.now() - job.begunMs) / 10_000);
+  const time = seconds ? ` for ${seconds} s` : job.name === 'report' ? '' : ', for some minutes';
+  const text = `${job.name}: working${time}; you can go on playing`;
+  if (byId('job').textContent !== text) byId('job').textContent = text;
+}
 
 function connect() {
   socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/socket`);
@@ -209,6 +220,7 @@ function frame(time) {
   if (time - shownMs > 250) {
     shownMs = time;
     showWays();
+    showJob();
     const delay = measured.delayMs === null ? '' : `, ${Math.round(measured.delayMs)} ms from your hand to the drawn prediction`;
     byId('numbers').textContent = `${Math.round(measured.fps)} frames a second${delay}`;
   }
