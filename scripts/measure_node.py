@@ -4,10 +4,11 @@ The player publishes a hand at 1 kHz and 50 obstacles at 30 Hz with jitter, all 
 the frame of a camera whose transform is sent 5 ms later (this needs tf2). The script prints
 
 - start: time from the line "ready" of the node to its first prediction [s],
-- rate: predictions per second at the default budget; the longest time between two of them, and the largest age of one, by the
-  stamp of its pose, when it was published [s],
+- rate: predictions per second at the default budget; the longest time between two of them; the median and the largest age of one,
+  by the stamp of its pose, when it was published [s]; how many were older than two periods of `rate_hz`,
 - clutch: the longest answer of `~/engage` in this load [s],
-- intake: what the hand costs, as a share of one core: the CPU time of a node that predicts once in ten seconds.
+- intake: what a hand at 1 kHz costs, as a share of one core: the CPU time of a node that predicts once in ten seconds. A busy
+  machine publishes fewer poses: the share of those is scaled to 1 kHz.
 
 Other programs of the machine lengthen all times: run it alone.
 """
@@ -28,11 +29,13 @@ from typing import Any
 import numpy as np
 from soak import isolated_graph
 
+from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import RclpyTypes
 
 HAND_HZ, OBSTACLES_HZ, COUNT, LATE_S = 1000.0, 30.0, 50, 0.005
+PERIOD_S = 1.0 / Config().rate_hz
 START_S = 300.0
 """Time within which a node has to be ready; a new machine compiles its kernels first [s]."""
 GOALS = np.array([[0.3, 0.0, 0.0]])
@@ -68,6 +71,7 @@ class Player:
         self._rows = [
             (x, y, 0.0, 0.008, 0.001, i) for i, (x, y) in enumerate(self._random.uniform((0.03, -0.15), (0.27, 0.15), (COUNT, 2)))
         ]
+        self.sent = 0
         self.stamps_ns: list[int] = []
         self.ages_s: list[float] = []
         self.heard_s: list[float] = []
@@ -96,6 +100,7 @@ class Player:
                 due['hand'] = max(due['hand'] + 1.0 / hand_hz, now - 0.01)
                 phase = 0.5 - 0.5 * np.cos(2.0 * np.pi * (now - began) / 2.0)
                 position = np.array([0.28 * phase, 0.05 * phase, 0.1])
+                self.sent += 1
                 self._hand.publish(encode_hand_pose(self._types, stamp_ns, self._frame, position))
                 late.append((now + LATE_S, stamp_ns))
             if now >= due['obstacles']:
@@ -185,27 +190,36 @@ def measure_predictions(player: Player, seconds: float, *parameters: str) -> dic
         player.play(2.0)
         player.forget()
         player.play(seconds)
+    ages_s = np.array(player.ages_s or [float('nan')])
     return {
         'start [s]': start_s,
         'rate [Hz]': len(player.stamps_ns) / seconds,
         'longest gap [s]': float(np.diff(player.heard_s).max(initial=0.0)),
-        'largest age [s]': max(player.ages_s, default=float('nan')),
+        'median age [s]': float(np.median(ages_s)),
+        'largest age [s]': float(ages_s.max()),
+        'older than two periods': int((ages_s > 2.0 * PERIOD_S).sum()),
         'longest answer [s]': max(player.answers_s, default=float('nan')),
     }
 
 
 def measure_intake(player: Player, seconds: float, *parameters: str) -> dict[str, float]:
     """Measure the CPU time of a node that hardly predicts, with the hand and without."""
-    shares = []
+    shares, rates = [], []
     with run_node('rate_hz:=0.1', *parameters) as process:
         wait_until_ready(process)
         player.play(3.0)
         for hand_hz in (HAND_HZ, 0.0):
             player.play(0.5, hand_hz)
-            before, began = read_cpu_s(process), time.monotonic()
+            before, sent, began = read_cpu_s(process), player.sent, time.monotonic()
             player.play(seconds, hand_hz)
-            shares.append((read_cpu_s(process) - before) / (time.monotonic() - began))
-    return {'intake of the hand [cores]': shares[0] - shares[1], 'without a hand [cores]': shares[1]}
+            seconds_played = time.monotonic() - began
+            shares.append((read_cpu_s(process) - before) / seconds_played)
+            rates.append((player.sent - sent) / seconds_played)
+    return {
+        'intake at 1 kHz [cores]': (shares[0] - shares[1]) * HAND_HZ / rates[0],
+        'poses published [Hz]': rates[0],
+        'without a hand [cores]': shares[1],
+    }
 
 
 def main() -> int:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import pytest
 import ros_helpers
 
@@ -13,44 +10,36 @@ ros_helpers.require_ros()
 from foc_ros.ros import queue_polling  # noqa: E402
 
 
-class FakeNode:
-    """A node with one timer, which is called by hand, and its time."""
+class FakeExecutor:
+    """An executor that waits for messages of a group, with its own time."""
 
-    def __init__(self) -> None:
-        self.now_s, self.is_polled = 0.0, False
+    def __init__(self, rate_hz: float) -> None:
+        self.now_s, self.polled, self.woken = 0.0, 0, 0
+        self._arrivals = [0.0, 0.001, *(0.002 + row / rate_hz for row in range(1, int(rate_hz)))]
+        self.group = queue_polling.QueuePolling(self._poll)
 
-    def create_timer(self, _period_s: float, tick: Callable[[], None], **_: Any) -> FakeNode:
-        self.is_polled, self.tick = True, tick
-        return self
+    def spin_once(self, timeout_sec: float) -> None:
+        """Wait for a message, unless the group is polled, and for the timeout at most."""
+        end_s = self.now_s + timeout_sec
+        if self.group.is_polling or not self._arrivals or self._arrivals[0] > end_s:
+            self.now_s = end_s
+            return
+        self.now_s = self._arrivals.pop(0)
+        self.woken += 1
+        self.group.note_message()
 
-    def cancel(self) -> None:
-        self.is_polled = False
-
-    def reset(self) -> None:
-        self.is_polled = True
-
-    def is_canceled(self) -> bool:
-        return not self.is_polled
+    def _poll(self) -> bool:
+        number = sum(each <= self.now_s for each in self._arrivals)
+        del self._arrivals[:number]
+        self.polled += number
+        return number > 0
 
 
 @pytest.mark.parametrize(('rate_hz', 'share'), [(1000.0, 1.0), (500.0, 1.0), (120.0, 0.0), (60.0, 0.0)])
 def test_polling_ends_with_the_burst_that_began_it(monkeypatch: pytest.MonkeyPatch, rate_hz: float, share: float) -> None:
     """Two messages come at once, and then one each period: a message of a slow hand must not wait for a poll."""
-    node, waiting, polled = FakeNode(), [0.0], 0
-    polling = queue_polling.QueuePolling(node, lambda: [waiting.pop() for _ in waiting[:]] != [])
-    monkeypatch.setattr(queue_polling, 'monotonic', lambda: node.now_s)
-    polling.note_message()
-    node.now_s = 0.001
-    polling.note_message()
-    assert node.is_polled
-    ticks = [(row * queue_polling.POLL_S, node.tick) for row in range(1, 200)]
-    messages = [(0.002 + row / rate_hz, None) for row in range(1, int(0.9 * rate_hz))]
-    for node.now_s, tick in sorted(ticks + messages, key=lambda each: each[0]):
-        if tick is not None and node.is_polled:
-            tick()
-        elif tick is None and node.is_polled:
-            polled += 1
-            waiting.append(node.now_s)
-        elif tick is None:
-            polling.note_message()
-    assert polled / len(messages) == pytest.approx(share, abs=0.03)
+    executor = FakeExecutor(rate_hz)
+    monkeypatch.setattr(queue_polling, 'monotonic', lambda: executor.now_s)
+    while executor.now_s < 1.0:
+        executor.group.spin_once(executor, 0.1)
+    assert executor.polled / (executor.polled + executor.woken) == pytest.approx(share, abs=0.05)

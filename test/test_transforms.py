@@ -203,7 +203,7 @@ class Held:
         self.tree.add(SimpleNamespace(transforms=[camera(x, round((10 + tick / 100) * SECOND))]), is_static=False)
 
     def release(self, tick: float) -> list[Any]:
-        return self.transforms.release('hand_pose', 'world', self.config, 10 + tick / 100)
+        return list(self.transforms.release('hand_pose', 'world', self.config, 10 + tick / 100))
 
 
 def test_messages_are_held_in_order_until_their_transform_arrives() -> None:
@@ -219,6 +219,19 @@ def test_messages_are_held_in_order_until_their_transform_arrives() -> None:
     held.move_camera(3, 1.2)
     assert len(held.release(5)) == 2
     assert held.transforms.roles == []
+
+
+def test_a_pose_that_is_skipped_neither_waits_for_a_transform_nor_gets_one() -> None:
+    held = Held(0.1)
+    skipped = {10 * SECOND + SECOND // 100}
+    held.transforms = Transforms(held.tree, skipped.__contains__)
+    held.move_camera(-1, 1.0)
+    for i in range(3):
+        held.transforms.add('hand_pose', HAND[i], 10 + i / 100)
+    assert held.release(3) == [] and held.transforms.holds('hand_pose'), 'the first one waits, and those behind it'
+    held.move_camera(0, 1.0)
+    assert [each.message is HAND[i] for i, each in enumerate(held.release(3))] == [False, True]
+    assert held.transforms.holds('hand_pose'), 'the third one waits'
 
 
 def test_after_the_tolerance_the_newest_transform_is_taken_if_it_is_near_enough() -> None:

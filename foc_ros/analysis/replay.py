@@ -49,7 +49,7 @@ class Replay:
         self._budget_s = budget_s
         self.intake = Intake(self.pipeline)
         self._tree = TransformTree()
-        self._transforms = Transforms(self._tree)
+        self._transforms = Transforms(self._tree, self.intake.is_skipped)
         self._held: dict[str, deque[Item]] = defaultdict(deque)
         self._received: Counter[str] = Counter()
         self._refused: Counter[str] = Counter()
@@ -92,7 +92,7 @@ class Replay:
         for arrival in self._transforms.release(role, self.pipeline.frame_id, self.pipeline.config, now_s):
             status = self.intake.take_arrival(role, arrival)
             self._received[role] += 1
-            if status is None or not status.is_taken:
+            if status is None or status.is_refused:
                 self._refused[role] += 1
                 self._reasons[role] = self.intake.last_refusal or ''
             yield self._held[role].popleft(), status

@@ -115,6 +115,13 @@ class EstimatorConfig:
     acceleration_time_s: float = _p(
         0.02, 'decay time of an acceleration: predictions start at the speed that it leads to; 0: no decay', 's', 0.0, 10.0
     )
+    min_interval_s: float = _p(
+        0.0035,
+        'time after a pose that was used, by stamps, within which node and replay skip others; 0: they skip none',
+        's',
+        0.0,
+        0.1,
+    )
     gap_s: float = _p(0.5, 'gap between samples after which the filter restarts', 's', 0.001, 60.0)
     hand_timeout_s: float = _p(0.5, 'timeout after which a missing or stale hand pose stops prediction; 0: never', 's', 0.0, 1e6)
 

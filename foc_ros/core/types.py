@@ -65,7 +65,8 @@ class SampleStatus(StrEnum):
     """What became of a message that was given to the predictor.
 
     ACCEPTED: used. RESTARTED_BACKWARD, RESTARTED_GAP: used, and the movement restarts from it. DISENGAGED: the hand was followed,
-    but nothing is predicted from it. DUPLICATE, LATE, WRONG_FRAME: rejected, without any change.
+    but nothing is predicted from it. SKIPPED: not used, because it is too near to the last one. DUPLICATE, LATE, WRONG_FRAME:
+    refused. The last four change nothing.
     """
 
     ACCEPTED = 'accepted'
@@ -74,12 +75,18 @@ class SampleStatus(StrEnum):
     RESTARTED_BACKWARD = 'restarted_backward'
     RESTARTED_GAP = 'restarted_gap'
     WRONG_FRAME = 'wrong_frame'
+    SKIPPED = 'skipped'
     DISENGAGED = 'disengaged'
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether the message was rejected."""
+        return self in (SampleStatus.DUPLICATE, SampleStatus.LATE, SampleStatus.WRONG_FRAME)
 
     @property
     def is_taken(self) -> bool:
         """Whether the message was used."""
-        return self not in (SampleStatus.DUPLICATE, SampleStatus.LATE, SampleStatus.WRONG_FRAME)
+        return not self.is_refused and self is not SampleStatus.SKIPPED
 
     @property
     def is_restart(self) -> bool:

@@ -42,7 +42,7 @@ OVERRIDABLE = QoSOverridingOptions(
 
 
 def create_subscriptions(node: Node, receive: Callable[[str, Any], None], hand_group: CallbackGroup) -> dict[str, Any]:
-    """Create the subscriptions, by topic; each calls `receive(topic, message)`.
+    """Create the subscriptions, by topic; each calls `receive(topic, message)`, with a serialized message for the hand.
 
     A message of `BEST_EFFORT` is a complete state; those of the other inputs are changes, or are sent once, and are received
     reliably. A scene that was published once, before the start of the node, is received with
@@ -65,6 +65,7 @@ def create_subscriptions(node: Node, receive: Callable[[str, Any], None], hand_g
             partial(receive, role),
             _build_qos(reliability, HAND_DEPTH if role == HAND else SCENE_DEPTH),
             callback_group=hand_group if role == HAND else None,
+            raw=role == HAND,
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
             qos_overriding_options=OVERRIDABLE,
         )
@@ -140,7 +141,7 @@ def take_queued(subscription: Any) -> list[Any]:
     messages: list[Any] = []
     with subscription.handle:
         while len(messages) < HAND_DEPTH:
-            taken = subscription.handle.take_message(subscription.msg_type, False)
+            taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
             if taken is None:
                 break
             messages.append(taken[0])

@@ -26,7 +26,7 @@ WINDOW = 1000
 """Number of predictions over which the percentiles are computed."""
 OK, WARN, ERROR = 0, 1, 2
 """Levels of diagnostic_msgs/DiagnosticStatus."""
-HARMLESS = ('candidate_', 'hand_disengaged', 'hand_duplicate', 'predict_', 'predictions', 'transform_newest_')
+HARMLESS = ('candidate_', 'hand_disengaged', 'hand_duplicate', 'hand_skipped', 'predict_', 'predictions', 'transform_newest_')
 """Prefixes of the counts that are no fault by themselves; the reason why no prediction is made is reported as text."""
 FAULTS = ('predict_failed', 'predict_nothing_solved', 'predict_too_late')
 DROPPED = 'hand_superseded'
@@ -142,10 +142,10 @@ class Monitor:
         self._counts_before: Counter[str] = Counter()
         self._reported_s = now_s
 
-    def note_message(self, role: str, now_s: float, *, is_taken: bool) -> tuple[int, int]:
+    def note_message(self, role: str, now_s: float, *, is_refused: bool) -> tuple[int, int]:
         """Count an input message; return how many of this input were refused, and how many were received."""
         entry = self._inputs.setdefault(role, _Input())
-        entry.received, entry.refused, entry.last_s = entry.received + 1, entry.refused + (not is_taken), now_s
+        entry.received, entry.refused, entry.last_s = entry.received + 1, entry.refused + is_refused, now_s
         return entry.refused, entry.received
 
     def note_computed(self, prediction: Prediction, budget_s: float) -> None:

@@ -16,15 +16,16 @@ from foc_ros.io import topics
 from .messages.decode_markers import MarkerTable
 from .messages.decode_objects import CollisionTable, decode_detections
 from .messages.decode_point_cloud import decode_point_cloud
-from .messages.decode_poses import decode_goal, decode_goals, decode_hand_sample
+from .messages.decode_poses import decode_goal, decode_goals, decode_hand_sample, decode_stamp
 from .transforms import Arrival
 
 
 class Intake:
     """Takes messages by the name of their input; one that cannot be decoded changes nothing and is counted.
 
-    A marker whose lifetime ends before the stamp of the last hand sample does not exist for it. Attributes: pipeline; sample: the
-    last decoded hand sample; last_refusal: why the last refused message was refused.
+    A hand pose that is later than the last one that was used by less than `estimator.min_interval_s` is skipped and counted, and
+    nothing of it but its stamp is looked at. A marker whose lifetime ends before the stamp of the last hand sample does not exist
+    for it. Attributes: pipeline; sample: the last decoded hand sample; last_refusal: why the last refused message was refused.
     """
 
     def __init__(self, pipeline: Pipeline) -> None:
@@ -63,12 +64,26 @@ class Intake:
         try:
             status = self._handlers[role](message)
         except MessageError as error:
-            self._counts[f'{role}_invalid'] += 1
-            self.last_refusal = f'{role}: {error}'
+            self.refuse(role, error)
             return None
         if self.pipeline.refused > refused_before:
             self.last_refusal = '; '.join(filter(None, [self.pipeline.last_refusal, transform_error]))
         return status
+
+    def refuse(self, role: str, error: MessageError) -> None:
+        """Count a message that cannot be decoded."""
+        self._counts[f'{role}_invalid'] += 1
+        self.last_refusal = f'{role}: {error}'
+
+    def is_skipped(self, stamp_ns: int) -> bool:
+        """Return whether a hand pose of a stamp [ns] will be skipped if it is the next one."""
+        hand, interval_s = self.pipeline.hand_state, self.pipeline.config.estimator.min_interval_s
+        return hand is not None and 0 < stamp_ns - hand.stamp_ns < int(interval_s * NANOSECONDS)
+
+    def count_skipped(self) -> SampleStatus:
+        """Count a hand pose that is skipped."""
+        self._counts['hand_skipped'] += 1
+        return SampleStatus.SKIPPED
 
     def remove_source(self, source: str) -> None:
         """Forget the obstacles of one source, such as 'cloud' or 'markers', as if none of its messages had been received."""
@@ -79,6 +94,8 @@ class Intake:
             self._markers, self._markers_ns, self._markers_unchanged = MarkerTable(), 0, (-math.inf, math.inf)
 
     def _take_hand(self, message: Any) -> SampleStatus:
+        if self.is_skipped(decode_stamp(message.header)):
+            return self.count_skipped()
         self.sample = decode_hand_sample(message, self.pipeline.config.plane)
         status = self.pipeline.add_hand_sample(self.sample)
         start_ns, end_ns = self._markers_unchanged

@@ -96,7 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     executor.add_node(node)
     while not stop.is_requested and context.ok():
         try:
-            executor.spin_once(timeout_sec=SPIN_S)
+            node.polling.spin_once(executor, SPIN_S)
         except ExternalShutdownException:
             break
         except Exception as error:

@@ -29,8 +29,8 @@ from std_srvs.srv import SetBool, Trigger
 
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.errors import FocError
-from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.errors import FocError, MessageError
+from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.predictor import warm_up
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import CLOUD, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, REQUIRED
@@ -53,6 +53,7 @@ from .messages.encode_prediction import encode_outputs
 from .messages.types import RclpyTypes
 from .node_parameters import LiveParameters, declare_autostart, declare_parameters
 from .queue_polling import QueuePolling
+from .serialized_poses import deserialize_pose, read_stamp
 from .tf_listener import TfListener
 from .transforms import Arrival, Transforms
 from .worker import Computation, Worker
@@ -87,7 +88,7 @@ class FocNode(LifecycleNode):
         except ImportError:  # tf2 is optional
             self._tf = None
         self._retries = self.create_timer(RETRY_S, self._take_held, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._polling = QueuePolling(self, self._take_queued_poses)
+        self.polling = QueuePolling(self._take_queued_poses)
         self._worker = Worker(self, self._finish)
         self._create_pipeline()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -104,7 +105,7 @@ class FocNode(LifecycleNode):
         try:
             warm_up(self._live_parameters.config)
             self._outputs = create_publishers(self)
-            self._inputs = create_subscriptions(self, self._receive, self._polling)
+            self._inputs = create_subscriptions(self, self._receive, self.polling)
             self._inputs[COMMAND] = create_command_subscription(self, self._blend_command)
             self._guidance.create()
         except Exception as error:
@@ -167,7 +168,7 @@ class FocNode(LifecycleNode):
             self.pipeline.reset()  # ends a prediction that is being computed
         self.pipeline = Pipeline(self._live_parameters.config, self._library)
         self.intake, self._freshness, self._monitor = Intake(self.pipeline), Freshness(), Monitor(monotonic())
-        self._transforms = Transforms(self._tf)
+        self._transforms = Transforms(self._tf, self.intake.is_skipped)
 
     def _destroy_topics(self) -> None:
         self._guidance.destroy()
@@ -192,47 +193,61 @@ class FocNode(LifecycleNode):
 
         Markers are taken one message at a time, because every message counts and takes time; the hand has its turn in between.
         """
+        messages = [message] if role == MARKERS else [message, *take_queued(self._inputs[role])]
         if role == HAND:
-            self._polling.note_message()
-        self._take_all(role, [message] if role == MARKERS else [message, *take_queued(self._inputs[role])])
-
-    def _take_queued_poses(self) -> bool:
-        """Take the hand poses that wait; return whether there were any."""
-        messages = take_queued(self._inputs[HAND]) if HAND in self._inputs else []
-        self._take_all(HAND, messages)
-        return bool(messages)
-
-    def _take_all(self, role: str, messages: list[Any]) -> None:
+            self.polling.note_message()
+            self._take_poses(messages)
+            return
         for each in messages:
             self._transforms.add(role, each, monotonic())
         self._take_released(role)
 
+    def _take_queued_poses(self) -> bool:
+        """Take the hand poses that wait; return whether there were any."""
+        poses = take_queued(self._inputs[HAND]) if HAND in self._inputs else []
+        self._take_poses(poses)
+        return bool(poses)
+
+    def _take_poses(self, poses: list[bytes]) -> None:
+        """Take serialized hand poses. One that is skipped is not deserialized, unless it has to wait for those before it."""
+        is_taken = False
+        for each in poses:
+            if not self._transforms.holds(HAND) and self.intake.is_skipped(read_stamp(each)):
+                self._note(HAND, self.intake.count_skipped(), monotonic())
+                continue
+            try:
+                self._transforms.add(HAND, deserialize_pose(each), monotonic())
+            except MessageError as error:
+                self.intake.refuse(HAND, error)
+                self._note(HAND, None, monotonic())
+            is_taken = self._take_released(HAND) or is_taken
+        if is_taken and self.pipeline.is_due:
+            self._predict()
+
     def _take_held(self) -> None:
         """Take the held messages whose transform has arrived, or will not arrive any more."""
         for role in self._transforms.roles:
-            self._take_released(role)
+            if self._take_released(role) and role == HAND and self.pipeline.is_due:
+                self._predict()
         if not self._transforms.roles:
             self._retries.cancel()
 
-    def _take_released(self, role: str) -> None:
+    def _take_released(self, role: str) -> bool:
+        """Take the messages of an input that are not held; return whether one was used."""
         arrivals = self._transforms.release(role, self.pipeline.frame_id, self.pipeline.config, monotonic())
         is_taken = False
-        for each in reversed(arrivals) if role in COMPLETE else arrivals:
+        for each in reversed(list(arrivals)) if role in COMPLETE else arrivals:
             is_taken = self._take(role, each) or is_taken
             if is_taken and role in COMPLETE:
                 break
         if self._retries.is_canceled() and self._transforms.roles:
             self._retries.reset()
-        if is_taken and role == HAND and self.pipeline.is_due:
-            self._predict()
+        return is_taken
 
     def _take(self, role: str, arrival: Arrival) -> bool:
         status = self.intake.take_arrival(role, arrival)
-        is_taken = status is not None and status.is_taken
-        refused, received = self._monitor.note_message(role, arrival.received_s, is_taken=is_taken)
-        if status is None or not is_taken:
-            text = f'{self.intake.last_refusal} ({refused} of {received} refused so far)'
-            self._loggers[role].warning(text, throttle_duration_sec=THROTTLE_S)
+        self._note(role, status, arrival.received_s)
+        if status is None or not status.is_taken:
             return False
         self._freshness.note_received(role, arrival.received_s)
         if role == HAND:
@@ -241,6 +256,14 @@ class FocNode(LifecycleNode):
             clock_ns, timeout_s = self.get_clock().now().nanoseconds, self.pipeline.config.estimator.hand_timeout_s
             self._freshness.note_pose(self.intake.sample.stamp_ns, clock_ns, timeout_s, is_restart=status.is_restart)
         return True
+
+    def _note(self, role: str, status: SampleStatus | None, received_s: float) -> None:
+        """Count a message, and log it if it was refused."""
+        is_refused = status is None or status.is_refused
+        refused, received = self._monitor.note_message(role, received_s, is_refused=is_refused)
+        if is_refused:
+            text = f'{self.intake.last_refusal} ({refused} of {received} refused so far)'
+            self._loggers[role].warning(text, throttle_duration_sec=THROTTLE_S)
 
     def _find_clock_reason(self) -> tuple[str, str] | None:
         """Return why the clocks allow no prediction, as (kind, text); the pipeline decides all that depends on stamps."""

@@ -7,45 +7,48 @@ from time import monotonic
 from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
+from rclpy.executors import Executor
 
 POLL_S = 0.005
-"""Time between two polls, and between two messages below which polling begins [s]."""
+"""Longest time between two polls, and time between two messages below which polling goes on [s]."""
 
 
 class QueuePolling(MutuallyExclusiveCallbackGroup):
     """A callback group whose subscription wakes the executor up while its messages are rare, and is polled while they are not.
 
-    One wake-up of the executor costs more than the processing of several messages. Polling ends with the first poll without a
-    message, because a message waits for up to `POLL_S`.
+    One wake-up of the executor costs more than the processing of several messages. A poll is no callback, because the executor
+    prepares to wait twice after each callback. There are no polls unless :meth:`spin_once` is called in place of the executor's.
+    Polling ends when no message came for `POLL_S`, because the messages of a slow hand would wait for the polls.
 
     Parameters
     ----------
-    node
-        The node of the subscription.
     poll
         Takes the messages that wait, and returns whether there were any.
     """
 
-    def __init__(self, node: Node, poll: Callable[[], bool]) -> None:
+    def __init__(self, poll: Callable[[], bool]) -> None:
         super().__init__()
         self._poll = poll
         self._last_s = float('-inf')
-        self._timer = node.create_timer(POLL_S, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._timer.cancel()
+        self._is_allowed = False
+        self.is_polling = False
 
     def can_execute(self, entity: Any) -> bool:
         """Return whether the executor waits for the subscription."""
-        return self._timer.is_canceled() and bool(super().can_execute(entity))
+        return not self.is_polling and bool(super().can_execute(entity))
 
     def note_message(self) -> None:
         """Begin to poll if the message before arrived just now."""
         now_s = monotonic()
-        if now_s - self._last_s < POLL_S and self._timer.is_canceled():
-            self._timer.reset()
+        self.is_polling = self._is_allowed and now_s - self._last_s < POLL_S
         self._last_s = now_s
 
-    def _tick(self) -> None:
-        if not self._poll():
-            self._timer.cancel()
+    def spin_once(self, executor: Executor, timeout_s: float) -> None:
+        """Spin once, for a time at most [s], and poll after it if the messages come so often."""
+        self._is_allowed = True
+        executor.spin_once(timeout_sec=min(POLL_S, timeout_s) if self.is_polling else timeout_s)
+        if not self.is_polling:
+            return
+        if self._poll():
+            self._last_s = monotonic()
+        self.is_polling = monotonic() - self._last_s < POLL_S

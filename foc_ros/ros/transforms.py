@@ -9,11 +9,13 @@ their order. Node and replay share this: times are those of the steady clock in 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS
+from foc_ros.io.topics import HAND
 
 from .messages.decode_poses import decode_stamp
 from .messages.transform_messages import Transform, transform_message
@@ -50,10 +52,13 @@ class Arrival(NamedTuple):
 
 
 class Transforms:
-    """Queues of messages, one for each input; source: None if there is none."""
+    """Queues of messages, one for each input.
 
-    def __init__(self, source: TransformSource | None) -> None:
-        self._source = source
+    source: None if there is none; is_skipped: whether a hand pose of a stamp [ns] will be skipped, so that it needs no transform.
+    """
+
+    def __init__(self, source: TransformSource | None, is_skipped: Callable[[int], bool] = lambda _: False) -> None:
+        self._source, self._is_skipped = source, is_skipped
         self._held: dict[str, deque[tuple[Any, float]]] = {}
 
     @property
@@ -61,16 +66,21 @@ class Transforms:
         """The inputs of which messages are held."""
         return [role for role, queue in self._held.items() if queue]
 
+    def holds(self, role: str) -> bool:
+        """Return whether messages of an input are held."""
+        return bool(self._held.get(role))
+
     def add(self, role: str, message: Any, now_s: float) -> None:
         """Append a message of an input that arrives at a time [s]."""
         self._held.setdefault(role, deque()).append((message, now_s))
 
-    def release(self, role: str, frame_id: str | None, config: Config, now_s: float) -> list[Arrival]:
-        """Return the messages of an input that need not be held any longer at a time [s], in the order of their arrival.
+    def release(self, role: str, frame_id: str | None, config: Config, now_s: float) -> Iterator[Arrival]:
+        """Yield the messages of an input that need not be held any longer at a time [s], in the order of their arrival.
 
-        frame_id: the working frame; while it is unknown, None, messages are not transformed.
+        Each has to be taken before the next one is asked for: it decides whether the next one is skipped. frame_id: the working
+        frame; while it is unknown, None, messages are not transformed.
         """
-        queue, arrivals = self._held.get(role, ()), []
+        queue = self._held.get(role, ())
         while queue:
             message, received_s = queue[0]
             is_overdue = now_s - received_s >= config.frames.tolerance_s or len(queue) > MOST_HELD
@@ -84,12 +94,12 @@ class Transforms:
             except Exception as error:  # the message is not checked yet
                 arrival = Arrival(message, received_s, f'cannot be transformed to {frame_id}: {" ".join(str(error).split())}')
             queue.popleft()
-            arrivals.append(arrival)
-        return arrivals
+            yield arrival
 
     def _transform(self, role: str, message: Any, frame_id: str | None, config: Config, is_overdue: bool) -> tuple[Any, bool]:
         """Return a message in the working frame, and whether the newest transform was taken for it."""
-        if self._source is None or frame_id is None:
+        is_unneeded = role == HAND and self._is_skipped(decode_stamp(message.header))
+        if self._source is None or frame_id is None or is_unneeded:
             return message, False
         try:
             return transform_message(role, message, frame_id, config.plane, partial(self._find, frame_id)), False

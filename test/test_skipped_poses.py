@@ -1,0 +1,191 @@
+"""A hand that is faster than needed is thinned out by its stamps, in node and replay alike; bad poses are still found."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bag_helpers import CONFIG, messages, write_bag
+from message_helpers import SECOND, message_types, pose_stamped
+
+from foc_ros.analysis.replay import Replay
+from foc_ros.core.config import Config, replace_values
+from foc_ros.core.errors import MessageError
+from foc_ros.core.pipeline import Pipeline, SampleStatus
+from foc_ros.core.types import Prediction
+from foc_ros.io.bags import TYPESTORE, BagReader
+from foc_ros.ros.intake import Intake
+
+TYPES = message_types('rosbags')
+MS = SECOND // 1000
+A, S, R = SampleStatus.ACCEPTED, SampleStatus.SKIPPED, SampleStatus.RESTARTED_BACKWARD
+
+
+def pose(ms: float, x: float = 0.0, frame_id: str = 'world') -> Any:
+    return pose_stamped(TYPES, (x, 0.0, 0.1), 10 * SECOND + round(ms * MS), frame_id)
+
+
+@pytest.mark.parametrize(
+    ('interval_s', 'stamps_ms', 'expected'),
+    [
+        pytest.param(0.0035, (0, 1, 2, 3, 4, 5, 6, 7, 8), (A, S, S, S, A, S, S, S, A), id='1 kHz'),
+        pytest.param(0.0035, (0, 4, 8.2, 11.7, 16), (A, A, A, A, A), id='250 Hz with jitter'),
+        pytest.param(0.003, (0, 0, 1, 1, -1, 3), (A, SampleStatus.DUPLICATE, S, S, SampleStatus.LATE, A), id='out of order'),
+        pytest.param(0.003, (0, 1, -2000, -1999, -1997), (A, S, R, S, A), id='a jump back'),
+        pytest.param(0.003, (0, 1000, 1001), (A, SampleStatus.RESTARTED_GAP, S), id='a gap'),
+        pytest.param(0.0, (0, 1, 1.001), (A, A, A), id='switched off'),
+    ],
+)
+def test_poses_are_skipped_by_their_stamps(
+    interval_s: float, stamps_ms: tuple[float, ...], expected: tuple[SampleStatus, ...]
+) -> None:
+    intake = Intake(Pipeline(replace_values(Config(), {'estimator.min_interval_s': interval_s})))
+    assert tuple(intake.take('hand_pose', pose(ms)) for ms in stamps_ms) == expected
+    assert intake.counts.get('hand_skipped', 0) == expected.count(S)
+
+
+def test_a_skipped_pose_changes_nothing() -> None:
+    intake = Intake(Pipeline(Config()))
+    intake.take('hand_pose', pose(0))
+    state, sample = intake.pipeline.hand_state, intake.sample
+    assert not SampleStatus.SKIPPED.is_taken and not SampleStatus.SKIPPED.is_refused
+    assert intake.take('hand_pose', pose(2, x=0.5)) is S
+    assert (intake.pipeline.hand_state, intake.sample, intake.last_refusal, intake.pipeline.refused) == (state, sample, None, 0)
+
+
+def test_only_the_stamp_of_a_skipped_pose_is_looked_at() -> None:
+    """Bad poses between good ones count as skipped; where no good one is near, they are refused with their reason."""
+    intake = Intake(Pipeline(Config()))
+    intake.take('hand_pose', pose(0))
+    for bad in (pose(1, math.nan), pose(2, 0.0, 'camera')):
+        assert intake.take('hand_pose', bad) is S
+    assert intake.take('hand_pose', pose(3.6, math.nan)) is None
+    assert intake.last_refusal == 'hand_pose: pose.position.x: expected a finite number [m], got nan'
+    assert intake.take('hand_pose', pose(4, 0.0, 'camera')) is SampleStatus.WRONG_FRAME
+    assert intake.take('hand_pose', pose(4.5)) is A, 'a refused pose keeps no good one away'
+    wrong = pose(5)
+    wrong.header.stamp.nanosec = SECOND
+    assert intake.take('hand_pose', wrong) is None
+
+
+def test_a_publisher_in_a_wrong_frame_does_not_keep_the_right_one_away() -> None:
+    intake = Intake(Pipeline(replace_values(Config(), {'frame_id': 'world'})))
+    found = [intake.take('hand_pose', pose(2 * i, 0.0, 'camera' if i % 2 else 'world')) for i in range(100)]
+    assert found.count(A) == 50
+
+
+def predict(bag: Path, config: Config) -> tuple[list[Prediction], dict[str, int]]:
+    replayed = Replay(config)
+    with BagReader(bag) as reader:
+        return [each.prediction for each in replayed.steps(reader) if each.prediction is not None], replayed.intake.counts
+
+
+def are_equal(one: list[Prediction], other: list[Prediction]) -> bool:
+    """Whether predictions are the same to the last bit."""
+    return len(one) == len(other) and all(
+        a.stamp_ns == b.stamp_ns
+        and [c.likelihood for c in a.candidates] == [c.likelihood for c in b.candidates]
+        and all(np.array_equal(c.mean, d.mean) for c, d in zip(a.candidates, b.candidates, strict=True))
+        for a, b in zip(one, other, strict=True)
+    )
+
+
+def test_a_replay_of_a_fast_hand_is_that_of_the_poses_that_are_not_skipped(tmp_path: Path) -> None:
+    items = messages(0.2, rate_hz=1000.0)
+    hands = [item for item in items if item[0] == '/hand_pose']
+    dropped = {id(item) for i, item in enumerate(hands) if i % 4}
+    whole, counts = predict(write_bag(tmp_path / 'whole', items), CONFIG)
+    thinned, none = predict(write_bag(tmp_path / 'thinned', [item for item in items if id(item) not in dropped]), CONFIG)
+    assert (counts.get('hand_skipped'), none.get('hand_skipped')) == (len(dropped), None)
+    assert whole and are_equal(whole, thinned)
+    assert not are_equal(whole, predict(tmp_path / 'whole', replace_values(CONFIG, {'estimator.min_interval_s': 0.0}))[0])
+
+
+def test_a_hand_at_250_hz_with_jitter_is_unaffected(tmp_path: Path) -> None:
+    random, items = np.random.default_rng(4), []
+    for topic, stamp_ns, message in messages(0.2, rate_hz=250.0):
+        if topic == '/hand_pose':
+            stamp_ns += int(random.uniform(-0.2, 0.2) * MS)
+            message.header.stamp = pose_stamped(TYPES, (0, 0, 0), stamp_ns).header.stamp
+        items.append((topic, stamp_ns, message))
+    bag = write_bag(tmp_path / 'jitter', items)
+    (found, counts), (expected, _) = predict(bag, CONFIG), predict(bag, replace_values(CONFIG, {'estimator.min_interval_s': 0.0}))
+    assert 'hand_skipped' not in counts
+    assert found and are_equal(found, expected)
+
+
+def serialize(message: Any, *, little_endian: bool = True) -> bytes:
+    return bytes(TYPESTORE.serialize_cdr(message, 'geometry_msgs/msg/PoseStamped', little_endian=little_endian))
+
+
+@pytest.fixture
+def reader() -> Any:
+    pytest.importorskip('rclpy')
+    from foc_ros.ros import serialized_poses
+
+    return serialized_poses
+
+
+@pytest.mark.parametrize('little_endian', [True, False])
+@pytest.mark.parametrize('frame_id', ['', 'world', 'a frame with a longer name', 'Raum \u00e4'])
+def test_a_serialized_pose_is_read_as_it_was_written(reader: Any, frame_id: str, little_endian: bool) -> None:
+    for stamp_ns in (0, 1, 10 * SECOND + 7, (2**31 - 1) * SECOND + SECOND - 1):
+        message = pose_stamped(TYPES, (math.inf, -0.25, 1e-300), stamp_ns, frame_id)
+        message.pose.orientation.x = 0.5
+        data = serialize(message, little_endian=little_endian)
+        assert reader.read_stamp(data) == stamp_ns
+        read = reader.deserialize_pose(data)
+        assert (read.header.stamp.sec, read.header.stamp.nanosec) == divmod(stamp_ns, SECOND)
+        assert read.header.frame_id == frame_id
+        assert (read.pose.position.x, read.pose.position.y, read.pose.position.z) == (math.inf, -0.25, 1e-300)
+        turned = read.pose.orientation
+        assert (turned.x, turned.y, turned.z, turned.w) == (0.5, 0.0, 0.0, 1.0)
+
+
+def test_what_rclpy_serializes_is_read(reader: Any) -> None:
+    from rclpy.serialization import serialize_message
+
+    data = serialize_message(pose_stamped(message_types('rclpy'), (1.0, 2.0, 3.0), 5 * SECOND + 6, 'odd'))
+    assert reader.read_stamp(data) == 5 * SECOND + 6
+    assert reader.deserialize_pose(data).pose.position.z == 3.0
+
+
+def test_wrong_bytes_are_no_pose_and_have_no_stamp(reader: Any) -> None:
+    message = pose_stamped(TYPES, (1.0, 2.0, 3.0))
+    good = serialize(message)
+    for data in (b'', b'\0\1\0\0', good[:12], good[:30], good[:-1], b'\xff' * 40, good[:12] + b'\xff' * 60):
+        with pytest.raises(MessageError, match=f'expected a serialized geometry_msgs/PoseStamped, got {len(data)} other bytes'):
+            reader.deserialize_pose(data)
+    for data in (b'', good[:12], b'\xff' * 40):
+        assert reader.read_stamp(data) == 0
+    for sec, nanosec in ((-1, 0), (1, SECOND)):
+        message.header.stamp.sec, message.header.stamp.nanosec = sec, nanosec
+        assert reader.read_stamp(serialize(message)) == 0
+
+
+def estimate(step_ms: int, seed: int) -> tuple[float, float]:
+    """Return the errors (root mean square) of position and velocity of a reach with 1 mm of noise [m, m/s]."""
+    times = np.arange(-300, 1000) * 1e-3
+    s = np.clip(times, 0.0, 1.0)
+    positions, speeds = 0.3 * s**3 * (10.0 - 15.0 * s + 6.0 * s**2), 9.0 * s**2 * (1.0 - s) ** 2
+    measured = positions + np.random.default_rng(seed).normal(0.0, 1e-3, len(times))
+    intake, errors = Intake(Pipeline(Config())), []
+    for i in range(0, len(times), step_ms):
+        assert intake.take('hand_pose', pose(i, measured[i])) is A
+        state = intake.pipeline.hand_state
+        assert state is not None
+        errors.append((state.mean[0] - positions[i], state.mean[2] - speeds[i]))
+    position, speed = np.sqrt(np.mean(np.array(errors)[len(errors) // 4 :] ** 2, axis=0)).tolist()
+    return position, speed
+
+
+def test_a_hand_that_is_thinned_out_is_estimated_nearly_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 1 mm of noise, 0.5 mm remain of one pose in 4 ms, and 0.3 mm of four; of velocity 21 and 15 mm/s (doc/speed.md)."""
+    thinned = np.mean([estimate(4, seed) for seed in range(4)], axis=0)
+    monkeypatch.setattr(Intake, 'is_skipped', lambda *_: False)
+    whole = np.mean([estimate(1, seed) for seed in range(4)], axis=0)
+    np.testing.assert_allclose(1e3 * whole, [0.3, 15.0], rtol=0.15)
+    np.testing.assert_allclose(1e3 * thinned, [0.5, 21.0], rtol=0.15)
