@@ -96,13 +96,26 @@ class DurationConfig:
         100.0, f'cost of time of model cost_of_time, for {JERK_ONLY} also in the cost of a class', 'm^2/s^6', 1e-9, 1e9
     )
     adaptation: str = _p(
-        'online', "whether expected durations follow the operator's earlier movements, by a factor", choices=ADAPTATIONS
+        'online', "whether expected durations and `arrival` follow the operator's earlier movements", choices=ADAPTATIONS
     )
     min_time_to_go_s: float = _p(0.3, 'lower limit of the time to go', 's', 0.01, 60.0)
     spread: float = _p(0.4, f'standard deviation of the time to go, as a fraction of it; it {WIDENS}', '', 0.0, 2.0)
     wait_s: float = _p(0.0, f'mean time until a hand at rest starts to move; it {WIDENS}', 's', 0.0, 60.0)
     arrival: str = _p('rest', 'how the hand arrives at its goal: it comes to rest, or passes at any speed', choices=ARRIVALS)
     max_time_to_go_s: float = _p(10.0, 'upper limit of the time to go', 's', 0.05, 120.0)
+
+
+@dataclass(frozen=True)
+class CovarianceConfig:
+    """Factors on the predicted standard deviations."""
+
+    near: float = _p(1.0, 'factor on the standard deviations of predicted states up to 0.25 s ahead', '', 0.01, 100.0)
+    far: float = _p(
+        1.0, 'the same from 1 s ahead on; in between the factor changes with the logarithm of the time', '', 0.01, 100.0
+    )
+    adaptation: str = _p(
+        'online', 'whether both factors follow the errors of earlier predictions, with factors on them', choices=ADAPTATIONS
+    )
 
 
 @dataclass(frozen=True)
@@ -197,7 +210,7 @@ class SceneConfig:
     )
 
 
-Group = TypeVar('Group', DurationConfig, LikelihoodConfig)
+Group = TypeVar('Group', DurationConfig, CovarianceConfig, LikelihoodConfig)
 
 
 @dataclass(frozen=True)
@@ -274,6 +287,7 @@ class Config:
     )
     foc: FocConfig = field(default_factory=FocConfig)
     duration: DurationConfig = field(default_factory=DurationConfig)
+    covariance: CovarianceConfig = field(default_factory=CovarianceConfig)
     estimator: EstimatorConfig = field(default_factory=EstimatorConfig)
     homotopy: HomotopyConfig = field(default_factory=HomotopyConfig)
     likelihood: LikelihoodConfig = field(default_factory=LikelihoodConfig)
