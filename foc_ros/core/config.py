@@ -148,9 +148,9 @@ class LikelihoodConfig:
     """Conversion of costs to likelihoods."""
 
     rule: str = _p('cost_ratio', 'rule that gives the weight of a class from its cost', choices=LIKELIHOOD_RULES)
-    beta: float = _p(1.0, 'exponent of the cost ratio', '', 0.0, 100.0)
+    beta: float = _p(4.0, 'exponent of the cost ratio', '', 0.0, 100.0)
     shortfall: float = _p(
-        3.0,
+        12.0,
         'log-likelihood that a class loses per standard deviation below the wanted eta; .inf: left out',
         '',
         0.0,
@@ -158,7 +158,7 @@ class LikelihoodConfig:
     )
     spent_share: float = _p(0.0, f'fraction of the effort since onset that every cost contains, for {JERK_ONLY}', '', 0.0, 1.0)
     lookahead_s: float = _p(
-        0.0, 'mean look-ahead of the operator: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
+        0.5, 'mean look-ahead of the operator: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
     )
     beta_beyond: float = _p(0.3, 'exponent of the cost ratio for what lies beyond the next row of obstacles', '', 0.0, 100.0)
     weaving: float = _p(
