@@ -48,14 +48,24 @@ def test_the_factor_approaches_that_of_the_operator(factor: float) -> None:
     duration_s = factor * compute_movement_time(0.4, CONFIG.duration)
     pipeline = follow(Pipeline(CONFIG), *[reach(duration_s)] * 3)
     assert pipeline.operator.movements >= 2
-    assert pipeline.operator.duration_factor == pytest.approx(factor, rel=0.3)
-    adapted = pipeline.adapted_config.duration
-    assert adapted == scale_durations(CONFIG.duration, pipeline.operator.duration_factor)
+    arrival, found = pipeline.operator.find_best(CONFIG.duration)
+    assert arrival == 'rest' and found == pytest.approx(factor, rel=0.3)
+    assert pipeline.adapted_config.duration == scale_durations(CONFIG.duration, found)
+
+
+def test_an_operator_who_passes_the_goals_is_recognised() -> None:
+    """The hand crosses the goal at the constant speed with which it came, and stops beyond it."""
+    there = np.arange(0.0, 0.4, 0.02 * 0.2)
+    beyond = 0.4 + 0.2 * 0.05 * (1.0 - np.exp(-np.arange(0.0, 0.5, 0.02) / 0.05))
+    movement = np.outer(np.concatenate([np.zeros(30), there, beyond]), [1.0, 0.0])
+    pipeline = follow(Pipeline(CONFIG), *[movement] * 3)
+    assert pipeline.operator.movements >= 2 and pipeline.operator.find_best(CONFIG.duration)[0] == 'passing'
+    assert pipeline.adapted_config.duration.arrival == 'passing'
 
 
 def test_without_a_movement_nothing_changes() -> None:
     pipeline = follow(Pipeline(CONFIG), np.zeros((100, 2)))
-    assert pipeline.operator.movements == 0 and pipeline.operator.duration_factor == 1.0
+    assert pipeline.operator.movements == 0 and pipeline.operator.find_best(CONFIG.duration) == ('rest', 1.0)
     assert pipeline.adapted_config is CONFIG
 
 
@@ -75,7 +85,7 @@ def test_equal_samples_give_equal_factors_and_a_reset_forgets_them() -> None:
     assert one.operator.movements > 0
     one.reset()
     assert one.operator.movements == 0 and one.adapted_config is CONFIG
-    np.testing.assert_array_equal(one.operator.losses, PRIOR_WEIGHT * np.log(FACTORS) ** 2)
+    np.testing.assert_array_equal(one.operator.losses, np.tile(PRIOR_WEIGHT * np.log(FACTORS) ** 2, (2, 1)))
 
 
 def test_it_can_be_switched_off_and_new_durations_begin_anew() -> None:
@@ -90,7 +100,7 @@ def test_it_can_be_switched_off_and_new_durations_begin_anew() -> None:
 
 def test_factors_stay_within_the_bounds_of_the_parameters() -> None:
     assert scale_durations(DurationConfig(model='fixed', fixed_s=50.0), 3.0).fixed_s == 60.0
-    assert replace(Operator(), movements=1).duration_factor == pytest.approx(1.0)
+    assert replace(Operator(), movements=1).find_best(DurationConfig()) == ('rest', pytest.approx(1.0))
 
 
 @pytest.mark.parametrize('passing', [False, True])

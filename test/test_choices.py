@@ -136,7 +136,7 @@ def test_equal_messages_give_equal_factors_and_a_reset_forgets_them() -> None:
 
 
 def test_it_can_be_switched_off_and_new_parameters_begin_anew() -> None:
-    off = replace_values(CONFIG, {'likelihood.adaptation': 'none', 'duration.adaptation': 'none'})
+    off = replace_values(CONFIG, {f'{each}.adaptation': 'none' for each in ('likelihood', 'duration', 'covariance')})
     pipeline = make_operator(off)
     assert pipeline.preferences.movements == 0 and not pipeline.preferences.choices and pipeline.adapted_config is off
     pipeline = make_operator(CONFIG)

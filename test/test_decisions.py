@@ -19,6 +19,7 @@ GOALS = np.array([[0.5, 0.02], [0.5, -0.02]])
 SIDES = np.array(
     [[LEFT, LEFT, LEFT], [RIGHT, LEFT, LEFT], [RIGHT, LEFT, RIGHT], [LEFT, RIGHT, LEFT], [RIGHT, RIGHT, RIGHT]], dtype=np.int8
 )
+GOAL = np.array([0, 1, 0, 1, 0])
 COSTS = np.array([1.0, 2.0, 3.0, 2.5, 4.0])
 CONFIG = replace(LikelihoodConfig(), beta=2.0, beta_beyond=0.3, weaving=1.5)
 
@@ -28,19 +29,27 @@ def make_hand(x: float) -> HandState:
 
 
 def test_the_next_row_is_the_first_open_one_ahead() -> None:
-    found = find_decisions(SIDES, OBSTACLES, make_hand(0.0), GOALS)
+    found = find_decisions(SIDES, GOAL, OBSTACLES, make_hand(0.0), GOALS)
     gap = found.next_gap
     assert gap[1] == gap[2] and len(set(gap.tolist())) == 4
     assert found.woven.tolist() == [0, 0, 0, 1, 0]
-    beyond = find_decisions(SIDES, OBSTACLES, make_hand(0.2), GOALS)
+    beyond = find_decisions(SIDES, GOAL, OBSTACLES, make_hand(0.2), GOALS)
     assert len(set(beyond.next_gap[[0, 1, 3]].tolist())) == 1
     assert beyond.next_gap[0] != beyond.next_gap[4] and not beyond.woven.any()
 
 
 def test_where_all_agree_nothing_is_open() -> None:
-    found = find_decisions(SIDES[:1].repeat(3, axis=0), OBSTACLES, make_hand(0.0), GOALS)
+    same, no_sides = SIDES[:1].repeat(3, axis=0), np.zeros((3, 0), dtype=np.int8)
+    found = find_decisions(same, np.zeros(3, dtype=np.intp), OBSTACLES, make_hand(0.0), GOALS)
     assert not found.next_gap.any() and not found.woven.any()
-    assert find_decisions(np.zeros((2, 0), dtype=np.int8), make_obstacles(), make_hand(0.0), GOALS).next_gap.tolist() == [0, 0]
+    assert find_decisions(no_sides, GOAL[:3], make_obstacles(), make_hand(0.0), GOALS).next_gap.tolist() == [0, 1, 0]
+
+
+def test_where_no_row_is_ahead_the_choice_of_a_goal_is_a_near_one() -> None:
+    decisions = find_decisions(SIDES, GOAL, OBSTACLES, make_hand(0.4), GOALS)
+    assert decisions.next_gap.tolist() == GOAL.tolist()
+    p = compute_likelihoods(np.array([1.0, 3.0]), CONFIG, decisions=Decisions(np.array([0, 1]), np.zeros(2, dtype=np.intp)))
+    assert p[0] / p[1] == pytest.approx(3.0**CONFIG.beta)
 
 
 def test_gaps_keep_their_weight_and_share_it_by_the_other_exponent() -> None:

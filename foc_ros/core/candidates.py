@@ -180,9 +180,9 @@ def rank_candidates(
     is_learnt = likelihood.adaptation == 'online'
     has_far_choices = likelihood.weaving > 0.0 or likelihood.beta_beyond != likelihood.beta
     if len(taken) > 1 and (has_far_choices or is_learnt):
-        decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), obstacles, hand, goals)
+        goal, sides = np.array([each.candidate.goal for each in taken], dtype=np.intp), tuple(each.sides for each in taken)
+        decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
         if is_learnt:
-            goal, sides = np.array([each.candidate.goal for each in taken], dtype=np.intp), tuple(each.sides for each in taken)
             choice = Choice(hand.stamp_ns, obstacles, goals, goal, sides, costs, shortfalls, branch_times, decisions)
     shares = compute_likelihoods(costs, likelihood, branch_times, shortfalls, decisions)
     pairs = zip(taken, shares.tolist(), strict=True)

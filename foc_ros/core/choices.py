@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from .config import LikelihoodConfig, clip_values
 from .decisions import Decisions
-from .estimation.adaptation import REMAINING_SHARE, choose_judged, sample_movement
+from .estimation.adaptation import REMAINING_SHARE, choose_judged, compute_mean_factors, sample_movement
 from .homotopy import find_path_sides
 from .homotopy.branch_times import BranchTimes
 from .likelihood import compute_likelihoods
@@ -128,17 +128,8 @@ class Preferences(Record):
         if not scores:
             return self
         total = self.scores + np.mean(scores, axis=0)
-        return replace(self, movements=self.movements + 1, scores=total, factors=_compute_factors(total))
-
-
-def _compute_factors(scores: Array) -> tuple[float, float]:
-    """Return the posterior means of both factors for the scores (f, f') of all pairs."""
-    logs = np.log(FACTORS)
-    prior = -0.5 * (logs / PRIOR_STDDEV) ** 2
-    total = scores + prior[:, None] + prior
-    weights = np.exp(total - total.max())
-    weights /= weights.sum()
-    return float(np.exp(weights.sum(axis=1) @ logs)), float(np.exp(weights.sum(axis=0) @ logs))
+        factors = compute_mean_factors(np.log(FACTORS), total, PRIOR_STDDEV)
+        return replace(self, movements=self.movements + 1, scores=total, factors=factors)
 
 
 def _scale_exponents(config: LikelihoodConfig, near: float, beyond: float) -> LikelihoodConfig:

@@ -96,13 +96,26 @@ class DurationConfig:
         100.0, f'cost of time of model cost_of_time, for {JERK_ONLY} also in the cost of a class', 'm^2/s^6', 1e-9, 1e9
     )
     adaptation: str = _p(
-        'online', "whether expected durations follow the operator's earlier movements, by a factor", choices=ADAPTATIONS
+        'online', "whether expected durations and `arrival` follow the operator's earlier movements", choices=ADAPTATIONS
     )
     min_time_to_go_s: float = _p(0.3, 'lower limit of the time to go', 's', 0.01, 60.0)
     spread: float = _p(0.4, f'standard deviation of the time to go, as a fraction of it; it {WIDENS}', '', 0.0, 2.0)
     wait_s: float = _p(0.0, f'mean time until a hand at rest starts to move; it {WIDENS}', 's', 0.0, 60.0)
     arrival: str = _p('rest', 'how the hand arrives at its goal: it comes to rest, or passes at any speed', choices=ARRIVALS)
     max_time_to_go_s: float = _p(10.0, 'upper limit of the time to go', 's', 0.05, 120.0)
+
+
+@dataclass(frozen=True)
+class CovarianceConfig:
+    """Factors on the predicted standard deviations."""
+
+    near: float = _p(1.0, 'factor on the standard deviations of predicted states up to 0.25 s ahead', '', 0.01, 100.0)
+    far: float = _p(
+        1.0, 'the same from 1 s ahead on; in between the factor changes with the logarithm of the time', '', 0.01, 100.0
+    )
+    adaptation: str = _p(
+        'online', 'whether both factors follow the errors of earlier predictions, with factors on them', choices=ADAPTATIONS
+    )
 
 
 @dataclass(frozen=True)
@@ -142,9 +155,9 @@ class LikelihoodConfig:
     """Conversion of costs to likelihoods."""
 
     rule: str = _p('cost_ratio', 'rule that gives the weight of a class from its cost', choices=LIKELIHOOD_RULES)
-    beta: float = _p(1.0, 'exponent of the cost ratio', '', 0.0, 100.0)
+    beta: float = _p(4.0, 'exponent of the cost ratio', '', 0.0, 100.0)
     shortfall: float = _p(
-        3.0,
+        12.0,
         'log-likelihood that a class loses per standard deviation below the wanted eta; .inf: left out',
         '',
         0.0,
@@ -152,7 +165,7 @@ class LikelihoodConfig:
     )
     spent_share: float = _p(0.0, f'fraction of the effort since onset that every cost contains, for {JERK_ONLY}', '', 0.0, 1.0)
     lookahead_s: float = _p(
-        0.0, 'mean look-ahead of the operator: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
+        0.5, 'mean look-ahead of the operator: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
     )
     beta_beyond: float = _p(0.3, 'exponent of the cost ratio for what lies beyond the next row of obstacles', '', 0.0, 100.0)
     weaving: float = _p(
@@ -204,7 +217,7 @@ class SceneConfig:
     )
 
 
-Group = TypeVar('Group', DurationConfig, LikelihoodConfig)
+Group = TypeVar('Group', DurationConfig, CovarianceConfig, LikelihoodConfig)
 
 
 @dataclass(frozen=True)
@@ -281,6 +294,7 @@ class Config:
     )
     foc: FocConfig = field(default_factory=FocConfig)
     duration: DurationConfig = field(default_factory=DurationConfig)
+    covariance: CovarianceConfig = field(default_factory=CovarianceConfig)
     estimator: EstimatorConfig = field(default_factory=EstimatorConfig)
     homotopy: HomotopyConfig = field(default_factory=HomotopyConfig)
     likelihood: LikelihoodConfig = field(default_factory=LikelihoodConfig)

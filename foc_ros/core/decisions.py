@@ -1,7 +1,8 @@
 """The decisions that tell classes apart: which gap each takes in the next row, and in how many rows it turns back.
 
 An obstacle is open if some classes pass it on the left and others on the right. Open obstacles form rows (`rows`), and the next
-row is the first of them that is still ahead of the hand. A class weaves through a row if it passes an obstacle on the right and
+row is the first of them that is still ahead of the hand. Where no row is ahead, the next decision is that between the goals. A
+class weaves through a row if it passes an obstacle on the right and
 one to the right of that on the left, so that it goes through several gaps of this row.
 """
 
@@ -24,6 +25,8 @@ NO_OBSTACLES = np.zeros(0, dtype=np.intp)
 class Decisions(NamedTuple):
     """Of k classes: the number (k,) of the gap that each takes in the next row, and the number (k,) of rows it weaves through.
 
+    Where no row is ahead, the gap of a class is its goal.
+
     next_row (m,): the obstacles of the next row, none where no row is ahead.
     """
 
@@ -41,8 +44,10 @@ def tabulate_sides(solutions: Sequence[Solution], obstacles: Obstacles) -> NDArr
     return np.where(np.array(angles).reshape(len(solutions), len(obstacles)) < 0.0, LEFT, RIGHT).astype(np.int8)
 
 
-def find_decisions(sides: NDArray[np.int8], obstacles: Obstacles, hand: HandState, goals: Array) -> Decisions:
-    """Find the decisions of classes that pass obstacles on sides (k, n); goals (g, 2) [m]."""
+def find_decisions(
+    sides: NDArray[np.int8], goal: NDArray[np.intp], obstacles: Obstacles, hand: HandState, goals: Array
+) -> Decisions:
+    """Find the decisions of classes that pass obstacles on sides (k, n) and lead to goals (k,), rows of goals (g, 2) [m]."""
     here, start = hand.mean[:2], hand.mean[:2] if hand.onset_position is None else hand.onset_position
     direction = find_direction(start, goals)
     is_open = (sides != sides[:1]).any(axis=0)
@@ -53,7 +58,7 @@ def find_decisions(sides: NDArray[np.int8], obstacles: Obstacles, hand: HandStat
     order = np.lexsort((obstacles.centre @ np.array([-direction[1], direction[0]]), row))
     order = order[is_ahead[order]]
     if not len(order):
-        return Decisions(np.zeros(len(sides), dtype=np.intp), np.zeros(len(sides), dtype=np.intp))
+        return Decisions(np.unique(goal, return_inverse=True)[1], np.zeros(len(sides), dtype=np.intp))
     row, is_left = row[order], is_left[:, order]
     turns_back = np.zeros_like(is_left)
     turns_back[:, 1:] = (is_left[:, 1:] > is_left[:, :-1]) & (row[1:] == row[:-1])

@@ -159,11 +159,11 @@ def pool_recordings(
     evidence = find_evidence(library, hand, obstacles, goals, config)
     if not len(evidence.row):
         return list(candidates)
-    decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), obstacles, hand, goals)
+    goal = np.array([each.candidate.goal for each in taken], dtype=np.intp)
+    decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
     agreements = [compare_with_class(each.candidate, evidence, obstacles, decisions.next_row) for each in taken]
     counts = np.array([evidence.weight[each.is_same].sum() for each in agreements])
-    group = decisions.next_gap if len(decisions.next_row) else np.array([each.candidate.goal for each in taken])
-    likelihoods = _update_likelihoods(np.array([each.likelihood for each in taken]), counts, group, config)
+    likelihoods = _update_likelihoods(np.array([each.likelihood for each in taken]), counts, decisions.next_gap, config)
     pooled = []
     for each, share, agreement in zip(taken, likelihoods.tolist(), agreements, strict=True):
         recorded = follow_recordings(library, evidence, agreement.until_s, hand, each.times)

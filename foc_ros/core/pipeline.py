@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from .choices import Preferences
 from .config import Config
 from .deadline import NEVER, Deadline
+from .dispersion import Dispersion
 from .errors import FocError
 from .estimation.adaptation import Operator
 from .estimation.kalman_filter import FilterState, update
@@ -21,6 +22,9 @@ from .obstacles.scene import ObstacleSource, Scene
 from .predictor import predict
 from .rejections import Rejections
 from .types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction, SampleStatus
+
+DISPERSED_BY = ('foc', 'duration', 'covariance', 'estimator')
+"""Groups of parameters on which errors and covariances depend: if they change, what was learnt of errors is forgotten."""
 
 __all__ = ['Pipeline', 'PredictionTask', 'SampleStatus']
 
@@ -49,7 +53,7 @@ class Pipeline:
 
     library: demonstrated paths. Attributes: config; hand_state, None before the first hand sample; scene, obstacles and goals;
     engaged, whether predictions are made; frame_id, the working frame, None until the parameter or the first hand sample fixes
-    it; operator and preferences, what was learnt from the movements so far of durations and of choices.
+    it; operator, preferences and dispersion, what was learnt from the movements so far of durations, choices and errors.
     """
 
     def __init__(self, config: Config, library: Sequence[Demonstration] = ()) -> None:
@@ -58,7 +62,7 @@ class Pipeline:
         self.hand_state: FilterState | None = None
         self.scene = Scene()
         self.is_engaged = True
-        self.operator, self.preferences = Operator(), Preferences()
+        self.operator, self.preferences, self.dispersion = Operator(), Preferences(), Dispersion()
         self.frame_id = config.frame_id or None
         self._rejections = Rejections()
         self._memory = Memory()
@@ -73,8 +77,9 @@ class Pipeline:
         """The parameters with which the next prediction is made: those given, adapted to the operator."""
         config = self.config
         duration, likelihood = self.operator.adapt(config.duration), self.preferences.adapt(config.likelihood)
-        is_same = duration is config.duration and likelihood is config.likelihood
-        return config if is_same else replace(config, duration=duration, likelihood=likelihood)
+        covariance = self.dispersion.adapt(config.covariance)
+        is_same = duration is config.duration and likelihood is config.likelihood and covariance is config.covariance
+        return config if is_same else replace(config, duration=duration, likelihood=likelihood, covariance=covariance)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -134,6 +139,8 @@ class Pipeline:
             self.operator = self.operator.follow(self.hand_state, self.scene.goals, self.config.duration)
         if self.config.likelihood.adaptation == 'online':
             self.preferences = self.preferences.follow(self.hand_state, self.config.likelihood)
+        if self.config.covariance.adaptation == 'online':
+            self.dispersion = self.dispersion.follow(self.hand_state)
         return status
 
     def set_obstacles(self, source: str, obstacles: Obstacles, stamp_ns: int | None, frame_id: str) -> SampleStatus:
@@ -203,6 +210,7 @@ class Pipeline:
             self._rejections.reject('predict_failed', str(error))
             return None
         self.preferences = self.preferences.add(self._memory.choice)
+        self.dispersion = self.dispersion.add(prediction.stamp_ns, prediction.candidates, task.config.covariance)
         for candidate in prediction.candidates:
             if not candidate.has_likelihood:
                 self._rejections.count(f'candidate_{candidate.status.value}')
@@ -220,7 +228,7 @@ class Pipeline:
         if on != self.is_engaged:
             self._forget_predictions()
             self._is_new, self.operator = False, replace(self.operator, states=())
-            self.preferences = self.preferences.interrupt()
+            self.preferences, self.dispersion = self.preferences.interrupt(), self.dispersion.interrupt()
         self.is_engaged = on
 
     def remove_source(self, source: str) -> None:
@@ -229,7 +237,8 @@ class Pipeline:
 
     def reset(self) -> None:
         """Forget the movement and the operator; keep the scene, the working frame and the counts."""
-        self.hand_state, self._is_new, self.operator, self.preferences = None, False, Operator(), Preferences()
+        self.hand_state, self._is_new = None, False
+        self.operator, self.preferences, self.dispersion = Operator(), Preferences(), Dispersion()
         self._forget_predictions()
 
     def reconfigure(self, config: Config) -> None:
@@ -247,6 +256,8 @@ class Pipeline:
             self.operator = Operator()
         if config.likelihood != self.config.likelihood:
             self.preferences = Preferences()
+        if any(getattr(config, name) != getattr(self.config, name) for name in DISPERSED_BY):
+            self.dispersion = Dispersion()
         self.config = config
         if self._task is not None:
             self._abandon_task()

@@ -9,9 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from .candidates import rank_candidates, solve_candidates
-from .config import REFERENCE_STEP_S, Config
+from .config import REFERENCE_STEP_S, Config, EstimatorConfig
 from .continuity import Past, keep_answers, make_continuous, smooth_paths
 from .deadline import NEVER, Deadline
+from .dispersion import scale_covariance
 from .dynamics.noise import scale_noise
 from .dynamics.plant_models import make_plant_model
 from .dynamics.predictive_covariance import SharedCovariances, widen_covariance
@@ -72,7 +73,7 @@ def predict(
         The prediction, and the memory for the next one. Without a deadline, equal arguments give equal results, wall times apart.
     """
     began, past = time.perf_counter(), memory.past.keep_goals(goals)
-    estimated, hand = hand, _simplify_start(hand, config.estimator.acceleration_time_s)
+    estimated, hand = hand, _simplify_start(hand, config.estimator)
     durations = _find_durations(hand, goals, past, config)
     given, grown = obstacles, obstacles.grow(config.scene.hand_radius)
     shared = SharedCovariances(hand, config)
@@ -113,7 +114,9 @@ def predict(
     prediction = Prediction(*hand_at, predicted, best, notes, time.perf_counter() - began, *scene_then)
     earlier, followed = memory.remember(candidates, solved, earlier, likelihoods, hand.stamp_ns)
     present = past.follow(prediction, durations, config.likelihood.hold_s)
-    return prediction, Memory(best, candidates, earlier, followed, present, found.next_goal, numbers, choice)
+    scaled = tuple(scale_covariance(each, config.covariance) for each in predicted)
+    followed_by = Memory(best, candidates, earlier, followed, present, found.next_goal, numbers, choice)
+    return replace(prediction, candidates=scaled), followed_by
 
 
 def warm_up(config: Config) -> None:
@@ -175,25 +178,33 @@ def build_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: A
     )
 
 
-def _simplify_start(hand: HandState, acceleration_time_s: float) -> HandState:
+def _simplify_start(hand: HandState, config: EstimatorConfig) -> HandState:
     """Return the state that a prediction starts from.
 
     Speed and acceleration of a hand that has not begun to move, those of its height too, are set to zero, because they are noise:
     with 1 mm of it at 100 Hz, the efforts of a hand at rest would differ by a factor of three from one sample to the next, and
-    the classes of a symmetric obstacle would swap their ranks 24 times a second.
+    the classes of a symmetric obstacle would swap their ranks 24 times a second. The covariance is that of a hand that moves with
+    about `estimator.onset_speed` at most.
 
     An acceleration a that decays as exp(-t / tau) leads from the speed v to v + tau a. Where the operator commands speed, as with
     a thumb stick, tau is short, and a plan that starts from v + tau a without acceleration is nearer to what follows.
     """
     if hand.onset_ns is None:
-        height_at_rest = np.array([hand.height_mean[0], 0.0, 0.0])
-        return replace(hand, mean=np.concatenate([hand.mean[:2], np.zeros(4)]), height_mean=height_at_rest)
-    if not acceleration_time_s:
+        height_at_rest, mean = np.array([hand.height_mean[0], 0.0, 0.0]), np.concatenate([hand.mean[:2], np.zeros(4)])
+        return replace(hand, mean=mean, covariance=_slow_down(hand.covariance, config.onset_speed), height_mean=height_at_rest)
+    if not config.acceleration_time_s:
         return hand
-    final_velocity = hand.mean[2:4] + acceleration_time_s * hand.mean[4:]
+    final_velocity = hand.mean[2:4] + config.acceleration_time_s * hand.mean[4:]
     height, velocity, acceleration = hand.height_mean.tolist()
-    height_then = np.array([height, velocity + acceleration_time_s * acceleration, 0.0])
+    height_then = np.array([height, velocity + config.acceleration_time_s * acceleration, 0.0])
     return replace(hand, mean=np.concatenate([hand.mean[:2], final_velocity, np.zeros(2)]), height_mean=height_then)
+
+
+def _slow_down(covariance: Array, onset_speed: float) -> Array:
+    """Return the covariance (6, 6) of a state given that its velocity is zero with a standard deviation of onset_speed [m/s]."""
+    gain = covariance[:, 2:4] @ np.linalg.inv(covariance[2:4, 2:4] + onset_speed**2 * np.eye(2))
+    slowed: Array = covariance - gain @ covariance[2:4]
+    return slowed
 
 
 def _widen_covariance(

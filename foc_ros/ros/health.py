@@ -247,11 +247,14 @@ class Monitor:
 
 
 def _describe_operator(pipeline: Pipeline) -> str:
-    """Return what was learnt of the operator: the movements judged, and the factors on durations and on near and far choices."""
-    operator, preferences = pipeline.operator, pipeline.preferences
+    """Return what was learnt of the operator: what was judged, and the factors on durations, choices and standard deviations."""
+    operator, preferences, dispersion = pipeline.operator, pipeline.preferences, pipeline.dispersion
     near, beyond = preferences.factors
-    durations = f'{operator.movements} movements, durations x {operator.duration_factor:.2f}'
-    return f'{durations}; {preferences.movements} choices, near x {near:.2f}, far x {beyond:.2f}'
+    arrival, factor = operator.find_best(pipeline.config.duration)
+    durations = f'{operator.movements} movements, durations x {factor:.2f}, arrival {arrival}'
+    choices = f'{preferences.movements} choices, near x {near:.2f}, far x {beyond:.2f}'
+    now, later = dispersion.factors
+    return f'{durations}; {choices}; {dispersion.errors} errors, near x {now:.2f}, far x {later:.2f}'
 
 
 def _describe_prediction(prediction: Prediction | None) -> dict[str, str]:

@@ -180,10 +180,11 @@ def _tabulate_candidates(
     solutions = [each.solution for each in predicted]
     has_likelihood = np.array([each.has_likelihood for each in predicted])
     sides = np.array([_find_predicted_sides(each, obstacles) for each in predicted])
+    goal, grown = np.array([each.candidate.goal for each in predicted], dtype=np.intp), obstacles.grow(config.scene.hand_radius)
     named = [[identity in dict(each.candidate.sides) for identity in obstacles.ids] for each in predicted]
     return CandidateTable(
         labels=tuple(each.candidate.label for each in predicted),
-        goal=np.array([each.candidate.goal for each in predicted]),
+        goal=goal,
         has_likelihood=has_likelihood,
         effort_spent=hand.effort_spent,
         cost_to_go=np.array([each.effort * each.dt + price * each.times[-1] for each in solutions]),
@@ -200,7 +201,7 @@ def _tabulate_candidates(
             [interpolate_steps(compute_duration_sensitivity(each, passing)[:, :2], each.dt) for each in solutions]
         ),
         branch_times=compute_branch_times(predicted, obstacles),
-        decisions=find_decisions(sides[has_likelihood], obstacles.grow(config.scene.hand_radius), hand, goals),
+        decisions=find_decisions(sides[has_likelihood], goal[has_likelihood], grown, hand, goals),
     )
 
 

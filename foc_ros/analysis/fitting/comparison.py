@@ -24,7 +24,7 @@ SMALLER_IS_BETTER = ('error_m', 'nlpd')
 
 
 def compare_configs(
-    recordings: Mapping[str, Recording], configs: tuple[Config, Config], thinned: Mapping[str, float], executor: Executor
+    recordings: Mapping[str, Recording], configs: tuple[Config, Config], thinned: Mapping[str, object], executor: Executor
 ) -> dict[str, dict[str, float | None]]:
     """Return the measures of two configurations, `before` and `after`, by measure, from the recordings that both predict.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from foc_ros.analysis.parallel import collect
 from foc_ros.analysis.recordings import Recording
-from foc_ros.core.config import Config, replace_values
+from foc_ros.core.config import Config, flatten, replace_values
 from foc_ros.core.errors import RecordingError
 
 from . import covariance_fit, likelihood_fit
@@ -27,6 +27,10 @@ PREDICTIONS = 10
 """About as many predictions are made in each recording, because neighbours say the same."""
 MIN_FOLDS = 3
 """Recordings below which there is no cross-validation."""
+UNSCALED = {'covariance.near': 1.0, 'covariance.far': 1.0}
+"""Factors on standard deviations in the replays of a fit and after it, because it fits what they multiply."""
+LEARNT = {'likelihood.adaptation': 'none'}
+"""What a fit switches off: choices are known from many movements, and learning them anew from a few makes them worse."""
 
 
 def fit_parameters(recordings: Mapping[str, Recording], config: Config, executor: Executor, may_lower_eta: bool = False) -> Fit:
@@ -45,9 +49,13 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, executor
     if config.foc.strategy == 'fixed':
         fit.take(*fit_plans(_make_reaches(hands, fit), fit.config))
     duration_s = float(np.median([each.times[-1] for each in hands]))
-    thinned = {'rate_hz': clip_to_bounds('rate_hz', min(config.rate_hz, PREDICTIONS / max(duration_s, 1e-3)))}
+    rate_hz = clip_to_bounds('rate_hz', min(config.rate_hz, PREDICTIONS / max(duration_s, 1e-3)))
+    thinned = {'rate_hz': rate_hz, 'covariance.adaptation': 'none', **UNSCALED}
     _search(hands, fit, Replays(usable, thinned, executor), may_lower_eta)
     _fit_to_one_replay(usable, fit, thinned, executor)
+    given = flatten(config)
+    fit.chosen |= {name: value for name, value in LEARNT.items() if given[name] != value}
+    fit.config = replace_values(fit.config, {**UNSCALED, **LEARNT})
     compared = {name: usable[name] for name in sample_names(list(usable))}
     fit.comparison = compare_configs(compared, (config, fit.config), thinned, executor)
     fit.warnings[:0] = find_worse_positions(fit.comparison)
@@ -91,7 +99,7 @@ def _make_reaches(hands: Sequence[RecordedHand], fit: Fit) -> list[Reach]:
     return reaches
 
 
-def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: Mapping[str, float], executor: Executor) -> None:
+def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: Mapping[str, object], executor: Executor) -> None:
     """Fit the likelihood and the widening of the covariance to one replay, and score them held out."""
     observed, failed = observe_by_motor_noise(recordings, replace_values(fit.config, thinned), executor, 'replay')
     fit.failed.update(failed)

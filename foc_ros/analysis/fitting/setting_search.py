@@ -83,7 +83,7 @@ class Replays:
     """Replays of recordings under settings, each made once; thinned: parameters of these replays alone."""
 
     recordings: Mapping[str, Recording]
-    thinned: Mapping[str, float]
+    thinned: Mapping[str, object]
     executor: Executor
     _known: dict[Config, dict[str, ReplayScores]] = field(default_factory=dict)
 

@@ -1,14 +1,16 @@
-"""What is learnt of an operator: the factor by which their movements take longer than the duration model expects.
+"""What is learnt of an operator: how they arrive, and the factor by which they take longer than the duration model expects.
 
-When a movement has covered most of its distance to a goal, every factor f of `FACTORS` is judged by the positions that it would
-have led to. At a time t, the time to go T_f(t) is estimated with all expected durations multiplied by f. Where the free movement
-to the goal in T_f(t) would be h = `AHEAD_S` later is compared with where the hand x was then, relative to how far it had moved:
+When a movement has covered most of its distance to a goal, both arrivals, at rest and passing, with every factor f of `FACTORS`
+are judged by the positions that they would have led to. At a time t, the time to go T_f(t) is estimated with all expected
+durations multiplied by f. Where the free movement to the goal in T_f(t) would be h = `AHEAD_S` later is compared with where the
+hand x was then, relative to how far it had moved:
 
     l_f = sum_t |x_f(t + h) - x(t + h)| / sum_t |x(t + h) - x(t)|.
 
-The factor in use minimises w log(f)^2 + sum l_f over the movements so far, as a regularised leader (Shalev-Shwartz 2012,
-Foundations and Trends in Machine Learning 4(2)), with the weight w of `PRIOR_WEIGHT`: without movements it is 1, and it adapts in
-the course of a few. It depends on the samples and goals alone, so that equal input gives equal factors.
+The arrival and the factor in use minimise w log(f)^2 + w' + sum l_f over the movements so far, as a regularised leader
+(Shalev-Shwartz 2012, Foundations and Trends in Machine Learning 4(2)), with the weight w of `PRIOR_WEIGHT` and w' of
+`ARRIVAL_WEIGHT` for the arrival that `duration.arrival` does not name: without movements the factor is 1, and both adapt in the
+course of a few. They depend on the samples and goals alone, so that equal input gives equal factors.
 
 The free movement has the least integral of squared jerk, and begins at the velocity v without acceleration, as predictions do.
 After the share s = h / T of its time it has come to
@@ -29,7 +31,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from foc_ros.core.config import DurationConfig
+from foc_ros.core.config import ARRIVALS, DurationConfig
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Record, as_readonly
 
 from .duration import estimate_times_to_go, is_passing, scale_durations
@@ -38,6 +40,8 @@ FACTORS = as_readonly(np.exp(np.linspace(-0.8, 1.6, 25)))
 """Factors that are judged."""
 PRIOR_WEIGHT = 0.1
 """Weight of log(f)^2 against the errors of one movement."""
+ARRIVAL_WEIGHT = 0.1
+"""Weight of another arrival than that of the parameters, likewise."""
 AHEAD_S = 0.5
 """How far ahead positions are judged [s]."""
 REMAINING_SHARE = 0.25
@@ -71,26 +75,42 @@ def choose_judged(kept: Sequence[T]) -> list[T]:
     return [kept[row] for row in np.unique(np.linspace(0, len(kept) - 1, min(JUDGED, len(kept))).astype(int))]
 
 
+def compute_mean_factors(logs: Array, scores: Array, prior_stddev: float) -> tuple[float, float]:
+    """Return the geometric posterior means of two factors, each on a grid of logarithms (f,).
+
+    scores (f, f'): log-likelihood of each pair; prior_stddev: of the logarithms, about zero, before anything is known.
+    """
+    prior = -0.5 * (logs / prior_stddev) ** 2
+    total = scores + prior[:, None] + prior
+    weights = np.exp(total - total.max())
+    weights /= weights.sum()
+    return float(np.exp(weights.sum(axis=1) @ logs)), float(np.exp(weights.sum(axis=0) @ logs))
+
+
 @dataclass(frozen=True, eq=False)
 class Operator(Record):
     """The movements of an operator so far.
 
-    movements: how many were judged; losses (f,): sum of the errors of each factor, with the prior; states: of the present
-    movement.
+    movements: how many were judged; losses (2, f): sum of the errors by `ARRIVALS` and factor, with the prior of the factor;
+    states: of the present movement.
     """
 
     movements: int = 0
-    losses: Array = field(default_factory=lambda: PRIOR_WEIGHT * np.log(FACTORS) ** 2)
+    losses: Array = field(default_factory=lambda: np.tile(PRIOR_WEIGHT * np.log(FACTORS) ** 2, (2, 1)))
     states: tuple[HandState, ...] = ()
 
-    @property
-    def duration_factor(self) -> float:
-        """The factor on expected durations; exactly 1 before the first movement."""
-        return float(FACTORS[self.losses.argmin()]) if self.movements else 1.0
+    def find_best(self, config: DurationConfig) -> tuple[str, float]:
+        """Return the arrival, and the factor on expected durations, which is exactly 1 before the first movement."""
+        if not self.movements:
+            return config.arrival, 1.0
+        other = np.array([[each != config.arrival] for each in ARRIVALS])
+        row, column = np.unravel_index((self.losses + ARRIVAL_WEIGHT * other).argmin(), self.losses.shape)
+        return ARRIVALS[row], float(FACTORS[column])
 
     def adapt(self, config: DurationConfig) -> DurationConfig:
         """Return the durations of this operator."""
-        return scale_durations(config, self.duration_factor) if self.movements else config
+        arrival, factor = self.find_best(config)
+        return replace(scale_durations(config, factor), arrival=arrival) if self.movements else config
 
     def follow(self, hand: HandState, goals: Array | None, config: DurationConfig) -> Operator:
         """Return the operator after the next state of the hand; goals (g, 2) [m]; config: before it is adapted."""
@@ -116,16 +136,18 @@ class Operator(Record):
         return replace(ended, movements=self.movements + 1, losses=as_readonly(self.losses + errors / moved))
 
     def _sum_errors(self, path: Array, goal: Array, config: DurationConfig) -> tuple[Array, float]:
-        """Return the sum of the errors of positions with each factor (f,), and of the ways of the hand meanwhile [m]."""
+        """Return sums of errors with each arrival and factor (2, f), and of the ways of the hand meanwhile [m]."""
         seconds = np.array([(each.stamp_ns - self.states[0].stamp_ns) / NANOSECONDS for each in self.states])
         ahead = np.minimum(seconds + AHEAD_S, seconds[-1])
         reached = np.stack([np.interp(ahead, seconds, axis) for axis in path.T], axis=-1)
-        scaled, errors, moved = [scale_durations(config, factor) for factor in FACTORS.tolist()], np.zeros(len(FACTORS)), 0.0
+        scaled, errors, moved = [scale_durations(config, each) for each in FACTORS.tolist()], np.zeros(self.losses.shape), 0.0
         for row in choose_judged(np.flatnonzero(seconds < seconds[-1]).tolist()):
             hand, later_s = self.states[row], float(ahead[row] - seconds[row])
-            times = np.array([estimate_times_to_go(hand, goal[None], each)[0] for each in scaled])
-            expected = find_free_positions(hand.mean[:4], goal, times, later_s, is_passing(config))
-            errors += np.hypot(*(expected - reached[row]).T)
+            for number, arrival in enumerate(ARRIVALS):
+                configs = [replace(each, arrival=arrival) for each in scaled]
+                times = np.array([estimate_times_to_go(hand, goal[None], each)[0] for each in configs])
+                expected = find_free_positions(hand.mean[:4], goal, times, later_s, is_passing(configs[0]))
+                errors[number] += np.hypot(*(expected - reached[row]).T)
             moved += float(np.hypot(*(reached[row] - path[row])))
         return errors, moved
 

@@ -1,0 +1,169 @@
+"""What is learnt of the errors of predicted positions: factors on the standard deviations, for near and for far times ahead.
+
+The parameters of the covariance are expectations, and devices and people differ by much. How far the hand comes beside where the
+mixture of all candidates predicted it shows what they should be. The standard deviations at a time t ahead are multiplied by a
+factor that leads from `covariance.near` = f at and before `NEAR_S` to `covariance.far` = f' at and after `FAR_S`,
+
+    f(t) = f^(1 - s) f'^s,  s = log(t / NEAR_S) / log(FAR_S / NEAR_S) within [0, 1].                                        (1)
+
+Predictions of a moving hand, `SAMPLE_S` apart, are kept until the hand has reached the times h of `HORIZONS_S`. With its position
+x there and the mixture of normal distributions (p_i, m_i, S_i) that was predicted without the factors, each pair of factors has
+the log-posterior
+
+    log w(f, f') = -(log^2 f + log^2 f') / (2 s^2) + sum_h sum_predictions c log sum_i p_i N(x; m_i, f(h)^2 S_i).
+
+The errors within one second, which depend on each other, count as one: c is the time since the prediction before over 1 s, or
+`SAMPLE_S` over 1 s for the first one of a movement. The factors in use are the posterior means, of the logarithms. They change
+little from one prediction to the next, as stiffness needs it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .config import CovarianceConfig, clip_values
+from .estimation.adaptation import compute_mean_factors
+from .types import NANOSECONDS, Array, HandState, PredictedCandidate, Record, as_readonly
+
+LOG_FACTORS = as_readonly(math.log(2.0) * np.linspace(-3.0, 2.0, 11))
+"""Logarithms of the factors that are judged, for near and for far times."""
+PRIOR_STDDEV = 1.0
+"""Standard deviation of the logarithm of a factor before the first prediction."""
+NEAR_S, FAR_S = 0.25, 1.0
+"""Times ahead up to which, and from which on, the factors for near and for far times hold [s]."""
+HORIZONS_S = (0.25, 0.5, 1.0)
+"""Times ahead at which predicted positions are judged [s]."""
+SAMPLE_S = 0.1
+"""Interval at which predictions are judged [s]."""
+DEPENDENT_S = 1.0
+"""Time within which errors count as one observation [s]."""
+VARIANCE_FLOOR = 1e-12
+"""Variance that is added to that of a predicted position [m^2], so that its density is finite."""
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast(Record):
+    """Where a prediction at a stamp expects the hand at a time ahead: a mixture of k normal distributions.
+
+    due_ns: the time ahead, as a stamp; count: of observations, as which it counts; share (k,): s in equation 1, at this time or
+    at the end of the candidate before it; weight (k,); mean (k, 2) [m]; covariance (k, 2, 2) [m^2]: without the factors.
+    """
+
+    due_ns: int
+    count: float
+    share: Array
+    weight: Array
+    mean: Array
+    covariance: Array
+
+    def score(self, position: Array) -> Array:
+        """Return the log-density (f, f') [nat, metres] of a position (2,) for each pair of factors."""
+        x, y = (position - self.mean).T
+        xx, yy, xy = (self.covariance[:, row, column] for row, column in ((0, 0), (1, 1), (0, 1)))
+        determinant = xx * yy - xy**2
+        squared = (yy * x**2 - 2.0 * xy * x * y + xx * y**2) / determinant
+        logs = np.log(self.weight / (2.0 * np.pi * np.sqrt(determinant)))
+        scale = LOG_FACTORS[:, None, None] * (1.0 - self.share) + LOG_FACTORS[:, None] * self.share
+        exponents = logs - 2.0 * scale - 0.5 * squared * np.exp(-2.0 * scale)
+        largest = exponents.max(axis=-1)
+        density: Array = largest + np.log(np.exp(exponents - largest[..., None]).sum(axis=-1))
+        return density
+
+
+@dataclass(frozen=True, eq=False)
+class Dispersion(Record):
+    """The errors of the predictions so far.
+
+    errors: how many were judged; scores (f, f'): sums of their scores for each pair of factors; factors: for near and for far
+    times, exactly 1 before the first error; hand: its last state; taken_ns: stamp of the last prediction that was taken;
+    forecasts: that the hand has not reached yet.
+    """
+
+    errors: int = 0
+    scores: Array = field(default_factory=lambda: np.zeros((len(LOG_FACTORS), len(LOG_FACTORS))))
+    factors: tuple[float, float] = (1.0, 1.0)
+    hand: HandState | None = None
+    taken_ns: int | None = None
+    forecasts: tuple[Forecast, ...] = ()
+
+    def adapt(self, config: CovarianceConfig) -> CovarianceConfig:
+        """Return the factors of this operator."""
+        if not self.errors:
+            return config
+        near, far = self.factors
+        return clip_values(config, {'near': near * config.near, 'far': far * config.far})
+
+    def follow(self, hand: HandState) -> Dispersion:
+        """Return what is known after the next state of the hand, which ends the forecasts that it has reached."""
+        before = self.hand
+        if before is None or before.onset_ns != hand.onset_ns or hand.stamp_ns <= before.stamp_ns:
+            return replace(self, hand=hand, taken_ns=None, forecasts=())
+        reached = [each for each in self.forecasts if each.due_ns <= hand.stamp_ns]
+        if not reached:
+            return replace(self, hand=hand)
+        total = self.scores.copy()
+        for each in reached:
+            share = max((each.due_ns - before.stamp_ns) / (hand.stamp_ns - before.stamp_ns), 0.0)
+            total += each.count * each.score((1.0 - share) * before.mean[:2] + share * hand.mean[:2])
+        left = tuple(each for each in self.forecasts if each.due_ns > hand.stamp_ns)
+        factors = compute_mean_factors(LOG_FACTORS, total, PRIOR_STDDEV)
+        return replace(self, errors=self.errors + len(reached), scores=total, factors=factors, hand=hand, forecasts=left)
+
+    def add(self, stamp_ns: int, candidates: Sequence[PredictedCandidate], config: CovarianceConfig) -> Dispersion:
+        """Return what is known after a prediction with the factors of config, which counts if the hand is moving."""
+        if self.hand is None or self.hand.onset_ns is None or stamp_ns < self.hand.onset_ns:
+            return self
+        since_s = SAMPLE_S if self.taken_ns is None else (stamp_ns - self.taken_ns) / NANOSECONDS
+        taking_part = [each for each in candidates if each.likelihood > 0.0]
+        if since_s < SAMPLE_S or not taking_part:
+            return self
+        count = min(since_s / DEPENDENT_S, 1.0)
+        made = [make_forecast(stamp_ns, ahead_s, count, taking_part, config) for ahead_s in HORIZONS_S]
+        return replace(self, taken_ns=stamp_ns, forecasts=(*self.forecasts, *made))
+
+    def interrupt(self) -> Dispersion:
+        """Return what is known without the present movement."""
+        return replace(self, hand=None, taken_ns=None, forecasts=())
+
+
+def make_forecast(
+    stamp_ns: int, ahead_s: float, count: float, candidates: Sequence[PredictedCandidate], config: CovarianceConfig
+) -> Forecast:
+    """Return where candidates, published with the factors of config, expect the hand some time ahead, at their end after it."""
+    times, means, covariances = [], [], []
+    for solution in (each.solution for each in candidates):
+        at = min(ahead_s / solution.dt, len(solution.control))
+        row = min(int(at), len(solution.control) - 1)
+        after = at - row
+        times.append(at * solution.dt)
+        means.append((1.0 - after) * solution.mean[row, :2] + after * solution.mean[row + 1, :2])
+        covariances.append((1.0 - after) * solution.covariance[row, :2, :2] + after * solution.covariance[row + 1, :2, :2])
+    factors = compute_factors(np.array(times), config)
+    covariance = np.array(covariances) / factors[:, None, None] ** 2 + VARIANCE_FLOOR * np.eye(2)
+    due_ns, weight = stamp_ns + round(ahead_s * NANOSECONDS), np.array([each.likelihood for each in candidates])
+    return Forecast(due_ns, count, _compute_shares(np.array(times)), weight, np.array(means), covariance)
+
+
+def compute_factors(times: Array, config: CovarianceConfig) -> Array:
+    """Return the factors (m,) on standard deviations at times (m,) ahead [s]: equation 1."""
+    shares = _compute_shares(times)
+    factors: Array = config.near ** (1.0 - shares) * config.far**shares
+    return factors
+
+
+def scale_covariance(candidate: PredictedCandidate, config: CovarianceConfig) -> PredictedCandidate:
+    """Return a candidate whose covariance has the factors of config; that of motor noise and that of the height stay."""
+    if config.near == config.far == 1.0:
+        return candidate
+    solution = candidate.solution
+    covariance = solution.covariance * compute_factors(solution.times, config)[:, None, None] ** 2
+    return replace(candidate, solution=solution.with_covariance(covariance))
+
+
+def _compute_shares(times: Array) -> Array:
+    """Return s of equation 1 (m,) at times (m,) ahead [s]."""
+    return np.log(np.clip(times, NEAR_S, FAR_S) / NEAR_S) / math.log(FAR_S / NEAR_S)

@@ -1,0 +1,161 @@
+"""Factors on predicted standard deviations are learnt from errors: causally, equally for equal input, until a reset."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from foc_ros.core.config import Config, CovarianceConfig, replace_values
+from foc_ros.core.dispersion import LOG_FACTORS, Dispersion, compute_factors, make_forecast, scale_covariance
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.types import (
+    NANOSECONDS,
+    Candidate,
+    HandSample,
+    HandState,
+    PredictedCandidate,
+    Prediction,
+    Solution,
+    Status,
+    make_obstacles,
+)
+from foc_ros.ros.parameters import load_parameter_file, write_parameter_file
+
+STDDEV = 0.02
+STEP_NS = NANOSECONDS // 10
+FIXED = {'duration.adaptation': 'none', 'likelihood.adaptation': 'none'}
+CONFIG = replace_values(Config(), {'rate_hz': 10.0, 'foc.steps': 15, 'estimator.position_stddev': 1e-4} | FIXED)
+
+
+def make_candidate(likelihood: float = 1.0, duration_s: float = 2.0, place: Sequence[float] = (0.0, 0.0)) -> PredictedCandidate:
+    """Return a candidate that stays at a place with a standard deviation of `STDDEV` along each axis."""
+    mean, covariance = np.zeros((9, 6)), np.tile(STDDEV**2 * np.eye(6), (9, 1, 1))
+    mean[:, :2] = place
+    solution = Solution(Status.SOLVED, '', duration_s / 8.0, mean, covariance, np.zeros((8, 2)), 1.0, {}, 0.0, 0.0, 1.0)
+    return PredictedCandidate(Candidate('goal0', 0, (), mean[:, :2], 0.0), solution, {}, 1.0, likelihood)
+
+
+def place_hand(stamp_ns: int, position: Sequence[float]) -> HandState:
+    """Return a moving hand at a position."""
+    mean = np.array([*position, 0.0, 0.0, 0.0, 0.0])
+    return HandState(stamp_ns, mean, np.eye(6), onset_ns=0, onset_position=np.zeros(2))
+
+
+def judge(ahead_s: float, factor: float, count: int = 60) -> Dispersion:
+    """Return what is learnt if the hand is beside the candidate by `factor` standard deviations in 2D some time later."""
+    generator, dispersion = np.random.default_rng(3), Dispersion()
+    for position in factor * STDDEV * generator.standard_normal((count, 2)):
+        dispersion = dispersion.interrupt().follow(place_hand(0, (0.0, 0.0))).add(0, [make_candidate()], CovarianceConfig())
+        due = [replace(each, count=1.0) for each in dispersion.forecasts if each.due_ns == round(ahead_s * NANOSECONDS)]
+        dispersion = replace(dispersion, forecasts=tuple(due))
+        dispersion = dispersion.follow(place_hand(round(ahead_s * NANOSECONDS), position))
+    return dispersion
+
+
+@pytest.mark.parametrize('factor', [0.25, 1.0, 3.0])
+@pytest.mark.parametrize(('ahead_s', 'learnt'), [(0.25, 0), (1.0, 1)])
+def test_the_factor_of_gaussian_errors_is_recovered(factor: float, ahead_s: float, learnt: int) -> None:
+    dispersion = judge(ahead_s, factor)
+    assert dispersion.errors == 60
+    assert dispersion.factors[learnt] == pytest.approx(factor, rel=0.1)
+    assert dispersion.factors[1 - learnt] == pytest.approx(1.0, abs=0.1)
+
+
+def test_the_score_is_the_density_of_the_scaled_mixture() -> None:
+    config, position = CovarianceConfig(near=0.5, far=3.0), np.array([0.03, -0.01])
+    candidates = [make_candidate(0.7), make_candidate(0.3, duration_s=0.5, place=(0.05, 0.0))]
+    published = [scale_covariance(each, config) for each in candidates]
+    found = make_forecast(0, 1.0, 1.0, published, config).score(position)
+    for row, column in ((0, 0), (4, 9), (10, 2)):
+        near, far = np.exp(LOG_FACTORS[[row, column]])
+        stddevs = STDDEV * compute_factors(np.array([1.0, 0.5]), CovarianceConfig(near=near, far=far))
+        parts = [
+            each.likelihood * multivariate_normal(each.mean[0, :2], stddev**2 * np.eye(2)).pdf(position)
+            for each, stddev in zip(candidates, stddevs, strict=True)
+        ]
+        assert found[row, column] == pytest.approx(np.log(sum(parts)), rel=1e-6)
+
+
+def test_the_factor_changes_with_the_logarithm_of_the_time_and_no_further() -> None:
+    times = np.array([0.0, 0.25, 0.5, 1.0, 4.0])
+    np.testing.assert_allclose(compute_factors(times, CovarianceConfig(near=0.5, far=2.0)), [0.5, 0.5, 1.0, 2.0, 2.0])
+
+
+def test_only_a_moving_hand_counts_and_only_within_its_movement() -> None:
+    resting, candidates = replace(place_hand(0, (0.0, 0.0)), onset_ns=None), [make_candidate()]
+    assert not Dispersion().follow(resting).add(0, candidates, CovarianceConfig()).forecasts
+    assert not Dispersion().add(0, candidates, CovarianceConfig()).forecasts
+    moving = Dispersion().follow(place_hand(0, (0.0, 0.0))).add(0, candidates, CovarianceConfig())
+    later = moving.add(STEP_NS * 5, candidates, CovarianceConfig())
+    assert [each.count for each in later.forecasts] == [0.1] * 3 + [0.5] * 3
+    assert len(moving.forecasts) == 3 and moving.add(STEP_NS // 2, candidates, CovarianceConfig()) is moving
+    ended = moving.follow(replace(resting, stamp_ns=2 * NANOSECONDS))
+    assert not ended.forecasts and ended.errors == 0 and ended.adapt(CONFIG.covariance) is CONFIG.covariance
+
+
+def reach(pipeline: Pipeline, start_s: float, until_s: float = 1.6) -> list[Prediction]:
+    """Pass a reach around an obstacle through a pipeline that predicts; return the predictions."""
+    pipeline.set_obstacles('cloud', make_obstacles([[0.15, 0.0]], 0.03, 0.001), int(start_s * NANOSECONDS), 'world')
+    pipeline.set_goals(np.array([[0.3, 0.0]]), 'world')
+    made = []
+    for t in np.arange(0.0, until_s, 0.05):
+        s = np.clip((t - 0.3) / 0.8, 0.0, 1.0)
+        x = 0.3 * (10 * s**3 - 15 * s**4 + 6 * s**5)
+        stamp_ns = int((start_s + t) * NANOSECONDS)
+        pipeline.add_hand_sample(HandSample(stamp_ns, np.array([x, 0.06 * np.sin(np.pi * x / 0.3)]), 0.0, 'world'))
+        prediction = pipeline.predict() if pipeline.is_due else None
+        made += [prediction] if prediction is not None else []
+    return made
+
+
+def test_factors_scale_the_covariance_and_nothing_else() -> None:
+    off = {'covariance.adaptation': 'none'}
+    plain = reach(Pipeline(replace_values(CONFIG, off)), 1.0)
+    scaled = reach(Pipeline(replace_values(CONFIG, off | {'covariance.near': 2.0, 'covariance.far': 2.0})), 1.0)
+    assert len(plain) == len(scaled) > 10
+    for one, other in zip(plain, scaled, strict=True):
+        for before, after in zip(one.candidates, other.candidates, strict=True):
+            np.testing.assert_allclose(after.covariance, 4.0 * before.covariance, rtol=1e-12)
+            np.testing.assert_array_equal(after.mean, before.mean)
+            np.testing.assert_array_equal(after.motor_covariance, before.motor_covariance)
+            assert after.likelihood == before.likelihood
+
+
+def test_equal_messages_give_equal_factors_and_later_ones_change_no_earlier_prediction() -> None:
+    one, other = Pipeline(CONFIG), Pipeline(CONFIG)
+    whole, part = reach(one, 1.0) + reach(one, 11.0), reach(other, 1.0) + reach(other, 11.0, until_s=0.9)
+    assert one.dispersion.errors > other.dispersion.errors > 0
+    for before, after in zip(part, whole, strict=False):
+        np.testing.assert_array_equal(before.candidates[0].covariance, after.candidates[0].covariance)
+    again = Pipeline(CONFIG)
+    reach(again, 1.0), reach(again, 11.0)
+    np.testing.assert_array_equal(one.dispersion.scores, again.dispersion.scores)
+
+
+def test_factors_are_forgotten_by_a_reset_and_by_other_parameters_and_can_be_switched_off() -> None:
+    pipeline = Pipeline(CONFIG)
+    reach(pipeline, 1.0)
+    assert pipeline.adapted_config.covariance == pipeline.dispersion.adapt(CONFIG.covariance) != CONFIG.covariance
+    pipeline.reconfigure(replace_values(CONFIG, {'rate_hz': 20.0}))
+    assert pipeline.dispersion.errors > 0
+    pipeline.reconfigure(replace_values(CONFIG, {'foc.endpoint_stddev': 0.1}))
+    assert pipeline.dispersion.errors == 0
+    reach(pipeline, 11.0)
+    pipeline.reset()
+    assert pipeline.dispersion.errors == 0 and pipeline.adapted_config.covariance == CONFIG.covariance
+    off = replace_values(CONFIG, {'covariance.adaptation': 'none'})
+    pipeline = Pipeline(off)
+    reach(pipeline, 1.0)
+    assert pipeline.dispersion.errors == 0 and pipeline.adapted_config is off
+
+
+def test_factors_are_exported_as_a_parameter_file(tmp_path: Path) -> None:
+    pipeline = Pipeline(CONFIG)
+    reach(pipeline, 1.0)
+    write_parameter_file('--operator', tmp_path / 'operator.yaml', pipeline.adapted_config)
+    assert load_parameter_file(tmp_path / 'operator.yaml').covariance == pipeline.adapted_config.covariance
