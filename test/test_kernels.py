@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from foc_ros.core.compilation import count_kernels, follow_compilation
+from foc_ros.core.kernel_library import InnerLibrary
 from foc_ros.core.kernels import Matrix, Vector, compiled, compiled_with_caller, forget_outdated, freeze
 
 KERNEL, GROUP = '@compiled\ndef kernel(): ...', 'class Group(NamedTuple): ...'
@@ -88,3 +89,26 @@ def test_the_compilation_of_kernels_is_followed_and_happens_once(tmp_path, monke
         del sys.modules['followed_kernel']
     assert reported == [0, 1]
     assert count_kernels() > 10
+
+
+def test_an_inner_kernel_becomes_machine_code_only_as_part_of_an_entry_kernel(tmp_path, monkeypatch):
+    """Machine code of its own would be compiled, and what it calls optimised again, for nobody."""
+    (tmp_path / 'kernel_in_kernel.py').write_text(
+        'from foc_ros.core.kernels import compiled, compiled_separately, compiled_with_caller\n'
+        '@compiled_with_caller\ndef half(number: "float") -> "float":\n    return number / 2.0\n'
+        '@compiled_separately\ndef quarter(number: "float") -> "float":\n    return half(half(number))\n'
+        '@compiled\ndef sixteenth(number: "float") -> "float":\n    return quarter(quarter(number))\n'
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    kernels = import_module('kernel_in_kernel')
+    assert kernels.sixteenth(2.0) == 0.125
+    for kernel in (kernels.half, kernels.quarter):
+        (only,) = kernel.overloads.values()
+        assert isinstance(only.library, InnerLibrary)
+        assert only.library.get_pointer_to_function(only.fndesc.llvm_func_name) == 0
+    del sys.modules['kernel_in_kernel']
+
+
+def test_an_inner_kernel_that_is_called_from_python_runs_as_python():
+    line = weigh(Line(np.ones((1, 2)), 3.0))
+    np.testing.assert_array_equal(line.points, [[3.0, 3.0]])

@@ -4,6 +4,7 @@ There are two kinds. An entry kernel (`compiled`, `compiled_exactly`) is called 
 for the types that its annotations name, and the machine code is kept beside the source, or in the user's cache directory where
 that cannot be written. An inner kernel (`compiled_with_caller`) is called by other kernels only: it is compiled as part of each
 entry kernel that needs it, for the types of that call, and it may be given NamedTuples that a kernel has built.
+Called from Python, an inner kernel runs as Python.
 
 The first import on a machine compiles all entry kernels, which takes some time. Numba checks only the file of an entry kernel for
 changes, not the files of what it calls, so `forget_outdated` removes machine code that is older than any of these.
@@ -21,6 +22,8 @@ from typing import Any, ForwardRef, TypeAlias, TypeVar, cast
 import numpy as np
 from numba import config, njit, types
 from numpy.typing import NDArray
+
+from .kernel_library import EntryCompiler, InnerKernel
 
 Vector: TypeAlias = NDArray[np.float64]
 """One axis, C-contiguous; like all arguments of entry kernels, it may be read-only."""
@@ -108,17 +111,17 @@ def compiled_with_caller(kernel: Kernel) -> Kernel:
 
     It is inlined: passing on the arrays of a NamedTuple, which are counted references, took as long as the work in some of them.
     """
-    return cast('Kernel', njit(fastmath=REORDERED, forceinline=True, **COMMON)(kernel))
+    return _make_inner(kernel, fastmath=REORDERED, forceinline=True)
 
 
 def compiled_exactly_with_caller(kernel: Kernel) -> Kernel:
     """Compile an inner kernel like `compiled_with_caller`, in which each product and sum is rounded as written."""
-    return cast('Kernel', njit(forceinline=True, **COMMON)(kernel))
+    return _make_inner(kernel, fastmath=set(), forceinline=True)
 
 
 def compiled_separately(kernel: Kernel) -> Kernel:
     """Compile an inner kernel for the types of its calls, not inlined: a large one takes long to compile in each caller."""
-    return cast('Kernel', njit(fastmath=REORDERED, **COMMON)(kernel))
+    return _make_inner(kernel, fastmath=REORDERED)
 
 
 def freeze(group: Group) -> Group:
@@ -131,17 +134,21 @@ def freeze(group: Group) -> Group:
     return group
 
 
+def _make_inner(kernel: Kernel, **options: object) -> Kernel:
+    return cast('Kernel', InnerKernel(kernel, targetoptions={'nopython': True, 'no_cpython_wrapper': True, **options, **COMMON}))
+
+
 def _compile_entry(kernel: Kernel, freedom: set[str]) -> Kernel:
     scope = kernel.__globals__
     signature = tuple(_find_type(each, scope, _TYPES) for name, each in kernel.__annotations__.items() if name != 'return')
     options = {'nogil': True, 'fastmath': freedom, **COMMON}
     with _compiler_at_level():
         try:
-            return cast('Kernel', njit(signature, cache=True, **options)(kernel))
+            return cast('Kernel', njit(signature, cache=True, pipeline_class=EntryCompiler, **options)(kernel))
         except RuntimeError as error:  # no directory to keep machine code in: compile in every process
             if 'cannot cache' not in str(error):
                 raise
-            return cast('Kernel', njit(signature, **options)(kernel))
+            return cast('Kernel', njit(signature, pipeline_class=EntryCompiler, **options)(kernel))
 
 
 @contextmanager
