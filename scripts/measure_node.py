@@ -3,12 +3,13 @@
 The player publishes a hand at 1 kHz and 50 obstacles at 30 Hz with jitter, all of them with best effort, and with `--moving` in
 the frame of a camera whose transform is sent 5 ms later (this needs tf2). The script prints
 
+- discovery: time from the line "ready" of the node until DDS has connected its inputs to the player [s],
 - start: time from the line "ready" of the node to its first prediction [s],
 - rate: predictions per second at the default budget; the longest time between two of them; the median and the largest age of one,
   by the stamp of its pose, when it was published [s]; how many were older than two periods of `rate_hz`,
 - clutch: the longest answer of `~/engage` in this load [s],
-- intake: what a hand at 1 kHz costs, as a share of one core: the CPU time of a node that predicts once in ten seconds. A busy
-  machine publishes fewer poses: the share of those is scaled to 1 kHz.
+- intake: what a hand at 1 kHz costs, as a share of one core: the CPU time of a node that predicts once in ten seconds. On a
+  busy machine fewer poses are published, and their share is scaled to 1 kHz.
 
 Other programs of the machine lengthen all times: run it alone.
 """
@@ -119,6 +120,11 @@ class Player:
             self._executor.spin_once(timeout_sec=max(min(due.values()) - time.monotonic(), 0.0) if hand_hz else 0.005)
 
     @property
+    def is_connected(self) -> bool:
+        """Whether the node's inputs are connected."""
+        return all(each.get_subscription_count() for each in (self._hand, self._obstacles, self._goals))
+
+    @property
     def _frame(self) -> str:
         return 'world' if self._broadcaster is None else 'camera'
 
@@ -185,6 +191,8 @@ def measure_predictions(player: Player, seconds: float, *parameters: str) -> dic
     with run_node(*parameters) as process:
         wait_until_ready(process)
         began = time.monotonic()
+        player.play(60.0, until=lambda: player.is_connected)
+        discovery_s = time.monotonic() - began
         player.play(60.0, until=lambda: bool(player.heard_s))
         start_s = time.monotonic() - began
         player.play(2.0)
@@ -192,6 +200,7 @@ def measure_predictions(player: Player, seconds: float, *parameters: str) -> dic
         player.play(seconds)
     ages_s = np.array(player.ages_s or [float('nan')])
     return {
+        'discovery [s]': discovery_s,
         'start [s]': start_s,
         'rate [Hz]': len(player.stamps_ns) / seconds,
         'longest gap [s]': float(np.diff(player.heard_s).max(initial=0.0)),
