@@ -4,7 +4,8 @@ The node runs in a process of its own, where every prediction first keeps Python
 plays a hand at 100 Hz and notes when wrenches arrive. The node says when its updates of guidance began, and for how long they
 computed and waited: for a processor that was taken by other programs, as Linux counts it, and otherwise, which is for Python's
 global lock. A third process does nothing but wait for each period, as the thread of guidance does between its updates: no program
-in Python has a shorter period on the same machine at the same time. Run `.venv/bin/python scripts/measure_guidance.py`.
+in Python has a shorter period on the same machine at the same time. All three have the real-time priority `--priority`, as the
+driver of a haptic device has one; 0 is an ordinary priority. Run `.venv/bin/python scripts/measure_guidance.py`.
 """
 
 from __future__ import annotations
@@ -66,7 +67,12 @@ class Waits:
         return np.array([time.monotonic(), time.thread_time(), 1e-9 * int(os.pread(counts.fileno(), 100, 0).split()[1])])
 
 
-def run_node(load_s: float) -> int:
+def set_priority(priority: int) -> None:
+    """Set the real-time priority of this process; its later threads have it too."""
+    os.sched_setscheduler(0, os.SCHED_FIFO if priority else os.SCHED_OTHER, os.sched_param(priority))
+
+
+def run_node(load_s: float, priority: int) -> int:
     """Run the node with predictions that keep the global lock for a time [s]; print the waits at the end."""
     from foc_ros.core.pipeline import PredictionTask
     from foc_ros.ros.guidance_loop import GuidanceLoop
@@ -84,13 +90,15 @@ def run_node(load_s: float) -> int:
         return run(task)
 
     PredictionTask.run = run_slowly  # type: ignore[method-assign, assignment]
-    code = main(['--ros-args', *(word for option in OPTIONS for word in ('-p', option))])
+    options = *OPTIONS, f'guidance.realtime_priority:={priority}'
+    code = main(['--ros-args', *(word for option in options for word in ('-p', option))])
     print(json.dumps(waits.summarise()))
     return code
 
 
-def run_idle() -> int:
+def run_idle(priority: int) -> int:
     """Wait for each period until the process is terminated; print the 99th percentile of the period, in nominal periods."""
+    set_priority(priority)
     begun: list[float] = []
     is_over = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: is_over.set())
@@ -147,15 +155,17 @@ class Player:
         self.wrenches.append((1e-9 * info['received_timestamp'], float(np.hypot(force.x, force.y))))
 
 
-def measure(load_s: float) -> dict[str, float]:
+def measure(load_s: float, priority: int) -> dict[str, float]:
     """Return percentiles of the period, in nominal periods, the times from the clutch to a force of zero, and the waits [s]."""
     import rclpy
     from rclpy.executors import SingleThreadedExecutor
 
     def start(*words: str) -> subprocess.Popen[bytes]:
-        return subprocess.Popen([sys.executable, __file__, *words], stdout=subprocess.PIPE)
+        command = sys.executable, __file__, '--load', str(load_s), '--priority', str(priority), *words
+        return subprocess.Popen(command, stdout=subprocess.PIPE)
 
-    with rclpy.Context() as context, start('--node', '--load', str(load_s)) as node_process, start('--idle') as idle_process:
+    with start('--node') as node_process, start('--idle') as idle_process, rclpy.Context() as context:
+        set_priority(priority)
         node = rclpy.create_node('player', context=context)
         executor = SingleThreadedExecutor(context=context)
         executor.add_node(node)
@@ -205,15 +215,16 @@ def main() -> int:
     """Print the measurement as a JSON object."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--load', type=float, default=0.03, metavar='S', help='time for which each prediction keeps the lock')
+    parser.add_argument('--priority', type=int, default=50, help='real-time priority (default: %(default)s)')
     parser.add_argument('--node', action='store_true', help='run the node (used by the script itself)')
     parser.add_argument('--idle', action='store_true', help='wait for each period (used by the script itself)')
     arguments = parser.parse_args()
     if arguments.idle:
-        return run_idle()
+        return run_idle(arguments.priority)
     if arguments.node:
-        return run_node(arguments.load)
+        return run_node(arguments.load, arguments.priority)
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    print(json.dumps({'load_s': arguments.load, **measure(arguments.load)}))
+    print(json.dumps({'load_s': arguments.load, 'priority': arguments.priority, **measure(arguments.load, arguments.priority)}))
     return 0
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from logging import getLogger
 from queue import SimpleQueue
 from threading import Thread
 from time import monotonic
@@ -112,7 +113,7 @@ class LibraryPredictor(LivePredictor):
         self._queue: SimpleQueue[tuple[str, bytes] | Config | None] = SimpleQueue()
         self._types, self._guidance_types = RosbagsTypes(TYPESTORE), RosbagsTypes(TYPESTORE)  # one for each thread
         self._error = ''
-        self._guidance = GuidanceLoop(config, self._send_guidance, self._note_error)
+        self._guidance = GuidanceLoop(config, self._send_guidance, self._note_error, getLogger(__name__).warning)
         self._thread = Thread(target=self._run, name='prediction', daemon=True)
 
     def start(self) -> None:

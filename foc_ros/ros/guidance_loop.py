@@ -1,7 +1,8 @@
 """The thread of guidance: updates at `guidance.rate_hz` by the steady clock, whatever the executor and the predictions do.
 
 The executor tells the thread what is new by replacing one record; the thread reads it at each update. So neither waits for the
-other. While guidance is disabled, the thread waits without updates.
+other. While guidance is enabled, the thread has the priority `guidance.realtime_priority`, if that is permitted: an update takes
+less than its period, and the thread sleeps between two updates. While guidance is disabled, the thread waits without updates.
 """
 
 from __future__ import annotations
@@ -19,7 +20,10 @@ from foc_ros.core.guidance.step import GuidanceInput, GuidanceOutput, GuidanceSt
 from foc_ros.core.types import Prediction
 
 from .messages.encode_guidance import Place
+from .realtime import ThreadPriority
 
+LEAST_SLEEP = 0.1
+"""Part of the period that the thread sleeps after an update that was late: it must not keep a processor for itself."""
 ZEROS = 2
 """Number of outputs without any force that are published after the hand has been released."""
 END_S = 1.0
@@ -60,15 +64,22 @@ class GuidanceLoop:
         Called in the thread with each output and the place where it holds.
     report
         Called in the thread with an exception of an update, after which guidance begins anew with a force of zero.
+    warn
+        Called in the thread with a text if it may not have its priority.
     """
 
     def __init__(
-        self, config: Config, publish: Callable[[GuidanceOutput, Place], None], report: Callable[[Exception], None]
+        self,
+        config: Config,
+        publish: Callable[[GuidanceOutput, Place], None],
+        report: Callable[[Exception], None],
+        warn: Callable[[str], None],
     ) -> None:
         self.newest = Newest(config)
         self.output: GuidanceOutput | None = None
         self.place: Place | None = None
-        self._publish, self._report = publish, report
+        self._publish, self._report, self._warn = publish, report, warn
+        self._priority = 0
         self._state, self._zeros = GuidanceState(), ZEROS
         self._end, self._enabled = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
@@ -119,6 +130,7 @@ class GuidanceLoop:
             'authority': f'{output.authority:.3f}',
             'tank_J': f'{output.tank:.4f}',
             'force_N': f'{float((output.force @ output.force) ** 0.5):.3f}',
+            'realtime_priority': str(self._priority),
         }
 
     def update(self, now_s: float) -> None:
@@ -148,19 +160,22 @@ class GuidanceLoop:
 
     def _run(self) -> None:
         """Update at fixed instants; those that are missed are left out."""
-        due_s = monotonic()
+        due_s, priority = monotonic(), ThreadPriority(self._warn)
         while not self._end.wait(max(due_s - monotonic(), 0.0)):
             if self._zeros >= ZEROS and not self._enabled.is_set():
+                priority.set(0)
                 self._enabled.wait()
                 self._state = GuidanceState()
                 continue
+            priority.set(self.newest.config.guidance.realtime_priority)
+            self._priority = priority.priority
             try:
                 self.update(monotonic())
             except Exception as error:
                 self._state = GuidanceState()
                 self._report(error)
             period_s = 1.0 / self.newest.config.guidance.rate_hz
-            due_s = max(due_s + period_s, monotonic())
+            due_s = max(due_s + period_s, monotonic() + LEAST_SLEEP * period_s)
 
 
 def _has_ended(output: GuidanceOutput) -> bool:

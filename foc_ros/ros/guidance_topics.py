@@ -38,7 +38,7 @@ class GuidanceTopics:
         self._node = node
         self._thread_types = RclpyTypes()  # messages of the thread of guidance; no other thread uses them
         self.publishers: dict[str, Any] = {}
-        self.loop = GuidanceLoop(config, self._publish_output, report)
+        self.loop = GuidanceLoop(config, self._publish_output, report, node.get_logger().warning)
 
     def create(self) -> None:
         """Create the publishers and begin to update."""
