@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import threading
 import time
@@ -112,5 +113,5 @@ def test_a_late_update_leaves_the_processor_to_others(monkeypatch: pytest.Monkey
         time.sleep(0.001)
     loop.stop()
     assert len(updates) >= 5
-    pauses = [began - ended for (_, ended), (began, _) in zip(updates, updates[1:], strict=False)]
+    pauses = [began - ended for (_, ended), (began, _) in itertools.pairwise(updates)]
     assert min(pauses) > 0.09 / GUIDED.guidance.rate_hz
