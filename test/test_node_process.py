@@ -180,7 +180,7 @@ def test_a_second_signal_has_no_effect(ros: Graph) -> None:
         (['--ros-args', '-p', 'qos_overrides./obstacles.subscription.durability:=eternal'], 'eternal'),
         (['--ros-args', '-p', 'homotopy.library:=/nowhere/ways.json'], 'foc_node: /nowhere/ways.json: cannot be read'),
         (['--ros-args', '--no-such-option'], 'no-such-option'),
-        (['--ros-args', '-p', 'nonsense:=1'], 'foc_node: nonsense: expected a known parameter, got 1\n'),
+        (['--ros-args', '-p', 'qqq:=1'], 'foc_node: qqq: expected a known parameter, got 1\n'),
         (
             ['--ros-args', '-p', 'foc.etta:=0.5'],
             'foc_node: foc.etta: expected a known parameter (did you mean foc.eta?), got 0.5\n',
