@@ -133,9 +133,11 @@ def test_the_outputs_agree_with_each_other(ros: Graph) -> None:
     assert [each.size for each in bench.stiffness[-1].layout.dim] == [3, 3]
     assert bench.references[-1].pose.position.z == pytest.approx(0.1)
     markers = [each for each in bench.received['markers'][-1].markers if each.ns == 'guidance']
-    assert len(markers) == 2
+    assert [each.type for each in markers] == [markers[0].ARROW, markers[0].SPHERE]
     values = figures(bench.health())
     assert values['guidance'] in ('guiding', 'stale')
+    assert 0.0 <= float(values['authority']) <= 0.5 and 0.0 <= float(values['force_N']) <= 3.0
+    assert values['realtime_priority'] in ('0', '50')
     assert 0.0 <= float(values['agreement']) <= 1.0 and 0.0 < float(values['tank_J']) <= 0.5
 
 
