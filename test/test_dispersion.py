@@ -70,20 +70,21 @@ def test_the_score_is_the_density_of_the_scaled_mixture() -> None:
     config, position = CovarianceConfig(near=0.5, far=3.0), np.array([0.03, -0.01])
     candidates = [make_candidate(0.7), make_candidate(0.3, duration_s=0.5, place=(0.05, 0.0))]
     published = [scale_covariance(each, config) for each in candidates]
-    found = make_forecast(0, 1.0, 1.0, published, config).score(position)
+    found = make_forecast(0, 1.0, 1.0, published, config).score(position)  # the second one ends before
     for row, column in ((0, 0), (4, 9), (10, 2)):
-        near, far = np.exp(LOG_FACTORS[[row, column]])
-        stddevs = STDDEV * compute_factors(np.array([1.0, 0.5]), CovarianceConfig(near=near, far=far))
+        far = np.exp(LOG_FACTORS[column])
         parts = [
             each.likelihood * multivariate_normal(each.mean[0, :2], stddev**2 * np.eye(2)).pdf(position)
-            for each, stddev in zip(candidates, stddevs, strict=True)
+            for each, stddev in zip(candidates, STDDEV * np.array([far, far]), strict=True)
         ]
         assert found[row, column] == pytest.approx(np.log(sum(parts)), rel=1e-6)
 
 
 def test_the_factor_changes_with_the_logarithm_of_the_time_and_no_further() -> None:
-    times = np.array([0.0, 0.25, 0.5, 1.0, 4.0])
-    np.testing.assert_allclose(compute_factors(times, CovarianceConfig(near=0.5, far=2.0)), [0.5, 0.5, 1.0, 2.0, 2.0])
+    config = CovarianceConfig(near=0.5, far=2.0)
+    np.testing.assert_allclose(compute_factors(make_candidate().solution, config)[[0, 1, 2, 4, 8]], [0.5, 0.5, 1.0, 2.0, 2.0])
+    early = compute_factors(make_candidate(duration_s=0.5).solution, config)
+    np.testing.assert_allclose(early[[4, 8]], [0.5, 2.0])
 
 
 def test_only_a_moving_hand_counts_and_only_within_its_movement() -> None:

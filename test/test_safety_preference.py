@@ -42,7 +42,7 @@ def test_a_preference_contains_what_the_cost_contains():
 
 
 def test_a_class_that_misses_eta_takes_part_with_less_weight():
-    found = classes(foc__eta=0.99)
+    found = classes(foc__eta=0.99, likelihood__lookahead_s=0.0)
     assert {each.status for each in found} == {Status.COMPROMISED}
     assert all(each.has_likelihood and not each.is_solved and 0 < each.eta < 0.99 for each in found)
     assert sum(each.likelihood for each in found) == pytest.approx(1.0)

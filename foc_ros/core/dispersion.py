@@ -2,9 +2,10 @@
 
 The parameters of the covariance are expectations, and devices and people differ by much. How far the hand comes beside where the
 mixture of all candidates predicted it shows what they should be. The standard deviations at a time t ahead are multiplied by a
-factor that leads from `covariance.near` = f at and before `NEAR_S` to `covariance.far` = f' at and after `FAR_S`,
+factor that leads from `covariance.near` = f at and before `NEAR_S` to `covariance.far` = f' at and after b = `FAR_S`, or at the
+end of a candidate that ends before, which stands for all times after it:
 
-    f(t) = f^(1 - s) f'^s,  s = log(t / NEAR_S) / log(FAR_S / NEAR_S) within [0, 1].                                        (1)
+    f(t) = f^(1 - s) f'^s,  s = log(t / NEAR_S) / log(b / NEAR_S) within [0, 1].                                            (1)
 
 Predictions of a moving hand, `SAMPLE_S` apart, are kept until the hand has reached the times h of `HORIZONS_S`. With its position
 x there and the mixture of normal distributions (p_i, m_i, S_i) that was predicted without the factors, each pair of factors has
@@ -27,7 +28,7 @@ import numpy as np
 
 from .config import CovarianceConfig, clip_values
 from .estimation.adaptation import compute_mean_factors
-from .types import NANOSECONDS, Array, HandState, PredictedCandidate, Record, as_readonly
+from .types import NANOSECONDS, Array, HandState, PredictedCandidate, Record, Solution, as_readonly
 
 LOG_FACTORS = as_readonly(math.log(2.0) * np.linspace(-3.0, 2.0, 11))
 """Logarithms of the factors that are judged, for near and for far times."""
@@ -35,6 +36,8 @@ PRIOR_STDDEV = 1.0
 """Standard deviation of the logarithm of a factor before the first prediction."""
 NEAR_S, FAR_S = 0.25, 1.0
 """Times ahead up to which, and from which on, the factors for near and for far times hold [s]."""
+SHORTEST = 1.05
+"""Lower limit of the latter, relative to the former, where a candidate ends early."""
 HORIZONS_S = (0.25, 0.5, 1.0)
 """Times ahead at which predicted positions are judged [s]."""
 SAMPLE_S = 0.1
@@ -134,23 +137,24 @@ def make_forecast(
     stamp_ns: int, ahead_s: float, count: float, candidates: Sequence[PredictedCandidate], config: CovarianceConfig
 ) -> Forecast:
     """Return where candidates, published with the factors of config, expect the hand some time ahead, at their end after it."""
-    times, means, covariances = [], [], []
+    factors, shares, means, covariances = [], [], [], []
     for solution in (each.solution for each in candidates):
         at = min(ahead_s / solution.dt, len(solution.control))
         row = min(int(at), len(solution.control) - 1)
         after = at - row
-        times.append(at * solution.dt)
+        share = _compute_shares(np.array(at * solution.dt), solution)
+        shares.append(share)
+        factors.append(config.near ** (1.0 - share) * config.far**share)
         means.append((1.0 - after) * solution.mean[row, :2] + after * solution.mean[row + 1, :2])
         covariances.append((1.0 - after) * solution.covariance[row, :2, :2] + after * solution.covariance[row + 1, :2, :2])
-    factors = compute_factors(np.array(times), config)
-    covariance = np.array(covariances) / factors[:, None, None] ** 2 + VARIANCE_FLOOR * np.eye(2)
+    covariance = np.array(covariances) / np.array(factors)[:, None, None] ** 2 + VARIANCE_FLOOR * np.eye(2)
     due_ns, weight = stamp_ns + round(ahead_s * NANOSECONDS), np.array([each.likelihood for each in candidates])
-    return Forecast(due_ns, count, _compute_shares(np.array(times)), weight, np.array(means), covariance)
+    return Forecast(due_ns, count, np.array(shares), weight, np.array(means), covariance)
 
 
-def compute_factors(times: Array, config: CovarianceConfig) -> Array:
-    """Return the factors (m,) on standard deviations at times (m,) ahead [s]: equation 1."""
-    shares = _compute_shares(times)
+def compute_factors(solution: Solution, config: CovarianceConfig) -> Array:
+    """Return the factors (N + 1,) on the standard deviations of a solution: equation 1."""
+    shares = _compute_shares(solution.times, solution)
     factors: Array = config.near ** (1.0 - shares) * config.far**shares
     return factors
 
@@ -160,10 +164,12 @@ def scale_covariance(candidate: PredictedCandidate, config: CovarianceConfig) ->
     if config.near == config.far == 1.0:
         return candidate
     solution = candidate.solution
-    covariance = solution.covariance * compute_factors(solution.times, config)[:, None, None] ** 2
+    covariance = solution.covariance * compute_factors(solution, config)[:, None, None] ** 2
     return replace(candidate, solution=solution.with_covariance(covariance))
 
 
-def _compute_shares(times: Array) -> Array:
-    """Return s of equation 1 (m,) at times (m,) ahead [s]."""
-    return np.log(np.clip(times, NEAR_S, FAR_S) / NEAR_S) / math.log(FAR_S / NEAR_S)
+def _compute_shares(times: Array, solution: Solution) -> Array:
+    """Return s of equation 1 at times ahead [s], of any shape."""
+    far_s = min(max(solution.dt * len(solution.control), SHORTEST * NEAR_S), FAR_S)
+    shares: Array = np.log(np.clip(times, NEAR_S, far_s) / NEAR_S) / math.log(far_s / NEAR_S)
+    return shares

@@ -35,7 +35,8 @@ def compute_branch_times(outcomes: Sequence[PredictedCandidate], obstacles: Obst
     """Compute when the mean paths of candidates separate; obstacles: where they are now.
 
     Two paths from one hand pass an obstacle on different sides if the angles that they sweep about it differ by more than half a
-    turn. They separate at the first such obstacle, when the first of the two is nearest to it.
+    turn. They separate at the first such obstacle, when the first of the two is nearest to it. A parabola through three
+    steps gives this time, so that it does not jump.
     """
     if not outcomes:
         return BranchTimes(np.zeros((0, 0)), np.zeros(0, dtype=np.intp))
@@ -44,8 +45,19 @@ def compute_branch_times(outcomes: Sequence[PredictedCandidate], obstacles: Obst
         centre = centre_trajectories(obstacles.centre, solution.dt * obstacles.velocity, len(solution.mean) - 1)
         angles.append(compute_swept_angles(solution.path, centre))
         _, distance = measure_offsets(solution.path, obstacles, centre)
-        times.append(solution.times[distance.argmin(axis=0)])
+        times.append(solution.dt * _find_minima(distance))
     swept, passing_s = np.array(angles), np.array(times)
     is_opposite = np.abs(swept[:, None] - swept) > np.pi
     after_s = np.where(is_opposite, np.minimum(passing_s[:, None], passing_s), np.inf).min(axis=2, initial=np.inf)
     return BranchTimes(after_s, np.isinf(after_s).argmax(axis=1))
+
+
+def _find_minima(distance: Array) -> Array:
+    """Return where the distances (N + 1, n) at steps are smallest, in steps (n,)."""
+    row, column = distance.argmin(axis=0), np.arange(distance.shape[1])
+    inner = np.clip(row, 1, len(distance) - 2)
+    before, here, after = (distance[inner + step, column] for step in (-1, 0, 1))
+    bend = before - 2.0 * here + after
+    offset = 0.5 * (before - after) / np.where(bend > 0.0, bend, np.inf)
+    minima: Array = np.where(bend > 0.0, np.clip(inner + np.clip(offset, -1.0, 1.0), 0.0, len(distance) - 1.0), row)
+    return minima
