@@ -59,9 +59,10 @@ def test_the_priority_holds_for_the_thread_alone_and_can_be_given_back() -> None
     assert get_policy() == ordinary
 
 
-def test_a_priority_that_is_not_permitted_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize('error', [PermissionError(1, 'Operation not permitted'), AttributeError('not on this system')])
+def test_a_priority_that_is_not_permitted_is_told_once(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
     def refuse(*_: object) -> None:
-        raise PermissionError(1, 'Operation not permitted')
+        raise error
 
     monkeypatch.setattr(os, 'sched_setscheduler', refuse)
     told: list[str] = []

@@ -31,12 +31,12 @@ class ThreadPriority:
         if priority == self._wanted:
             return
         self._wanted = priority
-        policy = (os.SCHED_FIFO if priority else os.SCHED_OTHER) | os.SCHED_RESET_ON_FORK
         try:
+            policy = (os.SCHED_FIFO if priority else os.SCHED_OTHER) | os.SCHED_RESET_ON_FORK
             os.sched_setscheduler(0, policy, os.sched_param(priority))
-        except OSError as error:
+        except (OSError, AttributeError) as error:  # Python has these on Linux only
             if self._warn is not None:
-                self._warn(f'the real-time priority {priority} of guidance is not permitted ({error.strerror}): {REMEDY}')
+                self._warn(f'the real-time priority {priority} of guidance is not permitted ({error}): {REMEDY}')
                 self._warn = None
             return
         self.priority = priority
