@@ -86,7 +86,7 @@ def test_a_longer_path_takes_longer_with_this_model_only() -> None:
 def test_the_price_of_time_is_part_of_the_cost_with_this_model_only() -> None:
     scene = make_obstacles([[0.15, 0.03]], 0.05), np.array([[0.3, 0.0]])
     for model, price in (('cost_of_time', 100.0), ('fitts', 0.0), ('fixed', 0.0)):
-        config = replace_values(Config(), {'duration.model': model, 'duration.time_cost': 100.0})
+        config = replace_values(Config(), {'duration.model': model, 'duration.time_cost': 100.0, 'likelihood.lookahead_s': 0.0})
         solved = predict(config, AT_REST, *scene, Memory())[0].solved_candidates
         assert len(solved) == 2
         for each in solved:
