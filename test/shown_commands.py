@@ -93,6 +93,8 @@ ENDLESS = (
     'foc_ros node --ros-args -r hand_pose:=/MTMR/measured_cp',
     'foc_ros node --ros-args -r hand_pose:=/MTMR/measured_cp -r obstacles:=/perception/obstacles -p plane:=xz',
     'foc_ros node --ros-args -r obstacles:=/camera/obstacles -p frame_id:=world -p frames.tolerance_s:=0.1',
+    'foc_ros node --ros-args -r hand_pose:=/servo_node/pose_target_cmds -p guidance.enabled:=true '
+    '-r command_twist:=/joy/twist -r foc/guidance/twist:=/servo_node/delta_twist_cmds',
     'python doc/examples/teleoperation_loop.py',
 )
 KNOWN_BLOCKS = ('console', 'python', 'yaml', 'text', '{toctree}', '{eval-rst}')

@@ -166,7 +166,7 @@ def changed(report: Path, copy: Path, old: str, new: str) -> Path:
         ('y: share, type', 'y: share.map((value) => value * 0.99), type'),
         ('times: data.times.slice(begin, end)', 'times: data.times.slice(begin + 1, end + 1)'),
         ("cell(row, percent(share), 'number')", "cell(row, percent(share / 2), 'number')"),
-        ('cell(row, data.labels[candidate.label])', 'cell(row, data.labels[0])'),
+        ("cell(row, data.labels[candidate.label], 'label')", "cell(row, data.labels[0], 'label')"),
         ('const hand = { t:', 'const hand = {{ t:'),
         ('drawn.map((each) => each.path)', 'drawn.map(() => nothing)'),
         ('</body>', '<script src="https://foc-ros.invalid/x.js"></script></body>'),
