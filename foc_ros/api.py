@@ -16,10 +16,10 @@ from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import InputError, SceneError
 from foc_ros.core.estimation.kalman_filter import FilterState, update
-from foc_ros.core.experience import make_library
 from foc_ros.core.guidance.step import GuidanceInput, GuidanceOutput, GuidanceState, guide
 from foc_ros.core.homotopy.demonstrations import Demonstration
-from foc_ros.core.memory import Memory
+from foc_ros.core.learning.experience import make_library
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.obstacles.scene import ObstacleSource
 from foc_ros.core.obstacles.shapes import Shape, collect_obstacles
 from foc_ros.core.ocp import monte_carlo as sampling

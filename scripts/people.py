@@ -31,8 +31,8 @@ from foc_ros.analysis.recordings import Recording, find_recordings, group_by_ope
 from foc_ros.cli.arguments import add_worker_arguments
 from foc_ros.core.config import Config
 from foc_ros.core.errors import RecordingError
-from foc_ros.core.estimation.adaptation import Operator
 from foc_ros.core.estimation.duration import estimate_times_to_go
+from foc_ros.core.learning.pace import Operator
 from foc_ros.ros.parameters import load_parameter_file
 
 PAGE, EXAMPLES = ROOT / 'doc' / 'people.md', ROOT / 'doc' / 'examples'

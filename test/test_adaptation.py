@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config, DurationConfig, replace_values
-from foc_ros.core.estimation.adaptation import FACTORS, PRIOR_WEIGHT, Operator, find_free_positions
 from foc_ros.core.estimation.duration import compute_movement_time, estimate_times_to_go, scale_durations
 from foc_ros.core.height import reach_along_axis
+from foc_ros.core.learning.pace import FACTORS, PRIOR_WEIGHT, Operator, find_free_positions
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, HandSample
 

@@ -13,7 +13,7 @@ from foc_ros.core.dynamics.replanning import (
 )
 from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition
 from foc_ros.core.estimation.time_cost import compute_least_effort, find_least_cost_time
-from foc_ros.core.memory import Memory
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import HandState, make_obstacles
 

@@ -12,7 +12,7 @@ from foc_ros.core.candidates import EarlierSolutions
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
 from foc_ros.core.estimation.kalman_filter import update
-from foc_ros.core.memory import Memory
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.ocp import working_set
 from foc_ros.core.ocp.qp import clearance_qp, effort_cost
 from foc_ros.core.ocp.solve import solve_problem

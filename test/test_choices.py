@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foc_ros.core.choices import FACTORS, Choice, Preferences
 from foc_ros.core.config import Config, LikelihoodConfig, replace_values
-from foc_ros.core.decisions import Decisions
+from foc_ros.core.homotopy.decisions import Decisions
+from foc_ros.core.learning.choices import FACTORS, Choice, Preferences
 from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import LEFT, NANOSECONDS, RIGHT, HandSample, HandState, make_obstacles

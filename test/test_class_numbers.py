@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from prediction_samples import outcome
 
-from foc_ros.core.class_numbers import NO_NUMBERS
 from foc_ros.core.config import Config
-from foc_ros.core.memory import Memory
+from foc_ros.core.memory.class_numbers import NO_NUMBERS
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import Candidate, HandState, PredictedCandidate, make_obstacles
 from foc_ros.reporting.snapshots import parse_label

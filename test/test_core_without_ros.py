@@ -34,7 +34,7 @@ assert 'foc_ros.core.predictor' in names, names
 PREDICT = """
 import numpy as np
 from foc_ros.core.config import Config
-from foc_ros.core.memory import Memory
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import HandState, make_obstacles
 hand = HandState(0, np.zeros(6), np.zeros((6, 6)))

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config, LikelihoodConfig
-from foc_ros.core.decisions import Decisions, find_decisions
+from foc_ros.core.homotopy.decisions import Decisions, find_decisions
 from foc_ros.core.likelihood import compute_likelihoods
-from foc_ros.core.memory import Memory
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import LEFT, RIGHT, HandState, make_obstacles
 

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from foc_ros.core.config import Config, HomotopyConfig, replace_values
 from foc_ros.core.errors import FocError
-from foc_ros.core.experience import make_library
 from foc_ros.core.homotopy import find_path_sides
 from foc_ros.core.homotopy.demonstrations import (
     MOST,
@@ -19,7 +18,8 @@ from foc_ros.core.homotopy.demonstrations import (
     recall_demonstrations,
     record_demonstration,
 )
-from foc_ros.core.memory import Memory
+from foc_ros.core.learning.experience import make_library
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import HandState, make_obstacles
 from foc_ros.io.class_library import load_library, save_library

@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from foc_ros.core.config import Config, CovarianceConfig, replace_values
-from foc_ros.core.dispersion import LOG_FACTORS, Dispersion, compute_factors, make_forecast, scale_covariance
+from foc_ros.core.learning.dispersion import LOG_FACTORS, Dispersion, compute_factors, make_forecast, scale_covariance
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import (
     NANOSECONDS,

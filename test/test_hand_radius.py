@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import foc_ros
-from foc_ros.core.memory import Memory
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.obstacles.shapes import collect_obstacles
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import HandState

@@ -12,7 +12,7 @@ from foc_ros.core.deadline import Deadline
 from foc_ros.core.dynamics.predictive_covariance import SharedCovariances
 from foc_ros.core.estimation.kalman_filter import update
 from foc_ros.core.height import HeightPredictor, predict_height, reach_along_axis
-from foc_ros.core.memory import Memory
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.obstacles.height_clearance import SLACK
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import cold_start

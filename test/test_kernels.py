@@ -10,9 +10,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from foc_ros.core.compilation import count_kernels, follow_compilation
-from foc_ros.core.kernel_library import InnerLibrary
-from foc_ros.core.kernels import Matrix, Vector, compiled, compiled_with_caller, forget_outdated, freeze
+from foc_ros.core.kernels import Matrix, Vector, compiled, compiled_with_caller, freeze
+from foc_ros.core.kernels.compilation import count_kernels, follow_compilation
+from foc_ros.core.kernels.decorators import forget_outdated
+from foc_ros.core.kernels.libraries import InnerLibrary
 
 KERNEL, GROUP = '@compiled\ndef kernel(): ...', 'class Group(NamedTuple): ...'
 

@@ -11,7 +11,7 @@ from foc_ros.core.candidates import EarlierSolutions
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.deadline import Deadline, OutOfTimeError
 from foc_ros.core.estimation.kalman_filter import update
-from foc_ros.core.memory import RETRY_AFTER, Memory
+from foc_ros.core.memory.memory import RETRY_AFTER, Memory
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import LEFT, RIGHT, Candidate, HandSample, HandState, Status, make_obstacles

@@ -11,8 +11,8 @@ from foc_ros.core import pipeline as module
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.errors import SceneError
-from foc_ros.core.experience import NO_LIBRARY, Library
-from foc_ros.core.memory import Memory
+from foc_ros.core.learning.experience import NO_LIBRARY, Library
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction, make_obstacles
 

@@ -8,7 +8,7 @@ from foc_ros.core.config import Config, replace_values
 from foc_ros.core.dynamics.plants import build_triple_integrator_horizon, condense, discretise_triple_integrator
 from foc_ros.core.dynamics.predictive_covariance import compute_duration_sensitivity, compute_onset_delay_covariance
 from foc_ros.core.dynamics.replanning import compute_goal_map, triple_integrator_goal_map
-from foc_ros.core.memory import Memory
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import cold_start

@@ -7,7 +7,7 @@ from foc_ros.core.config import Config, replace_values
 from foc_ros.core.dynamics.plants import condense, discretise_triple_integrator
 from foc_ros.core.dynamics.replanning import compute_error_map, triple_integrator_process_covariance
 from foc_ros.core.estimation.kalman_filter import compute_gramian
-from foc_ros.core.memory import Memory
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import HandState, make_obstacles
 

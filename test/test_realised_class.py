@@ -12,7 +12,7 @@ import pytest
 from homotopy_scenes import GOAL, random_scene
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.memory import Memory
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import HandState, Obstacles, Prediction, make_obstacles
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.memory import Memory
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.predictor import predict, warm_up
 from foc_ros.core.types import HandState, make_obstacles
 

@@ -8,7 +8,7 @@ from foc_ros.core.config import Config, FocConfig, replace_values
 from foc_ros.core.estimation.duration import choose_candidate_durations
 from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition
 from foc_ros.core.estimation.time_cost import compute_least_effort, find_least_cost_time
-from foc_ros.core.memory import Memory
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import cold_start
 from foc_ros.core.predictor import predict

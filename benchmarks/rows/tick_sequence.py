@@ -9,7 +9,7 @@ import numpy as np
 from measurement import Times
 from scenes import Reach
 
-from foc_ros.core.memory import Memory
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import Prediction
 

@@ -13,7 +13,7 @@ from scenes import Reach, add_far_obstacles, build_4x8, build_8x16
 from foc_ros.core import predictor
 from foc_ros.core.candidates import solve_candidates
 from foc_ros.core.config import FocConfig
-from foc_ros.core.memory import Memory
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import cold_start

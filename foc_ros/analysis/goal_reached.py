@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foc_ros.core.estimation.adaptation import REMAINING_SHARE
+from foc_ros.core.learning.pace import REMAINING_SHARE
 from foc_ros.core.types import Array
 
 AT_GOAL_M = 0.05

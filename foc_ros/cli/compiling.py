@@ -11,7 +11,7 @@ WORDS = 'compiling the solver, once for this machine'
 @contextmanager
 def show_compilation() -> Iterator[None]:
     """Show the progress of a compilation within the context; if anything has to be compiled there, compile everything."""
-    from foc_ros.core.compilation import count_kernels, follow_compilation  # not before: it imports numba
+    from foc_ros.core.kernels.compilation import count_kernels, follow_compilation  # not before: it imports numba
     from foc_ros.io.terminal import Counter, show_counter
 
     with ExitStack() as stack:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from time import monotonic
 
-from foc_ros.core.compilation import count_kernels, follow_compilation
 from foc_ros.core.config import Config
+from foc_ros.core.kernels.compilation import count_kernels, follow_compilation
 from foc_ros.core.registry import import_all
 from foc_ros.io.terminal import show_counter
 

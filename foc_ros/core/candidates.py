@@ -9,12 +9,12 @@ from typing import Protocol
 
 import numpy as np
 
-from .choices import Choice
 from .config import FocConfig, LikelihoodConfig
 from .deadline import NEVER, Deadline
-from .decisions import find_decisions, tabulate_sides
 from .homotopy import find_path_sides
 from .homotopy.branch_times import compute_branch_times
+from .homotopy.decisions import find_decisions, tabulate_sides
+from .learning.choices import Choice
 from .likelihood import CostModel, compute_likelihoods
 from .ocp.problem import Problem
 from .ocp.solve import solve_problem

@@ -40,11 +40,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .config import Config, LikelihoodConfig
-from .decisions import Decisions
 from .dynamics.plant_models import make_plant_model
 from .errors import InputError
 from .estimation.duration import get_time_price
 from .homotopy.branch_times import BranchTimes
+from .homotopy.decisions import Decisions
 from .kernels import Vector, compiled
 from .registry import LIKELIHOOD_RULES
 from .safety_preference import COST_FLOOR, SafetyPreference

@@ -8,16 +8,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from .choices import Preferences
 from .config import Config
 from .deadline import NEVER, Deadline
-from .dispersion import Dispersion
 from .errors import FocError
-from .estimation.adaptation import Operator
 from .estimation.kalman_filter import FilterState, update
-from .experience import Library, make_library
 from .homotopy.demonstrations import Demonstration
-from .memory import Memory
+from .learning.choices import Preferences
+from .learning.dispersion import Dispersion
+from .learning.experience import Library, make_library
+from .learning.pace import Operator
+from .memory.memory import Memory
 from .obstacles.scene import ObstacleSource, Scene
 from .predictor import predict
 from .rejections import Rejections

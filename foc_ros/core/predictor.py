@@ -10,19 +10,19 @@ import numpy as np
 
 from .candidates import rank_candidates, solve_candidates
 from .config import REFERENCE_STEP_S, Config, EstimatorConfig
-from .continuity import Past, keep_answers, make_continuous, smooth_paths
 from .deadline import NEVER, Deadline
-from .dispersion import scale_covariance
 from .dynamics.noise import scale_noise
 from .dynamics.plant_models import make_plant_model
 from .dynamics.predictive_covariance import SharedCovariances, widen_covariance
 from .estimation.duration import choose_candidate_durations, estimate_times_to_go, is_passing, limit_change
-from .experience import NO_LIBRARY, Library, pool_recordings
 from .height import HeightPredictor
 from .homotopy import Turn, search
 from .homotopy.demonstrations import GuessTiming, recall_demonstrations
+from .learning.dispersion import scale_covariance
+from .learning.experience import NO_LIBRARY, Library, pool_recordings
 from .likelihood import make_cost_model, make_preference, select_most_likely
-from .memory import Memory
+from .memory.continuity import Past, keep_answers, make_continuous, smooth_paths
+from .memory.memory import Memory
 from .obstacles.chance_constraint import RiskBound, count_events
 from .obstacles.culling import cull_obstacles
 from .ocp.problem import Problem, rest_to_goal

@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
 
-    from foc_ros.core.compilation import follow_compilation
+    from foc_ros.core.kernels.compilation import follow_compilation
     from foc_ros.core.registry import import_all
 
     try:
@@ -118,7 +118,7 @@ def _reject(error: Exception) -> int:
 
 def _log_compilation(logger: Any, done: int) -> None:
     """Log that kernels are compiled, and how many of them are."""
-    from foc_ros.core.compilation import count_kernels
+    from foc_ros.core.kernels.compilation import count_kernels
 
     total = count_kernels()
     if done == 0:

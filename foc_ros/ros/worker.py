@@ -15,7 +15,7 @@ from typing import Any
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
-from foc_ros.core.memory import Memory
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.pipeline import PredictionTask
 from foc_ros.core.types import Prediction
 

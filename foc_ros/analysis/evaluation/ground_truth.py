@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from foc_ros.analysis.goal_reached import find_reached_goal
 from foc_ros.core.homotopy import compute_swept_angles
+from foc_ros.core.homotopy.rows import WALL, Rows, locate_rows
 from foc_ros.core.obstacles.rounded_polygon import measure_offsets
-from foc_ros.core.rows import WALL, Rows, locate_rows
 from foc_ros.core.types import LEFT, NANOSECONDS, RIGHT, Array, Obstacles, Record
 
 TIMES_S = tuple(0.125 * step for step in range(1, 9))

@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from foc_ros.core.kernels import Matrix, Vector, compiled
-from foc_ros.core.linear_algebra import factorise_cholesky, multiply, solve_lower
+from foc_ros.core.kernels.linear_algebra import factorise_cholesky, multiply, solve_lower
 from foc_ros.core.types import NANOSECONDS, Array, Record, as_readonly
 
 DEGREE = 5

@@ -32,7 +32,7 @@ import numpy as np
 
 from foc_ros.core.config import EstimatorConfig
 from foc_ros.core.kernels import Matrix, Vector, compiled
-from foc_ros.core.linear_algebra import multiply, multiply_transposed
+from foc_ros.core.kernels.linear_algebra import multiply, multiply_transposed
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, SampleStatus, as_readonly
 
 from .effort import Effort, add_sample

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from foc_ros.core.dynamics.impulse_response import apply_impulse_response
 from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled, compiled_with_caller, freeze
-from foc_ros.core.linear_algebra import factorise_cholesky, multiply, multiply_transposed, multiply_vector, solve_lower
+from foc_ros.core.kernels.linear_algebra import factorise_cholesky, multiply, multiply_transposed, multiply_vector, solve_lower
 from foc_ros.core.obstacles.rounded_polygon import find_normal, find_offset
 from foc_ros.core.types import Array
 

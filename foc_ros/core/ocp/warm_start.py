@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled, freeze
-from foc_ros.core.linear_algebra import (
+from foc_ros.core.kernels.linear_algebra import (
     factorise_cholesky,
     multiply_transposed,
     multiply_vector,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.kernels import Indices, Matrix, Vector, compiled, compiled_with_caller
-from foc_ros.core.linear_algebra import factorise_cholesky, multiply_vector, solve_lower, solve_lower_transposed
+from foc_ros.core.kernels.linear_algebra import factorise_cholesky, multiply_vector, solve_lower, solve_lower_transposed
 from foc_ros.core.registry import QP_BACKENDS
 from foc_ros.core.types import Array
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from foc_ros.core.kernels import Indices, Matrix, Vector, compiled_separately, compiled_with_caller
-from foc_ros.core.linear_algebra import (
+from foc_ros.core.kernels.linear_algebra import (
     factorise_cholesky,
     multiply,
     multiply_transposed,

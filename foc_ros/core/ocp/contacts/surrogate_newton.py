@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled_separately
-from foc_ros.core.linear_algebra import multiply_vector, multiply_weighted, solve_by_elimination
+from foc_ros.core.kernels.linear_algebra import multiply_vector, multiply_weighted, solve_by_elimination
 from foc_ros.core.ocp.terms import CostTerms, MovingObstacles, ProblemTerms
 
 from .contacts import Contacts

@@ -23,13 +23,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .config import LikelihoodConfig, clip_values
-from .decisions import Decisions
-from .estimation.adaptation import REMAINING_SHARE, choose_judged, compute_mean_factors, sample_movement
-from .homotopy import find_path_sides
-from .homotopy.branch_times import BranchTimes
-from .likelihood import compute_likelihoods
-from .types import NANOSECONDS, Array, HandState, Obstacles, Record, as_readonly
+from foc_ros.core.config import LikelihoodConfig, clip_values
+from foc_ros.core.homotopy import find_path_sides
+from foc_ros.core.homotopy.branch_times import BranchTimes
+from foc_ros.core.homotopy.decisions import Decisions
+from foc_ros.core.likelihood import compute_likelihoods
+from foc_ros.core.types import NANOSECONDS, Array, HandState, Obstacles, Record, as_readonly
+
+from .pace import REMAINING_SHARE, choose_judged, compute_mean_factors, sample_movement
 
 FACTORS = as_readonly(2.0 ** np.arange(-5.0, 6.0))
 """Factors that are judged, for near and for far choices."""

@@ -26,9 +26,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .config import CovarianceConfig, clip_values
-from .estimation.adaptation import compute_mean_factors
-from .types import NANOSECONDS, Array, HandState, PredictedCandidate, Record, Solution, as_readonly
+from foc_ros.core.config import CovarianceConfig, clip_values
+from foc_ros.core.types import NANOSECONDS, Array, HandState, PredictedCandidate, Record, Solution, as_readonly
+
+from .pace import compute_mean_factors
 
 LOG_FACTORS = as_readonly(math.log(2.0) * np.linspace(-3.0, 2.0, 11))
 """Logarithms of the factors that are judged, for near and for far times."""

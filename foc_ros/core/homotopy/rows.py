@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .types import Array, Obstacles
+from foc_ros.core.types import Array, Obstacles
 
 Rows = NDArray[np.int64]
 WALL = -1

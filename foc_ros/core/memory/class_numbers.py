@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
-from .types import NANOSECONDS, Candidate, PredictedCandidate
+from foc_ros.core.types import NANOSECONDS, Candidate, PredictedCandidate
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ import numpy as np
 from numba import config, njit, types
 from numpy.typing import NDArray
 
-from .kernel_library import EntryCompiler, InnerKernel
+from .libraries import EntryCompiler, InnerKernel
 
 Vector: TypeAlias = NDArray[np.float64]
 """One axis, C-contiguous; like all arguments of entry kernels, it may be read-only."""
@@ -82,7 +82,7 @@ def forget_outdated(folder: Path) -> None:
                 each.unlink()
 
 
-forget_outdated(Path(__file__).parent)
+forget_outdated(Path(__file__).parents[1])
 
 Kernel = TypeVar('Kernel', bound=Callable[..., object])
 Group = TypeVar('Group', bound=tuple[Any, ...])

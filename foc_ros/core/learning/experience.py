@@ -27,11 +27,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .config import ExperienceConfig
-from .decisions import find_decisions, tabulate_sides
-from .homotopy.demonstrations import NEAR, STEP_S, Demonstration, is_same_demonstration
+from foc_ros.core.config import ExperienceConfig
+from foc_ros.core.homotopy.decisions import find_decisions, tabulate_sides
+from foc_ros.core.homotopy.demonstrations import NEAR, STEP_S, Demonstration, is_same_demonstration
+from foc_ros.core.types import LEFT, RIGHT, Array, Candidate, HandState, Obstacles, PredictedCandidate, Record, Solution
+
 from .recorded_paths import RecordedPaths, fade_weights, pool_path, stays_in_class
-from .types import LEFT, RIGHT, Array, Candidate, HandState, Obstacles, PredictedCandidate, Record, Solution
 
 MOST_NEAR = 64
 """Number of recordings, the nearest ones, that count in one prediction: its time is bounded whatever the size of the library."""

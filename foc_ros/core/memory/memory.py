@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from .candidates import NO_TURN, NOTHING, EarlierSolutions
-from .choices import Choice
+from foc_ros.core.candidates import NO_TURN, NOTHING, EarlierSolutions
+from foc_ros.core.learning.choices import Choice
+from foc_ros.core.types import Candidate, PredictedCandidate, Solution, Status
+
 from .class_numbers import NO_NUMBERS, ClassNumbers, is_renamed
 from .continuity import NO_PAST, Past
-from .types import Candidate, PredictedCandidate, Solution, Status
 
 RETRY_AFTER = 10
 """Predictions after which a candidate that is unreachable, or left its class, is solved again from its own guess."""

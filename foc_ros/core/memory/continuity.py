@@ -25,11 +25,12 @@ from functools import cache
 
 import numpy as np
 
+from foc_ros.core.config import LikelihoodConfig
+from foc_ros.core.likelihood import CostModel
+from foc_ros.core.ocp.warm_start import interpolate_rest, resample_rest
+from foc_ros.core.types import NANOSECONDS, Array, Candidate, PredictedCandidate, Prediction, Record, Solution, as_readonly
+
 from .class_numbers import is_renamed
-from .config import LikelihoodConfig
-from .likelihood import CostModel
-from .ocp.warm_start import interpolate_rest, resample_rest
-from .types import NANOSECONDS, Array, Candidate, PredictedCandidate, Prediction, Record, Solution, as_readonly
 
 MOVED = 0.01
 """A goal that moves by more than this between two predictions is another goal [m]."""

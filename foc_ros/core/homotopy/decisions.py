@@ -14,10 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .homotopy import compute_swept_angles
-from .obstacles.chance_constraint import centre_trajectories
+from foc_ros.core.homotopy import compute_swept_angles
+from foc_ros.core.obstacles.chance_constraint import centre_trajectories
+from foc_ros.core.types import LEFT, RIGHT, Array, HandState, Obstacles, Solution
+
 from .rows import WALL, find_direction, find_rows, locate_rows
-from .types import LEFT, RIGHT, Array, HandState, Obstacles, Solution
 
 NO_OBSTACLES = np.zeros(0, dtype=np.intp)
 

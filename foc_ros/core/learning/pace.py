@@ -32,9 +32,8 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from foc_ros.core.config import ARRIVALS, DurationConfig
+from foc_ros.core.estimation.duration import estimate_times_to_go, is_passing, scale_durations
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Record, as_readonly
-
-from .duration import estimate_times_to_go, is_passing, scale_durations
 
 FACTORS = as_readonly(np.exp(np.linspace(-0.8, 1.6, 25)))
 """Factors that are judged."""

@@ -22,10 +22,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .homotopy import find_path_sides
-from .obstacles.chance_constraint import centre_trajectories
-from .obstacles.rounded_polygon import measure_offsets
-from .types import Array, Obstacles, PredictedCandidate, Record, Solution, as_readonly
+from foc_ros.core.homotopy import find_path_sides
+from foc_ros.core.obstacles.chance_constraint import centre_trajectories
+from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Record, Solution, as_readonly
 
 FADE_S = 0.25
 """Time over which the weight of a recording falls to zero before its end [s]."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kernels import Matrix, Vector, compiled, compiled_separately
+from .decorators import Matrix, Vector, compiled, compiled_separately
 
 
 @compiled
