@@ -23,7 +23,8 @@ from .guesses import TautPath, lay_out
 from .path_search import PathQuery, find_shortest_paths
 from .search_scene import SearchScene
 from .sides import compute_swept_angles
-from .tangent_graph import GRAZE, TangentGraph, build_tangent_graph, connect_hand
+from .tangent_graph import TangentGraph, build_tangent_graph, connect_hand
+from .tangents import GRAZE
 
 FEW, MOST = 16, 64
 """So many shapes are always in the graph together; a graph grows up to the larger number."""

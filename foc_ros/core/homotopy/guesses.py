@@ -11,8 +11,11 @@ from foc_ros.core.kernels import Indices, Matrix, Vector, compiled_exactly, free
 from foc_ros.core.obstacles.rounded_polygon import TURN, Polygons, find_offsets
 from foc_ros.core.types import Array, as_readonly
 
+from .arcs import measure_arc_between
+from .runs import Runs
 from .search_scene import SearchScene
-from .tangent_graph import Outlines, Runs, TangentGraph, measure_arc_between
+from .tangent_graph import TangentGraph
+from .tangents import Outlines
 
 SLOPE = 0.5
 """A hand in a margin leaves it by this much for each metre of its path, and enters the margin of its goal likewise."""

@@ -20,7 +20,8 @@ from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.kernels import Indices, Matrix, Register, Table, Vector, compiled_exactly, freeze
 from foc_ros.core.obstacles.rounded_polygon import TURN
 
-from .tangent_graph import TangentGraph, measure_arc_between
+from .arcs import measure_arc_between
+from .tangent_graph import TangentGraph
 
 COAST_S = 0.2
 """A path that leaves at an angle p to the velocity v ranks as if |v| (1 - cos p) times this longer: a hand coasts first."""
