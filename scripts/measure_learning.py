@@ -115,7 +115,8 @@ def main() -> None:
     known, predicted = ([each for each in recordings if int(each.name) % 2 == odd] for odd in (1, 0))
     rows = []
     with open_executor(arguments) as executor:
-        learnt, _ = collect(partial(learn_recording, config=CONFIG), [(each.name, each) for each in known], executor, 'learn')
+        learn = partial(learn_recording, config=CONFIG)
+        learnt = [each for part in collect(learn, [(each.name, each) for each in known], executor, 'learn')[0] for each in part]
         for number in NUMBERS:
             for seed in range(arguments.draws if 0 < number < len(learnt) else 1):
                 drawn = np.random.default_rng([seed, number]).permutation(len(learnt))[:number]

@@ -16,6 +16,7 @@ from rclpy.serialization import deserialize_message, serialize_message  # noqa: 
 from ros_helpers import Graph  # noqa: E402
 
 from foc_ros.core.config import Config, replace_values  # noqa: E402
+from foc_ros.core.homotopy.demonstrations import is_same_recording  # noqa: E402
 from foc_ros.core.pipeline import Pipeline  # noqa: E402
 from foc_ros.ros import health  # noqa: E402
 from foc_ros.ros.intake import Intake  # noqa: E402
@@ -246,3 +247,17 @@ def test_diagnostics_are_published_while_simulated_time_stands_still(ros: Graph)
     assert bench.node.get_clock().now().nanoseconds == 0
     assert bench.diagnostics[-1].status[0].level == b'\x01'
     assert 'no hand pose yet' in bench.diagnostics[-1].status[0].message
+
+
+def test_the_node_learns_the_movement_that_the_pipeline_learns(ros: Graph) -> None:
+    learning = {'experience.learning': 'online'}
+    bench, poses = Bench(ros, parameters=learning), hand_path(141)
+    bench.publish_scene()
+    bench.move(poses)
+    intake = Intake(Pipeline(replace_values(Config(), QUICK | learning)))
+    intake.take('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND))
+    intake.take('goals', pose_array(TYPES, GOALS))
+    for pose in poses:
+        intake.take('hand_pose', pose)
+    (live,), (learnt,) = (each.movements.finish().learnt for each in (bench.node.pipeline, intake.pipeline))
+    assert is_same_recording(live, learnt)

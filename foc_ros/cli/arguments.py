@@ -54,7 +54,7 @@ def add_replay_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--output', type=Path, metavar='NEW_BAG', help='write inputs and predictions to a new bag')
     parser.add_argument('--report', type=Path, metavar='DIR', help='write a page with pictures')
     _add_parameter_file(parser)
-    words = 'add the demonstrated homotopy classes to a class library, for homotopy.library'
+    words = 'learn the movements, with experience.learning, and add them to this class library, for homotopy.library'
     parser.add_argument('--learn', type=Path, metavar='FILE', help=words)
     words = 'write the parameters with the durations of this operator, for --params'
     parser.add_argument('--operator', type=Path, metavar='FILE', help=words)

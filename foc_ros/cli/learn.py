@@ -21,7 +21,7 @@ def run(arguments: argparse.Namespace) -> int:
     learnt, failed = list[Demonstration](), dict[str, str]()
     for name, recording in show_progress(recordings.items(), 'learn', len(recordings)):
         try:
-            learnt.append(learn_recording(recording, arguments.config))
+            learnt.extend(learn_recording(recording, arguments.config))
         except FocError as error:
             failed[name] = str(error)
     if not learnt:
@@ -30,7 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps({'learned': len(learnt), 'failed': failed, 'output': str(output)}))
     else:
-        print(f'{len(learnt)} recordings written to {output}; the parameter homotopy.library names this file for node and replay')
+        print(f'{len(learnt)} movements written to {output}; the parameter homotopy.library names this file for node and replay')
     for reason in failed.values():
         print(f'foc_ros learn: {reason}', file=sys.stderr)
     return 2 if failed else 0

@@ -8,13 +8,15 @@ import shutil
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
+from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TextIO
 
-from foc_ros.analysis.learn_demonstrations import Learner
 from foc_ros.analysis.replay import Replay, Step
 from foc_ros.analysis.replay_guidance import GuidanceReplay, GuidanceStep
 from foc_ros.analysis.replay_summary import Summary, facts
+from foc_ros.core.config import Config
+from foc_ros.core.homotopy.demonstrations import is_same_recording
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
 from foc_ros.io.class_library import load_library, save_library
 from foc_ros.io.json_output import encode_guidance, encode_prediction
@@ -34,18 +36,15 @@ GuidanceConsumer = Callable[[Step, GuidanceStep], None]
 
 def run(arguments: argparse.Namespace) -> int:
     """Replay the recording; return 3 if no prediction has a solved candidate."""
-    replay, summary = Replay(arguments.config), Summary()
+    config = arguments.config if arguments.learn is None else _prepare_learning(arguments.config, arguments.learn)
+    replay, summary = Replay(config), Summary()
     consumers: list[Consumer] = [summary.add]
-    report = learner = None
+    report = None
     if arguments.report is not None:
         from foc_ros.reporting.report import ReportCollector  # a missing library is reported before the work
 
         report = ReportCollector()
         consumers.append(report.add)
-    if arguments.learn is not None:
-        known = load_library(str(arguments.learn)) if arguments.learn.exists() else ()
-        learner = Learner(replay.pipeline, known)
-        consumers.append(learner.add)
     # The answers wait in files: nothing is printed of a recording that turns out to be damaged.
     with TemporaryFile('w+', encoding='utf-8') as predictions, TemporaryFile('w+', encoding='utf-8') as guidance:
         guided = [_guidance_writer(guidance)] if arguments.guidance and arguments.json else []
@@ -53,10 +52,8 @@ def run(arguments: argparse.Namespace) -> int:
             consumers.append(_json_writer(predictions))
         duration_s = _play(arguments, replay, consumers, guided)
         answer = summary.answer(replay.intake.counts, duration_s)
-        if learner is not None:
-            learner.finish()
-            save_library(arguments.learn, learner.demonstrations)
-            answer['learned'] = learner.learned
+        if arguments.learn is not None:
+            answer['learned'] = _save_learnt(arguments.learn, config, replay)
         if arguments.operator is not None:
             write_parameter_file('--operator', arguments.operator, replay.pipeline.adapted_config)
         if report is not None:
@@ -77,6 +74,21 @@ def run(arguments: argparse.Namespace) -> int:
     reason = replay.describe_refusals() or replay.pipeline.not_ready_reason() or 'see the candidates not solved'
     print(f'foc_ros replay: no prediction has a solved candidate: {reason}', file=sys.stderr)
     return 3
+
+
+def _prepare_learning(config: Config, library: Path) -> Config:
+    """Return the config with which movements are learnt, in addition to those in a class library that exists."""
+    given = {'homotopy.library': str(library)} if library.exists() else {}
+    return config.with_values({'experience.learning': 'online', **given})
+
+
+def _save_learnt(library: Path, config: Config, replay: Replay) -> int:
+    """Write the class library of a replay with the movements that were learnt; return how many it did not contain before."""
+    given = load_library(config.homotopy.library)
+    learnt = replay.pipeline.movements.finish().learnt
+    new = [each for each in learnt if not any(is_same_recording(each, known) for known in given)]
+    save_library(library, [*given, *new])
+    return len(new)
 
 
 def _play(arguments: argparse.Namespace, replay: Replay, consumers: list[Consumer], guided: list[GuidanceConsumer]) -> float:

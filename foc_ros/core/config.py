@@ -187,6 +187,9 @@ class LikelihoodConfig:
 class ExperienceConfig:
     """Use of the recordings in the class library (`homotopy.library`) as evidence."""
 
+    learning: str = _p(
+        'none', 'whether movements that end at a goal are added to the recordings of the running program', choices=ADAPTATIONS
+    )
     prior_count: float = _p(1.0, 'number of recordings as which the model counts, for the gap in the next row', '', 1e-3, 1e6)
     prior_count_beyond: float = _p(30.0, 'the same, for what lies beyond the next row of obstacles', '', 1e-3, 1e6)
     prior_count_path: float = _p(0.3, 'the same, for the path to the next row and as far as recordings reach', '', 1e-3, 1e6)

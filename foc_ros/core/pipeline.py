@@ -16,6 +16,7 @@ from .homotopy.demonstrations import Demonstration
 from .learning.choices import Preferences
 from .learning.dispersion import Dispersion
 from .learning.experience import Library, make_library
+from .learning.movements import Movements
 from .learning.pace import Operator
 from .memory.memory import Memory
 from .obstacles.scene import ObstacleSource, Scene
@@ -53,16 +54,17 @@ class Pipeline:
 
     library: demonstrated paths. Attributes: config; hand_state, None before the first hand sample; scene, obstacles and goals;
     engaged, whether predictions are made; frame_id, the working frame, None until the parameter or the first hand sample fixes
-    it; operator, preferences and dispersion, what was learnt from the movements so far of durations, choices and errors.
+    it; operator, preferences, dispersion and movements, what was learnt so far of durations, choices, errors and the scene.
     """
 
     def __init__(self, config: Config, library: Sequence[Demonstration] = ()) -> None:
         self.config = config
-        self._library = make_library(library)
+        self._given = tuple(library)
         self.hand_state: FilterState | None = None
         self.scene = Scene()
         self.is_engaged = True
         self.operator, self.preferences, self.dispersion = Operator(), Preferences(), Dispersion()
+        self.movements, self._library = Movements(), make_library(self._given)
         self.frame_id = config.frame_id or None
         self._rejections = Rejections()
         self._memory = Memory()
@@ -141,6 +143,8 @@ class Pipeline:
             self.preferences = self.preferences.follow(self.hand_state, self.config.likelihood)
         if self.config.covariance.adaptation == 'online':
             self.dispersion = self.dispersion.follow(self.hand_state)
+        if self.config.experience.learning == 'online':
+            self._set_movements(self.movements.follow(self.hand_state, self.scene, is_restart=status.is_restart))
         return status
 
     def set_obstacles(self, source: str, obstacles: Obstacles, stamp_ns: int | None, frame_id: str) -> SampleStatus:
@@ -229,6 +233,7 @@ class Pipeline:
             self._forget_predictions()
             self._is_new, self.operator = False, replace(self.operator, states=())
             self.preferences, self.dispersion = self.preferences.interrupt(), self.dispersion.interrupt()
+            self._set_movements(self.movements.interrupt())
         self.is_engaged = on
 
     def remove_source(self, source: str) -> None:
@@ -239,6 +244,7 @@ class Pipeline:
         """Forget the movement and the operator; keep the scene, the working frame and the counts."""
         self.hand_state, self._is_new = None, False
         self.operator, self.preferences, self.dispersion = Operator(), Preferences(), Dispersion()
+        self._set_movements(Movements())
         self._forget_predictions()
 
     def reconfigure(self, config: Config) -> None:
@@ -258,11 +264,19 @@ class Pipeline:
             self.preferences = Preferences()
         if any(getattr(config, name) != getattr(self.config, name) for name in DISPERSED_BY):
             self.dispersion = Dispersion()
+        if (config.experience, config.estimator) != (self.config.experience, self.config.estimator):
+            self._set_movements(Movements())
         self.config = config
         if self._task is not None:
             self._abandon_task()
             self._is_new, self._predicted_ns = True, None
         self._memory = Memory(self._memory.most_likely, numbers=self._memory.numbers)
+
+    def _set_movements(self, movements: Movements) -> None:
+        """Replace what was learnt of the movements, and the library if it changes with it."""
+        if movements.learnt is not self.movements.learnt:
+            self._library = make_library((*self._given, *movements.learnt))
+        self.movements = movements
 
     def _find_not_ready_reason(self) -> tuple[str, str] | None:
         """Return why the pipeline cannot predict, as (kind, message), judged by stamps; the node also judges by its clocks."""

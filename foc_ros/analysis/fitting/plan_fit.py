@@ -16,12 +16,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from foc_ros.analysis.goal_reached import AT_GOAL_M, find_goal_at_end
 from foc_ros.core.config import REFERENCE_STEP_S, Config
 from foc_ros.core.dynamics.noise import scale_noise
 from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
 from foc_ros.core.errors import RecordingError
 from foc_ros.core.estimation.duration import is_passing
+from foc_ros.core.learning.goal_reached import AT_GOAL_M, find_goal_at_end
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.warm_start import Start, cold_start

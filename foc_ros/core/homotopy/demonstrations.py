@@ -8,14 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.obstacles.boundary import find_segment_squares
 from foc_ros.core.obstacles.rounded_polygon import measure_offsets, tabulate_polygons
-from foc_ros.core.types import Array, Candidate, HandState, Obstacles, Record
+from foc_ros.core.types import LEFT, RIGHT, Array, Candidate, HandState, Obstacles, Record
 
 from .class_search import name_course
 from .guesses import compute_path_lengths, timed
@@ -60,6 +62,26 @@ class Demonstration(Record):
             return False
         return _is_near(obstacles.centre[[rows[identity] for identity in self.ids]], self.centre)
 
+    @cached_property
+    def passing(self) -> NDArray[np.intp]:
+        """Rows of the states (n,) that are nearest to the n obstacles."""
+        nearest: NDArray[np.intp] = np.hypot(*self._offsets.transpose(2, 0, 1)).argmin(axis=0)
+        return nearest
+
+    @cached_property
+    def rest_sides(self) -> NDArray[np.int8]:
+        """LEFT or RIGHT (t, n), on which the path from each state to the goal passes the n obstacles."""
+        assert self.states is not None
+        turns = np.unwrap(np.arctan2(self._offsets[..., 1], self._offsets[..., 0]), axis=0)
+        at_goal = int(np.hypot(*(self.states[:, :2] - self.path[-1]).T).argmin())
+        return np.where(turns[at_goal] - turns < 0.0, LEFT, RIGHT).astype(np.int8)
+
+    @property
+    def _offsets(self) -> Array:
+        assert self.states is not None
+        offsets: Array = self.states[:, None, :2] - self.centre
+        return offsets
+
 
 class GuessTiming(NamedTuple):
     """The time to go to each goal (g,) [s], and the number N of time steps."""
@@ -88,6 +110,13 @@ def is_same_demonstration(one: Demonstration, other: Demonstration) -> bool:
     if (one.frame_id, one.ids, one.sides) != (other.frame_id, other.ids, other.sides):
         return False
     return _is_near(one.centre, other.centre) and _is_near(one.path[-1:], other.path[-1:])
+
+
+def is_same_recording(one: Demonstration, other: Demonstration) -> bool:
+    """Tell whether two demonstrations are the same movement: of one class, with equal states."""
+    if one.states is None or other.states is None or not np.array_equal(one.states, other.states):
+        return False
+    return is_same_demonstration(one, other)
 
 
 def recall_demonstrations(

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from foc_ros.core.config import ExperienceConfig
 from foc_ros.core.homotopy.decisions import find_decisions, tabulate_sides
 from foc_ros.core.homotopy.demonstrations import NEAR, STEP_S, Demonstration, is_same_demonstration
-from foc_ros.core.types import LEFT, RIGHT, Array, Candidate, HandState, Obstacles, PredictedCandidate, Record, Solution
+from foc_ros.core.types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Record, Solution
 
 from .recorded_paths import RecordedPaths, fade_weights, pool_path, stays_in_class
 
@@ -45,17 +45,14 @@ class Library(Record):
     """The class library.
 
     demonstrations: one of each class, to recall; recordings: those with states, r of them; states (r, m, 4): x, y, vx, vy [m,
-    m/s], infinite beyond the end of each; ends (r,): the last state of each; sides: for each recording, LEFT or RIGHT (m, n) on
-    which its path from each state to its goal passes its n obstacles; passing: the states (n,) that are nearest to them; scene
-    (r,): equal numbers for recordings in the same scene.
+    m/s], infinite beyond the end of each; ends (r,): the last state of each; scene (r,): equal numbers for recordings in the same
+    scene.
     """
 
     demonstrations: tuple[Demonstration, ...]
     recordings: tuple[Demonstration, ...]
     states: Array
     ends: NDArray[np.intp]
-    sides: tuple[NDArray[np.int8], ...]
-    passing: tuple[NDArray[np.intp], ...]
     scene: tuple[int, ...]
 
 
@@ -96,21 +93,9 @@ def make_library(found: Sequence[Demonstration]) -> Library:
     for row, table in enumerate(tables):
         states[row, : len(table)] = table
     ends = np.array([len(table) - 1 for table in tables], dtype=np.intp)
-    sides, passing = [], []
-    for recording, table in zip(recordings, tables, strict=True):
-        sides.append(_find_rest_sides(recording, table))
-        passing.append(np.hypot(*(table[:, None, :2] - recording.centre).transpose(2, 0, 1)).argmin(axis=0))
     numbers = dict[tuple[object, ...], int]()
     scene = tuple(numbers.setdefault((each.frame_id, each.ids, each.centre.tobytes()), len(numbers)) for each in recordings)
-    return Library(tuple(distinct), recordings, states, ends, tuple(sides), tuple(passing), scene)
-
-
-def _find_rest_sides(recording: Demonstration, states: Array) -> NDArray[np.int8]:
-    """Return the sides (m, n) on which a path from each of its m states to its goal passes its n obstacles."""
-    offset = states[:, None, :2] - recording.centre
-    turns = np.unwrap(np.arctan2(offset[..., 1], offset[..., 0]), axis=0)
-    at_goal = int(np.hypot(*(states[:, :2] - recording.path[-1]).T).argmin())
-    return np.where(turns[at_goal] - turns < 0.0, LEFT, RIGHT).astype(np.int8)
+    return Library(tuple(distinct), recordings, states, ends, scene)
 
 
 NO_LIBRARY = make_library(())
@@ -134,9 +119,10 @@ def find_evidence(library: Library, hand: HandState, obstacles: Obstacles, goals
     sides, passing_s = np.zeros((len(rows), len(obstacles)), dtype=np.int8), np.zeros((len(rows), len(obstacles)))
     column = {name: number for number, name in enumerate(obstacles.ids)}
     for number, row in enumerate(rows):
-        columns = [column[name] for name in library.recordings[row].ids]
-        sides[number, columns] = library.sides[row][state[row]]
-        passing_s[number, columns] = STEP_S * (library.passing[row] - state[row])
+        recording = library.recordings[row]
+        columns = [column[name] for name in recording.ids]
+        sides[number, columns] = recording.rest_sides[state[row]]
+        passing_s[number, columns] = STEP_S * (recording.passing - state[row])
     ends = np.array([library.recordings[row].path[-1] for row in rows]).reshape(-1, 1, 2)
     is_at_goal = np.hypot(*(ends - goals).transpose(2, 0, 1)) <= NEAR
     return Evidence(weight[rows], np.array(rows, dtype=np.intp), state[rows], sides, passing_s, is_at_goal)

@@ -1,4 +1,4 @@
-"""When a recorded movement has reached a goal. All that `evaluate`, `fit` and `replay --learn` say of it is decided here.
+"""When a movement has reached a goal. All that learning, `evaluate` and `fit` say of it is decided here.
 
 Three questions need three answers. Scores need the goal that the hand visited last, even if the recording goes on. A plan or a
 demonstration needs a path that ends at the goal. Durations need a movement that covered most of its distance.
@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from foc_ros.core.learning.pace import REMAINING_SHARE
 from foc_ros.core.types import Array
+
+from .pace import REMAINING_SHARE
 
 AT_GOAL_M = 0.05
 """A path that ends no farther from a goal than this ends at it [m]."""

@@ -1,0 +1,117 @@
+"""Movements that are learnt while the hand moves: each one that ends at a goal is a demonstration, with the states of the hand.
+
+A movement begins with its onset. It ends when the hand has been at rest for `AROUND_S`, when it moves on after a rest at a goal,
+or when its samples begin anew; shorter rests at other places are part of it. It is learnt when it has ended, so that a prediction
+depends on the past alone.
+
+The states are those of the estimator at the multiples of `STEP_S` of the stamps, linear between two samples. They depend on the
+samples and the scene alone, so that equal input gives equal demonstrations, live, replayed or learnt from a recording.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from foc_ros.core.errors import RecordingError
+from foc_ros.core.homotopy.demonstrations import MOST_STATES, STEP_S, Demonstration, record_demonstration
+from foc_ros.core.obstacles.scene import Scene
+from foc_ros.core.types import NANOSECONDS, Array, HandState, Record
+
+from .experience import MOST_NEAR
+from .goal_reached import AT_GOAL_M, find_goal_at_end, find_reached_goal
+
+Stamped = tuple[int, Array]
+"""A stamp [ns] and the state then (4,): x, y, vx, vy [m, m/s]."""
+AROUND_S = 1.0
+"""Time before the onset and after the goal that a demonstration contains [s]: predictions near both look as far."""
+SHORTEST_M = 0.05
+"""Shorter movements demonstrate nothing [m]."""
+MOST_LEARNT = MOST_NEAR
+"""Number of demonstrations that are kept, the newest ones: as many as count in one prediction."""
+STEP_NS, AROUND_NS, AROUND_STEPS = round(STEP_S * NANOSECONDS), round(AROUND_S * NANOSECONDS), round(AROUND_S / STEP_S)
+
+
+@dataclass(frozen=True, eq=False)
+class Movements(Record):
+    """What was learnt of the movements so far, and the present one.
+
+    learnt: demonstrations, the newest last; refused: how many movements demonstrate nothing; refusal: why the last of them does
+    not; hand: its last state; states: the last ones, `STEP_S` apart; onset_ns, ended_ns: when the present movement began, and
+    came to rest; scene: of the last state that moved.
+    """
+
+    learnt: tuple[Demonstration, ...] = ()
+    refused: int = 0
+    refusal: str = ''
+    hand: HandState | None = None
+    states: tuple[Stamped, ...] = ()
+    onset_ns: int | None = None
+    ended_ns: int | None = None
+    scene: Scene = field(default_factory=Scene)
+
+    def follow(self, hand: HandState, scene: Scene, *, is_restart: bool) -> Movements:
+        """Return the movements after the next state of the hand; is_restart: whether its filter began anew."""
+        before = self.interrupt() if is_restart else self.finish() if self._is_over(hand) else self
+        states = sample_states(before.states, before.hand, hand)
+        if hand.onset_ns is not None:
+            onset_ns = hand.onset_ns if before.onset_ns is None else before.onset_ns
+            return replace(before, hand=hand, states=states, onset_ns=onset_ns, ended_ns=None, scene=scene)
+        is_resting = before.onset_ns is None or before.ended_ns is not None
+        return replace(before, hand=hand, states=states, ended_ns=before.ended_ns if is_resting else hand.stamp_ns)
+
+    def interrupt(self) -> Movements:
+        """Return the movements after the end of the present one, at which the samples of the hand end."""
+        return replace(self.finish(), hand=None, states=())
+
+    def finish(self) -> Movements:
+        """Return the movements after the end of the present one, if there is one, which is learnt or refused."""
+        if self.onset_ns is None:
+            return self
+        ended = replace(self, onset_ns=None, ended_ns=None)
+        try:
+            found = self._record()
+        except RecordingError as error:
+            return replace(ended, refused=self.refused + 1, refusal=str(error))
+        return replace(ended, learnt=(*self.learnt, found)[-MOST_LEARNT:])
+
+    def _is_over(self, hand: HandState) -> bool:
+        """Tell whether the present movement had ended before the next state of the hand."""
+        if self.hand is None or self.ended_ns is None:
+            return False
+        if hand.onset_ns is None:
+            return hand.stamp_ns - self.ended_ns >= AROUND_NS
+        goals = self.scene.goals
+        return goals is not None and len(goals) > 0 and find_goal_at_end(self.hand.mean[None, :2], goals)[1] <= AT_GOAL_M
+
+    def _record(self) -> Demonstration:
+        """Return the present movement up to where it was nearest to its goal; raise RecordingError if it demonstrates nothing."""
+        goals, hand = self.scene.goals, self.hand
+        assert hand is not None and self.onset_ns is not None
+        if goals is None or not len(goals):
+            raise RecordingError('a movement without goals')
+        stamps, states = np.array([stamp for stamp, _ in self.states]), np.array([state for _, state in self.states])
+        if len(stamps) == MOST_STATES and stamps[0] > self.onset_ns:
+            raise RecordingError(f'expected a movement of at most {STEP_S * MOST_STATES - AROUND_S:g} s, got a longer one')
+        first, beyond = np.searchsorted(stamps, [self.onset_ns, hand.stamp_ns if self.ended_ns is None else self.ended_ns + 1])
+        path, length_m, distance_m, goal = states[first:beyond, :2].reshape(-1, 2), 0.0, np.inf, 0
+        if len(path):
+            path = path[: find_reached_goal(path, goals)[1] + 1]
+            length_m = float(np.hypot(*np.diff(path, axis=0).T).sum())
+            goal, distance_m = find_goal_at_end(path, goals)
+        if length_m < SHORTEST_M or distance_m > AT_GOAL_M:
+            wanted = f'expected a movement of at least {SHORTEST_M:g} m that ends within {AT_GOAL_M:g} m of a goal'
+            raise RecordingError(f'{wanted}, got {length_m:.3g} m that end {distance_m:.3g} m from the nearest')
+        kept = states[max(first - AROUND_STEPS, 0) : first + len(path) + AROUND_STEPS]
+        return record_demonstration(hand.frame_id, np.vstack([path, goals[goal]]), self.scene.obstacles(hand.stamp_ns), kept)
+
+
+def sample_states(states: tuple[Stamped, ...], before: HandState | None, hand: HandState) -> tuple[Stamped, ...]:
+    """Return states with those that are due between the hand before and now, of which the newest MOST_STATES are kept."""
+    if before is None or hand.stamp_ns // STEP_NS == before.stamp_ns // STEP_NS:
+        return states
+    due = np.arange(before.stamp_ns // STEP_NS + 1, hand.stamp_ns // STEP_NS + 1) * STEP_NS
+    share = (due - before.stamp_ns)[:, None] / (hand.stamp_ns - before.stamp_ns)
+    between = (1.0 - share) * before.mean[:4] + share * hand.mean[:4]
+    return (*states, *zip(due.tolist(), between, strict=True))[-MOST_STATES:]
