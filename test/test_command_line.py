@@ -102,6 +102,15 @@ WRONG_SCENE = (
     'obstacles[1].radius: expected a number in [0, 10000], got -1',
     "goal: expected a number in [-10000, 10000], got 'a'",
 )
+TABLES = {
+    'recordings.csv': 'recording,t_s,x_m,y_m\na,0,0,0\na,x,0.1,0\nb,0,0,0\nb,1,0.1,y\n',
+    'obstacles.csv': 'x_m,y_m,radius_m\n0.1,0,0.01\n',
+    'goals.csv': 'x_m,y_m\n0.3,0\n',
+}
+NO_NUMBERS = (
+    "tables/recordings.csv: row 3, column t_s: expected a number in [0, 86400], got 'x'",
+    "tables/recordings.csv: row 5, column y_m: expected a number in [-10000, 10000], got 'y'",
+)
 NAMES = 'accurate, noisy, laggy, changes_way, unannounced_goal, human_paths'
 INPUTS = 'hand_pose, obstacles, obstacle_markers, collision_objects, detections, goals, goal_pose'
 
@@ -130,6 +139,8 @@ INPUTS = 'hand_pose, obstacles, obstacle_markers, collision_objects, detections,
         (['replay', 'scene.yaml'], ['scene.yaml: expected a bag directory, a .mcap or a .db3 file']),
         (['replay', 'bag.mcap', '--report', 'scene.yaml'], ['--report: expected a folder, got scene.yaml, which is a file']),
         (['replay', 'bag.mcap', '--learn', 'no/a'], ['--learn: expected a file in a directory that exists, got no/a']),
+        (['evaluate', 'tables'], NO_NUMBERS),
+        (['fit', 'tables', '--output', 'a'], NO_NUMBERS),
         (['evaluate', 'scene.yaml'], ['scene.yaml: expected a bag directory, a .mcap or a .db3 file']),
         (['fit', '.', '--output', 'no/a'], ['--output: expected a file in a directory that exists, got no/a']),
         (
@@ -150,6 +161,9 @@ def test_wrong_inputs_are_answered_before_the_solver_is_imported(
 ) -> None:
     (tmp_path / 'scene.yaml').write_text(SCENE)
     (tmp_path / 'bag.mcap').write_bytes(b'x')
+    (tmp_path / 'tables').mkdir()
+    for name, text in TABLES.items():
+        (tmp_path / 'tables' / name).write_text(text)
     program = 'import sys\nfrom foc_ros.cli.main import main\nmain(sys.argv[1:])\nprint("numba" in sys.modules)'
     command = [sys.executable, '-c', program, *arguments]
     environment = {**os.environ, 'PYTHONPATH': str(ROOT)}

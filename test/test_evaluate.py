@@ -156,6 +156,16 @@ def test_data_that_cannot_be_used_is_one_line_and_exit_2(tables: Path, capsys, c
     assert captured.out == '' and words in captured.err and captured.err.count('\n') == 1
 
 
+def test_the_errors_of_all_tables_are_found_at_once(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with (tables / 'recordings.csv').open('a') as file:
+        file.write('broken,0.0,nan,0.0\n')
+    (tables / 'obstacles.csv').write_text('x_m,y_m\n')
+    (tables / 'goals.csv').write_text('x_m,y_m\n0,a\n')
+    assert run(tables) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.partition('.csv: ')[0].rpartition('/')[2] for line in lines] == ['obstacles', 'goals', 'recordings']
+
+
 def test_a_label_of_another_class_is_reported(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
     # low x is on neither side of a movement along x; by convention the left counts as high
     labels = {'left': 1, 'right': 0, 'left too': 0}

@@ -24,7 +24,7 @@ def test_every_reach_begins_at_rest_and_ends_near_its_goal(kind: str, noise_m: f
     recordings = find_recordings(tmp_path)
     assert len(recordings) == script.COUNT
     for number, recording in enumerate(recordings.values()):
-        path = np.array([[row.read_number('x_m'), row.read_number('y_m')] for row in recording.rows])
+        path = recording.read_movement().positions[:, :2]
         assert find_reached_goal(path, recording.scene.goals[:, :2])[0] == number % len(recording.scene.goals)
         assert np.ptp(path[:4], axis=0).max() < 10.0 * noise_m
         distance = np.hypot(*(path[-20:].mean(axis=0) - recording.scene.goals[number % len(recording.scene.goals), :2]))

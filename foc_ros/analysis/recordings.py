@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from foc_ros.core.errors import RecordingError
+from foc_ros.core.errors import FocError, RecordingError, collect, join_errors
 from foc_ros.io.bags import BagReader, Item, check_bag
 from foc_ros.io.csv_tables import Row
 
@@ -43,15 +43,17 @@ class BagRecording:
 
 @dataclass(frozen=True)
 class TableRecording:
-    """One recording of a table; its rows are checked when they are read, so that a bad row fails its own recording only."""
+    """One recording of a table; movement: or why there is none, because a bad row fails its own recording only."""
 
     name: str
-    rows: tuple[Row, ...]
+    movement: Movement | RecordingError
     scene: RecordedScene
 
     def read_movement(self) -> Movement:
         """Return the movement of the hand; raises RecordingError."""
-        return parse_movement(self.name, self.rows)
+        if isinstance(self.movement, RecordingError):
+            raise self.movement
+        return self.movement
 
     def items(self) -> Iterator[Item]:
         """Yield the messages that `convert` would write; raises RecordingError."""
@@ -91,11 +93,25 @@ def group_by_operator(found: Mapping[str, Recording]) -> dict[str, list[Recordin
 
 
 def read_tables(data: Path) -> dict[str, TableRecording]:
-    """Return the recordings of a folder of tables by name."""
-    scenes = _read_scenes(data)
-    return {
-        name: TableRecording(name, tuple(rows), scenes.find(name)) for name, rows in read_movement_rows(data / RECORDINGS).items()
-    }
+    """Return the recordings of a folder of tables by name.
+
+    Raises one RecordingError for the errors of all tables if a table has no scenes or no recording that can be used.
+    """
+    errors: list[FocError] = []
+    scenes = collect(errors, _read_scenes, data)
+    rows = collect(errors, read_movement_rows, data / RECORDINGS) or {}
+    movements = {name: _parse_movement(name, each) for name, each in rows.items()}
+    failures = [each for each in movements.values() if isinstance(each, RecordingError)]
+    if scenes is None or len(failures) == len(movements):
+        raise join_errors([*errors, *failures])
+    return {name: TableRecording(name, movement, scenes.find(name)) for name, movement in movements.items()}
+
+
+def _parse_movement(name: str, rows: Iterable[Row]) -> Movement | RecordingError:
+    try:
+        return parse_movement(name, rows)
+    except RecordingError as error:
+        return error
 
 
 def _read_scenes(data: Path) -> SceneTables | BoxScenes:

@@ -80,7 +80,7 @@ class AfterSession:
         self._note_fitted(not losses)
         text = 'Predictions now use your parameters.'
         if losses:
-            text = f'{"; ".join(losses)}. Predictions use your parameters if you choose them above.'
+            text = f'{"; ".join(losses)}. Predictions use the standard parameters, unless you choose yours above.'
         return {'text': text[0].upper() + text[1:], 'columns': jobs.FITTED_COLUMNS, 'rows': rows}
 
     async def _compare(self, folder: Path) -> dict[str, Any]:

@@ -1,0 +1,255 @@
+"""A session of `foc_ros play`: tasks, recordings, the fit and its comparison, and what is refused."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip('matplotlib', reason='matplotlib is not installed')
+pytest.importorskip('plotly', reason='plotly is not installed')
+
+from report_samples import predictions, samples
+from session_helpers import SCENE, TASKS, Page, Silent, reach, wait_until
+
+from foc_ros.analysis.recordings import find_recordings
+from foc_ros.analysis.replay import Replay
+from foc_ros.core.config import Config, replace_values
+from foc_ros.core.errors import InputError
+from foc_ros.io.bags import TYPESTORE, BagReader
+from foc_ros.io.topics import TYPES
+from foc_ros.play import jobs, recorder
+from foc_ros.play.predictors import LibraryPredictor, LivePredictor
+from foc_ros.play.scene import BOUNDS, FIRST_SCENE, START
+from foc_ros.play.session import Session
+from foc_ros.ros.messages.encode_prediction import encode_prediction_cloud
+from foc_ros.ros.messages.types import RosbagsTypes
+from foc_ros.ros.parameters import dump_parameter_file
+
+
+@pytest.fixture
+def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Page:
+    """Return a page of a session whose clock goes on with the time of the page."""
+    session = Session(Silent, Config(), tmp_path / 'data')
+    session.predictor.start()
+    page = Page(session)
+    monkeypatch.setattr('foc_ros.play.session.time_ns', lambda: 10**15 + round(page.t_ms * 1e6))
+    return page
+
+
+def test_tasks_leave_bags_that_fit_and_evaluate_read(page: Page) -> None:
+    page.send(TASKS)
+    with pytest.raises(InputError, match='scene: expected no change while tasks run'):
+        page.send(SCENE)
+    for _ in range(2):
+        reach(page)
+    assert page.last('task') == {'type': 'task', 'phase': 'none'}
+    assert sorted(row[0] for row in page.last('score')['rows']) == ['with guidance', 'without guidance']
+    assert [each.guidance.enabled for each in page.session.predictor.configs] in ([True, False], [True])
+    folder = Path(page.last('settings')['session'])
+    (name,) = recordings = find_recordings(folder / recorder.UNGUIDED)
+    replay = Replay(Config(rate_hz=5.0))
+    steps = list(replay.steps(recordings[name].items()))
+    stamps = [step.sample.stamp_ns for step in steps if step.sample is not None]
+    assert {round(gap) for gap in np.diff(stamps)} == {20_000_000}
+    assert any(step.prediction is not None and step.prediction.candidates_with_likelihood for step in steps)
+    assert replay.describe_refusals() == ''
+    with BagReader(folder / recorder.SESSION) as reader:
+        assert sum(item.role == 'hand_pose' for item in reader) > len(stamps)
+
+
+def test_a_stopped_task_leaves_its_session_and_restores_guidance(page: Page) -> None:
+    page.send(TASKS | {'assistance': 'with'})
+    page.move(START, 60)
+    page.send({'type': 'stop'})
+    assert page.last('score')['rows'] == []
+    assert [each.guidance.enabled for each in page.session.predictor.configs] == [True, False]
+    folder = Path(page.last('settings')['session'])
+    assert sorted(each.name for each in folder.iterdir()) == ['parameters.yaml', 'session']
+
+
+def test_a_blinded_page_learns_nothing_from_what_it_receives(page: Page) -> None:
+    """The page receives no prediction, and the same messages with and without guidance; the force itself must be felt."""
+    received = {}
+    for assistance in ('with', 'without'):
+        page.send(TASKS | {'assistance': assistance, 'blinded': True})
+        begin = len(page.received)
+        page.move(START, 100)
+        prediction = encode_prediction_cloud(predictions(samples())[0], 'xy', RosbagsTypes(TYPESTORE))
+        page.session._receive('/foc/prediction', bytes(TYPESTORE.serialize_cdr(prediction, prediction.__msgtype__)))
+        received[assistance] = page.received[begin:]
+        page.send({'type': 'stop'})
+    assert received['with'] == received['without']
+    assert {each['type'] for each in received['with']} == {'task', 'status'}
+
+
+async def work(page: Page, name: str) -> dict[str, Any]:
+    """Press the button of a job, and return what the page is told at its end."""
+    page.send({'type': 'job', 'name': name})
+    await wait_until(lambda: page.last('job')['state'] != 'running', 400.0)
+    assert page.last('job')['state'] == 'done', page.last('job')
+    return page.last('job')
+
+
+def record_trials(page: Page, count: int) -> None:
+    page.send(TASKS | {'trials': count, 'assistance': 'without'})
+    for _ in range(count):
+        reach(page)
+
+
+@pytest.mark.timeout(500)
+def test_a_fit_and_its_comparison(page: Page) -> None:
+    """The commands behind the buttons, on three trials."""
+
+    async def run() -> None:
+        fitted = await work(page, 'fit')
+        assert fitted['columns'] == ['parameter', 'before', 'after']
+        assert 'duration.fitts_b_s' in [row[0] for row in fitted['rows']]
+        compared = await work(page, 'compare')
+        assert 'on the trials of the fit' in compared['text']
+        assert [row[0] for row in compared['rows']][:2] == ['path class: correct [%]', 'path class: log-likelihood [nat]']
+
+    record_trials(page, 3)
+    asyncio.run(run())
+    assert page.last('settings')['fitted']
+    page.send({'type': 'parameters', 'name': 'mine'})  # the page keeps the others if positions become worse
+    assert page.last('settings')['parameters'] == 'mine'
+    mine = page.session.predictor.configs[-1]
+    assert mine.duration != Config().duration
+    assert mine.plane == 'xy'
+    page.send({'type': 'parameters', 'name': 'standard'})
+    assert page.session.predictor.configs[-1] == Config()
+
+
+FITTED = {'likelihood.beta': 7.5}
+
+
+def fit_with_errors(page: Page, monkeypatch: pytest.MonkeyPatch, before_m: float, after_m: float) -> dict[str, Any]:
+    """Press the button of the fit; in place of the command, write FITTED, with the errors of positions before and after it."""
+
+    async def fit(*arguments: str | Path) -> str:
+        given = list(map(str, arguments))
+        assert given[0] == 'fit' and given[given.index('--allow') + 1] == 'positions'
+        Path(given[given.index('--output') + 1]).write_text(dump_parameter_file(replace_values(Config(), FITTED)))
+        parameters = {name: {'given': 4.0, 'value': value} for name, value in FITTED.items()}
+        comparison = {'class_gain': {'before': 0.1, 'after': 0.3}, 'error_m 0.5': {'before': before_m, 'after': after_m}}
+        return json.dumps({'parameters': parameters, 'chosen': {}, 'comparison': comparison})
+
+    monkeypatch.setattr(jobs, 'run_command', fit)
+    return asyncio.run(work(page, 'fit'))
+
+
+def test_the_page_predicts_with_the_fit_if_positions_become_no_worse(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    record_trials(page, 1)
+    fitted = fit_with_errors(page, monkeypatch, 0.063, 0.060)
+    assert fitted['text'] == 'Predictions now use your parameters.'
+    assert fitted['rows'] == [['likelihood.beta', '4', '7.5']]
+    assert (page.last('settings')['parameters'], page.last('settings')['fitted']) == ('mine', True)
+    assert page.session.predictor.configs[-1] == replace_values(Config(), FITTED)
+
+
+def test_the_page_keeps_the_standard_parameters_if_positions_become_worse_and_says_so(
+    page: Page, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    record_trials(page, 1)
+    fitted = fit_with_errors(page, monkeypatch, 0.063, 0.096)
+    assert fitted['text'] == (
+        'Predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm. '
+        'Predictions use the standard parameters, unless you choose yours above.'
+    )
+    assert (page.last('settings')['parameters'], page.last('settings')['fitted']) == ('standard', True)
+    assert page.session.predictor.configs[-1] == Config()
+    page.send({'type': 'parameters', 'name': 'mine'})
+    assert page.session.predictor.configs[-1] == replace_values(Config(), FITTED)
+    # the next fit is worse, too: its parameters are not used because those before it were
+    fit_with_errors(page, monkeypatch, 0.063, 0.096)
+    assert page.last('settings')['parameters'] == 'standard'
+    assert page.session.predictor.configs[-1] == Config()
+
+
+def test_what_is_impossible_is_refused(page: Page) -> None:
+    for message, error in (
+        ({'type': 'job', 'name': 'report'}, 'job: expected a session that was recorded, got report'),
+        ({'type': 'parameters', 'name': 'mine'}, 'parameters: expected standard until parameters were fitted, got mine'),
+    ):
+        with pytest.raises(InputError, match=error):
+            page.send(message)
+    page.send({'type': 'record', 'on': True})
+    page.move(START, 3)
+    page.send({'type': 'record', 'on': False})
+    with pytest.raises(InputError, match='job: expected a session with trials without guidance, got fit'):
+        page.send({'type': 'job', 'name': 'fit'})
+    assert page.last('settings')['recording'] is False
+
+
+def test_only_the_newest_page_steers(page: Page) -> None:
+    other = Page(page.session)
+    assert page.last('replaced') == {'type': 'replaced'}
+    before = len(page.session.predictor.sent)
+    page.move(START)
+    assert len(page.session.predictor.sent) == before
+    other.move(START)
+    assert [role for role, _ in page.session.predictor.sent[before:]] == ['hand_pose']
+
+
+def test_a_full_disk_ends_the_recording_and_nothing_else(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(28, 'No space left on device')
+
+    page.send({'type': 'record', 'on': True})
+    monkeypatch.setattr('rosbags.rosbag2.Writer.write', fail)
+    page.move(START)
+    assert 'No space left' in page.last('error')['text']
+    assert page.last('settings')['recording'] is False
+    page.move(START)
+
+
+def test_the_library_predicts_and_reports_the_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The hand moves to a goal; the report holds what was predicted, and the bag what was sent."""
+
+    async def run() -> tuple[Page, Session]:
+        loop = asyncio.get_running_loop()
+
+        def make(config: Config, receive: Any) -> LivePredictor:
+            return LibraryPredictor(config, lambda topic, raw: loop.call_soon_threadsafe(receive, topic, raw))
+
+        session = Session(make, Config(budget_s=0.0, rate_hz=20.0), tmp_path)
+        session.predictor.start()
+        try:
+            page = Page(session)
+            monkeypatch.setattr('foc_ros.play.session.time_ns', lambda: 10**15 + round(page.t_ms * 1e6))
+            session.tick()
+            page.send({'type': 'record', 'on': True})
+            for step in range(60):
+                page.move((0.004 * step, 0.0006 * step))
+                if step % 10 == 9:
+                    count = len(page.received)
+                    await wait_until(lambda count=count, page=page: any(m['type'] == 'prediction' for m in page.received[count:]))
+            page.send({'type': 'record', 'on': False})
+            page.send({'type': 'job', 'name': 'report'})
+            await wait_until(lambda: page.last('job')['state'] != 'running')
+        finally:
+            session.close()
+        return page, session
+
+    page, session = asyncio.run(run())
+    assert page.last('job')['state'] == 'done', page.last('job')
+    assert session.report is not None
+    numbers = json.loads((session.report.parent / 'predictions.json').read_text(encoding='utf-8'))
+    assert numbers['hand_samples'] == 60
+    assert numbers['predictions'], 'how many depends on how busy the machine is'
+    shown = page.last('prediction')
+    assert sum(each['likelihood'] for each in shown['candidates']) == pytest.approx(1.0, abs=1e-3)
+    low_x, high_x, low_y, high_y = BOUNDS
+    for each in shown['candidates']:
+        path = np.array(each['path'])
+        assert ((path >= [low_x, low_y]) & (path <= [high_x, high_y])).all()
+        np.testing.assert_allclose(path[-1], FIRST_SCENE.goals[each['goal']], atol=2e-3)
+    with BagReader(Path(page.last('settings')['session']) / recorder.SESSION) as reader:
+        topics = {each.topic for each in reader._connections}
+        assert {TYPES[item.role] for item in reader} == {TYPES[role] for role in ('hand_pose', 'obstacles', 'goals')}
+    assert topics == {'/hand_pose', '/obstacles', '/goals', '/foc/prediction', '/foc/likelihoods'}
