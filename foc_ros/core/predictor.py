@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .candidates import rank_candidates, solve_candidates
+from .candidates import EarlierSolutions, rank_candidates, solve_candidates
 from .config import REFERENCE_STEP_S, Config, EstimatorConfig
 from .deadline import NEVER, Deadline
 from .dynamics.noise import scale_noise
@@ -16,17 +17,17 @@ from .dynamics.plant_models import make_plant_model
 from .dynamics.predictive_covariance import SharedCovariances, widen_covariance
 from .estimation.duration import choose_candidate_durations, estimate_times_to_go, is_passing, limit_change
 from .height import HeightPredictor
-from .homotopy import Turn, search
+from .homotopy import Search, Turn, search
 from .homotopy.demonstrations import GuessTiming, recall_demonstrations
 from .learning.dispersion import scale_covariance
 from .learning.experience import NO_LIBRARY, Library, pool_recordings
-from .likelihood import make_cost_model, make_preference, select_most_likely
+from .likelihood import CostModel, make_cost_model, make_preference, select_most_likely
 from .memory.continuity import Past, keep_answers, make_continuous, smooth_paths
 from .memory.memory import Memory
 from .obstacles.chance_constraint import RiskBound, count_events
 from .obstacles.culling import cull_obstacles
 from .ocp.problem import Problem, rest_to_goal
-from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Prediction, make_obstacles
+from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Prediction, Record, make_obstacles
 
 SEARCH_SHARE, RAISE_SHARE, SOLVE_SHARE = 0.3, 0.25, 0.65
 """Shares of the time left after which the search, the raises of safety factors (but those of the first candidates), and the
@@ -73,50 +74,98 @@ def predict(
         The prediction, and the memory for the next one. Without a deadline, equal arguments give equal results, wall times apart.
     """
     began, past = time.perf_counter(), memory.past.keep_goals(goals)
-    estimated, hand = hand, _simplify_start(hand, config.estimator)
-    durations = _find_durations(hand, goals, past, config)
-    given, grown = obstacles, obstacles.grow(config.scene.hand_radius)
-    shared = SharedCovariances(hand, config)
-    heights = HeightPredictor(config, hand, goal_heights, shared)
-    cleared = heights.find_cleared(grown, goals, durations)
-    blocking = grown.take(np.flatnonzero(~cleared)) if cleared.any() else grown
-    obstacles = cull_obstacles(blocking, hand.mean[:2], goals, max(durations), config.scene.max_obstacles)
-    timing, turn = GuessTiming(durations, config.foc.steps), Turn(deadline.take_share(SEARCH_SHARE), memory.next_goal)
-    found = search(hand.mean, goals, obstacles, config.homotopy, *timing, memory.candidates, turn)
-    scene = hand, goals, obstacles, config.homotopy, timing
-    candidates = recall_demonstrations(library.demonstrations, *scene, found.candidates, memory.candidates)
-    problems = Problems(config, hand, obstacles, goals, candidates, durations)
-    costs, earlier = make_cost_model(hand.effort_spent, config), memory.find_earlier(candidates)
-    until = [deadline.take_share(share, RESERVE_S * len(candidates)) for share in (SOLVE_SHARE, RAISE_SHARE)]
-    solved = solve_candidates(candidates, problems, config.foc, costs, earlier, *until)
-    widened = [_widen_covariance(each, shared, hand, config) for each in solved]
-    kept = keep_answers(candidates, widened, past, hand.stamp_ns, config.likelihood.hold_s, costs)
-    ranked, choice = rank_candidates(kept, config.likelihood, obstacles, hand, goals)
-    ranked = pool_recordings(ranked, library, estimated, blocking, goals, config.experience)
-    smooth = smooth_paths(ranked, past, hand.stamp_ns, config.likelihood.smoothing_s)
+    scene = _prepare_scene(config, hand, obstacles, goals, goal_heights, past)
+    found, candidates = _find_candidates(scene, config, memory, library, deadline)
+    costs, earlier = make_cost_model(scene.hand.effort_spent, config), memory.find_earlier(candidates)
+    solved = _solve(scene, config, candidates, costs, earlier, deadline)
+    kept = keep_answers(candidates, solved, past, hand.stamp_ns, config.likelihood.hold_s, costs)
+    ranked, choice = rank_candidates(kept, config.likelihood, scene.near, scene.hand, goals)
+    pooled = pool_recordings(ranked, library, hand, scene.blocking, goals, config.experience)
+    smooth = smooth_paths(pooled, past, hand.stamp_ns, config.likelihood.smoothing_s)
     continuous = make_continuous(smooth, past, hand.stamp_ns, config.likelihood)
-    numbers = memory.numbers.keep_goals(past.durations_s)
-    predicted, numbers = numbers.number(continuous, hand.stamp_ns, config.likelihood.hold_s)
-    predicted = heights.add_to(predicted)
-    likelihoods = {each.label: each.likelihood for each in predicted if each.has_likelihood}
-    shares = {each.candidate: each.likelihood for each in predicted if each.has_likelihood}
+    numbered, numbers = memory.numbers.keep_goals(past.durations_s).number(continuous, hand.stamp_ns, config.likelihood.hold_s)
+    predicted = scene.heights.add_to(numbered)
+    taking_part = [each for each in predicted if each.has_likelihood]
+    shares = {each.candidate: each.likelihood for each in taking_part}
+    likelihoods = {each.label: each.likelihood for each in taking_part}
     best = select_most_likely(likelihoods, past.find_renamed(memory.most_likely, shares), config.likelihood.margin)
+    solved_or_kept = {each.label for each in candidates} & {each.label for each in kept}
     counts = {
         'merged': len(kept) - len(ranked),
-        'culled': len(blocking) - len(obstacles),
-        'cleared_by_height': int(cleared.sum()),
+        'culled': len(scene.blocking) - len(scene.near),
+        'cleared_by_height': int(scene.cleared.sum()),
+        'recalled': len(candidates) - len(found.candidates),
+        'kept': sum(each.age_s > 0.0 for each in predicted),
+        'waiting': len(candidates) - len(solved_or_kept),
     }
-    counts |= {'recalled': len(candidates) - len(found.candidates), 'kept': sum(each.age_s > 0.0 for each in predicted)}
-    counts['waiting'] = len(candidates) - len({each.label for each in candidates} & {each.label for each in kept})
     notes = dict(found.notes) | {name: count for name, count in counts.items() if count}
-    hand_at = hand.stamp_ns, hand.frame_id, hand.height
-    scene_then = given, goals, tuple(cleared.tolist())
-    prediction = Prediction(*hand_at, predicted, best, notes, time.perf_counter() - began, *scene_then)
+    hand_at, cleared = (hand.stamp_ns, hand.frame_id, hand.height), tuple(scene.cleared.tolist())
+    prediction = Prediction(*hand_at, predicted, best, notes, time.perf_counter() - began, obstacles, goals, cleared)
+    present = past.follow(prediction, scene.durations_s, config.likelihood.hold_s)
     earlier, followed = memory.remember(candidates, solved, earlier, likelihoods, hand.stamp_ns)
-    present = past.follow(prediction, durations, config.likelihood.hold_s)
     scaled = tuple(scale_covariance(each, config.covariance) for each in predicted)
-    followed_by = Memory(best, candidates, earlier, followed, present, found.next_goal, numbers, choice)
-    return replace(prediction, candidates=scaled), followed_by
+    remembered = Memory(best, candidates, earlier, followed, present, found.next_goal, numbers, choice)
+    return replace(prediction, candidates=scaled), remembered
+
+
+@dataclass(frozen=True, eq=False)
+class _Scene(Record):
+    """What the candidates of one prediction are found and solved in.
+
+    hand: the state that they start from; goals (g, 2) [m]; durations_s: time to go to each; blocking: obstacles that the hand
+    does not clear by its height, grown by its radius; near: those that are not culled; cleared (n,): whether the hand clears each
+    of all obstacles; heights: the prediction of the height; covariances: what all candidates share of theirs.
+    """
+
+    hand: HandState
+    goals: Array
+    durations_s: list[float]
+    blocking: Obstacles
+    near: Obstacles
+    cleared: NDArray[np.bool_]
+    heights: HeightPredictor
+    covariances: SharedCovariances
+
+
+def _prepare_scene(
+    config: Config, estimated: HandState, obstacles: Obstacles, goals: Array, goal_heights: Array | None, past: Past
+) -> _Scene:
+    """Return the scene of a prediction: a start without noise, times to go, and the obstacles that are in the way."""
+    hand = _simplify_start(estimated, config.estimator)
+    durations_s = _find_durations(hand, goals, past, config)
+    grown = obstacles.grow(config.scene.hand_radius)
+    covariances = SharedCovariances(hand, config)
+    heights = HeightPredictor(config, hand, goal_heights, covariances)
+    cleared = heights.find_cleared(grown, goals, durations_s)
+    blocking = grown.take(np.flatnonzero(~cleared)) if cleared.any() else grown
+    near = cull_obstacles(blocking, hand.mean[:2], goals, max(durations_s), config.scene.max_obstacles)
+    return _Scene(hand, goals, durations_s, blocking, near, cleared, heights, covariances)
+
+
+def _find_candidates(
+    scene: _Scene, config: Config, memory: Memory, library: Library, deadline: Deadline
+) -> tuple[Search, tuple[Candidate, ...]]:
+    """Search for homotopy classes; return what was found, and the candidates with those that a library recalls."""
+    timing = GuessTiming(scene.durations_s, config.foc.steps)
+    turn = Turn(deadline.take_share(SEARCH_SHARE), memory.next_goal)
+    found = search(scene.hand.mean, scene.goals, scene.near, config.homotopy, *timing, memory.candidates, turn)
+    where = scene.hand, scene.goals, scene.near, config.homotopy, timing
+    return found, recall_demonstrations(library.demonstrations, *where, found.candidates, memory.candidates)
+
+
+def _solve(
+    scene: _Scene,
+    config: Config,
+    candidates: Sequence[Candidate],
+    costs: CostModel,
+    earlier: EarlierSolutions,
+    deadline: Deadline,
+) -> list[PredictedCandidate]:
+    """Solve the candidates for which there is time; return them with their predictive covariance."""
+    problems = Problems(config, scene.hand, scene.near, scene.goals, candidates, scene.durations_s)
+    until = [deadline.take_share(share, RESERVE_S * len(candidates)) for share in (SOLVE_SHARE, RAISE_SHARE)]
+    solved = solve_candidates(candidates, problems, config.foc, costs, earlier, *until)
+    return [_widen_covariance(each, scene.covariances, scene.hand, config) for each in solved]
 
 
 def warm_up(config: Config) -> None:
