@@ -32,7 +32,7 @@ from foc_ros.cli.arguments import add_worker_arguments
 from foc_ros.core.config import Config
 from foc_ros.core.errors import RecordingError
 from foc_ros.core.estimation.duration import estimate_times_to_go
-from foc_ros.core.learning.pace import Operator
+from foc_ros.core.learning.pace import Pace
 from foc_ros.ros.parameters import load_parameter_file
 
 PAGE, EXAMPLES = ROOT / 'doc' / 'people.md', ROOT / 'doc' / 'examples'
@@ -98,16 +98,16 @@ def compare_pace(hands: Sequence[RecordedHand]) -> Iterator[tuple[int, float, fl
 
     The first error is that of the defaults, the second one that with the pace learnt so far.
     """
-    config, operator = Config(), Operator()
+    config, pace = Config(), Pace()
     for hand in hands:
         if samples := find_samples(hand, config):
             before, after = (
                 np.mean([abs(estimate_times_to_go(state, goal[None], each)[0] - left) for state, goal, left in samples])
-                for each in (config.duration, operator.adapt(config.duration))
+                for each in (config.duration, pace.adapt(config.duration))
             )
-            yield operator.movements, float(before), float(after)
+            yield pace.movements, float(before), float(after)
         for state in hand.estimate_states(config):
-            operator = operator.follow(state, hand.goals, config.duration)
+            pace = pace.follow(state, hand.goals, config.duration)
 
 
 def measure_pace(persons: Persons, executor: Executor) -> list[tuple[str, ...]]:

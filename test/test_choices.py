@@ -128,22 +128,24 @@ def make_operator(config: Config) -> Pipeline:
 
 def test_equal_messages_give_equal_factors_and_a_reset_forgets_them() -> None:
     one, other = make_operator(CONFIG), make_operator(CONFIG)
-    assert one.preferences.movements >= 2 and one.preferences.factors != (1.0, 1.0)
-    np.testing.assert_array_equal(one.preferences.scores, other.preferences.scores)
-    assert one.adapted_config.likelihood == one.preferences.adapt(CONFIG.likelihood) != CONFIG.likelihood
+    assert one.learnt.preferences.movements >= 2 and one.learnt.preferences.factors != (1.0, 1.0)
+    np.testing.assert_array_equal(one.learnt.preferences.scores, other.learnt.preferences.scores)
+    assert one.adapted_config.likelihood == one.learnt.preferences.adapt(CONFIG.likelihood) != CONFIG.likelihood
     one.reset()
-    assert one.preferences.movements == 0 and one.adapted_config is CONFIG
+    assert one.learnt.preferences.movements == 0 and one.adapted_config is CONFIG
 
 
 def test_it_can_be_switched_off_and_new_parameters_begin_anew() -> None:
     off = replace_values(CONFIG, {f'{each}.adaptation': 'none' for each in ('likelihood', 'duration', 'covariance')})
     pipeline = make_operator(off)
-    assert pipeline.preferences.movements == 0 and not pipeline.preferences.choices and pipeline.adapted_config is off
+    assert (
+        pipeline.learnt.preferences.movements == 0 and not pipeline.learnt.preferences.choices and pipeline.adapted_config is off
+    )
     pipeline = make_operator(CONFIG)
     pipeline.reconfigure(replace_values(CONFIG, {'rate_hz': 20.0}))
-    assert pipeline.preferences.movements >= 2
+    assert pipeline.learnt.preferences.movements >= 2
     pipeline.reconfigure(replace_values(CONFIG, {'likelihood.beta': 2.0}))
-    assert pipeline.preferences.movements == 0
+    assert pipeline.learnt.preferences.movements == 0
 
 
 def test_what_was_learnt_is_exported_and_imported_as_a_parameter_file(tmp_path: Path) -> None:

@@ -130,29 +130,29 @@ def test_factors_scale_the_covariance_and_nothing_else() -> None:
 def test_equal_messages_give_equal_factors_and_later_ones_change_no_earlier_prediction() -> None:
     one, other = Pipeline(CONFIG), Pipeline(CONFIG)
     whole, part = reach(one, 1.0) + reach(one, 11.0), reach(other, 1.0) + reach(other, 11.0, until_s=0.9)
-    assert one.dispersion.errors > other.dispersion.errors > 0
+    assert one.learnt.dispersion.errors > other.learnt.dispersion.errors > 0
     for before, after in zip(part, whole, strict=False):
         np.testing.assert_array_equal(before.candidates[0].covariance, after.candidates[0].covariance)
     again = Pipeline(CONFIG)
     reach(again, 1.0), reach(again, 11.0)
-    np.testing.assert_array_equal(one.dispersion.scores, again.dispersion.scores)
+    np.testing.assert_array_equal(one.learnt.dispersion.scores, again.learnt.dispersion.scores)
 
 
 def test_factors_are_forgotten_by_a_reset_and_by_other_parameters_and_can_be_switched_off() -> None:
     pipeline = Pipeline(CONFIG)
     reach(pipeline, 1.0)
-    assert pipeline.adapted_config.covariance == pipeline.dispersion.adapt(CONFIG.covariance) != CONFIG.covariance
+    assert pipeline.adapted_config.covariance == pipeline.learnt.dispersion.adapt(CONFIG.covariance) != CONFIG.covariance
     pipeline.reconfigure(replace_values(CONFIG, {'rate_hz': 20.0}))
-    assert pipeline.dispersion.errors > 0
+    assert pipeline.learnt.dispersion.errors > 0
     pipeline.reconfigure(replace_values(CONFIG, {'foc.endpoint_stddev': 0.1}))
-    assert pipeline.dispersion.errors == 0
+    assert pipeline.learnt.dispersion.errors == 0
     reach(pipeline, 11.0)
     pipeline.reset()
-    assert pipeline.dispersion.errors == 0 and pipeline.adapted_config.covariance == CONFIG.covariance
+    assert pipeline.learnt.dispersion.errors == 0 and pipeline.adapted_config.covariance == CONFIG.covariance
     off = replace_values(CONFIG, {'covariance.adaptation': 'none'})
     pipeline = Pipeline(off)
     reach(pipeline, 1.0)
-    assert pipeline.dispersion.errors == 0 and pipeline.adapted_config is off
+    assert pipeline.learnt.dispersion.errors == 0 and pipeline.adapted_config is off
 
 
 def test_factors_are_exported_as_a_parameter_file(tmp_path: Path) -> None:

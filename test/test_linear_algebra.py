@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from foc_ros.core import linear_algebra
+from foc_ros.core.kernels import linear_algebra
 from foc_ros.core.kernels import compiled
 
 GENERATOR = np.random.default_rng(4)

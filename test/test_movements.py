@@ -13,9 +13,9 @@ from test_demonstrations import GOAL, OBSTACLES, bow
 from foc_ros.analysis.learn_demonstrations import learn_recording
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.analysis.replay import Replay
-from foc_ros.core import movements as learning
 from foc_ros.core.config import Config
 from foc_ros.core.homotopy.demonstrations import MOST_STATES, is_same_recording
+from foc_ros.core.learning import movements as learning
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io.bags import BagReader
@@ -73,17 +73,17 @@ def test_a_repeated_way_becomes_more_likely() -> None:
 def test_it_is_off_by_default() -> None:
     pipeline = Pipeline(CONFIG.with_values({'experience.learning': Config().experience.learning}))
     follow(pipeline, reach(ABOVE), reach(ABOVE))
-    assert not pipeline.movements.learnt and not pipeline.movements.states
+    assert not pipeline.learnt.movements.learnt and not pipeline.learnt.movements.states
 
 
 def test_a_movement_is_learnt_when_it_has_ended() -> None:
     pipeline, path = Pipeline(CONFIG), reach(ABOVE, after_s=2.0)
     ended = round((0.4 + 1.5) / STEP_S)
     follow(pipeline, path[:ended])
-    assert not pipeline.movements.learnt
+    assert not pipeline.learnt.movements.learnt
     pipeline = Pipeline(CONFIG)
     follow(pipeline, path)
-    (found,) = pipeline.movements.learnt
+    (found,) = pipeline.learnt.movements.learnt
     assert found.states is not None
     around = np.hypot(*(found.states[-1, :2] - GOAL[0])), np.hypot(*found.states[0, :2])
     assert max(around) < 0.005
@@ -95,12 +95,12 @@ def test_a_rest_on_the_way_is_part_of_a_movement_and_one_at_a_goal_ends_it() -> 
     paused = np.concatenate([reach(halfway, after_s=0.1), reach(ABOVE[len(ABOVE) // 2 :], rest_s=0.1)[1:]])
     pipeline = Pipeline(CONFIG)
     follow(pipeline, paused, paused[:2])
-    (found,) = pipeline.movements.learnt
+    (found,) = pipeline.learnt.movements.learnt
     assert np.hypot(*found.path[0]) < 0.01
     there_and_back = np.concatenate([reach(ABOVE), reach(ABOVE[::-1])[1:]])
     pipeline = Pipeline(CONFIG)
     follow(pipeline, there_and_back, paused[:2], goals=np.array([[0.3, 0.0], [0.0, 0.0]]))
-    there, back = pipeline.movements.learnt
+    there, back = pipeline.learnt.movements.learnt
     assert np.hypot(*(there.path[-1] - [0.3, 0.0])) == 0.0 and np.hypot(*back.path[-1]) == 0.0
     assert there.sides == tuple(-side for side in back.sides)
 
@@ -118,7 +118,7 @@ def test_a_rest_on_the_way_is_part_of_a_movement_and_one_at_a_goal_ends_it() -> 
 def test_what_is_no_demonstration_is_refused(path: np.ndarray, goals: np.ndarray, reason: str) -> None:
     pipeline = Pipeline(CONFIG)
     follow(pipeline, path, goals=goals)
-    movements = pipeline.movements.finish()
+    movements = pipeline.learnt.movements.finish()
     assert not movements.learnt and movements.refused == 1 and reason in movements.refusal
     assert len(movements.states) <= MOST_STATES
 
@@ -127,7 +127,7 @@ def test_the_oldest_movement_leaves_first(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(learning, 'MOST_LEARNT', 2)
     pipeline = Pipeline(CONFIG)
     follow(pipeline, reach(ABOVE), reach(BELOW), reach(BELOW), np.zeros((2, 2)))
-    assert [each.sides for each in pipeline.movements.learnt] == 2 * [pipeline.movements.learnt[-1].sides]
+    assert [each.sides for each in pipeline.learnt.movements.learnt] == 2 * [pipeline.learnt.movements.learnt[-1].sides]
     assert len(pipeline._library.recordings) == 2
 
 
@@ -136,25 +136,25 @@ def test_a_reset_and_new_parameters_forget_what_was_learnt_and_keep_the_library(
     for forget in (Pipeline.reset, lambda each: each.reconfigure(CONFIG.with_values({'estimator.jerk_density': 3.0}))):
         pipeline = Pipeline(CONFIG, [given])
         follow(pipeline, reach(BELOW), np.zeros((2, 2)))
-        assert len(pipeline.movements.learnt) == 1 and len(pipeline._library.recordings) == 2
+        assert len(pipeline.learnt.movements.learnt) == 1 and len(pipeline._library.recordings) == 2
         pipeline.reconfigure(CONFIG.with_values({'rate_hz': 5.0}))
-        assert len(pipeline.movements.learnt) == 1
+        assert len(pipeline.learnt.movements.learnt) == 1
         forget(pipeline)
-        assert not pipeline.movements.learnt and pipeline._library.recordings == (given,)
+        assert not pipeline.learnt.movements.learnt and pipeline._library.recordings == (given,)
 
 
 def follow_one(path: np.ndarray):
     pipeline = Pipeline(CONFIG)
     follow(pipeline, reach(path), np.zeros((2, 2)))
-    return pipeline.movements.learnt[0]
+    return pipeline.learnt.movements.learnt[0]
 
 
 def test_a_released_clutch_ends_a_movement() -> None:
     pipeline = Pipeline(CONFIG)
     follow(pipeline, reach(ABOVE))
-    assert not pipeline.movements.learnt
+    assert not pipeline.learnt.movements.learnt
     pipeline.set_engaged(False)
-    assert len(pipeline.movements.learnt) == 1 and pipeline.movements.hand is None
+    assert len(pipeline.learnt.movements.learnt) == 1 and pipeline.learnt.movements.hand is None
 
 
 def test_recording_replay_and_pipeline_learn_the_same(tmp_path: Path) -> None:
@@ -163,7 +163,7 @@ def test_recording_replay_and_pipeline_learn_the_same(tmp_path: Path) -> None:
     replayed = Replay(CONFIG)
     with BagReader(bag) as reader:
         assert sum(step.prediction is not None for step in replayed.steps(reader)) > 0
-    (same,) = replayed.pipeline.movements.finish().learnt
+    (same,) = replayed.pipeline.learnt.movements.finish().learnt
     assert is_same_recording(learnt, same)
     assert not is_same_recording(learnt, replace(same, states=same.states + 1e-5))
 
@@ -184,6 +184,6 @@ def test_states_do_not_depend_on_the_rate_of_the_samples() -> None:
         pipeline.set_goals(GOAL, 'world')
         for row, position in enumerate(positions):
             pipeline.add_hand_sample(HandSample(round(row * step_s * NANOSECONDS), position, 0.0, 'world'))
-        found.append(pipeline.movements.finish().learnt[0])
+        found.append(pipeline.learnt.movements.finish().learnt[0])
     assert found[0].sides == found[1].sides
     np.testing.assert_allclose(found[0].path, found[1].path, atol=0.01)

@@ -18,7 +18,7 @@ def learn_recording(recording: Recording, config: Config) -> tuple[Demonstration
     replayed = Replay(config.with_values({'experience.learning': 'online', 'homotopy.library': ''}))
     for _ in replayed.take(recording.items()):
         pass
-    movements = replayed.pipeline.movements.finish()
+    movements = replayed.pipeline.learnt.movements.finish()
     if not movements.learnt:
         standing = f'no movement: the hand was never faster than {config.estimator.onset_speed:g} m/s'
         unused = replayed.describe_refusals() or replayed.pipeline.not_ready_reason()

@@ -85,7 +85,7 @@ def _prepare_learning(config: Config, library: Path) -> Config:
 def _save_learnt(library: Path, config: Config, replay: Replay) -> int:
     """Write the class library of a replay with the movements that were learnt; return how many it did not contain before."""
     given = load_library(config.homotopy.library)
-    learnt = replay.pipeline.movements.finish().learnt
+    learnt = replay.pipeline.learnt.movements.finish().learnt
     new = [each for each in learnt if not any(is_same_recording(each, known) for known in given)]
     save_library(library, [*given, *new])
     return len(new)

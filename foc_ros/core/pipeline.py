@@ -6,26 +6,20 @@ The pipeline uses the stamps of messages only and reads no clock, so that equal 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from .config import Config
 from .deadline import NEVER, Deadline
 from .errors import FocError
 from .estimation.kalman_filter import FilterState, update
 from .homotopy.demonstrations import Demonstration
-from .learning.choices import Preferences
-from .learning.dispersion import Dispersion
 from .learning.experience import Library, make_library
-from .learning.movements import Movements
-from .learning.pace import Operator
+from .learning.learnt import Learnt
 from .memory.memory import Memory
 from .obstacles.scene import ObstacleSource, Scene
 from .predictor import predict
 from .rejections import Rejections
 from .types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction, SampleStatus
-
-DISPERSED_BY = ('foc', 'duration', 'covariance', 'estimator')
-"""Groups of parameters on which errors and covariances depend: if they change, what was learnt of errors is forgotten."""
 
 __all__ = ['Pipeline', 'PredictionTask', 'SampleStatus']
 
@@ -54,7 +48,7 @@ class Pipeline:
 
     library: demonstrated paths. Attributes: config; hand_state, None before the first hand sample; scene, obstacles and goals;
     engaged, whether predictions are made; frame_id, the working frame, None until the parameter or the first hand sample fixes
-    it; operator, preferences, dispersion and movements, what was learnt so far of durations, choices, errors and the scene.
+    it; learnt, what was learnt so far of the operator and the scene.
     """
 
     def __init__(self, config: Config, library: Sequence[Demonstration] = ()) -> None:
@@ -63,8 +57,7 @@ class Pipeline:
         self.hand_state: FilterState | None = None
         self.scene = Scene()
         self.is_engaged = True
-        self.operator, self.preferences, self.dispersion = Operator(), Preferences(), Dispersion()
-        self.movements, self._library = Movements(), make_library(self._given)
+        self.learnt, self._library = Learnt(), make_library(self._given)
         self.frame_id = config.frame_id or None
         self._rejections = Rejections()
         self._memory = Memory()
@@ -77,11 +70,7 @@ class Pipeline:
     @property
     def adapted_config(self) -> Config:
         """The parameters with which the next prediction is made: those given, adapted to the operator."""
-        config = self.config
-        duration, likelihood = self.operator.adapt(config.duration), self.preferences.adapt(config.likelihood)
-        covariance = self.dispersion.adapt(config.covariance)
-        is_same = duration is config.duration and likelihood is config.likelihood and covariance is config.covariance
-        return config if is_same else replace(config, duration=duration, likelihood=likelihood, covariance=covariance)
+        return self.learnt.adapt(self.config)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -137,14 +126,7 @@ class Pipeline:
         if not self.is_engaged:
             self._rejections.reject('hand_disengaged', 'hand_pose: disengaged, nothing is predicted')
             return SampleStatus.DISENGAGED
-        if self.config.duration.adaptation == 'online':
-            self.operator = self.operator.follow(self.hand_state, self.scene.goals, self.config.duration)
-        if self.config.likelihood.adaptation == 'online':
-            self.preferences = self.preferences.follow(self.hand_state, self.config.likelihood)
-        if self.config.covariance.adaptation == 'online':
-            self.dispersion = self.dispersion.follow(self.hand_state)
-        if self.config.experience.learning == 'online':
-            self._set_movements(self.movements.follow(self.hand_state, self.scene, is_restart=status.is_restart))
+        self._learn(self.learnt.follow(self.hand_state, self.scene, self.config, is_restart=status.is_restart))
         return status
 
     def set_obstacles(self, source: str, obstacles: Obstacles, stamp_ns: int | None, frame_id: str) -> SampleStatus:
@@ -213,8 +195,7 @@ class Pipeline:
         except FocError as error:
             self._rejections.reject('predict_failed', str(error))
             return None
-        self.preferences = self.preferences.add(self._memory.choice)
-        self.dispersion = self.dispersion.add(prediction.stamp_ns, prediction.candidates, task.config.covariance)
+        self.learnt = self.learnt.add(prediction, self._memory.choice, task.config.covariance)
         for candidate in prediction.candidates:
             if not candidate.has_likelihood:
                 self._rejections.count(f'candidate_{candidate.status.value}')
@@ -231,9 +212,8 @@ class Pipeline:
         """Engage or disengage: while disengaged the hand is followed, but nothing is predicted."""
         if on != self.is_engaged:
             self._forget_predictions()
-            self._is_new, self.operator = False, replace(self.operator, states=())
-            self.preferences, self.dispersion = self.preferences.interrupt(), self.dispersion.interrupt()
-            self._set_movements(self.movements.interrupt())
+            self._is_new = False
+            self._learn(self.learnt.interrupt())
         self.is_engaged = on
 
     def remove_source(self, source: str) -> None:
@@ -243,8 +223,7 @@ class Pipeline:
     def reset(self) -> None:
         """Forget the movement and the operator; keep the scene, the working frame and the counts."""
         self.hand_state, self._is_new = None, False
-        self.operator, self.preferences, self.dispersion = Operator(), Preferences(), Dispersion()
-        self._set_movements(Movements())
+        self._learn(Learnt())
         self._forget_predictions()
 
     def reconfigure(self, config: Config) -> None:
@@ -258,25 +237,19 @@ class Pipeline:
         if config.frame_id and config.frame_id != self.frame_id:
             self.reset()
             self._fix_frame(config.frame_id)
-        if config.duration != self.config.duration:
-            self.operator = Operator()
-        if config.likelihood != self.config.likelihood:
-            self.preferences = Preferences()
-        if any(getattr(config, name) != getattr(self.config, name) for name in DISPERSED_BY):
-            self.dispersion = Dispersion()
-        if (config.experience, config.estimator) != (self.config.experience, self.config.estimator):
-            self._set_movements(Movements())
+        self._learn(self.learnt.reconfigure(self.config, config))
         self.config = config
         if self._task is not None:
             self._abandon_task()
             self._is_new, self._predicted_ns = True, None
         self._memory = Memory(self._memory.most_likely, numbers=self._memory.numbers)
 
-    def _set_movements(self, movements: Movements) -> None:
-        """Replace what was learnt of the movements, and the library if it changes with it."""
-        if movements.learnt is not self.movements.learnt:
-            self._library = make_library((*self._given, *movements.learnt))
-        self.movements = movements
+    def _learn(self, learnt: Learnt) -> None:
+        """Replace what was learnt, and the library if it has other recordings now."""
+        recordings = learnt.movements.learnt
+        if recordings is not self.learnt.movements.learnt:
+            self._library = make_library((*self._given, *recordings))
+        self.learnt = learnt
 
     def _find_not_ready_reason(self) -> tuple[str, str] | None:
         """Return why the pipeline cannot predict, as (kind, message), judged by stamps; the node also judges by its clocks."""

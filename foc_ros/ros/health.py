@@ -248,14 +248,15 @@ class Monitor:
 
 def _describe_operator(pipeline: Pipeline) -> str:
     """Return what was learnt: what was judged, the factors on durations, choices and standard deviations, and recordings."""
-    operator, preferences, dispersion = pipeline.operator, pipeline.preferences, pipeline.dispersion
+    pace, preferences, dispersion = pipeline.learnt.pace, pipeline.learnt.preferences, pipeline.learnt.dispersion
+    movements = pipeline.learnt.movements
     near, beyond = preferences.factors
-    arrival, factor = operator.find_best(pipeline.config.duration)
-    durations = f'{operator.movements} movements, durations x {factor:.2f}, arrival {arrival}'
+    arrival, factor = pace.find_best(pipeline.config.duration)
+    durations = f'{pace.movements} movements, durations x {factor:.2f}, arrival {arrival}'
     choices = f'{preferences.movements} choices, near x {near:.2f}, far x {beyond:.2f}'
     now, later = dispersion.factors
     errors = f'{dispersion.errors} errors, near x {now:.2f}, far x {later:.2f}'
-    recorded = f'{len(pipeline.movements.learnt)} movements recorded, {pipeline.movements.refused} refused'
+    recorded = f'{len(movements.learnt)} movements recorded, {movements.refused} refused'
     return f'{durations}; {choices}; {errors}; {recorded}'
 
 

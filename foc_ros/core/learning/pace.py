@@ -87,8 +87,8 @@ def compute_mean_factors(logs: Array, scores: Array, prior_stddev: float) -> tup
 
 
 @dataclass(frozen=True, eq=False)
-class Operator(Record):
-    """The movements of an operator so far.
+class Pace(Record):
+    """The pace and arrival of an operator, from the movements so far.
 
     movements: how many were judged; losses (2, f): sum of the errors by `ARRIVALS` and factor, with the prior of the factor;
     states: of the present movement.
@@ -111,18 +111,22 @@ class Operator(Record):
         arrival, factor = self.find_best(config)
         return replace(scale_durations(config, factor), arrival=arrival) if self.movements else config
 
-    def follow(self, hand: HandState, goals: Array | None, config: DurationConfig) -> Operator:
-        """Return the operator after the next state of the hand; goals (g, 2) [m]; config: before it is adapted."""
-        operator = self
+    def follow(self, hand: HandState, goals: Array | None, config: DurationConfig) -> Pace:
+        """Return the pace after the next state of the hand; goals (g, 2) [m]; config: before it is adapted."""
+        pace = self
         if self.states and self.states[0].onset_ns != hand.onset_ns:
-            operator = replace(self, states=()) if goals is None or not len(goals) else self._judge(goals, config)
+            pace = replace(self, states=()) if goals is None or not len(goals) else self._judge(goals, config)
         if hand.onset_ns is None:
-            return operator
-        states = sample_movement(operator.states, hand)
-        return operator if states is operator.states else replace(operator, states=states)
+            return pace
+        states = sample_movement(pace.states, hand)
+        return pace if states is pace.states else replace(pace, states=states)
 
-    def _judge(self, goals: Array, config: DurationConfig) -> Operator:
-        """Return the operator after the end of the present movement, which counts if it covered the distance to a goal."""
+    def interrupt(self) -> Pace:
+        """Return the pace without the present movement."""
+        return replace(self, states=())
+
+    def _judge(self, goals: Array, config: DurationConfig) -> Pace:
+        """Return the pace after the end of the present movement, which counts if it covered the distance to a goal."""
         path, ended = np.array([each.mean[:2] for each in self.states]), replace(self, states=())
         first = self.states[0].onset_position
         assert first is not None

@@ -10,7 +10,7 @@ import pytest
 from foc_ros.core.config import Config, DurationConfig, replace_values
 from foc_ros.core.estimation.duration import compute_movement_time, estimate_times_to_go, scale_durations
 from foc_ros.core.height import reach_along_axis
-from foc_ros.core.learning.pace import FACTORS, PRIOR_WEIGHT, Operator, find_free_positions
+from foc_ros.core.learning.pace import FACTORS, PRIOR_WEIGHT, Pace, find_free_positions
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, HandSample
 
@@ -47,8 +47,8 @@ def test_scaled_durations_are_longer_by_the_factor(model: str) -> None:
 def test_the_factor_approaches_that_of_the_operator(factor: float) -> None:
     duration_s = factor * compute_movement_time(0.4, CONFIG.duration)
     pipeline = follow(Pipeline(CONFIG), *[reach(duration_s)] * 3)
-    assert pipeline.operator.movements >= 2
-    arrival, found = pipeline.operator.find_best(CONFIG.duration)
+    assert pipeline.learnt.pace.movements >= 2
+    arrival, found = pipeline.learnt.pace.find_best(CONFIG.duration)
     assert arrival == 'rest' and found == pytest.approx(factor, rel=0.3)
     assert pipeline.adapted_config.duration == scale_durations(CONFIG.duration, found)
 
@@ -59,48 +59,48 @@ def test_an_operator_who_passes_the_goals_is_recognised() -> None:
     beyond = 0.4 + 0.2 * 0.05 * (1.0 - np.exp(-np.arange(0.0, 0.5, 0.02) / 0.05))
     movement = np.outer(np.concatenate([np.zeros(30), there, beyond]), [1.0, 0.0])
     pipeline = follow(Pipeline(CONFIG), *[movement] * 3)
-    assert pipeline.operator.movements >= 2 and pipeline.operator.find_best(CONFIG.duration)[0] == 'passing'
+    assert pipeline.learnt.pace.movements >= 2 and pipeline.learnt.pace.find_best(CONFIG.duration)[0] == 'passing'
     assert pipeline.adapted_config.duration.arrival == 'passing'
 
 
 def test_without_a_movement_nothing_changes() -> None:
     pipeline = follow(Pipeline(CONFIG), np.zeros((100, 2)))
-    assert pipeline.operator.movements == 0 and pipeline.operator.find_best(CONFIG.duration) == ('rest', 1.0)
+    assert pipeline.learnt.pace.movements == 0 and pipeline.learnt.pace.find_best(CONFIG.duration) == ('rest', 1.0)
     assert pipeline.adapted_config is CONFIG
 
 
 def test_a_movement_that_ends_on_the_way_does_not_count() -> None:
-    assert follow(Pipeline(CONFIG), reach(2.0, distance=0.2), np.zeros((50, 2))).operator.movements == 0
+    assert follow(Pipeline(CONFIG), reach(2.0, distance=0.2), np.zeros((50, 2))).learnt.pace.movements == 0
 
 
 def test_the_present_movement_has_no_influence_before_its_end() -> None:
     slow, pipeline = reach(4.0), Pipeline(CONFIG)
     follow(pipeline, slow[: len(slow) // 2])
-    assert pipeline.operator.movements == 0 and pipeline.operator.states
+    assert pipeline.learnt.pace.movements == 0 and pipeline.learnt.pace.states
 
 
 def test_equal_samples_give_equal_factors_and_a_reset_forgets_them() -> None:
     one, other = (follow(Pipeline(CONFIG), reach(4.0), reach(3.5), reach(4.2)) for _ in range(2))
-    np.testing.assert_array_equal(one.operator.losses, other.operator.losses)
-    assert one.operator.movements > 0
+    np.testing.assert_array_equal(one.learnt.pace.losses, other.learnt.pace.losses)
+    assert one.learnt.pace.movements > 0
     one.reset()
-    assert one.operator.movements == 0 and one.adapted_config is CONFIG
-    np.testing.assert_array_equal(one.operator.losses, np.tile(PRIOR_WEIGHT * np.log(FACTORS) ** 2, (2, 1)))
+    assert one.learnt.pace.movements == 0 and one.adapted_config is CONFIG
+    np.testing.assert_array_equal(one.learnt.pace.losses, np.tile(PRIOR_WEIGHT * np.log(FACTORS) ** 2, (2, 1)))
 
 
 def test_it_can_be_switched_off_and_new_durations_begin_anew() -> None:
     off = replace_values(CONFIG, {'duration.adaptation': 'none'})
-    assert follow(Pipeline(off), reach(4.0), reach(4.0)).operator.movements == 0
+    assert follow(Pipeline(off), reach(4.0), reach(4.0)).learnt.pace.movements == 0
     pipeline = follow(Pipeline(CONFIG), reach(4.0), reach(4.0))
     pipeline.reconfigure(replace_values(CONFIG, {'rate_hz': 20.0}))
-    assert pipeline.operator.movements > 0
+    assert pipeline.learnt.pace.movements > 0
     pipeline.reconfigure(pipeline.adapted_config)
-    assert pipeline.operator.movements == 0 and pipeline.config.duration.fitts_b_s > CONFIG.duration.fitts_b_s
+    assert pipeline.learnt.pace.movements == 0 and pipeline.config.duration.fitts_b_s > CONFIG.duration.fitts_b_s
 
 
 def test_factors_stay_within_the_bounds_of_the_parameters() -> None:
     assert scale_durations(DurationConfig(model='fixed', fixed_s=50.0), 3.0).fixed_s == 60.0
-    assert replace(Operator(), movements=1).find_best(DurationConfig()) == ('rest', pytest.approx(1.0))
+    assert replace(Pace(), movements=1).find_best(DurationConfig()) == ('rest', pytest.approx(1.0))
 
 
 @pytest.mark.parametrize('passing', [False, True])
