@@ -153,6 +153,7 @@ $(VENV)/.bench: $(STAMP)
 people: $(STAMP)
 	$(BIN)/python scripts/people.py $(OPTIONS)
 	$(BIN)/python scripts/measure_learning.py $(OPTIONS)
+	$(BIN)/python scripts/measure_order.py $(OPTIONS)
 
 pages: $(STAMP)
 	$(BIN)/python -m foc_ros.ros.parameters > config/foc.yaml

@@ -18,10 +18,8 @@ from pathlib import Path
 import numpy as np
 from accuracy.data_sets import SHARED
 from accuracy.page import format_table, write_blocks
-from people import D3IL, EXAMPLES, PAGE, format_ways, score_ways
+from people import D3IL, EXAMPLES, PAGE, PUBLISHED, format_ways, score_ways
 
-from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares
-from foc_ros.analysis.evaluation.forecasts import published_shares
 from foc_ros.analysis.evaluation.ground_truth import HORIZONS_S
 from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording, observe
 from foc_ros.analysis.evaluation.position_metrics import HORIZONS, compute_position_scores, log_mixture_density
@@ -41,7 +39,6 @@ NUMBERS = (0, 8, 16, 24)
 """Numbers of recordings; the last one is that of all with odd numbers."""
 SPREAD_M, DRIFT = 0.001, 0.02
 """Standard deviation about the path of a recording, at once [m] and for each second more [m/s], the best one of three."""
-PUBLISHED = Baseline('published', partial(forecast_shares, published_shares), (None,))
 
 
 def predict_by_nearest(observation: Observation, library: Library, frame_id: str) -> tuple[Array, Array]:

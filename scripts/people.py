@@ -49,6 +49,7 @@ SETTINGS = {
     (HLP, 'defaults'): HAND,
     (HLP, 'free_hand.yaml'): load_parameter_file(EXAMPLES / 'free_hand.yaml').with_values({'rate_hz': 4.0}),
 }
+PUBLISHED = Baseline('published', partial(forecast_shares, published_shares), (None,))
 CURVE = (0, 1, 2, 4, 8)
 """Numbers of earlier movements after which the time to go is scored."""
 
@@ -132,7 +133,6 @@ def main() -> None:
     add_worker_arguments(parser)
     arguments = parser.parse_args()
     ways, positions, left_out, pace = [], [], [], []
-    published = Baseline('published', partial(forecast_shares, published_shares), (None,))
     with open_executor(arguments) as executor:
         for (data, setting), config in SETTINGS.items():
             persons = find_persons(SHARED / data)
@@ -141,7 +141,7 @@ def main() -> None:
             recordings = [recording for each, _ in observed for recording in each]
             for name, reason in [failure for _, failed in observed for failure in failed.items()]:
                 raise RecordingError(f'{name}: {reason}')
-            ways.append((data, setting, *format_ways(score_ways(recordings, published, [0] * len(recordings)))))
+            ways.append((data, setting, *format_ways(score_ways(recordings, PUBLISHED, [0] * len(recordings)))))
             positions.append((data, setting, *format_positions(recordings)))
             if data == HLP:
                 rules = Baseline(

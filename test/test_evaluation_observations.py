@@ -12,7 +12,13 @@ from evaluation_samples import reach, write_tables
 from foc_ros.analysis.csv_recordings import EPOCH_NS, read_movements, read_scenes, write_movement
 from foc_ros.analysis.evaluation.forecasts import power_rule_shares
 from foc_ros.analysis.evaluation.ground_truth import TIMES_S
-from foc_ros.analysis.evaluation.observations import ObservedRecording, interpolate_path, interpolate_steps, observe
+from foc_ros.analysis.evaluation.observations import (
+    ObservedRecording,
+    interpolate_path,
+    interpolate_steps,
+    observe,
+    observe_in_order,
+)
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
 from foc_ros.analysis.recordings import BagRecording, find_recordings
 from foc_ros.analysis.replay import Replay
@@ -114,3 +120,21 @@ def test_predictions_are_compared_at_the_exact_time(dt: float) -> None:
     np.testing.assert_allclose(interpolate_path(plan), np.column_stack([expected**3, expected**2]), atol=1e-12)
     np.testing.assert_allclose(interpolate_steps(2.0 * steps, dt), 2.0 * expected)
     assert interpolate_steps(np.zeros((8, 2, 2)), dt).shape == (len(TIMES_S), 2, 2)
+
+
+def test_in_order_a_recording_has_its_own_obstacles_only(tmp_path: Path) -> None:
+    """Markers stay until they are deleted; those of another recording are not in the scene of this one."""
+    rows, scenes = [], []
+    for name in ('one_1', 'one_2'):
+        for t in np.arange(0.0, 1.0, 0.02):
+            rows.append(f'{name},{t:.2f},0.0,{0.4 * min(t / 0.8, 1.0):.4f},0.7')
+        scenes += [f'{name},Target,0,0.45,0.7,0.05,0.05,0.1', f'{name},Near,0.05,0.2,0.7,0.05,0.05,0.1']
+    scenes.insert(2, 'one_1,Far,-0.1,0.2,0.7,0.05,0.05,0.1')
+    (tmp_path / 'recordings.csv').write_text('\n'.join(['recording,t_s,x_m,y_m,z_m', *rows]))
+    (tmp_path / 'scenes.csv').write_text('\n'.join(['recording,object,x_m,y_m,z_m,width_m,depth_m,height_m', *scenes]))
+    found = find_recordings(tmp_path)
+    config = Config().with_values({'rate_hz': 2.0, 'foc.steps': 20})
+    observed, failed = observe_in_order([found['one_1'], found['one_2']], config)
+    assert not failed
+    before, after = ({name.partition('/')[0] for name in each.observations[0].ids} for each in observed)
+    assert before == {'Near', 'Far'} and after == {'Near'}

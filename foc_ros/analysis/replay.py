@@ -81,6 +81,12 @@ class Replay:
             sample = self.intake.sample if is_hand and status is not None and status.is_taken else None
             yield Step(item, sample, prediction, self.pipeline.scene)
 
+    def forget_scene(self) -> None:
+        """Forget obstacles and goals, as before the first message: another recording has its own."""
+        for source in tuple(self.pipeline.scene.sources):
+            self.intake.remove_source(source)
+        self.pipeline.scene = Scene()
+
     def describe_refusals(self) -> str:
         """Return how many messages of each input were refused, with the last reason; empty if none was."""
         return '; '.join(

@@ -111,9 +111,10 @@ class ObservedRecording:
 def observe(recording: Recording, config: Config, replayed: Replay | None = None) -> ObservedRecording:
     """Replay a recording; raises RecordingError where it cannot be read or nothing could be predicted in it.
 
-    replayed: a replay with the same config that goes on, with what it has learnt of the operator; a new one if not given.
+    replayed: a replay with the same config that goes on, with what it has learnt but not with its scene; a new one if not given.
     """
     replayed = replayed or Replay(config)
+    replayed.forget_scene()
     stamps: list[int] = []
     positions: list[Array] = []
     made: list[tuple[Step, HandState]] = []

@@ -6,7 +6,7 @@ stores the initial guesses of each class for its scene).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -141,21 +141,29 @@ def recall_demonstrations(
     for demonstration in library:
         if not demonstration.matches(hand.frame_id, obstacles):
             continue
+        shown = dict(zip(demonstration.ids, demonstration.sides, strict=True))
         for goal in np.flatnonzero(np.hypot(*(goals - demonstration.path[-1]).T) <= NEAR).tolist():
+            if all(name in shown for name in names[goal]) and _name(goal, names[goal], shown)[0] in labels:
+                continue
             rest = _deform(demonstration.path, hand.mean[:2], goals[goal])
             if rest is None or not _is_free(rest, obstacles):
                 continue
             guess = timed(rest, hand.mean[2:4], timing.durations_s[goal], timing.steps)
-            sides, shown = find_path_sides(guess, obstacles), dict(zip(demonstration.ids, demonstration.sides, strict=True))
+            sides = find_path_sides(guess, obstacles)
             if not sides.keys() >= set(names[goal]) or any(shown.get(name, side) != side for name, side in sides.items()):
                 continue
-            named = tuple([(name, sides[name]) for name in names[goal]])
-            label = f'goal{goal}:{name_course(named)}'
+            label, named = _name(goal, names[goal], sides)
             if label not in labels:
                 labels.add(label)
                 recalled.append(Candidate(label, goal, named, guess, float(compute_path_lengths(rest)[-1])))
     recalled.sort(key=_rank)
     return tuple(sorted([*found, *recalled[:MOST]], key=_rank)) if recalled else tuple(found)
+
+
+def _name(goal: int, names: Sequence[str], sides: Mapping[str, int]) -> tuple[str, tuple[tuple[str, int], ...]]:
+    """Return the label of a class, and the sides on which it passes the obstacles that are named in it."""
+    named = tuple([(name, sides[name]) for name in names])
+    return f'goal{goal}:{name_course(named)}', named
 
 
 def _deform(path: Array, hand: Array, goal: Array) -> Array | None:
