@@ -272,6 +272,7 @@ def test_everything_can_be_done_by_keys(page: Any, library: Play, tmp_path: Path
     press_keys(page, ENTER)
     wait_for(page, "document.getElementById('task').innerText.startsWith('1 of 1: ')", 'the task')
     assert page.execute_script('return document.activeElement.id') == 'scene'
+    assert text_of(page, 'record') == 'record without tasks', 'the button does not offer to end what the tasks record'
     move_by_keys(page, (0.0, 0.0))
     wait_for(page, "play.view.phase === 'reach'", 'the light')
     goal = page.execute_script('return [play.view.scene.goals[play.view.goal].x, play.view.scene.goals[play.view.goal].y]')
