@@ -54,7 +54,8 @@ async def run_command(*arguments: str | Path) -> str:
 async def fit_operator(folder: Path) -> tuple[list[tuple[str, str, str]], list[str]]:
     """Fit the parameters to the trials without guidance, and write OPERATOR.
 
-    Return a row of FITTED_COLUMNS for each parameter that has changed, and a sentence for each horizon at which positions become worse with OPERATOR.
+    Return a row of FITTED_COLUMNS for each parameter that has changed, and a sentence for each horizon at which positions become
+    worse with OPERATOR.
     """
     options = '--params', folder / PARAMETERS, '--output', folder / OPERATOR, '--allow', 'positions', '--json'
     answer = json.loads(await run_command('fit', folder / UNGUIDED, *options))

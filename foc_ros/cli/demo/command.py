@@ -51,6 +51,7 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf) -
     items = [item for item in items if item.log_ns - items[0].log_ns <= last_s * NANOSECONDS]
     recorder = Recorder(Config())
     prepare(output)
+    print('The node starts ...', flush=True)
     try:
         with _catch_interrupts() as stopped, BagWriter(output / 'bag') as bag:
             _play(items, bag, recorder, stopped)
@@ -62,6 +63,7 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf) -
     if stopped.is_set():
         print(f'interrupted; the messages recorded so far are in {output / "bag"}')
         return 130
+    print('The recording has ended. The report is written ...', flush=True)
     facts = _collect_facts(recorder, items)
     title, hand = 'Reaching among obstacles, live', build_hand_trajectory(recorder.samples)
     write_report(output / 'report', title, hand, recorder.snapshots, facts)
