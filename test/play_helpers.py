@@ -122,3 +122,34 @@ def wait_for_answer(browser: Any) -> None:
     """Wait for a prediction from the present position of the hand."""
     distance = 'Math.hypot(...play.view.hand.position.map((value, axis) => value - play.view.candidates[0].path[0][axis]))'
     wait_for(browser, f'play.view.candidates.length && {distance} < 0.005', 'predictions')
+
+
+def find_point(browser: Any, position: tuple[float, float]) -> tuple[float, float]:
+    """Return the pixel of the window at which a position of the scene [m] is drawn."""
+    script = """
+        const [x, y] = arguments[0];
+        const [low, high, bottom, top] = play.settings.bounds;
+        const box = document.getElementById('scene').getBoundingClientRect();
+        return [box.left + box.width * (x - low) / (high - low), box.top + box.height * (top - y) / (top - bottom)];
+    """
+    x, y = browser.execute_script(script, list(position))
+    return x, y
+
+
+def tab_to(browser: Any, name: str) -> None:
+    """Press Tab until a control of the page has the focus."""
+    for _ in range(60):
+        if browser.execute_script('return document.activeElement.id') == name:
+            return
+        press_keys(browser, '\ue004')
+    raise AssertionError(f'{name} cannot be reached by Tab')
+
+
+def press_keys(browser: Any, *keys: str, hold_s: float = 0.0) -> None:
+    """Press keys of the keyboard, one after the other, for a time [s]."""
+    from selenium.webdriver import ActionChains
+
+    actions = ActionChains(browser, duration=0)
+    for key in keys:
+        actions.key_down(key).pause(hold_s).key_up(key)
+    actions.perform()

@@ -179,6 +179,7 @@ def test_the_report_is_one_page(tables: Path, tmp_path: Path, capsys: pytest.Cap
     page = (tmp_path / 'report' / 'evaluation.html').read_text('utf-8')
     assert page.count('<img') == 4 and 'constant velocity' in page
     out = capsys.readouterr().out
+    assert out.endswith(f'\nreport: file://{tmp_path}/report/evaluation.html\n')
     assert 'log-likelihood above uniform [nat]' in out and 'foc, held out' in out
 
 

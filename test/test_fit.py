@@ -109,11 +109,13 @@ def test_one_bag_and_a_broken_one(tmp_path: Path, capsys: pytest.CaptureFixture[
 def test_the_result_is_printed_as_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag, given, output = write_bag(tmp_path / 'bag'), tmp_path / 'given.yaml', tmp_path / 'out.yaml'
     given.write_text(dump_parameter_file(replace_values(Config(), {**QUICK, 'foc.strategy': 'hc'})))
-    assert main(['fit', str(bag), '--output', str(output), '--params', str(given), '--workers', '1', '--allow', 'positions']) == 0
+    options = ['--params', str(given), '--workers', '1', '--allow', 'positions', '--report', str(tmp_path)]
+    assert main(['fit', str(bag), '--output', str(output), *options]) == 0
     words = capsys.readouterr().out
     assert 'log-likelihood of the class taken' in words and 'note: ' in words
     assert 'with the fitted parameters: ' in words
-    assert max(len(line) for line in words.splitlines() if str(output) not in line) <= 80
+    assert max(len(line) for line in words.splitlines() if str(tmp_path) not in line) <= 80
+    assert words.endswith(f'\nreport: file://{tmp_path}/fit.html\n')
     assert f'python -m foc_ros node --ros-args --params-file {output}' in words
 
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from foc_ros.core.kernels import linear_algebra
-from foc_ros.core.kernels import compiled
+from foc_ros.core.kernels import compiled, linear_algebra
 
 GENERATOR = np.random.default_rng(4)
 A, B = GENERATOR.normal(size=(5, 7)), GENERATOR.normal(size=(3, 7))

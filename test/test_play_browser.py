@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 pytest.importorskip('plotly', reason='plotly is not installed')
 
 from browser_helpers import check_report, chromium, screenshot
-from play_helpers import Play, play, steer, until, visit, wait_for, wait_for_answer
+from play_helpers import Play, find_point, play, press_keys, steer, tab_to, until, visit, wait_for, wait_for_answer
 from ros_helpers import require_ros
 
 from foc_ros.core.config import Config
@@ -221,20 +222,129 @@ def test_tasks_are_recorded_and_reported(page: Any, library: Play, tmp_path: Pat
     check_report(page, folder / 'report')
 
 
+RIGHT, LEFT, UP, DOWN, DELETE, ENTER, SPACE = '\ue014', '\ue012', '\ue013', '\ue015', '\ue017', '\ue007', ' '
+
+
+def move_by_keys(browser: Any, goal: tuple[float, float], near: float = 0.008) -> None:
+    """Hold arrow keys, one after the other, until the hand is near a goal [m]."""
+
+    def is_there() -> bool:
+        left = [
+            wanted - is_at for wanted, is_at in zip(goal, browser.execute_script('return play.view.hand.position'), strict=True)
+        ]
+        axis = int(abs(left[1]) > abs(left[0]))
+        if math.hypot(*left) > near:
+            # STICK_SPEED of hand.js is 0.35 m/s; a little less, because the hand goes on for a moment
+            press_keys(
+                browser, ((LEFT, RIGHT), (DOWN, UP))[axis][left[axis] > 0.0], hold_s=max(0.02, 0.8 * abs(left[axis]) / 0.35)
+            )
+        return math.hypot(*left) <= near
+
+    until(is_there, f'the hand at {goal}')
+
+
+def test_everything_can_be_done_by_keys(page: Any, library: Play, tmp_path: Path) -> None:
+    """Move the hand, arrange the scene, switch guidance, record, do a task, write a report and download it, without a pointer."""
+    page.execute_cdp_cmd('Browser.setDownloadBehavior', {'behavior': 'allow', 'downloadPath': str(tmp_path)})
+    tab_to(page, 'scene')
+    move_by_keys(page, (0.05, -0.03))
+    press_keys(page, 'e')
+    wait_for(page, "!document.getElementById('editing').hidden", 'the buttons for arranging')
+    press_keys(page, 'c', *(3 * [DOWN]))
+    wait_for(page, 'play.view.scene.obstacles.length === 4 && play.view.selected === play.view.scene.obstacles[3]', 'a circle')
+    added = page.execute_script('return play.view.scene.obstacles[3]')
+    assert (added['x'], added['y']) == pytest.approx((0.16, 0.045), abs=1e-6)  # in the middle of the scene, and then down
+    press_keys(page, DELETE, 'g', RIGHT)
+    wait_for(
+        page, 'play.view.scene.obstacles.length === 3 && play.view.scene.goals.length === 4', 'a goal in place of the circle'
+    )
+    press_keys(page, DELETE, 'n')
+    wait_for(page, 'play.view.selected === play.view.scene.obstacles[0] && play.view.scene.goals.length === 3', 'an obstacle')
+    assert page.execute_script('return play.view.hand.position') == pytest.approx([0.05, -0.03], abs=0.02), 'the hand stays'
+    press_keys(page, 'e')
+    for is_on in (True, False):
+        tab_to(page, 'guidance')
+        press_keys(page, SPACE)
+        assert page.execute_script("return document.getElementById('guidance').checked") is is_on
+    tab_to(page, 'trials')
+    press_keys(page, UP, DOWN, *(11 * [DOWN]))
+    tab_to(page, 'begin')
+    press_keys(page, ENTER)
+    wait_for(page, "document.getElementById('task').innerText.startsWith('1 of 1: ')", 'the task')
+    assert page.execute_script('return document.activeElement.id') == 'scene'
+    assert text_of(page, 'record') == 'record without tasks', 'the button does not offer to end what the tasks record'
+    move_by_keys(page, (0.0, 0.0))
+    wait_for(page, "play.view.phase === 'reach'", 'the light')
+    goal = page.execute_script('return [play.view.scene.goals[play.view.goal].x, play.view.scene.goals[play.view.goal].y]')
+    move_by_keys(page, tuple(goal))
+    wait_for(page, "document.querySelectorAll('#score tr').length === 2", 'the score')
+    tab_to(page, 'record')
+    press_keys(page, ENTER)
+    wait_for(page, "document.getElementById('session').innerText.startsWith('Recording to ')", 'a recording')
+    press_keys(page, ENTER)
+    wait_for(page, "document.getElementById('session').innerText.startsWith('Recorded to ')", 'the end of the recording')
+    tab_to(page, 'report')
+    press_keys(page, ENTER)
+    wait_for(page, "!document.getElementById('download').hidden", 'the report')
+    tab_to(page, 'download-link')
+    press_keys(page, ENTER)
+    file = tmp_path / 'foc_ros_report.html'
+    until(file.exists, 'the downloaded report')
+    folder = Path(text_of(page, 'session').removeprefix('Recorded to '))
+    until(lambda: file.read_bytes() == (folder / 'report' / 'index.html').read_bytes(), 'all of the report')
+
+
+PHONE = 360, 640
+
+
 @pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
 def test_the_page_fits_on_a_phone(browser: Any, library: Play, dark: bool) -> None:
-    visit(browser, library, 390, 844, dark)
-    assert browser.execute_script('return document.documentElement.scrollWidth') == 390
+    """It has the width of the phone, whatever it shows, and the colours of the system until the button changes them."""
+    visit(browser, library, *PHONE, dark)
     colour = 'return getComputedStyle(document.body).backgroundColor'
     before = browser.execute_script(colour)
     assert before == ('rgb(20, 24, 28)' if dark else 'rgb(255, 255, 255)')
     assert len(screenshot(browser)) > 20_000
     click(browser, 'theme')
     assert browser.execute_script(colour) != before
+    click(browser, 'arrange')
+    browser.execute_script("""
+        document.getElementById('download').hidden = false;
+        document.getElementById('session').textContent = `Recorded to /a/${'long'.repeat(30)}/folder`;
+        for (const name of ['score', 'result']) {
+          const line = document.createElement('table').insertRow();
+          for (let column = 0; column < 6; column += 1) line.insertCell().textContent = 'estimator.acceleration_time_s';
+          document.getElementById(name).append(line.closest('table'));
+        }
+    """)
+    assert browser.execute_script('return document.documentElement.scrollWidth') == PHONE[0]
     unnamed = """return [...document.querySelectorAll('button, input, select, canvas')].filter(
         (each) => !(each.innerText || each.ariaLabel || (each.labels && each.labels.length)))"""
     assert browser.execute_script(unnamed) == []
     assert browser.execute_script("return performance.getEntriesByType('resource').every((each) => each.name.startsWith(origin))")
+    browser.get('about:blank')
+
+
+def test_a_finger_moves_the_hand_and_drags_an_obstacle_on_a_phone(browser: Any, library: Play) -> None:
+    visit(browser, library, *PHONE)
+    click(browser, 'restore')
+
+    def drag(*points: tuple[float, float]) -> None:
+        for row, point in enumerate(points):
+            x, y = find_point(browser, point)
+            kind = 'touchMove' if row else 'touchStart'
+            browser.execute_cdp_cmd('Input.dispatchTouchEvent', {'type': kind, 'touchPoints': [{'x': x, 'y': y}]})
+        browser.execute_cdp_cmd('Input.dispatchTouchEvent', {'type': 'touchEnd', 'touchPoints': []})
+
+    drag((0.0, 0.0), (0.02, -0.02), (0.1, -0.04))
+    wait_for(browser, 'Math.hypot(play.view.hand.position[0] - 0.1, play.view.hand.position[1] + 0.04) < 2e-3', 'the hand')
+    click(browser, 'arrange')
+    drag((0.14, 0.015), (0.14, 0.1), (0.13, 0.13))
+    moved = browser.execute_script('return play.view.scene.obstacles[0]')
+    assert (moved['x'], moved['y']) == pytest.approx((0.13, 0.13), abs=2e-3)
+    assert browser.execute_script('return [scrollX, scrollY]') == [0, 0]
+    click(browser, 'arrange')
+    click(browser, 'restore')
     browser.get('about:blank')
 
 

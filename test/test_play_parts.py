@@ -154,8 +154,9 @@ def test_a_trial_is_scored() -> None:
     [
         ('predicting', 'predicting'),
         ('no prediction: no hand pose yet', 'no prediction: no hand pose yet'),
-        ('hand_superseded 3', 'predicting; 3 positions were passed over, because this computer is busy'),
-        ('busy: a; hand_late 2; predict_nothing_solved 1', 'busy: a; hand_late 2; 1 predictions found no way'),
+        ('hand_superseded 3', 'predicting; positions were passed over, because this computer is busy: 3'),
+        ('busy: a; hand_late 2; predict_nothing_solved 1', 'busy: a; hand_late 2; predictions found no way: 1'),
+        ('scene_hand_inside 2', 'predicting; predictions began within the margin of an obstacle: 2'),
     ],
 )
 def test_counters_of_the_node_are_shown_in_words(message: str, words: str) -> None:

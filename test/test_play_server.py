@@ -182,6 +182,7 @@ def test_a_wrong_option_is_refused_in_one_line(tmp_path: Path, capsys: pytest.Ca
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_the_command_ends_when_it_is_stopped(tmp_path: Path, number: int) -> None:
     with play(tmp_path, '--no-ros', '--host', '0.0.0.0') as started:
+        assert started.output.startswith('foc_ros play: loading ...\n')
         assert 'warning: everybody who reaches 0.0.0.0 can steer the hand' in started.output
         started.process.send_signal(number)
         assert started.process.wait(30) == 0

@@ -137,7 +137,8 @@ def fit_with_errors(page: Page, monkeypatch: pytest.MonkeyPatch, before_m: float
         Path(given[given.index('--output') + 1]).write_text(dump_parameter_file(replace_values(Config(), FITTED)))
         parameters = {name: {'given': 4.0, 'value': value} for name, value in FITTED.items()}
         comparison = {'class_gain': {'before': 0.1, 'after': 0.3}, 'error_m 0.5': {'before': before_m, 'after': after_m}}
-        return json.dumps({'parameters': parameters, 'chosen': {}, 'comparison': comparison})
+        chosen = {'foc.eta': {'given': 0.9, 'value': 0.9}}  # not shown, because it has not changed
+        return json.dumps({'parameters': parameters, 'chosen': chosen, 'comparison': comparison})
 
     monkeypatch.setattr(jobs, 'run_command', fit)
     return asyncio.run(work(page, 'fit'))

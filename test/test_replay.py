@@ -182,6 +182,7 @@ def test_a_cut_bag_leaves_neither_json_nor_output(tmp_path: Path, bag: Path, cap
 def test_a_report_is_written(tmp_path: Path, bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip('matplotlib', reason='matplotlib is not installed')
     assert run(bag, '--report', str(tmp_path / 'report')) == 0
+    assert capsys.readouterr().out.endswith(f'\nreport: file://{tmp_path}/report/index.html\n')
     page = (tmp_path / 'report' / 'index.html').read_text('utf-8')
     assert 'reach' in page and 'hand poses' in page
 

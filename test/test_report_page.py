@@ -122,6 +122,25 @@ def test_a_candidate_can_be_highlighted(browser: Any, report: Path) -> None:
     assert len(browser.find_elements('css selector', '#candidates tr.faded')) == 2
 
 
+def test_paths_are_smooth_and_candidates_are_named_in_words(browser: Any, report: Path) -> None:
+    show(browser, report / 'index.html')
+    drawn = browser.execute_script("""
+        const lines = [...document.querySelectorAll('#scene .scatterlayer .trace')].filter((each) => {
+          const { meta } = each.__data__[0].trace;
+          return meta && meta.candidate !== undefined;
+        });
+        return lines.map((each) => each.querySelector('.js-line').getAttribute('d'));
+    """)
+    assert drawn and all('C' in line and 'L' not in line for line in drawn), 'curves, and no straight lines'
+    number = browser.execute_script("return JSON.parse(document.getElementById('report-data').textContent).frames[0].at")
+    predictions = json.loads((report / 'predictions.json').read_text(encoding='utf-8'))['predictions']
+    words = browser.execute_script(
+        "return [...document.querySelectorAll('#candidates tr[data-track]')].map((row) => row.cells[4].textContent)"
+    )
+    assert words == [each['description'] for each in predictions[number]['candidates']]
+    assert any('right of 1' in each for each in words)
+
+
 def test_a_warning_leads_to_its_first_moment(browser: Any, tmp_path: Path) -> None:
     made = samples()
     snapshots = [build_snapshot(each) for each in predictions(made)]

@@ -11,7 +11,7 @@ from fit_recordings import write_tables
 from foc_ros.analysis.fitting.tables import COMPARISON_TITLES
 from foc_ros.cli import fit, paper
 from foc_ros.cli.main import main
-from foc_ros.io.terminal import COLUMNS, show_table
+from foc_ros.io.terminal import COLUMNS, show_counter, show_table
 
 ROOT = Path(__file__).parents[1]
 NAMES = ('front_left_post', 'front_right_post_of_the_shelf', 'a_name_that_is_longer_than_a_column_40')
@@ -81,3 +81,10 @@ def test_a_wide_table_is_divided_and_loses_nothing(capsys: pytest.CaptureFixture
     assert find_widest(printed) <= COLUMNS
     assert all(printed.count(text) == 1 for text in ('title', *columns[1:], *(cell for row in rows for cell in row[1:])))
     assert printed.count('rule 2') == 4
+
+
+def test_a_counter_is_printed_at_times_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    with show_counter('compiling', 50) as counter:
+        for done in range(51):
+            counter.show(done)
+    assert capsys.readouterr().err.splitlines() == [f'compiling: {done} of 50' for done in (0, 20, 40)]

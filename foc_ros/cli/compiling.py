@@ -1,7 +1,8 @@
-"""The first command on a machine compiles the solver, which takes minutes, and shows its progress."""
+"""A command that computes loads the solver, which takes seconds, or minutes to compile it for the first time; it says so."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
@@ -10,7 +11,13 @@ WORDS = 'compiling the solver, once for this machine'
 
 @contextmanager
 def show_compilation() -> Iterator[None]:
-    """Show the progress of a compilation within the context; if anything has to be compiled there, compile everything."""
+    """Say on a terminal that the solver is loaded within the context, and show the progress of a compilation anywhere.
+
+    If anything has to be compiled there, compile everything.
+    """
+    is_terminal = sys.stderr.isatty()
+    if is_terminal:
+        print('loading ...', end='\r', file=sys.stderr, flush=True)
     from foc_ros.core.kernels.compilation import count_kernels, follow_compilation  # not before: it imports numba
     from foc_ros.io.terminal import Counter, show_counter
 
@@ -28,3 +35,5 @@ def show_compilation() -> Iterator[None]:
                 from foc_ros.core.registry import import_all
 
                 import_all()
+    if is_terminal:
+        print(' ' * len('loading ...'), end='\r', file=sys.stderr, flush=True)

@@ -12,7 +12,8 @@ from foc_ros.analysis.evaluation.observations import observe, observe_in_order
 from foc_ros.analysis.evaluation.tables import make_tables
 from foc_ros.analysis.parallel import collect, open_executor
 from foc_ros.analysis.recordings import group_by_operator
-from foc_ros.io.terminal import show_table, show_text
+from foc_ros.io.outputs import EVALUATION_PAGE
+from foc_ros.io.terminal import show_address, show_table, show_text
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -47,4 +48,6 @@ def run(arguments: argparse.Namespace) -> int:
             show_table(columns, lines, title)
         for sentence in answer['verdict']:
             show_text(sentence)
+        if arguments.report is not None:
+            show_address(arguments.report / EVALUATION_PAGE)
     return 2 if failed else 0

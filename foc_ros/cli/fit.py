@@ -23,7 +23,8 @@ from foc_ros.analysis.fitting.tables import (
 )
 from foc_ros.analysis.parallel import open_executor
 from foc_ros.core.config import Config, flatten
-from foc_ros.io.terminal import show_table, show_text
+from foc_ros.io.outputs import FIT_PAGE
+from foc_ros.io.terminal import show_address, show_table, show_text
 from foc_ros.ros.parameters import write_parameter_file
 
 
@@ -45,6 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
         print(json.dumps(answer, allow_nan=False))
     else:
         _show(answer)
+        if arguments.report is not None:
+            show_address(arguments.report / FIT_PAGE)
     for name, reason in fit.failed.items():
         print(f'foc_ros fit: {name}: {reason}', file=sys.stderr)
     return 2 if fit.failed else 0

@@ -21,6 +21,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Serve the page until an interrupt."""
     if not arguments.no_ros and find_spec('rclpy') is None:
         raise FocError('rclpy is not installed: use --no-ros, or source a ROS 2 installation, or install the extra `ros`')
+    print('foc_ros play: loading ...', flush=True)
     sys.setswitchinterval(SWITCH_S)
     asyncio.run(_serve(arguments, arguments.config))
     return 0

@@ -20,7 +20,7 @@ from foc_ros.core.homotopy.demonstrations import is_same_recording
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
 from foc_ros.io.class_library import load_library, save_library
 from foc_ros.io.json_output import encode_guidance, encode_prediction
-from foc_ros.io.terminal import show_progress, show_table
+from foc_ros.io.terminal import show_address, show_progress, show_table
 from foc_ros.ros.messages.encode_guidance import GUIDANCE_OUTPUTS
 from foc_ros.ros.messages.encode_prediction import encode_outputs
 from foc_ros.ros.messages.types import RosbagsTypes
@@ -69,6 +69,8 @@ def run(arguments: argparse.Namespace) -> int:
             print(']}')
         else:
             show_table(('', str(arguments.bag)), facts(answer).items())
+            if report is not None:
+                show_address(arguments.report / 'index.html')
     if summary.solved:
         return 0
     reason = replay.describe_refusals() or replay.pipeline.not_ready_reason() or 'see the candidates not solved'

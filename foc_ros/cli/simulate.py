@@ -9,7 +9,8 @@ from foc_ros.analysis.parallel import open_executor
 from foc_ros.analysis.simulation.human_paths import read_tasks
 from foc_ros.analysis.simulation.study import make_pairs, simulate, summarise
 from foc_ros.analysis.simulation.tables import make_tables
-from foc_ros.io.terminal import show_table
+from foc_ros.io.outputs import SIMULATION_PAGE
+from foc_ros.io.terminal import show_address, show_table
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -29,4 +30,6 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         for title, columns, lines in make_tables(cells):
             show_table(columns, lines, title)
+        if arguments.report is not None:
+            show_address(arguments.report / SIMULATION_PAGE)
     return 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from textwrap import fill
 from typing import TypeVar
 
@@ -116,3 +117,8 @@ def _measure(text: str) -> int:
 def show_text(text: str) -> None:
     """Print a text on standard output, with line breaks between its words so that it fits into `COLUMNS`."""
     print(fill(text, COLUMNS, subsequent_indent='  ', break_long_words=False, break_on_hyphens=False))
+
+
+def show_address(page: Path) -> None:
+    """Print the address of a page that was written, which a terminal shows as a link."""
+    print(f'report: {page.resolve().as_uri()}')

@@ -54,13 +54,14 @@ async def run_command(*arguments: str | Path) -> str:
 async def fit_operator(folder: Path) -> tuple[list[tuple[str, str, str]], list[str]]:
     """Fit the parameters to the trials without guidance, and write OPERATOR.
 
-    Return the rows of FITTED_COLUMNS, and a sentence for each horizon at which positions become worse with OPERATOR.
+    Return a row of FITTED_COLUMNS for each parameter that has changed, and a sentence for each horizon at which positions become
+    worse with OPERATOR.
     """
     options = '--params', folder / PARAMETERS, '--output', folder / OPERATOR, '--allow', 'positions', '--json'
     answer = json.loads(await run_command('fit', folder / UNGUIDED, *options))
-    changed = {**answer['parameters'], **answer['chosen']}
-    rows = [(name, _format(each['given']), _format(each['value'])) for name, each in changed.items()]
-    return rows, find_worse_positions(answer['comparison'])
+    fitted = {**answer['parameters'], **answer['chosen']}
+    rows = [(name, _format(each['given']), _format(each['value'])) for name, each in fitted.items()]
+    return [row for row in rows if row[1] != row[2]], find_worse_positions(answer['comparison'])
 
 
 async def compare_parameters(folder: Path, operator: Path) -> list[tuple[str, str, str]]:

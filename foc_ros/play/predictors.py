@@ -40,9 +40,13 @@ KINDS = {f'{NODE}/{name}': OUTPUTS[name][0] for name in SENT} | {
 COUNTERS = {
     'hand_superseded': 'positions were passed over, because this computer is busy',
     'predict_over_budget': 'predictions took longer than budget_s, because this computer is busy',
+    'predict_too_late': 'predictions came too late, because this computer is busy',
     'predict_nothing_solved': 'predictions found no way',
+    'scene_hand_inside': 'predictions began within the margin of an obstacle',
+    'scene_goal_inside': 'predictions had a goal within an obstacle',
+    'scene_no_way': 'predictions had a goal to which there is no way',
 }
-"""What the counters of the diagnostics mean that rise most often, after their number."""
+"""What the counters of the diagnostics mean that rise most often, before their number."""
 
 Receive = Callable[[str, bytes], None]
 """Takes topic and bytes of an output, in any thread."""
@@ -61,7 +65,7 @@ def describe_health(message: str) -> str:
     parts = message.split('; ')
     counters = [part.rpartition(' ') for part in parts if part.partition(' ')[0] in COUNTERS]
     others = [part for part in parts if part.partition(' ')[0] not in COUNTERS]
-    return '; '.join([*(others or ['predicting']), *(f'{count} {COUNTERS[name]}' for name, _, count in counters)])
+    return '; '.join([*(others or ['predicting']), *(f'{COUNTERS[name]}: {count}' for name, _, count in counters)])
 
 
 class LivePredictor(ABC):

@@ -20,7 +20,7 @@ from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import BagReader, BagWriter, Item
-from foc_ros.io.terminal import show_table, show_text
+from foc_ros.io.terminal import show_address, show_table, show_text
 from foc_ros.reporting.snapshots import build_hand_trajectory
 from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, private_environment, reserve_domain, set_environment
 
@@ -51,6 +51,7 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf) -
     items = [item for item in items if item.log_ns - items[0].log_ns <= last_s * NANOSECONDS]
     recorder = Recorder(Config())
     prepare(output)
+    print('The node starts ...', flush=True)
     try:
         with _catch_interrupts() as stopped, BagWriter(output / 'bag') as bag:
             _play(items, bag, recorder, stopped)
@@ -62,12 +63,13 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf) -
     if stopped.is_set():
         print(f'interrupted; the messages recorded so far are in {output / "bag"}')
         return 130
+    print('The recording has ended. The report is written ...', flush=True)
     facts = _collect_facts(recorder, items)
     title, hand = 'Reaching among obstacles, live', build_hand_trajectory(recorder.samples)
     write_report(output / 'report', title, hand, recorder.snapshots, facts)
     show_table(('', str(output)), [('predictions', str(len(recorder.snapshots))), *facts.items()])
     print(f'written to {output}: bag (inputs and outputs, MCAP) and the report')
-    print(f'report: {(output / "report" / "index.html").resolve().as_uri()}')
+    show_address(output / 'report' / 'index.html')
     show_text(describe_lead(hand, recorder.snapshots))
     return 0
 

@@ -78,7 +78,7 @@ export class Hand {
   // Returns the deflection of the arrow keys, or else of the first gamepad's left stick; at most of length 1.
   readStick() {
     let stick = [0, 0];
-    for (const key of this.pressed) {
+    for (const key of this.enabled ? this.pressed : []) {
       stick = stick.map((value, axis) => value + KEYS[key][axis]);
     }
     const pad = navigator.getGamepads().find((each) => each);

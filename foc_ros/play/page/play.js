@@ -89,8 +89,8 @@ const handlers = {
     byId('guidance').checked = message.guided;
     byId('parameters').value = message.parameters;
     byId('parameters').options[1].disabled = !message.fitted;
-    byId('record').textContent = message.recording && task.phase === 'none' ? 'end the recording' : 'record without tasks';
     byId('record').dataset.on = message.recording;
+    nameRecordButton();
     for (const name of ['report', 'fit', 'compare']) byId(name).disabled = message.recording || !message.session;
     byId('compare').disabled ||= !message.fitted;
     if (message.session) byId('session').textContent = `${message.recording ? 'Recording' : 'Recorded'} to ${message.session}`;
@@ -118,6 +118,7 @@ const handlers = {
     byId('begin').textContent = isRunning ? 'end' : 'begin';
     for (const name of ['arrange', 'shuffle', 'restore', 'guidance', 'record', 'parameters']) byId(name).disabled = isRunning;
     if (isRunning) setArranging(false);
+    nameRecordButton();
     byId('task').textContent = isRunning ? `${message.trial} of ${message.trials}: ${TASK_WORDS[message.phase]}` : '';
   },
   score({ columns, rows }) {
@@ -134,6 +135,11 @@ const handlers = {
     byId('job').textContent = `refused: ${text}`;
   },
 };
+
+// Tasks end the recording that belongs to them.
+function nameRecordButton() {
+  byId('record').textContent = byId('record').dataset.on === 'true' && task.phase === 'none' ? 'end the recording' : 'record without tasks';
+}
 
 // Says that a job is running, and every 10 s for how long.
 function showJob() {
