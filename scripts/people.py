@@ -85,12 +85,12 @@ def format_ways(scores: Scores) -> tuple[str, ...]:
 
 
 def format_positions(recordings: Sequence[ObservedRecording]) -> tuple[str, ...]:
-    """Return errors [mm] of the most likely candidate and NLPDs, of the mixture and of the Singer model, by horizon."""
+    """Return errors [mm] of the most likely candidate, NLPDs of the mixture and of the Singer model, and shares in regions."""
     scores, names = compute_position_scores(recordings), [f'{each:g}' for each in HORIZONS_S]
     errors = [1e3 * scores['displacement_m']['most likely']['final'][name] for name in names]
     nlpd = [[scores['nlpd'][each][name] for name in names] for each in ('foc', 'Singer Kalman')]
-    inside = [100 * scores['inside_all']['0.9'][name] for name in names]
-    rows = zip((errors, *nlpd, inside), (0, 2, 2, 0), strict=True)
+    inside = [[100 * scores['inside_all'][level][name] for name in names] for level in ('0.5', '0.9')]
+    rows = zip((errors, *nlpd, *inside), (0, 2, 2, 0, 0), strict=True)
     return tuple(' '.join(f'{value:.{digits}f}' for value in row) for row, digits in rows)
 
 
@@ -157,7 +157,8 @@ def main() -> None:
         {
             'ways': format_table(('data', 'parameters', *titles), ways),
             'positions': format_table(
-                ('data', 'parameters', 'error [mm]', 'NLPD', 'NLPD, Singer', 'in 90 % region [%]'), positions
+                ('data', 'parameters', 'error [mm]', 'NLPD', 'NLPD, Singer', 'in 50 % region [%]', 'in 90 % region [%]'),
+                positions,
             ),
             'persons': format_table(('parameters', *titles), left_out),
             'pace': format_table(('data', 'movements before', 'movements', 'defaults [s]', 'pace learnt [s]'), pace),

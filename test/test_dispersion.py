@@ -46,11 +46,11 @@ def place_hand(stamp_ns: int, position: Sequence[float]) -> HandState:
     return HandState(stamp_ns, mean, np.eye(6), onset_ns=0, onset_position=np.zeros(2))
 
 
-def judge(ahead_s: float, factor: float, count: int = 60) -> Dispersion:
+def judge(ahead_s: float, factor: float, duration_s: float, count: int = 60) -> Dispersion:
     """Return what is learnt if the hand is beside the candidate by `factor` standard deviations in 2D some time later."""
-    generator, dispersion = np.random.default_rng(3), Dispersion()
+    generator, dispersion, candidates = np.random.default_rng(3), Dispersion(), [make_candidate(duration_s=duration_s)]
     for position in factor * STDDEV * generator.standard_normal((count, 2)):
-        dispersion = dispersion.interrupt().follow(place_hand(0, (0.0, 0.0))).add(0, [make_candidate()], CovarianceConfig())
+        dispersion = dispersion.interrupt().follow(place_hand(0, (0.0, 0.0))).add(0, candidates, CovarianceConfig())
         due = [replace(each, count=1.0) for each in dispersion.forecasts if each.due_ns == round(ahead_s * NANOSECONDS)]
         dispersion = replace(dispersion, forecasts=tuple(due))
         dispersion = dispersion.follow(place_hand(round(ahead_s * NANOSECONDS), position))
@@ -58,12 +58,14 @@ def judge(ahead_s: float, factor: float, count: int = 60) -> Dispersion:
 
 
 @pytest.mark.parametrize('factor', [0.25, 1.0, 3.0])
-@pytest.mark.parametrize(('ahead_s', 'learnt'), [(0.25, 0), (1.0, 1)])
-def test_the_factor_of_gaussian_errors_is_recovered(factor: float, ahead_s: float, learnt: int) -> None:
-    dispersion = judge(ahead_s, factor)
+@pytest.mark.parametrize(('ahead_s', 'duration_s', 'share'), [(0.25, 10.0, 0.025), (1.0, 2.0, 0.5), (1.0, 0.8, 1.0)])
+def test_the_factor_of_gaussian_errors_is_recovered(factor: float, ahead_s: float, duration_s: float, share: float) -> None:
+    dispersion = judge(ahead_s, factor, duration_s)
     assert dispersion.errors == 60
-    assert dispersion.factors[learnt] == pytest.approx(factor, rel=0.1)
-    assert dispersion.factors[1 - learnt] == pytest.approx(1.0, abs=0.1)
+    near, far = dispersion.factors
+    assert near ** (1.0 - share) * far**share == pytest.approx(factor, rel=0.15)
+    if share == 1.0:
+        assert near == pytest.approx(1.0, abs=0.1)
 
 
 def test_the_score_is_the_density_of_the_scaled_mixture() -> None:
@@ -72,19 +74,18 @@ def test_the_score_is_the_density_of_the_scaled_mixture() -> None:
     published = [scale_covariance(each, config) for each in candidates]
     found = make_forecast(0, 1.0, 1.0, published, config).score(position)  # the second one ends before
     for row, column in ((0, 0), (4, 9), (10, 2)):
-        far = np.exp(LOG_FACTORS[column])
+        near, far = np.exp(LOG_FACTORS[[row, column]])
         parts = [
             each.likelihood * multivariate_normal(each.mean[0, :2], stddev**2 * np.eye(2)).pdf(position)
-            for each, stddev in zip(candidates, STDDEV * np.array([far, far]), strict=True)
+            for each, stddev in zip(candidates, STDDEV * np.array([np.sqrt(near * far), far]), strict=True)
         ]
         assert found[row, column] == pytest.approx(np.log(sum(parts)), rel=1e-6)
 
 
-def test_the_factor_changes_with_the_logarithm_of_the_time_and_no_further() -> None:
-    config = CovarianceConfig(near=0.5, far=2.0)
-    np.testing.assert_allclose(compute_factors(make_candidate().solution, config)[[0, 1, 2, 4, 8]], [0.5, 0.5, 1.0, 2.0, 2.0])
-    early = compute_factors(make_candidate(duration_s=0.5).solution, config)
-    np.testing.assert_allclose(early[[4, 8]], [0.5, 2.0])
+@pytest.mark.parametrize('duration_s', [0.5, 2.0])
+def test_the_factor_leads_from_now_to_the_end_of_a_candidate(duration_s: float) -> None:
+    found = compute_factors(make_candidate(duration_s=duration_s).solution, CovarianceConfig(near=0.5, far=2.0))
+    np.testing.assert_allclose(found[[0, 4, 8]], [0.5, 1.0, 2.0])
 
 
 def test_only_a_moving_hand_counts_and_only_within_its_movement() -> None:

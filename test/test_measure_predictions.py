@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from foc_ros.core.config import Config
 from foc_ros.core.types import Candidate, PredictedCandidate, Prediction, Solution, Status, make_obstacles
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -20,6 +21,7 @@ steadiness = importlib.import_module('accuracy.steadiness')
 tracks = importlib.import_module('accuracy.tracks')
 measure_candidates = importlib.import_module('measure_candidates')
 measure_flicker = importlib.import_module('measure_flicker')
+measure_order = importlib.import_module('measure_order')
 
 STEPS = 20
 
@@ -138,3 +140,19 @@ def test_a_change_of_the_goals_begins_anew() -> None:
     total = steadiness.Steadiness()
     steadiness.measure_steadiness([first, replace(second, goals=np.array([[0.0, 0.3]]))], total)
     assert (total.ticks, total.changed) == (0, 0)
+
+
+def test_the_worst_prediction_of_a_recording_is_found_and_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = measure_order.find_recordings(write_reach(tmp_path))
+    config = Config().with_values({'rate_hz': 5.0, 'foc.steps': 20})
+    ((observed, miss),) = measure_order.observe_person(list(found.values()), config)
+    asked = measure_order.ask_all(observed, 'way')
+    gains = [
+        np.log(question.possible * measure_order.PUBLISHED.forecast(each, question, None).true_probability(question))
+        for each, question in asked
+    ]
+    assert miss.gain == pytest.approx(min(gains)) and len(gains) > 1
+    assert miss.sketch.obstacles.ids == miss.observation.ids
+    monkeypatch.setattr(measure_order, 'IMAGES', tmp_path)
+    measure_order.draw_misses([miss], 'worst.png')
+    assert (tmp_path / 'worst.png').stat().st_size > 5000

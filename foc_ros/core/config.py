@@ -109,9 +109,13 @@ class DurationConfig:
 class CovarianceConfig:
     """Factors on the predicted standard deviations."""
 
-    near: float = _p(1.0, 'factor on the standard deviations of predicted states up to 0.25 s ahead', '', 0.01, 100.0)
+    near: float = _p(1.0, 'factor on the standard deviations of predicted states, for those at once', '', 0.01, 100.0)
     far: float = _p(
-        1.0, 'the same from 1 s ahead on; in between the factor changes with the logarithm of the time', '', 0.01, 100.0
+        1.0,
+        'the same at the end of each candidate; in between the logarithm of the factor changes evenly with the time',
+        '',
+        0.01,
+        100.0,
     )
     adaptation: str = _p(
         'online', 'whether both factors follow the errors of earlier predictions, with factors on them', choices=ADAPTATIONS

@@ -1,11 +1,13 @@
-"""What is learnt of the errors of predicted positions: factors on the standard deviations, for near and for far times ahead.
+"""What is learnt of the errors of predicted positions: factors on the standard deviations, from now to the end of a movement.
 
 The parameters of the covariance are expectations, and devices and people differ by much. How far the hand comes beside where the
-mixture of all candidates predicted it shows what they should be. The standard deviations at a time t ahead are multiplied by a
-factor that leads from `covariance.near` = f at and before `NEAR_S` to `covariance.far` = f' at and after b = `FAR_S`, or at the
-end of a candidate that ends before, which stands for all times after it:
+mixture of all candidates predicted it shows what they should be. The standard deviations of a candidate that lasts T are
+multiplied, at a time t ahead, by a factor that leads from `covariance.near` = f now to `covariance.far` = f' at its end:
 
-    f(t) = f^(1 - s) f'^s,  s = log(t / NEAR_S) / log(b / NEAR_S) within [0, 1].                                            (1)
+    f(t) = f^(1 - s) f'^s,  s = t / T.                                                                                      (1)
+
+A hand that is on its way follows a plan closely. How it arrives, when, and what it does then are known less well, however near
+the end is.
 
 Predictions of a moving hand, `SAMPLE_S` apart, are kept until the hand has reached the times h of `HORIZONS_S`. With its position
 x there and the mixture of normal distributions (p_i, m_i, S_i) that was predicted without the factors, each pair of factors has
@@ -32,13 +34,9 @@ from foc_ros.core.types import NANOSECONDS, Array, HandState, PredictedCandidate
 from .pace import compute_mean_factors
 
 LOG_FACTORS = as_readonly(math.log(2.0) * np.linspace(-3.0, 2.0, 11))
-"""Logarithms of the factors that are judged, for near and for far times."""
+"""Logarithms of the factors that are judged, for now and for the end."""
 PRIOR_STDDEV = 1.0
 """Standard deviation of the logarithm of a factor before the first prediction."""
-NEAR_S, FAR_S = 0.25, 1.0
-"""Times ahead up to which, and from which on, the factors for near and for far times hold [s]."""
-SHORTEST = 1.05
-"""Lower limit of the latter, relative to the former, where a candidate ends early."""
 HORIZONS_S = (0.25, 0.5, 1.0)
 """Times ahead at which predicted positions are judged [s]."""
 SAMPLE_S = 0.1
@@ -53,8 +51,8 @@ VARIANCE_FLOOR = 1e-12
 class Forecast(Record):
     """Where a prediction at a stamp expects the hand at a time ahead: a mixture of k normal distributions.
 
-    due_ns: the time ahead, as a stamp; count: of observations, as which it counts; share (k,): s in equation 1, at this time or
-    at the end of the candidate before it; weight (k,); mean (k, 2) [m]; covariance (k, 2, 2) [m^2]: without the factors.
+    due_ns: the time ahead, as a stamp; count: of observations, as which it counts; share (k,): s in equation 1; weight (k,);
+    mean (k, 2) [m]; covariance (k, 2, 2) [m^2]: without the factors.
     """
 
     due_ns: int
@@ -82,8 +80,8 @@ class Forecast(Record):
 class Dispersion(Record):
     """The errors of the predictions so far.
 
-    errors: how many were judged; scores (f, f'): sums of their scores for each pair of factors; factors: for near and for far
-    times, exactly 1 before the first error; hand: its last state; taken_ns: stamp of the last prediction that was taken;
+    errors: how many were judged; scores (f, f'): sums of their scores for each pair of factors; factors: for now and for
+    the end, exactly 1 before the first error; hand: its last state; taken_ns: stamp of the last prediction that was taken;
     forecasts: that the hand has not reached yet.
     """
 
@@ -143,7 +141,7 @@ def make_forecast(
         at = min(ahead_s / solution.dt, len(solution.control))
         row = min(int(at), len(solution.control) - 1)
         after = at - row
-        share = _compute_shares(np.array(at * solution.dt), solution)
+        share = at / len(solution.control)
         shares.append(share)
         factors.append(config.near ** (1.0 - share) * config.far**share)
         means.append((1.0 - after) * solution.mean[row, :2] + after * solution.mean[row + 1, :2])
@@ -155,7 +153,7 @@ def make_forecast(
 
 def compute_factors(solution: Solution, config: CovarianceConfig) -> Array:
     """Return the factors (N + 1,) on the standard deviations of a solution: equation 1."""
-    shares = _compute_shares(solution.times, solution)
+    shares = np.linspace(0.0, 1.0, len(solution.mean))
     factors: Array = config.near ** (1.0 - shares) * config.far**shares
     return factors
 
@@ -167,10 +165,3 @@ def scale_covariance(candidate: PredictedCandidate, config: CovarianceConfig) ->
     solution = candidate.solution
     covariance = solution.covariance * compute_factors(solution, config)[:, None, None] ** 2
     return replace(candidate, solution=solution.with_covariance(covariance))
-
-
-def _compute_shares(times: Array, solution: Solution) -> Array:
-    """Return s of equation 1 at times ahead [s], of any shape."""
-    far_s = min(max(solution.dt * len(solution.control), SHORTEST * NEAR_S), FAR_S)
-    shares: Array = np.log(np.clip(times, NEAR_S, far_s) / NEAR_S) / math.log(far_s / NEAR_S)
-    return shares
