@@ -212,3 +212,24 @@ def test_without_a_terminal_worse_positions_are_written_only_if_allowed(
     assert 'predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm\n' in error
     assert output.exists() == (code == 0)
     assert (f'{output} is not written; --allow positions writes it all the same' in error) == (code == 2)
+
+
+@pytest.mark.parametrize(('answer', 'is_written'), [('y', True), ('Yes ', True), ('', False), ('no', False)])
+def test_a_terminal_is_asked_before_worse_positions_are_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], answer: str, is_written: bool
+) -> None:
+    asked = []
+
+    def ask(question: str) -> str:
+        assert 'become worse' in capsys.readouterr().err and not output.exists()
+        asked.append(question)
+        return answer
+
+    output = tmp_path / 'operator.yaml'
+    monkeypatch.setattr(fit_command.sys.stdin, 'isatty', lambda: True)
+    monkeypatch.setattr(fit_command.sys.stdout, 'isatty', lambda: True)
+    monkeypatch.setattr('builtins.input', ask)
+    losses = ['predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm']
+    assert fit_command._confirm(losses, False, output) is is_written
+    assert asked == [f'Write {output} all the same? [y/N] ']
+    assert fit_command._confirm([], False, output) and fit_command._confirm(losses, True, output) and len(asked) == 1

@@ -325,7 +325,7 @@ def test_the_page_fits_on_a_phone(browser: Any, library: Play, dark: bool) -> No
     browser.get('about:blank')
 
 
-def test_a_finger_moves_the_hand_and_drags_an_obstacle_on_a_phone(browser: Any, library: Play) -> None:
+def test_a_finger_moves_the_hand_and_drags_obstacles_and_goals_on_a_phone(browser: Any, library: Play) -> None:
     visit(browser, library, *PHONE)
     click(browser, 'restore')
 
@@ -340,8 +340,10 @@ def test_a_finger_moves_the_hand_and_drags_an_obstacle_on_a_phone(browser: Any, 
     wait_for(browser, 'Math.hypot(play.view.hand.position[0] - 0.1, play.view.hand.position[1] + 0.04) < 2e-3', 'the hand')
     click(browser, 'arrange')
     drag((0.14, 0.015), (0.14, 0.1), (0.13, 0.13))
-    moved = browser.execute_script('return play.view.scene.obstacles[0]')
-    assert (moved['x'], moved['y']) == pytest.approx((0.13, 0.13), abs=2e-3)
+    drag((0.31, 0.0), (0.3, 0.03), (0.25, 0.04))
+    for name, row, place in (('obstacles', 0, (0.13, 0.13)), ('goals', 1, (0.25, 0.04))):
+        moved = browser.execute_script(f'return play.view.scene.{name}[{row}]')
+        assert (moved['x'], moved['y']) == pytest.approx(place, abs=2e-3)
     assert browser.execute_script('return [scrollX, scrollY]') == [0, 0]
     click(browser, 'arrange')
     click(browser, 'restore')

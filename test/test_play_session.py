@@ -128,7 +128,9 @@ def test_a_fit_and_its_comparison(page: Page) -> None:
 FITTED = {'likelihood.beta': 7.5}
 
 
-def fit_with_errors(page: Page, monkeypatch: pytest.MonkeyPatch, before_m: float, after_m: float) -> dict[str, Any]:
+def fit_with_errors(
+    page: Page, monkeypatch: pytest.MonkeyPatch, before_m: float, after_m: float, failed: dict[str, str] | None = None
+) -> dict[str, Any]:
     """Press the button of the fit; in place of the command, write FITTED, with the errors of positions before and after it."""
 
     async def fit(*arguments: str | Path) -> str:
@@ -138,7 +140,7 @@ def fit_with_errors(page: Page, monkeypatch: pytest.MonkeyPatch, before_m: float
         parameters = {name: {'given': 4.0, 'value': value} for name, value in FITTED.items()}
         comparison = {'class_gain': {'before': 0.1, 'after': 0.3}, 'error_m 0.5': {'before': before_m, 'after': after_m}}
         chosen = {'foc.eta': {'given': 0.9, 'value': 0.9}}  # not shown, because it has not changed
-        return json.dumps({'parameters': parameters, 'chosen': chosen, 'comparison': comparison})
+        return json.dumps({'parameters': parameters, 'chosen': chosen, 'comparison': comparison, 'failed': failed or {}})
 
     monkeypatch.setattr(jobs, 'run_command', fit)
     return asyncio.run(work(page, 'fit'))
@@ -170,6 +172,57 @@ def test_the_page_keeps_the_standard_parameters_if_positions_become_worse_and_sa
     fit_with_errors(page, monkeypatch, 0.063, 0.096)
     assert page.last('settings')['parameters'] == 'standard'
     assert page.session.predictor.configs[-1] == Config()
+
+
+def test_a_fit_that_ends_during_tasks_changes_the_parameters_after_them(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    record_trials(page, 1)
+    page.send(TASKS | {'assistance': 'with'})
+    page.session.predictor.configs.clear()
+    operator = page.session._after.operator = page.session._after.folder / jobs.OPERATOR
+    operator.write_text(dump_parameter_file(replace_values(Config(), FITTED)))
+    page.session._note_fitted(True)
+    reach(page)
+    assert {each.likelihood.beta for each in page.session.predictor.configs} <= {Config().likelihood.beta}
+    page.send({'type': 'stop'})
+    assert page.session.predictor.configs[-1] == replace_values(Config(), FITTED)
+    assert page.last('settings')['parameters'] == 'mine'
+
+
+UNUSED = {'trial_002': 'nothing could be predicted'}
+
+
+@pytest.mark.parametrize('printed', ['{"failed": {}}', ''], ids=['answer', 'nothing'])
+def test_a_command_that_could_not_use_all_trials_has_an_answer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, printed: str
+) -> None:
+    """Exit code 2 and an answer mean that some recordings were not used; without an answer, the command has failed."""
+    program = tmp_path / 'program'
+    program.write_text(f"#!/bin/sh\necho 'foc_ros fit: trial_002: reason' >&2\nprintf '%s' '{printed}'\nexit 2\n")
+    program.chmod(0o755)
+    monkeypatch.setattr(jobs.sys, 'executable', str(program))
+    if printed:
+        assert asyncio.run(jobs.run_command('fit')) == printed
+    else:
+        with pytest.raises(jobs.CommandError, match='foc_ros fit: trial_002: reason'):
+            asyncio.run(jobs.run_command('fit'))
+
+
+def test_the_page_says_which_trials_were_not_used(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    record_trials(page, 1)
+    fitted = fit_with_errors(page, monkeypatch, 0.063, 0.060, UNUSED)
+    assert fitted['text'] == 'Predictions now use your parameters. Not used: trial_002 (nothing could be predicted).'
+
+    async def evaluate(*_: str | Path) -> str:
+        return json.dumps({'questions': {}, 'positions': NO_POSITIONS, 'failed': UNUSED})
+
+    monkeypatch.setattr(jobs, 'run_command', evaluate)
+    assert asyncio.run(work(page, 'compare'))['text'].endswith(' Not used: trial_002 (nothing could be predicted).')
+
+
+NO_POSITIONS = {
+    'displacement_m': {'likelihood-weighted': {'average': {'0.5': None}}},
+    'nlpd': {'foc': {'0.5': None}},
+}
 
 
 def test_what_is_impossible_is_refused(page: Page) -> None:
@@ -207,6 +260,18 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(page: Page, monkeypatch
     assert 'No space left' in page.last('error')['text']
     assert page.last('settings')['recording'] is False
     page.move(START)
+
+
+def test_a_full_disk_ends_the_tasks_and_restores_guidance(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(28, 'No space left on device')
+
+    page.send(TASKS | {'assistance': 'with'})
+    monkeypatch.setattr('rosbags.rosbag2.Writer.write', fail)
+    page.move(START)
+    assert page.last('task') == {'type': 'task', 'phase': 'none'}
+    assert [each.guidance.enabled for each in page.session.predictor.configs] == [True, False]
+    assert page.last('settings')['guided'] is False
 
 
 def test_the_library_predicts_and_reports_the_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

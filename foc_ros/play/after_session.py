@@ -75,17 +75,17 @@ class AfterSession:
         return {'text': 'The report is ready.'}
 
     async def _fit(self, folder: Path) -> dict[str, Any]:
-        rows, losses = await jobs.fit_operator(folder)
+        rows, losses, unused = await jobs.fit_operator(folder)
         self.operator = folder / jobs.OPERATOR
         self._note_fitted(not losses)
         text = 'Predictions now use your parameters.'
         if losses:
             text = f'{"; ".join(losses)}. Predictions use the standard parameters, unless you choose yours above.'
-        return {'text': text[0].upper() + text[1:], 'columns': jobs.FITTED_COLUMNS, 'rows': rows}
+        return {'text': text[0].upper() + text[1:] + unused, 'columns': jobs.FITTED_COLUMNS, 'rows': rows}
 
     async def _compare(self, folder: Path) -> dict[str, Any]:
         assert self.operator is not None
-        rows = await jobs.compare_parameters(folder, self.operator)
+        rows, unused = await jobs.compare_parameters(folder, self.operator)
         is_same = folder == self.operator.parent
         text = 'on the trials of the fit; record new trials for an independent comparison' if is_same else 'on new trials'
-        return {'text': f'Before and after the fit, {text}.', 'columns': jobs.COMPARE_COLUMNS, 'rows': rows}
+        return {'text': f'Before and after the fit, {text}.{unused}', 'columns': jobs.COMPARE_COLUMNS, 'rows': rows}

@@ -58,6 +58,7 @@ class Session:
         self._after = AfterSession(self._say, self._note_fitted)
         self._parameters, self._is_guided = 'standard', config.guidance.enabled
         self._recording = SessionRecording(data, self._note_lost_recording)
+        self._given = self._standard
         self.predictor = make_predictor(self._config, self._receive)
         self._types = RosbagsTypes(TYPESTORE)
         self._scene = scene.FIRST_SCENE
@@ -196,11 +197,19 @@ class Session:
     def _end_tasks(self) -> None:
         if self._tasks is None:
             return
-        scores, self._tasks = self._tasks.scores, None
+        scores = self._tasks.scores
         self._end_recording()
-        self._set_guidance(self._guided_before)
-        self._say_task()
+        self._leave_tasks()
         self._say('score', columns=tasks.SCORE_COLUMNS, rows=tasks.tabulate_scores(scores))
+
+    def _leave_tasks(self) -> None:
+        """Forget the tasks, and use the guidance from before them, and the parameters that were fitted meanwhile."""
+        if self._tasks is not None:
+            self._tasks = None
+            if self._is_guided != self._guided_before or self._given != self._read_parameters():
+                self._is_guided = self._guided_before
+                self._configure()
+        self._say_task()
 
     # recordings, and what is made of them
 
@@ -216,10 +225,9 @@ class Session:
 
     def _note_lost_recording(self, error: RecordingError) -> None:
         """End the tasks with the recording that cannot be written."""
-        self._tasks = None
+        self._leave_tasks()
         self._say('error', text=str(error))
         self._say_settings()
-        self._say_task()
 
     def _begin_job(self, message: page_messages.JobMessage) -> None:
         if self._recording.is_running:
@@ -234,12 +242,16 @@ class Session:
 
     @property
     def _config(self) -> Config:
-        given = self._standard
+        return replace_values(self._given, {'guidance.enabled': self._is_guided})
+
+    def _read_parameters(self) -> Config:
         if self._parameters == 'mine' and self._after.operator is not None:
-            given = replace_values(load_parameter_file(self._after.operator), OWN_VALUES)
-        return replace_values(given, {'guidance.enabled': self._is_guided})
+            return replace_values(load_parameter_file(self._after.operator), OWN_VALUES)
+        return self._standard
 
     def _configure(self) -> None:
+        if self._tasks is None:  # the parameters do not change while tasks run, also where a fit ends meanwhile
+            self._given = self._read_parameters()
         self.predictor.configure(self._config)
         self._say_settings()
 
