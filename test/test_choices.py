@@ -24,11 +24,18 @@ STEP_NS = NANOSECONDS // 10
 CONFIG = replace_values(Config(), {'rate_hz': 10.0, 'foc.steps': 15, 'estimator.position_stddev': 1e-4})
 
 
-def choose(costs: list[float], stamp_ns: int, goals: np.ndarray = GOALS, goal: tuple[int, ...] = (0, 0, 0, 0)) -> Choice:
+def choose(
+    costs: list[float],
+    stamp_ns: int,
+    goals: np.ndarray = GOALS,
+    goal: tuple[int, ...] = (0, 0, 0, 0),
+    onset_ns: int | None = None,
+) -> Choice:
     """Return a choice between the four classes about two obstacles in a row of one each."""
     sides = tuple(dict(zip(OBSTACLES.ids, each, strict=True)) for each in CLASSES)
     decisions = Decisions(np.array([0, 0, 1, 1]), np.zeros(4, dtype=np.intp))
-    return Choice(stamp_ns, OBSTACLES, goals, np.array(goal), sides, np.array(costs), np.zeros(4), None, decisions)
+    made = stamp_ns, onset_ns, OBSTACLES, goals
+    return Choice(*made, np.array(goal), sides, np.array(costs), np.zeros(4), None, decisions)
 
 
 def move(preferences: Preferences, sides: tuple[int, int], costs: list[float], start_s: float = 1.0) -> Preferences:
@@ -38,7 +45,7 @@ def move(preferences: Preferences, sides: tuple[int, int], costs: list[float], s
         y = np.interp(x, [0.0, 0.1, 0.2, 0.3], [0.0, *(0.05 if each == LEFT else -0.05 for each in sides), 0.0])
         mean = np.array([x, y, 0.3, 0.0, 0.0, 0.0])
         hand = HandState(start_ns + row * STEP_NS, mean, np.eye(6), onset_ns=start_ns, onset_position=np.zeros(2))
-        preferences = preferences.follow(hand, LIKELIHOOD).add(choose(costs, hand.stamp_ns))
+        preferences = preferences.follow(hand, LIKELIHOOD).add(choose(costs, hand.stamp_ns, onset_ns=start_ns))
     return preferences.follow(HandState(start_ns + 14 * STEP_NS, np.zeros(6), np.eye(6)), LIKELIHOOD)
 
 
@@ -82,6 +89,18 @@ def test_a_movement_counts_from_its_end_on_and_rest_and_interruptions_do_not() -
     assert not resting.interrupt().states and not resting.interrupt().choices
     assert Preferences().add(choose([1.0, 2.0, 4.0, 8.0], 0)).choices == ()
     assert Preferences().adapt(LIKELIHOOD) is LIKELIHOOD
+
+
+def test_a_prediction_counts_for_the_movement_in_which_it_began() -> None:
+    costs, rest = [1.0, 2.0, 4.0, 8.0], HandState(0, np.zeros(6), np.eye(6))
+    early, last = choose(costs, 0), choose(costs, STEP_NS // 10)
+    moving = replace(rest, stamp_ns=STEP_NS, onset_ns=STEP_NS, onset_position=np.zeros(2))
+    begun = Preferences().follow(rest, LIKELIHOOD).add(early).follow(moving, LIKELIHOOD)
+    assert begun.add(last).choices == (last,), 'a prediction at rest that ends in the movement replaces the one before it'
+    now = choose(costs, STEP_NS, onset_ns=STEP_NS)
+    assert begun.add(last).add(now).choices == (last, now)
+    ended = begun.follow(replace(rest, stamp_ns=2 * STEP_NS), LIKELIHOOD)
+    assert ended.add(now).choices == (), 'a prediction of the movement before comes too late'
 
 
 def test_the_goal_that_is_reached_counts_and_an_unclear_one_does_not() -> None:

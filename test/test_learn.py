@@ -45,6 +45,11 @@ def test_a_reach_is_learned_once(bag: Path, tmp_path: Path, capsys: pytest.Captu
     assert run(bag, library=str(file)) == 0
 
 
+def test_another_library_in_the_parameters_is_refused(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(bag, '--learn', str(tmp_path / 'ways.json'), library=str(tmp_path / 'other.json')) == 2
+    assert '--learn: expected no other class library in homotopy.library' in capsys.readouterr().err
+
+
 def test_a_reach_that_ends_before_its_goal_is_not_learned(tmp_path: Path) -> None:
     bag, file = write_bag(tmp_path / 'short', messages(seconds=0.4)), tmp_path / 'ways.json'
     assert run(bag, '--learn', str(file)) == 0

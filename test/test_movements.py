@@ -137,7 +137,7 @@ def test_a_reset_and_new_parameters_forget_what_was_learnt_and_keep_the_library(
         pipeline = Pipeline(CONFIG, [given])
         follow(pipeline, reach(BELOW), np.zeros((2, 2)))
         assert len(pipeline.learnt.movements.learnt) == 1 and len(pipeline._library.recordings) == 2
-        pipeline.reconfigure(CONFIG.with_values({'rate_hz': 5.0}))
+        pipeline.reconfigure(CONFIG.with_values({'rate_hz': 5.0, 'experience.prior_count': 2.0}))
         assert len(pipeline.learnt.movements.learnt) == 1
         forget(pipeline)
         assert not pipeline.learnt.movements.learnt and pipeline._library.recordings == (given,)
@@ -155,6 +155,28 @@ def test_a_released_clutch_ends_a_movement() -> None:
     assert not pipeline.learnt.movements.learnt
     pipeline.set_engaged(False)
     assert len(pipeline.learnt.movements.learnt) == 1 and pipeline.learnt.movements.hand is None
+
+
+def test_a_clutch_that_is_released_after_one_pose_of_a_movement_is_released() -> None:
+    pipeline, path = Pipeline(CONFIG), reach(ABOVE)
+    follow(pipeline, path[: len(path) // 2])
+    assert pipeline.hand_state is not None and pipeline.hand_state.onset_ns is not None
+    for on in (False, True):
+        pipeline.set_engaged(on)
+    stamp_ns = pipeline.hand_state.stamp_ns + round(STEP_S * NANOSECONDS)
+    pipeline.add_hand_sample(HandSample(stamp_ns, path[len(path) // 2], 0.0, 'world'))
+    pipeline.set_engaged(False)
+    movements = pipeline.learnt.movements
+    assert (pipeline.is_engaged, movements.learnt, movements.refused) == (False, (), 2)
+
+
+def test_without_a_message_of_obstacles_nothing_is_learnt() -> None:
+    pipeline = Pipeline(CONFIG)
+    pipeline.set_goals(GOAL, 'world')
+    for row, position in enumerate(reach(ABOVE)):
+        pipeline.add_hand_sample(HandSample(round(row * STEP_S * NANOSECONDS), position, 0.0, 'world'))
+    movements = pipeline.learnt.movements.finish()
+    assert not movements.learnt and 'before the first message of obstacles' in movements.refusal
 
 
 def test_recording_replay_and_pipeline_learn_the_same(tmp_path: Path) -> None:

@@ -73,6 +73,16 @@ def test_a_movement_that_ends_on_the_way_does_not_count() -> None:
     assert follow(Pipeline(CONFIG), reach(2.0, distance=0.2), np.zeros((50, 2))).learnt.pace.movements == 0
 
 
+def test_a_movement_is_judged_by_the_goals_that_it_had() -> None:
+    """The next recording has other goals, and its first sample ends a movement that was not at rest yet."""
+    unended = reach(2.0)[:-35]
+    pipeline = follow(Pipeline(CONFIG), unended)
+    follow(pipeline, np.zeros((2, 2)), goal=np.array([[-5.0, 0.0]]))
+    assert pipeline.learnt.pace.movements == 1 and pipeline.learnt.pace.goals is None
+    same = follow(follow(Pipeline(CONFIG), unended), np.zeros((2, 2)))
+    np.testing.assert_array_equal(pipeline.learnt.pace.losses, same.learnt.pace.losses)
+
+
 def test_the_present_movement_has_no_influence_before_its_end() -> None:
     slow, pipeline = reach(4.0), Pipeline(CONFIG)
     follow(pipeline, slow[: len(slow) // 2])

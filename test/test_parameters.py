@@ -166,6 +166,9 @@ def node_with(ros: Graph, **overrides: object) -> Any:
         ['--params-file', 'arm.yaml', '-p', 'rate_hz:=-1.0'],
         ['--params-file', 'no.yaml'],
         ['-p', 'budget_s:=1e-3', '-p', 'likelihood.shortfall:=.inf'],
+        ['-p', 'frame_id:=2026-11-24'],
+        ['-p', 'frame_id:=1_0'],
+        ['-p', 'frame_id:=~'],
     ],
 )
 def test_what_depends_on_the_name_of_the_node_is_left_to_the_node(

@@ -266,3 +266,14 @@ def test_the_recording_of_a_killed_recorder_is_replayed_with_a_warning(
     assert capsys.readouterr().err == (
         f'foc_ros replay: {file}: killed.mcap: the recorder was killed; read up to the last whole chunk\n'
     )
+
+
+def test_another_recording_begins_without_scene_frame_and_transforms(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'reach', messages())
+    replayed = Replay(CONFIG)
+    with BagReader(bag) as reader:
+        found = [each.prediction for each in replayed.steps(reader) if each.prediction is not None]
+    assert found and replayed.pipeline.frame_id is not None
+    replayed.forget_scene()
+    assert replayed.pipeline.frame_id is None and not replayed.pipeline.scene.sources and replayed.pipeline.scene.goals is None
+    assert replayed.describe_refusals() == ''

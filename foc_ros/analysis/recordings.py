@@ -43,7 +43,7 @@ class BagRecording:
 
 @dataclass(frozen=True)
 class TableRecording:
-    """One recording of a table; movement: or why there is none, because a bad row fails its own recording only."""
+    """One recording of a table; movement: the movement, or the error of its rows; other recordings are not affected."""
 
     name: str
     movement: Movement | RecordingError

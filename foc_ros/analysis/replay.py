@@ -48,9 +48,12 @@ class Replay:
         self.pipeline = Pipeline(config, load_library(config.homotopy.library))
         self._budget_s = budget_s
         self.intake = Intake(self.pipeline)
+        self._held: dict[str, deque[Item]] = defaultdict(deque)
+        self._begin_recording()
+
+    def _begin_recording(self) -> None:
         self._tree = TransformTree()
         self._transforms = Transforms(self._tree, self.intake.is_skipped)
-        self._held: dict[str, deque[Item]] = defaultdict(deque)
         self._received: Counter[str] = Counter()
         self._refused: Counter[str] = Counter()
         self._reasons: dict[str, str] = {}
@@ -82,10 +85,11 @@ class Replay:
             yield Step(item, sample, prediction, self.pipeline.scene)
 
     def forget_scene(self) -> None:
-        """Forget obstacles and goals, as before the first message: another recording has its own."""
+        """Forget scene, working frame, transforms and counts of refusals: another recording has its own."""
         for source in tuple(self.pipeline.scene.sources):
             self.intake.remove_source(source)
-        self.pipeline.scene = Scene()
+        self.pipeline.forget_scene()
+        self._begin_recording()
 
     def describe_refusals(self) -> str:
         """Return how many messages of each input were refused, with the last reason; empty if none was."""

@@ -11,7 +11,7 @@ WORDS = 'compiling the solver, once for this machine'
 
 @contextmanager
 def show_compilation() -> Iterator[None]:
-    """Say on a terminal that the solver is loaded within the context, and show the progress of a compilation anywhere.
+    """Say on a terminal that the solver is loaded within the context; show the progress of a compilation in any case.
 
     If anything has to be compiled there, compile everything.
     """

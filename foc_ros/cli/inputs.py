@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from pathlib import Path
 
 from foc_ros.core.errors import InputError
 from foc_ros.io.outputs import (
@@ -47,6 +48,9 @@ def _read_replay(arguments: argparse.Namespace) -> None:
     for option, file in (('--learn', arguments.learn), ('--operator', arguments.operator)):
         if file is not None:
             check_file(option, file)
+    library = arguments.config.homotopy.library
+    if arguments.learn is not None and library and Path(library) != arguments.learn:
+        raise InputError('--learn', 'no other class library in homotopy.library', library)
     remapped = [role for role, _ in arguments.remap]
     if len(set(remapped)) < len(remapped):
         raise InputError('--remap', 'INPUT:=TOPIC, once for an input', ', '.join(remapped))

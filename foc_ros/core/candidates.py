@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from .config import FocConfig, LikelihoodConfig
+from .config import ONLINE, FocConfig, LikelihoodConfig
 from .deadline import NEVER, Deadline
 from .homotopy import find_path_sides
 from .homotopy.branch_times import compute_branch_times
@@ -177,13 +177,14 @@ def rank_candidates(
     branch_times = compute_branch_times(taken, obstacles) if likelihood.lookahead_s > 0.0 else None
     costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))
     decisions = choice = None
-    is_learnt = likelihood.adaptation == 'online'
+    is_learnt = likelihood.adaptation == ONLINE
     has_far_choices = likelihood.weaving > 0.0 or likelihood.beta_beyond != likelihood.beta
     if len(taken) > 1 and (has_far_choices or is_learnt):
         goal, sides = np.array([each.candidate.goal for each in taken], dtype=np.intp), tuple(each.sides for each in taken)
         decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
         if is_learnt:
-            choice = Choice(hand.stamp_ns, obstacles, goals, goal, sides, costs, shortfalls, branch_times, decisions)
+            made = hand.stamp_ns, hand.onset_ns, obstacles, goals
+            choice = Choice(*made, goal, sides, costs, shortfalls, branch_times, decisions)
     shares = compute_likelihoods(costs, likelihood, branch_times, shortfalls, decisions)
     pairs = zip(taken, shares.tolist(), strict=True)
     ranked = [replace(each, likelihood=share) for each, share in pairs]

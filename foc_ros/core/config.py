@@ -17,7 +17,8 @@ from .registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registr
 PLANES = ('xy', 'xz', 'yz')
 DURATION_MODELS = ('fixed', 'fitts', 'cost_of_time')
 ARRIVALS = ('rest', 'passing')
-ADAPTATIONS = ('none', 'online')
+ONLINE = 'online'
+ADAPTATIONS = ('none', ONLINE)
 BOUNDS = ('cantelli', 'gaussian')
 RISKS = ('step', 'path')
 GUIDANCE_MODES = ('path', 'trajectory')
@@ -118,7 +119,7 @@ class CovarianceConfig:
         100.0,
     )
     adaptation: str = _p(
-        'online', 'whether both factors follow the errors of earlier predictions, with factors on them', choices=ADAPTATIONS
+        'online', 'whether both factors are multiplied by factors that are learnt from earlier errors', choices=ADAPTATIONS
     )
 
 
@@ -189,7 +190,7 @@ class LikelihoodConfig:
 
 @dataclass(frozen=True)
 class ExperienceConfig:
-    """Use of the recordings in the class library (`homotopy.library`) as evidence."""
+    """Use of recordings as evidence: those in the class library (`homotopy.library`), and those that are learnt."""
 
     learning: str = _p(
         'none', 'whether movements that end at a goal are added to the recordings of the running program', choices=ADAPTATIONS

@@ -210,15 +210,19 @@ class Pipeline:
 
     def set_engaged(self, on: bool) -> None:
         """Engage or disengage: while disengaged the hand is followed, but nothing is predicted."""
-        if on != self.is_engaged:
-            self._forget_predictions()
-            self._is_new = False
-            self._learn(self.learnt.interrupt())
-        self.is_engaged = on
+        if on == self.is_engaged:
+            return
+        self.is_engaged, self._is_new = on, False
+        self._forget_predictions()
+        self._learn(self.learnt.interrupt())
 
     def remove_source(self, source: str) -> None:
         """Forget the obstacles of one source, as if none of its messages had been received."""
         self.scene = self.scene.without_source(source)
+
+    def forget_scene(self) -> None:
+        """Forget obstacles, goals and the working frame, unless the parameter fixes it."""
+        self.scene, self.frame_id = Scene(), self.config.frame_id or None
 
     def reset(self) -> None:
         """Forget the movement and the operator; keep the scene, the working frame and the counts."""

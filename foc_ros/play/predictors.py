@@ -46,7 +46,7 @@ COUNTERS = {
     'scene_goal_inside': 'predictions had a goal within an obstacle',
     'scene_no_way': 'predictions had a goal to which there is no way',
 }
-"""What the counters of the diagnostics mean that rise most often, before their number."""
+"""Words for the most frequent counters of the diagnostics; the number follows them."""
 
 Receive = Callable[[str, bytes], None]
 """Takes topic and bytes of an output, in any thread."""

@@ -1,8 +1,8 @@
 """The thread of guidance: updates at `guidance.rate_hz` by the steady clock, whatever the executor and the predictions do.
 
 The executor tells the thread what is new by replacing one record; the thread reads it at each update. So neither waits for the
-other. While guidance is enabled, the thread has the priority `guidance.realtime_priority`, if that is permitted: an update takes
-less than its period, and the thread sleeps between two updates. While guidance is disabled, the thread waits without updates.
+other. While guidance is enabled, the thread has the priority `guidance.realtime_priority`, if that is permitted: the thread
+sleeps after each update, so that others run as well. While guidance is disabled, the thread waits without updates.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ class GuidanceLoop:
             self._enabled.clear()
 
     def _run(self) -> None:
-        """Update at fixed instants; those that are missed are left out."""
+        """Update once in a period; a late update shifts the following ones."""
         due_s, priority = monotonic(), ThreadPriority(self._warn)
         while not self._end.wait(max(due_s - monotonic(), 0.0)):
             if self._zeros >= ZEROS and not self._enabled.is_set():

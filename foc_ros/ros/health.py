@@ -253,9 +253,9 @@ def _describe_operator(pipeline: Pipeline) -> str:
     near, beyond = preferences.factors
     arrival, factor = pace.find_best(pipeline.config.duration)
     durations = f'{pace.movements} movements, durations x {factor:.2f}, arrival {arrival}'
-    choices = f'{preferences.movements} choices, near x {near:.2f}, far x {beyond:.2f}'
+    choices = f'{preferences.movements} movements with choices, near ones x {near:.2f}, far ones x {beyond:.2f}'
     now, later = dispersion.factors
-    errors = f'{dispersion.errors} errors, near x {now:.2f}, far x {later:.2f}'
+    errors = f'{dispersion.errors} errors, standard deviations x {now:.2f} now, x {later:.2f} at the end'
     recorded = f'{len(movements.learnt)} movements recorded, {movements.refused} refused'
     return f'{durations}; {choices}; {errors}; {recorded}'
 

@@ -23,9 +23,9 @@ from .transforms import Arrival
 class Intake:
     """Takes messages by the name of their input; one that cannot be decoded changes nothing and is counted.
 
-    A hand pose that is later than the last one that was used by less than `estimator.min_interval_s` is skipped and counted, and
-    nothing of it but its stamp is looked at. A marker whose lifetime ends before the stamp of the last hand sample does not exist
-    for it. Attributes: pipeline; sample: the last decoded hand sample; last_refusal: why the last refused message was refused.
+    A hand pose less than `estimator.min_interval_s` after the last used one is skipped and counted, and nothing of it but its
+    stamp is looked at. A marker whose lifetime ends before the stamp of the last hand sample does not exist for it. Attributes:
+    pipeline; sample: the last decoded hand sample; last_refusal: why the last refused message was refused.
     """
 
     def __init__(self, pipeline: Pipeline) -> None:

@@ -41,7 +41,8 @@ def check_parameters(arguments: Sequence[str]) -> None:
     """Raise ParameterError for wrong parameters in the ROS arguments of a node, before the node is imported, which takes seconds.
 
     This leaves to the node what it cannot read as simply as ROS would: a node with another name or namespace, a file without a
-    section for the default name, and parameters of one node among several. The node checks all that it is given.
+    section for the default name, parameters of one node among several, and texts that PyYAML takes for dates or numbers. The
+    node checks all that it is given.
     """
     values: dict[str, object] = {}
     try:
@@ -54,7 +55,10 @@ def check_parameters(arguments: Sequence[str]) -> None:
                 name, _, text = given.partition(':=')
                 if ':' in name:
                     return
-                values.update(_flatten_group({name: parse_yaml(text)}))
+                value = parse_yaml(text)
+                if name in KNOWN and isinstance(KNOWN[name].default, str) and not isinstance(value, str):
+                    return
+                values.update(_flatten_group({name: value}))
     except (FocError, ValueError, yaml.YAMLError):
         return
     replace_values(Config(), values)

@@ -9,7 +9,7 @@ REMEDY = 'allow it with `rtprio` in /etc/security/limits.d, or set guidance.real
 
 
 class ThreadPriority:
-    """Sets the real-time priority of the thread that calls it. A thread that it starts has an ordinary priority.
+    """Sets the real-time priority of the thread that calls it. Threads started by that thread have an ordinary priority.
 
     A thread with such a priority runs before all ordinary threads of the machine, so it must do little and sleep often.
 

@@ -113,25 +113,27 @@ def observe(recording: Recording, config: Config, replayed: Replay | None = None
 
     replayed: a replay with the same config that goes on, with what it has learnt but not with its scene; a new one if not given.
     """
-    replayed = replayed or Replay(config)
-    replayed.forget_scene()
+    if replayed is None:
+        replayed = Replay(config)
+    else:
+        replayed.forget_scene()
     stamps: list[int] = []
     positions: list[Array] = []
-    made: list[tuple[Step, HandState]] = []
+    made: list[tuple[Step, HandState, Config]] = []
     for step in replayed.steps(recording.items()):
         if step.sample is not None:
             stamps.append(step.sample.stamp_ns)
             positions.append(step.sample.position)
         if step.prediction is not None and step.prediction.candidates_with_likelihood:
             assert replayed.pipeline.hand_state is not None
-            made.append((step, replayed.pipeline.hand_state))
+            made.append((step, replayed.pipeline.hand_state, replayed.pipeline.adapted_config))
     if not made:
         reason = replayed.describe_refusals() or replayed.pipeline.not_ready_reason() or 'no candidate could be solved'
         raise RecordingError(f'{recording.name}: nothing could be predicted: {reason}')
     goals = made[-1][0].scene.goals
     assert goals is not None
     path = RecordedPath(np.array(stamps), np.array(positions), goals)
-    found = [make_observation(step, hand, path, config) for step, hand in made if hand.stamp_ns <= path.end_ns]
+    found = [make_observation(step, hand, path, adapted) for step, hand, adapted in made if hand.stamp_ns <= path.end_ns]
     if not found:
         raise RecordingError(f'{recording.name}: nothing was predicted before its goal was reached')
     return ObservedRecording(recording.name, tuple(found), path)
@@ -152,7 +154,10 @@ def observe_in_order(recordings: Sequence[Recording], config: Config) -> tuple[l
 
 
 def make_observation(step: Step, hand: HandState, path: RecordedPath, config: Config) -> Observation:
-    """Return one prediction, with the hand that it was made from, beside what came: path is the whole path of the hand."""
+    """Return one prediction, with the hand that it was made from, beside what came.
+
+    path: the whole path of the hand; config: adapted to the operator, as for the prediction.
+    """
     prediction, goals = step.prediction, step.scene.goals
     assert prediction is not None and goals is not None
     obstacles = step.scene.obstacles(prediction.stamp_ns)

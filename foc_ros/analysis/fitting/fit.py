@@ -27,9 +27,9 @@ PREDICTIONS = 10
 """About as many predictions are made in each recording, because neighbours say the same."""
 MIN_FOLDS = 3
 """Recordings below which there is no cross-validation."""
-UNSCALED = {'covariance.near': 1.0, 'covariance.far': 1.0}
-"""Factors on standard deviations in the replays of a fit and after it, because it fits what they multiply."""
-LEARNT = {'likelihood.adaptation': 'none'}
+UNSCALED: dict[str, object] = {'covariance.near': 1.0, 'covariance.far': 1.0}
+"""A fit sets both factors to 1, because it fits the covariances that they multiply."""
+LEARNT: dict[str, object] = {'likelihood.adaptation': 'none'}
 """What a fit switches off: choices are known from many movements, and learning them anew from a few makes them worse."""
 
 
@@ -50,12 +50,12 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, executor
         fit.take(*fit_plans(_make_reaches(hands, fit), fit.config))
     duration_s = float(np.median([each.times[-1] for each in hands]))
     rate_hz = clip_to_bounds('rate_hz', min(config.rate_hz, PREDICTIONS / max(duration_s, 1e-3)))
-    thinned = {'rate_hz': rate_hz, 'covariance.adaptation': 'none', **UNSCALED}
-    _search(hands, fit, Replays(usable, thinned, executor), may_lower_eta)
-    _fit_to_one_replay(usable, fit, thinned, executor)
-    given = flatten(config)
-    fit.chosen |= {name: value for name, value in LEARNT.items() if given[name] != value}
-    fit.config = replace_values(fit.config, {**UNSCALED, **LEARNT})
+    thinned = {'rate_hz': rate_hz, 'covariance.adaptation': 'none'}
+    _search(hands, fit, Replays(usable, thinned | UNSCALED, executor), may_lower_eta)
+    _fit_to_one_replay(usable, fit, thinned | UNSCALED, executor)
+    given, decided = flatten(config), UNSCALED | LEARNT
+    fit.chosen |= {name: str(value) for name, value in decided.items() if given[name] != value}
+    fit.config = replace_values(fit.config, decided)
     compared = {name: usable[name] for name in sample_names(list(usable))}
     fit.comparison = compare_configs(compared, (config, fit.config), thinned, executor)
     fit.warnings[:0] = find_worse_positions(fit.comparison)

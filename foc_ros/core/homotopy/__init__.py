@@ -1,6 +1,7 @@
 """Homotopy classes of the paths from the hand to the goals: which classes exist, their names, and an initial guess in each.
 
-Enters: the hand, the goals and the obstacles. Leaves: candidates, and the side on which a given path passes an obstacle.
+Enters: the hand, the goals and the obstacles. Leaves: candidates, the side on which a given path passes an obstacle, and the
+decisions that tell candidates apart.
 May import `foc_ros.core.dynamics`, `obstacles`, `estimation` and the ground modules.
 """
 

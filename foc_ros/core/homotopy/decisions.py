@@ -1,9 +1,10 @@
 """The decisions that tell classes apart: which gap each takes in the next row, and in how many rows it turns back.
 
 An obstacle is open if some classes pass it on the left and others on the right. Open obstacles form rows (`rows`), and the next
-row is the first of them that is still ahead of the hand. Where no row is ahead, the next decision is that between the goals. A
-class weaves through a row if it passes an obstacle on the right and
-one to the right of that on the left, so that it goes through several gaps of this row.
+row is the first of them that is still ahead of the hand. Where no row is ahead, the next decision is that between the goals.
+
+A class weaves through a row if it passes one obstacle on its right side, and another one, farther to the right, on its left side:
+it goes through several gaps of this row.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.homotopy import compute_swept_angles
 from foc_ros.core.obstacles.chance_constraint import centre_trajectories
 from foc_ros.core.types import LEFT, RIGHT, Array, HandState, Obstacles, Solution
 
 from .rows import WALL, find_direction, find_rows, locate_rows
+from .sides import compute_swept_angles
 
 NO_OBSTACLES = np.zeros(0, dtype=np.intp)
 

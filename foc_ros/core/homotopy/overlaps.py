@@ -1,4 +1,4 @@
-"""How shapes hold, overlap and cover each other.
+"""Which shapes contain the centre of another, overlap, and cover its boundary.
 
 Of two shapes that overlap, each part of one that stands out of the other begins and ends with a tangent, and the boundary is cut
 where the other shape covers it.

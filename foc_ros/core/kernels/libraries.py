@@ -1,9 +1,9 @@
 """How kernels are compiled: what an entry kernel (`@compiled`) calls is linked to it, and optimised with it, once.
 
 Numba makes machine code of every function that a kernel calls, its own functions for arrays too, after it has linked and
-optimised all that this function calls. Nobody uses the machine code of an inner function, and its callers repeat the
+optimised all that this function calls. The machine code of an inner function is never called, and its callers repeat the
 optimisation. Here an inner function is intermediate code and a list of the functions that it calls, and only entry kernels become
-machine code. The classes are numba's own with other answers in a few of its internal methods.
+machine code. The classes derive from numba's and override a few internal methods.
 """
 
 # mypy: allow-untyped-calls
@@ -25,7 +25,7 @@ class InnerLibrary(JITCodeLibrary):
 
     @property
     def codegen(self) -> Any:
-        """Return what numba tells the environment of a function, which only machine code has."""
+        """Return an object that ignores environments: only machine code has one."""
         return _NoEngine()
 
     def get_pointer_to_function(self, _: str) -> int:

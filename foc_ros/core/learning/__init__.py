@@ -1,4 +1,4 @@
-"""Learning: movements that ended enter; what they say about the operator and about the scene leaves.
+"""Learning: the hand's movements and their predictions enter; what they say about the operator and about the scene leaves.
 
 `learnt` holds all of it: `pace` is how the operator moves and arrives, `choices` how precisely they choose, `dispersion` how
 large the errors of predictions are, and `movements` which recordings of the scene there are. `experience` is how recordings

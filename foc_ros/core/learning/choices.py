@@ -30,7 +30,8 @@ from foc_ros.core.homotopy.decisions import Decisions
 from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Obstacles, Record, as_readonly
 
-from .pace import REMAINING_SHARE, choose_judged, compute_mean_factors, sample_movement
+from .goal_reached import find_chosen_goal
+from .judging import choose_judged, compute_mean_factors, sample_movement
 
 FACTORS = as_readonly(2.0 ** np.arange(-5.0, 6.0))
 """Factors that are judged, for near and for far choices."""
@@ -44,11 +45,12 @@ UNEXPLAINED = 0.01
 class Choice(Record):
     """A prediction among k classes, at least two, about obstacles and goals (g, 2) [m] at a stamp.
 
-    goal (k,): row of the goal of each class; sides: sides by id on which each passes obstacles; costs, shortfalls, branch_times,
-    decisions: what `compute_likelihoods` takes.
+    onset_ns: when the movement of the hand began, None at rest; goal (k,): row of the goal of each class; sides: sides by id on
+    which each passes obstacles; costs, shortfalls, branch_times, decisions: what `compute_likelihoods` takes.
     """
 
     stamp_ns: int
+    onset_ns: int | None
     obstacles: Obstacles
     goals: Array
     goal: NDArray[np.intp]
@@ -66,7 +68,7 @@ class Choice(Record):
         centres = self.obstacles.centre + seconds[:, None, None] * self.obstacles.velocity
         passed = find_path_sides(path, self.obstacles, centres).items()
         agrees = np.array([all(each.get(identity, side) == side for identity, side in passed) for each in self.sides])
-        reached = _find_reached_goal(path[-1], self.goals)
+        reached = find_chosen_goal(path[-1], self.goals)
         return agrees if reached is None else agrees & (self.goal == reached)
 
     def score(self, agrees: NDArray[np.bool_], likelihoods: Sequence[LikelihoodConfig]) -> Array:
@@ -109,11 +111,13 @@ class Preferences(Record):
         return followed if states is followed.states else replace(followed, states=states)
 
     def add(self, choice: Choice | None) -> Preferences:
-        """Return the preferences after a prediction in the present movement, or at rest, where the last one before it counts."""
-        if choice is None or not self.states or choice.stamp_ns < self.states[0].stamp_ns:
+        """Return the preferences after a prediction in the present movement, or at rest, where the last one before it counts.
+
+        A prediction takes time: one that began at rest may end in the movement, and one of an earlier movement comes too late.
+        """
+        if choice is None or not self.states or choice.onset_ns not in (None, self.states[-1].onset_ns):
             return self
-        is_at_rest = self.states[-1].onset_ns is None
-        return replace(self, choices=(choice,) if is_at_rest else sample_movement(self.choices, choice))
+        return replace(self, choices=(choice,) if choice.onset_ns is None else sample_movement(self.choices, choice))
 
     def interrupt(self) -> Preferences:
         """Return the preferences without the present movement."""
@@ -137,11 +141,3 @@ def _scale_exponents(config: LikelihoodConfig, near: float, beyond: float) -> Li
     """Return the likelihood with factors on the logarithms of the weights, by near and by far choices, within the bounds."""
     scaled = {'beta': near * config.beta, 'shortfall': near * config.shortfall, 'beta_beyond': beyond * config.beta_beyond}
     return clip_values(config, scaled)
-
-
-def _find_reached_goal(end: Array, goals: Array) -> int | None:
-    """Return the goal (g, 2) [m] at which a movement ends: near its end (2,), compared with the distances between goals."""
-    distance = np.hypot(*(goals - end).T)
-    nearest = int(distance.argmin())
-    between = np.hypot(*(np.delete(goals, nearest, axis=0) - goals[nearest]).T)
-    return nearest if distance[nearest] <= REMAINING_SHARE * between.min(initial=np.inf) else None

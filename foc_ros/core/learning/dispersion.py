@@ -1,7 +1,7 @@
 """What is learnt of the errors of predicted positions: factors on the standard deviations, from now to the end of a movement.
 
-The parameters of the covariance are expectations, and devices and people differ by much. How far the hand comes beside where the
-mixture of all candidates predicted it shows what they should be. The standard deviations of a candidate that lasts T are
+The parameters of the covariance are expectations, and devices and people differ by much. The distances between predicted and true
+positions show what the standard deviations should be. The standard deviations of a candidate that lasts T are
 multiplied, at a time t ahead, by a factor that leads from `covariance.near` = f now to `covariance.far` = f' at its end:
 
     f(t) = f^(1 - s) f'^s,  s = t / T.                                                                                      (1)
@@ -15,9 +15,9 @@ the log-posterior
 
     log w(f, f') = -(log^2 f + log^2 f') / (2 s^2) + sum_h sum_predictions c log sum_i p_i N(x; m_i, f(h)^2 S_i).
 
-The errors within one second, which depend on each other, count as one: c is the time since the prediction before over 1 s, or
-`SAMPLE_S` over 1 s for the first one of a movement. The factors in use are the posterior means, of the logarithms. They change
-little from one prediction to the next, as stiffness needs it.
+The errors within one second, which depend on each other, count as one: c is the time since the prediction before over 1 s, at
+most 1, or `SAMPLE_S` over 1 s for the first one of a movement. The factors in use are the posterior means, of the logarithms.
+They change little from one prediction to the next, as stiffness needs it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ import numpy as np
 from foc_ros.core.config import CovarianceConfig, clip_values
 from foc_ros.core.types import NANOSECONDS, Array, HandState, PredictedCandidate, Record, Solution, as_readonly
 
-from .pace import compute_mean_factors
+from .judging import compute_mean_factors
 
 LOG_FACTORS = as_readonly(math.log(2.0) * np.linspace(-3.0, 2.0, 11))
 """Logarithms of the factors that are judged, for now and for the end."""
@@ -51,7 +51,7 @@ VARIANCE_FLOOR = 1e-12
 class Forecast(Record):
     """Where a prediction at a stamp expects the hand at a time ahead: a mixture of k normal distributions.
 
-    due_ns: the time ahead, as a stamp; count: of observations, as which it counts; share (k,): s in equation 1; weight (k,);
+    due_ns: the time ahead, as a stamp; count: its weight, in independent observations; share (k,): s in equation 1; weight (k,);
     mean (k, 2) [m]; covariance (k, 2, 2) [m^2]: without the factors.
     """
 
@@ -109,7 +109,7 @@ class Dispersion(Record):
             return replace(self, hand=hand)
         total = self.scores.copy()
         for each in reached:
-            share = max((each.due_ns - before.stamp_ns) / (hand.stamp_ns - before.stamp_ns), 0.0)
+            share = (each.due_ns - before.stamp_ns) / (hand.stamp_ns - before.stamp_ns)
             total += each.count * each.score((1.0 - share) * before.mean[:2] + share * hand.mean[:2])
         left = tuple(each for each in self.forecasts if each.due_ns > hand.stamp_ns)
         factors = compute_mean_factors(LOG_FACTORS, total, PRIOR_STDDEV)
@@ -125,7 +125,8 @@ class Dispersion(Record):
             return self
         count = min(since_s / DEPENDENT_S, 1.0)
         made = [make_forecast(stamp_ns, ahead_s, count, taking_part, config) for ahead_s in HORIZONS_S]
-        return replace(self, taken_ns=stamp_ns, forecasts=(*self.forecasts, *made))
+        later = [each for each in made if each.due_ns > self.hand.stamp_ns]  # a prediction may take longer than the first time
+        return replace(self, taken_ns=stamp_ns, forecasts=(*self.forecasts, *later))
 
     def interrupt(self) -> Dispersion:
         """Return what is known without the present movement."""

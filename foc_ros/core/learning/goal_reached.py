@@ -1,7 +1,8 @@
 """When a movement has reached a goal. All that learning, `evaluate` and `fit` say of it is decided here.
 
-Three questions need three answers. Scores need the goal that the hand visited last, even if the recording goes on. A plan or a
-demonstration needs a path that ends at the goal. Durations need a movement that covered most of its distance.
+Four questions need four answers. Scores need the goal that the hand visited last, even if the recording goes on. A plan or a
+demonstration needs a path that ends at the goal. Durations need a movement that covered most of its distance. A choice between
+goals needs a movement that ends much nearer to one of them than they are to each other.
 """
 
 from __future__ import annotations
@@ -10,8 +11,8 @@ import numpy as np
 
 from foc_ros.core.types import Array
 
-from .pace import REMAINING_SHARE
-
+REMAINING_SHARE = 0.25
+"""A movement that leaves no more than this share of its first distance to a goal has covered the distance."""
 AT_GOAL_M = 0.05
 """A path that ends no farther from a goal than this ends at it [m]."""
 
@@ -44,3 +45,10 @@ def has_covered_distance(positions: Array, goal: Array) -> bool:
     """Tell whether a path (m, 2) [m] came to within REMAINING_SHARE of its first distance from a goal (2,) [m]."""
     distance = np.hypot(*(positions - goal).T)
     return bool(distance.min() <= REMAINING_SHARE * distance[0])
+
+
+def find_chosen_goal(end: Array, goals: Array) -> int | None:
+    """Return the goal (g, 2) [m] at the end (2,) of a movement, None if it is farther than REMAINING_SHARE of the next goal."""
+    goal, distance_m = find_goal_at_end(end[None], goals)
+    between = np.hypot(*(np.delete(goals, goal, axis=0) - goals[goal]).T)
+    return goal if distance_m <= REMAINING_SHARE * between.min(initial=np.inf) else None

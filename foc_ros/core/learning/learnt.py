@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from foc_ros.core.config import Config, CovarianceConfig
+from foc_ros.core.config import ONLINE, Config, CovarianceConfig
 from foc_ros.core.obstacles.scene import Scene
 from foc_ros.core.types import HandState, Prediction
 
@@ -18,7 +18,6 @@ from .dispersion import Dispersion
 from .movements import Movements
 from .pace import Pace
 
-ONLINE = 'online'
 DISPERSED_BY = ('foc', 'duration', 'covariance', 'estimator')
 """Groups of parameters on which errors and covariances depend."""
 
@@ -68,10 +67,10 @@ class Learnt:
     def reconfigure(self, before: Config, now: Config) -> Learnt:
         """Return what still holds with other parameters: what depends on one that changed is forgotten."""
         is_dispersed = any(getattr(before, name) != getattr(now, name) for name in DISPERSED_BY)
-        is_recorded = (before.experience, before.estimator) != (now.experience, now.estimator)
+        is_recorded = (before.experience.learning, before.estimator) == (now.experience.learning, now.estimator)
         return Learnt(
             self.pace if before.duration == now.duration else Pace(),
             self.preferences if before.likelihood == now.likelihood else Preferences(),
             Dispersion() if is_dispersed else self.dispersion,
-            Movements() if is_recorded else self.movements,
+            self.movements if is_recorded else Movements(),
         )

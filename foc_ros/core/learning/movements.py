@@ -25,7 +25,7 @@ from .goal_reached import AT_GOAL_M, find_goal_at_end, find_reached_goal
 Stamped = tuple[int, Array]
 """A stamp [ns] and the state then (4,): x, y, vx, vy [m, m/s]."""
 AROUND_S = 1.0
-"""Time before the onset and after the goal that a demonstration contains [s]: predictions near both look as far."""
+"""Time before the onset and after the goal that a demonstration contains [s]: predictions near either end look that far."""
 SHORTEST_M = 0.05
 """Shorter movements demonstrate nothing [m]."""
 MOST_LEARNT = MOST_NEAR
@@ -91,7 +91,10 @@ class Movements(Record):
         assert hand is not None and self.onset_ns is not None
         if goals is None or not len(goals):
             raise RecordingError('a movement without goals')
-        stamps, states = np.array([stamp for stamp, _ in self.states]), np.array([state for _, state in self.states])
+        if not self.scene.sources:
+            raise RecordingError('a movement before the first message of obstacles')
+        stamps = np.array([stamp for stamp, _ in self.states])
+        states = np.array([state for _, state in self.states]).reshape(-1, 4)
         if len(stamps) == MOST_STATES and stamps[0] > self.onset_ns:
             raise RecordingError(f'expected a movement of at most {STEP_S * MOST_STATES - AROUND_S:g} s, got a longer one')
         first, beyond = np.searchsorted(stamps, [self.onset_ns, hand.stamp_ns if self.ended_ns is None else self.ended_ns + 1])

@@ -25,15 +25,16 @@ jerk is nearest to them with another duration than theirs.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol, TypeVar
 
 import numpy as np
 
 from foc_ros.core.config import ARRIVALS, DurationConfig
 from foc_ros.core.estimation.duration import estimate_times_to_go, is_passing, scale_durations
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Record, as_readonly
+
+from .goal_reached import has_covered_distance
+from .judging import choose_judged, sample_movement
 
 FACTORS = as_readonly(np.exp(np.linspace(-0.8, 1.6, 25)))
 """Factors that are judged."""
@@ -43,47 +44,6 @@ ARRIVAL_WEIGHT = 0.1
 """Weight of another arrival than that of the parameters, likewise."""
 AHEAD_S = 0.5
 """How far ahead positions are judged [s]."""
-REMAINING_SHARE = 0.25
-"""A movement that leaves no more than this share of its first distance to a goal has covered the distance."""
-SAMPLE_S = 0.05
-"""Interval at which states of a movement are kept [s]."""
-MOST_STATES, JUDGED = 1000, 10
-"""Numbers of states of a movement that are kept and, spread evenly over it, judged at most."""
-
-T = TypeVar('T')
-S = TypeVar('S', bound='Stamped')
-
-
-class Stamped(Protocol):
-    """What belongs to a stamp [ns]."""
-
-    @property
-    def stamp_ns(self) -> int:
-        """The stamp [ns]."""
-
-
-def sample_movement(kept: tuple[S, ...], following: S) -> tuple[S, ...]:
-    """Return what is kept of a movement after what follows in it, at most `MOST_STATES` that are `SAMPLE_S` apart."""
-    if len(kept) >= MOST_STATES or (kept and following.stamp_ns - kept[-1].stamp_ns < SAMPLE_S * NANOSECONDS):
-        return kept
-    return (*kept, following)
-
-
-def choose_judged(kept: Sequence[T]) -> list[T]:
-    """Return at most `JUDGED` of what was kept of a movement, spread evenly over it."""
-    return [kept[row] for row in np.unique(np.linspace(0, len(kept) - 1, min(JUDGED, len(kept))).astype(int))]
-
-
-def compute_mean_factors(logs: Array, scores: Array, prior_stddev: float) -> tuple[float, float]:
-    """Return the geometric posterior means of two factors, each on a grid of logarithms (f,).
-
-    scores (f, f'): log-likelihood of each pair; prior_stddev: of the logarithms, about zero, before anything is known.
-    """
-    prior = -0.5 * (logs / prior_stddev) ** 2
-    total = scores + prior[:, None] + prior
-    weights = np.exp(total - total.max())
-    weights /= weights.sum()
-    return float(np.exp(weights.sum(axis=1) @ logs)), float(np.exp(weights.sum(axis=0) @ logs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,12 +51,13 @@ class Pace(Record):
     """The pace and arrival of an operator, from the movements so far.
 
     movements: how many were judged; losses (2, f): sum of the errors by `ARRIVALS` and factor, with the prior of the factor;
-    states: of the present movement.
+    states: of the present movement; goals (g, 2): at its last state [m].
     """
 
     movements: int = 0
     losses: Array = field(default_factory=lambda: np.tile(PRIOR_WEIGHT * np.log(FACTORS) ** 2, (2, 1)))
     states: tuple[HandState, ...] = ()
+    goals: Array | None = None
 
     def find_best(self, config: DurationConfig) -> tuple[str, float]:
         """Return the arrival, and the factor on expected durations, which is exactly 1 before the first movement."""
@@ -115,23 +76,25 @@ class Pace(Record):
         """Return the pace after the next state of the hand; goals (g, 2) [m]; config: before it is adapted."""
         pace = self
         if self.states and self.states[0].onset_ns != hand.onset_ns:
-            pace = replace(self, states=()) if goals is None or not len(goals) else self._judge(goals, config)
+            pace = self._judge(config)
         if hand.onset_ns is None:
             return pace
         states = sample_movement(pace.states, hand)
-        return pace if states is pace.states else replace(pace, states=states)
+        return pace if states is pace.states and goals is pace.goals else replace(pace, states=states, goals=goals)
 
     def interrupt(self) -> Pace:
         """Return the pace without the present movement."""
-        return replace(self, states=())
+        return replace(self, states=(), goals=None)
 
-    def _judge(self, goals: Array, config: DurationConfig) -> Pace:
+    def _judge(self, config: DurationConfig) -> Pace:
         """Return the pace after the end of the present movement, which counts if it covered the distance to a goal."""
-        path, ended = np.array([each.mean[:2] for each in self.states]), replace(self, states=())
+        path, ended = np.array([each.mean[:2] for each in self.states]), self.interrupt()
         first = self.states[0].onset_position
         assert first is not None
-        goal = goals[int(np.hypot(*(goals - path[-1]).T).argmin())]
-        if np.hypot(*(path - goal).T).min() > REMAINING_SHARE * float(np.hypot(*(first - goal))):
+        if self.goals is None or not len(self.goals):
+            return ended
+        goal = self.goals[int(np.hypot(*(self.goals - path[-1]).T).argmin())]
+        if not has_covered_distance(np.vstack([first, path]), goal):
             return ended
         errors, moved = self._sum_errors(path, goal, config)
         if not moved:

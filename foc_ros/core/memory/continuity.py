@@ -12,8 +12,8 @@ where a = 0 for a fresh answer, and b_i is the l_i of the prediction before: 0 f
 sum to one, and so does f.
 
 A class is the same one under another name if one of the names is the other with obstacles left out. Of several that it may have
-become, the one with the largest p has what it had, and the others fade in. What a class had that has become none is divided among
-all.
+become, the one with the largest p has what it had, and the others fade in. The share of a class that has disappeared is
+divided among all.
 """
 
 from __future__ import annotations
