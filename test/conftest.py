@@ -1,6 +1,7 @@
 """What all tests share: their marks, a private ROS graph, and failure instead of a skip where ROS is required."""
 
 import os
+import signal
 from collections.abc import Iterator
 
 import pytest
@@ -12,6 +13,9 @@ from tiers import add_marks
 from foc_ros.ros.messages.types import MessageTypes
 
 prepare_environment()
+
+# A shell starts a job in the background with SIGINT ignored, and its processes inherit this: a test that sends it would wait.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Every run uses the same examples, without a time limit, because a test must not fail on a busy machine.
 settings.register_profile('seeded', derandomize=True, deadline=None)

@@ -111,5 +111,8 @@ def test_a_command_is_interrupted_at_any_moment(turn: int) -> None:
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(random.Random(turn).uniform(0.0, 0.5 * turn) + 1e-6)
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=LIMIT_S)
+        try:
+            _, errors = process.communicate(timeout=LIMIT_S)
+        finally:
+            process.kill()
     assert (process.returncode, errors) == (130, '')
