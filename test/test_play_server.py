@@ -26,7 +26,7 @@ from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
-from foc_ros.play.address import is_loopback, open_sockets
+from foc_ros.play.address import describe_page, is_loopback, open_sockets
 from foc_ros.play.page_messages import LONGEST_MESSAGE
 from foc_ros.play.predictors import LibraryPredictor
 from foc_ros.play.server import FILES, is_own_host, listen
@@ -164,6 +164,13 @@ def test_loopback() -> None:
     assert [each for each in ('127.0.0.1', 'localhost', '::1', '0.0.0.0', '192.168.1.7', 'lab') if is_loopback(each)] == [
         '127.0.0.1', 'localhost', '::1',
     ]  # fmt: skip
+
+
+def test_the_address_of_the_page_can_be_opened() -> None:
+    assert describe_page('127.0.0.1', 8420) == 'http://127.0.0.1:8420 in a browser'
+    assert describe_page('::1', 8420) == 'http://[::1]:8420 in a browser'
+    words = 'http://0.0.0.0:8420 in a browser, on other computers with an address of this one in place of 0.0.0.0'
+    assert describe_page('0.0.0.0', 8420) == words
 
 
 def test_a_wrong_option_is_refused_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
