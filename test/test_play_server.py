@@ -195,6 +195,14 @@ def test_the_command_ends_when_it_is_stopped(tmp_path: Path, number: int) -> Non
         assert started.process.wait(30) == 0
 
 
+def test_without_rclpy_the_message_names_the_option(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr('foc_ros.cli.play.find_spec', lambda _: None)
+    assert main(['play', '--data', str(tmp_path), '--port', '0']) == 2
+    assert 'rclpy is not installed: use --no-ros, or ' in capsys.readouterr().err
+
+
 def test_without_tornado_the_message_says_what_to_install(tmp_path: Path) -> None:
     (tmp_path / 'tornado.py').write_text('raise ImportError')
     paths = os.pathsep.join([str(tmp_path), str(Path(__file__).parents[1]), *filter(None, [os.environ.get('PYTHONPATH')])])
