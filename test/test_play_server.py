@@ -26,7 +26,7 @@ from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
-from foc_ros.play.address import is_loopback, open_sockets
+from foc_ros.play.address import describe_page, is_loopback, open_sockets
 from foc_ros.play.page_messages import LONGEST_MESSAGE
 from foc_ros.play.predictors import LibraryPredictor
 from foc_ros.play.server import FILES, is_own_host, listen
@@ -166,6 +166,13 @@ def test_loopback() -> None:
     ]  # fmt: skip
 
 
+def test_the_address_of_the_page_can_be_opened() -> None:
+    assert describe_page('127.0.0.1', 8420) == 'http://127.0.0.1:8420 in a browser'
+    assert describe_page('::1', 8420) == 'http://[::1]:8420 in a browser'
+    words = 'http://0.0.0.0:8420 in a browser, on other computers with an address of this one in place of 0.0.0.0'
+    assert describe_page('0.0.0.0', 8420) == words
+
+
 def test_a_wrong_option_is_refused_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with (tmp_path / 'file').open('w'):
         pass
@@ -186,6 +193,14 @@ def test_the_command_ends_when_it_is_stopped(tmp_path: Path, number: int) -> Non
         assert 'warning: everybody who reaches 0.0.0.0 can steer the hand' in started.output
         started.process.send_signal(number)
         assert started.process.wait(30) == 0
+
+
+def test_without_rclpy_the_message_names_the_option(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr('foc_ros.cli.play.find_spec', lambda _: None)
+    assert main(['play', '--data', str(tmp_path), '--port', '0']) == 2
+    assert 'rclpy is not installed: use --no-ros, or ' in capsys.readouterr().err
 
 
 def test_without_tornado_the_message_says_what_to_install(tmp_path: Path) -> None:

@@ -90,7 +90,7 @@ def test_a_blinded_page_learns_nothing_from_what_it_receives(page: Page) -> None
 async def work(page: Page, name: str) -> dict[str, Any]:
     """Press the button of a job, and return what the page is told at its end."""
     page.send({'type': 'job', 'name': name})
-    await wait_until(lambda: page.last('job')['state'] != 'running', 400.0)
+    await wait_until(lambda: page.last('job')['state'] != 'running', 800.0)
     assert page.last('job')['state'] == 'done', page.last('job')
     return page.last('job')
 
@@ -101,7 +101,7 @@ def record_trials(page: Page, count: int) -> None:
         reach(page)
 
 
-@pytest.mark.timeout(500)
+@pytest.mark.timeout(900)
 def test_a_fit_and_its_comparison(page: Page) -> None:
     """The commands behind the buttons, on three trials."""
 

@@ -80,16 +80,16 @@ def test_hostile_text_is_escaped(browser: Any, report: Path) -> None:
 
 @pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
 def test_the_page_fits_on_a_phone(browser: Any, report: Path, tmp_path: Path, dark: bool) -> None:
-    """The page fits into a width of 390 px; it follows the dark or light mode of the system, and a button changes it."""
-    assert show(browser, report / 'index.html', 390, 844, dark) == []
-    assert browser.execute_script('return document.documentElement.scrollWidth') == 390
+    """The page fits into a width of 360 px; it follows the dark or light mode of the system, and a button changes it."""
+    assert show(browser, report / 'index.html', 360, 640, dark) == []
+    assert browser.execute_script('return document.documentElement.scrollWidth') == 360
     browser.execute_script("""
         for (const row of document.querySelectorAll('#candidates tr[data-track]')) {
           [row.cells[1].textContent, row.cells[4].textContent] = ['100 %', 'goal0: right of 1, right of 2, left of post_3'];
           [row.cells[5].textContent, row.cells[6].textContent] = ['11.81', '0.000 *'];
         }
     """)
-    assert browser.execute_script('return document.documentElement.scrollWidth') == 390
+    assert browser.execute_script('return document.documentElement.scrollWidth') == 360
     pages = [browser.execute_script('return getComputedStyle(document.body).backgroundColor')]
     picture = screenshot(browser)
     assert picture.startswith(b'\x89PNG') and len(picture) > 20_000

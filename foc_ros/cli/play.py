@@ -29,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 async def _serve(arguments: argparse.Namespace, config: Config) -> None:
     with show_compilation():
-        from foc_ros.play.address import is_loopback
+        from foc_ros.play.address import describe_page, is_loopback
         from foc_ros.play.predictors import LibraryPredictor, LivePredictor, Receive
         from foc_ros.play.server import listen, serve
         from foc_ros.play.session import Session
@@ -58,7 +58,7 @@ async def _serve(arguments: argparse.Namespace, config: Config) -> None:
                 f'warning: everybody who reaches {arguments.host} can steer the hand and start recordings; there is no password'
             )
             print(f'foc_ros play: {words}', file=sys.stderr)
-        print(f'foc_ros play: open http://{arguments.host}:{port} in a browser; Ctrl-C ends it', flush=True)
+        print(f'foc_ros play: open {describe_page(arguments.host, port)}; Ctrl-C ends it', flush=True)
         await serve(session, ended)
     finally:
         server.stop()

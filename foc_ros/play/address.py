@@ -21,6 +21,14 @@ def is_loopback(host: str) -> bool:
         return False
 
 
+def describe_page(host: str, port: int) -> str:
+    """Return the address of the page and where it can be opened."""
+    words = f'http://{f"[{host}]" if ":" in host else host}:{port} in a browser'
+    if host in ('0.0.0.0', '::'):  # noqa: S104  this is where it is warned of
+        words += f', on other computers with an address of this one in place of {host}'
+    return words
+
+
 def open_sockets(host: str, port: int) -> list[socket]:
     """Open the sockets of a host at a port, 0 for a free one; raises InputError where that is impossible."""
     try:

@@ -81,7 +81,7 @@ export class Hand {
     for (const key of this.enabled ? this.pressed : []) {
       stick = stick.map((value, axis) => value + KEYS[key][axis]);
     }
-    const pad = navigator.getGamepads().find((each) => each);
+    const pad = (navigator.getGamepads?.() ?? []).find((each) => each); // missing on a page that is reached without encryption
     if (pad && this.enabled && !this.pressed.size && Math.hypot(pad.axes[0], pad.axes[1]) > DEAD_ZONE) {
       stick = [pad.axes[0], -pad.axes[1]];
     }
