@@ -259,5 +259,5 @@ def test_the_node_learns_the_movement_that_the_pipeline_learns(ros: Graph) -> No
     intake.take('goals', pose_array(TYPES, GOALS))
     for pose in poses:
         intake.take('hand_pose', pose)
-    (live,), (learnt,) = (each.movements.finish().learnt for each in (bench.node.pipeline, intake.pipeline))
+    (live,), (learnt,) = (each.learnt.movements.finish().learnt for each in (bench.node.pipeline, intake.pipeline))
     assert is_same_recording(live, learnt)
