@@ -30,7 +30,7 @@ from foc_ros.cli.arguments import add_worker_arguments
 from foc_ros.core.config import Config
 from foc_ros.core.types import Array, Obstacles
 from foc_ros.io.bags import Item
-from foc_ros.reporting.drawing import draw_scene, get_class_style, open_figure
+from foc_ros.reporting.drawing import get_class_style, make_obstacle_patch, open_figure
 from foc_ros.reporting.plots import save_figure
 
 RUNS = [(D3IL, setting, learning) for setting in ('defaults', 'thumb_stick.yaml') for learning in ('none', 'online')]
@@ -40,6 +40,8 @@ CURVE = (0, 1, 2, 4, 8, 16, 32)
 """Numbers of earlier movements at which a part of the learning curve begins."""
 MIDDLE = f'{HORIZONS_S[1]:g}'
 WORST, COLUMNS = 10, 5
+LONGEST_NAME = 2
+"""Number of letters of an obstacle's name that a picture has room for."""
 SHOWN = 3
 """Number of candidates in a picture, the likeliest."""
 
@@ -143,13 +145,18 @@ def draw_miss(axes: Any, miss: Miss) -> None:
     low, high = positions.min(axis=0), positions.max(axis=0)
     centre, half = 0.5 * (low + high), 0.5 * float((high - low).max()) + 0.05
     bounds = centre[0] - half, centre[0] + half, centre[1] - half, centre[1] + half
-    draw_scene(axes, miss.sketch.obstacles, miss.sketch.goals, bounds, named=False)
+    obstacles = miss.sketch.obstacles
+    for row, (name, place) in enumerate(zip(obstacles.ids, obstacles.centre, strict=True)):
+        axes.add_patch(make_obstacle_patch(obstacles, row, 0.0, facecolor='0.65', edgecolor='0.35', linewidth=0.8))
+        if len(name) <= LONGEST_NAME:
+            axes.text(*place, name, ha='center', va='center', fontsize=8)
+    axes.plot(*miss.sketch.goals.T, '*', markersize=11, color='black', markerfacecolor='white')
     for slot, (likelihood, mean) in enumerate(sorted(miss.sketch.paths, key=lambda each: -each[0])[:SHOWN]):
         axes.plot(*mean.T, color=get_class_style(slot)[0], linewidth=1.0 + 3.0 * likelihood, label=f'{100 * likelihood:.0f} %')
     axes.plot(*positions[is_past].T, color='0.5', linewidth=1.5)
     axes.plot(*positions[~is_past].T, color='black', linewidth=1.5)
     axes.set(xlim=bounds[:2], ylim=bounds[2:], aspect='equal')
-    axes.legend(fontsize=7, loc='lower left', handlelength=1.0, framealpha=0.7)
+    axes.legend(fontsize=7, loc='upper center', bbox_to_anchor=(0.5, 0.0), ncols=SHOWN, handlelength=1.0, columnspacing=1.0)
 
 
 def measure(data: str, config: Config, every: int, executor: Executor) -> tuple[list[ObservedRecording], list[Miss], list[int]]:
