@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from accuracy.data_sets import SHARED
 from accuracy.page import format_table, write_blocks
-from people import D3IL, EXAMPLES, PAGE, PUBLISHED, format_ways, score_ways
+from people import D3IL, EXAMPLES, PAGE, PUBLISHED, format_ways, is_held_out, score_ways
 
 from foc_ros.analysis.evaluation.ground_truth import HORIZONS_S
 from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording, observe
@@ -109,7 +109,7 @@ def main() -> None:
     add_worker_arguments(parser)
     arguments = parser.parse_args()
     recordings = list(find_recordings(SHARED / D3IL).values())
-    known, predicted = ([each for each in recordings if int(each.name) % 2 == odd] for odd in (1, 0))
+    known, predicted = ([each for each in recordings if is_held_out(each.name) == held_out] for held_out in (False, True))
     rows = []
     with open_executor(arguments) as executor:
         learn = partial(learn_recording, config=CONFIG)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from accuracy.data_sets import SHARED
 from accuracy.page import IMAGES, format_table, write_blocks
-from people import D3IL, HLP, PAGE, PUBLISHED, SETTINGS, find_persons, format_positions, format_ways, score_ways
+from people import D3IL, HLP, PAGE, PUBLISHED, SETTINGS, find_persons, format_positions, format_ways, is_held_out, score_ways
 
 from foc_ros.analysis.evaluation.ground_truth import HORIZONS_S
 from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording, observe
@@ -171,8 +171,8 @@ def measure(data: str, config: Config, every: int, executor: Executor) -> tuple[
 
 def tabulate_halves(observed: Sequence[ObservedRecording]) -> Iterator[tuple[str, ...]]:
     """Yield the scores of both halves of D3IL: that on which settings were chosen, and the other one."""
-    for half, odd in (('chosen on', 1), ('other', 0)):
-        part = [each for each in observed if int(each.name) % 2 == odd]
+    for half, held_out in (('chosen on', False), ('other', True)):
+        part = [each for each in observed if is_held_out(each.name) == held_out]
         if not part:  # with --every
             continue
         yield half, *format_ways(score_ways(part, PUBLISHED, [0] * len(part))), *format_positions(part)[:2]
@@ -180,7 +180,7 @@ def tabulate_halves(observed: Sequence[ObservedRecording]) -> Iterator[tuple[str
 
 def show_worst(data: str, misses: Sequence[Miss]) -> list[tuple[str, ...]]:
     """Draw the worst predictions of recordings on which no setting was chosen, and return their rows."""
-    held_out = [each for each in misses if data != D3IL or int(each.recording.name) % 2 == 0]
+    held_out = [each for each in misses if data != D3IL or is_held_out(each.recording.name)]
     found = sorted(held_out, key=lambda each: each.gain)[:WORST]
     draw_misses(found, f'worst_{data}.png')
     return [(data, f'{number}', *describe_miss(each)) for number, each in enumerate(found, 1)]

@@ -56,6 +56,11 @@ CURVE = (0, 1, 2, 4, 8)
 Persons = dict[str, list[Recording]]
 
 
+def is_held_out(name: str) -> bool:
+    """Tell whether no setting was chosen on a recording of D3IL: its number is even."""
+    return int(name) % 2 == 0
+
+
 def find_persons(data: Path) -> Persons:
     """Return the recordings of each person that no setting was chosen on; D3IL does not tell its persons apart.
 
@@ -63,7 +68,7 @@ def find_persons(data: Path) -> Persons:
     """
     found = group_by_operator(find_recordings(data))
     if len(found) == 1:
-        return {person: [each for each in recordings if int(each.name) % 2 == 0] for person, recordings in found.items()}
+        return {person: [each for each in recordings if is_held_out(each.name)] for person, recordings in found.items()}
     return {person: found[person] for person in sorted(found)[1::2]}
 
 

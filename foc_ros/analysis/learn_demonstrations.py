@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from foc_ros.core.config import Config
+from foc_ros.core.config import ONLINE, Config
 from foc_ros.core.errors import RecordingError
 from foc_ros.core.homotopy.demonstrations import Demonstration
 
@@ -15,7 +15,7 @@ def learn_recording(recording: Recording, config: Config) -> tuple[Demonstration
 
     Raises RecordingError where the recording cannot be read or contains none.
     """
-    replayed = Replay(config.with_values({'experience.learning': 'online', 'homotopy.library': ''}))
+    replayed = Replay(config.with_values({'experience.learning': ONLINE, 'homotopy.library': ''}))
     for _ in replayed.take(recording.items()):
         pass
     movements = replayed.pipeline.learnt.movements.finish()

@@ -46,18 +46,18 @@ class PredictionTask:
 class Pipeline:
     """Follow the hand, keep the scene, and predict when a new hand sample is due.
 
-    library: demonstrated paths. Attributes: config; hand_state, None before the first hand sample; scene, obstacles and goals;
-    engaged, whether predictions are made; frame_id, the working frame, None until the parameter or the first hand sample fixes
-    it; learnt, what was learnt so far of the operator and the scene.
+    library: demonstrated paths. Attributes: config; given, this library; hand_state, None before the first hand sample; scene,
+    obstacles and goals; is_engaged, whether predictions are made; frame_id, the working frame, None until the parameter or the
+    first hand sample fixes it; learnt, what was learnt so far of the operator and the scene.
     """
 
     def __init__(self, config: Config, library: Sequence[Demonstration] = ()) -> None:
         self.config = config
-        self._given = tuple(library)
+        self.given = tuple(library)
         self.hand_state: FilterState | None = None
         self.scene = Scene()
         self.is_engaged = True
-        self.learnt, self._library = Learnt(), make_library(self._given)
+        self.learnt, self._library = Learnt(), make_library(self.given)
         self.frame_id = config.frame_id or None
         self._rejections = Rejections()
         self._memory = Memory()
@@ -252,7 +252,7 @@ class Pipeline:
         """Replace what was learnt, and the library if it has other recordings now."""
         recordings = learnt.movements.learnt
         if recordings is not self.learnt.movements.learnt:
-            self._library = make_library((*self._given, *recordings))
+            self._library = make_library((*self.given, *recordings))
         self.learnt = learnt
 
     def _find_not_ready_reason(self) -> tuple[str, str] | None:

@@ -89,14 +89,14 @@ def predict(
     shares = {each.candidate: each.likelihood for each in taking_part}
     likelihoods = {each.label: each.likelihood for each in taking_part}
     best = select_most_likely(likelihoods, past.find_renamed(memory.most_likely, shares), config.likelihood.margin)
-    solved_or_kept = {each.label for each in candidates} & {each.label for each in kept}
+    answered = {each.label for each in kept}
     counts = {
         'merged': len(kept) - len(ranked),
         'culled': len(scene.blocking) - len(scene.near),
         'cleared_by_height': int(scene.cleared.sum()),
         'recalled': len(candidates) - len(found.candidates),
         'kept': sum(each.age_s > 0.0 for each in predicted),
-        'waiting': len(candidates) - len(solved_or_kept),
+        'waiting': sum(each.label not in answered for each in candidates),
     }
     notes = dict(found.notes) | {name: count for name, count in counts.items() if count}
     hand_at, cleared = (hand.stamp_ns, hand.frame_id, hand.height), tuple(scene.cleared.tolist())
@@ -109,7 +109,7 @@ def predict(
 
 
 @dataclass(frozen=True, eq=False)
-class _Scene(Record):
+class _PredictionScene(Record):
     """What the candidates of one prediction are found and solved in.
 
     hand: the state that they start from; goals (g, 2) [m]; durations_s: time to go to each; blocking: obstacles that the hand
@@ -129,7 +129,7 @@ class _Scene(Record):
 
 def _prepare_scene(
     config: Config, estimated: HandState, obstacles: Obstacles, goals: Array, goal_heights: Array | None, past: Past
-) -> _Scene:
+) -> _PredictionScene:
     """Return the scene of a prediction: a start without noise, times to go, and the obstacles that are in the way."""
     hand = _simplify_start(estimated, config.estimator)
     durations_s = _find_durations(hand, goals, past, config)
@@ -139,11 +139,11 @@ def _prepare_scene(
     cleared = heights.find_cleared(grown, goals, durations_s)
     blocking = grown.take(np.flatnonzero(~cleared)) if cleared.any() else grown
     near = cull_obstacles(blocking, hand.mean[:2], goals, max(durations_s), config.scene.max_obstacles)
-    return _Scene(hand, goals, durations_s, blocking, near, cleared, heights, covariances)
+    return _PredictionScene(hand, goals, durations_s, blocking, near, cleared, heights, covariances)
 
 
 def _find_candidates(
-    scene: _Scene, config: Config, memory: Memory, library: Library, deadline: Deadline
+    scene: _PredictionScene, config: Config, memory: Memory, library: Library, deadline: Deadline
 ) -> tuple[Search, tuple[Candidate, ...]]:
     """Search for homotopy classes; return what was found, and the candidates with those that a library recalls."""
     timing = GuessTiming(scene.durations_s, config.foc.steps)
@@ -154,7 +154,7 @@ def _find_candidates(
 
 
 def _solve(
-    scene: _Scene,
+    scene: _PredictionScene,
     config: Config,
     candidates: Sequence[Candidate],
     costs: CostModel,

@@ -197,7 +197,7 @@ class Monitor:
             'working frame': pipeline.frame_id if pipeline.frame_id is not None else 'not known yet',
             **{f'obstacles of {source}': str(len(part.obstacles)) for source, part in pipeline.scene.sources.items()},
             'goals': 'none yet' if pipeline.scene.goals is None else str(len(pipeline.scene.goals)),
-            'operator': _describe_operator(pipeline),
+            'operator': _describe_learnt(pipeline),
             **self._describe_inputs(now_s, seconds),
             'prediction rate [Hz]': f'{recent["predictions"] / seconds:.1f}',
             'prediction age [s]': 'none yet' if self._predicted_s is None else f'{now_s - self._predicted_s:.3f}',
@@ -246,7 +246,7 @@ class Monitor:
         return values
 
 
-def _describe_operator(pipeline: Pipeline) -> str:
+def _describe_learnt(pipeline: Pipeline) -> str:
     """Return what was learnt: what was judged, the factors on durations, choices and standard deviations, and recordings."""
     pace, preferences, dispersion = pipeline.learnt.pace, pipeline.learnt.preferences, pipeline.learnt.dispersion
     movements = pipeline.learnt.movements

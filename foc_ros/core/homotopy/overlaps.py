@@ -1,6 +1,6 @@
 """Which shapes contain the centre of another, overlap, and cover its boundary.
 
-Of two shapes that overlap, each part of one that stands out of the other begins and ends with a tangent, and the boundary is cut
+Of two shapes that overlap, each part of one that protrudes from the other begins and ends with a tangent. The boundary is cut
 where the other shape covers it.
 """
 

@@ -1,8 +1,8 @@
 """What is learnt of the errors of predicted positions: factors on the standard deviations, from now to the end of a movement.
 
 The parameters of the covariance are expectations, and devices and people differ by much. The distances between predicted and true
-positions show what the standard deviations should be. The standard deviations of a candidate that lasts T are
-multiplied, at a time t ahead, by a factor that leads from `covariance.near` = f now to `covariance.far` = f' at its end:
+positions show what the standard deviations should be. The standard deviations of a candidate that lasts T are multiplied, at a
+time t ahead, by a factor that leads from `covariance.near` = f now to `covariance.far` = f' at its end:
 
     f(t) = f^(1 - s) f'^s,  s = t / T.                                                                                      (1)
 
@@ -13,7 +13,7 @@ Predictions of a moving hand, `SAMPLE_S` apart, are kept until the hand has reac
 x there and the mixture of normal distributions (p_i, m_i, S_i) that was predicted without the factors, each pair of factors has
 the log-posterior
 
-    log w(f, f') = -(log^2 f + log^2 f') / (2 s^2) + sum_h sum_predictions c log sum_i p_i N(x; m_i, f(h)^2 S_i).
+    log w(f, f') = -(log^2 f + log^2 f') / (2 v^2) + sum_h sum_predictions c log sum_i p_i N(x; m_i, f(h)^2 S_i).
 
 The errors within one second, which depend on each other, count as one: c is the time since the prediction before over 1 s, at
 most 1, or `SAMPLE_S` over 1 s for the first one of a movement. The factors in use are the posterior means, of the logarithms.
@@ -137,25 +137,28 @@ def make_forecast(
     stamp_ns: int, ahead_s: float, count: float, candidates: Sequence[PredictedCandidate], config: CovarianceConfig
 ) -> Forecast:
     """Return where candidates, published with the factors of config, expect the hand some time ahead, at their end after it."""
-    factors, shares, means, covariances = [], [], [], []
+    shares, means, covariances = [], [], []
     for solution in (each.solution for each in candidates):
         at = min(ahead_s / solution.dt, len(solution.control))
         row = min(int(at), len(solution.control) - 1)
         after = at - row
-        share = at / len(solution.control)
-        shares.append(share)
-        factors.append(config.near ** (1.0 - share) * config.far**share)
+        shares.append(at / len(solution.control))
         means.append((1.0 - after) * solution.mean[row, :2] + after * solution.mean[row + 1, :2])
         covariances.append((1.0 - after) * solution.covariance[row, :2, :2] + after * solution.covariance[row + 1, :2, :2])
-    covariance = np.array(covariances) / np.array(factors)[:, None, None] ** 2 + VARIANCE_FLOOR * np.eye(2)
+    share = np.array(shares)
+    covariance = np.array(covariances) / interpolate_factors(share, config)[:, None, None] ** 2 + VARIANCE_FLOOR * np.eye(2)
     due_ns, weight = stamp_ns + round(ahead_s * NANOSECONDS), np.array([each.likelihood for each in candidates])
-    return Forecast(due_ns, count, np.array(shares), weight, np.array(means), covariance)
+    return Forecast(due_ns, count, share, weight, np.array(means), covariance)
 
 
 def compute_factors(solution: Solution, config: CovarianceConfig) -> Array:
-    """Return the factors (N + 1,) on the standard deviations of a solution: equation 1."""
-    shares = np.linspace(0.0, 1.0, len(solution.mean))
-    factors: Array = config.near ** (1.0 - shares) * config.far**shares
+    """Return the factors (N + 1,) on the standard deviations of a solution at its steps."""
+    return interpolate_factors(np.linspace(0.0, 1.0, len(solution.mean)), config)
+
+
+def interpolate_factors(share: Array, config: CovarianceConfig) -> Array:
+    """Return the factors on standard deviations at shares s of the duration, any shape: equation 1."""
+    factors: Array = config.near ** (1.0 - share) * config.far**share
     return factors
 
 

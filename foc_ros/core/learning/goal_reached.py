@@ -48,7 +48,10 @@ def has_covered_distance(positions: Array, goal: Array) -> bool:
 
 
 def find_chosen_goal(end: Array, goals: Array) -> int | None:
-    """Return the goal (g, 2) [m] at the end (2,) of a movement, None if it is farther than REMAINING_SHARE of the next goal."""
+    """Return the goal (g, 2) [m] at which a movement ends, None if that is unclear.
+
+    The distance from the end (2,) to the goal is then more than REMAINING_SHARE of that from the goal to the nearest other one.
+    """
     goal, distance_m = find_goal_at_end(end[None], goals)
     between = np.hypot(*(np.delete(goals, goal, axis=0) - goals[goal]).T)
     return goal if distance_m <= REMAINING_SHARE * between.min(initial=np.inf) else None

@@ -1,4 +1,4 @@
-"""What the learning of pace, choices and errors shares: what is kept and judged of a movement, and means of factors."""
+"""Shared by the learning of pace, choices and errors: samples of a movement, and posterior means of factors."""
 
 from __future__ import annotations
 

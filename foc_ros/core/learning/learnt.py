@@ -60,7 +60,7 @@ class Learnt:
         return replace(self, preferences=self.preferences.add(choice), dispersion=dispersion)
 
     def interrupt(self) -> Learnt:
-        """Return what is known without the present movement, of which no more is seen."""
+        """Return what is known where the samples of the hand stop: the present movement ends there."""
         preferences, dispersion = self.preferences.interrupt(), self.dispersion.interrupt()
         return Learnt(self.pace.interrupt(), preferences, dispersion, self.movements.interrupt())
 

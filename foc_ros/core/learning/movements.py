@@ -22,12 +22,12 @@ from foc_ros.core.types import NANOSECONDS, Array, HandState, Record
 from .experience import MOST_NEAR
 from .goal_reached import AT_GOAL_M, find_goal_at_end, find_reached_goal
 
-Stamped = tuple[int, Array]
+StampedState = tuple[int, Array]
 """A stamp [ns] and the state then (4,): x, y, vx, vy [m, m/s]."""
 AROUND_S = 1.0
 """Time before the onset and after the goal that a demonstration contains [s]: predictions near either end look that far."""
 SHORTEST_M = 0.05
-"""Shorter movements demonstrate nothing [m]."""
+"""Least length of a movement that is learnt [m]."""
 MOST_LEARNT = MOST_NEAR
 """Number of demonstrations that are kept, the newest ones: as many as count in one prediction."""
 STEP_NS, AROUND_NS, AROUND_STEPS = round(STEP_S * NANOSECONDS), round(AROUND_S * NANOSECONDS), round(AROUND_S / STEP_S)
@@ -37,16 +37,16 @@ STEP_NS, AROUND_NS, AROUND_STEPS = round(STEP_S * NANOSECONDS), round(AROUND_S *
 class Movements(Record):
     """What was learnt of the movements so far, and the present one.
 
-    learnt: demonstrations, the newest last; refused: how many movements demonstrate nothing; refusal: why the last of them does
-    not; hand: its last state; states: the last ones, `STEP_S` apart; onset_ns, ended_ns: when the present movement began, and
-    came to rest; scene: of the last state that moved.
+    learnt: demonstrations, the newest last; refused: number of movements that are no demonstration; refusal: the reason for the
+    last of them; hand: its last state; states: the last ones, `STEP_S` apart; onset_ns, ended_ns: when the present movement
+    began, and came to rest; scene: of the last state that moved.
     """
 
     learnt: tuple[Demonstration, ...] = ()
     refused: int = 0
     refusal: str = ''
     hand: HandState | None = None
-    states: tuple[Stamped, ...] = ()
+    states: tuple[StampedState, ...] = ()
     onset_ns: int | None = None
     ended_ns: int | None = None
     scene: Scene = field(default_factory=Scene)
@@ -110,7 +110,7 @@ class Movements(Record):
         return record_demonstration(hand.frame_id, np.vstack([path, goals[goal]]), self.scene.obstacles(hand.stamp_ns), kept)
 
 
-def sample_states(states: tuple[Stamped, ...], before: HandState | None, hand: HandState) -> tuple[Stamped, ...]:
+def sample_states(states: tuple[StampedState, ...], before: HandState | None, hand: HandState) -> tuple[StampedState, ...]:
     """Return states with those that are due between the hand before and now, of which the newest MOST_STATES are kept."""
     if before is None or hand.stamp_ns // STEP_NS == before.stamp_ns // STEP_NS:
         return states

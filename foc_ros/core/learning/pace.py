@@ -102,17 +102,18 @@ class Pace(Record):
         return replace(ended, movements=self.movements + 1, losses=as_readonly(self.losses + errors / moved))
 
     def _sum_errors(self, path: Array, goal: Array, config: DurationConfig) -> tuple[Array, float]:
-        """Return sums of errors with each arrival and factor (2, f), and of the ways of the hand meanwhile [m]."""
+        """Return sums of errors with each arrival and factor (2, f), and the distance that the hand moved meanwhile [m]."""
         seconds = np.array([(each.stamp_ns - self.states[0].stamp_ns) / NANOSECONDS for each in self.states])
         ahead = np.minimum(seconds + AHEAD_S, seconds[-1])
         reached = np.stack([np.interp(ahead, seconds, axis) for axis in path.T], axis=-1)
-        scaled, errors, moved = [scale_durations(config, each) for each in FACTORS.tolist()], np.zeros(self.losses.shape), 0.0
+        scaled = [scale_durations(config, each) for each in FACTORS.tolist()]
+        configs = [[replace(each, arrival=arrival) for each in scaled] for arrival in ARRIVALS]
+        errors, moved = np.zeros(self.losses.shape), 0.0
         for row in choose_judged(np.flatnonzero(seconds < seconds[-1]).tolist()):
             hand, later_s = self.states[row], float(ahead[row] - seconds[row])
-            for number, arrival in enumerate(ARRIVALS):
-                configs = [replace(each, arrival=arrival) for each in scaled]
-                times = np.array([estimate_times_to_go(hand, goal[None], each)[0] for each in configs])
-                expected = find_free_positions(hand.mean[:4], goal, times, later_s, is_passing(configs[0]))
+            for number, of_arrival in enumerate(configs):
+                times = np.array([estimate_times_to_go(hand, goal[None], each)[0] for each in of_arrival])
+                expected = find_free_positions(hand.mean[:4], goal, times, later_s, is_passing(of_arrival[0]))
                 errors[number] += np.hypot(*(expected - reached[row]).T)
             moved += float(np.hypot(*(reached[row] - path[row])))
         return errors, moved

@@ -11,9 +11,9 @@ the stamps of two predictions, and the weight of a kept answer fades in the seco
 where a = 0 for a fresh answer, and b_i is the l_i of the prediction before: 0 for a new class, which so fades in. Both p and b
 sum to one, and so does f.
 
-A class is the same one under another name if one of the names is the other with obstacles left out. Of several that it may have
-become, the one with the largest p has what it had, and the others fade in. The share of a class that has disappeared is
-divided among all.
+A class is the same one under another name if one of the names is the other with obstacles left out. Of several such classes, the
+one with the largest p takes over its share, and the others fade in. The share of a class that has disappeared is divided among
+all.
 """
 
 from __future__ import annotations
