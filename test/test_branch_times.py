@@ -71,7 +71,7 @@ COSTS = np.array([1.0, 2.0, 5.0])
 
 
 def make_config(lookahead_s: float) -> LikelihoodConfig:
-    return LikelihoodConfig(beta=2.0, lookahead_s=lookahead_s)
+    return LikelihoodConfig(beta=2.0, lookahead_share=1.0, lookahead_s=lookahead_s)
 
 
 def make_branch_times(after_s: float) -> BranchTimes:
@@ -107,8 +107,18 @@ def test_an_infinite_lookahead_is_the_plain_rule() -> None:
 
 
 def test_branch_times_have_no_influence_without_a_lookmake_config() -> None:
-    plain = LikelihoodConfig(beta=2.0, lookahead_s=0.0)
+    plain = LikelihoodConfig(beta=2.0, lookahead_share=1.0, lookahead_s=0.0)
     np.testing.assert_array_equal(compute_likelihoods(COSTS, plain, make_branch_times(1.0)), compute_likelihoods(COSTS, plain))
+
+
+@pytest.mark.parametrize('share', [0.0, 0.3, 1.0])
+def test_the_rule_is_that_of_both_kinds_of_operators_by_their_probabilities(share: float) -> None:
+    planned, ahead = (
+        compute_likelihoods(COSTS, make_config(0.7)),
+        compute_likelihoods(COSTS, make_config(0.7), make_branch_times(1.0)),
+    )
+    found = compute_likelihoods(COSTS, replace(make_config(0.7), lookahead_share=share), make_branch_times(1.0))
+    np.testing.assert_allclose(found, (1.0 - share) * planned + share * ahead, rtol=1e-12)
 
 
 def test_extreme_costs_do_not_overflow() -> None:

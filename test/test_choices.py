@@ -1,4 +1,4 @@
-"""The precision of choices is learnt from choices: causally, equally for equal input, until a reset, and in bounds."""
+"""Who looks ahead, and how precisely, is learnt from choices: causally, equally for equal input, until a reset, and in bounds."""
 
 from __future__ import annotations
 
@@ -49,34 +49,52 @@ def move(preferences: Preferences, sides: tuple[int, int], costs: list[float], s
     return preferences.follow(HandState(start_ns + 14 * STEP_NS, np.zeros(6), np.eye(6)), LIKELIHOOD)
 
 
-def test_near_and_far_choices_are_learnt_apart() -> None:
-    """The next gap is always the cheap one, the far one is even: near choices become more precise, far ones less."""
-    preferences = Preferences()
-    for number in range(20):
-        preferences = move(preferences, (LEFT, (LEFT, RIGHT)[number % 2]), [1.0, 2.0, 4.0, 8.0], 10.0 * number + 1.0)
-    near, beyond = preferences.factors
-    assert preferences.movements == 20 and near > 1.5 and beyond < 0.7
-    adapted = preferences.adapt(LIKELIHOOD)
-    assert adapted.beta == pytest.approx(near * LIKELIHOOD.beta)
-    assert adapted.shortfall == pytest.approx(near * LIKELIHOOD.shortfall)
-    assert adapted.beta_beyond == pytest.approx(beyond * LIKELIHOOD.beta_beyond)
+FIRST_IS_CHEAP, FIRST_AND_LAST_ARE_CHEAP = [1.0, 1.0, 3.0, 3.0], [1.0, 3.0, 3.0, 9.0]
 
 
-def test_choices_against_the_costs_lower_the_precision() -> None:
+def follow_movements(sides: list[tuple[int, int]], costs: list[float]) -> Preferences:
+    """Return the preferences after movements in turn, each of them past both obstacles on given sides."""
     preferences = Preferences()
-    for number in range(10):
-        preferences = move(preferences, CLASSES[number % 4], [1.0, 2.0, 4.0, 8.0], 10.0 * number + 1.0)
-    assert max(preferences.factors) < 1.0
+    for number, each in enumerate(sides):
+        preferences = move(preferences, each, costs, 10.0 * number + 1.0)
+    return preferences
+
+
+def test_who_leaves_far_choices_open_looks_ahead_and_who_follows_the_costs_there_plans() -> None:
+    near_only = follow_movements([(LEFT, LEFT), (LEFT, RIGHT)] * 10, FIRST_AND_LAST_ARE_CHEAP)
+    throughout = follow_movements([(LEFT, LEFT)] * 20, FIRST_AND_LAST_ARE_CHEAP)
+    assert near_only.adapt(LIKELIHOOD).lookahead_share > 0.95 and throughout.adapt(LIKELIHOOD).lookahead_share < 0.05
+
+
+def test_precision_follows_choices_and_all_exponents_follow_it() -> None:
+    precise, careless = (follow_movements(each, FIRST_IS_CHEAP) for each in ([(LEFT, LEFT)] * 20, CLASSES * 5))
+    assert careless.find_mean(0.25)[0] < 0.6 < 1.5 < precise.find_mean(0.25)[0]
+    factor, share = precise.find_mean(LIKELIHOOD.lookahead_share)
+    adapted = precise.adapt(LIKELIHOOD)
+    for name in ('beta', 'shortfall', 'beta_beyond'):
+        assert getattr(adapted, name) == pytest.approx(factor * getattr(LIKELIHOOD, name))
+    assert adapted.lookahead_share == share
+
+
+@pytest.mark.parametrize('share', [0.0, 1.0])
+def test_what_is_certain_is_not_learnt(share: float) -> None:
+    preferences = follow_movements([(LEFT, LEFT), (LEFT, RIGHT)] * 3, FIRST_AND_LAST_ARE_CHEAP)
+    assert preferences.adapt(replace(LIKELIHOOD, lookahead_share=share)).lookahead_share == share
 
 
 def test_the_score_is_the_likelihood_of_the_classes_that_agree() -> None:
     choice, agrees = choose([1.0, 2.0, 4.0, 8.0], 0), np.array([False, True, False, False])
-    likelihoods = [replace(LIKELIHOOD, beta=0.5, beta_beyond=2.0), replace(LIKELIHOOD, beta=3.0, beta_beyond=0.1)]
-    found = choice.score(agrees, likelihoods)
-    for row, near in enumerate(likelihoods):
-        for column, beyond in enumerate(likelihoods):
-            mixed = replace(near, beta_beyond=beyond.beta_beyond)
-            shares = compute_likelihoods(choice.costs, mixed, None, choice.shortfalls, choice.decisions)
+    found = choice.score(agrees, LIKELIHOOD)
+    for row, share in enumerate((0.0, 1.0)):
+        for column, factor in enumerate(FACTORS):
+            scaled = replace(
+                LIKELIHOOD,
+                lookahead_share=share,
+                beta=factor * LIKELIHOOD.beta,
+                beta_beyond=factor * LIKELIHOOD.beta_beyond,
+                shortfall=factor * LIKELIHOOD.shortfall,
+            )
+            shares = compute_likelihoods(choice.costs, scaled, None, choice.shortfalls, choice.decisions)
             assert found[row, column] == pytest.approx(np.log(0.99 * shares[1] + 0.01 / 4))
 
 
@@ -114,14 +132,15 @@ def test_the_goal_that_is_reached_counts_and_an_unclear_one_does_not() -> None:
 
 def test_exponents_stay_within_the_bounds_of_the_parameters() -> None:
     extreme = LikelihoodConfig(beta=100.0, beta_beyond=100.0, shortfall=np.inf)
-    adapted = replace(Preferences(), movements=1, factors=(float(FACTORS[-1]), float(FACTORS[-1]))).adapt(extreme)
+    scores = np.where(FACTORS[-1] == FACTORS, 0.0, -1e3) * np.ones((2, 1))
+    adapted = Preferences(movements=1, scores=scores).adapt(extreme)
     assert (adapted.beta, adapted.beta_beyond, adapted.shortfall) == (100.0, 100.0, np.inf)
 
 
 @pytest.mark.parametrize('costs', [[0.0] * 4, [1e300, 1.0, 1e-300, 0.0]])
 def test_extreme_costs_give_finite_factors(costs: list[float]) -> None:
     preferences = move(move(Preferences(), (RIGHT, LEFT), costs), (LEFT, LEFT), costs, 11.0)
-    assert preferences.movements == 2 and np.isfinite(preferences.scores).all() and np.isfinite(preferences.factors).all()
+    assert preferences.movements == 2 and np.isfinite(preferences.scores).all() and np.isfinite(preferences.find_mean(0.25)).all()
 
 
 def reach(pipeline: Pipeline, aside: float, start_s: float) -> None:
@@ -147,7 +166,7 @@ def make_operator(config: Config) -> Pipeline:
 
 def test_equal_messages_give_equal_factors_and_a_reset_forgets_them() -> None:
     one, other = make_operator(CONFIG), make_operator(CONFIG)
-    assert one.learnt.preferences.movements >= 2 and one.learnt.preferences.factors != (1.0, 1.0)
+    assert one.learnt.preferences.movements >= 2 and one.learnt.preferences.find_mean(0.25) != (1.0, 0.25)
     np.testing.assert_array_equal(one.learnt.preferences.scores, other.learnt.preferences.scores)
     assert one.adapted_config.likelihood == one.learnt.preferences.adapt(CONFIG.likelihood) != CONFIG.likelihood
     one.reset()
@@ -163,7 +182,7 @@ def test_it_can_be_switched_off_and_new_parameters_begin_anew() -> None:
     pipeline = make_operator(CONFIG)
     pipeline.reconfigure(replace_values(CONFIG, {'rate_hz': 20.0}))
     assert pipeline.learnt.preferences.movements >= 2
-    pipeline.reconfigure(replace_values(CONFIG, {'likelihood.beta': 2.0}))
+    pipeline.reconfigure(replace_values(CONFIG, {'likelihood.beta': 3.0}))
     assert pipeline.learnt.preferences.movements == 0
 
 

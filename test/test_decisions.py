@@ -21,7 +21,7 @@ SIDES = np.array(
 )
 GOAL = np.array([0, 1, 0, 1, 0])
 COSTS = np.array([1.0, 2.0, 3.0, 2.5, 4.0])
-CONFIG = replace(LikelihoodConfig(), beta=2.0, beta_beyond=0.3, weaving=1.5)
+CONFIG = replace(LikelihoodConfig(), beta=2.0, lookahead_share=1.0, beta_beyond=0.3, weaving=1.5)
 
 
 def make_hand(x: float) -> HandState:
@@ -70,6 +70,13 @@ def test_with_one_exponent_and_no_weaving_the_rule_is_the_plain_one() -> None:
     config, shortfalls = replace(CONFIG, beta_beyond=CONFIG.beta), np.array([0.0, 0.4, 0.0, 0.2, 0.0])
     plain, two = (compute_likelihoods(COSTS, config, shortfalls=shortfalls, decisions=each) for each in (None, decisions))
     np.testing.assert_allclose(two, plain)
+
+
+def test_who_plans_the_whole_way_weighs_all_choices_alike() -> None:
+    decisions = Decisions(np.array([0, 0, 1, 1, 1]), np.array([0, 0, 0, 1, 0]))
+    p = compute_likelihoods(COSTS, replace(CONFIG, lookahead_share=0.0), decisions=decisions)
+    weights = COSTS**-CONFIG.beta * np.exp(-CONFIG.weaving * decisions.woven)
+    np.testing.assert_allclose(p, weights / weights.sum())
 
 
 def test_where_no_class_can_be_solved_there_is_no_likelihood() -> None:

@@ -174,12 +174,12 @@ def rank_candidates(
     """
     candidates = drop_duplicates(candidates)
     taken = [each for each in candidates if each.has_likelihood]
-    branch_times = compute_branch_times(taken, obstacles) if likelihood.lookahead_s > 0.0 else None
+    is_learnt = likelihood.adaptation == ONLINE
+    may_look_ahead = is_learnt or likelihood.lookahead_share > 0.0
+    branch_times = compute_branch_times(taken, obstacles) if may_look_ahead and likelihood.lookahead_s > 0.0 else None
     costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))
     decisions = choice = None
-    is_learnt = likelihood.adaptation == ONLINE
-    has_far_choices = likelihood.weaving > 0.0 or likelihood.beta_beyond != likelihood.beta
-    if len(taken) > 1 and (has_far_choices or is_learnt):
+    if len(taken) > 1 and (may_look_ahead or likelihood.weaving > 0.0):
         goal, sides = np.array([each.candidate.goal for each in taken], dtype=np.intp), tuple(each.sides for each in taken)
         decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
         if is_learnt:

@@ -160,25 +160,28 @@ class LikelihoodConfig:
     """Conversion of costs to likelihoods."""
 
     rule: str = _p('cost_ratio', 'rule that gives the weight of a class from its cost', choices=LIKELIHOOD_RULES)
-    beta: float = _p(4.0, 'exponent of the cost ratio', '', 0.0, 100.0)
+    beta: float = _p(2.0, 'exponent of the cost ratio', '', 0.0, 100.0)
     shortfall: float = _p(
-        12.0,
+        6.0,
         'log-likelihood that a class loses per standard deviation below the wanted eta; .inf: left out',
         '',
         0.0,
         math.inf,
     )
     spent_share: float = _p(0.0, f'fraction of the effort since onset that every cost contains, for {JERK_ONLY}', '', 0.0, 1.0)
-    lookahead_s: float = _p(
-        0.5, 'mean look-ahead of the operator: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
+    lookahead_share: float = _p(
+        0.25, 'probability that the operator looks ahead, as the next two say, and does not plan the whole way', '', 0.0, 1.0
     )
-    beta_beyond: float = _p(0.3, 'exponent of the cost ratio for what lies beyond the next row of obstacles', '', 0.0, 100.0)
+    lookahead_s: float = _p(
+        0.5, 'mean look-ahead of such an operator: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
+    )
+    beta_beyond: float = _p(0.05, 'exponent of such an operator for what lies beyond the next row of obstacles', '', 0.0, 100.0)
     weaving: float = _p(
         4.0, 'log-likelihood that a class loses for each row through several gaps of which it leads', '', 0.0, 100.0
     )
     adaptation: str = _p(
         'online',
-        "whether `beta`, `shortfall` and `beta_beyond` follow the operator's earlier choices, by factors",
+        "whether `lookahead_share` and, by a factor, `beta`, `shortfall` and `beta_beyond` follow the operator's earlier choices",
         choices=ADAPTATIONS,
     )
     hold_s: float = _p(

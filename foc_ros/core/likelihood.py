@@ -9,24 +9,28 @@ factor k is below the wanted one has a smaller weight, by the factor exp(-likeli
 J_i is the cost that `CostModel` assembles: the effort to go through class i, the price of its duration, and a part of the effort
 since movement onset, which all classes share.
 
-Operators weigh what is near and leave distant choices open. Where `likelihood.lookahead_s` is set, an operator looks ahead by a
-time h that is exponentially distributed with this mean. A path class W, with all goals to which it leads, has the weight
-V_W = sum_{i in W} J_i^-beta. The path classes that branch off from W later than h, S_W(h) = {W': tau_WW' > h}, are not yet
-distinguished from W, so that each gets their mean weight:
+This is for operators who plan the whole way. Others weigh what is near and leave distant choices open: with p' from the rules
+below, and the probability s = `likelihood.lookahead_share` that the operator looks ahead in this way,
 
-    p_W = exp(u_W) / sum_W' exp(u_W'),  u_W = E_h[log mean_{W' in S_W(h)} V_W'],  and within W  p_i = p_W J_i^-beta / V_W.
+    p_i <- (1 - s) p_i + s p'_i.
+
+Such an operator looks ahead by a time h that is exponentially distributed with the mean `likelihood.lookahead_s`. A path class W,
+with all goals to which it leads, has the weight V_W = sum_{i in W} J_i^-beta. The path classes that branch off from W later than
+h, S_W(h) = {W': tau_WW' > h}, are not yet distinguished from W, so that each gets their mean weight:
+
+    p'_W = exp(u_W) / sum_W' exp(u_W'),  u_W = E_h[log mean_{W' in S_W(h)} V_W'],  and within W  p'_i = p'_W J_i^-beta / V_W.
 
 A choice that lies tau ahead is therefore made with the exponent beta exp(-tau / lookahead_s): by the ratio of costs when it is
-near, evenly when it is far. Without `lookahead_s`, h is infinite, and p_i is as above.
+near, evenly when it is far. With a `lookahead_s` of 0, h is infinite.
 
-These p_i give the probabilities of the gaps of the next row. What lies beyond this row is decided with an exponent of its own,
-beta' = `likelihood.beta_beyond`. A class that weaves through w_i rows (`decisions`) has a weight that is smaller by
-exp(-`likelihood.weaving` w_i), in both. With G the classes that take the same gap in the next row, those of class i,
+These p'_i give the probabilities of the gaps of the next row. What lies beyond this row is decided with an exponent of its own,
+beta' = `likelihood.beta_beyond`. With G the classes that take the same gap in the next row, those of class i,
 
-    p_i <- sum_{j in G} p_j  r_i / sum_{j in G} r_j,
-    log r_i = -beta' log J_i - (beta' / beta) shortfall (k_wanted - k) - weaving w_i,
+    p'_i <- sum_{j in G} p'_j  r_i / sum_{j in G} r_j,  log r_i = -beta' log J_i - (beta' / beta) shortfall (k_wanted - k),
 
 so that far choices follow the same losses as near ones, less precisely if beta' < beta.
+
+The weight of a class that weaves through w_i rows (`decisions`) is smaller by exp(-`likelihood.weaving` w_i), in both p and p'.
 """
 
 from __future__ import annotations
@@ -104,15 +108,20 @@ def compute_likelihoods(
     rule, losses = LIKELIHOOD_RULES.get(config.rule), np.zeros(len(values))
     if shortfalls is not None and shortfalls.any():
         losses = config.shortfall * shortfalls
-    logs = rule(values, config) - losses
-    if config.lookahead_s > 0.0 and branch_times is not None and len(logs):
-        logs = _weigh_by_lookahead(logs - logs.max(), branch_times, config.lookahead_s)
-    if decisions is not None and len(logs):
-        woven = config.weaving * decisions.woven
+    logs, woven = rule(values, config) - losses, np.zeros(len(values)) if decisions is None else config.weaving * decisions.woven
+    planned = normalise_logs(logs - woven)
+    if config.lookahead_share == 0.0 or not len(logs) or (branch_times is None and decisions is None):
+        return planned
+    near = logs
+    if config.lookahead_s > 0.0 and branch_times is not None:
+        near = _weigh_by_lookahead(logs - logs.max(), branch_times, config.lookahead_s)
+    if decisions is not None:
         precision = config.beta_beyond / config.beta if config.beta > 0.0 else 1.0
         beyond = rule(values, replace(config, beta=config.beta_beyond)) - precision * losses
-        logs = _share_next_gaps(logs - woven, beyond - woven, decisions.next_gap)
-    return normalise_logs(np.ascontiguousarray(logs, dtype=float))
+        near = _share_next_gaps(near - woven, beyond - woven, decisions.next_gap)
+    ahead = normalise_logs(np.ascontiguousarray(near, dtype=float))
+    mixed: Array = (1.0 - config.lookahead_share) * planned + config.lookahead_share * ahead
+    return mixed
 
 
 def cost_ratio_logs(costs: Array, config: LikelihoodConfig) -> Array:

@@ -104,7 +104,7 @@ def make_power_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig
     """Return all parameters of the likelihood that are tried: one exponent for all choices, or near and far ones that differ."""
     plain = (replace(make_plain(published, beta), spent_share=share) for beta, share in product(POWERS, (1.0, 0.0)))
     ahead = (
-        replace(published, spent_share=0.0, lookahead_s=seconds, beta=beta, beta_beyond=beyond, weaving=weaving)
+        replace(make_ahead(published, seconds, beta, beyond), weaving=weaving)
         for seconds, beta, beyond, weaving in product(LOOKAHEADS_S, POWERS_AHEAD, POWERS_BEYOND, WEAVINGS)
     )
     return (*plain, *ahead)
@@ -112,12 +112,18 @@ def make_power_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig
 
 def make_plain(likelihood: LikelihoodConfig, beta: float) -> LikelihoodConfig:
     """Return a likelihood by which all choices are made with one exponent."""
-    return replace(likelihood, beta=beta, beta_beyond=beta, lookahead_s=0.0)
+    return replace(likelihood, beta=beta, beta_beyond=beta, lookahead_s=0.0, lookahead_share=0.0)
+
+
+def make_ahead(likelihood: LikelihoodConfig, lookahead_s: float, beta: float, beta_beyond: float) -> LikelihoodConfig:
+    """Return a likelihood of operators who look ahead, all of them, and for whom effort that was spent does not count."""
+    ahead = replace(likelihood, lookahead_share=1.0, lookahead_s=lookahead_s, spent_share=0.0)
+    return replace(ahead, beta=beta, beta_beyond=beta_beyond)
 
 
 def is_plain(likelihood: LikelihoodConfig) -> bool:
     """Return whether all choices are made with one exponent."""
-    return likelihood.beta_beyond == likelihood.beta and likelihood.lookahead_s == 0.0
+    return likelihood.lookahead_share == 0.0
 
 
 def make_boltzmann_rates(recordings: Sequence[ObservedRecording], _: LikelihoodConfig) -> tuple[float, ...]:

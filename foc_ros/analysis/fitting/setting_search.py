@@ -23,7 +23,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.analysis.evaluation.baselines import make_plain
+from foc_ros.analysis.evaluation.baselines import make_ahead, make_plain
 from foc_ros.analysis.evaluation.bootstrap import CENTRAL, RESAMPLES, SEED
 from foc_ros.analysis.evaluation.forecasts import Forecast, power_rule_shares
 from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
@@ -57,7 +57,7 @@ RULES = (
         for beta, share in product((0.5, 1.0, 2.0, 3.0, 6.0, 12.0), (1.0, 0.0))
     ),
     *(
-        replace(LikelihoodConfig(), spent_share=0.0, lookahead_s=seconds, beta=beta, beta_beyond=beyond)
+        make_ahead(LikelihoodConfig(), seconds, beta, beyond)
         for seconds, beta, beyond in product((0.0, 0.5, 1.0), (1.0, 2.0, 3.0, 6.0), (0.05, 0.3))
     ),
 )

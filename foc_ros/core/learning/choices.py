@@ -1,18 +1,18 @@
-"""What is learnt of an operator's choices: how precisely they follow the losses of the classes, in near and in far choices.
+"""What is learnt of an operator's choices: whether the operator looks ahead or plans the whole way, and how precisely.
 
-The logarithms of the weights of classes are multiplied by a factor f in near choices, and by f' in far ones (`likelihood`): f on
-`likelihood.beta` and `likelihood.shortfall`, so that the solutions stay the same, and f' on `likelihood.beta_beyond`. When a
-movement has ended, it is known which classes of each of its predictions agree with it: they pass the obstacles on the same sides
-and lead to the goal that was reached. With P_t the probability that the prediction at time t gave to these classes,
+Before the first movement, the probability that the operator looks ahead (`likelihood`) is s = `likelihood.lookahead_share`. The
+precision with which the losses of the classes are followed is a factor f on the logarithms of their weights: on
+`likelihood.beta`, `likelihood.shortfall` and `likelihood.beta_beyond`, so that the solutions stay the same. When a movement has
+ended, it is known which classes of each of its predictions agree with it: they pass the obstacles on the same sides and lead to
+the goal that was reached. With P_t the probability that the prediction at time t gave to these classes, for an operator of the
+kind z, who plans the whole way (0) or looks ahead (1),
 
-    log w(f, f') = -(log^2 f + log^2 f') / (2 s^2) + sum_movements mean_t log((1 - u) P_t(f, f') + u a_t),
+    log w(z, f) = log(1 - s or s) - log^2 f / (2 `PRIOR_STDDEV`^2) + sum_movements mean_t log((1 - u) P_t(z, f) + u a_t),
 
-which is a Bayesian posterior over the grid `FACTORS` x `FACTORS`. A movement counts as one observation, because its predictions
-depend on each other. A share u of the choices is not explained by losses: all classes are equally likely in it, and a_t is the
-share of those that agree. The factors in use are the posterior means, of the logarithms.
-
-The likelihoods need not be computed for each pair: with G the gaps of the next row (`decisions`), P = sum_G N_f(G) C_f'(G), where
-N_f(G) is the probability of a gap, and C_f'(G) that of the classes that agree, among those through this gap.
+which is a Bayesian posterior over both kinds and the grid `FACTORS`. A movement counts as one observation, because its
+predictions depend on each other. A share u of the choices is not explained by losses: all classes are equally likely in it, and
+a_t is the share of those that agree. In use are the posterior of z = 1 as `likelihood.lookahead_share`, and the posterior mean of
+the logarithm of f.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Obstacles, Record, as_readonly
 
 from .goal_reached import find_chosen_goal
-from .judging import choose_judged, compute_mean_factors, sample_movement
+from .judging import choose_judged, sample_movement
 
-FACTORS = as_readonly(2.0 ** np.arange(-5.0, 6.0))
-"""Factors that are judged, for near and for far choices."""
-PRIOR_STDDEV = 1.5
+FACTORS = as_readonly(2.0 ** np.arange(-3.0, 4.0))
+"""Factors that are judged."""
+PRIOR_STDDEV = 0.7
 """Standard deviation of the logarithm of a factor before the first movement."""
 UNEXPLAINED = 0.01
 """Share of choices that losses do not explain, as in the scores of `evaluate`."""
@@ -71,34 +71,40 @@ class Choice(Record):
         reached = find_chosen_goal(path[-1], self.goals)
         return agrees if reached is None else agrees & (self.goal == reached)
 
-    def score(self, agrees: NDArray[np.bool_], likelihoods: Sequence[LikelihoodConfig]) -> Array:
-        """Return the log-likelihood (m, m) of the classes (k,) that agree, by m configs for near choices and for far ones."""
-        gap, near, beyond = self.decisions.next_gap, [], []
-        for config in likelihoods:
-            shares = compute_likelihoods(self.costs, config, self.branch_times, self.shortfalls, self.decisions)
-            near.append(np.bincount(gap, shares))
-            beyond.append(np.bincount(gap, agrees * shares) / np.maximum(near[-1], np.finfo(float).tiny))
-        probability = np.array(near) @ np.array(beyond).T
-        return np.asarray(np.log((1.0 - UNEXPLAINED) * probability + UNEXPLAINED * agrees.mean()))
+    def score(self, agrees: NDArray[np.bool_], likelihood: LikelihoodConfig) -> Array:
+        """Return the log-likelihoods (2, f) of the classes (k,) that agree, by operators who plan and who look ahead."""
+        kinds = [[_scale(likelihood, factor, share) for factor in FACTORS.tolist()] for share in (0.0, 1.0)]
+        found = [[self._sum_likelihoods(agrees, each) for each in kind] for kind in kinds]
+        return np.asarray(np.log((1.0 - UNEXPLAINED) * np.array(found) + UNEXPLAINED * agrees.mean()))
+
+    def _sum_likelihoods(self, agrees: NDArray[np.bool_], likelihood: LikelihoodConfig) -> float:
+        shares = compute_likelihoods(self.costs, likelihood, self.branch_times, self.shortfalls, self.decisions)
+        return float(shares @ agrees)
 
 
 @dataclass(frozen=True, eq=False)
 class Preferences(Record):
     """The choices of an operator so far.
 
-    movements: how many were judged; scores (f, f'): sums of their scores for each pair of factors; factors: for near and for far
-    choices, exactly 1 before the first movement; states, choices: of the present movement.
+    movements: how many were judged; scores (2, f): sums of their scores for operators who plan and who look ahead, by factor;
+    states, choices: of the present movement.
     """
 
     movements: int = 0
-    scores: Array = field(default_factory=lambda: np.zeros((len(FACTORS), len(FACTORS))))
-    factors: tuple[float, float] = (1.0, 1.0)
+    scores: Array = field(default_factory=lambda: np.zeros((2, len(FACTORS))))
     states: tuple[HandState, ...] = ()
     choices: tuple[Choice, ...] = ()
 
     def adapt(self, config: LikelihoodConfig) -> LikelihoodConfig:
         """Return the likelihood of this operator."""
-        return _scale_exponents(config, *self.factors) if self.movements else config
+        return _scale(config, *self.find_mean(config.lookahead_share)) if self.movements else config
+
+    def find_mean(self, lookahead_share: float) -> tuple[float, float]:
+        """Return the factor and the probability that the operator looks ahead, which was `lookahead_share` at first."""
+        prior = np.array([[1.0 - lookahead_share], [lookahead_share]]) * np.exp(-0.5 * (np.log(FACTORS) / PRIOR_STDDEV) ** 2)
+        weights = prior * np.exp(self.scores - self.scores.max())
+        weights /= weights.sum()
+        return float(np.exp(weights.sum(axis=0) @ np.log(FACTORS))), float(weights[1].sum())
 
     def follow(self, hand: HandState, config: LikelihoodConfig) -> Preferences:
         """Return the preferences after the next state of the hand; config: before it is adapted."""
@@ -125,19 +131,15 @@ class Preferences(Record):
 
     def _judge(self, config: LikelihoodConfig) -> Preferences:
         """Return the preferences after the end of the present movement, which counts if it decided between classes."""
-        scaled, scores = [_scale_exponents(config, each, each) for each in FACTORS.tolist()], []
+        scores = []
         for choice in choose_judged(self.choices):
             agrees = choice.find_agreeing(self.states)
             if agrees.any() and not agrees.all():
-                scores.append(choice.score(agrees, scaled))
-        if not scores:
-            return self
-        total = self.scores + np.mean(scores, axis=0)
-        factors = compute_mean_factors(np.log(FACTORS), total, PRIOR_STDDEV)
-        return replace(self, movements=self.movements + 1, scores=total, factors=factors)
+                scores.append(choice.score(agrees, config))
+        return replace(self, movements=self.movements + 1, scores=self.scores + np.mean(scores, axis=0)) if scores else self
 
 
-def _scale_exponents(config: LikelihoodConfig, near: float, beyond: float) -> LikelihoodConfig:
-    """Return the likelihood with factors on the logarithms of the weights, by near and by far choices, within the bounds."""
-    scaled = {'beta': near * config.beta, 'shortfall': near * config.shortfall, 'beta_beyond': beyond * config.beta_beyond}
-    return clip_values(config, scaled)
+def _scale(config: LikelihoodConfig, factor: float, lookahead_share: float) -> LikelihoodConfig:
+    """Return the likelihood with a factor on the logarithms of all weights, within the bounds, and another share."""
+    scaled = {name: factor * getattr(config, name) for name in ('beta', 'shortfall', 'beta_beyond')}
+    return clip_values(config, {**scaled, 'lookahead_share': lookahead_share})
