@@ -37,7 +37,7 @@ def make_candidates(sides, goal=None, likelihood=None, cost_to_go=None, solved=N
         covariance=np.tile(np.eye(2), (k, H, 1, 1)),
         duration_sensitivity=np.zeros((k, H, 2)),
         branch_times=BranchTimes(np.where(np.eye(k, dtype=bool), np.inf, 0.0), np.arange(k)),
-        decisions=Decisions(np.arange(solved.sum()), np.zeros(solved.sum(), dtype=np.intp)),
+        decisions=Decisions(np.arange(solved.sum()), np.arange(solved.sum()), np.zeros(solved.sum(), dtype=np.intp)),
     )
 
 

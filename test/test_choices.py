@@ -33,7 +33,7 @@ def choose(
 ) -> Choice:
     """Return a choice between the four classes about two obstacles in a row of one each."""
     sides = tuple(dict(zip(OBSTACLES.ids, each, strict=True)) for each in CLASSES)
-    decisions = Decisions(np.array([0, 0, 1, 1]), np.zeros(4, dtype=np.intp))
+    decisions = Decisions(np.array([0, 0, 1, 1]), np.arange(4), np.zeros(4, dtype=np.intp))
     made = stamp_ns, onset_ns, OBSTACLES, goals
     return Choice(*made, np.array(goal), sides, np.array(costs), np.zeros(4), None, decisions)
 

@@ -13,8 +13,9 @@ from foc_ros.cli.main import main
 from foc_ros.core.config import Config, ExperienceConfig
 from foc_ros.core.errors import InputError
 from foc_ros.core.homotopy import find_path_sides
+from foc_ros.core.homotopy.decisions import Decisions
 from foc_ros.core.homotopy.demonstrations import STEP_S, record_demonstration
-from foc_ros.core.learning.experience import NO_LIBRARY, compare_with_class, find_evidence, make_library
+from foc_ros.core.learning.experience import NO_LIBRARY, compare_with_class, find_evidence, make_library, update_likelihoods
 from foc_ros.core.memory.memory import Memory
 from foc_ros.core.obstacles.rounded_polygon import measure_offsets
 from foc_ros.core.predictor import predict
@@ -61,6 +62,19 @@ def test_likelihoods_are_those_of_a_dirichlet_distribution():
         if each.has_likelihood:
             expected = (prior * each.likelihood + count * (label in taken)) / (prior + count)
             assert after[label].likelihood == pytest.approx(expected, abs=1e-9)
+
+
+def test_recordings_count_for_gaps_and_goals_as_much_as_the_model_and_less_for_ways():
+    """Eight classes: two gaps with two ways each, and two goals on each way; ten recordings of the first class."""
+    gap, way = np.repeat([0, 1], 4), np.repeat([0, 1, 2, 3], 2)
+    counts, config = np.array([10.0, *[0.0] * 7]), ExperienceConfig(prior_count=2.0, prior_count_beyond=30.0)
+    after = update_likelihoods(np.full(8, 0.125), counts, Decisions(gap, way, np.zeros(8, dtype=np.intp)), config)
+    of_gap, of_way = np.bincount(gap, after), np.bincount(way, after)
+    assert after.sum() == pytest.approx(1.0)
+    assert of_gap[0] == pytest.approx((2.0 * 0.5 + 10.0) / 12.0)
+    assert of_way[0] / of_gap[0] == pytest.approx((30.0 * 0.5 + 10.0) / 40.0)
+    assert after[0] / of_way[0] == pytest.approx((2.0 * 0.5 + 10.0) / 12.0)
+    np.testing.assert_allclose(after[4:], of_gap[1] / 4.0)
 
 
 MOVING = replace(HAND, mean=np.array([*ABOVE.states[20], 0.0, 0.0]), onset_ns=0)

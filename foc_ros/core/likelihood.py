@@ -23,10 +23,12 @@ h, S_W(h) = {W': tau_WW' > h}, are not yet distinguished from W, so that each ge
 A choice that lies tau ahead is therefore made with the exponent beta exp(-tau / lookahead_s): by the ratio of costs when it is
 near, evenly when it is far. With a `lookahead_s` of 0, h is infinite.
 
-These p'_i give the probabilities of the gaps of the next row. What lies beyond this row is decided with an exponent of its own,
-beta' = `likelihood.beta_beyond`. With G the classes that take the same gap in the next row, those of class i,
+These p'_i give the probabilities of the gaps of the next row. Which way to take beyond this row is decided with an exponent of
+its own, beta' = `likelihood.beta_beyond`. With G the classes that take the same gap in the next row as class i, and W those of
+the same way through all rows, which differ in their goals,
 
-    p'_i <- sum_{j in G} p'_j  r_i / sum_{j in G} r_j,  log r_i = -beta' log J_i - (beta' / beta) shortfall (k_wanted - k),
+    p'_i <- sum_{j in G} p'_j  (sum_{j in W} r_j / sum_{j in G} r_j)  p_i / sum_{j in W} p_j,
+    log r_i = -beta' log J_i - (beta' / beta) shortfall (k_wanted - k),
 
 so that far choices follow the same losses as near ones, less precisely if beta' < beta.
 
@@ -118,7 +120,8 @@ def compute_likelihoods(
     if decisions is not None:
         precision = config.beta_beyond / config.beta if config.beta > 0.0 else 1.0
         beyond = rule(values, replace(config, beta=config.beta_beyond)) - precision * losses
-        near = _share_next_gaps(near - woven, beyond - woven, decisions.next_gap)
+        beyond = _share_weights(beyond, logs, decisions.way)
+        near = _share_weights(near - woven, beyond - woven, decisions.next_gap)
     ahead = normalise_logs(np.ascontiguousarray(near, dtype=float))
     mixed: Array = (1.0 - config.lookahead_share) * planned + config.lookahead_share * ahead
     return mixed
@@ -145,12 +148,12 @@ def normalise_logs(logs: Vector) -> Vector:
     return weights
 
 
-def _share_next_gaps(near: Array, beyond: Array, next_gap: NDArray[np.intp]) -> Array:
-    """Return logarithms (k,) that give each gap the weight that it has by `near`, and share it among its classes by `beyond`."""
-    weights = np.full((2, int(next_gap.max()) + 1), -np.inf)
-    np.logaddexp.at(weights[0], next_gap, near)
-    np.logaddexp.at(weights[1], next_gap, beyond)
-    shared: Array = beyond + (weights[0] - weights[1])[next_gap]
+def _share_weights(between: Array, within: Array, group: NDArray[np.intp]) -> Array:
+    """Return logarithms (k,) that give each group its weight by `between`, and share it among its classes by `within`."""
+    weights = np.full((2, int(group.max()) + 1), -np.inf)
+    np.logaddexp.at(weights[0], group, between)
+    np.logaddexp.at(weights[1], group, within)
+    shared: Array = within + (weights[0] - weights[1])[group]
     return shared
 
 

@@ -25,14 +25,15 @@ NO_OBSTACLES = np.zeros(0, dtype=np.intp)
 
 
 class Decisions(NamedTuple):
-    """Of k classes: the number (k,) of the gap that each takes in the next row, and the number (k,) of rows it weaves through.
+    """The decisions of k classes.
 
-    Where no row is ahead, the gap of a class is its goal.
-
-    next_row (m,): the obstacles of the next row, none where no row is ahead.
+    next_gap, way (k,): numbers of the gap that each takes in the next row, and of its way. Classes of one way take the same gaps
+    in all rows ahead and differ in their goals. Where no row is ahead, the gap and the way of a class are its goal. woven (k,):
+    how many rows each weaves through. next_row (m,): the obstacles of the next row, none where no row is ahead.
     """
 
     next_gap: NDArray[np.intp]
+    way: NDArray[np.intp]
     woven: NDArray[np.intp]
     next_row: NDArray[np.intp] = NO_OBSTACLES
 
@@ -60,11 +61,17 @@ def find_decisions(
     order = np.lexsort((obstacles.centre @ np.array([-direction[1], direction[0]]), row))
     order = order[is_ahead[order]]
     if not len(order):
-        return Decisions(np.unique(goal, return_inverse=True)[1], np.zeros(len(sides), dtype=np.intp))
+        number = np.unique(goal, return_inverse=True)[1]
+        return Decisions(number, number, np.zeros(len(sides), dtype=np.intp))
     row, is_left = row[order], is_left[:, order]
     turns_back = np.zeros_like(is_left)
     turns_back[:, 1:] = (is_left[:, 1:] > is_left[:, :-1]) & (row[1:] == row[:-1])
     woven = np.logical_or.reduceat(turns_back, np.flatnonzero(np.diff(row, prepend=WALL)), axis=1).sum(axis=1)
+    is_next = row == row[0]
+    return Decisions(_number_rows(is_left[:, is_next]), _number_rows(is_left), woven, open_obstacles[order[is_next]])
+
+
+def _number_rows(table: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return a number (k,) for each row of a table (k, n), the same for equal rows."""
     numbers = dict[bytes, int]()
-    next_gap = [numbers.setdefault(gap.tobytes(), len(numbers)) for gap in is_left[:, row == row[0]]]
-    return Decisions(np.array(next_gap, dtype=np.intp), woven, open_obstacles[order[row == row[0]]])
+    return np.array([numbers.setdefault(each.tobytes(), len(numbers)) for each in table], dtype=np.intp)

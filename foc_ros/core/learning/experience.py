@@ -5,13 +5,15 @@ A recording r counts by how near its states come to the position p [m] and the v
     w_r = max_m exp(-|p - p_rm|^2 / 2 a^2 - |v - v_rm|^2 / 2 b^2),  a = `position_stddev`,  b = `velocity_stddev`.
 
 From the state m of this maximum on, it passes obstacles on the sides of a class i towards the goal at its end. With G the classes
-that take the same gap in the next row, or lead to the same goal where no row is ahead, n_i = sum of the w_r of class i, and n_G =
-sum of the n_i in G, the likelihoods p_i of the model are means of two Dirichlet distributions, of the gap and of the class beyond
-it. They count as n_0 = `prior_count` and n_1 = `prior_count_beyond` recordings; the recordings are observations:
+that take the same gap in the next row, or lead to the same goal where no row is ahead, W those of the same way through all rows,
+n_i = sum of the w_r of class i, and n_G and n_W = sums of the n_i, the likelihoods p_i of the model are means of three Dirichlet
+distributions: of the gap, of the way beyond it, and of the goal. They count as n_0 = `prior_count` recordings for the gap and for
+the goal, and as n_1 = `prior_count_beyond` for the way; the recordings are observations:
 
-    p_G <- (n_0 p_G + n_G) / (n_0 + sum n),    p_i <- p_G (n_1 p_i / p_G + n_i) / (n_1 + n_G),
+    p_G <- (n_0 p_G + n_G) / (n_0 + sum n),    p_W <- p_G (n_1 p_W / p_G + n_W) / (n_1 + n_G),
+    p_i <- p_W (n_0 p_i / p_W + n_i) / (n_0 + n_W),
 
-with the p_G of the model in the last fraction.
+with the p_G and p_W of the model in the fractions p_W / p_G and p_i / p_W.
 
 The path of a class is pooled with the recordings that take its gap in the next row, each up to where it passes an obstacle on
 another side than the class (`recorded_paths`). If this path leaves the class or enters an obstacle, only the recordings of the
@@ -28,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.config import ExperienceConfig
-from foc_ros.core.homotopy.decisions import find_decisions, tabulate_sides
+from foc_ros.core.homotopy.decisions import Decisions, find_decisions, tabulate_sides
 from foc_ros.core.homotopy.demonstrations import NEAR, STEP_S, Demonstration, is_same_demonstration
 from foc_ros.core.types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Record, Solution
 
@@ -150,7 +152,7 @@ def pool_recordings(
     decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
     agreements = [compare_with_class(each.candidate, evidence, obstacles, decisions.next_row) for each in taken]
     counts = np.array([evidence.weight[each.is_same].sum() for each in agreements])
-    likelihoods = _update_likelihoods(np.array([each.likelihood for each in taken]), counts, decisions.next_gap, config)
+    likelihoods = update_likelihoods(np.array([each.likelihood for each in taken]), counts, decisions, config)
     pooled = []
     for each, share, agreement in zip(taken, likelihoods.tolist(), agreements, strict=True):
         recorded = follow_recordings(library, evidence, agreement.until_s, hand, each.times)
@@ -212,12 +214,19 @@ def _pool_path(
     return candidate.solution
 
 
-def _update_likelihoods(likelihoods: Array, counts: Array, gap: NDArray[np.intp], config: ExperienceConfig) -> Array:
-    """Return likelihoods (k,) that counts (k,) change, first those of the gaps (k,) and then those of the classes in each gap."""
-    of_gap, counts_of_gap = np.bincount(gap, likelihoods), np.bincount(gap, counts)
-    near, beyond = config.prior_count, config.prior_count_beyond
-    of_gap_now = (near * of_gap + counts_of_gap) / (near + counts.sum())
-    within = np.divide(likelihoods, of_gap[gap], out=np.zeros(len(gap)), where=of_gap[gap] > 0.0)
-    pooled: Array = of_gap_now[gap] * (beyond * within + counts) / (beyond + counts_of_gap[gap])
+def update_likelihoods(likelihoods: Array, counts: Array, decisions: Decisions, config: ExperienceConfig) -> Array:
+    """Return likelihoods (k,) that counts (k,) change: of the gaps, of the ways in each gap, and of the goals in each way."""
+    whole, each = np.zeros(len(counts), dtype=np.intp), np.arange(len(counts))
+    levels = (
+        (whole, decisions.next_gap, config.prior_count),
+        (decisions.next_gap, decisions.way, config.prior_count_beyond),
+        (decisions.way, each, config.prior_count),
+    )
+    pooled = np.ones(len(counts))
+    for group, part, prior_count in levels:
+        of_group, of_part = (np.bincount(number, likelihoods)[number] for number in (group, part))
+        in_group, in_part = (np.bincount(number, counts)[number] for number in (group, part))
+        share = np.divide(of_part, of_group, out=np.zeros(len(counts)), where=of_group > 0.0)
+        pooled *= (prior_count * share + in_part) / (prior_count + in_group)
     pooled /= pooled.sum()
     return pooled
