@@ -83,9 +83,14 @@ def observe_with(found: Sequence[Demonstration], recordings: Sequence[Recording]
         return collect_all(partial(observe, config=config), items, executor, f'{len(found)} recordings')
 
 
-def format_row(name: str, ways: str, errors: Sequence[float], densities: Sequence[float]) -> tuple[str, ...]:
-    """Return a row of the table."""
-    return name, ways, ' '.join(f'{1e3 * each:.0f}' for each in errors), ' '.join(f'{each:.2f}' for each in densities)
+def format_errors(errors: Sequence[float]) -> str:
+    """Return errors [m] in mm."""
+    return ' '.join(f'{1e3 * each:.0f}' for each in errors)
+
+
+def format_densities(densities: Sequence[float]) -> str:
+    """Return negative log-densities."""
+    return ' '.join(f'{each:.2f}' for each in densities)
 
 
 def measure(found: Sequence[Demonstration], recordings: Sequence[Recording], executor: Executor) -> list[tuple[str, ...]]:
@@ -93,11 +98,12 @@ def measure(found: Sequence[Demonstration], recordings: Sequence[Recording], exe
     observed = observe_with(found, recordings, executor)
     scores, names = compute_position_scores(observed), [f'{each:g}' for each in HORIZONS_S]
     gain = format_ways(score_ways(observed, PUBLISHED, [0] * len(observed)))[0]
-    errors = scores['displacement_m']['most likely']['final']
-    rows = [format_row('foc', gain, [errors[each] for each in names], [scores['nlpd']['foc'][each] for each in names])]
+    errors = [scores['displacement_m'][each]['final'] for each in ('most likely', 'likelihood-weighted')]
+    likeliest, mean = (format_errors([each[name] for name in names]) for each in errors)
+    rows = [('foc', gain, likeliest, mean, format_densities([scores['nlpd']['foc'][name] for name in names]))]
     if found:
         nearest = score_nearest(observed, make_library(found), found[0].frame_id)
-        rows.append(format_row('nearest recordings', '', *(each.tolist() for each in nearest)))
+        rows.append(('nearest recordings', '', '', format_errors(nearest[0].tolist()), format_densities(nearest[1].tolist())))
     return [(f'{len(found)}', *row) for row in rows]
 
 
@@ -119,7 +125,7 @@ def main() -> None:
                 drawn = np.random.default_rng([seed, number]).permutation(len(learnt))[:number]
                 found = [learnt[each] for each in sorted(drawn.tolist())]
                 rows += measure(found, predicted[:: arguments.every], executor)
-    titles = 'recordings', 'predictor', 'ways, gain [nat]', 'error [mm]', 'NLPD'
+    titles = 'recordings', 'predictor', 'ways, gain [nat]', 'error of the likeliest [mm]', 'error of the mean [mm]', 'NLPD'
     write_blocks({'learning': format_table(titles, rows)}, PAGE)
 
 
