@@ -139,16 +139,16 @@ def expand_to_both_axes(covariance: Matrix) -> Matrix:
 
 @compiled
 def filter_step(
-    mean: Vector, height_mean: Vector, root: Matrix, dt: float, position: Vector, height: float, jerk_density: float, stddev: float
+    mean: Vector, height_mean: Vector, root: Matrix, dt: float, position: Vector, height: float, density: float, stddev: float
 ) -> tuple[Vector, Vector, Matrix, Matrix]:
     """Return mean (6,), mean of the height (3,), covariance (6, 6) and root (3, 3) after dt [s] and a sample.
 
-    position (2,) and height are those of the sample [m]; stddev: of each of its coordinates [m].
+    position (2,) and height are those of the sample [m]; density: of the jerk; stddev: of each coordinate of the sample [m].
     """
     step, columns, before = compute_transition(dt), np.empty((3, 6)), np.empty((3, 3))
     columns[:, :3] = multiply(step, root)
     for i in range(3):
-        columns[i, 3:] = jerk_density * dt ** (2.5 - i) * _UNIT_ROOT[i]
+        columns[i, 3:] = density * dt ** (2.5 - i) * _UNIT_ROOT[i]
         before[i, 0], before[i, 1], before[i, 2] = mean[2 * i], mean[2 * i + 1], height_mean[i]
     corrected = triangularise(columns)
     first = corrected[0, 0]
