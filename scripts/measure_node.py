@@ -4,7 +4,7 @@ The player publishes a hand at 1 kHz and 50 obstacles at 30 Hz with jitter, all 
 the frame of a camera whose transform is sent 5 ms later (this needs tf2). The script prints
 
 - discovery: time from the line "ready" of the node until DDS has connected its inputs to the player [s],
-- start: time from the line "ready" of the node to its first prediction [s],
+- start: time from the line "ready" of the node to its first prediction [s]; with `--starts 20` these two of 20 starts,
 - rate: predictions per second at the default budget; the longest time between two of them; the median and the largest age of one,
   by the stamp of its pose, when it was published [s]; how many were older than two periods of `rate_hz`,
 - clutch: the longest answer of `~/engage` in this load [s],
@@ -186,15 +186,32 @@ def read_cpu_s(process: subprocess.Popen[str]) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
 
 
+def measure_start(player: Player, process: subprocess.Popen[str]) -> tuple[float, float]:
+    """Return the times from the line "ready" of a node to its connection and to its first prediction [s]."""
+    wait_until_ready(process)
+    began = time.monotonic()
+    player.play(60.0, until=lambda: player.is_connected)
+    discovery_s = time.monotonic() - began
+    player.play(60.0, until=lambda: bool(player.heard_s))
+    return discovery_s, time.monotonic() - began
+
+
+def measure_starts(player: Player, number: int, *parameters: str) -> None:
+    """Start a node several times beside the same player, and print the times."""
+    times_s = []
+    for _ in range(number):
+        with run_node(*parameters) as process:
+            times_s.append(measure_start(player, process))
+        player.play(10.0, 0.0, until=lambda: not player.is_connected)
+        player.forget()
+    for name, found_s in zip(('discovery [s]', 'start [s]'), np.sort(np.array(times_s), axis=0).T, strict=True):
+        print(f'{name:28} {" ".join(f"{each:.2f}" for each in found_s)}')
+
+
 def measure_predictions(player: Player, seconds: float, *parameters: str) -> dict[str, float]:
     """Measure the start, the rate and the clutch."""
     with run_node(*parameters) as process:
-        wait_until_ready(process)
-        began = time.monotonic()
-        player.play(60.0, until=lambda: player.is_connected)
-        discovery_s = time.monotonic() - began
-        player.play(60.0, until=lambda: bool(player.heard_s))
-        start_s = time.monotonic() - began
+        discovery_s, start_s = measure_start(player, process)
         player.play(2.0)
         player.forget()
         player.play(seconds)
@@ -235,10 +252,16 @@ def main() -> int:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument('--seconds', type=float, default=10.0, help='duration of each measurement (default: %(default)s)')
+    parser.add_argument('--starts', type=int, default=0, help='start a node so many times, and print the times of these starts')
     parser.add_argument('--moving', action='store_true', help='publish in a moving frame, which needs tf2')
     arguments = parser.parse_args()
     parameters = ['frame_id:=world'] if arguments.moving else []
     with isolated_graph():
+        if arguments.starts:
+            player = Player(arguments.moving)
+            measure_starts(player, arguments.starts, *parameters)
+            player.close()
+            return 0
         for measure in (measure_predictions, measure_intake):
             player = Player(arguments.moving)
             for name, value in measure(player, arguments.seconds, *parameters).items():

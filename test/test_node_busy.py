@@ -113,6 +113,17 @@ def test_a_fast_hand_is_polled_until_it_is_slow_again(ros: Graph, monkeypatch: p
     assert figures(bench.health())['hand_pose refused'] == f'0 of {count + 51}'
 
 
+def test_a_fast_hand_is_needed_when_a_prediction_is_due_and_always_for_guidance(ros: Graph) -> None:
+    bench = Bench(ros)
+    assert bench.node.polling._find_unneeded_s() == 0.0
+    bench.publish_scene()
+    bench.move(hand_path(1))
+    bench.wait_for('prediction', 1)
+    assert bench.node.polling._find_unneeded_s() == 1.0 / bench.node.pipeline.config.rate_hz
+    assert set_on(bench, guidance__enabled=True).successful
+    assert bench.node.polling._find_unneeded_s() == 0.0
+
+
 def test_poses_in_the_queue_are_no_silence(ros: Graph) -> None:
     """Whatever kept the node from taking its messages, its diagnostics do not blame the hand."""
     bench = Bench(ros, parameters={'estimator.hand_timeout_s': 0.3})

@@ -150,6 +150,20 @@ def test_a_first_start_says_at_once_that_it_compiles(ros: Graph, tmp_path: Path,
     assert not compiled, 'the message comes before the first kernel is compiled'
 
 
+def test_dds_connects_the_process_while_it_loads_and_a_stop_then_leaves_no_trace(
+    ros: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path))
+    watcher = ros.node('watcher')
+    with running(ros, 'module') as process:
+        ros.spin_until(lambda: '_foc_start' in watcher.get_node_names(), 'the process', 30.0)
+        assert 'foc' not in watcher.get_node_names(), 'its kernels are still being compiled'
+        code, errors = ended(process, signal.SIGTERM)
+    assert code == 0
+    assert [line for line in errors.splitlines() if not line.startswith('[INFO]')] == []
+    ros.spin_until(lambda: '_foc_start' not in watcher.get_node_names(), 'the end, without waiting for the lease', 10.0)
+
+
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_starting_node_stops_without_an_error_at_any_moment(ros: Graph, number: signal.Signals) -> None:
     watcher = ros.node('watcher')
@@ -221,6 +235,7 @@ def test_a_stopped_node_leaves_no_files_and_no_trace_in_the_graph(ros: Graph, tm
     environment = ros.environment | {'ROS_LOG_DIR': str(tmp_path / 'log'), 'PYTHONPATH': str(ROOT)}
     with subprocess.Popen(command, cwd=tmp_path, env=environment) as process:
         ros.spin_until(lambda: 'foc' in watcher.get_node_names(), 'the node', 30.0)
+        ros.spin_until(lambda: '_foc_start' not in watcher.get_node_names(), 'the end of the hidden node')
         process.send_signal(signal.SIGTERM)
         assert process.wait(30) == 0
     deadline = time.monotonic() + 30

@@ -92,6 +92,7 @@ def test_the_rate_is_reached_whatever_the_period_of_the_samples(recorder: Record
     pipeline, stamps = ready(), []
     for ms in np.arange(0.0, 1000.0, period_ms):
         pipeline.add_hand_sample(hand(ms))
+        assert pipeline.is_due == (pipeline.until_due_s <= 0.0)
         if pipeline.is_due:
             prediction = pipeline.predict()
             assert prediction is not None
@@ -104,6 +105,7 @@ def test_a_period_may_be_a_fraction_of_a_nanosecond(recorder: Recorder) -> None:
     pipeline = ready(replace_values(CONFIG, {'rate_hz': 30.0}))
     pipeline.add_hand_sample(hand(0.0))
     pipeline.predict()
+    assert pipeline.until_due_s == 0.033333333
     pipeline.add_hand_sample(HandSample(START + 33_333_333, np.zeros(2), 0.0, 'world'))
     assert pipeline.is_due
 

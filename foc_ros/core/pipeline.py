@@ -99,6 +99,13 @@ class Pipeline:
         return self._due_ns is None or self.hand_state.stamp_ns >= self._due_ns
 
     @property
+    def until_due_s(self) -> float:
+        """Time from the stamp of the newest hand sample to the next one that is due [s]; at most 0 if any is due."""
+        if self.hand_state is None or self._due_ns is None:
+            return 0.0
+        return (self._due_ns - self.hand_state.stamp_ns) / NANOSECONDS
+
+    @property
     def _due_ns(self) -> int | None:
         """Stamp from which on the next prediction is due; None if any stamp is."""
         period_ns = int(NANOSECONDS / self.config.rate_hz)

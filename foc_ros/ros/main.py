@@ -6,7 +6,7 @@ import gc
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from types import FrameType
 from typing import Any
@@ -30,12 +30,13 @@ class StopSignals:
     """Ends the process on SIGINT and SIGTERM: at once while it imports, and by :attr:`is_requested` after :meth:`defer`.
 
     rclpy's own handlers shut the context down during a callback, and some of the stops then end with an error. This flag ends
-    the loop between two callbacks. Before there is a context, nothing has to be closed, and an exception would be lost in some
-    parts of an import.
+    the loop between two callbacks. An exception would be lost in some parts of an import. Attribute leave: what is to be done
+    before the end during an import.
     """
 
     def __init__(self) -> None:
         self.is_requested = False
+        self.leave: Callable[[], object] = lambda: None
         self._is_deferred = False
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._request)
@@ -46,6 +47,7 @@ class StopSignals:
 
     def _request(self, _number: int, _frame: FrameType | None) -> None:
         if not self._is_deferred:
+            self.leave()
             os._exit(0)
         self.is_requested = True
 
@@ -67,28 +69,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
 
-    from foc_ros.core.kernels.compilation import follow_compilation
-    from foc_ros.core.registry import import_all
-
+    context = rclpy.Context()
     try:
         extra = remove_ros_args(given)[1:]
         if extra:
             raise FocError(f'unrecognized arguments: {" ".join(extra)} (those of ROS follow --ros-args)')
+        rclpy.init(args=given, context=context, signal_handler_options=SignalHandlerOptions.NO)
     except (FocError, RuntimeError, ValueError) as error:
         return _reject(error)
+    forerunner = _join_graph(context)
+    stop.leave = forerunner.destroy_node
+    from foc_ros.core.kernels.compilation import follow_compilation
+    from foc_ros.core.registry import import_all
 
     with follow_compilation(partial(_log_compilation, get_logger('foc'))):
         from .node import FocNode  # imports kernels too
 
         import_all()
     stop.defer()
-    context = rclpy.Context()
     try:
-        rclpy.init(args=given, context=context, signal_handler_options=SignalHandlerOptions.NO)
         node = FocNode(context=context)
     except (FocError, RuntimeError, ValueError) as error:
         context.try_shutdown()
         return _reject(error)
+    finally:
+        forerunner.destroy_node()
     sys.setswitchinterval(SWITCH_S)
     gc.collect()
     gc.freeze()  # these objects stay alive: a full collection over them would delay a prediction by 80 ms
@@ -107,6 +112,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if node.is_busy_after(END_S):
         os._exit(0)  # otherwise the interpreter waits for the computation
     return 0
+
+
+def _join_graph(context: Any) -> Any:
+    """Create a hidden node, with which DDS finds the other programs while the solver is loaded: this may take it 3 s."""
+    import rclpy
+
+    name, without = '_foc_start', {'enable_rosout': False, 'start_parameter_services': False}
+    return rclpy.create_node(name, context=context, use_global_arguments=False, **without)
 
 
 def _reject(error: Exception) -> int:

@@ -88,7 +88,7 @@ class FocNode(LifecycleNode):
         except ImportError:  # tf2 is optional
             self._tf = None
         self._retries = self.create_timer(RETRY_S, self._take_held, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self.polling = QueuePolling(self._take_queued_poses)
+        self.polling = QueuePolling(self._take_queued_poses, self._find_unneeded_s)
         self._worker = Worker(self, self._finish)
         self._create_pipeline()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -202,24 +202,28 @@ class FocNode(LifecycleNode):
             self._transforms.add(role, each, monotonic())
         self._take_released(role)
 
-    def _take_queued_poses(self) -> bool:
-        """Take the hand poses that wait; return whether there were any."""
+    def _take_queued_poses(self) -> int:
+        """Take the hand poses that wait, and return their number."""
         poses = take_queued(self._inputs[HAND]) if HAND in self._inputs else []
         self._take_poses(poses)
-        return bool(poses)
+        return len(poses)
+
+    def _find_unneeded_s(self) -> float:
+        """Return for how long no hand pose is needed [s]: until a prediction is due, unless guidance follows the hand."""
+        return 0.0 if self.pipeline.config.guidance.enabled else self.pipeline.until_due_s
 
     def _take_poses(self, poses: list[bytes]) -> None:
         """Take serialized hand poses. One that is skipped is not deserialized, unless it has to wait for those before it."""
-        is_taken = False
+        is_taken, now_s = False, monotonic()
         for each in poses:
             if not self._transforms.holds(HAND) and self.intake.is_skipped(read_stamp(each)):
-                self._note(HAND, self.intake.count_skipped(), monotonic())
+                self._note(HAND, self.intake.count_skipped(), now_s)
                 continue
             try:
-                self._transforms.add(HAND, deserialize_pose(each), monotonic())
+                self._transforms.add(HAND, deserialize_pose(each), now_s)
             except MessageError as error:
                 self.intake.refuse(HAND, error)
-                self._note(HAND, None, monotonic())
+                self._note(HAND, None, now_s)
             is_taken = self._take_released(HAND) or is_taken
         if is_taken and self.pipeline.is_due:
             self._predict()
@@ -295,6 +299,8 @@ class FocNode(LifecycleNode):
             self._publish_prediction(ended)
         except Exception as error:
             self._recover(error)
+        if self.polling.is_polling:
+            self._take_queued_poses()  # the newest of them is predicted from
         if self.pipeline.is_due:
             self._predict()
 

@@ -10,7 +10,9 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.executors import Executor
 
 POLL_S = 0.005
-"""Longest time between two polls, and time between two messages below which polling goes on [s]."""
+"""Shortest wait for a poll, and time between two messages below which polling goes on [s]."""
+LONGEST_S = 0.02
+"""Longest wait for a poll [s]."""
 
 
 class QueuePolling(MutuallyExclusiveCallbackGroup):
@@ -18,17 +20,20 @@ class QueuePolling(MutuallyExclusiveCallbackGroup):
 
     One wake-up of the executor costs more than the processing of several messages. A poll is no callback, because the executor
     prepares to wait twice after each callback. There are no polls unless :meth:`spin_once` is called in place of the executor's.
-    Polling ends when no message came for `POLL_S`, because the messages of a slow hand would wait for the polls.
+    Polling ends when the messages since the last poll were not more frequent than one in `POLL_S`, because the messages of a slow
+    hand would wait for the polls.
 
     Parameters
     ----------
     poll
-        Takes the messages that wait, and returns whether there were any.
+        Takes the messages that wait, and returns their number.
+    find_unneeded_s
+        Returns for how long no message is needed [s].
     """
 
-    def __init__(self, poll: Callable[[], bool]) -> None:
+    def __init__(self, poll: Callable[[], int], find_unneeded_s: Callable[[], float]) -> None:
         super().__init__()
-        self._poll = poll
+        self._poll, self._find_unneeded_s = poll, find_unneeded_s
         self._last_s = float('-inf')
         self._is_allowed = False
         self.is_polling = False
@@ -46,9 +51,11 @@ class QueuePolling(MutuallyExclusiveCallbackGroup):
     def spin_once(self, executor: Executor, timeout_s: float) -> None:
         """Spin once, for a time at most [s], and poll after it if the messages come so often."""
         self._is_allowed = True
-        executor.spin_once(timeout_sec=min(POLL_S, timeout_s) if self.is_polling else timeout_s)
+        wait_s = min(max(self._find_unneeded_s(), POLL_S), LONGEST_S) if self.is_polling else timeout_s
+        executor.spin_once(timeout_sec=min(wait_s, timeout_s))
         if not self.is_polling:
             return
-        if self._poll():
-            self._last_s = monotonic()
-        self.is_polling = monotonic() - self._last_s < POLL_S
+        number, now_s = self._poll(), monotonic()
+        self.is_polling = now_s - self._last_s < POLL_S * max(number, 1)
+        if number and self.is_polling:
+            self._last_s = now_s

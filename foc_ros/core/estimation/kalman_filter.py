@@ -139,25 +139,27 @@ def expand_to_both_axes(covariance: Matrix) -> Matrix:
 
 @compiled
 def filter_step(
-    mean: Vector, root: Matrix, dt: float, jerk_density: float, stddev: float, position: Vector
-) -> tuple[Vector, Matrix, Matrix]:
-    """Return mean (9,), covariance (6, 6) and root (3, 3) after dt [s] and a position (3,) of a standard deviation [m].
+    mean: Vector, height_mean: Vector, root: Matrix, dt: float, position: Vector, height: float, density: float, stddev: float
+) -> tuple[Vector, Vector, Matrix, Matrix]:
+    """Return mean (6,), mean of the height (3,), covariance (6, 6) and root (3, 3) after dt [s] and a sample.
 
-    mean: position, velocity and acceleration, of the two axes of the plane and the height each; covariance: of the two axes.
+    position (2,) and height are those of the sample [m]; density: of the jerk; stddev: of each coordinate of the sample [m].
     """
-    step, columns = compute_transition(dt), np.empty((3, 6))
+    step, columns, before = compute_transition(dt), np.empty((3, 6)), np.empty((3, 3))
     columns[:, :3] = multiply(step, root)
     for i in range(3):
-        columns[i, 3:] = jerk_density * dt ** (2.5 - i) * _UNIT_ROOT[i]
+        columns[i, 3:] = density * dt ** (2.5 - i) * _UNIT_ROOT[i]
+        before[i, 0], before[i, 1], before[i, 2] = mean[2 * i], mean[2 * i + 1], height_mean[i]
     corrected = triangularise(columns)
     first = corrected[0, 0]
     deviation = np.hypot(first, stddev)
-    states = multiply(step, mean.reshape(3, 3))
-    innovation = position - states[0]
+    states = multiply(step, before)
+    innovation = np.array([position[0], position[1], height]) - states[0]
     for i in range(3):
         states[i] += corrected[i, 0] * (first / deviation / deviation) * innovation
         corrected[i, 0] *= stddev / deviation
-    return states.ravel(), expand_to_both_axes(multiply_transposed(corrected, corrected)), corrected
+    covariance = expand_to_both_axes(multiply_transposed(corrected, corrected))
+    return states[:, :2].copy().ravel(), states[:, 2].copy(), covariance, corrected
 
 
 def _start_state(sample: HandSample, config: EstimatorConfig) -> FilterState:
@@ -172,12 +174,9 @@ def _start_state(sample: HandSample, config: EstimatorConfig) -> FilterState:
 
 def _update_state(state: FilterState, sample: HandSample, dt: float, config: EstimatorConfig) -> FilterState:
     """Propagate a state to the stamp of the sample, correct it by the position, and update the movement."""
-    settings = config.jerk_density, config.position_stddev
-    before = np.empty((3, 3))
-    before[:, :2], before[:, 2] = state.mean.reshape(3, 2), state.height_mean
-    measured = np.array([*sample.position.tolist(), sample.height])
-    after, covariance, root = map(as_readonly, filter_step(before.ravel(), state.root, dt, *settings, measured))
-    mean, height_mean = as_readonly(after.reshape(3, 3)[:, :2].ravel()), after[2::3]
+    measured, settings = (dt, sample.position, sample.height), (config.jerk_density, config.position_stddev)
+    found = filter_step(state.mean, state.height_mean, state.root, *measured, *settings)
+    mean, height_mean, covariance, root = map(as_readonly, found)
     onset_ns, onset_position, effort = _update_movement(state, sample, mean, covariance, config)
     hand = sample.stamp_ns, mean, covariance, sample.height, sample.frame_id
     return FilterState(*hand, onset_ns, onset_position, effort.spent, height_mean, root, effort)
