@@ -1,6 +1,6 @@
 """Write recordings of simulated hand reaches among several goals without obstacles, as tables for `evaluate` and `fit`.
 
-make_reaches.py FOLDER [SEED [KIND]]: 48 reaches of one of two kinds.
+There are 48 reaches of one of two kinds:
 
 - grid: from near the origin to 25 goals on a grid of 0.4 x 0.3 m, sampled at 120 Hz with 0.5 mm of noise. Each waits 0.2 to
   0.6 s, takes a duration that varies by 20 % about a law, bends, falls short and corrects, and ends about 6 mm beside its goal;
@@ -11,7 +11,7 @@ make_reaches.py FOLDER [SEED [KIND]]: 48 reaches of one of two kinds.
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -87,4 +87,9 @@ def main(folder: Path, seed: int, kind: str) -> None:
 
 
 if __name__ == '__main__':
-    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 2, sys.argv[3] if len(sys.argv) > 3 else 'grid')
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('folder', type=Path)
+    parser.add_argument('seed', type=int, nargs='?', default=2)
+    parser.add_argument('kind', choices=KINDS, nargs='?', default='grid')
+    arguments = parser.parse_args()
+    main(arguments.folder, arguments.seed, arguments.kind)
