@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from importlib import import_module
@@ -108,6 +109,21 @@ def test_an_inner_kernel_becomes_machine_code_only_as_part_of_an_entry_kernel(tm
         assert isinstance(only.library, InnerLibrary)
         assert only.library.get_pointer_to_function(only.fndesc.llvm_func_name) == 0
     del sys.modules['kernel_in_kernel']
+
+
+def test_compiling_leaves_no_object_that_the_garbage_collector_ignores(tmp_path, monkeypatch):
+    (tmp_path / 'collected_kernel.py').write_text(
+        'from foc_ros.core.kernels import compiled\n@compiled\ndef double(number: "float") -> "float":\n    return 2.0 * number\n'
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    frozen = []
+    with monkeypatch.context() as patch:
+        collect = gc.collect
+        patch.setattr(gc, 'collect', lambda: frozen.append(gc.get_freeze_count()) or collect())
+        assert import_module('collected_kernel').double(2.0) == 4.0
+    del sys.modules['collected_kernel']
+    assert frozen and frozen[0] > 10000, 'what numba keeps is not looked at'
+    assert gc.get_freeze_count() == 0
 
 
 def test_an_inner_kernel_that_is_called_from_python_runs_as_python():

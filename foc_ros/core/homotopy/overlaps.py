@@ -75,8 +75,13 @@ def find_cuts(outlines: Outlines, overlaps: FlagTable) -> tuple[Vector, Indices]
                         count += 1
     first_cut = np.zeros(n + 1, np.intp)
     for each in row[:count]:
-        first_cut[each + 1 :] += 1
-    return place[np.argsort(row[:count], kind='mergesort')], first_cut
+        for k in range(each + 1, n + 1):
+            first_cut[k] += 1
+    cut, following = np.empty(count), first_cut.copy()
+    for c in range(count):
+        cut[following[row[c]]] = place[c]
+        following[row[c]] += 1
+    return cut, first_cut
 
 
 @compiled_exactly
@@ -110,7 +115,9 @@ def build_shapes(outlines: Outlines, n: int) -> Shapes:
             is_outer[i] &= not is_within[i, k] or (is_within[k, i] and i < k)
             if overlaps[i, k] and cluster[i] != cluster[k]:
                 low, high = min(cluster[i], cluster[k]), max(cluster[i], cluster[k])
-                cluster = np.where(cluster == high, low, cluster)
+                for each in range(n):
+                    if cluster[each] == high:
+                        cluster[each] = low
     for i in range(n):
         for k in range(n):
             overlaps[i, k] &= i != k and is_outer[i] and is_outer[k]

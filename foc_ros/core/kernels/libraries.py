@@ -11,6 +11,7 @@ machine code. The classes derive from numba's and override a few internal method
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, cast
@@ -69,7 +70,7 @@ class EntryCompiler(Compiler):
         codegen = self.state.targetctx.codegen()
         self.state.library = EntryLibrary(codegen, kernel.__qualname__)
         self.state.library.enable_object_caching()
-        with _make_libraries(codegen, InnerLibrary):
+        with _make_libraries(codegen, InnerLibrary), _collect_new_garbage():
             return super().compile_extra(kernel)
 
 
@@ -93,6 +94,17 @@ def _collect_called(library: Any, found: dict[Any, None]) -> None:
             if isinstance(each, InnerLibrary):
                 _collect_called(each, found)
             found[each] = None
+
+
+@contextmanager
+def _collect_new_garbage() -> Iterator[None]:
+    """Let the garbage collector look at new objects only: with all that numba keeps, it takes a tenth of the time to compile."""
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.collect()
+        gc.unfreeze()
 
 
 @contextmanager

@@ -248,8 +248,9 @@ def find_shortfalls(
                 depth[count], places[count, 0], places[count, 1] = least, j, time
                 count += 1
     found, kept = np.empty((count, 2)), 0
-    for i in np.argsort(depth[:count]):
-        is_apart = True
+    for _ in range(count):
+        i, is_apart = np.argmin(depth[:count]), True
+        depth[i] = np.inf
         for other in range(kept):
             is_apart = is_apart and abs(found[other, 1] - places[i, 1]) >= APART
         if is_apart:
