@@ -10,9 +10,9 @@ kind z, who plans the whole way (0) or looks ahead (1),
     log w(z, f) = log(1 - s or s) - log^2 f / (2 `PRIOR_STDDEV`^2) + c sum_movements mean_t log((1 - u) P_t(z, f) + u a_t),
 
 which is a Bayesian posterior over both kinds and the grid `FACTORS`. A movement counts as c = `OBSERVATIONS`, a near choice and a
-far one, because its predictions depend on each other. A share u of the choices is not explained by losses: all classes are equally likely in it, and
-a_t is the share of those that agree. In use are the posterior of z = 1 as `likelihood.lookahead_share`, and the posterior mean of
-the logarithm of f.
+far one, because its predictions depend on each other. A share u of the choices is not explained by losses: all classes are
+equally likely in it, and a_t is the share of those that agree. In use are the posterior of z = 1 as
+`likelihood.lookahead_share`, and the posterior mean of the logarithm of f.
 """
 
 from __future__ import annotations
