@@ -170,7 +170,7 @@ class LikelihoodConfig:
     )
     spent_share: float = _p(0.0, f'fraction of the effort since onset that every cost contains, for {JERK_ONLY}', '', 0.0, 1.0)
     lookahead_share: float = _p(
-        0.4, 'probability that the operator looks ahead, as the next two say, and does not plan the whole way', '', 0.0, 1.0
+        0.25, 'probability that the operator looks ahead, as the next two say, and does not plan the whole way', '', 0.0, 1.0
     )
     lookahead_s: float = _p(
         0.5, 'mean look-ahead of such an operator: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0

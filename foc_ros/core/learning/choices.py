@@ -7,12 +7,12 @@ ended, it is known which classes of each of its predictions agree with it: they 
 the goal that was reached. With P_t the probability that the prediction at time t gave to these classes, for an operator of the
 kind z, who plans the whole way (0) or looks ahead (1),
 
-    log w(z, f) = log(1 - s or s) - log^2 f / (2 `PRIOR_STDDEV`^2) + c sum_movements mean_t log((1 - u) P_t(z, f) + u a_t),
+    log w(z, f) = log(1 - s or s) - log^2 f / (2 `PRIOR_STDDEV`^2) + sum_movements mean_t log((1 - u) P_t(z, f) + u a_t),
 
-which is a Bayesian posterior over both kinds and the grid `FACTORS`. A movement counts as c = `OBSERVATIONS`, a near choice and a
-far one, because its predictions depend on each other. A share u of the choices is not explained by losses: all classes are
-equally likely in it, and a_t is the share of those that agree. In use are the posterior of z = 1 as
-`likelihood.lookahead_share`, and the posterior mean of the logarithm of f.
+which is a Bayesian posterior over both kinds and the grid `FACTORS`. A movement counts as one observation, because its
+predictions depend on each other. A share u of the choices is not explained by losses: all classes are equally likely in it, and
+a_t is the share of those that agree. In use are the posterior of z = 1 as `likelihood.lookahead_share`, and the posterior mean of
+the logarithm of f.
 """
 
 from __future__ import annotations
@@ -35,8 +35,6 @@ from .judging import choose_judged, sample_movement
 
 FACTORS = as_readonly(2.0 ** np.arange(-3.0, 4.0))
 """Factors that are judged."""
-OBSERVATIONS = 2.0
-"""Number of independent observations as which a movement counts."""
 PRIOR_STDDEV = 0.7
 """Standard deviation of the logarithm of a factor before the first movement."""
 UNEXPLAINED = 0.01
@@ -138,9 +136,7 @@ class Preferences(Record):
             agrees = choice.find_agreeing(self.states)
             if agrees.any() and not agrees.all():
                 scores.append(choice.score(agrees, config))
-        if not scores:
-            return self
-        return replace(self, movements=self.movements + 1, scores=self.scores + OBSERVATIONS * np.mean(scores, axis=0))
+        return replace(self, movements=self.movements + 1, scores=self.scores + np.mean(scores, axis=0)) if scores else self
 
 
 def _scale(config: LikelihoodConfig, factor: float, lookahead_share: float) -> LikelihoodConfig:
