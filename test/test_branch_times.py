@@ -106,7 +106,7 @@ def test_an_infinite_lookahead_is_the_plain_rule() -> None:
     )
 
 
-def test_branch_times_have_no_influence_without_a_lookmake_config() -> None:
+def test_branch_times_have_no_influence_without_a_look_ahead() -> None:
     plain = LikelihoodConfig(beta=2.0, lookahead_share=1.0, lookahead_s=0.0)
     np.testing.assert_array_equal(compute_likelihoods(COSTS, plain, make_branch_times(1.0)), compute_likelihoods(COSTS, plain))
 

@@ -80,6 +80,8 @@ def test_precision_follows_choices_and_all_exponents_follow_it() -> None:
 def test_what_is_certain_is_not_learnt(share: float) -> None:
     preferences = follow_movements([(LEFT, LEFT), (LEFT, RIGHT)] * 3, FIRST_AND_LAST_ARE_CHEAP)
     assert preferences.adapt(replace(LIKELIHOOD, lookahead_share=share)).lookahead_share == share
+    against = replace(preferences, scores=np.array([[-1e4 * share], [-1e4 * (1.0 - share)]]) + np.zeros((2, len(FACTORS))))
+    assert np.isfinite(against.find_mean(share)).all() and against.find_mean(1.0 - share)[1] == 1.0 - share
 
 
 def test_the_score_is_the_likelihood_of_the_classes_that_agree() -> None:

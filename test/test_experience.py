@@ -75,6 +75,9 @@ def test_recordings_count_for_gaps_and_goals_as_much_as_the_model_and_less_for_w
     assert of_way[0] / of_gap[0] == pytest.approx((30.0 * 0.5 + 10.0) / 40.0)
     assert after[0] / of_way[0] == pytest.approx((2.0 * 0.5 + 10.0) / 12.0)
     np.testing.assert_allclose(after[4:], of_gap[1] / 4.0)
+    sure, seen = np.array([1.0, *[0.0] * 7]), np.array([*[0.0] * 7, 6.0])
+    of_gap = np.bincount(gap, update_likelihoods(sure, seen, Decisions(gap, way, np.zeros(8, dtype=np.intp)), config))
+    np.testing.assert_allclose(of_gap, [2.0 / 8.0, 6.0 / 8.0])
 
 
 MOVING = replace(HAND, mean=np.array([*ABOVE.states[20], 0.0, 0.0]), onset_ns=0)

@@ -13,7 +13,8 @@ from foc_ros.ros import queue_polling  # noqa: E402
 class FakeExecutor:
     """An executor that waits for messages of a group, with its own time. One is needed every unneeded_s."""
 
-    def __init__(self, rate_hz: float, unneeded_s: float = 0.0) -> None:
+    def __init__(self, rate_hz: float, unneeded_s: float = 0.0, taken_beside: int = 0) -> None:
+        self._spins, self._taken_beside = 0, taken_beside
         self.now_s, self.polled, self.woken, self.polls = 0.0, 0, 0, 0
         self._arrivals = [0.0, 0.001, *(0.002 + row / rate_hz for row in range(1, int(rate_hz)))]
         self.group = queue_polling.QueuePolling(self._poll, lambda: unneeded_s)
@@ -21,8 +22,11 @@ class FakeExecutor:
     def spin_once(self, timeout_sec: float) -> None:
         """Wait for a message, unless the group is polled, and for the timeout at most."""
         end_s = self.now_s + timeout_sec
+        self._spins += 1
         if self.group.is_polling or not self._arrivals or self._arrivals[0] > end_s:
             self.now_s = end_s
+            if self._taken_beside and self._spins % self._taken_beside == 0:
+                self.group.take()
             return
         self.now_s = self._arrivals.pop(0)
         self.woken += 1
@@ -58,3 +62,9 @@ def test_a_poll_comes_when_a_message_is_needed(monkeypatch: pytest.MonkeyPatch, 
     executor = FakeExecutor(1000.0, unneeded_s)
     executor.run(monkeypatch)
     assert executor.polls == pytest.approx(1.0 / period_s, abs=2)
+
+
+def test_polling_goes_on_where_the_end_of_a_prediction_takes_the_messages(monkeypatch: pytest.MonkeyPatch) -> None:
+    executor = FakeExecutor(1000.0, 0.016, taken_beside=2)
+    executor.run(monkeypatch)
+    assert executor.woken <= 3

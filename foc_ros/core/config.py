@@ -170,12 +170,18 @@ class LikelihoodConfig:
     )
     spent_share: float = _p(0.0, f'fraction of the effort since onset that every cost contains, for {JERK_ONLY}', '', 0.0, 1.0)
     lookahead_share: float = _p(
-        0.25, 'probability that the operator looks ahead, as the next two say, and does not plan the whole way', '', 0.0, 1.0
+        0.25,
+        'probability that the operator looks ahead, by lookahead_s and beta_beyond, and does not plan the whole way',
+        '',
+        0.0,
+        1.0,
     )
     lookahead_s: float = _p(
-        0.5, 'mean look-ahead of such an operator: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
+        0.5, 'mean look-ahead of an operator who looks ahead: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
     )
-    beta_beyond: float = _p(0.05, 'exponent of such an operator for what lies beyond the next row of obstacles', '', 0.0, 100.0)
+    beta_beyond: float = _p(
+        0.05, 'exponent of an operator who looks ahead for the way beyond the next row of obstacles', '', 0.0, 100.0
+    )
     weaving: float = _p(
         4.0, 'log-likelihood that a class loses for each row through several gaps of which it leads', '', 0.0, 100.0
     )
@@ -198,8 +204,10 @@ class ExperienceConfig:
     learning: str = _p(
         'none', 'whether movements that end at a goal are added to the recordings of the running program', choices=ADAPTATIONS
     )
-    prior_count: float = _p(1.0, 'number of recordings as which the model counts, for the gap in the next row', '', 1e-3, 1e6)
-    prior_count_beyond: float = _p(30.0, 'the same, for what lies beyond the next row of obstacles', '', 1e-3, 1e6)
+    prior_count: float = _p(
+        1.0, 'number of recordings as which the model counts, for the gap in the next row and for the goal', '', 1e-3, 1e6
+    )
+    prior_count_beyond: float = _p(30.0, 'the same, for the way beyond the next row of obstacles', '', 1e-3, 1e6)
     prior_count_path: float = _p(0.3, 'the same, for the path to the next row and as far as recordings reach', '', 1e-3, 1e6)
     position_stddev: float = _p(0.02, 'distance from the hand at which a recording counts less', 'm', 1e-4, 10.0)
     velocity_stddev: float = _p(

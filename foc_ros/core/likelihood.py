@@ -30,7 +30,9 @@ the same way through all rows, which differ in their goals,
     p'_i <- sum_{j in G} p'_j  (sum_{j in W} r_j / sum_{j in G} r_j)  p_i / sum_{j in W} p_j,
     log r_i = -beta' log J_i - (beta' / beta) shortfall (k_wanted - k),
 
-so that far choices follow the same losses as near ones, less precisely if beta' < beta.
+so that far choices follow the same losses as near ones, less precisely if beta' < beta. With a beta of 0 the shortfall counts in
+full.
+Where no row is ahead, W and G are the classes that lead to the same goal, and all is decided as near.
 
 The weight of a class that weaves through w_i rows (`decisions`) is smaller by exp(-`likelihood.weaving` w_i), in both p and p'.
 """
@@ -108,8 +110,8 @@ def compute_likelihoods(
         if not 0.0 <= value < math.inf:
             raise InputError(f'costs[{row}]', 'a finite number >= 0', value)
     rule, losses = LIKELIHOOD_RULES.get(config.rule), np.zeros(len(values))
-    if shortfalls is not None and shortfalls.any():
-        losses = config.shortfall * shortfalls
+    if shortfalls is not None:
+        np.multiply(config.shortfall, shortfalls, out=losses, where=shortfalls > 0.0)
     logs, woven = rule(values, config) - losses, np.zeros(len(values)) if decisions is None else config.weaving * decisions.woven
     planned = normalise_logs(logs - woven)
     if config.lookahead_share == 0.0 or not len(logs) or (branch_times is None and decisions is None):

@@ -30,13 +30,12 @@ class StopSignals:
     """Ends the process on SIGINT and SIGTERM: at once while it imports, and by :attr:`is_requested` after :meth:`defer`.
 
     rclpy's own handlers shut the context down during a callback, and some of the stops then end with an error. This flag ends
-    the loop between two callbacks. An exception would be lost in some parts of an import. Attribute leave: what is to be done
-    before the end during an import.
+    the loop between two callbacks. During an import the process ends without an exception, which some imports would hide.
     """
 
     def __init__(self) -> None:
         self.is_requested = False
-        self.leave: Callable[[], object] = lambda: None
+        self._leave: Callable[[], object] = lambda: None
         self._is_deferred = False
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._request)
@@ -45,11 +44,22 @@ class StopSignals:
         """Let the signals set the flag from now on."""
         self._is_deferred = True
 
+    def resume(self, leave: Callable[[], object]) -> None:
+        """Let the signals end the process at once again, after what is to be done before that."""
+        self._leave, self._is_deferred = leave, False
+        if self.is_requested:
+            self._end()
+
     def _request(self, _number: int, _frame: FrameType | None) -> None:
-        if not self._is_deferred:
-            self.leave()
-            os._exit(0)
         self.is_requested = True
+        if not self._is_deferred:
+            self._end()
+
+    def _end(self) -> None:
+        try:
+            self._leave()
+        finally:
+            os._exit(0)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -75,10 +85,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if extra:
             raise FocError(f'unrecognized arguments: {" ".join(extra)} (those of ROS follow --ros-args)')
         rclpy.init(args=given, context=context, signal_handler_options=SignalHandlerOptions.NO)
+        stop.defer()
+        forerunner = _join_graph(context)
     except (FocError, RuntimeError, ValueError) as error:
+        context.try_shutdown()
         return _reject(error)
-    forerunner = _join_graph(context)
-    stop.leave = forerunner.destroy_node
+    stop.resume(forerunner.destroy_node)
     from foc_ros.core.kernels.compilation import follow_compilation
     from foc_ros.core.registry import import_all
 
@@ -115,11 +127,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _join_graph(context: Any) -> Any:
-    """Create a hidden node, with which DDS finds the other programs while the solver is loaded: this may take it 3 s."""
+    """Create a hidden node, with which DDS finds the other programs while the solver is loaded: this may take it 3 s.
+
+    It has no services and no log, so that it needs no permissions besides those of the node.
+    """
     import rclpy
 
-    name, without = '_foc_start', {'enable_rosout': False, 'start_parameter_services': False}
-    return rclpy.create_node(name, context=context, use_global_arguments=False, **without)
+    return rclpy.create_node(
+        '_foc_start',
+        context=context,
+        use_global_arguments=False,
+        enable_rosout=False,
+        start_parameter_services=False,
+        parameter_overrides=[rclpy.Parameter('start_type_description_service', value=False)],
+    )
 
 
 def _reject(error: Exception) -> int:

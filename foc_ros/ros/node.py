@@ -300,7 +300,7 @@ class FocNode(LifecycleNode):
         except Exception as error:
             self._recover(error)
         if self.polling.is_polling:
-            self._take_queued_poses()  # the newest of them is predicted from
+            self.polling.take()  # the newest pose is predicted from
         if self.pipeline.is_due:
             self._predict()
 
@@ -337,7 +337,7 @@ class FocNode(LifecycleNode):
         self._guidance.loop.note_hand(None, monotonic())
 
     def _publish_health(self) -> None:
-        self._take_queued_poses()  # a hand whose poses wait here is not silent
+        self.polling.take()  # a hand whose poses wait here is not silent
         self._report_missing_packages()
         clock_reason, present = self._find_clock_reason(), self._worker.present
         not_ready_reason = self.pipeline.not_ready_reason() or (clock_reason and clock_reason[1])

@@ -36,6 +36,7 @@ class QueuePolling(MutuallyExclusiveCallbackGroup):
         self._poll, self._find_unneeded_s = poll, find_unneeded_s
         self._last_s = float('-inf')
         self._is_allowed = False
+        self._waiting = 0
         self.is_polling = False
 
     def can_execute(self, entity: Any) -> bool:
@@ -55,7 +56,11 @@ class QueuePolling(MutuallyExclusiveCallbackGroup):
         executor.spin_once(timeout_sec=min(wait_s, timeout_s))
         if not self.is_polling:
             return
-        number, now_s = self._poll(), monotonic()
-        self.is_polling = now_s - self._last_s < POLL_S * max(number, 1)
+        number, now_s = self._waiting + self._poll(), monotonic()
+        self.is_polling, self._waiting = now_s - self._last_s < POLL_S * max(number, 1), 0
         if number and self.is_polling:
             self._last_s = now_s
+
+    def take(self) -> None:
+        """Take the messages that wait now, beside the polls; they count for the next one."""
+        self._waiting += self._poll()

@@ -112,7 +112,7 @@ def make_power_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig
 
 def make_plain(likelihood: LikelihoodConfig, beta: float) -> LikelihoodConfig:
     """Return a likelihood by which all choices are made with one exponent."""
-    return replace(likelihood, beta=beta, beta_beyond=beta, lookahead_s=0.0, lookahead_share=0.0)
+    return replace(likelihood, beta=beta, lookahead_share=0.0)
 
 
 def make_ahead(likelihood: LikelihoodConfig, lookahead_s: float, beta: float, beta_beyond: float) -> LikelihoodConfig:

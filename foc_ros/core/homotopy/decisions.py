@@ -28,7 +28,7 @@ class Decisions(NamedTuple):
     """The decisions of k classes.
 
     next_gap, way (k,): numbers of the gap that each takes in the next row, and of its way. Classes of one way take the same gaps
-    in all rows ahead and differ in their goals. Where no row is ahead, the gap and the way of a class are its goal. woven (k,):
+    in all rows ahead, whatever their goals. Where no row is ahead, the gap and the way of a class are its goal. woven (k,):
     how many rows each weaves through. next_row (m,): the obstacles of the next row, none where no row is ahead.
     """
 

@@ -98,7 +98,13 @@ def _collect_called(library: Any, found: dict[Any, None]) -> None:
 
 @contextmanager
 def _collect_new_garbage() -> Iterator[None]:
-    """Let the garbage collector look at new objects only: with all that numba keeps, it takes a tenth of the time to compile."""
+    """Let the garbage collector look at new objects only: with all that numba keeps, it takes a tenth of the time to compile.
+
+    A program that has frozen objects itself keeps them so.
+    """
+    if gc.get_freeze_count():
+        yield
+        return
     gc.freeze()
     try:
         yield

@@ -101,10 +101,12 @@ class Preferences(Record):
 
     def find_mean(self, lookahead_share: float) -> tuple[float, float]:
         """Return the factor and the probability that the operator looks ahead, which was `lookahead_share` at first."""
-        prior = np.array([[1.0 - lookahead_share], [lookahead_share]]) * np.exp(-0.5 * (np.log(FACTORS) / PRIOR_STDDEV) ** 2)
-        weights = prior * np.exp(self.scores - self.scores.max())
-        weights /= weights.sum()
-        return float(np.exp(weights.sum(axis=0) @ np.log(FACTORS))), float(weights[1].sum())
+        with np.errstate(divide='ignore'):  # what is certain has the logarithm -inf
+            prior = np.log([[1.0 - lookahead_share], [lookahead_share]]) - 0.5 * (np.log(FACTORS) / PRIOR_STDDEV) ** 2
+        logs = prior + self.scores
+        weights = np.exp(logs - logs.max())
+        planning, looking = weights.sum(axis=1)
+        return float(np.exp(weights.sum(axis=0) @ np.log(FACTORS) / weights.sum())), float(looking / (planning + looking))
 
     def follow(self, hand: HandState, config: LikelihoodConfig) -> Preferences:
         """Return the preferences after the next state of the hand; config: before it is adapted."""

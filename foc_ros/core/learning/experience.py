@@ -226,7 +226,8 @@ def update_likelihoods(likelihoods: Array, counts: Array, decisions: Decisions, 
     for group, part, prior_count in levels:
         of_group, of_part = (np.bincount(number, likelihoods)[number] for number in (group, part))
         in_group, in_part = (np.bincount(number, counts)[number] for number in (group, part))
-        share = np.divide(of_part, of_group, out=np.zeros(len(counts)), where=of_group > 0.0)
+        even = 1.0 / np.array([len(np.unique(part[group == number])) for number in group])
+        share = np.divide(of_part, of_group, out=even, where=of_group > 0.0)
         pooled *= (prior_count * share + in_part) / (prior_count + in_group)
     pooled /= pooled.sum()
     return pooled
