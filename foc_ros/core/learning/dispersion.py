@@ -31,8 +31,6 @@ import numpy as np
 from foc_ros.core.config import CovarianceConfig, clip_values
 from foc_ros.core.types import NANOSECONDS, Array, HandState, PredictedCandidate, Record, Solution, as_readonly
 
-from .judging import compute_mean_factors
-
 LOG_FACTORS = as_readonly(math.log(2.0) * np.linspace(-3.0, 2.0, 11))
 """Logarithms of the factors that are judged, for now and for the end."""
 PRIOR_STDDEV = 1.0
@@ -169,3 +167,15 @@ def scale_covariance(candidate: PredictedCandidate, config: CovarianceConfig) ->
     solution = candidate.solution
     covariance = solution.covariance * compute_factors(solution, config)[:, None, None] ** 2
     return replace(candidate, solution=solution.with_covariance(covariance))
+
+
+def compute_mean_factors(logs: Array, scores: Array, prior_stddev: float) -> tuple[float, float]:
+    """Return the geometric posterior means of two factors, each on a grid of logarithms (f,).
+
+    scores (f, f'): log-likelihood of each pair; prior_stddev: of the logarithms, about zero, before anything is known.
+    """
+    prior = -0.5 * (logs / prior_stddev) ** 2
+    total = scores + prior[:, None] + prior
+    weights = np.exp(total - total.max())
+    weights /= weights.sum()
+    return float(np.exp(weights.sum(axis=1) @ logs)), float(np.exp(weights.sum(axis=0) @ logs))

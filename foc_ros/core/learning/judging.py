@@ -1,4 +1,4 @@
-"""Shared by the learning of pace, choices and errors: samples of a movement, and posterior means of factors."""
+"""Samples of a movement, by which it is judged: shared by the learning of pace and of choices."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from foc_ros.core.types import NANOSECONDS, Array
+from foc_ros.core.types import NANOSECONDS
 
 SAMPLE_S = 0.05
 """Interval at which states and choices of a movement are kept [s]."""
@@ -36,15 +36,3 @@ def sample_movement(kept: tuple[S, ...], following: S) -> tuple[S, ...]:
 def choose_judged(kept: Sequence[T]) -> list[T]:
     """Return at most `MOST_JUDGED` of what was kept of a movement, spread evenly over it."""
     return [kept[row] for row in np.unique(np.linspace(0, len(kept) - 1, min(MOST_JUDGED, len(kept))).astype(int))]
-
-
-def compute_mean_factors(logs: Array, scores: Array, prior_stddev: float) -> tuple[float, float]:
-    """Return the geometric posterior means of two factors, each on a grid of logarithms (f,).
-
-    scores (f, f'): log-likelihood of each pair; prior_stddev: of the logarithms, about zero, before anything is known.
-    """
-    prior = -0.5 * (logs / prior_stddev) ** 2
-    total = scores + prior[:, None] + prior
-    weights = np.exp(total - total.max())
-    weights /= weights.sum()
-    return float(np.exp(weights.sum(axis=1) @ logs)), float(np.exp(weights.sum(axis=0) @ logs))
