@@ -226,7 +226,7 @@ def update_likelihoods(likelihoods: Array, counts: Array, decisions: Decisions, 
     for group, part, prior_count in levels:
         of_group, of_part = (np.bincount(number, likelihoods)[number] for number in (group, part))
         in_group, in_part = (np.bincount(number, counts)[number] for number in (group, part))
-        even = 1.0 / np.array([len(np.unique(part[group == number])) for number in group])
+        even = 1.0 / np.bincount(group[np.unique(part, return_index=True)[1]])[group]
         share = np.divide(of_part, of_group, out=even, where=of_group > 0.0)
         pooled *= (prior_count * share + in_part) / (prior_count + in_group)
     pooled /= pooled.sum()
