@@ -110,7 +110,7 @@ class Dispersion(Record):
             share = (each.due_ns - before.stamp_ns) / (hand.stamp_ns - before.stamp_ns)
             total += each.count * each.score((1.0 - share) * before.mean[:2] + share * hand.mean[:2])
         left = tuple(each for each in self.forecasts if each.due_ns > hand.stamp_ns)
-        factors = compute_mean_factors(LOG_FACTORS, total, PRIOR_STDDEV)
+        factors = _compute_mean_factors(total)
         return replace(self, errors=self.errors + len(reached), scores=total, factors=factors, hand=hand, forecasts=left)
 
     def add(self, stamp_ns: int, candidates: Sequence[PredictedCandidate], config: CovarianceConfig) -> Dispersion:
@@ -169,13 +169,10 @@ def scale_covariance(candidate: PredictedCandidate, config: CovarianceConfig) ->
     return replace(candidate, solution=solution.with_covariance(covariance))
 
 
-def compute_mean_factors(logs: Array, scores: Array, prior_stddev: float) -> tuple[float, float]:
-    """Return the geometric posterior means of two factors, each on a grid of logarithms (f,).
-
-    scores (f, f'): log-likelihood of each pair; prior_stddev: of the logarithms, about zero, before anything is known.
-    """
-    prior = -0.5 * (logs / prior_stddev) ** 2
+def _compute_mean_factors(scores: Array) -> tuple[float, float]:
+    """Return the geometric posterior means of the factors for now and for the end, from sums of scores (f, f') of each pair."""
+    prior = -0.5 * (LOG_FACTORS / PRIOR_STDDEV) ** 2
     total = scores + prior[:, None] + prior
     weights = np.exp(total - total.max())
     weights /= weights.sum()
-    return float(np.exp(weights.sum(axis=1) @ logs)), float(np.exp(weights.sum(axis=0) @ logs))
+    return float(np.exp(weights.sum(axis=1) @ LOG_FACTORS)), float(np.exp(weights.sum(axis=0) @ LOG_FACTORS))
