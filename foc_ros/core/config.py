@@ -171,7 +171,7 @@ class LikelihoodConfig:
     spent_share: float = _p(0.0, f'fraction of the effort since onset that every cost contains, for {JERK_ONLY}', '', 0.0, 1.0)
     lookahead_share: float = _p(
         0.25,
-        'probability that the operator looks ahead, by lookahead_s and beta_beyond, and does not plan the whole way',
+        'probability that the operator looks ahead (lookahead_s, beta_beyond) instead of planning the whole way',
         '',
         0.0,
         1.0,

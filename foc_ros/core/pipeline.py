@@ -100,7 +100,7 @@ class Pipeline:
 
     @property
     def until_due_s(self) -> float:
-        """Time from the stamp of the newest hand sample to the next one that is due [s]; at most 0 if any is due."""
+        """Time from the stamp of the newest hand sample until a prediction is due [s]; 0 or less if one is due now."""
         if self.hand_state is None or self._due_ns is None:
             return 0.0
         return (self._due_ns - self.hand_state.stamp_ns) / NANOSECONDS

@@ -247,7 +247,7 @@ class Monitor:
 
 
 def _describe_learnt(pipeline: Pipeline) -> str:
-    """Return what was learnt: what was judged, factors, the arrival, whether the operator looks ahead, and recordings."""
+    """Return what was learnt of the operator and of the scene, and from how many movements and errors."""
     pace, preferences, dispersion = pipeline.learnt.pace, pipeline.learnt.preferences, pipeline.learnt.dispersion
     movements = pipeline.learnt.movements
     precision, ahead = preferences.find_mean(pipeline.config.likelihood.lookahead_share)

@@ -62,5 +62,5 @@ class QueuePolling(MutuallyExclusiveCallbackGroup):
             self._last_s = now_s
 
     def take(self) -> None:
-        """Take the messages that wait now, beside the polls; they count for the next one."""
+        """Take the messages that wait, between two polls. The next poll counts them as its own."""
         self._waiting += self._poll()

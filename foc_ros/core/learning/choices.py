@@ -11,8 +11,8 @@ kind z, who plans the whole way (0) or looks ahead (1),
 
 which is a Bayesian posterior over both kinds and the grid `FACTORS`. A movement counts as one observation, because its
 predictions depend on each other. A share u of the choices is not explained by losses: all classes are equally likely in it, and
-a_t is the share of those that agree. In use are the posterior of z = 1 as `likelihood.lookahead_share`, and the posterior mean of
-the logarithm of f.
+a_t is the share of those that agree. The likelihood uses the posterior probability of z = 1 in place of s, and the posterior
+mean of the logarithm of f.
 """
 
 from __future__ import annotations
