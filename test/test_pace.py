@@ -10,7 +10,7 @@ import pytest
 from foc_ros.core.config import Config, DurationConfig, replace_values
 from foc_ros.core.estimation.duration import compute_movement_time, estimate_times_to_go, scale_durations
 from foc_ros.core.height import reach_along_axis
-from foc_ros.core.learning.pace import FACTORS, PRIOR_WEIGHT, Pace, find_free_positions
+from foc_ros.core.learning.pace import Pace, find_free_positions
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, HandSample
 
@@ -78,15 +78,36 @@ def test_a_movement_is_judged_by_the_goals_that_it_had() -> None:
     unended = reach(2.0)[:-35]
     pipeline = follow(Pipeline(CONFIG), unended)
     follow(pipeline, np.zeros((2, 2)), goal=np.array([[-5.0, 0.0]]))
-    assert pipeline.learnt.pace.movements == 1 and pipeline.learnt.pace.goals is None
+    assert pipeline.learnt.pace.movements == 1 and pipeline.learnt.pace.present is None
     same = follow(follow(Pipeline(CONFIG), unended), np.zeros((2, 2)))
     np.testing.assert_array_equal(pipeline.learnt.pace.losses, same.learnt.pace.losses)
 
 
-def test_the_present_movement_has_no_influence_before_its_end() -> None:
-    slow, pipeline = reach(4.0), Pipeline(CONFIG)
-    follow(pipeline, slow[: len(slow) // 2])
-    assert pipeline.learnt.pace.movements == 0 and pipeline.learnt.pace.states
+def test_the_present_movement_counts_by_the_distance_that_it_has_covered() -> None:
+    slow, pipeline, found = reach(4.0), Pipeline(CONFIG), [1.0]
+    for row, position in enumerate(slow[:130]):
+        pipeline.set_goals(GOAL, 'world')
+        pipeline.add_hand_sample(HandSample(NANOSECONDS + row * STEP_NS, position, 0.0, 'world'))
+        found.append(pipeline.learnt.pace.find_best(CONFIG.duration)[1])
+    assert pipeline.learnt.pace.movements == 0 and found[40] == 1.0 and found[-1] > 1.5
+    first = int(np.flatnonzero(np.array(found) != 1.0)[0])
+    assert np.abs(np.diff(np.log(found[first:]))).max() < 0.1, 'after the first state that is judged, the factor does not jump'
+    assert pipeline.learnt.pace.interrupt().find_best(CONFIG.duration) == ('rest', 1.0)
+
+
+def test_a_present_movement_is_judged_by_the_goal_to_which_it_fits_best() -> None:
+    goals = np.vstack([[[-0.1, 0.3]], GOAL, [[0.0, -0.4]]])
+    several, one = (follow(Pipeline(CONFIG), reach(3.0)[:150], goal=each).learnt.pace for each in (goals, GOAL))
+    found, expected = (each.find_best(CONFIG.duration)[1] for each in (several, one))
+    assert found == pytest.approx(expected, rel=0.05) and expected > 1.5
+
+
+def test_other_goals_begin_the_present_movement_anew() -> None:
+    pipeline = follow(Pipeline(CONFIG), reach(3.0)[:150])
+    stamp_ns = pipeline.hand_state.stamp_ns + STEP_NS
+    pipeline.set_goals(np.vstack([GOAL, GOAL + 0.1]), 'world')
+    pipeline.add_hand_sample(HandSample(stamp_ns, reach(3.0)[150], 0.0, 'world'))
+    assert pipeline.learnt.pace.present.moved == 0.0 and pipeline.adapted_config.duration == CONFIG.duration
 
 
 def test_equal_samples_give_equal_factors_and_a_reset_forgets_them() -> None:
@@ -95,7 +116,7 @@ def test_equal_samples_give_equal_factors_and_a_reset_forgets_them() -> None:
     assert one.learnt.pace.movements > 0
     one.reset()
     assert one.learnt.pace.movements == 0 and one.adapted_config is CONFIG
-    np.testing.assert_array_equal(one.learnt.pace.losses, np.tile(PRIOR_WEIGHT * np.log(FACTORS) ** 2, (2, 1)))
+    np.testing.assert_array_equal(one.learnt.pace.losses, Pace().losses)
 
 
 def test_it_can_be_switched_off_and_new_durations_begin_anew() -> None:

@@ -22,10 +22,11 @@ The path is taken as straight. Bends increase the effort; C times the effort mak
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
-from foc_ros.core.types import Array
+from foc_ros.core.types import Array, as_readonly
 
 GRID = 64
 """Number of durations that are compared, evenly in the logarithm; the optimum between them is interpolated by a parabola."""
@@ -39,7 +40,7 @@ def find_least_cost_time(
     length [m] of the remaining path; state: speed [m/s] and acceleration [m/s^2] along it now; passing: it need not end at rest.
     """
     low, high = bounds
-    times = np.geomspace(low, high, GRID)
+    times = _choose_times(low, high)
     costs = compute_least_effort(length, *state, times, passing) + time_cost * times
     best = int(costs.argmin())
     if not 0 < best < GRID - 1:
@@ -48,6 +49,11 @@ def find_least_cost_time(
     bend = before - 2.0 * here + after
     shift = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
     return float(times[best] * math.exp(shift * math.log(high / low) / (GRID - 1)))
+
+
+@lru_cache(maxsize=4)
+def _choose_times(low: float, high: float) -> Array:
+    return as_readonly(np.geomspace(low, high, GRID))
 
 
 def compute_least_effort(length: float, speed: float, acceleration: float, times: Array, passing: bool = False) -> Array:

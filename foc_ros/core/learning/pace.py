@@ -1,16 +1,19 @@
 """What is learnt of an operator: how they arrive, and the factor by which they take longer than the duration model expects.
 
-When a movement has covered most of its distance to a goal, both arrivals, at rest and passing, with every factor f of `FACTORS`
-are judged by the positions that they would have led to. At a time t, the time to go T_f(t) is estimated with all expected
-durations multiplied by f. Where the free movement to the goal in T_f(t) would be h = `AHEAD_S` later is compared with where the
-hand x was then, relative to how far it had moved:
+Both arrivals, at rest and passing, with every factor f of `FACTORS` are judged by the positions that they would have led to. At a
+time t of a movement, the time to go T_f(t) is estimated with all expected durations multiplied by f. Where the free movement to
+the goal in T_f(t) would be h = `AHEAD_S` later is compared with where the hand x was then, relative to how far it had moved:
 
-    l_f = sum_t |x_f(t + h) - x(t + h)| / sum_t |x(t + h) - x(t)|.
+    l_f = c sum_t |x_f(t + h) - x(t + h)| / sum_t |x(t + h) - x(t)|.
+
+A movement that has covered most of its distance to a goal counts with c = 1. In the present one, c is the share of the straight
+distance to the goal that it has covered so far, and the goal is the one for which the least sum of its errors is smallest.
 
 The arrival and the factor in use minimise w log(f)^2 + w' + sum l_f over the movements so far, as a regularised leader
 (Shalev-Shwartz 2012, Foundations and Trends in Machine Learning 4(2)), with the weight w of `PRIOR_WEIGHT` and w' of
 `ARRIVAL_WEIGHT` for the arrival that `duration.arrival` does not name: without movements the factor is 1, and both adapt in the
-course of a few. They depend on the samples and goals alone, so that equal input gives equal factors.
+course of a few. A parabola through three factors gives the least, so that the factor does not jump; the arrival changes
+between movements only. They depend on the samples and goals alone, so that equal input gives equal factors.
 
 The free movement has the least integral of squared jerk, and begins at the velocity v without acceleration, as predictions do.
 After the share s = h / T of its time it has come to
@@ -26,6 +29,7 @@ jerk is nearest to them with another duration than theirs.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -34,9 +38,9 @@ from foc_ros.core.estimation.duration import estimate_times_to_go, is_passing, s
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Record, as_readonly
 
 from .goal_reached import has_covered_distance
-from .judging import choose_judged, sample_movement
 
-FACTORS = as_readonly(np.exp(np.linspace(-0.8, 1.6, 25)))
+LOG_FACTORS = as_readonly(np.linspace(-0.8, 1.6, 13))
+FACTORS = as_readonly(np.exp(LOG_FACTORS))
 """Factors that are judged."""
 PRIOR_WEIGHT = 0.1
 """Weight of log(f)^2 against the errors of one movement."""
@@ -44,92 +48,159 @@ ARRIVAL_WEIGHT = 0.1
 """Weight of another arrival than that of the parameters, likewise."""
 AHEAD_S = 0.5
 """How far ahead positions are judged [s]."""
+SAMPLE_S = 0.1
+"""Interval at which states of a movement are judged [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class PresentMovement(Record):
+    """The movement of the hand that has not ended yet.
+
+    onset (2,): where it began [m]; goals (g, 2) [m]; hand: its newest state; waiting: states that are to be judged when the hand
+    has moved on; errors (g, 2, f), moved: sums [m] of the states that were judged, with each goal, arrival and factor.
+    """
+
+    onset: Array
+    goals: Array
+    hand: HandState
+    waiting: tuple[HandState, ...]
+    errors: Array
+    moved: float = 0.0
+
+    @classmethod
+    def begin(cls, hand: HandState, goals: Array) -> PresentMovement:
+        """Return a movement of which one state is known."""
+        onset = hand.mean[:2] if hand.onset_position is None else hand.onset_position
+        return cls(onset, goals, hand, (hand,), np.zeros((len(goals), len(ARRIVALS), len(FACTORS))))
+
+    def follow(self, hand: HandState, goals: Array, config: DurationConfig) -> PresentMovement:
+        """Return the movement after its next state, which is judged later if it is `SAMPLE_S` after the one before it."""
+        followed = replace(self, hand=hand, goals=goals)
+        while hand.stamp_ns - followed.waiting[0].stamp_ns >= AHEAD_S * NANOSECONDS and len(followed.waiting) > 1:
+            followed = followed.judge_oldest(config)
+        if hand.stamp_ns - followed.waiting[-1].stamp_ns < SAMPLE_S * NANOSECONDS:
+            return followed
+        return replace(followed, waiting=(*followed.waiting, hand))
+
+    def end(self, config: DurationConfig) -> PresentMovement:
+        """Return the movement with all its states judged: the last ones by where it ended."""
+        ended = self
+        while ended.waiting and ended.waiting[0].stamp_ns < ended.hand.stamp_ns:
+            ended = ended.judge_oldest(config)
+        return ended
+
+    def judge_oldest(self, config: DurationConfig) -> PresentMovement:
+        """Return the movement with the errors of its oldest waiting state, by where the hand has come since."""
+        hand, *later = self.waiting
+        path = (*self.waiting, self.hand)
+        seconds = np.array([(each.stamp_ns - hand.stamp_ns) / NANOSECONDS for each in path])
+        ahead_s = min(AHEAD_S, float(seconds[-1]))
+        reached = np.array([np.interp(ahead_s, seconds, [each.mean[axis] for each in path]) for axis in (0, 1)])
+        errors = self.errors.copy()
+        for row, scaled in enumerate(_scale_all(config)):
+            times = np.array([estimate_times_to_go(hand, self.goals, each) for each in scaled]).T
+            expected = find_free_positions(hand.mean[:4], self.goals[:, None], times, ahead_s, is_passing(scaled[0]))
+            errors[:, row] += np.linalg.norm(expected - reached, axis=-1)
+        moved = self.moved + float(np.linalg.norm(reached - hand.mean[:2]))
+        return replace(self, waiting=tuple(later), errors=as_readonly(errors), moved=moved)
+
+    def compute_losses(self) -> Array:
+        """Return the losses c sum |x_f - x| / sum |x(t + h) - x(t)|, (2, f), of the movement so far; zero if it did not move."""
+        if not self.moved:
+            return np.zeros(self.errors.shape[1:])
+        goal = int(self.errors.min(axis=(1, 2)).argmin())
+        covered, whole = (float(np.linalg.norm(each - self.onset)) for each in (self.hand.mean[:2], self.goals[goal]))
+        losses: Array = self.errors[goal] / self.moved * (min(covered / whole, 1.0) if whole else 1.0)
+        return losses
 
 
 @dataclass(frozen=True, eq=False)
 class Pace(Record):
-    """The pace and arrival of an operator, from the movements so far.
+    """The pace and arrival of an operator.
 
-    movements: how many were judged; losses (2, f): sum of the errors by `ARRIVALS` and factor, with the prior of the factor;
-    states: of the present movement; goals (g, 2): at its last state [m].
+    movements: how many have ended; losses (2, f): sum of their errors by `ARRIVALS` and factor, with the prior of the factor;
+    present: the movement that has not ended, None at rest.
     """
 
     movements: int = 0
-    losses: Array = field(default_factory=lambda: np.tile(PRIOR_WEIGHT * np.log(FACTORS) ** 2, (2, 1)))
-    states: tuple[HandState, ...] = ()
-    goals: Array | None = None
+    losses: Array = field(default_factory=lambda: np.tile(PRIOR_WEIGHT * LOG_FACTORS**2, (len(ARRIVALS), 1)))
+    present: PresentMovement | None = None
+
+    @property
+    def is_known(self) -> bool:
+        """Whether any state of a movement was judged."""
+        return self.movements > 0 or (self.present is not None and self.present.moved > 0.0)
 
     def find_best(self, config: DurationConfig) -> tuple[str, float]:
-        """Return the arrival, and the factor on expected durations, which is exactly 1 before the first movement."""
-        if not self.movements:
+        """Return the arrival, and the factor on expected durations, which is exactly 1 as long as nothing was judged."""
+        if not self.is_known:
             return config.arrival, 1.0
         other = np.array([[each != config.arrival] for each in ARRIVALS])
-        row, column = np.unravel_index((self.losses + ARRIVAL_WEIGHT * other).argmin(), self.losses.shape)
-        return ARRIVALS[row], float(FACTORS[column])
+        row = ARRIVALS.index(config.arrival)
+        if self.movements:
+            row = int((self.losses + ARRIVAL_WEIGHT * other).min(axis=1).argmin())
+        present = 0.0 if self.present is None else self.present.compute_losses()[row]
+        return ARRIVALS[row], _find_least(self.losses[row] + present)
 
     def adapt(self, config: DurationConfig) -> DurationConfig:
         """Return the durations of this operator."""
         arrival, factor = self.find_best(config)
-        return replace(scale_durations(config, factor), arrival=arrival) if self.movements else config
+        return replace(scale_durations(config, factor), arrival=arrival) if self.is_known else config
 
     def follow(self, hand: HandState, goals: Array | None, config: DurationConfig) -> Pace:
         """Return the pace after the next state of the hand; goals (g, 2) [m]; config: before it is adapted."""
-        pace = self
-        if self.states and self.states[0].onset_ns != hand.onset_ns:
-            pace = self._judge(config)
-        if hand.onset_ns is None:
+        pace, present = self, self.present
+        if present is not None and present.hand.onset_ns != hand.onset_ns:
+            pace, present = self._end(present, config), None
+        if hand.onset_ns is None or goals is None or not len(goals):
             return pace
-        states = sample_movement(pace.states, hand)
-        return pace if states is pace.states and goals is pace.goals else replace(pace, states=states, goals=goals)
+        if present is None or len(present.goals) != len(goals):
+            return replace(pace, present=PresentMovement.begin(hand, goals))
+        return replace(pace, present=present.follow(hand, goals, config))
 
     def interrupt(self) -> Pace:
         """Return the pace without the present movement."""
-        return replace(self, states=(), goals=None)
+        return replace(self, present=None)
 
-    def _judge(self, config: DurationConfig) -> Pace:
-        """Return the pace after the end of the present movement, which counts if it covered the distance to a goal."""
-        path, ended = np.array([each.mean[:2] for each in self.states]), self.interrupt()
-        first = self.states[0].onset_position
-        assert first is not None
-        if self.goals is None or not len(self.goals):
-            return ended
-        goal = self.goals[int(np.hypot(*(self.goals - path[-1]).T).argmin())]
-        if not has_covered_distance(np.vstack([first, path]), goal):
-            return ended
-        errors, moved = self._sum_errors(path, goal, config)
-        if not moved:
-            return ended
-        return replace(ended, movements=self.movements + 1, losses=as_readonly(self.losses + errors / moved))
+    def _end(self, present: PresentMovement, config: DurationConfig) -> Pace:
+        """Return the pace after the end of a movement, which counts if it covered the distance to the goal nearest to its end."""
+        end = present.hand.mean[:2]
+        goal = int(np.hypot(*(present.goals - end).T).argmin())
+        ended = present.end(config)
+        if not has_covered_distance(np.vstack([present.onset, end]), present.goals[goal]) or not ended.moved:
+            return self.interrupt()
+        return Pace(self.movements + 1, as_readonly(self.losses + ended.errors[goal] / ended.moved))
 
-    def _sum_errors(self, path: Array, goal: Array, config: DurationConfig) -> tuple[Array, float]:
-        """Return sums of errors with each arrival and factor (2, f), and the distance that the hand moved meanwhile [m]."""
-        seconds = np.array([(each.stamp_ns - self.states[0].stamp_ns) / NANOSECONDS for each in self.states])
-        ahead = np.minimum(seconds + AHEAD_S, seconds[-1])
-        reached = np.stack([np.interp(ahead, seconds, axis) for axis in path.T], axis=-1)
-        scaled = [scale_durations(config, each) for each in FACTORS.tolist()]
-        configs = [[replace(each, arrival=arrival) for each in scaled] for arrival in ARRIVALS]
-        errors, moved = np.zeros(self.losses.shape), 0.0
-        for row in choose_judged(np.flatnonzero(seconds < seconds[-1]).tolist()):
-            hand, later_s = self.states[row], float(ahead[row] - seconds[row])
-            for number, of_arrival in enumerate(configs):
-                times = np.array([estimate_times_to_go(hand, goal[None], each)[0] for each in of_arrival])
-                expected = find_free_positions(hand.mean[:4], goal, times, later_s, is_passing(of_arrival[0]))
-                errors[number] += np.hypot(*(expected - reached[row]).T)
-            moved += float(np.hypot(*(reached[row] - path[row])))
-        return errors, moved
+
+@lru_cache(maxsize=4)
+def _scale_all(config: DurationConfig) -> tuple[tuple[DurationConfig, ...], ...]:
+    """Return the durations multiplied by each of `FACTORS`, for each of `ARRIVALS`."""
+    scaled = [scale_durations(config, each) for each in FACTORS.tolist()]
+    return tuple(tuple(replace(each, arrival=arrival) for each in scaled) for arrival in ARRIVALS)
+
+
+def _find_least(losses: Array) -> float:
+    """Return the factor at which a parabola through the least loss (f,) and its neighbours is least."""
+    middle = int(np.clip(losses.argmin(), 1, len(losses) - 2))
+    before, here, after = losses[middle - 1 : middle + 2].tolist()
+    bend = before - 2.0 * here + after
+    offset = min(max(0.5 * (before - after) / bend, -1.0), 1.0) if bend > 0.0 else float(losses.argmin() - middle)
+    step = LOG_FACTORS[1] - LOG_FACTORS[0]
+    return float(np.exp(LOG_FACTORS[middle] + offset * step))
 
 
 def find_free_positions(start: Array, goal: Array, times: Array, seconds: float, passing: bool) -> Array:
-    """Return the positions (f, 2) [m] some seconds later in movements of least jerk that reach a goal (2,) in times (f,) [s].
+    """Return the positions (..., f, 2) [m] some seconds later in movements of least jerk that reach a goal in times (..., f) [s].
 
-    start (4,): position [m] and velocity [m/s]; passing: whether a movement passes the goal, or comes to rest there.
+    start (4,): position [m] and velocity [m/s]; goal (2,), or (..., 1, 2) [m]; passing: whether a movement passes the goal, or
+    comes to rest there.
     """
-    s = np.minimum(seconds / times, 1.0)[:, None]
+    s = np.minimum(seconds / times, 1.0)[..., None]
     if passing:
         covered = (20.0 * s**3 - 15.0 * s**4 + 3.0 * s**5) / 8.0
         kept = s - covered
     else:
         covered = 10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5
         kept = s - 6.0 * s**3 + 8.0 * s**4 - 3.0 * s**5
-    positions: Array = start[:2] + covered * (goal - start[:2]) + kept * times[:, None] * start[2:]
+    positions: Array = start[:2] + covered * (goal - start[:2]) + kept * times[..., None] * start[2:]
     return positions
