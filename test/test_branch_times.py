@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.homotopy.branch_times import BranchTimes, compute_branch_times
@@ -71,7 +73,7 @@ COSTS = np.array([1.0, 2.0, 5.0])
 
 
 def make_config(lookahead_s: float) -> LikelihoodConfig:
-    return LikelihoodConfig(beta=2.0, lookahead_share=1.0, lookahead_s=lookahead_s)
+    return LikelihoodConfig(beta=2.0, planning_horizon_s=0.0, lookahead_s=lookahead_s)
 
 
 def make_branch_times(after_s: float) -> BranchTimes:
@@ -107,18 +109,21 @@ def test_an_infinite_lookahead_is_the_plain_rule() -> None:
 
 
 def test_branch_times_have_no_influence_without_a_look_ahead() -> None:
-    plain = LikelihoodConfig(beta=2.0, lookahead_share=1.0, lookahead_s=0.0)
+    plain = LikelihoodConfig(beta=2.0, planning_horizon_s=0.0, lookahead_s=0.0)
     np.testing.assert_array_equal(compute_likelihoods(COSTS, plain, make_branch_times(1.0)), compute_likelihoods(COSTS, plain))
 
 
-@pytest.mark.parametrize('share', [0.0, 0.3, 1.0])
-def test_the_rule_is_that_of_both_kinds_of_operators_by_their_probabilities(share: float) -> None:
+@pytest.mark.parametrize(('horizon_s', 'share'), [(1000.0, 0.0), (4.0, norm.cdf(-math.log(2.0) / 0.5)), (2.0, 0.5), (0.0, 1.0)])
+def test_who_needs_longer_than_the_planning_horizon_looks_ahead(horizon_s: float, share: float) -> None:
     planned, ahead = (
         compute_likelihoods(COSTS, make_config(0.7)),
         compute_likelihoods(COSTS, make_config(0.7), make_branch_times(1.0)),
     )
-    found = compute_likelihoods(COSTS, replace(make_config(0.7), lookahead_share=share), make_branch_times(1.0))
+    config = replace(make_config(0.7), planning_horizon_s=horizon_s, planning_spread=0.5)
+    found = compute_likelihoods(COSTS, config, make_branch_times(1.0), time_s=2.0)
     np.testing.assert_allclose(found, (1.0 - share) * planned + share * ahead, rtol=1e-12)
+    at_goal = compute_likelihoods(COSTS, config, make_branch_times(1.0), time_s=0.0)
+    np.testing.assert_array_equal(at_goal, ahead if horizon_s == 0.0 else planned)
 
 
 def test_extreme_costs_do_not_overflow() -> None:

@@ -1,4 +1,4 @@
-"""Who looks ahead, and how precisely, is learnt from choices: causally, equally for equal input, until a reset, and in bounds."""
+"""How far ahead an operator plans, and how precisely, is learnt: causally, equally for equal input, until a reset, in bounds."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 
 from foc_ros.core.config import Config, LikelihoodConfig, replace_values
 from foc_ros.core.homotopy.decisions import Decisions
-from foc_ros.core.learning.choices import FACTORS, Choice, Preferences
-from foc_ros.core.likelihood import compute_likelihoods
+from foc_ros.core.learning.choices import FACTORS, HORIZONS, OWN_SPREAD, Choice, Preferences
+from foc_ros.core.likelihood import compute_likelihoods, compute_lookahead_share
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import LEFT, NANOSECONDS, RIGHT, HandSample, HandState, make_obstacles
 from foc_ros.ros.parameters import load_parameter_file, write_parameter_file
@@ -21,6 +21,8 @@ OBSTACLES = make_obstacles([[0.1, 0.0], [0.2, 0.0]], 0.02, 0.001)
 GOALS = np.array([[0.3, 0.0]])
 CLASSES = [(LEFT, LEFT), (LEFT, RIGHT), (RIGHT, LEFT), (RIGHT, RIGHT)]
 STEP_NS = NANOSECONDS // 10
+TIME_S = 3.0
+"""Time to go of all classes [s]."""
 CONFIG = replace_values(Config(), {'rate_hz': 10.0, 'foc.steps': 15, 'estimator.position_stddev': 1e-4})
 
 
@@ -35,7 +37,7 @@ def choose(
     sides = tuple(dict(zip(OBSTACLES.ids, each, strict=True)) for each in CLASSES)
     decisions = Decisions(np.array([0, 0, 1, 1]), np.arange(4), np.zeros(4, dtype=np.intp))
     made = stamp_ns, onset_ns, OBSTACLES, goals
-    return Choice(*made, np.array(goal), sides, np.array(costs), np.zeros(4), None, decisions)
+    return Choice(*made, np.array(goal), sides, np.array(costs), np.zeros(4), None, decisions, TIME_S)
 
 
 def move(preferences: Preferences, sides: tuple[int, int], costs: list[float], start_s: float = 1.0) -> Preferences:
@@ -63,40 +65,45 @@ def follow_movements(sides: list[tuple[int, int]], costs: list[float]) -> Prefer
 def test_who_leaves_far_choices_open_looks_ahead_and_who_follows_the_costs_there_plans() -> None:
     near_only = follow_movements([(LEFT, LEFT), (LEFT, RIGHT)] * 10, FIRST_AND_LAST_ARE_CHEAP)
     throughout = follow_movements([(LEFT, LEFT)] * 20, FIRST_AND_LAST_ARE_CHEAP)
-    assert near_only.adapt(LIKELIHOOD).lookahead_share > 0.95 and throughout.adapt(LIKELIHOOD).lookahead_share < 0.05
+    shares = [compute_lookahead_share(TIME_S, each.adapt(LIKELIHOOD)) for each in (near_only, throughout)]
+    assert compute_lookahead_share(TIME_S, LIKELIHOOD) == 0.5 and shares[0] > 0.9 and shares[1] < 0.1
+    assert near_only.adapt(LIKELIHOOD).planning_horizon_s < TIME_S < throughout.adapt(LIKELIHOOD).planning_horizon_s
 
 
 def test_precision_follows_choices_and_all_exponents_follow_it() -> None:
     precise, careless = (follow_movements(each, FIRST_IS_CHEAP) for each in ([(LEFT, LEFT)] * 20, CLASSES * 5))
-    assert careless.find_mean(0.25)[0] < 0.6 < 1.5 < precise.find_mean(0.25)[0]
-    factor, share = precise.find_mean(LIKELIHOOD.lookahead_share)
+    assert careless.find_mean(LIKELIHOOD)[0] < 0.6 < 1.5 < precise.find_mean(LIKELIHOOD)[0]
+    factor, horizon_s, spread = precise.find_mean(LIKELIHOOD)
     adapted = precise.adapt(LIKELIHOOD)
     for name in ('beta', 'shortfall', 'beta_beyond'):
         assert getattr(adapted, name) == pytest.approx(factor * getattr(LIKELIHOOD, name))
-    assert adapted.lookahead_share == share
+    assert (adapted.planning_horizon_s, adapted.planning_spread) == (horizon_s, spread)
+    assert OWN_SPREAD < spread < LIKELIHOOD.planning_spread
 
 
-@pytest.mark.parametrize('share', [0.0, 1.0])
-def test_what_is_certain_is_not_learnt(share: float) -> None:
+@pytest.mark.parametrize(('horizon_s', 'spread'), [(0.0, 0.3), (2.0, OWN_SPREAD), (2.0, 0.1)])
+def test_a_horizon_that_is_known_is_not_learnt(horizon_s: float, spread: float) -> None:
+    known = replace(LIKELIHOOD, planning_horizon_s=horizon_s, planning_spread=spread)
     preferences = follow_movements([(LEFT, LEFT), (LEFT, RIGHT)] * 3, FIRST_AND_LAST_ARE_CHEAP)
-    assert preferences.adapt(replace(LIKELIHOOD, lookahead_share=share)).lookahead_share == share
-    against = replace(preferences, scores=np.array([[-1e4 * share], [-1e4 * (1.0 - share)]]) + np.zeros((2, len(FACTORS))))
-    assert np.isfinite(against.find_mean(share)).all() and against.find_mean(1.0 - share)[1] == 1.0 - share
+    against = replace(preferences, scores=-1e4 * np.abs(np.log(HORIZONS[-1] / HORIZONS))[:, None] * np.ones(len(FACTORS)))
+    for each in (preferences, against):
+        assert each.find_mean(known)[1:] == pytest.approx((horizon_s, spread), rel=1e-6)
 
 
 def test_the_score_is_the_likelihood_of_the_classes_that_agree() -> None:
     choice, agrees = choose([1.0, 2.0, 4.0, 8.0], 0), np.array([False, True, False, False])
     found = choice.score(agrees, LIKELIHOOD)
-    for row, share in enumerate((0.0, 1.0)):
+    for row, horizon in enumerate(HORIZONS):
         for column, factor in enumerate(FACTORS):
             scaled = replace(
                 LIKELIHOOD,
-                lookahead_share=share,
+                planning_horizon_s=horizon * LIKELIHOOD.planning_horizon_s,
+                planning_spread=OWN_SPREAD,
                 beta=factor * LIKELIHOOD.beta,
                 beta_beyond=factor * LIKELIHOOD.beta_beyond,
                 shortfall=factor * LIKELIHOOD.shortfall,
             )
-            shares = compute_likelihoods(choice.costs, scaled, None, choice.shortfalls, choice.decisions)
+            shares = compute_likelihoods(choice.costs, scaled, None, choice.shortfalls, choice.decisions, TIME_S)
             assert found[row, column] == pytest.approx(np.log(0.99 * shares[1] + 0.01 / 4))
 
 
@@ -134,7 +141,7 @@ def test_the_goal_that_is_reached_counts_and_an_unclear_one_does_not() -> None:
 
 def test_exponents_stay_within_the_bounds_of_the_parameters() -> None:
     extreme = LikelihoodConfig(beta=100.0, beta_beyond=100.0, shortfall=np.inf)
-    scores = np.where(FACTORS[-1] == FACTORS, 0.0, -1e3) * np.ones((2, 1))
+    scores = np.where(FACTORS[-1] == FACTORS, 0.0, -1e3) * np.ones((len(HORIZONS), 1))
     adapted = Preferences(movements=1, scores=scores).adapt(extreme)
     assert (adapted.beta, adapted.beta_beyond, adapted.shortfall) == (100.0, 100.0, np.inf)
 
@@ -142,7 +149,8 @@ def test_exponents_stay_within_the_bounds_of_the_parameters() -> None:
 @pytest.mark.parametrize('costs', [[0.0] * 4, [1e300, 1.0, 1e-300, 0.0]])
 def test_extreme_costs_give_finite_factors(costs: list[float]) -> None:
     preferences = move(move(Preferences(), (RIGHT, LEFT), costs), (LEFT, LEFT), costs, 11.0)
-    assert preferences.movements == 2 and np.isfinite(preferences.scores).all() and np.isfinite(preferences.find_mean(0.25)).all()
+    assert preferences.movements == 2
+    assert np.isfinite(preferences.scores).all() and np.isfinite(preferences.find_mean(LIKELIHOOD)).all()
 
 
 def reach(pipeline: Pipeline, aside: float, start_s: float) -> None:
@@ -168,7 +176,7 @@ def make_operator(config: Config) -> Pipeline:
 
 def test_equal_messages_give_equal_factors_and_a_reset_forgets_them() -> None:
     one, other = make_operator(CONFIG), make_operator(CONFIG)
-    assert one.learnt.preferences.movements >= 2 and one.learnt.preferences.find_mean(0.25) != (1.0, 0.25)
+    assert one.learnt.preferences.movements >= 2 and one.learnt.preferences.find_mean(CONFIG.likelihood)[0] != 1.0
     np.testing.assert_array_equal(one.learnt.preferences.scores, other.learnt.preferences.scores)
     assert one.adapted_config.likelihood == one.learnt.preferences.adapt(CONFIG.likelihood) != CONFIG.likelihood
     one.reset()

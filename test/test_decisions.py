@@ -21,7 +21,7 @@ SIDES = np.array(
 )
 GOAL = np.array([0, 1, 0, 1, 0])
 COSTS = np.array([1.0, 2.0, 3.0, 2.5, 4.0])
-CONFIG = replace(LikelihoodConfig(), beta=2.0, lookahead_share=1.0, beta_beyond=0.3, weaving=1.5)
+CONFIG = replace(LikelihoodConfig(), beta=2.0, planning_horizon_s=0.0, beta_beyond=0.3, weaving=1.5)
 
 
 def make_hand(x: float) -> HandState:
@@ -90,7 +90,7 @@ def test_with_one_exponent_and_no_weaving_the_rule_is_the_plain_one() -> None:
 
 def test_who_plans_the_whole_way_weighs_all_choices_alike() -> None:
     decisions = Decisions(np.array([0, 0, 1, 1, 1]), np.arange(5), np.array([0, 0, 0, 1, 0]))
-    p = compute_likelihoods(COSTS, replace(CONFIG, lookahead_share=0.0), decisions=decisions)
+    p = compute_likelihoods(COSTS, replace(CONFIG, planning_horizon_s=1000.0), decisions=decisions)
     weights = COSTS**-CONFIG.beta * np.exp(-CONFIG.weaving * decisions.woven)
     np.testing.assert_allclose(p, weights / weights.sum())
 

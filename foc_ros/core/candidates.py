@@ -15,7 +15,7 @@ from .homotopy import find_path_sides
 from .homotopy.branch_times import compute_branch_times
 from .homotopy.decisions import find_decisions, tabulate_sides
 from .learning.choices import Choice
-from .likelihood import CostModel, compute_likelihoods
+from .likelihood import CostModel, compute_likelihoods, compute_lookahead_share
 from .ocp.problem import Problem
 from .ocp.solve import solve_problem
 from .ocp.warm_start import Start, cold_start, warm_start
@@ -175,7 +175,8 @@ def rank_candidates(
     candidates = drop_duplicates(candidates)
     taken = [each for each in candidates if each.has_likelihood]
     is_learnt = likelihood.adaptation == ONLINE
-    may_look_ahead = is_learnt or likelihood.lookahead_share > 0.0
+    time_s = min((each.solution.dt * len(each.solution.control) for each in taken), default=0.0)
+    may_look_ahead = is_learnt or compute_lookahead_share(time_s, likelihood) > 0.0
     branch_times = compute_branch_times(taken, obstacles) if may_look_ahead and likelihood.lookahead_s > 0.0 else None
     costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))
     decisions = choice = None
@@ -184,8 +185,8 @@ def rank_candidates(
         decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
         if is_learnt:
             made = hand.stamp_ns, hand.onset_ns, obstacles, goals
-            choice = Choice(*made, goal, sides, costs, shortfalls, branch_times, decisions)
-    shares = compute_likelihoods(costs, likelihood, branch_times, shortfalls, decisions)
+            choice = Choice(*made, goal, sides, costs, shortfalls, branch_times, decisions, time_s)
+    shares = compute_likelihoods(costs, likelihood, branch_times, shortfalls, decisions, time_s)
     pairs = zip(taken, shares.tolist(), strict=True)
     ranked = [replace(each, likelihood=share) for each, share in pairs]
     ranked.sort(key=lambda each: (-each.likelihood, each.label))

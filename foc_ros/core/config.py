@@ -28,6 +28,8 @@ WIDENS = 'widens the predicted covariance, not the chance constraint'
 JERK_ONLY = 'plant triple_integrator'
 REFERENCE_STEP_S = 0.02
 """Step for which the noise parameters are quoted (doc/model.md): c is scaled by sqrt(0.02 / dt)."""
+WHOLE_WAY_S = 1000.0
+"""Planning horizon of operators who plan the whole way [s]."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,7 @@ class DurationConfig:
         100.0, f'cost of time of model cost_of_time, for {JERK_ONLY} also in the cost of a class', 'm^2/s^6', 1e-9, 1e9
     )
     adaptation: str = _p(
-        'online', "whether expected durations and `arrival` follow the operator's earlier movements", choices=ADAPTATIONS
+        'online', "whether expected durations and `arrival` follow the operator's movements", choices=ADAPTATIONS
     )
     min_time_to_go_s: float = _p(0.3, 'lower limit of the time to go', 's', 0.01, 60.0)
     spread: float = _p(0.4, f'standard deviation of the time to go, as a fraction of it; it {WIDENS}', '', 0.0, 2.0)
@@ -169,12 +171,15 @@ class LikelihoodConfig:
         math.inf,
     )
     spent_share: float = _p(0.0, f'fraction of the effort since onset that every cost contains, for {JERK_ONLY}', '', 0.0, 1.0)
-    lookahead_share: float = _p(
-        0.25,
-        'probability that the operator looks ahead (lookahead_s, beta_beyond) instead of planning the whole way',
-        '',
+    planning_horizon_s: float = _p(
+        3.0,
+        'who needs longer than this to the goal looks ahead (lookahead_s, beta_beyond); 0: always; 1000: plans the whole way',
+        's',
         0.0,
-        1.0,
+        WHOLE_WAY_S,
+    )
+    planning_spread: float = _p(
+        1.0, 'standard deviation of the logarithm of the planning horizon, in one operator and between operators', '', 0.05, 10.0
     )
     lookahead_s: float = _p(
         0.5, 'mean look-ahead of an operator who looks ahead: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
@@ -187,7 +192,7 @@ class LikelihoodConfig:
     )
     adaptation: str = _p(
         'online',
-        "whether `lookahead_share` and, by a factor, `beta`, `shortfall` and `beta_beyond` follow the operator's earlier choices",
+        "whether the planning horizon and, by a factor, `beta`, `shortfall` and `beta_beyond` follow the operator's choices",
         choices=ADAPTATIONS,
     )
     hold_s: float = _p(

@@ -9,12 +9,14 @@ factor k is below the wanted one has a smaller weight, by the factor exp(-likeli
 J_i is the cost that `CostModel` assembles: the effort to go through class i, the price of its duration, and a part of the effort
 since movement onset, which all classes share.
 
-This is for operators who plan the whole way. Others weigh what is near and leave distant choices open: with p' from the rules
-below, and the probability s = `likelihood.lookahead_share` that the operator looks ahead in this way,
+This is for operators who plan the whole way. They do so where they need less time than their planning horizon. Otherwise they
+look ahead: they weigh what is near and leave distant choices open, with p' from the rules below. The horizon has a log-normal
+distribution with the median H = `likelihood.planning_horizon_s` and the spread sigma = `likelihood.planning_spread`, so that with
+the shortest time to go T of the classes
 
-    p_i <- (1 - s) p_i + s p'_i.
+    p_i <- (1 - s) p_i + s p'_i,   s = Phi(log(T / H) / sigma).
 
-Such an operator looks ahead by a time h that is exponentially distributed with the mean `likelihood.lookahead_s`. A path class W,
+An operator looks ahead by a time h that is exponentially distributed with the mean `likelihood.lookahead_s`. A path class W,
 with all goals to which it leads, has the weight V_W = sum_{i in W} J_i^-beta. The path classes that branch off from W later than
 h, S_W(h) = {W': tau_WW' > h}, are not yet distinguished from W, so that each gets their mean weight:
 
@@ -98,12 +100,14 @@ def compute_likelihoods(
     branch_times: BranchTimes | None = None,
     shortfalls: Array | None = None,
     decisions: Decisions | None = None,
+    time_s: float = 0.0,
 ) -> Array:
     """Return the likelihoods (k,) of classes by the rule that `likelihood.rule` names; they sum to one.
 
     costs (k,) >= 0 [m^2/s^5], of which those below `COST_FLOOR` count as `COST_FLOOR`; branch_times: of these classes, for a
     look-ahead only; shortfalls (k,) >= 0: of their safety factors, zero if not given; decisions: of these classes, without which
-    all choices are near. Logarithms keep numbers in range. Raises InputError for a cost that is negative or not finite.
+    all choices are near; time_s: the shortest time to go of these classes [s]. Logarithms keep numbers in range. Raises
+    InputError for a cost that is negative or not finite.
     """
     values = np.ascontiguousarray(costs, dtype=float)
     for row, value in enumerate(values.tolist()):
@@ -114,7 +118,8 @@ def compute_likelihoods(
         np.multiply(config.shortfall, shortfalls, out=losses, where=shortfalls > 0.0)
     logs, woven = rule(values, config) - losses, np.zeros(len(values)) if decisions is None else config.weaving * decisions.woven
     planned = normalise_logs(logs - woven)
-    if config.lookahead_share == 0.0 or not len(logs) or (branch_times is None and decisions is None):
+    share = compute_lookahead_share(time_s, config)
+    if share == 0.0 or not len(logs) or (branch_times is None and decisions is None):
         return planned
     near = logs
     if config.lookahead_s > 0.0 and branch_times is not None:
@@ -125,8 +130,17 @@ def compute_likelihoods(
         beyond = _share_weights(beyond, logs, decisions.way)
         near = _share_weights(near - woven, beyond - woven, decisions.next_gap)
     ahead = normalise_logs(np.ascontiguousarray(near, dtype=float))
-    mixed: Array = (1.0 - config.lookahead_share) * planned + config.lookahead_share * ahead
+    mixed: Array = (1.0 - share) * planned + share * ahead
     return mixed
+
+
+def compute_lookahead_share(time_s: float, config: LikelihoodConfig) -> float:
+    """Return the probability Phi(log(T / H) / sigma) that an operator looks ahead whose time to go is time_s [s]."""
+    if config.planning_horizon_s == 0.0:
+        return 1.0
+    if time_s <= 0.0:
+        return 0.0
+    return 0.5 * math.erfc(math.log(config.planning_horizon_s / time_s) / (math.sqrt(2.0) * config.planning_spread))
 
 
 def cost_ratio_logs(costs: Array, config: LikelihoodConfig) -> Array:

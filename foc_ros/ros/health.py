@@ -250,10 +250,10 @@ def _describe_learnt(pipeline: Pipeline) -> str:
     """Return what was learnt of the operator and of the scene, and from how many movements and errors."""
     pace, preferences, dispersion = pipeline.learnt.pace, pipeline.learnt.preferences, pipeline.learnt.dispersion
     movements = pipeline.learnt.movements
-    precision, ahead = preferences.find_mean(pipeline.config.likelihood.lookahead_share)
+    precision, horizon_s, _ = preferences.find_mean(pipeline.config.likelihood)
     arrival, factor = pace.find_best(pipeline.config.duration)
     durations = f'{pace.movements} movements, durations x {factor:.2f}, arrival {arrival}'
-    choices = f'{preferences.movements} movements with choices, precision x {precision:.2f}, looks ahead: {100 * ahead:.0f} %'
+    choices = f'{preferences.movements} movements with choices, precision x {precision:.2f}, planning horizon {horizon_s:.3g} s'
     now, later = dispersion.factors
     errors = f'{dispersion.errors} errors, standard deviations x {now:.2f} now, x {later:.2f} at the end'
     recorded = f'{len(movements.learnt)} movements recorded, {movements.refused} refused'

@@ -77,7 +77,9 @@ def power_rule_shares(observation: Observation, config: LikelihoodConfig) -> Arr
     solved = np.flatnonzero(candidates.has_likelihood)
     costs = compute_shared_cost(candidates.effort_spent, config) + candidates.cost_to_go[solved]
     branch_times, shortfalls = candidates.branch_times.take(solved), candidates.safety_shortfall[solved]
-    return _share_among_solved(observation, compute_likelihoods(costs, config, branch_times, shortfalls, candidates.decisions))
+    time_s = float(candidates.time_s[solved].min()) if len(solved) else 0.0
+    shares = compute_likelihoods(costs, config, branch_times, shortfalls, candidates.decisions, time_s)
+    return _share_among_solved(observation, shares)
 
 
 def boltzmann_shares(observation: Observation, inverse_temperature: float) -> Array:

@@ -57,8 +57,8 @@ RULES = (
         for beta, share in product((0.5, 1.0, 2.0, 3.0, 6.0, 12.0), (1.0, 0.0))
     ),
     *(
-        make_ahead(LikelihoodConfig(), seconds, beta, beyond)
-        for seconds, beta, beyond in product((0.0, 0.5, 1.0), (1.0, 2.0, 3.0, 6.0), (0.05, 0.3))
+        make_ahead(LikelihoodConfig(), horizon, seconds, beta, beyond)
+        for horizon, seconds, beta, beyond in product((0.0, 2.5), (0.0, 0.5, 1.0), (1.0, 2.0, 3.0, 6.0), (0.05, 0.3))
     ),
 )
 """The likelihoods of which each setting gets its best. By a single one, settings that suit the others would lose."""

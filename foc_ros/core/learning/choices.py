@@ -1,22 +1,23 @@
-"""What is learnt of an operator's choices: whether the operator looks ahead or plans the whole way, and how precisely.
+"""What is learnt of an operator's choices: how far ahead the operator plans, and how precisely.
 
-Before the first movement, the probability that the operator looks ahead (`likelihood`) is s = `likelihood.lookahead_share`. The
-precision with which the losses of the classes are followed is a factor f on the logarithms of their weights: on
+The planning horizon of an operator (`likelihood`) is h `likelihood.planning_horizon_s`, where h is a factor of `HORIZONS`. The
+precision with which the losses of the classes are followed is a factor f of `FACTORS` on the logarithms of their weights: on
 `likelihood.beta`, `likelihood.shortfall` and `likelihood.beta_beyond`, so that the solutions stay the same. When a movement has
 ended, it is known which classes of each of its predictions agree with it: they pass the obstacles on the same sides and lead to
-the goal that was reached. With P_t the probability that the prediction at time t gave to these classes, for an operator of the
-kind z, who plans the whole way (0) or looks ahead (1),
+the goal that was reached. With P_t the probability that the prediction at time t gave to these classes,
 
-    log w(z, f) = log(1 - s or s) - log^2 f / (2 `PRIOR_STDDEV`^2) + sum_movements mean_t log((1 - u) P_t(z, f) + u a_t),
+    log w(h, f) = -log^2 h / (2 v^2) - log^2 f / (2 `PRIOR_STDDEV`^2) + sum_movements mean_t log((1 - u) P_t(h, f) + u a_t),
 
-which is a Bayesian posterior over both kinds and the grid `FACTORS`. A movement counts as one observation, because its
-predictions depend on each other. A share u of the choices is not explained by losses: all classes are equally likely in it, and
-a_t is the share of those that agree. The likelihood uses the posterior probability of z = 1 in place of s, and the posterior
-mean of the logarithm of f.
+which is a Bayesian posterior over both factors. A movement counts as one observation, because its predictions depend on each
+other. A share u of the choices is not explained by losses: all classes are equally likely in it, and a_t is the share of those
+that agree. In P_t, the spread of the horizon is `OWN_SPREAD`, that of one operator from choice to choice. The prior variance v^2
+is the rest of that of `likelihood.planning_spread`, which contains also how operators differ. The likelihood uses the posterior
+means of the logarithms of both factors, and as its spread the root of `OWN_SPREAD`^2 and the posterior variance of log h.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -27,16 +28,22 @@ from foc_ros.core.config import LikelihoodConfig, clip_values
 from foc_ros.core.homotopy import find_path_sides
 from foc_ros.core.homotopy.branch_times import BranchTimes
 from foc_ros.core.homotopy.decisions import Decisions
-from foc_ros.core.likelihood import compute_likelihoods
+from foc_ros.core.likelihood import compute_likelihoods, compute_lookahead_share
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Obstacles, Record, as_readonly
 
 from .goal_reached import find_chosen_goal
 from .judging import choose_judged, sample_movement
 
 FACTORS = as_readonly(2.0 ** np.arange(-3.0, 4.0))
-"""Factors that are judged."""
+"""Factors on the precision that are judged."""
 PRIOR_STDDEV = 0.7
-"""Standard deviation of the logarithm of a factor before the first movement."""
+"""Standard deviation of the logarithm of the precision before the first movement."""
+HORIZONS = as_readonly(2.0 ** np.arange(-4.0, 4.5, 0.5))
+"""Factors on the planning horizon that are judged."""
+OWN_SPREAD = 0.3
+"""Standard deviation of the logarithm of the planning horizon of one operator from choice to choice."""
+CERTAIN = 1e-12
+"""Variance of the logarithm of a horizon that is known."""
 UNEXPLAINED = 0.01
 """Share of choices that losses do not explain, as in the scores of `evaluate`."""
 
@@ -46,7 +53,7 @@ class Choice(Record):
     """A prediction among k classes, at least two, about obstacles and goals (g, 2) [m] at a stamp.
 
     onset_ns: when the movement of the hand began, None at rest; goal (k,): row of the goal of each class; sides: sides by id on
-    which each passes obstacles; costs, shortfalls, branch_times, decisions: what `compute_likelihoods` takes.
+    which each passes obstacles; costs, shortfalls, branch_times, decisions, time_s: what `compute_likelihoods` takes.
     """
 
     stamp_ns: int
@@ -59,6 +66,7 @@ class Choice(Record):
     shortfalls: Array
     branch_times: BranchTimes | None
     decisions: Decisions
+    time_s: float
 
     def find_agreeing(self, states: Sequence[HandState]) -> NDArray[np.bool_]:
         """Tell which classes (k,) agree with the states of the hand until the end of the movement."""
@@ -72,41 +80,49 @@ class Choice(Record):
         return agrees if reached is None else agrees & (self.goal == reached)
 
     def score(self, agrees: NDArray[np.bool_], likelihood: LikelihoodConfig) -> Array:
-        """Return the log-likelihoods (2, f) of the classes (k,) that agree, by operators who plan and who look ahead."""
-        kinds = [[_scale(likelihood, factor, share) for factor in FACTORS.tolist()] for share in (0.0, 1.0)]
-        found = [[self._sum_likelihoods(agrees, each) for each in kind] for kind in kinds]
-        return np.asarray(np.log((1.0 - UNEXPLAINED) * np.array(found) + UNEXPLAINED * agrees.mean()))
+        """Return the log-likelihoods (h, f) of the classes (k,) that agree, by horizon and precision."""
+        planned, ahead = (
+            np.array([self._sum_likelihoods(agrees, _scale(likelihood, factor, horizon_s)) for factor in FACTORS.tolist()])
+            for horizon_s in (math.inf, 0.0)
+        )
+        horizons = [_scale(likelihood, 1.0, each * likelihood.planning_horizon_s, OWN_SPREAD) for each in HORIZONS.tolist()]
+        share = np.array([[compute_lookahead_share(self.time_s, each)] for each in horizons])
+        found = (1.0 - share) * planned + share * ahead
+        return np.asarray(np.log((1.0 - UNEXPLAINED) * found + UNEXPLAINED * agrees.mean()))
 
     def _sum_likelihoods(self, agrees: NDArray[np.bool_], likelihood: LikelihoodConfig) -> float:
-        shares = compute_likelihoods(self.costs, likelihood, self.branch_times, self.shortfalls, self.decisions)
-        return float(shares @ agrees)
+        decided = self.branch_times, self.shortfalls, self.decisions, self.time_s
+        return float(compute_likelihoods(self.costs, likelihood, *decided) @ agrees)
 
 
 @dataclass(frozen=True, eq=False)
 class Preferences(Record):
     """The choices of an operator so far.
 
-    movements: how many were judged; scores (2, f): sums of their scores for operators who plan and who look ahead, by factor;
-    states, choices: of the present movement.
+    movements: how many were judged; scores (h, f): sums of their scores, by horizon and precision; states, choices: of the
+    present movement.
     """
 
     movements: int = 0
-    scores: Array = field(default_factory=lambda: np.zeros((2, len(FACTORS))))
+    scores: Array = field(default_factory=lambda: np.zeros((len(HORIZONS), len(FACTORS))))
     states: tuple[HandState, ...] = ()
     choices: tuple[Choice, ...] = ()
 
     def adapt(self, config: LikelihoodConfig) -> LikelihoodConfig:
         """Return the likelihood of this operator."""
-        return _scale(config, *self.find_mean(config.lookahead_share)) if self.movements else config
+        return _scale(config, *self.find_mean(config)) if self.movements else config
 
-    def find_mean(self, lookahead_share: float) -> tuple[float, float]:
-        """Return the factor and the probability that the operator looks ahead, which was `lookahead_share` at first."""
-        with np.errstate(divide='ignore'):  # what is certain has the logarithm -inf
-            prior = np.log([[1.0 - lookahead_share], [lookahead_share]]) - 0.5 * (np.log(FACTORS) / PRIOR_STDDEV) ** 2
-        logs = prior + self.scores
+    def find_mean(self, config: LikelihoodConfig) -> tuple[float, float, float]:
+        """Return the factor on the precision, the planning horizon [s] and its spread; config: before it is adapted."""
+        log_horizons, log_factors = np.log(HORIZONS), np.log(FACTORS)
+        between = math.sqrt(max(config.planning_spread**2 - OWN_SPREAD**2, CERTAIN))
+        logs = self.scores - 0.5 * (log_horizons[:, None] / between) ** 2 - 0.5 * (log_factors / PRIOR_STDDEV) ** 2
         weights = np.exp(logs - logs.max())
-        planning, looking = weights.sum(axis=1)
-        return float(np.exp(weights.sum(axis=0) @ np.log(FACTORS) / weights.sum())), float(looking / (planning + looking))
+        weights /= weights.sum()
+        by_horizon = weights.sum(axis=1)
+        mean = float(by_horizon @ log_horizons)
+        spread = math.sqrt(min(config.planning_spread, OWN_SPREAD) ** 2 + float(by_horizon @ (log_horizons - mean) ** 2))
+        return float(np.exp(weights.sum(axis=0) @ log_factors)), config.planning_horizon_s * math.exp(mean), spread
 
     def follow(self, hand: HandState, config: LikelihoodConfig) -> Preferences:
         """Return the preferences after the next state of the hand; config: before it is adapted."""
@@ -141,7 +157,7 @@ class Preferences(Record):
         return replace(self, movements=self.movements + 1, scores=self.scores + np.mean(scores, axis=0)) if scores else self
 
 
-def _scale(config: LikelihoodConfig, factor: float, lookahead_share: float) -> LikelihoodConfig:
-    """Return the likelihood with a factor on the logarithms of all weights, within the bounds, and another share."""
+def _scale(config: LikelihoodConfig, factor: float, horizon_s: float, spread: float = OWN_SPREAD) -> LikelihoodConfig:
+    """Return the likelihood with a factor on the logarithms of all weights, within the bounds, and another planning horizon."""
     scaled = {name: factor * getattr(config, name) for name in ('beta', 'shortfall', 'beta_beyond')}
-    return clip_values(config, {**scaled, 'lookahead_share': lookahead_share})
+    return clip_values(config, {**scaled, 'planning_horizon_s': horizon_s, 'planning_spread': spread})
