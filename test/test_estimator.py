@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foc_ros.core.config import EstimatorConfig
-from foc_ros.core.estimation.kalman_filter import FilterState, compute_gramian, compute_transition, update
+from foc_ros.core.estimation.kalman_filter import JUMP_SPEED, JUMP_STDDEVS, FilterState, compute_gramian, compute_transition, update
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, SampleStatus
 
 CONFIG = EstimatorConfig(position_stddev=0.001, jerk_density=5.0, onset_speed=0.05, gap_s=0.5)
@@ -56,7 +56,7 @@ def test_gramian_and_transition_compose() -> None:
 def test_the_filter_equals_a_plain_one_with_six_states() -> None:
     rng = np.random.default_rng(1)
     times = np.cumsum(rng.uniform(0.002, 0.1, 60))
-    positions = 0.2 * rng.standard_normal((60, 2))
+    positions = 0.003 * rng.standard_normal((60, 2))
     observe = np.hstack([np.eye(2), np.zeros((2, 4))])
     first = run(times[:1], positions[:1])[0]
     mean, covariance = first.mean, first.covariance
@@ -156,6 +156,19 @@ def test_backward_jumps_and_gaps_restart_the_filter() -> None:
         np.testing.assert_array_equal(updated.state.covariance, fresh.covariance)
         assert updated.state.onset_ns is None
     assert update(state, sample(0.98 + 0.5), CONFIG).status is SampleStatus.ACCEPTED
+
+
+@pytest.mark.parametrize('dt', [0.0035, 0.02, 0.1])
+def test_a_position_that_jumps_restarts_the_filter_and_a_fast_hand_does_not(dt: float) -> None:
+    times = np.arange(0.0, 1.0, dt)
+    state = run(times, np.outer(times, [2.0, 0.0]))[-1]
+    expected = state.mean[0] + dt * state.mean[2]
+    limit = JUMP_STDDEVS * CONFIG.position_stddev + JUMP_SPEED * dt
+    jump = sample(times[-1] + dt, expected - 1.01 * limit, 0.0)
+    updated = update(state, jump, CONFIG)
+    assert updated.status is SampleStatus.RESTARTED_JUMP and updated.status.is_restart and updated.state.onset_ns is None
+    np.testing.assert_array_equal(updated.state.mean, update(None, jump, CONFIG).state.mean)
+    assert update(state, sample(times[-1] + dt, expected - 0.99 * limit, 0.0), CONFIG).status is SampleStatus.ACCEPTED
 
 
 def test_a_movement_begins_above_the_onset_speed_and_ends_below_half_of_it() -> None:

@@ -64,8 +64,8 @@ class HandSample(Record):
 class SampleStatus(StrEnum):
     """What became of a message that was given to the predictor.
 
-    ACCEPTED: used. RESTARTED_BACKWARD, RESTARTED_GAP: used, and the movement restarts from it. DISENGAGED: the hand was followed,
-    but nothing is predicted from it. SKIPPED: not used, because it is too near to the last one. DUPLICATE, LATE, WRONG_FRAME:
+    ACCEPTED: used. RESTARTED_BACKWARD, RESTARTED_GAP, RESTARTED_JUMP: used, and the movement restarts from it. DISENGAGED: the
+    hand was followed, but nothing is predicted from it. SKIPPED: not used, because it is too near to the last one. DUPLICATE, LATE, WRONG_FRAME:
     refused. The last four change nothing.
     """
 
@@ -74,6 +74,7 @@ class SampleStatus(StrEnum):
     LATE = 'late'
     RESTARTED_BACKWARD = 'restarted_backward'
     RESTARTED_GAP = 'restarted_gap'
+    RESTARTED_JUMP = 'restarted_jump'
     WRONG_FRAME = 'wrong_frame'
     SKIPPED = 'skipped'
     DISENGAGED = 'disengaged'
@@ -91,7 +92,7 @@ class SampleStatus(StrEnum):
     @property
     def is_restart(self) -> bool:
         """Whether the movement restarts from this message."""
-        return self in (SampleStatus.RESTARTED_BACKWARD, SampleStatus.RESTARTED_GAP)
+        return self in (SampleStatus.RESTARTED_BACKWARD, SampleStatus.RESTARTED_GAP, SampleStatus.RESTARTED_JUMP)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,10 @@ stay. The covariance is therefore symmetric and positive for all deviations and 
 The first sample gives the position. Velocity and acceleration start at zero, with the covariance that the jerk would give a hand
 at rest within `gap_s`, the longest time for which the filter trusts an old state.
 
+A tracker that has lost the hand, or takes another object for it, makes its position jump. A sample that is farther from where the
+hand was going at its estimated velocity than `JUMP_STDDEVS` r + `JUMP_SPEED` dt is such a jump, since no hand changes its velocity
+by as much between two samples, and the filter starts anew there: the speed of a jump is not that of a movement.
+
 A movement begins when the speed in the plane exceeds both `onset_speed` and three of its own standard deviations, and ends below
 half of `onset_speed`. Measured at rest with 1 mm of noise and the default jerk density, the second condition reduces the false
 onsets from several per second to at most one in 45 s, and delays a true one (0.3 m in 1 s) by 0.03 s at 200 Hz and 0.09 s at
@@ -38,6 +42,9 @@ from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Sample
 from .effort import Effort, add_sample
 
 ONSET_STDDEVS = 3.0
+JUMP_STDDEVS = 10.0
+JUMP_SPEED = 5.0
+"""Change of velocity between two samples that no hand has [m/s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +82,7 @@ def update(state: FilterState | None, sample: HandSample, config: EstimatorConfi
     -------
     Update
         A sample with the last stamp, or late by at most `gap_s`, is dropped, and the state stays as it was. A sample that is
-        earlier than that, or later than the last one by more than `gap_s`, restarts the filter.
+        earlier than that, or later than the last one by more than `gap_s`, restarts the filter, and so does a position that jumps.
     """
     if state is None:
         return Update(_start_state(sample, config), SampleStatus.ACCEPTED)
@@ -88,6 +95,9 @@ def update(state: FilterState | None, sample: HandSample, config: EstimatorConfi
         return Update(state, SampleStatus.LATE)
     if dt > config.gap_s:
         return Update(_start_state(sample, config), SampleStatus.RESTARTED_GAP)
+    away = sample.position - state.mean[:2] - dt * state.mean[2:4]
+    if math.hypot(*away) > JUMP_STDDEVS * config.position_stddev + JUMP_SPEED * dt:
+        return Update(_start_state(sample, config), SampleStatus.RESTARTED_JUMP)
     return Update(_update_state(state, sample, dt, config), SampleStatus.ACCEPTED)
 
 
