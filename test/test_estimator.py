@@ -9,7 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foc_ros.core.config import EstimatorConfig
-from foc_ros.core.estimation.kalman_filter import JUMP_SPEED, JUMP_STDDEVS, FilterState, compute_gramian, compute_transition, update
+from foc_ros.core.estimation.kalman_filter import (
+    JUMP_SPEED,
+    JUMP_STDDEVS,
+    FilterState,
+    compute_gramian,
+    compute_transition,
+    update,
+)
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, SampleStatus
 
 CONFIG = EstimatorConfig(position_stddev=0.001, jerk_density=5.0, onset_speed=0.05, gap_s=0.5)

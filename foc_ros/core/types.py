@@ -65,8 +65,8 @@ class SampleStatus(StrEnum):
     """What became of a message that was given to the predictor.
 
     ACCEPTED: used. RESTARTED_BACKWARD, RESTARTED_GAP, RESTARTED_JUMP: used, and the movement restarts from it. DISENGAGED: the
-    hand was followed, but nothing is predicted from it. SKIPPED: not used, because it is too near to the last one. DUPLICATE, LATE, WRONG_FRAME:
-    refused. The last four change nothing.
+    hand was followed, but nothing is predicted from it. SKIPPED: not used, because it is too near to the last one. DUPLICATE,
+    LATE, WRONG_FRAME: refused. The last four change nothing.
     """
 
     ACCEPTED = 'accepted'

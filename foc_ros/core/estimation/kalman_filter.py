@@ -17,9 +17,9 @@ stay. The covariance is therefore symmetric and positive for all deviations and 
 The first sample gives the position. Velocity and acceleration start at zero, with the covariance that the jerk would give a hand
 at rest within `gap_s`, the longest time for which the filter trusts an old state.
 
-A tracker that has lost the hand, or takes another object for it, makes its position jump. A sample that is farther from where the
-hand was going at its estimated velocity than `JUMP_STDDEVS` r + `JUMP_SPEED` dt is such a jump, since no hand changes its velocity
-by as much between two samples, and the filter starts anew there: the speed of a jump is not that of a movement.
+A tracker that has lost the hand, or takes another object for it, makes its position jump. A sample that is farther from where
+the hand was going at its estimated velocity than `JUMP_STDDEVS` r + `JUMP_SPEED` dt is such a jump, since no hand changes its
+velocity by as much between two samples, and the filter starts anew there: the speed of a jump is not that of a movement.
 
 A movement begins when the speed in the plane exceeds both `onset_speed` and three of its own standard deviations, and ends below
 half of `onset_speed`. Measured at rest with 1 mm of noise and the default jerk density, the second condition reduces the false
@@ -82,7 +82,8 @@ def update(state: FilterState | None, sample: HandSample, config: EstimatorConfi
     -------
     Update
         A sample with the last stamp, or late by at most `gap_s`, is dropped, and the state stays as it was. A sample that is
-        earlier than that, or later than the last one by more than `gap_s`, restarts the filter, and so does a position that jumps.
+        earlier than that, or later than the last one by more than `gap_s`, restarts the filter, and so does a position that
+        jumps.
     """
     if state is None:
         return Update(_start_state(sample, config), SampleStatus.ACCEPTED)
