@@ -190,7 +190,7 @@ class Predictor:
     >>> predictor.set_obstacles([foc_ros.Circle((0.15, 0.01), radius=0.03, name='cup')])
     >>> prediction = predictor.update(t=0.0, position=(0.0, 0.0))
     >>> prediction
-    <Prediction t=0 s, 2 candidates, most likely goal0:-cup (0.64)>
+    <Prediction t=0 s, 2 candidates, most likely goal0:-cup (0.65)>
     >>> [candidate.label for candidate in prediction.candidates]
     ['goal0:-cup', 'goal0:+cup']
     """
@@ -419,8 +419,8 @@ def solve_classes(
     >>> import foc_ros
     >>> for candidate in foc_ros.solve_classes((0, 0), (0.3, 0), [foc_ros.Circle((0.15, 0.01), radius=0.03)]):
     ...     print(candidate)
-    <PredictedCandidate goal0:-0, solved, likelihood 0.65>
-    <PredictedCandidate goal0:+0, solved, likelihood 0.35>
+    <PredictedCandidate goal0:-0, solved, likelihood 0.66>
+    <PredictedCandidate goal0:+0, solved, likelihood 0.34>
     """
     goals = check_array('goal', np.atleast_2d(np.asarray(goal, dtype=object)).tolist(), (None, 2))
     return _solve(_build_scene(start, goals, obstacles, _fix_parameters(config, eta, strategy, duration_s)))

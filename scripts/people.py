@@ -106,13 +106,15 @@ def compare_pace(hands: Sequence[RecordedHand]) -> Iterator[tuple[int, float, fl
     """
     config, pace = Config(), Pace()
     for hand in hands:
+        first, *others = hand.estimate_states(config)
+        pace = pace.follow(first, hand.goals, config.duration)  # this ends the movement of the recording before
         if samples := find_samples(hand, config):
             before, after = (
                 np.mean([abs(estimate_times_to_go(state, goal[None], each)[0] - left) for state, goal, left in samples])
                 for each in (config.duration, pace.adapt(config.duration))
             )
             yield pace.movements, float(before), float(after)
-        for state in hand.estimate_states(config):
+        for state in others:
             pace = pace.follow(state, hand.goals, config.duration)
 
 

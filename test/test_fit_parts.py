@@ -9,7 +9,7 @@ from foc_ros.analysis.fitting.estimator_fit import Innovations, fit_estimator
 from foc_ros.analysis.fitting.resampling import expand_quadratic
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition, update
-from foc_ros.core.types import HandSample, make_obstacles
+from foc_ros.core.types import HandSample, SampleStatus, make_obstacles
 
 
 def _drifting(seed: int, stddev: float, density: float, count: int = 6) -> list:
@@ -32,11 +32,13 @@ def test_innovations_are_those_of_the_estimator() -> None:
     each = _drifting(1, 1e-3, 3.0, 1)[0]
     gap = each.stamps_ns.copy()
     gap[100:] += 1_000_000_000
-    each = recorded_hand('gap', gap * 1e-9, each.positions, each.obstacles, each.goals)
+    jumped = each.positions + 0.5 * (np.arange(len(gap)) >= 50)[:, None]
+    each = recorded_hand('gap', gap * 1e-9, jumped, each.obstacles, each.goals)
     config, total, state = Config().estimator, 0.0, None
     for stamp_ns, position in zip(each.stamps_ns.tolist(), each.positions, strict=True):
-        following = update(state, HandSample(stamp_ns, position), config).state
-        if state is not None and stamp_ns - state.stamp_ns < 5e8:
+        updated = update(state, HandSample(stamp_ns, position), config)
+        following = updated.state
+        if state is not None and updated.status is SampleStatus.ACCEPTED:
             dt = (stamp_ns - state.stamp_ns) * 1e-9
             prior = compute_transition(dt) @ state.covariance[::2, ::2] @ compute_transition(
                 dt
@@ -45,7 +47,7 @@ def test_innovations_are_those_of_the_estimator() -> None:
             v = position - (compute_transition(dt) @ state.mean.reshape(3, 2))[0]
             total -= np.log(2 * np.pi * S) + v @ v / (2 * S)
         state = following
-    found = Innovations([each], config.gap_s).log_likelihood(config.position_stddev, config.jerk_density)
+    found = Innovations([each], config).log_likelihood(config.position_stddev, config.jerk_density)
     assert found == pytest.approx([total], rel=1e-9)
 
 

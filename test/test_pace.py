@@ -102,6 +102,19 @@ def test_a_present_movement_is_judged_by_the_goal_to_which_it_fits_best() -> Non
     assert found == pytest.approx(expected, rel=0.05) and expected > 1.5
 
 
+@pytest.mark.parametrize(('goals', 'interval_s'), [(1, 0.1), (16, 0.1), (64, 0.4)])
+def test_with_many_goals_fewer_states_are_judged(goals: int, interval_s: float) -> None:
+    places = np.column_stack([np.full(goals, 0.4), np.linspace(0.0, 0.3, goals)])
+    pipeline, kept = Pipeline(CONFIG), set()
+    pipeline.set_goals(places, 'world')
+    for row, position in enumerate(reach(3.0)[:120]):
+        pipeline.add_hand_sample(HandSample(NANOSECONDS + row * STEP_NS, position, 0.0, 'world'))
+        present = pipeline.learnt.pace.present
+        kept |= {each.stamp_ns for each in present.waiting} if present is not None else set()
+    np.testing.assert_allclose(np.diff(sorted(kept)) / NANOSECONDS, interval_s, atol=1e-6)
+    assert len(kept) > 3
+
+
 def test_other_goals_begin_the_present_movement_anew() -> None:
     pipeline = follow(Pipeline(CONFIG), reach(3.0)[:150])
     stamp_ns = pipeline.hand_state.stamp_ns + STEP_NS

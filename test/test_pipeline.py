@@ -258,6 +258,17 @@ def test_a_jump_of_the_hand_stamp_restarts_the_movement(recorder: Recorder, jump
     assert pipeline.counts[f'hand_{status}'] == 1
 
 
+def test_a_position_that_jumps_is_counted_and_the_movement_restarts(recorder: Recorder) -> None:
+    pipeline = ready()
+    pipeline.add_hand_sample(hand(0.0))
+    pipeline.predict()
+    jumped = replace(hand(20.0), position=hand(0.0).position + 0.24)
+    assert pipeline.add_hand_sample(jumped) is SampleStatus.RESTARTED_JUMP
+    assert pipeline.hand_state is not None and not pipeline.hand_state.mean[2:].any()
+    assert pipeline.predict() is not None and recorder.calls[1][4] == Memory()
+    assert pipeline.counts['hand_restarted_jump'] == 1
+
+
 def test_due_samples_that_a_newer_one_replaces_are_counted(recorder: Recorder) -> None:
     pipeline = ready()
     for ms in (0.0, 5.0, 10.0, 15.0):

@@ -25,8 +25,8 @@ from scipy.optimize import minimize
 
 from foc_ros.analysis.evaluation.bootstrap import CENTRAL, draw_resamples
 from foc_ros.analysis.evaluation.ground_truth import HORIZONS_S
-from foc_ros.core.config import Config
-from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition
+from foc_ros.core.config import Config, EstimatorConfig
+from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_jump_limit, compute_transition
 from foc_ros.core.types import Array
 
 from .estimates import Estimate, Estimates, clip_to_bounds
@@ -48,9 +48,10 @@ FADING_TIMES_S = np.array([0.0, *np.geomspace(0.01, 0.5, 60)])
 
 
 class Innovations:
-    """The recordings side by side, so that one pass filters all of them; gap_s: beyond it the filter starts anew [s]."""
+    """The recordings side by side, so that one pass filters all of them; where the given filter starts anew, so do they."""
 
-    def __init__(self, hands: Sequence[RecordedHand], gap_s: float) -> None:
+    def __init__(self, hands: Sequence[RecordedHand], given: EstimatorConfig) -> None:
+        gap_s = given.gap_s
         most = max(len(each.times) for each in hands)
         dt = np.full((most - 1, len(hands)), np.inf)
         self._positions = np.zeros((most, len(hands), 2))
@@ -59,6 +60,7 @@ class Innovations:
             self._positions[: len(each.times), row] = each.positions
         self._continues = dt <= gap_s
         dt = np.where(self._continues, dt, gap_s)
+        self._dt, self._jump_limit = dt[:, :, None], compute_jump_limit(dt, given.position_stddev)
         self._transition = np.array([[compute_transition(each) for each in row] for row in dt])
         self._gramian = np.array([[compute_gramian(each) for each in row] for row in dt])
         self._start = compute_gramian(gap_s)
@@ -72,7 +74,9 @@ class Innovations:
         mean[:, 0] = self._positions[0]
         covariance = np.broadcast_to(start, (len(mean), 3, 3))
         total = np.zeros(len(mean))
-        for A, G, continues, z in zip(self._transition, self._gramian, self._continues, self._positions[1:], strict=True):
+        steps = self._transition, self._gramian, self._dt, self._jump_limit, self._continues, self._positions[1:]
+        for A, G, dt, limit, is_near, z in zip(*steps, strict=True):
+            continues = is_near & (np.hypot(*(z - mean[:, 0] - dt * mean[:, 1]).T) <= limit)
             mean, covariance = A @ mean, A @ covariance @ A.swapaxes(1, 2) + jerk_density**2 * G
             S = np.maximum(covariance[:, 0, 0], 0.0) + position_stddev**2
             v = z - mean[:, 0]
@@ -89,7 +93,7 @@ class Innovations:
 
 def fit_estimator(hands: Sequence[RecordedHand], config: Config) -> tuple[Estimates, list[str]]:
     """Return the estimates of the deviations, and warnings in words."""
-    innovations = Innovations(hands, config.estimator.gap_s)
+    innovations = Innovations(hands, config.estimator)
 
     def per_recording(logs: Array) -> Array:
         return innovations.log_likelihood(*np.exp(np.clip(logs, LOW, HIGH)).tolist())

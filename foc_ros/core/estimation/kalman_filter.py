@@ -31,6 +31,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
@@ -40,6 +41,8 @@ from foc_ros.core.kernels.linear_algebra import multiply, multiply_transposed
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, SampleStatus, as_readonly
 
 from .effort import Effort, add_sample
+
+Seconds = TypeVar('Seconds', float, Array)
 
 ONSET_STDDEVS = 3.0
 JUMP_STDDEVS = 10.0
@@ -97,9 +100,14 @@ def update(state: FilterState | None, sample: HandSample, config: EstimatorConfi
     if dt > config.gap_s:
         return Update(_start_state(sample, config), SampleStatus.RESTARTED_GAP)
     away = sample.position - state.mean[:2] - dt * state.mean[2:4]
-    if math.hypot(*away) > JUMP_STDDEVS * config.position_stddev + JUMP_SPEED * dt:
+    if math.hypot(*away) > compute_jump_limit(dt, config.position_stddev):
         return Update(_start_state(sample, config), SampleStatus.RESTARTED_JUMP)
     return Update(_update_state(state, sample, dt, config), SampleStatus.ACCEPTED)
+
+
+def compute_jump_limit(dt: Seconds, position_stddev: float) -> Seconds:
+    """Return the distance [m] from where a hand was going, for samples dt [s] apart, beyond which its position has jumped."""
+    return JUMP_STDDEVS * position_stddev + JUMP_SPEED * dt
 
 
 @compiled

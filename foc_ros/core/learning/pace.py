@@ -49,7 +49,9 @@ ARRIVAL_WEIGHT = 0.1
 AHEAD_S = 0.5
 """How far ahead positions are judged [s]."""
 SAMPLE_S = 0.1
-"""Interval at which states of a movement are judged [s]."""
+"""Interval at which states of a movement are judged [s], if there are few goals."""
+FEW_GOALS = 16
+"""Number of goals beyond which fewer states are judged, in proportion, because each is judged with every goal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +76,12 @@ class PresentMovement(Record):
         return cls(onset, goals, hand, (hand,), np.zeros((len(goals), len(ARRIVALS), len(FACTORS))))
 
     def follow(self, hand: HandState, goals: Array, config: DurationConfig) -> PresentMovement:
-        """Return the movement after its next state, which is judged later if it is `SAMPLE_S` after the one before it."""
+        """Return the movement after its next state, which is judged later if it is long enough after the one before it."""
+        interval_s = SAMPLE_S * max(len(goals) / FEW_GOALS, 1.0)
         followed = replace(self, hand=hand, goals=goals)
         while hand.stamp_ns - followed.waiting[0].stamp_ns >= AHEAD_S * NANOSECONDS and len(followed.waiting) > 1:
             followed = followed.judge_oldest(config)
-        if hand.stamp_ns - followed.waiting[-1].stamp_ns < SAMPLE_S * NANOSECONDS:
+        if hand.stamp_ns - followed.waiting[-1].stamp_ns < interval_s * NANOSECONDS:
             return followed
         return replace(followed, waiting=(*followed.waiting, hand))
 
