@@ -102,6 +102,12 @@ def test_a_present_movement_is_judged_by_the_goal_to_which_it_fits_best() -> Non
     assert found == pytest.approx(expected, rel=0.05) and expected > 1.5
 
 
+def test_durations_that_are_better_known_are_changed_less() -> None:
+    pace = follow(Pipeline(CONFIG), reach(3.0)[:150]).learnt.pace
+    factors = [pace.find_best(replace(CONFIG.duration, spread=each))[1] for each in (0.4, 0.2, 0.1, 0.0)]
+    assert factors[0] > factors[1] > factors[2] > factors[3] == pytest.approx(1.0, abs=0.01)
+
+
 @pytest.mark.parametrize(('goals', 'interval_s'), [(1, 0.1), (16, 0.1), (64, 0.4)])
 def test_with_many_goals_fewer_states_are_judged(goals: int, interval_s: float) -> None:
     places = np.column_stack([np.full(goals, 0.4), np.linspace(0.0, 0.3, goals)])

@@ -9,11 +9,12 @@ the goal in T_f(t) would be h = `AHEAD_S` later is compared with where the hand 
 A movement that has covered most of its distance to a goal counts with c = 1. In the present one, c is the share of the straight
 distance to the goal that it has covered so far, and the goal is the one for which the least sum of its errors is smallest.
 
-The arrival and the factor in use minimise w log(f)^2 + w' + sum l_f over the movements so far, as a regularised leader
-(Shalev-Shwartz 2012, Foundations and Trends in Machine Learning 4(2)), with the weight w of `PRIOR_WEIGHT` and w' of
-`ARRIVAL_WEIGHT` for the arrival that `duration.arrival` does not name: without movements the factor is 1, and both adapt in the
-course of a few. A parabola through three factors gives the least, so that the factor does not jump; the arrival changes
-between movements only. They depend on the samples and goals alone, so that equal input gives equal factors.
+The arrival and the factor in use minimise w (log(f) / sigma)^2 + w' + sum l_f over the movements so far, as a regularised leader
+(Shalev-Shwartz 2012, Foundations and Trends in Machine Learning 4(2)), with the weight w of `PRIOR_WEIGHT`, sigma of
+`duration.spread`, and w' of `ARRIVAL_WEIGHT` for the arrival that `duration.arrival` does not name: without movements the factor
+is 1, and both adapt in the course of a few, the sooner the less is known of the durations. A parabola through three factors gives
+the least, so that the factor does not jump; the arrival changes between movements only. They depend on the samples and goals
+alone, so that equal input gives equal factors.
 
 The free movement has the least integral of squared jerk, and begins at the velocity v without acceleration, as predictions do.
 After the share s = h / T of its time it has come to
@@ -42,8 +43,10 @@ from .goal_reached import has_covered_distance
 LOG_FACTORS = as_readonly(np.linspace(-0.8, 1.6, 13))
 FACTORS = as_readonly(np.exp(LOG_FACTORS))
 """Factors that are judged."""
-PRIOR_WEIGHT = 0.1
-"""Weight of log(f)^2 against the errors of one movement."""
+PRIOR_WEIGHT = 0.016
+"""Weight of (log(f) / `duration.spread`)^2 against the errors of one movement."""
+SMALLEST_SPREAD = 1e-3
+"""Lower limit of `duration.spread` in this, where durations are known."""
 ARRIVAL_WEIGHT = 0.1
 """Weight of another arrival than that of the parameters, likewise."""
 AHEAD_S = 0.5
@@ -121,12 +124,12 @@ class PresentMovement(Record):
 class Pace(Record):
     """The pace and arrival of an operator.
 
-    movements: how many have ended; losses (2, f): sum of their errors by `ARRIVALS` and factor, with the prior of the factor;
-    present: the movement that has not ended, None at rest.
+    movements: how many have ended; losses (2, f): sum of their errors by `ARRIVALS` and factor; present: the movement that
+    has not ended, None at rest.
     """
 
     movements: int = 0
-    losses: Array = field(default_factory=lambda: np.tile(PRIOR_WEIGHT * LOG_FACTORS**2, (len(ARRIVALS), 1)))
+    losses: Array = field(default_factory=lambda: np.zeros((len(ARRIVALS), len(FACTORS))))
     present: PresentMovement | None = None
 
     @property
@@ -138,12 +141,13 @@ class Pace(Record):
         """Return the arrival, and the factor on expected durations, which is exactly 1 as long as nothing was judged."""
         if not self.is_known:
             return config.arrival, 1.0
+        losses = self.losses + PRIOR_WEIGHT * (LOG_FACTORS / max(config.spread, SMALLEST_SPREAD)) ** 2
         other = np.array([[each != config.arrival] for each in ARRIVALS])
         row = ARRIVALS.index(config.arrival)
         if self.movements:
-            row = int((self.losses + ARRIVAL_WEIGHT * other).min(axis=1).argmin())
+            row = int((losses + ARRIVAL_WEIGHT * other).min(axis=1).argmin())
         present = 0.0 if self.present is None else self.present.compute_losses()[row]
-        return ARRIVALS[row], _find_least(self.losses[row] + present)
+        return ARRIVALS[row], _find_least(losses[row] + present)
 
     def adapt(self, config: DurationConfig) -> DurationConfig:
         """Return the durations of this operator."""
