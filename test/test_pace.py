@@ -1,4 +1,4 @@
-"""Expected durations follow the operator's earlier movements: causally, equally for equal input, and until a reset."""
+"""Expected durations follow the operator's movements: causally, equally for equal input, and until a reset."""
 
 from __future__ import annotations
 
