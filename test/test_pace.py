@@ -10,7 +10,7 @@ import pytest
 from foc_ros.core.config import Config, DurationConfig, replace_values
 from foc_ros.core.estimation.duration import compute_movement_time, estimate_times_to_go, scale_durations
 from foc_ros.core.height import reach_along_axis
-from foc_ros.core.learning.pace import Pace, find_free_positions
+from foc_ros.core.learning.pace import MOST_GOALS, Pace, find_free_positions
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, HandSample
 
@@ -108,25 +108,39 @@ def test_durations_that_are_better_known_are_changed_less() -> None:
     assert factors[0] > factors[1] > factors[2] > factors[3] == pytest.approx(1.0, abs=0.01)
 
 
-@pytest.mark.parametrize(('goals', 'interval_s'), [(1, 0.1), (16, 0.1), (64, 0.4)])
-def test_with_many_goals_fewer_states_are_judged(goals: int, interval_s: float) -> None:
-    places = np.column_stack([np.full(goals, 0.4), np.linspace(0.0, 0.3, goals)])
-    pipeline, kept = Pipeline(CONFIG), set()
-    pipeline.set_goals(places, 'world')
-    for row, position in enumerate(reach(3.0)[:120]):
-        pipeline.add_hand_sample(HandSample(NANOSECONDS + row * STEP_NS, position, 0.0, 'world'))
-        present = pipeline.learnt.pace.present
-        kept |= {each.stamp_ns for each in present.waiting} if present is not None else set()
-    np.testing.assert_allclose(np.diff(sorted(kept)) / NANOSECONDS, interval_s, atol=1e-6)
-    assert len(kept) > 3
+def test_a_state_is_judged_with_the_goals_that_the_hand_has_come_nearer_to() -> None:
+    angles = np.linspace(-np.pi, np.pi, 64, endpoint=False)
+    places = 0.4 * np.column_stack([np.cos(angles), np.sin(angles)])
+    present = follow(Pipeline(CONFIG), reach(3.0)[:120], goal=places).learnt.pace.present
+    assert present is not None
+    judged = np.flatnonzero(present.moved)
+    assert MOST_GOALS <= len(judged) < 16 and np.abs(angles[judged]).max() < 1.0
+    alone = follow(Pipeline(CONFIG), reach(3.0)[:120], goal=GOAL).learnt.pace
+    assert present.moved[32] == alone.present.moved[0]
+    np.testing.assert_allclose(present.errors[32], alone.present.errors[0])
 
 
-def test_other_goals_begin_the_present_movement_anew() -> None:
-    pipeline = follow(Pipeline(CONFIG), reach(3.0)[:150])
-    stamp_ns = pipeline.hand_state.stamp_ns + STEP_NS
-    pipeline.set_goals(np.vstack([GOAL, GOAL + 0.1]), 'world')
-    pipeline.add_hand_sample(HandSample(stamp_ns, reach(3.0)[150], 0.0, 'world'))
-    assert pipeline.learnt.pace.present.moved == 0.0 and pipeline.adapted_config.duration == CONFIG.duration
+def test_goals_keep_their_errors_by_their_places_and_new_ones_have_none() -> None:
+    goals = np.vstack([GOAL, GOAL + 0.2, GOAL - 0.2])
+    present = follow(Pipeline(CONFIG), reach(3.0)[:150], goal=goals).learnt.pace.present
+    assert present is not None and present.moved.all()
+    matched = present.match(np.vstack([GOAL + 0.5, GOAL - 0.21, GOAL + 0.01]))
+    np.testing.assert_array_equal(matched.errors, [0.0 * present.errors[0], present.errors[2], present.errors[0]])
+    np.testing.assert_array_equal(matched.moved, [0.0, present.moved[2], present.moved[0]])
+
+
+def test_goals_that_change_during_movements_do_not_keep_the_pace_from_being_learnt() -> None:
+    pipeline, steady = Pipeline(CONFIG), follow(Pipeline(CONFIG), *[reach(4.0)] * 3)
+    for number in range(3):
+        for row, position in enumerate(reach(4.0)):
+            both = np.vstack([GOAL, [[0.0, -0.3]]])
+            pipeline.set_goals(both[:: 1 if row % 2 else -1] if row // 15 % 2 else GOAL.copy(), 'world')
+            stamp_ns = NANOSECONDS * (1 + 10 * number) + row * STEP_NS
+            pipeline.add_hand_sample(HandSample(stamp_ns, position, 0.0, 'world'))
+    assert pipeline.learnt.pace.movements == steady.learnt.pace.movements
+    assert pipeline.learnt.pace.find_best(CONFIG.duration)[1] == pytest.approx(
+        steady.learnt.pace.find_best(CONFIG.duration)[1], rel=0.1
+    )
 
 
 def test_equal_samples_give_equal_factors_and_a_reset_forgets_them() -> None:

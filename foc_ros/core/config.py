@@ -173,13 +173,13 @@ class LikelihoodConfig:
     spent_share: float = _p(0.0, f'fraction of the effort since onset that every cost contains, for {JERK_ONLY}', '', 0.0, 1.0)
     planning_horizon_s: float = _p(
         3.0,
-        'who needs longer than this to the goal looks ahead (lookahead_s, beta_beyond); 0: always; 1000: plans the whole way',
+        'an operator who needs longer than this to the goal looks ahead (lookahead_s, beta_beyond); 0: always; 1000: never',
         's',
         0.0,
         WHOLE_WAY_S,
     )
     planning_spread: float = _p(
-        1.0, 'standard deviation of the logarithm of the planning horizon, in one operator and between operators', '', 0.05, 10.0
+        1.0, 'standard deviation of the logarithm of the planning horizon, in one operator and between operators', '', 0.05, 1.5
     )
     lookahead_s: float = _p(
         0.5, 'mean look-ahead of an operator who looks ahead: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0

@@ -49,7 +49,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .config import Config, LikelihoodConfig
+from .config import WHOLE_WAY_S, Config, LikelihoodConfig
 from .dynamics.plant_models import make_plant_model
 from .errors import InputError
 from .estimation.duration import get_time_price
@@ -138,9 +138,10 @@ def compute_lookahead_share(time_s: float, config: LikelihoodConfig) -> float:
     """Return the probability Phi(log(T / H) / sigma) that an operator looks ahead whose time to go is time_s [s]."""
     if config.planning_horizon_s == 0.0:
         return 1.0
-    if time_s <= 0.0:
+    if time_s <= 0.0 or config.planning_horizon_s >= WHOLE_WAY_S:
         return 0.0
-    return 0.5 * math.erfc(math.log(config.planning_horizon_s / time_s) / (math.sqrt(2.0) * config.planning_spread))
+    log_ratio = math.log(config.planning_horizon_s) - math.log(time_s)
+    return 0.5 * math.erfc(log_ratio / (math.sqrt(2.0) * config.planning_spread))
 
 
 def cost_ratio_logs(costs: Array, config: LikelihoodConfig) -> Array:

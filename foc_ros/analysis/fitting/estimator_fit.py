@@ -26,8 +26,8 @@ from scipy.optimize import minimize
 from foc_ros.analysis.evaluation.bootstrap import CENTRAL, draw_resamples
 from foc_ros.analysis.evaluation.ground_truth import HORIZONS_S
 from foc_ros.core.config import Config, EstimatorConfig
-from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_jump_limit, compute_transition
-from foc_ros.core.types import Array
+from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition, update
+from foc_ros.core.types import Array, HandSample
 
 from .estimates import Estimate, Estimates, clip_to_bounds
 from .recorded_hand import RecordedHand
@@ -51,19 +51,18 @@ class Innovations:
     """The recordings side by side, so that one pass filters all of them; where the given filter starts anew, so do they."""
 
     def __init__(self, hands: Sequence[RecordedHand], given: EstimatorConfig) -> None:
-        gap_s = given.gap_s
         most = max(len(each.times) for each in hands)
-        dt = np.full((most - 1, len(hands)), np.inf)
+        dt = np.full((most - 1, len(hands)), given.gap_s)
+        self._continues = np.zeros(dt.shape, dtype=bool)
         self._positions = np.zeros((most, len(hands), 2))
         for row, each in enumerate(hands):
-            dt[: len(each.times) - 1, row] = np.diff(each.times)
+            continues = find_continued(each, given)
+            self._continues[: len(continues), row] = continues
+            dt[: len(continues), row] = np.where(continues, np.diff(each.times), given.gap_s)
             self._positions[: len(each.times), row] = each.positions
-        self._continues = dt <= gap_s
-        dt = np.where(self._continues, dt, gap_s)
-        self._dt, self._jump_limit = dt[:, :, None], compute_jump_limit(dt, given.position_stddev)
         self._transition = np.array([[compute_transition(each) for each in row] for row in dt])
         self._gramian = np.array([[compute_gramian(each) for each in row] for row in dt])
-        self._start = compute_gramian(gap_s)
+        self._start = compute_gramian(given.gap_s)
 
     def log_likelihood(self, position_stddev: float, jerk_density: float) -> Array:
         """Return the log-likelihood of the positions of each recording, (n,) [nat]; deviations in the estimator's units."""
@@ -74,9 +73,7 @@ class Innovations:
         mean[:, 0] = self._positions[0]
         covariance = np.broadcast_to(start, (len(mean), 3, 3))
         total = np.zeros(len(mean))
-        steps = self._transition, self._gramian, self._dt, self._jump_limit, self._continues, self._positions[1:]
-        for A, G, dt, limit, is_near, z in zip(*steps, strict=True):
-            continues = is_near & (np.hypot(*(z - mean[:, 0] - dt * mean[:, 1]).T) <= limit)
+        for A, G, continues, z in zip(self._transition, self._gramian, self._continues, self._positions[1:], strict=True):
             mean, covariance = A @ mean, A @ covariance @ A.swapaxes(1, 2) + jerk_density**2 * G
             S = np.maximum(covariance[:, 0, 0], 0.0) + position_stddev**2
             v = z - mean[:, 0]
@@ -89,6 +86,16 @@ class Innovations:
                 mean[~continues, 0] = z[~continues]
                 covariance[~continues] = start
         return total
+
+
+def find_continued(hand: RecordedHand, given: EstimatorConfig) -> list[bool]:
+    """Return for each sample after the first whether the given filter goes on with it, instead of starting anew."""
+    found, state = [], None
+    for stamp_ns, position in zip(hand.stamps_ns.tolist(), hand.positions, strict=True):
+        updated = update(state, HandSample(stamp_ns, position, frame_id=hand.frame_id), given)
+        state = updated.state
+        found.append(not updated.status.is_restart)
+    return found[1:]
 
 
 def fit_estimator(hands: Sequence[RecordedHand], config: Config) -> tuple[Estimates, list[str]]:

@@ -17,9 +17,10 @@ stay. The covariance is therefore symmetric and positive for all deviations and 
 The first sample gives the position. Velocity and acceleration start at zero, with the covariance that the jerk would give a hand
 at rest within `gap_s`, the longest time for which the filter trusts an old state.
 
-A tracker that has lost the hand, or takes another object for it, makes its position jump. A sample that is farther from where
-the hand was going at its estimated velocity than `JUMP_STDDEVS` r + `JUMP_SPEED` dt is such a jump, since no hand changes its
-velocity by as much between two samples, and the filter starts anew there: the speed of a jump is not that of a movement.
+A tracker that has lost the hand, or takes another object for it, makes its position jump. A sample that is farther in the plane
+from where the hand was going at its estimated velocity than `JUMP_STDDEVS` r + `JUMP_SPEED` dt is such a jump, since no hand
+changes its velocity by as much between two samples, and the filter starts anew there: the speed of a jump is not that of a
+movement. A hand that is already as fast as that when the filter starts is therefore not followed.
 
 A movement begins when the speed in the plane exceeds both `onset_speed` and three of its own standard deviations, and ends below
 half of `onset_speed`. Measured at rest with 1 mm of noise and the default jerk density, the second condition reduces the false
@@ -31,7 +32,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 import numpy as np
 
@@ -41,8 +41,6 @@ from foc_ros.core.kernels.linear_algebra import multiply, multiply_transposed
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, SampleStatus, as_readonly
 
 from .effort import Effort, add_sample
-
-Seconds = TypeVar('Seconds', float, Array)
 
 ONSET_STDDEVS = 3.0
 JUMP_STDDEVS = 10.0
@@ -100,14 +98,9 @@ def update(state: FilterState | None, sample: HandSample, config: EstimatorConfi
     if dt > config.gap_s:
         return Update(_start_state(sample, config), SampleStatus.RESTARTED_GAP)
     away = sample.position - state.mean[:2] - dt * state.mean[2:4]
-    if math.hypot(*away) > compute_jump_limit(dt, config.position_stddev):
+    if math.hypot(*away) > JUMP_STDDEVS * config.position_stddev + JUMP_SPEED * dt:
         return Update(_start_state(sample, config), SampleStatus.RESTARTED_JUMP)
     return Update(_update_state(state, sample, dt, config), SampleStatus.ACCEPTED)
-
-
-def compute_jump_limit(dt: Seconds, position_stddev: float) -> Seconds:
-    """Return the distance [m] from where a hand was going, for samples dt [s] apart, beyond which its position has jumped."""
-    return JUMP_STDDEVS * position_stddev + JUMP_SPEED * dt
 
 
 @compiled

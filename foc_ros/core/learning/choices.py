@@ -10,9 +10,9 @@ the goal that was reached. With P_t the probability that the prediction at time 
 
 which is a Bayesian posterior over both factors. A movement counts as one observation, because its predictions depend on each
 other. A share u of the choices is not explained by losses: all classes are equally likely in it, and a_t is the share of those
-that agree. In P_t, the spread of the horizon is `OWN_SPREAD`, that of one operator from choice to choice. The prior variance v^2
-is the rest of that of `likelihood.planning_spread`, which contains also how operators differ. The likelihood uses the posterior
-means of the logarithms of both factors, and as its spread the root of `OWN_SPREAD`^2 and the posterior variance of log h.
+that agree. In P_t, the spread of the horizon is `OWN_SPREAD`, that of one operator from choice to choice. How operators differ is
+the prior variance, v^2 = `likelihood.planning_spread`^2 - `OWN_SPREAD`^2. The likelihood uses the posterior means of the
+logarithms of both factors, and as its spread the root of `OWN_SPREAD`^2 and the posterior variance of log h.
 """
 
 from __future__ import annotations
@@ -85,7 +85,8 @@ class Choice(Record):
             np.array([self._sum_likelihoods(agrees, _scale(likelihood, factor, horizon_s)) for factor in FACTORS.tolist()])
             for horizon_s in (math.inf, 0.0)
         )
-        horizons = [_scale(likelihood, 1.0, each * likelihood.planning_horizon_s, OWN_SPREAD) for each in HORIZONS.tolist()]
+        spread = min(OWN_SPREAD, likelihood.planning_spread)
+        horizons = [_scale(likelihood, 1.0, each * likelihood.planning_horizon_s, spread) for each in HORIZONS.tolist()]
         share = np.array([[compute_lookahead_share(self.time_s, each)] for each in horizons])
         found = (1.0 - share) * planned + share * ahead
         return np.asarray(np.log((1.0 - UNEXPLAINED) * found + UNEXPLAINED * agrees.mean()))

@@ -6,15 +6,15 @@ the goal in T_f(t) would be h = `AHEAD_S` later is compared with where the hand 
 
     l_f = c sum_t |x_f(t + h) - x(t + h)| / sum_t |x(t + h) - x(t)|.
 
-A movement that has covered most of its distance to a goal counts with c = 1. In the present one, c is the share of the straight
-distance to the goal that it has covered so far, and the goal is the one for which the least sum of its errors is smallest.
+A movement that has covered most of its distance to a goal counts with c = 1. In the present one, c is the distance of the hand
+from the onset relative to that of the goal, at most 1, and the goal is the one for which the least loss is smallest.
 
 The arrival and the factor in use minimise w (log(f) / sigma)^2 + w' + sum l_f over the movements so far, as a regularised leader
 (Shalev-Shwartz 2012, Foundations and Trends in Machine Learning 4(2)), with the weight w of `PRIOR_WEIGHT`, sigma of
 `duration.spread`, and w' of `ARRIVAL_WEIGHT` for the arrival that `duration.arrival` does not name: without movements the factor
 is 1, and both adapt in the course of a few, the sooner the less is known of the durations. A parabola through three factors gives
-the least, so that the factor does not jump; the arrival changes between movements only. They depend on the samples and goals
-alone, so that equal input gives equal factors.
+the least, so that the factor does not jump from one of `FACTORS` to the next; the arrival changes between movements only. They
+depend on the samples and goals alone, so that equal input gives equal factors.
 
 The free movement has the least integral of squared jerk, and begins at the velocity v without acceleration, as predictions do.
 After the share s = h / T of its time it has come to
@@ -46,15 +46,17 @@ FACTORS = as_readonly(np.exp(LOG_FACTORS))
 PRIOR_WEIGHT = 0.016
 """Weight of (log(f) / `duration.spread`)^2 against the errors of one movement."""
 SMALLEST_SPREAD = 1e-3
-"""Lower limit of `duration.spread` in this, where durations are known."""
+"""Smallest spread with which the factor is weighed: a smaller one says that durations are known."""
 ARRIVAL_WEIGHT = 0.1
 """Weight of another arrival than that of the parameters, likewise."""
 AHEAD_S = 0.5
 """How far ahead positions are judged [s]."""
 SAMPLE_S = 0.1
-"""Interval at which states of a movement are judged [s], if there are few goals."""
-FEW_GOALS = 16
-"""Number of goals beyond which fewer states are judged, in proportion, because each is judged with every goal."""
+"""Interval at which states of a movement are judged [s]."""
+MOST_GOALS = 8
+"""Number of goals with which a state is judged at most: those that the hand has come nearer to most."""
+SAME_GOAL_M = 0.05
+"""Distance within which a goal is the same one from one state to the next [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +64,7 @@ class PresentMovement(Record):
     """The movement of the hand that has not ended yet.
 
     onset (2,): where it began [m]; goals (g, 2) [m]; hand: its newest state; waiting: states that are to be judged when the hand
-    has moved on; errors (g, 2, f), moved: sums [m] of the states that were judged, with each goal, arrival and factor.
+    has moved on; errors (g, 2, f), moved (g,): sums [m] of the states that were judged, with each goal, arrival and factor.
     """
 
     onset: Array
@@ -70,27 +72,34 @@ class PresentMovement(Record):
     hand: HandState
     waiting: tuple[HandState, ...]
     errors: Array
-    moved: float = 0.0
+    moved: Array
 
     @classmethod
     def begin(cls, hand: HandState, goals: Array) -> PresentMovement:
         """Return a movement of which one state is known."""
         onset = hand.mean[:2] if hand.onset_position is None else hand.onset_position
-        return cls(onset, goals, hand, (hand,), np.zeros((len(goals), len(ARRIVALS), len(FACTORS))))
+        return cls(onset, goals, hand, (hand,), np.zeros((len(goals), len(ARRIVALS), len(FACTORS))), np.zeros(len(goals)))
 
     def follow(self, hand: HandState, goals: Array, config: DurationConfig) -> PresentMovement:
-        """Return the movement after its next state, which is judged later if it is long enough after the one before it."""
-        interval_s = SAMPLE_S * max(len(goals) / FEW_GOALS, 1.0)
-        followed = replace(self, hand=hand, goals=goals)
+        """Return the movement after its next state, which is judged later if it is `SAMPLE_S` after the one before it."""
+        followed = replace(self if goals is self.goals else self.match(goals), hand=hand)
         while hand.stamp_ns - followed.waiting[0].stamp_ns >= AHEAD_S * NANOSECONDS and len(followed.waiting) > 1:
             followed = followed.judge_oldest(config)
-        if hand.stamp_ns - followed.waiting[-1].stamp_ns < interval_s * NANOSECONDS:
+        if hand.stamp_ns - followed.waiting[-1].stamp_ns < SAMPLE_S * NANOSECONDS:
             return followed
         return replace(followed, waiting=(*followed.waiting, hand))
 
-    def end(self, config: DurationConfig) -> PresentMovement:
-        """Return the movement with all its states judged: the last ones by where it ended."""
-        ended = self
+    def match(self, goals: Array) -> PresentMovement:
+        """Return the movement with other goals (g, 2) [m], which keep the errors of those at the same places."""
+        distances = np.linalg.norm(goals[:, None] - self.goals, axis=-1)
+        rows, is_same = distances.argmin(axis=1), distances.min(axis=1) <= SAME_GOAL_M
+        errors, moved = self.errors[rows] * is_same[:, None, None], self.moved[rows] * is_same
+        return replace(self, goals=goals, errors=as_readonly(errors), moved=as_readonly(moved))
+
+    def end(self, goal: int, config: DurationConfig) -> PresentMovement:
+        """Return the movement with only the goal of a row, and all its states judged: the last ones by where it ended."""
+        rows = slice(goal, goal + 1)
+        ended = replace(self, goals=self.goals[rows], errors=self.errors[rows], moved=self.moved[rows])
         while ended.waiting and ended.waiting[0].stamp_ns < ended.hand.stamp_ns:
             ended = ended.judge_oldest(config)
         return ended
@@ -102,21 +111,27 @@ class PresentMovement(Record):
         seconds = np.array([(each.stamp_ns - hand.stamp_ns) / NANOSECONDS for each in path])
         ahead_s = min(AHEAD_S, float(seconds[-1]))
         reached = np.array([np.interp(ahead_s, seconds, [each.mean[axis] for each in path]) for axis in (0, 1)])
-        errors = self.errors.copy()
+        left, left_before = (np.linalg.norm(self.goals - each, axis=1) for each in (reached, hand.mean[:2]))
+        rows = np.sort((left - left_before).argsort(kind='stable')[:MOST_GOALS])
+        goals, errors, moved = self.goals[rows], self.errors.copy(), self.moved.copy()
         for row, scaled in enumerate(_scale_all(config)):
-            times = np.array([estimate_times_to_go(hand, self.goals, each) for each in scaled]).T
-            expected = find_free_positions(hand.mean[:4], self.goals[:, None], times, ahead_s, is_passing(scaled[0]))
-            errors[:, row] += np.linalg.norm(expected - reached, axis=-1)
-        moved = self.moved + float(np.linalg.norm(reached - hand.mean[:2]))
-        return replace(self, waiting=tuple(later), errors=as_readonly(errors), moved=moved)
+            times = np.array([estimate_times_to_go(hand, goals, each) for each in scaled]).T
+            expected = find_free_positions(hand.mean[:4], goals[:, None], times, ahead_s, is_passing(scaled[0]))
+            errors[rows, row] += np.linalg.norm(expected - reached, axis=-1)
+        moved[rows] += float(np.linalg.norm(reached - hand.mean[:2]))
+        return replace(self, waiting=tuple(later), errors=as_readonly(errors), moved=as_readonly(moved))
 
     def compute_losses(self) -> Array:
-        """Return the losses c sum |x_f - x| / sum |x(t + h) - x(t)|, (2, f), of the movement so far; zero if it did not move."""
-        if not self.moved:
+        """Return the losses c sum |x_f - x| / sum |x(t + h) - x(t)|, (2, f), of the movement so far; zero if it did not move.
+
+        The goal is one with which at least half as much was judged as with any other.
+        """
+        if not self.moved.any():
             return np.zeros(self.errors.shape[1:])
-        goal = int(self.errors.min(axis=(1, 2)).argmin())
+        judged = np.flatnonzero((self.moved > 0.0) & (self.moved >= 0.5 * self.moved.max()))
+        goal = int(judged[(self.errors[judged].min(axis=(1, 2)) / self.moved[judged]).argmin()])
         covered, whole = (float(np.linalg.norm(each - self.onset)) for each in (self.hand.mean[:2], self.goals[goal]))
-        losses: Array = self.errors[goal] / self.moved * (min(covered / whole, 1.0) if whole else 1.0)
+        losses: Array = self.errors[goal] / self.moved[goal] * (min(covered / whole, 1.0) if whole else 1.0)
         return losses
 
 
@@ -124,7 +139,7 @@ class PresentMovement(Record):
 class Pace(Record):
     """The pace and arrival of an operator.
 
-    movements: how many have ended; losses (2, f): sum of their errors by `ARRIVALS` and factor; present: the movement that
+    movements: how many ended and counted; losses (2, f): sum of their errors by `ARRIVALS` and factor; present: the movement that
     has not ended, None at rest.
     """
 
@@ -135,7 +150,7 @@ class Pace(Record):
     @property
     def is_known(self) -> bool:
         """Whether any state of a movement was judged."""
-        return self.movements > 0 or (self.present is not None and self.present.moved > 0.0)
+        return self.movements > 0 or (self.present is not None and bool(self.present.moved.any()))
 
     def find_best(self, config: DurationConfig) -> tuple[str, float]:
         """Return the arrival, and the factor on expected durations, which is exactly 1 as long as nothing was judged."""
@@ -161,7 +176,7 @@ class Pace(Record):
             pace, present = self._end(present, config), None
         if hand.onset_ns is None or goals is None or not len(goals):
             return pace
-        if present is None or len(present.goals) != len(goals):
+        if present is None:
             return replace(pace, present=PresentMovement.begin(hand, goals))
         return replace(pace, present=present.follow(hand, goals, config))
 
@@ -173,10 +188,10 @@ class Pace(Record):
         """Return the pace after the end of a movement, which counts if it covered the distance to the goal nearest to its end."""
         end = present.hand.mean[:2]
         goal = int(np.hypot(*(present.goals - end).T).argmin())
-        ended = present.end(config)
-        if not has_covered_distance(np.vstack([present.onset, end]), present.goals[goal]) or not ended.moved:
+        ended = present.end(goal, config)
+        if not has_covered_distance(np.vstack([present.onset, end]), present.goals[goal]) or not ended.moved[0]:
             return self.interrupt()
-        return Pace(self.movements + 1, as_readonly(self.losses + ended.errors[goal] / ended.moved))
+        return Pace(self.movements + 1, as_readonly(self.losses + ended.errors[0] / ended.moved[0]))
 
 
 @lru_cache(maxsize=4)
