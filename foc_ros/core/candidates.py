@@ -175,7 +175,7 @@ def rank_candidates(
     candidates = drop_duplicates(candidates)
     taken = [each for each in candidates if each.has_likelihood]
     is_learnt = likelihood.adaptation == ONLINE
-    time_s = min((each.solution.dt * len(each.solution.control) for each in taken), default=0.0)
+    time_s = min((float(each.solution.times[-1]) for each in taken), default=0.0)
     may_look_ahead = is_learnt or compute_lookahead_share(time_s, likelihood) > 0.0
     branch_times = compute_branch_times(taken, obstacles) if may_look_ahead and likelihood.lookahead_s > 0.0 else None
     costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))

@@ -173,7 +173,7 @@ class LikelihoodConfig:
     spent_share: float = _p(0.0, f'fraction of the effort since onset that every cost contains, for {JERK_ONLY}', '', 0.0, 1.0)
     planning_horizon_s: float = _p(
         3.0,
-        'an operator who needs longer than this to the goal looks ahead (lookahead_s, beta_beyond); 0: always; 1000: never',
+        'time to the goal beyond which an operator looks ahead (lookahead_s, beta_beyond); 0: always; 1000: never',
         's',
         0.0,
         WHOLE_WAY_S,

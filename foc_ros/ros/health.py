@@ -252,7 +252,7 @@ def _describe_learnt(pipeline: Pipeline) -> str:
     movements = pipeline.learnt.movements
     precision, horizon_s, _ = preferences.find_mean(pipeline.config.likelihood)
     arrival, factor = pace.find_best(pipeline.config.duration)
-    durations = f'{pace.movements} movements and the present one, durations x {factor:.2f}, arrival {arrival}'
+    durations = f'{pace.movements} movements ended, durations x {factor:.2f}, arrival {arrival}'
     choices = f'{preferences.movements} movements with choices, precision x {precision:.2f}, planning horizon {horizon_s:.3g} s'
     now, later = dispersion.factors
     errors = f'{dispersion.errors} errors, standard deviations x {now:.2f} now, x {later:.2f} at the end'

@@ -26,8 +26,8 @@ from scipy.optimize import minimize
 from foc_ros.analysis.evaluation.bootstrap import CENTRAL, draw_resamples
 from foc_ros.analysis.evaluation.ground_truth import HORIZONS_S
 from foc_ros.core.config import Config, EstimatorConfig
-from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition, update
-from foc_ros.core.types import Array, HandSample
+from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition
+from foc_ros.core.types import Array
 
 from .estimates import Estimate, Estimates, clip_to_bounds
 from .recorded_hand import RecordedHand
@@ -48,7 +48,10 @@ FADING_TIMES_S = np.array([0.0, *np.geomspace(0.01, 0.5, 60)])
 
 
 class Innovations:
-    """The recordings side by side, so that one pass filters all of them; where the given filter starts anew, so do they."""
+    """The recordings side by side, so that one pass filters all of them.
+
+    Every filter that is tried starts anew where the given one does, so that all are compared by the same samples.
+    """
 
     def __init__(self, hands: Sequence[RecordedHand], given: EstimatorConfig) -> None:
         most = max(len(each.times) for each in hands)
@@ -56,7 +59,7 @@ class Innovations:
         self._continues = np.zeros(dt.shape, dtype=bool)
         self._positions = np.zeros((most, len(hands), 2))
         for row, each in enumerate(hands):
-            continues = find_continued(each, given)
+            continues = [not updated.status.is_restart for updated in each.filter(given)[1:]]
             self._continues[: len(continues), row] = continues
             dt[: len(continues), row] = np.where(continues, np.diff(each.times), given.gap_s)
             self._positions[: len(each.times), row] = each.positions
@@ -86,16 +89,6 @@ class Innovations:
                 mean[~continues, 0] = z[~continues]
                 covariance[~continues] = start
         return total
-
-
-def find_continued(hand: RecordedHand, given: EstimatorConfig) -> list[bool]:
-    """Return for each sample after the first whether the given filter goes on with it, instead of starting anew."""
-    found, state = [], None
-    for stamp_ns, position in zip(hand.stamps_ns.tolist(), hand.positions, strict=True):
-        updated = update(state, HandSample(stamp_ns, position, frame_id=hand.frame_id), given)
-        state = updated.state
-        found.append(not updated.status.is_restart)
-    return found[1:]
 
 
 def fit_estimator(hands: Sequence[RecordedHand], config: Config) -> tuple[Estimates, list[str]]:

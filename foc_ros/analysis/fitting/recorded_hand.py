@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay
-from foc_ros.core.config import Config
+from foc_ros.core.config import Config, EstimatorConfig
 from foc_ros.core.errors import RecordingError
-from foc_ros.core.estimation.kalman_filter import update
+from foc_ros.core.estimation.kalman_filter import Update, update
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Record
 
 MIN_SAMPLES = 10
@@ -34,13 +34,17 @@ class RecordedHand(Record):
         """Seconds since the first sample, (m,)."""
         return np.asarray((self.stamps_ns - self.stamps_ns[0]) / NANOSECONDS)
 
+    def filter(self, config: EstimatorConfig) -> list[Update]:
+        """Return what an estimator makes of each sample: the state, and whether it continues or starts anew."""
+        updates, state = list[Update](), None
+        for stamp_ns, position in zip(self.stamps_ns.tolist(), self.positions, strict=True):
+            updates.append(update(state, HandSample(stamp_ns, position, frame_id=self.frame_id), config))
+            state = updates[-1].state
+        return updates
+
     def estimate_states(self, config: Config) -> list[HandState]:
         """Return the state that the estimator of a configuration gives at each sample."""
-        state, states = None, list[HandState]()
-        for stamp_ns, position in zip(self.stamps_ns.tolist(), self.positions, strict=True):
-            state = update(state, HandSample(stamp_ns, position, frame_id=self.frame_id), config.estimator).state
-            states.append(state)
-        return states
+        return [each.state for each in self.filter(config.estimator)]
 
 
 def read_hand(recording: Recording, config: Config) -> RecordedHand:

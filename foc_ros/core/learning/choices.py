@@ -24,7 +24,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.config import LikelihoodConfig, clip_values
+from foc_ros.core.config import WHOLE_WAY_S, LikelihoodConfig, clip_values
 from foc_ros.core.homotopy import find_path_sides
 from foc_ros.core.homotopy.branch_times import BranchTimes
 from foc_ros.core.homotopy.decisions import Decisions
@@ -83,7 +83,7 @@ class Choice(Record):
         """Return the log-likelihoods (h, f) of the classes (k,) that agree, by horizon and precision."""
         planned, ahead = (
             np.array([self._sum_likelihoods(agrees, _scale(likelihood, factor, horizon_s)) for factor in FACTORS.tolist()])
-            for horizon_s in (math.inf, 0.0)
+            for horizon_s in (WHOLE_WAY_S, 0.0)
         )
         spread = min(OWN_SPREAD, likelihood.planning_spread)
         horizons = [_scale(likelihood, 1.0, each * likelihood.planning_horizon_s, spread) for each in HORIZONS.tolist()]

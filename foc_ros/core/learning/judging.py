@@ -1,4 +1,4 @@
-"""Samples of a movement, by which it is judged: shared by the learning of pace and of choices."""
+"""Samples of a movement, by which its choices are judged: states of the hand, and predictions."""
 
 from __future__ import annotations
 

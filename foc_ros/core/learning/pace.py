@@ -38,7 +38,7 @@ from foc_ros.core.config import ARRIVALS, DurationConfig
 from foc_ros.core.estimation.duration import estimate_times_to_go, is_passing, scale_durations
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Record, as_readonly
 
-from .goal_reached import has_covered_distance
+from .goal_reached import find_goal_at_end, has_covered_distance
 
 LOG_FACTORS = as_readonly(np.linspace(-0.8, 1.6, 13))
 FACTORS = as_readonly(np.exp(LOG_FACTORS))
@@ -128,7 +128,7 @@ class PresentMovement(Record):
         """
         if not self.moved.any():
             return np.zeros(self.errors.shape[1:])
-        judged = np.flatnonzero((self.moved > 0.0) & (self.moved >= 0.5 * self.moved.max()))
+        judged = np.flatnonzero(self.moved >= 0.5 * self.moved.max())
         goal = int(judged[(self.errors[judged].min(axis=(1, 2)) / self.moved[judged]).argmin()])
         covered, whole = (float(np.linalg.norm(each - self.onset)) for each in (self.hand.mean[:2], self.goals[goal]))
         losses: Array = self.errors[goal] / self.moved[goal] * (min(covered / whole, 1.0) if whole else 1.0)
@@ -186,10 +186,10 @@ class Pace(Record):
 
     def _end(self, present: PresentMovement, config: DurationConfig) -> Pace:
         """Return the pace after the end of a movement, which counts if it covered the distance to the goal nearest to its end."""
-        end = present.hand.mean[:2]
-        goal = int(np.hypot(*(present.goals - end).T).argmin())
+        path = np.vstack([present.onset, present.hand.mean[:2]])
+        goal, _ = find_goal_at_end(path, present.goals)
         ended = present.end(goal, config)
-        if not has_covered_distance(np.vstack([present.onset, end]), present.goals[goal]) or not ended.moved[0]:
+        if not has_covered_distance(path, present.goals[goal]) or not ended.moved[0]:
             return self.interrupt()
         return Pace(self.movements + 1, as_readonly(self.losses + ended.errors[0] / ended.moved[0]))
 
