@@ -15,7 +15,7 @@ from foc_ros.core.checks import check_array, check_number, check_vector
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import InputError, SceneError
-from foc_ros.core.estimation.kalman_filter import FilterState, update
+from foc_ros.core.estimation.kalman_filter import FilterState, describe_jump, update
 from foc_ros.core.guidance.step import GuidanceInput, GuidanceOutput, GuidanceState, guide
 from foc_ros.core.homotopy.demonstrations import Demonstration
 from foc_ros.core.learning.experience import make_library
@@ -264,6 +264,7 @@ class Predictor:
             If no goals were set.
         InputError
             For a time that is not after the last one, a number that is not finite or a wrong shape. Nothing is changed then.
+            Also for a position that jumps: the next one decides whether it was an outlier, or the movement restarts there.
         """
         stamp_ns = round(check_number('t', t, -LATEST_S, LATEST_S) * NANOSECONDS)
         point = check_vector('position', position, PLANE if self._goal_heights is None else SPACE)
@@ -272,6 +273,10 @@ class Predictor:
         if self._goals is None:
             raise SceneError('goals', 'at least one, by set_goals', 'none')
         updated = update(self._hand, sample, self.config.estimator)
+        if updated.status is SampleStatus.JUMPED:
+            assert self._hand is not None
+            error, self._hand = describe_jump('position', self._hand, sample, self.config.estimator), updated.state
+            raise error
         if updated.status is SampleStatus.RESTARTED_BACKWARD or not updated.status.is_taken:
             last = '' if self._hand is None else f', {self._hand.stamp_ns / NANOSECONDS:.9g} s'
             raise InputError('t', f'a time after the last one{last}', t)

@@ -142,6 +142,21 @@ def test_a_circle_is_checked_field_by_field(field, values):
         foc_ros.Circle(**({'centre': (0.1, 0.0), 'radius': 0.02} | values))
 
 
+def test_an_outlier_is_refused_and_the_movement_goes_on():
+    predictor, plain = foc_ros.Predictor(FAST), foc_ros.Predictor(FAST)
+    for each in (predictor, plain):
+        each.set_goals([(0.3, 0.0)])
+        each.update(0.0, (0.0, 0.0))
+    with pytest.raises(foc_ros.InputError, match=r'^position: expected a position within 0\.11 m .*, got one that is 0\.5 m'):
+        predictor.update(0.02, (0.3, 0.4))
+    means = [each.update(0.04, (0.01, 0.0)).candidates[0].solution.mean for each in (predictor, plain)]
+    np.testing.assert_array_equal(*means)
+    with pytest.raises(foc_ros.InputError, match=r'^position'):
+        predictor.update(0.06, (0.3, 0.4))
+    restarted = predictor.update(0.08, (0.3, 0.41))
+    np.testing.assert_array_equal(restarted.candidates[0].solution.mean[0], [0.3, 0.41, 0.0, 0.0, 0.0, 0.0])
+
+
 @pytest.mark.parametrize('obstacles', [[(0.1, 0.0, 0.02)], [CUP, CUP]])
 def test_obstacles_are_circles_with_different_names(obstacles):
     with pytest.raises(foc_ros.SceneError, match='obstacles'):

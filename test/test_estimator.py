@@ -166,16 +166,31 @@ def test_backward_jumps_and_gaps_restart_the_filter() -> None:
 
 
 @pytest.mark.parametrize('dt', [0.0035, 0.02, 0.1])
-def test_a_position_that_jumps_restarts_the_filter_and_a_fast_hand_does_not(dt: float) -> None:
+def test_a_position_that_jumps_decides_nothing_before_the_next_one(dt: float) -> None:
     times = np.arange(0.0, 1.0, dt)
     state = run(times, np.outer(times, [2.0, 0.0]))[-1]
     expected = state.mean[0] + dt * state.mean[2]
     limit = JUMP_STDDEVS * CONFIG.position_stddev + JUMP_SPEED * dt
-    jump = sample(times[-1] + dt, expected - 1.01 * limit, 0.0)
-    updated = update(state, jump, CONFIG)
-    assert updated.status is SampleStatus.RESTARTED_JUMP and updated.status.is_restart and updated.state.onset_ns is None
-    np.testing.assert_array_equal(updated.state.mean, update(None, jump, CONFIG).state.mean)
     assert update(state, sample(times[-1] + dt, expected - 0.99 * limit, 0.0), CONFIG).status is SampleStatus.ACCEPTED
+    held = update(state, sample(times[-1] + dt, expected - 1.01 * limit, 0.0), CONFIG)
+    assert held.status is SampleStatus.JUMPED and held.status.is_refused
+    np.testing.assert_array_equal(held.state.mean, state.mean)
+    following = times[-1] + 2 * dt
+
+    movement = sample(following, expected + dt * state.mean[2], 0.0)
+    continued = update(held.state, movement, CONFIG)
+    assert continued.status is SampleStatus.ACCEPTED and continued.state.jumped is None
+    np.testing.assert_array_equal(continued.state.mean, update(state, movement, CONFIG).state.mean)
+
+    jump = sample(following, expected - 1.01 * limit + 2.0 * dt, 0.0)
+    restarted = update(held.state, jump, CONFIG)
+    assert restarted.status is SampleStatus.RESTARTED_JUMP and restarted.status.is_restart and restarted.state.onset_ns is None
+    np.testing.assert_array_equal(restarted.state.mean, update(None, jump, CONFIG).state.mean)
+
+    other = update(held.state, sample(following, expected + 9.0, 0.0), CONFIG)
+    assert other.status is SampleStatus.JUMPED
+    later = sample(times[-1] + CONFIG.gap_s + dt, expected - 9.0, 0.0)
+    assert update(other.state, later, CONFIG).status is SampleStatus.RESTARTED_GAP
 
 
 def test_a_movement_begins_above_the_onset_speed_and_ends_below_half_of_it() -> None:

@@ -1,5 +1,6 @@
 """The pipeline: when a prediction is due, what is rejected and why, and that no outdated input is used as a new one."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -258,15 +259,32 @@ def test_a_jump_of_the_hand_stamp_restarts_the_movement(recorder: Recorder, jump
     assert pipeline.counts[f'hand_{status}'] == 1
 
 
+def test_an_outlier_is_refused_and_the_movement_goes_on(recorder: Recorder) -> None:
+    pipeline, plain = ready(), ready()
+    for each in (pipeline, plain):
+        each.add_hand_sample(hand(0.0))
+        each.predict()
+    assert pipeline.add_hand_sample(replace(hand(20.0), position=hand(0.0).position + 0.24)) is SampleStatus.JUMPED
+    assert not pipeline.is_due and pipeline.predict() is None
+    assert pipeline.add_hand_sample(hand(40.0)) is plain.add_hand_sample(hand(40.0)) is SampleStatus.ACCEPTED
+    assert pipeline.hand_state is not None and plain.hand_state is not None
+    np.testing.assert_array_equal(pipeline.hand_state.mean, plain.hand_state.mean)
+    assert pipeline.predict() is not None and recorder.calls[-1][4] != Memory()
+    assert pipeline.counts['hand_jumped'] == 1 and 'hand_restarted_jump' not in pipeline.counts
+
+
 def test_a_position_that_jumps_is_counted_and_the_movement_restarts(recorder: Recorder) -> None:
     pipeline = ready()
     pipeline.add_hand_sample(hand(0.0))
     pipeline.predict()
-    jumped = replace(hand(20.0), position=hand(0.0).position + 0.24)
-    assert pipeline.add_hand_sample(jumped) is SampleStatus.RESTARTED_JUMP
+    jumped = hand(0.0).position + 0.24
+    assert pipeline.add_hand_sample(replace(hand(20.0), position=jumped)) is SampleStatus.JUMPED
+    expected = r'hand_pose: expected a position within 0\.11 m of where the hand was going.*, got one that is 0\.339 m away'
+    assert re.match(expected, pipeline.last_refusal or '')
+    assert pipeline.add_hand_sample(replace(hand(40.0), position=jumped)) is SampleStatus.RESTARTED_JUMP
     assert pipeline.hand_state is not None and not pipeline.hand_state.mean[2:].any()
     assert pipeline.predict() is not None and recorder.calls[1][4] == Memory()
-    assert pipeline.counts['hand_restarted_jump'] == 1
+    assert pipeline.counts['hand_jumped'] == pipeline.counts['hand_restarted_jump'] == 1
 
 
 def test_due_samples_that_a_newer_one_replaces_are_counted(recorder: Recorder) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from .config import Config
 from .deadline import NEVER, Deadline
 from .errors import FocError
-from .estimation.kalman_filter import FilterState, update
+from .estimation.kalman_filter import FilterState, describe_jump, update
 from .homotopy.demonstrations import Demonstration
 from .learning.experience import Library, make_library
 from .learning.learnt import Learnt
@@ -120,7 +120,12 @@ class Pipeline:
         status = updated.status
         if not status.is_taken:
             assert before is not None
-            self._rejections.reject_stamp(f'hand_{status}', 'hand_pose', sample.stamp_ns, before.stamp_ns)
+            if status is SampleStatus.JUMPED:
+                error = describe_jump('hand_pose', before, sample, self.config.estimator)
+                self._rejections.reject('hand_jumped', str(error))
+            else:
+                self._rejections.reject_stamp(f'hand_{status}', 'hand_pose', sample.stamp_ns, before.stamp_ns)
+            self.hand_state = updated.state
             return status
         if self.frame_id is None:
             self._fix_frame(sample.frame_id)

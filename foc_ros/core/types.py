@@ -65,8 +65,9 @@ class SampleStatus(StrEnum):
     """What became of a message that was given to the predictor.
 
     ACCEPTED: used. RESTARTED_BACKWARD, RESTARTED_GAP, RESTARTED_JUMP: used, and the movement restarts from it. DISENGAGED: the
-    hand was followed, but nothing is predicted from it. SKIPPED: not used, because it is too near to the last one. DUPLICATE,
-    LATE, WRONG_FRAME: refused. The last four change nothing.
+    hand was followed, but nothing is predicted from it. JUMPED: refused, and kept until the next one decides whether it is an
+    outlier. SKIPPED: not used, because it is too near to the last one. DUPLICATE, LATE, WRONG_FRAME: refused. The last four
+    change nothing.
     """
 
     ACCEPTED = 'accepted'
@@ -75,6 +76,7 @@ class SampleStatus(StrEnum):
     RESTARTED_BACKWARD = 'restarted_backward'
     RESTARTED_GAP = 'restarted_gap'
     RESTARTED_JUMP = 'restarted_jump'
+    JUMPED = 'jumped'
     WRONG_FRAME = 'wrong_frame'
     SKIPPED = 'skipped'
     DISENGAGED = 'disengaged'
@@ -82,7 +84,7 @@ class SampleStatus(StrEnum):
     @property
     def is_refused(self) -> bool:
         """Whether the message was rejected."""
-        return self in (SampleStatus.DUPLICATE, SampleStatus.LATE, SampleStatus.WRONG_FRAME)
+        return self in (SampleStatus.JUMPED, SampleStatus.DUPLICATE, SampleStatus.LATE, SampleStatus.WRONG_FRAME)
 
     @property
     def is_taken(self) -> bool:

@@ -27,7 +27,7 @@ from foc_ros.analysis.evaluation.bootstrap import CENTRAL, draw_resamples
 from foc_ros.analysis.evaluation.ground_truth import HORIZONS_S
 from foc_ros.core.config import Config, EstimatorConfig
 from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition
-from foc_ros.core.types import Array
+from foc_ros.core.types import Array, SampleStatus
 
 from .estimates import Estimate, Estimates, clip_to_bounds
 from .recorded_hand import RecordedHand
@@ -50,7 +50,7 @@ FADING_TIMES_S = np.array([0.0, *np.geomspace(0.01, 0.5, 60)])
 class Innovations:
     """The recordings side by side, so that one pass filters all of them.
 
-    Every filter that is tried starts anew where the given one does, so that all are compared by the same samples.
+    Every filter that is tried starts anew where the given one does not continue, so that all are compared by the same samples.
     """
 
     def __init__(self, hands: Sequence[RecordedHand], given: EstimatorConfig) -> None:
@@ -59,7 +59,7 @@ class Innovations:
         self._continues = np.zeros(dt.shape, dtype=bool)
         self._positions = np.zeros((most, len(hands), 2))
         for row, each in enumerate(hands):
-            continues = [not updated.status.is_restart for updated in each.filter(given)[1:]]
+            continues = [updated.status is SampleStatus.ACCEPTED for updated in each.filter(given)[1:]]
             self._continues[: len(continues), row] = continues
             dt[: len(continues), row] = np.where(continues, np.diff(each.times), given.gap_s)
             self._positions[: len(each.times), row] = each.positions

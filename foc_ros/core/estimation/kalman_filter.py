@@ -19,8 +19,9 @@ at rest within `gap_s`, the longest time for which the filter trusts an old stat
 
 A tracker that has lost the hand, or takes another object for it, makes its position jump. A sample that is farther in the plane
 from where the hand was going at its estimated velocity than `JUMP_STDDEVS` r + `JUMP_SPEED` dt is such a jump, since no hand
-changes its velocity by as much between two samples, and the filter starts anew there: the speed of a jump is not that of a
-movement. A hand that is already as fast as that when the filter starts is therefore not followed.
+changes its velocity by as much between two samples. It is not used, and the next sample decides: where it continues the jump, the
+filter starts anew there, since the speed of a jump is not that of a movement; where it continues the movement, the jump was an
+outlier. A hand that is already as fast as that when the filter starts is therefore not followed.
 
 A movement begins when the speed in the plane exceeds both `onset_speed` and three of its own standard deviations, and ends below
 half of `onset_speed`. Measured at rest with 1 mm of noise and the default jerk density, the second condition reduces the false
@@ -31,11 +32,12 @@ onsets from several per second to at most one in 45 s, and delays a true one (0.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from foc_ros.core.config import EstimatorConfig
+from foc_ros.core.errors import InputError
 from foc_ros.core.kernels import Matrix, Vector, compiled
 from foc_ros.core.kernels.linear_algebra import multiply, multiply_transposed
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, SampleStatus, as_readonly
@@ -52,11 +54,13 @@ JUMP_SPEED = 5.0
 class FilterState(HandState):
     """A hand state with the internal state of the filter.
 
-    root (3, 3): lower triangular root of the covariance of one axis; effort: sums over the samples since onset.
+    root (3, 3): lower triangular root of the covariance of one axis; effort: sums over the samples since onset; jumped: the last
+    sample, if its position jumped.
     """
 
     root: Array = field(default_factory=lambda: np.zeros((3, 3)))
     effort: Effort = field(default_factory=Effort)
+    jumped: HandSample | None = None
 
 
 @dataclass(frozen=True)
@@ -83,8 +87,8 @@ def update(state: FilterState | None, sample: HandSample, config: EstimatorConfi
     -------
     Update
         A sample with the last stamp, or late by at most `gap_s`, is dropped, and the state stays as it was. A sample that is
-        earlier than that, or later than the last one by more than `gap_s`, restarts the filter, and so does a position that
-        jumps.
+        earlier than that, or later than the last one by more than `gap_s`, restarts the filter. A position that jumps is not
+        used, but kept in the state: a sample that continues it restarts the filter.
     """
     if state is None:
         return Update(_start_state(sample, config), SampleStatus.ACCEPTED)
@@ -97,10 +101,28 @@ def update(state: FilterState | None, sample: HandSample, config: EstimatorConfi
         return Update(state, SampleStatus.LATE)
     if dt > config.gap_s:
         return Update(_start_state(sample, config), SampleStatus.RESTARTED_GAP)
-    away = sample.position - state.mean[:2] - dt * state.mean[2:4]
-    if math.hypot(*away) > JUMP_STDDEVS * config.position_stddev + JUMP_SPEED * dt:
-        return Update(_start_state(sample, config), SampleStatus.RESTARTED_JUMP)
+    away_m, limit_m = measure_jump(state, sample, config)
+    if state.jumped is not None and state.jumped.stamp_ns < sample.stamp_ns:
+        jumped_m, jumped_limit_m = measure_jump(_start_state(state.jumped, config), sample, config)
+        if jumped_m < away_m and jumped_m <= jumped_limit_m:
+            return Update(_start_state(sample, config), SampleStatus.RESTARTED_JUMP)
+    if away_m > limit_m:
+        return Update(replace(state, jumped=sample), SampleStatus.JUMPED)
     return Update(_update_state(state, sample, dt, config), SampleStatus.ACCEPTED)
+
+
+def measure_jump(state: HandState, sample: HandSample, config: EstimatorConfig) -> tuple[float, float]:
+    """Return how far a later sample is from where the hand was going [m], and beyond which distance this is a jump [m]."""
+    dt = (sample.stamp_ns - state.stamp_ns) / NANOSECONDS
+    away = sample.position - state.mean[:2] - dt * state.mean[2:4]
+    return math.hypot(*away), JUMP_STDDEVS * config.position_stddev + JUMP_SPEED * dt
+
+
+def describe_jump(field: str, state: HandState, sample: HandSample, config: EstimatorConfig) -> InputError:
+    """Return the error that says in words how far the position of a sample, a field of that name, jumps."""
+    away_m, limit_m = measure_jump(state, sample, config)
+    expected = f'a position within {limit_m:.3g} m of where the hand was going, or the same jump again in the next sample'
+    return InputError(field, expected, f'one that is {away_m:.3g} m away')
 
 
 @compiled
