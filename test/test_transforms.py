@@ -254,12 +254,12 @@ def test_a_transform_that_arrives_after_its_message_is_awaited(ros: Graph, tf2: 
     tf.set_transform(camera(1.0, 9 * SECOND), '')
     for i, pose in enumerate(HAND):
         stamp_ns = 10 * SECOND + i * SECOND // 100
-        bench.send('obstacles', cloud(TYPES, obstacle_table([(0.2, 0.1 * i, 0.0, 0.03)]), stamp_ns, 'camera'))
+        bench.send('obstacles', cloud(TYPES, obstacle_table([(0.2, 0.03 * i, 0.0, 0.03)]), stamp_ns, 'camera'))
         bench.send('hand_pose', pose)
         ros.spin_until(lambda: bench.node._transforms.roles == ['obstacles', 'hand_pose'], 'messages that are held')
-        tf.set_transform(camera(1.0 + 0.1 * i, stamp_ns), '')
+        tf.set_transform(camera(1.0 + 0.03 * i, stamp_ns), '')
         np.testing.assert_allclose(seen(bench), [[1.0, 0.2]], atol=1e-12)
-        np.testing.assert_allclose(bench.node.intake.sample.position, [1.0 + 0.1 * i - 0.01 * i, 0.0], atol=1e-12)
+        np.testing.assert_allclose(bench.node.intake.sample.position, [1.0 + 0.03 * i - 0.01 * i, 0.0], atol=1e-12)
     status = figures(bench.health())
     assert (status['obstacles refused'], status['hand_pose refused']) == ('0 of 8', '0 of 8')
     assert 'count transform_newest_obstacles' not in status
