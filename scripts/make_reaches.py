@@ -1,12 +1,14 @@
 """Write recordings of simulated hand reaches among several goals without obstacles, as tables for `evaluate` and `fit`.
 
-There are 48 reaches of one of two kinds:
+There are 48 reaches of one of three kinds:
 
 - grid: from near the origin to 25 goals on a grid of 0.4 x 0.3 m, sampled at 120 Hz with 0.5 mm of noise. Each waits 0.2 to
   0.6 s, takes a duration that varies by 20 % about a law, bends, falls short and corrects, and ends about 6 mm beside its goal;
   one in seven starts towards another goal first.
 - star: from near the origin to 8 goals all round, 0.1 to 0.3 m away, sampled at 100 Hz with 0.3 mm of noise. Each waits 0.1 to
   0.4 s, takes 0.4 to 1 s however far it goes, bends a little, and ends about 3 mm beside its goal.
+- bent: likewise, but to 6 goals in an arc ahead, 0.25 m away and 24 degrees apart, in 0.6 to 1.2 s; all bend to the left, by 0.12
+  of their length, so that they begin 21 degrees beside the straight way. The goals come in random order.
 """
 
 from __future__ import annotations
@@ -55,16 +57,34 @@ def star_goals() -> Array:
 
 def star_reach(goals: Array, aim: int, draws: np.random.Generator) -> tuple[Array, Array]:
     """Return times (m,) [s] and positions (m, 2) [m] of one reach."""
-    end, start = goals[aim] + draws.normal(0.0, 0.003, 2), draws.normal(0.0, 0.002, 2)
-    lasts, waits = draws.uniform(0.4, 1.0), draws.uniform(0.1, 0.4)
+    return _bow_reach(goals[aim], (0.4, 1.0), (0.0, 0.02), draws)
+
+
+def _bow_reach(
+    goal: Array, lasts_s: tuple[float, float], bow: tuple[float, float], draws: np.random.Generator
+) -> tuple[Array, Array]:
+    """Return a reach to a goal (2,) that takes a time between two [s], and bends by a share of its length (mean, deviation)."""
+    end, start = goal + draws.normal(0.0, 0.003, 2), draws.normal(0.0, 0.002, 2)
+    lasts, waits = draws.uniform(*lasts_s), draws.uniform(0.1, 0.4)
     t = np.arange(0.0, waits + lasts + 0.4, 0.01)
     done = _minimum_jerk(np.clip((t - waits) / lasts, 0.0, 1.0) ** draws.uniform(0.9, 1.0))
     across = np.array([start[1] - end[1], end[0] - start[0]])
-    path = start + np.outer(done, end - start) + np.outer(draws.normal(0.0, 0.02) * np.sin(np.pi * done), across)
+    path = start + np.outer(done, end - start) + np.outer(draws.normal(*bow) * np.sin(np.pi * done), across)
     return t, path + draws.normal(0.0, 3e-4, path.shape)
 
 
-KINDS = {'grid': (grid_goals, grid_reach), 'star': (star_goals, star_reach)}
+def bent_goals() -> Array:
+    """Return the goals (6, 2) [m]."""
+    angles = np.radians(np.linspace(30.0, 150.0, 6))
+    return 0.25 * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def bent_reach(goals: Array, aim: int, draws: np.random.Generator) -> tuple[Array, Array]:
+    """Return times (m,) [s] and positions (m, 2) [m] of one reach."""
+    return _bow_reach(goals[draws.permutation(len(goals))[aim]], (0.6, 1.2), (0.12, 0.03), draws)
+
+
+KINDS = {'grid': (grid_goals, grid_reach), 'star': (star_goals, star_reach), 'bent': (bent_goals, bent_reach)}
 
 
 def _minimum_jerk(share: Array) -> Array:

@@ -37,7 +37,7 @@ def choose(
     sides = tuple(dict(zip(OBSTACLES.ids, each, strict=True)) for each in CLASSES)
     decisions = Decisions(np.array([0, 0, 1, 1]), np.arange(4), np.zeros(4, dtype=np.intp))
     made = stamp_ns, onset_ns, OBSTACLES, goals
-    return Choice(*made, np.array(goal), sides, np.array(costs), np.zeros(4), None, decisions, TIME_S)
+    return Choice(*made, np.array(goal), sides, np.array(costs), np.zeros(4), None, decisions, TIME_S, None)
 
 
 def move(preferences: Preferences, sides: tuple[int, int], costs: list[float], start_s: float = 1.0) -> Preferences:

@@ -9,8 +9,9 @@ from typing import Protocol
 
 import numpy as np
 
-from .config import ONLINE, FocConfig, LikelihoodConfig
+from .config import ONLINE, Config, FocConfig
 from .deadline import NEVER, Deadline
+from .heading_bias import make_reaches
 from .homotopy import find_path_sides
 from .homotopy.branch_times import compute_branch_times
 from .homotopy.decisions import find_decisions, tabulate_sides
@@ -165,28 +166,29 @@ def _identify_class(candidate: PredictedCandidate) -> tuple[int, frozenset[tuple
 
 
 def rank_candidates(
-    candidates: Sequence[PredictedCandidate], likelihood: LikelihoodConfig, obstacles: Obstacles, hand: HandState, goals: Array
+    candidates: Sequence[PredictedCandidate], config: Config, obstacles: Obstacles, hand: HandState, goals: Array
 ) -> tuple[list[PredictedCandidate], Choice | None]:
     """Return the distinct candidates: solved and compromised ones, most likely first, then the others, with likelihood 0.
 
     obstacles: grown by the radius of the hand; goals (g, 2) [m]. The choice is that between the candidates with a likelihood,
     None where there are fewer than two or nothing is learnt from choices.
     """
-    candidates = drop_duplicates(candidates)
+    candidates, likelihood = drop_duplicates(candidates), config.likelihood
     taken = [each for each in candidates if each.has_likelihood]
     is_learnt = likelihood.adaptation == ONLINE
     time_s = min((float(each.solution.times[-1]) for each in taken), default=0.0)
     may_look_ahead = is_learnt or compute_lookahead_share(time_s, likelihood) > 0.0
     branch_times = compute_branch_times(taken, obstacles) if may_look_ahead and likelihood.lookahead_s > 0.0 else None
     costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))
+    reaches = make_reaches(taken, goals, config)
     decisions = choice = None
     if len(taken) > 1 and (may_look_ahead or likelihood.weaving > 0.0):
         goal, sides = np.array([each.candidate.goal for each in taken], dtype=np.intp), tuple(each.sides for each in taken)
         decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
         if is_learnt:
             made = hand.stamp_ns, hand.onset_ns, obstacles, goals
-            choice = Choice(*made, goal, sides, costs, shortfalls, branch_times, decisions, time_s)
-    shares = compute_likelihoods(costs, likelihood, branch_times, shortfalls, decisions, time_s)
+            choice = Choice(*made, goal, sides, costs, shortfalls, branch_times, decisions, time_s, reaches)
+    shares = compute_likelihoods(costs, likelihood, branch_times, shortfalls, decisions, time_s, reaches)
     pairs = zip(taken, shares.tolist(), strict=True)
     ranked = [replace(each, likelihood=share) for each, share in pairs]
     ranked.sort(key=lambda each: (-each.likelihood, each.label))

@@ -190,9 +190,12 @@ class LikelihoodConfig:
     weaving: float = _p(
         4.0, 'log-likelihood that a class loses for each row through several gaps of which it leads', '', 0.0, 100.0
     )
+    heading_bias: float = _p(
+        0.0, 'angle, positive to the left, by which reaches begin beside the straight way to their goal', 'rad', -0.8, 0.8
+    )
     adaptation: str = _p(
         'online',
-        "whether the planning horizon and, by a factor, `beta`, `shortfall` and `beta_beyond` follow the operator's choices",
+        "whether horizon, heading bias and, by a factor, `beta`, `shortfall` and `beta_beyond` follow the operator's choices",
         choices=ADAPTATIONS,
     )
     hold_s: float = _p(

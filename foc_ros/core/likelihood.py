@@ -7,7 +7,7 @@ is the rule `cost_ratio`; `likelihood.rule` can name another one, which maps cos
 factor k is below the wanted one has a smaller weight, by the factor exp(-likelihood.shortfall (k_wanted - k)).
 
 J_i is the cost that `CostModel` assembles: the effort to go through class i, the price of its duration, and a part of the effort
-since movement onset, which all classes share.
+since movement onset, which all classes share. For an operator with a heading bias it is the cost without it (`heading_bias`).
 
 This is for operators who plan the whole way. They do so where they need less time than their planning horizon. Otherwise they
 look ahead: they weigh what is near and leave distant choices open, with p' from the rules below. The horizon has a log-normal
@@ -53,6 +53,7 @@ from .config import WHOLE_WAY_S, Config, LikelihoodConfig
 from .dynamics.plant_models import make_plant_model
 from .errors import InputError
 from .estimation.duration import get_time_price
+from .heading_bias import Reaches
 from .homotopy.branch_times import BranchTimes
 from .homotopy.decisions import Decisions
 from .kernels import Vector, compiled
@@ -101,18 +102,21 @@ def compute_likelihoods(
     shortfalls: Array | None = None,
     decisions: Decisions | None = None,
     time_s: float = 0.0,
+    reaches: Reaches | None = None,
 ) -> Array:
     """Return the likelihoods (k,) of classes by the rule that `likelihood.rule` names; they sum to one.
 
     costs (k,) >= 0 [m^2/s^5], of which those below `COST_FLOOR` count as `COST_FLOOR`; branch_times: of these classes, for a
     look-ahead only; shortfalls (k,) >= 0: of their safety factors, zero if not given; decisions: of these classes, without which
-    all choices are near; time_s: the shortest time to go of these classes [s]. Logarithms keep numbers in range. Raises
-    InputError for a cost that is negative or not finite.
+    all choices are near; time_s: the shortest time to go of these classes [s]; reaches: of these classes, without which there is
+    no heading bias. Logarithms keep numbers in range. Raises InputError for a cost that is negative or not finite.
     """
     values = np.ascontiguousarray(costs, dtype=float)
     for row, value in enumerate(values.tolist()):
         if not 0.0 <= value < math.inf:
             raise InputError(f'costs[{row}]', 'a finite number >= 0', value)
+    if reaches is not None and config.heading_bias:
+        values = reaches.compute_unbiased_costs(values, config.heading_bias)
     rule, losses = LIKELIHOOD_RULES.get(config.rule), np.zeros(len(values))
     if shortfalls is not None:
         np.multiply(config.shortfall, shortfalls, out=losses, where=shortfalls > 0.0)

@@ -79,7 +79,7 @@ def predict(
     costs, earlier = make_cost_model(scene.hand.effort_spent, config), memory.find_earlier(candidates)
     solved = _solve(scene, config, candidates, costs, earlier, deadline)
     kept = keep_answers(candidates, solved, past, hand.stamp_ns, config.likelihood.hold_s, costs)
-    ranked, choice = rank_candidates(kept, config.likelihood, scene.near, scene.hand, goals)
+    ranked, choice = rank_candidates(kept, config, scene.near, scene.hand, goals)
     pooled = pool_recordings(ranked, library, hand, scene.blocking, goals, config.experience)
     smooth = smooth_paths(pooled, past, hand.stamp_ns, config.likelihood.smoothing_s)
     continuous = make_continuous(smooth, past, hand.stamp_ns, config.likelihood)

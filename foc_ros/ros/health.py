@@ -253,7 +253,9 @@ def _describe_learnt(pipeline: Pipeline) -> str:
     precision, horizon_s, _ = preferences.find_mean(pipeline.config.likelihood)
     arrival, factor = pace.find_best(pipeline.config.duration)
     durations = f'{pace.movements} movements ended, durations x {factor:.2f}, arrival {arrival}'
-    choices = f'{preferences.movements} movements with choices, precision x {precision:.2f}, planning horizon {horizon_s:.3g} s'
+    bias = preferences.find_heading_bias(pipeline.config.likelihood)
+    planned = f'planning horizon {horizon_s:.3g} s, heading bias {bias:.2f} rad'
+    choices = f'{preferences.movements} movements with choices, precision x {precision:.2f}, {planned}'
     now, later = dispersion.factors
     errors = f'{dispersion.errors} errors, standard deviations x {now:.2f} now, x {later:.2f} at the end'
     recorded = f'{len(movements.learnt)} movements recorded, {movements.refused} refused'

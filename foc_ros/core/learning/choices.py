@@ -1,4 +1,4 @@
-"""What is learnt of an operator's choices: how far ahead the operator plans, and how precisely.
+"""What is learnt of an operator's choices: how far ahead the operator plans, how precisely, and to which side reaches bend.
 
 The planning horizon of an operator (`likelihood`) is h `likelihood.planning_horizon_s`, where h is a factor of `HORIZONS`. The
 precision with which the losses of the classes are followed is a factor f of `FACTORS` on the logarithms of their weights: on
@@ -13,6 +13,12 @@ other. A share u of the choices is not explained by losses: all classes are equa
 that agree. In P_t, the spread of the horizon is `OWN_SPREAD`, that of one operator from choice to choice. How operators differ is
 the prior variance, v^2 = `likelihood.planning_spread`^2 - `OWN_SPREAD`^2. The likelihood uses the posterior means of the
 logarithms of both factors, and as its spread the root of `OWN_SPREAD`^2 and the posterior variance of log h.
+
+The heading bias b (`heading_bias`) has the posterior
+
+    log w(b) = -(b - b0)^2 / (2 `HEADING_STDDEV`^2) + sum_movements mean_t log((1 - u) P_t(b) + u a_t),
+
+with b0 = `likelihood.heading_bias`, and with horizon and precision as they were learnt before the movement. Its mean is used.
 """
 
 from __future__ import annotations
@@ -25,6 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.config import WHOLE_WAY_S, LikelihoodConfig, clip_values
+from foc_ros.core.heading_bias import Reaches
 from foc_ros.core.homotopy import find_path_sides
 from foc_ros.core.homotopy.branch_times import BranchTimes
 from foc_ros.core.homotopy.decisions import Decisions
@@ -42,6 +49,10 @@ HORIZONS = as_readonly(2.0 ** np.arange(-4.0, 4.5, 0.5))
 """Factors on the planning horizon that are judged."""
 OWN_SPREAD = 0.3
 """Standard deviation of the logarithm of the planning horizon of one operator from choice to choice."""
+HEADING_OFFSETS = as_readonly(np.linspace(-0.8, 0.8, 9))
+"""Differences from the heading bias of the parameters that are judged [rad]."""
+HEADING_STDDEV = 0.3
+"""Standard deviation of the heading bias between operators [rad]."""
 CERTAIN = 1e-12
 """Variance of the logarithm of a horizon that is known."""
 UNEXPLAINED = 0.01
@@ -53,7 +64,7 @@ class Choice(Record):
     """A prediction among k classes, at least two, about obstacles and goals (g, 2) [m] at a stamp.
 
     onset_ns: when the movement of the hand began, None at rest; goal (k,): row of the goal of each class; sides: sides by id on
-    which each passes obstacles; costs, shortfalls, branch_times, decisions, time_s: what `compute_likelihoods` takes.
+    which each passes obstacles; costs, shortfalls, branch_times, decisions, time_s, reaches: what `compute_likelihoods` takes.
     """
 
     stamp_ns: int
@@ -67,6 +78,7 @@ class Choice(Record):
     branch_times: BranchTimes | None
     decisions: Decisions
     time_s: float
+    reaches: Reaches | None
 
     def find_agreeing(self, states: Sequence[HandState]) -> NDArray[np.bool_]:
         """Tell which classes (k,) agree with the states of the hand until the end of the movement."""
@@ -88,11 +100,15 @@ class Choice(Record):
         spread = min(OWN_SPREAD, likelihood.planning_spread)
         horizons = [_scale(likelihood, 1.0, each * likelihood.planning_horizon_s, spread) for each in HORIZONS.tolist()]
         share = np.array([[compute_lookahead_share(self.time_s, each)] for each in horizons])
-        found = (1.0 - share) * planned + share * ahead
-        return np.asarray(np.log((1.0 - UNEXPLAINED) * found + UNEXPLAINED * agrees.mean()))
+        return _compute_logs((1.0 - share) * planned + share * ahead, agrees)
+
+    def score_biases(self, agrees: NDArray[np.bool_], biases: Array, likelihood: LikelihoodConfig) -> Array:
+        """Return the log-likelihoods (b,) of the classes (k,) that agree, by bias (b,) [rad]; likelihood: of this operator."""
+        biased = [replace(likelihood, heading_bias=each) for each in biases.tolist()]
+        return _compute_logs(np.array([self._sum_likelihoods(agrees, each) for each in biased]), agrees)
 
     def _sum_likelihoods(self, agrees: NDArray[np.bool_], likelihood: LikelihoodConfig) -> float:
-        decided = self.branch_times, self.shortfalls, self.decisions, self.time_s
+        decided = self.branch_times, self.shortfalls, self.decisions, self.time_s, self.reaches
         return float(compute_likelihoods(self.costs, likelihood, *decided) @ agrees)
 
 
@@ -100,30 +116,37 @@ class Choice(Record):
 class Preferences(Record):
     """The choices of an operator so far.
 
-    movements: how many were judged; scores (h, f): sums of their scores, by horizon and precision; states, choices: of the
-    present movement.
+    movements: how many were judged; scores (h, f), bias_scores (b,): sums of their scores, by horizon and precision and by
+    heading bias; states, choices: of the present movement.
     """
 
     movements: int = 0
     scores: Array = field(default_factory=lambda: np.zeros((len(HORIZONS), len(FACTORS))))
+    bias_scores: Array = field(default_factory=lambda: np.zeros(len(HEADING_OFFSETS)))
     states: tuple[HandState, ...] = ()
     choices: tuple[Choice, ...] = ()
 
     def adapt(self, config: LikelihoodConfig) -> LikelihoodConfig:
         """Return the likelihood of this operator."""
-        return _scale(config, *self.find_mean(config)) if self.movements else config
+        if not self.movements:
+            return config
+        return clip_values(_scale(config, *self.find_mean(config)), {'heading_bias': self.find_heading_bias(config)})
 
     def find_mean(self, config: LikelihoodConfig) -> tuple[float, float, float]:
         """Return the factor on the precision, the planning horizon [s] and its spread; config: before it is adapted."""
         log_horizons, log_factors = np.log(HORIZONS), np.log(FACTORS)
         between = math.sqrt(max(config.planning_spread**2 - OWN_SPREAD**2, CERTAIN))
         logs = self.scores - 0.5 * (log_horizons[:, None] / between) ** 2 - 0.5 * (log_factors / PRIOR_STDDEV) ** 2
-        weights = np.exp(logs - logs.max())
-        weights /= weights.sum()
+        weights = _normalise(logs)
         by_horizon = weights.sum(axis=1)
         mean = float(by_horizon @ log_horizons)
         spread = math.sqrt(min(config.planning_spread, OWN_SPREAD) ** 2 + float(by_horizon @ (log_horizons - mean) ** 2))
         return float(np.exp(weights.sum(axis=0) @ log_factors)), config.planning_horizon_s * math.exp(mean), spread
+
+    def find_heading_bias(self, config: LikelihoodConfig) -> float:
+        """Return the heading bias [rad]; config: before it is adapted."""
+        weights = _normalise(self.bias_scores - 0.5 * (HEADING_OFFSETS / HEADING_STDDEV) ** 2)
+        return config.heading_bias + float(weights @ HEADING_OFFSETS)
 
     def follow(self, hand: HandState, config: LikelihoodConfig) -> Preferences:
         """Return the preferences after the next state of the hand; config: before it is adapted."""
@@ -150,12 +173,29 @@ class Preferences(Record):
 
     def _judge(self, config: LikelihoodConfig) -> Preferences:
         """Return the preferences after the end of the present movement, which counts if it decided between classes."""
-        scores = []
+        adapted, scores, bias_scores = self.adapt(config), list[Array](), list[Array]()
+        biases, config = config.heading_bias + HEADING_OFFSETS, replace(config, heading_bias=adapted.heading_bias)
         for choice in choose_judged(self.choices):
             agrees = choice.find_agreeing(self.states)
             if agrees.any() and not agrees.all():
                 scores.append(choice.score(agrees, config))
-        return replace(self, movements=self.movements + 1, scores=self.scores + np.mean(scores, axis=0)) if scores else self
+                bias_scores.append(choice.score_biases(agrees, biases, adapted))
+        if not scores:
+            return self
+        added, bias_added = np.mean(scores, axis=0), np.mean(bias_scores, axis=0)
+        judged = replace(self, movements=self.movements + 1, scores=self.scores + added)
+        return replace(judged, bias_scores=self.bias_scores + bias_added)
+
+
+def _compute_logs(found: Array, agrees: NDArray[np.bool_]) -> Array:
+    """Return log((1 - u) P + u a) for likelihoods P, of any shape, of the classes (k,) that agree."""
+    return np.asarray(np.log((1.0 - UNEXPLAINED) * found + UNEXPLAINED * agrees.mean()))
+
+
+def _normalise(logs: Array) -> Array:
+    """Return weights, of the same shape, that are proportional to exp(logs) and sum to one."""
+    weights: Array = np.exp(logs - logs.max())
+    return np.asarray(weights / weights.sum())
 
 
 def _scale(config: LikelihoodConfig, factor: float, horizon_s: float, spread: float = OWN_SPREAD) -> LikelihoodConfig:
