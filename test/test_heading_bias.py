@@ -46,7 +46,10 @@ def test_with_its_bias_a_hand_costs_what_one_costs_that_heads_straight(arrival: 
     config = replace_values(CONFIG, {'duration.arrival': arrival, 'foc.endpoint_stddev': 1e-3, 'foc.steps': 40})
     straight = np.array([0.05, 0.01, 0.3, 0.05, 0.4, -0.2])
     solved, biased = solve(straight, config), solve(turn(straight, BIAS), config)
-    costs, reaches = np.array([each.cost for each in biased]), make_reaches(biased, GOALS, config)
+    costs, reaches = (
+        np.array([each.cost for each in biased]),
+        make_reaches(biased, GOALS, HandState(0, straight, np.eye(6)), config),
+    )
     assert reaches is not None
     expected = [each.cost for each in solved]
     assert abs(np.log(costs / expected)).max() > 0.1
@@ -54,9 +57,23 @@ def test_with_its_bias_a_hand_costs_what_one_costs_that_heads_straight(arrival: 
     np.testing.assert_allclose(reaches.compute_unbiased_costs(costs, 0.0), costs, rtol=1e-12)
 
 
+def test_the_bias_falls_with_the_rest_of_the_way() -> None:
+    state = np.array([0.1, 0.0, 0.3, 0.05, 0.0, 0.0])
+    solved, hand = solve(state, CONFIG), HandState(0, state, np.eye(6), onset_ns=0, onset_position=np.array([0.02, 0.0]))
+    reaches = make_reaches(solved, GOALS, hand, CONFIG)
+    assert reaches is not None
+    left = np.hypot(*(GOALS - state[:2]).T)
+    np.testing.assert_allclose(reaches.remaining, left / (left + 0.08), rtol=1e-12)
+    costs = np.array([each.cost for each in solved])
+    whole = reaches._replace(remaining=np.ones(3))
+    for goal, share in enumerate(reaches.remaining):
+        found = reaches.compute_unbiased_costs(costs, BIAS)[goal]
+        assert found == pytest.approx(whole.compute_unbiased_costs(costs, BIAS * share)[goal], rel=1e-12)
+
+
 def test_the_cost_of_obstacles_stays_and_no_cost_is_negative() -> None:
     starts = np.array([[0.0, 0.0, 0.3, 0.1, 0.0, 0.0]] * 2)
-    reaches = Reaches(starts, GOALS[:2], np.array([1.0, 1.2]), passing=False)
+    reaches = Reaches(starts, GOALS[:2], np.array([1.0, 1.2]), np.array([1.0, 0.5]), passing=False)
     free = reaches.compute_unbiased_costs(np.zeros(2), 0.0)
     assert (free > 0.0).all(), 'no class needs less than the least effort'
     added = np.array([0.0, 70.0])
@@ -80,7 +97,7 @@ def test_a_hand_with_a_bias_leads_to_the_goal_that_it_is_turned_from() -> None:
 def test_a_plant_that_is_not_driven_by_jerk_has_no_bias() -> None:
     config = replace_values(CONFIG, {'foc.plant': 'damped_mass', 'likelihood.heading_bias': BIAS})
     solved = solve(np.array([0.05, 0.0, 0.3, 0.0, 0.0, 0.0]), config)
-    assert make_reaches(solved, GOALS, config) is None
+    assert make_reaches(solved, GOALS, HandState(0, np.zeros(6), np.eye(6)), config) is None
     costs = np.array([1.0, 2.0])
     biased = replace(config.likelihood, heading_bias=BIAS)
     np.testing.assert_array_equal(compute_likelihoods(costs, biased), compute_likelihoods(costs, Config().likelihood))
@@ -114,7 +131,8 @@ def test_it_is_learnt_from_reaches_that_bend_to_one_side(tmp_path: Path) -> None
         given = follow(pipeline, bow)
         biases.append(pipeline.adapted_config.likelihood.heading_bias)
         if bow:
-            assert np.mean(given[-3:]) > np.mean(given[:3]) + 0.1
+            unlearnt = follow(Pipeline(replace_values(CONFIG, {'likelihood.adaptation': 'none'})), bow)
+            assert np.mean(given[-3:]) > np.mean(unlearnt[-3:]) + 0.1
     assert biases[0] < -0.1 and abs(biases[1]) < 0.05 and biases[2] > 0.1
     write_parameter_file('--operator', tmp_path / 'operator.yaml', pipeline.adapted_config)
     assert load_parameter_file(tmp_path / 'operator.yaml').likelihood.heading_bias == biases[2]

@@ -180,7 +180,7 @@ def rank_candidates(
     may_look_ahead = is_learnt or compute_lookahead_share(time_s, likelihood) > 0.0
     branch_times = compute_branch_times(taken, obstacles) if may_look_ahead and likelihood.lookahead_s > 0.0 else None
     costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))
-    reaches = make_reaches(taken, goals, config)
+    reaches = make_reaches(taken, goals, hand, config)
     decisions = choice = None
     if len(taken) > 1 and (may_look_ahead or likelihood.weaving > 0.0):
         goal, sides = np.array([each.candidate.goal for each in taken], dtype=np.intp), tuple(each.sides for each in taken)
