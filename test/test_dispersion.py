@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from foc_ros.core.config import Config, CovarianceConfig, replace_values
-from foc_ros.core.learning.dispersion import LOG_FACTORS, Dispersion, compute_factors, make_forecast, scale_covariance
+from foc_ros.core.learning.dispersion import LOG_FACTORS, REST_SHARE, Dispersion, compute_factors, make_forecast, scale_covariance
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import (
     NANOSECONDS,
@@ -120,12 +120,16 @@ def test_factors_scale_the_covariance_and_nothing_else() -> None:
     plain = reach(Pipeline(replace_values(CONFIG, off)), 1.0)
     scaled = reach(Pipeline(replace_values(CONFIG, off | {'covariance.near': 2.0, 'covariance.far': 2.0})), 1.0)
     assert len(plain) == len(scaled) > 10
+    at_rest = list[bool]()
     for one, other in zip(plain, scaled, strict=True):
         for before, after in zip(one.candidates, other.candidates, strict=True):
-            np.testing.assert_allclose(after.covariance, 4.0 * before.covariance, rtol=1e-12)
+            at_rest.append(bool(after.covariance[0, 0, 0] < 3.9 * before.covariance[0, 0, 0]))
+            factors = 2.0 ** np.linspace(REST_SHARE if at_rest[-1] else 1.0, 1.0, len(after.mean))
+            np.testing.assert_allclose(after.covariance, factors[:, None, None] ** 2 * before.covariance, rtol=1e-12)
             np.testing.assert_array_equal(after.mean, before.mean)
             np.testing.assert_array_equal(after.motor_covariance, before.motor_covariance)
             assert after.likelihood == before.likelihood
+    assert at_rest[0] and at_rest[-1] and not all(at_rest), 'the hand rests before and after the reach'
 
 
 def test_equal_messages_give_equal_factors_and_later_ones_change_no_earlier_prediction() -> None:

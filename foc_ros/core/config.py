@@ -112,7 +112,9 @@ class DurationConfig:
 class CovarianceConfig:
     """Factors on the predicted standard deviations."""
 
-    near: float = _p(1.0, 'factor on the standard deviations of predicted states, for those at once', '', 0.01, 100.0)
+    near: float = _p(
+        1.0, 'factor on the standard deviations of predicted states, for those at once; at rest its power 2/3', '', 0.01, 100.0
+    )
     far: float = _p(
         1.0,
         'the same at the end of each candidate; in between the logarithm of the factor changes evenly with the time',

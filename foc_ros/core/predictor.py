@@ -103,7 +103,7 @@ def predict(
     prediction = Prediction(*hand_at, predicted, best, notes, time.perf_counter() - began, obstacles, goals, cleared)
     present = past.follow(prediction, scene.durations_s, config.likelihood.hold_s)
     earlier, followed = memory.remember(candidates, solved, earlier, likelihoods, hand.stamp_ns)
-    scaled = tuple(scale_covariance(each, config.covariance) for each in predicted)
+    scaled = tuple(scale_covariance(each, config.covariance, at_rest=hand.onset_ns is None) for each in predicted)
     remembered = Memory(best, candidates, earlier, followed, present, found.next_goal, numbers, choice)
     return replace(prediction, candidates=scaled), remembered
 

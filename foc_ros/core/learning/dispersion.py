@@ -7,7 +7,8 @@ time t ahead, by a factor that leads from `covariance.near` = f now to `covarian
     f(t) = f^(1 - s) f'^s,  s = t / T.                                                                                      (1)
 
 A hand that is on its way follows a plan closely. How it arrives, when, and what it does then are known less well, however near
-the end is.
+the end is. A hand at rest may begin to move at any time, and what holds for one on its way holds less for it: f counts with the
+power `REST_SHARE`.
 
 Predictions of a moving hand, `SAMPLE_S` apart, are kept until the hand has reached the times h of `HORIZONS_S`. With its position
 x there and the mixture of normal distributions (p_i, m_i, S_i) that was predicted without the factors, each pair of factors has
@@ -43,6 +44,10 @@ DEPENDENT_S = 1.0
 """Time within which errors count as one observation [s]."""
 VARIANCE_FLOOR = 1e-12
 """Variance that is added to that of a predicted position [m^2], so that its density is finite."""
+
+
+REST_SHARE = 2.0 / 3.0
+"""Power of the factor for now for a hand at rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,10 +165,12 @@ def interpolate_factors(share: Array, config: CovarianceConfig) -> Array:
     return factors
 
 
-def scale_covariance(candidate: PredictedCandidate, config: CovarianceConfig) -> PredictedCandidate:
+def scale_covariance(candidate: PredictedCandidate, config: CovarianceConfig, *, at_rest: bool = False) -> PredictedCandidate:
     """Return a candidate whose covariance has the factors of config; that of motor noise and that of the height stay."""
     if config.near == config.far == 1.0:
         return candidate
+    if at_rest:
+        config = replace(config, near=config.near**REST_SHARE)
     solution = candidate.solution
     covariance = solution.covariance * compute_factors(solution, config)[:, None, None] ** 2
     return replace(candidate, solution=solution.with_covariance(covariance))
