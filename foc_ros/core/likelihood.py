@@ -56,7 +56,6 @@ from .estimation.duration import get_time_price
 from .heading_bias import Reaches
 from .homotopy.branch_times import BranchTimes
 from .homotopy.decisions import Decisions
-from .kernels import Vector, compiled
 from .registry import LIKELIHOOD_RULES
 from .safety_preference import COST_FLOOR, SafetyPreference
 from .types import Array, Solution
@@ -111,7 +110,7 @@ def compute_likelihoods(
     all choices are near; time_s: the shortest time to go of these classes [s]; reaches: of these classes, without which there is
     no heading bias. Logarithms keep numbers in range. Raises InputError for a cost that is negative or not finite.
     """
-    values = np.ascontiguousarray(costs, dtype=float)
+    values = np.asarray(costs, dtype=float)
     for row, value in enumerate(values.tolist()):
         if not 0.0 <= value < math.inf:
             raise InputError(f'costs[{row}]', 'a finite number >= 0', value)
@@ -133,7 +132,7 @@ def compute_likelihoods(
         beyond = rule(values, replace(config, beta=config.beta_beyond)) - precision * losses
         beyond = _share_weights(beyond, logs, decisions.way)
         near = _share_weights(near - woven, beyond - woven, decisions.next_gap)
-    ahead = normalise_logs(np.ascontiguousarray(near, dtype=float))
+    ahead = normalise_logs(near)
     mixed: Array = (1.0 - share) * planned + share * ahead
     return mixed
 
@@ -150,17 +149,11 @@ def compute_lookahead_share(time_s: float, config: LikelihoodConfig) -> float:
 
 def cost_ratio_logs(costs: Array, config: LikelihoodConfig) -> Array:
     """Return log J_i^-beta, (k,), for costs (k,): the rule `cost_ratio`."""
-    return compute_log_weights(costs, config.beta)
+    logs: Array = -config.beta * np.log(np.maximum(costs, COST_FLOOR))
+    return logs
 
 
-@compiled
-def compute_log_weights(costs: Vector, beta: float) -> Vector:
-    """Return log J_i^-beta, (k,)."""
-    return -beta * np.log(np.maximum(costs, COST_FLOOR))
-
-
-@compiled
-def normalise_logs(logs: Vector) -> Vector:
+def normalise_logs(logs: Array) -> Array:
     """Return the weights (k,) that are proportional to exp(logs) and sum to one."""
     if not len(logs):
         return np.zeros(0)

@@ -8,21 +8,21 @@ channels; a control is stacked, (2N,): the first channel at steps 0..N-1, then t
 from __future__ import annotations
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 
-from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled
+from foc_ros.core.types import Array
 
 
-@compiled
-def apply_impulse_response(responses: Tensor, control: Vector) -> Matrix:
+def apply_impulse_response(responses: Array, control: Array) -> Array:
     """Return the q quantities at steps 0..N, (q, N + 1), from responses (q, 2, N + 1) and a stacked control (2N,)."""
-    quantities, _, times = responses.shape
-    moved = np.zeros((quantities, times))
-    for q in range(quantities):
-        for channel in range(2):
-            if not responses[q, channel].any():  # each axis responds to its own channel only
-                continue
-            for k in range(times - 1):
-                value = control[channel * (times - 1) + k]
-                for s in range(k + 1, times):
-                    moved[q, s] += responses[q, channel, s - k] * value
+    quantities, channels, times = responses.shape
+    moved: Array = responses.reshape(quantities, -1) @ _shift_control(control, channels, times)
     return moved
+
+
+def _shift_control(control: Array, channels: int, times: int) -> Array:
+    """Return the control at step s - m for each channel and each m, s = 0..N, (2 (N + 1), N + 1); zero before step 0."""
+    padded = np.zeros((channels, 2 * times - 1))
+    padded[:, times - 1 : -1] = control.reshape(channels, -1)
+    row, item = padded.strides
+    return as_strided(padded[:, times - 1 :], (channels, times, times), (row, -item, item)).reshape(channels * times, times)

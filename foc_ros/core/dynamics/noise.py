@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled
 from foc_ros.core.types import Array
 
+from .impulse_response import apply_impulse_response
 from .plants import Horizon
 
 
@@ -31,26 +31,6 @@ def propagate_covariance(horizon: Horizon, free: Array, noise_variance: Array, c
 
     free (N + 1, n, n): the part that the control does not cause; noise_variance (2N,): c^2; control (2N,): stacked.
     """
-    return accumulate_covariance(horizon.powers[1], np.ascontiguousarray(horizon.states[..., 1]), noise_variance, control, free)
-
-
-@compiled
-def accumulate_covariance(A: Matrix, B: Matrix, noise_variance: Vector, control: Vector, free: Tensor) -> Tensor:
-    """Return P(t + 1) = A P(t) A' + B diag(c^2 u_t^2) B' from P(0) = 0, plus a free part, (N + 1, n, n): A (n, n), B (n, 2)."""
-    n, steps, variance = len(A), len(control) // 2, noise_variance * control * control
-    covariance, moved = np.zeros((steps + 1, n, n)), np.empty((n, n))
-    for t in range(steps):
-        for i in range(n):
-            for j in range(n):
-                total = 0.0
-                for k in range(n):
-                    total += A[i, k] * covariance[t, k, j]
-                moved[i, j] = total
-        for i in range(n):
-            for j in range(i + 1):
-                total = B[i, 0] * variance[t] * B[j, 0] + B[i, 1] * variance[steps + t] * B[j, 1]
-                for k in range(n):
-                    total += moved[i, k] * A[j, k]
-                covariance[t + 1, i, j], covariance[t + 1, j, i] = total, total
-    covariance += free
+    caused = apply_impulse_response(horizon.products, noise_variance * control**2)
+    covariance: Array = free + caused.T.reshape(free.shape)
     return covariance

@@ -16,7 +16,7 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.types import Array, Record
 
 CACHED_HORIZONS = 16
-"""Size of caches: one horizon per duration, for a prediction and a few before it, about 30 kB each at N = 50."""
+"""Size of caches: one horizon per duration, for a prediction and a few before it, about 60 kB each at N = 50."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +92,12 @@ class Horizon(Record):
         """
         x, y = self.states[:2]
         return np.stack((x, y, x * x, y * y, x * y))
+
+    @cached_property
+    def products(self) -> Array:
+        """Products of the impulse responses of each two states, (n^2, 2, N + 1): applied to c^2 u^2, they give the covariance."""
+        products: Array = self.states[:, None] * self.states
+        return products.reshape(-1, *self.states.shape[1:])
 
     @cached_property
     def motion(self) -> Array:

@@ -23,7 +23,6 @@ from functools import lru_cache
 import numpy as np
 
 from foc_ros.core.estimation.kalman_filter import compute_gramian
-from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled
 from foc_ros.core.types import Array
 
 from .plants import (
@@ -35,9 +34,6 @@ from .plants import (
     discretise_triple_integrator,
     find_states_at_goal,
 )
-
-STATES = 6
-"""States of the triple integrator: with this number known at compile time, `propagate_scaled` is twice as fast."""
 
 
 def compute_goal_map(horizon: Horizon, passing: bool = False) -> Array:
@@ -112,24 +108,8 @@ def triple_integrator_process_covariance(dt: float, steps: int, passing: bool = 
     return covariance
 
 
-@compiled
-def propagate_scaled(maps: Tensor, scale: Vector, covariance: Matrix) -> Tensor:
+def propagate_scaled(maps: Array, scale: Array, covariance: Array) -> Array:
     """Return E P E', (m, 6, 6), of a covariance P (6, 6) for each E = D M D^-1: maps M (m, 6, 6), scale the diagonal of D."""
-    after, half, unit = np.empty_like(maps), np.empty((STATES, STATES)), np.empty((STATES, STATES))
-    for i in range(STATES):
-        for j in range(STATES):
-            unit[i, j] = covariance[i, j] / (scale[i] * scale[j])
-    for t in range(len(maps)):
-        for i in range(STATES):
-            for j in range(STATES):
-                total = 0.0
-                for k in range(STATES):
-                    total += maps[t, i, k] * unit[k, j]
-                half[i, j] = total
-        for i in range(STATES):
-            for j in range(i + 1):
-                total = 0.0
-                for k in range(STATES):
-                    total += half[i, k] * maps[t, j, k]
-                after[t, i, j] = after[t, j, i] = scale[i] * scale[j] * total
+    units = np.outer(scale, scale)
+    after: Array = maps @ (covariance / units) @ maps.swapaxes(1, 2) * units
     return after

@@ -25,8 +25,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from foc_ros.core.kernels import Matrix, Vector, compiled
-from foc_ros.core.kernels.linear_algebra import factorise_cholesky, multiply, solve_lower
 from foc_ros.core.types import NANOSECONDS, Array, Record, as_readonly
 
 DEGREE = 5
@@ -45,6 +43,8 @@ ROUNDING = 1e-12
 LEAST_PIVOT = 1e-9
 """Share of its own sum of squares that a degree has to add to those below it: for clustered stamps the degrees are degenerate."""
 
+_POWERS = np.arange(2.0 * DEGREE + 1.0)
+"""Exponents of t in the sums of `Effort.powers`, (11,)."""
 _K = np.arange(DEGREE + 1)
 _THIRD = _K * (_K - 1.0) * (_K - 2.0)
 _H: Array = np.outer(_THIRD, _THIRD) / np.maximum(_K[:, None] + _K - 5.0, 1.0)
@@ -86,43 +86,34 @@ def add_sample(effort: Effort, stamp_ns: int, position: Array, stddev: float) ->
     return Effort(spent, effort.before, start_ns, seconds, origin, powers, products, square)
 
 
-@compiled
-def add_to_sums(powers: Vector, products: Matrix, seconds: float, z: Vector) -> tuple[Vector, Matrix]:
+def add_to_sums(powers: Array, products: Array, seconds: float, z: Array) -> tuple[Array, Array]:
     """Return the sums of `Effort` with one more sample."""
-    powers, products, power = powers.copy(), products.copy(), 1.0
-    for k in range(len(powers)):
-        powers[k] += power
-        if k < len(products):
-            products[k] += power * z
-        power *= seconds
-    return powers, products
+    power = seconds**_POWERS
+    return powers + power, products + power[: DEGREE + 1, None] * z
 
 
-@compiled
-def fit_quintic(powers: Vector, products: Matrix, square: float, T: float, stddev: float) -> tuple[bool, float, bool]:
+def fit_quintic(powers: Array, products: Array, square: float, T: float, stddev: float) -> tuple[bool, float, bool]:
     """Fit the quintic of a segment of T [s].
 
     Return whether the samples determine all degrees, the effort [m^2/s^5], and whether the quintic explains the samples.
     """
-    n, count = len(products), powers[0]
-    gram, right = np.empty((n, n)), np.empty((n, 2))
-    for j in range(n):
-        right[j] = products[j] / T**j
-        for k in range(n):
-            gram[j, k] = powers[j + k] / T ** (j + k)
-    root = factorise_cholesky(gram, 0.0)
-    for k in range(n):
-        if not root[k, k] ** 2 > LEAST_PIVOT * gram[k, k]:
-            return False, 0.0, False
-    y = solve_lower(root, right)
+    n, count, unit = len(products), float(powers[0]), T**-_POWERS
+    gram = (powers * unit)[_K[:, None] + _K]
+    try:
+        root = np.linalg.cholesky(gram)
+    except np.linalg.LinAlgError:
+        return False, 0.0, False
+    if not (root.diagonal() ** 2 > LEAST_PIVOT * gram.diagonal()).all():
+        return False, 0.0, False
+    inverse = np.linalg.inv(root)
+    y = inverse @ (products * unit[:n, None])
     energy = (y**2).sum(axis=1)
     freedom = 2.0 * (count - n)
-    residual, rounding = max(square - energy.sum(), 0.0) / freedom, ROUNDING * square / freedom
+    residual, rounding = max(square - float(energy.sum()), 0.0) / freedom, ROUNDING * square / freedom
     noise = 2.0 * max(stddev**2, residual, rounding)
-    jerk = solve_lower(root, np.ascontiguousarray(solve_lower(root, _H).T))
+    jerk = inverse @ _H @ inverse.T
     length_squared = 12.0 * energy[1:].sum() / count
-    for k in range(n):
-        is_used = k >= 3 and noise * jerk[k, k] <= NOISE_SHARE * 720.0 * length_squared
-        y[k] *= max(1.0 - SHRINKAGE * noise / max(energy[k], noise), 0.0) if is_used else 0.0
-    spent = max((y * multiply(jerk, y)).sum(), 0.0) / T**5
+    is_used = (_K >= 3) & (noise * jerk.diagonal() <= NOISE_SHARE * 720.0 * length_squared)
+    y *= np.where(is_used, np.maximum(1.0 - SHRINKAGE * noise / np.maximum(energy, noise), 0.0), 0.0)[:, None]
+    spent = max(float((y * (jerk @ y)).sum()), 0.0) / T**5
     return True, spent, residual <= (MISFIT * stddev) ** 2 + rounding

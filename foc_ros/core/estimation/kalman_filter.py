@@ -38,8 +38,6 @@ import numpy as np
 
 from foc_ros.core.config import EstimatorConfig
 from foc_ros.core.errors import InputError
-from foc_ros.core.kernels import Matrix, Vector, compiled
-from foc_ros.core.kernels.linear_algebra import multiply, multiply_transposed
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, SampleStatus, as_readonly
 
 from .effort import Effort, add_sample
@@ -125,7 +123,6 @@ def describe_jump(field: str, state: HandState, sample: HandSample, config: Esti
     return InputError(field, expected, f'one that is {away_m:.3g} m away')
 
 
-@compiled
 def compute_transition(dt: float) -> Array:
     """Return A(dt), (3, 3), of one axis."""
     return np.array([[1.0, dt, dt**2 / 2.0], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
@@ -143,57 +140,41 @@ def compute_gramian(dt: float) -> Array:
 
 
 _UNIT_ROOT = np.linalg.cholesky(compute_gramian(1.0))
-"""C for dt = 1 s; the rows scale with dt^2.5, dt^1.5 and dt^0.5."""
+"""C for dt = 1 s."""
+_ROOT_ORDERS = np.array([[2.5], [1.5], [0.5]])
+"""Powers of dt with which the rows of C scale, (3, 1)."""
 
 
-@compiled
-def triangularise(columns: Matrix) -> Matrix:
-    """Return the lower triangular L (n, n) with L L' = M M' for columns M (n, q), q >= n, by plane rotations of M."""
-    turned = columns.copy()
-    n, q = turned.shape
-    for i in range(n):
-        for j in range(i + 1, q):
-            length = np.hypot(turned[i, i], turned[i, j])
-            if length > 0.0:
-                c, s = turned[i, i] / length, turned[i, j] / length
-                for k in range(i, n):
-                    turned[k, i], turned[k, j] = c * turned[k, i] + s * turned[k, j], c * turned[k, j] - s * turned[k, i]
-    return turned[:, :n].copy()
+def triangularise(columns: Array) -> Array:
+    """Return the lower triangular L (n, n) with L L' = M M' for columns M (n, q), q >= n; its diagonal is not negative."""
+    _, upper = np.linalg.qr(columns.T)
+    lower: Array = upper.T * np.copysign(1.0, upper.diagonal())
+    return lower
 
 
-@compiled
-def expand_to_both_axes(covariance: Matrix) -> Matrix:
+def expand_to_both_axes(covariance: Array) -> Array:
     """Return the covariance (6, 6) of x, y, vx, vy, ax, ay from the one (3, 3) that all axes share."""
     both = np.zeros((6, 6))
-    for i in range(3):
-        for j in range(3):
-            both[2 * i, 2 * j] = both[2 * i + 1, 2 * j + 1] = covariance[i, j]
+    both[::2, ::2] = both[1::2, 1::2] = covariance
     return both
 
 
-@compiled
 def filter_step(
-    mean: Vector, height_mean: Vector, root: Matrix, dt: float, position: Vector, height: float, density: float, stddev: float
-) -> tuple[Vector, Vector, Matrix, Matrix]:
+    mean: Array, height_mean: Array, root: Array, dt: float, position: Array, height: float, density: float, stddev: float
+) -> tuple[Array, Array, Array, Array]:
     """Return mean (6,), mean of the height (3,), covariance (6, 6) and root (3, 3) after dt [s] and a sample.
 
     position (2,) and height are those of the sample [m]; density: of the jerk; stddev: of each coordinate of the sample [m].
     """
-    step, columns, before = compute_transition(dt), np.empty((3, 6)), np.empty((3, 3))
-    columns[:, :3] = multiply(step, root)
-    for i in range(3):
-        columns[i, 3:] = density * dt ** (2.5 - i) * _UNIT_ROOT[i]
-        before[i, 0], before[i, 1], before[i, 2] = mean[2 * i], mean[2 * i + 1], height_mean[i]
-    corrected = triangularise(columns)
+    step = compute_transition(dt)
+    corrected = triangularise(np.hstack((step @ root, density * dt**_ROOT_ORDERS * _UNIT_ROOT)))
     first = corrected[0, 0]
-    deviation = np.hypot(first, stddev)
-    states = multiply(step, before)
-    innovation = np.array([position[0], position[1], height]) - states[0]
-    for i in range(3):
-        states[i] += corrected[i, 0] * (first / deviation / deviation) * innovation
-        corrected[i, 0] *= stddev / deviation
-    covariance = expand_to_both_axes(multiply_transposed(corrected, corrected))
-    return states[:, :2].copy().ravel(), states[:, 2].copy(), covariance, corrected
+    deviation = math.hypot(first, stddev)
+    states = step @ np.column_stack((mean.reshape(3, 2), height_mean))
+    innovation = np.array([*position, height]) - states[0]
+    states += np.outer(corrected[:, 0] * (first / deviation / deviation), innovation)
+    corrected[:, 0] *= stddev / deviation
+    return states[:, :2].ravel(), states[:, 2].copy(), expand_to_both_axes(corrected @ corrected.T), corrected
 
 
 def _start_state(sample: HandSample, config: EstimatorConfig) -> FilterState:
