@@ -23,8 +23,8 @@ from foc_ros.core.memory.memory import Memory
 from foc_ros.core.obstacles.scene import ObstacleSource
 from foc_ros.core.obstacles.shapes import Shape, collect_obstacles
 from foc_ros.core.ocp import monte_carlo as sampling
-from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
+from foc_ros.core.ocp.solve import find_least_safety_factor
 from foc_ros.core.predictor import predict, warm_up
 from foc_ros.core.reaching_scene import ReachingScene, check_outside
 from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
@@ -573,7 +573,8 @@ def register_strategy(name: str, function: Callable[..., Any]) -> None:
     name : str
         A new name; `InputError` is raised if it is taken.
     function : callable
-        ``function(problem, start, settings, deadline)``, which returns a `StrategyResult`: see `foc_ros.core.ocp.strategies`.
+        ``function(problems, starts, settings, deadline)``, which returns a list of `StrategyResult`: see
+        `foc_ros.core.ocp.strategies`.
     """
     _register(STRATEGIES, name, function)
 
@@ -585,8 +586,8 @@ def get_strategy(name: str) -> Callable[..., Any]:
 
 
 def compute_eta(problem: Problem, control: types.Array) -> float:
-    """Return the eta that a stacked control (2N,) achieves: the smallest over all obstacles and steps."""
-    return problem.risk.find_probability(find_minimum_safety_factor(problem, control, between_steps=False).k)
+    """Return the eta that a stacked control (2N,) achieves: the smallest over all obstacles and times."""
+    return problem.risk.find_probability(find_least_safety_factor(problem, control)[0])
 
 
 def register_plant(name: str, factory: Callable[..., Any]) -> None:

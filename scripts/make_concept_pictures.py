@@ -24,7 +24,7 @@ from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
-from foc_ros.core.ocp.warm_start import cold_start
+from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.scene_solver import build_scene_problems, solve_scene
 from foc_ros.core.types import Array, Obstacles, Solution, make_obstacles
 from foc_ros.io.scene_file import guess_path, load_scene

@@ -7,7 +7,7 @@ from foc_ros.core.config import Config, replace_values
 from foc_ros.core.estimation.duration import CHANGE_S, limit_change
 from foc_ros.core.memory.continuity import Past, carry_over, make_continuous
 from foc_ros.core.memory.memory import Memory
-from foc_ros.core.ocp.warm_start import resample_rest
+from foc_ros.core.ocp.start import resample_rest
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import LEFT, RIGHT, Candidate, HandState, PredictedCandidate, make_obstacles
 

@@ -11,7 +11,7 @@ from foc_ros.core.dynamics.plants import condense, discretise_damped_mass, discr
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.qp import Cost, effort_cost, half_planes
 from foc_ros.core.ocp.solve import solve_problem
-from foc_ros.core.ocp.warm_start import cold_start
+from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.types import make_obstacles
 
 STEPS, LAMBDA = 12, 3e4

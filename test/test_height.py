@@ -15,7 +15,7 @@ from foc_ros.core.height import HeightPredictor, predict_height, reach_along_axi
 from foc_ros.core.memory.memory import Memory
 from foc_ros.core.obstacles.height_clearance import SLACK
 from foc_ros.core.ocp.solve import solve_problem
-from foc_ros.core.ocp.warm_start import cold_start
+from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.predictor import build_problem, predict
 from foc_ros.core.types import HandSample, HandState, Obstacles, Prediction, make_obstacles
 

@@ -10,7 +10,7 @@ from reach_helpers import bowed, random_scene, reach
 
 from foc_ros.core.config import FocConfig
 from foc_ros.core.ocp.solve import solve_problem
-from foc_ros.core.ocp.warm_start import cold_start
+from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.types import Obstacles, Solution, Status
 
 SEEDS = st.integers(0, 10_000)

@@ -14,7 +14,7 @@ from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.strategies.least_loss import compute_loss
 from foc_ros.core.ocp.strategies.penalty_path import PathFollower, PenaltyPath
-from foc_ros.core.ocp.warm_start import cold_start, warm_start
+from foc_ros.core.ocp.start import cold_start, warm_start
 from foc_ros.core.predictor import predict
 from foc_ros.core.safety_preference import SafetyPreference
 from foc_ros.core.types import HandState, Solution, Status, make_obstacles

@@ -11,7 +11,7 @@ from foc_ros.core.dynamics.replanning import compute_goal_map, triple_integrator
 from foc_ros.core.memory.memory import Memory
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
-from foc_ros.core.ocp.warm_start import cold_start
+from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import HandState, Solution, make_obstacles
 

@@ -11,7 +11,7 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.ocp.backend import Answer, DenseQP, solve_named, solve_piqp
 from foc_ros.core.ocp.qp import clearance_qp, effort_cost
 from foc_ros.core.ocp.solve import solve_problem
-from foc_ros.core.ocp.warm_start import cold_start
+from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.ocp.working_set import WorkingSet, solve, solve_full
 from foc_ros.core.registry import QP_BACKENDS
 from foc_ros.core.types import Status, make_obstacles

@@ -11,7 +11,7 @@ from foc_ros.core.obstacles.chance_constraint import k_of_eta
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.sqp import converge
 from foc_ros.core.ocp.strategies import Strategy, StrategyResult, find_best_effort
-from foc_ros.core.ocp.warm_start import Start
+from foc_ros.core.ocp.start import Start
 from foc_ros.core.ocp.working_set import WorkingSet
 from foc_ros.core.registry import STRATEGIES
 from foc_ros.core.types import Status, make_obstacles

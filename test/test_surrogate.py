@@ -11,10 +11,10 @@ from foc_ros.core.obstacles.chance_constraint import eta_of_k
 from foc_ros.core.ocp.contacts.kkt_point import compute_class_angles
 from foc_ros.core.ocp.contacts.surrogate_newton import Preference
 from foc_ros.core.ocp.contacts.surrogate_point import SurrogatePoint, solve_surrogate_point
-from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
+from foc_ros.core.ocp.solve import find_least_safety_factor
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import solve_problem
-from foc_ros.core.ocp.warm_start import cold_start, warm_start
+from foc_ros.core.ocp.start import cold_start, warm_start
 from foc_ros.core.safety_preference import HARD, SafetyPreference
 from foc_ros.core.types import Solution, Status
 

@@ -10,7 +10,7 @@ from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_trans
 from foc_ros.core.estimation.time_cost import compute_least_effort, find_least_cost_time
 from foc_ros.core.memory.memory import Memory
 from foc_ros.core.ocp.solve import solve_problem
-from foc_ros.core.ocp.warm_start import cold_start
+from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import Candidate, HandState, make_obstacles
 

@@ -13,7 +13,7 @@ from foc_ros.core.config import FocConfig
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.qp import ReachingQP, clearance_qp, effort_cost
 from foc_ros.core.ocp.solve import solve_problem
-from foc_ros.core.ocp.warm_start import cold_start, warm_start
+from foc_ros.core.ocp.start import cold_start, warm_start
 from foc_ros.core.ocp.working_set import WorkingSet, solve
 from foc_ros.core.types import Solution, Status
 

@@ -16,7 +16,7 @@ from foc_ros.core.config import FocConfig
 from foc_ros.core.memory.memory import Memory
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import solve_problem
-from foc_ros.core.ocp.warm_start import cold_start
+from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import Candidate, PredictedCandidate
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
@@ -18,19 +18,11 @@ from .homotopy.decisions import find_decisions, tabulate_sides
 from .learning.choices import Choice
 from .likelihood import CostModel, compute_likelihoods, compute_lookahead_share
 from .ocp.problem import Problem
-from .ocp.solve import solve_problem
-from .ocp.warm_start import Start, cold_start, warm_start
+from .ocp.solve import solve_problems
+from .ocp.start import cold_start, warm_start
 from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Solution, Status
 
 EFFORT_ONLY = CostModel()
-NO_TURN = -1, -1
-"""The turns of a class that has had none."""
-RAISED_ANYWAY = 2
-"""Number of candidates for which there is always time to raise the safety factor: the most likely one, and the next in turn."""
-FIRST_RAISES, FURTHER_RAISES = 1, 8
-"""How often the safety factor of a candidate that is followed is raised: first of each, then of those that are not settled."""
-SETTLED = 0.02
-"""Change of a safety factor from one prediction to the next up to which it is settled."""
 
 
 class ProblemTable(Protocol):
@@ -40,113 +32,42 @@ class ProblemTable(Protocol):
         """Return the problem of the candidate in a row."""
 
 
-@dataclass(frozen=True)
-class EarlierSolutions:
-    """Results of earlier predictions by label: solutions to start from, and what gives the order of solving.
-
-    likelihoods; turns: two stamps [ns] of each class, of the prediction that solved it last, and of the last one that also had
-    time to raise its safety factor.
-    """
-
-    solutions: Mapping[str, Solution] = field(default_factory=dict)
-    likelihoods: Mapping[str, float] = field(default_factory=dict)
-    turns: Mapping[str, tuple[int, int]] = field(default_factory=dict)
-
-    def sort_by_turn(self, candidates: Sequence[Candidate]) -> list[int]:
-        """Return the rows of candidates: the one that was most likely, then those of which the turns are the longest time ago."""
-        labels, rows = [each.label for each in candidates], range(len(candidates))
-        most_likely = max(rows, key=lambda row: (self.likelihoods.get(labels[row], 0.0), -row), default=0)
-        has_likelihood = any(self.likelihoods.get(label, 0.0) > 0.0 for label in labels)
-        return sorted(rows, key=lambda row: (not has_likelihood or row != most_likely, self.turns.get(labels[row], NO_TURN)))
-
-
-NOTHING = EarlierSolutions()
-
-
 def solve_candidates(
     candidates: Sequence[Candidate],
     problems: ProblemTable,
     settings: FocConfig,
     costs: CostModel = EFFORT_ONLY,
-    earlier: EarlierSolutions = NOTHING,
+    earlier: Mapping[str, Solution] = MappingProxyType({}),
     deadline: Deadline = NEVER,
-    deadline_of_raises: Deadline = NEVER,
 ) -> list[PredictedCandidate]:
-    """Solve the candidates in turn; return those for which there was time in their own order, with likelihoods 0.
+    """Solve all candidates together, each from its earlier solution or its guess; return them with likelihoods 0.
 
-    problems: one for each candidate; costs: parts of the cost besides the effort to go; earlier: results of the prediction
-    before, to start from. The first one is begun whatever the time. One that the deadline stops gets the status DEADLINE. Until
-    the deadline of raises, safety factors are raised: once that of each candidate, of the first ones in any case, then those that
-    are not settled.
+    Parameters
+    ----------
+    candidates
+        The homotopy classes.
+    problems
+        One for each.
+    settings
+        The strategy and its parameters.
+    costs
+        Parts of the cost besides the effort to go.
+    earlier
+        Solutions of the prediction before, by label, from which their classes are followed.
+    deadline
+        When the solutions have to be ready. A class that is not ready then has an estimate, and says so.
     """
-    solved: dict[int, PredictedCandidate] = {}
-    for row in earlier.sort_by_turn(candidates):
-        if solved and not deadline.allows():
-            break
-        previous, raises = earlier.solutions.get(candidates[row].label), math.inf
-        if earlier is not NOTHING:
-            raises = FIRST_RAISES if len(solved) < RAISED_ANYWAY or deadline_of_raises.allows() else 0
-        solved[row] = _solve_candidate(candidates[row], problems[row], settings, costs, previous, deadline, raises)
-    unsettled = [row for row, each in solved.items() if earlier is not NOTHING and _is_unsettled(each, earlier.solutions)]
-    for row in unsettled:
-        if deadline_of_raises.allows():
-            first, problem = solved[row], problems[row]
-            start = replace(warm_start(first.solution, problem), raises=FURTHER_RAISES)
-            raised = _solve_from(start, candidates[row], problem, settings, costs, deadline_of_raises)
-            qp_solves = first.solution.qp_solves + raised.solution.qp_solves
-            raised = replace(raised, solution=replace(raised.solution, qp_solves=qp_solves))
-            solved[row] = raised if raised.has_likelihood else first
-    return [solved[row] for row in sorted(solved)]
+    starts = []
+    for row, candidate in enumerate(candidates):
+        previous = earlier.get(candidate.label)
+        starts.append(cold_start(candidate.guess) if previous is None else warm_start(previous, problems[row]))
+    needed = [problems[row] for row in range(len(candidates))]
+    solutions = solve_problems(needed, starts, settings, deadline)
+    return [_classify(*each, costs) for each in zip(candidates, solutions, needed, strict=True)]
 
 
-def _is_unsettled(result: PredictedCandidate, before: Mapping[str, Solution]) -> bool:
-    """Tell whether a safety factor below the wanted one is new or has changed, so that a larger one may be in reach."""
-    previous, k = before.get(result.label), result.solution.safety_factor
-    return result.status is Status.COMPROMISED and (previous is None or abs(k - previous.safety_factor) > SETTLED)
-
-
-def _solve_candidate(
-    candidate: Candidate,
-    problem: Problem,
-    settings: FocConfig,
-    costs: CostModel,
-    previous: Solution | None,
-    deadline: Deadline,
-    raises: float,
-) -> PredictedCandidate:
-    """Solve from the previous solution; where a likelihood comes or goes, also from the candidate's own guess.
-
-    raises: how often the safety factor may be raised, as in `Start`.
-
-    A candidate that was unreachable and is solved now may have come from far beyond the least effort: the result with the smaller
-    loss counts.
-    """
-    warm = None
-    if previous is not None:
-        start = replace(warm_start(previous, problem), raises=raises)
-        warm = _solve_from(start, candidate, problem, settings, costs, deadline)
-        # a solution that continues one stopped by the deadline has skipped nothing
-        is_continued = warm.has_likelihood and (previous.status is Status.DEADLINE or previous.status.has_likelihood)
-        if warm.status in (previous.status, Status.DEADLINE) or is_continued:
-            return warm
-    start = replace(cold_start(candidate.guess), raises=raises)
-    cold = _solve_from(start, candidate, problem, settings, costs, deadline)
-    if warm is None or not warm.has_likelihood:
-        return cold
-    return cold if cold.has_likelihood and _compute_loss(cold, problem) < _compute_loss(warm, problem) else warm
-
-
-def _compute_loss(candidate: PredictedCandidate, problem: Problem) -> float:
-    solution, wanted = candidate.solution, problem.wanted_k
-    k = wanted if candidate.is_solved else solution.safety_factor
-    return problem.preference.compute_loss(solution.effort, k, wanted)
-
-
-def _solve_from(
-    start: Start, candidate: Candidate, problem: Problem, settings: FocConfig, costs: CostModel, deadline: Deadline
-) -> PredictedCandidate:
-    """Solve from a start; find the class in which the solution is, and its cost. The status says if it left the candidate's."""
-    solution = solve_problem(problem, start, settings, deadline)
+def _classify(candidate: Candidate, solution: Solution, problem: Problem, costs: CostModel) -> PredictedCandidate:
+    """Find the class in which a solution is, and its cost. The status says if it left the candidate's."""
     sides = find_path_sides(solution.path, problem.obstacles, problem.centre_trajectories)
     if solution.status.has_likelihood and any(sides.get(identity, side) != side for identity, side in candidate.sides):
         solution = replace(solution, status=Status.LEFT_CLASS, message='the solution moved into another homotopy class')

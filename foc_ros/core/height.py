@@ -32,7 +32,6 @@ from .dynamics.plants import find_states_at_goal
 from .dynamics.predictive_covariance import SharedCovariances, widen_covariance
 from .estimation.duration import is_passing
 from .obstacles.height_clearance import find_cleared
-from .ocp.qp import solve_goal
 from .types import Array, HandState, HeightTrajectory, Obstacles, PredictedCandidate, Solution, Status
 
 
@@ -130,7 +129,10 @@ def reach_along_axis(config: Config, start: Array, target: float, dt: float) -> 
     noise = scale_noise(np.array([math.hypot(foc.noise_x, foc.noise_y) / math.sqrt(2.0), 0.0]), REFERENCE_STEP_S, dt)
     hessian = 1.0 + foc.goal_weight * (noise[0] * rows[0]) ** 2
     control = np.zeros((2, foc.steps))
-    control[0] = solve_goal(hessian, np.zeros(foc.steps), rows, missing, np.zeros(len(rows))).control
+    scaled = rows / hessian
+    length = np.sqrt((rows * scaled).sum(axis=1))
+    square = (scaled @ rows.T) / np.outer(length, length)
+    control[0] = np.linalg.solve(square, missing / length) @ (scaled / length[:, None])
     stacked = control.ravel()
     mean = free + apply_impulse_response(horizon.states, stacked).T
     covariance = propagate_covariance(horizon, np.zeros_like(horizon.powers), stack_noise(noise**2, foc.steps), stacked)

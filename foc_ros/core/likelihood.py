@@ -69,7 +69,7 @@ class CostModel(NamedTuple):
 
     def compute_cost(self, solution: Solution) -> float:
         """Return the cost J_i [m^2/s^5] of a class: an integral of squared jerk, so that classes of other durations compare."""
-        return solution.effort * solution.dt + self.compute_fixed_cost(solution.dt * len(solution.control))
+        return solution.expected_effort * solution.dt + self.compute_fixed_cost(solution.dt * len(solution.control))
 
     def compute_fixed_cost(self, duration_s: float) -> float:
         """Return the part of the cost [m^2/s^5] that is not effort to go, for a class with a duration [s]."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .candidates import EarlierSolutions, rank_candidates, solve_candidates
+from .candidates import rank_candidates, solve_candidates
 from .config import REFERENCE_STEP_S, Config, EstimatorConfig
 from .deadline import NEVER, Deadline
 from .dynamics.noise import scale_noise
@@ -27,11 +27,21 @@ from .memory.memory import Memory
 from .obstacles.chance_constraint import RiskBound, count_events
 from .obstacles.culling import cull_obstacles
 from .ocp.problem import Problem, rest_to_goal
-from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Prediction, Record, make_obstacles
+from .types import (
+    Array,
+    Candidate,
+    HandState,
+    Obstacles,
+    PredictedCandidate,
+    Prediction,
+    Record,
+    Solution,
+    Status,
+    make_obstacles,
+)
 
-SEARCH_SHARE, RAISE_SHARE, SOLVE_SHARE = 0.3, 0.25, 0.65
-"""Shares of the time left after which the search, the raises of safety factors (but those of the first candidates), and the
-solves begin no step. The last step may end later."""
+SEARCH_SHARE, SOLVE_SHARE = 0.3, 0.8
+"""Shares of the time left after which the search and the solver begin no step. The last step may end later."""
 RESERVE_S = 5e-5
 """Time besides that for each candidate, to keep, rank and smooth it [s]."""
 
@@ -63,8 +73,7 @@ def predict(
     library
         Demonstrated paths, which become candidates where they fit the scene, and recordings, which are evidence (`experience`).
     deadline
-        When the prediction has to be ready. Classes for which there is no time keep their last answer (`continuity`), and have
-        their turn later.
+        When the prediction has to be ready. All classes are solved together; what is not settled then is compared by an estimate.
     goal_heights
         Heights of the goals (g,) [m]; None where they are not known, and the height of the hand is not predicted.
 
@@ -89,22 +98,21 @@ def predict(
     shares = {each.candidate: each.likelihood for each in taking_part}
     likelihoods = {each.label: each.likelihood for each in taking_part}
     best = select_most_likely(likelihoods, past.find_renamed(memory.most_likely, shares), config.likelihood.margin)
-    answered = {each.label for each in kept}
     counts = {
         'merged': len(kept) - len(ranked),
         'culled': len(scene.blocking) - len(scene.near),
         'cleared_by_height': int(scene.cleared.sum()),
         'recalled': len(candidates) - len(found.candidates),
         'kept': sum(each.age_s > 0.0 for each in predicted),
-        'waiting': sum(each.label not in answered for each in candidates),
+        'unfinished': sum(each.status is Status.DEADLINE for each in predicted),
     }
     notes = dict(found.notes) | {name: count for name, count in counts.items() if count}
     hand_at, cleared = (hand.stamp_ns, hand.frame_id, hand.height), tuple(scene.cleared.tolist())
     prediction = Prediction(*hand_at, predicted, best, notes, time.perf_counter() - began, obstacles, goals, cleared)
     present = past.follow(prediction, scene.durations_s, config.likelihood.hold_s)
-    earlier, followed = memory.remember(candidates, solved, earlier, likelihoods, hand.stamp_ns)
+    solutions = {each.label: each.solution for each in solved if each.has_likelihood}
     scaled = tuple(scale_covariance(each, config.covariance, at_rest=hand.onset_ns is None) for each in predicted)
-    remembered = Memory(best, candidates, earlier, followed, present, found.next_goal, numbers, choice)
+    remembered = Memory(best, candidates, solutions, present, found.next_goal, numbers, choice)
     return replace(prediction, candidates=scaled), remembered
 
 
@@ -158,13 +166,13 @@ def _solve(
     config: Config,
     candidates: Sequence[Candidate],
     costs: CostModel,
-    earlier: EarlierSolutions,
+    earlier: Mapping[str, Solution],
     deadline: Deadline,
 ) -> list[PredictedCandidate]:
     """Solve the candidates for which there is time; return them with their predictive covariance."""
     problems = Problems(config, scene.hand, scene.near, scene.goals, candidates, scene.durations_s)
-    until = [deadline.take_share(share, RESERVE_S * len(candidates)) for share in (SOLVE_SHARE, RAISE_SHARE)]
-    solved = solve_candidates(candidates, problems, config.foc, costs, earlier, *until)
+    until = deadline.take_share(SOLVE_SHARE, RESERVE_S * len(candidates))
+    solved = solve_candidates(candidates, problems, config.foc, costs, earlier, until)
     return [_widen_covariance(each, scene.covariances, scene.hand, config) for each in solved]
 
 

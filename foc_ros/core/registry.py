@@ -74,11 +74,11 @@ def _find_qpsolvers() -> list[str]:
 STRATEGIES = Registry(
     'strategy',
     {
-        'lv': 'foc_ros.core.ocp.strategies.lv_hc:solve_lv',
-        'hc': 'foc_ros.core.ocp.strategies.lv_hc:solve_hc',
-        'optimal': 'foc_ros.core.ocp.strategies.optimal:solve_optimal',
-        'algorithm1': 'foc_ros.core.ocp.strategies.algorithm1:solve_algorithm1',
-        'fixed': 'foc_ros.core.ocp.strategies.fixed:solve_fixed',
+        'lv': 'foc_ros.core.ocp.strategies:solve_lv',
+        'hc': 'foc_ros.core.ocp.strategies:solve_hc',
+        'optimal': 'foc_ros.core.ocp.strategies:solve_optimal',
+        'algorithm1': 'foc_ros.core.ocp.strategies:solve_algorithm1',
+        'fixed': 'foc_ros.core.ocp.strategies:solve_fixed',
     },
 )
 PLANTS = Registry(

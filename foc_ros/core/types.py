@@ -238,11 +238,12 @@ class Candidate(Record):
 
 
 class Status(Enum):
-    """Result of the forward optimal control of a candidate. Solved and compromised candidates take part in the likelihood.
+    """Result of the forward optimal control of a candidate. Those that are solved, compromised or out of time have a likelihood.
 
     SOLVED: the solution meets the wanted eta. COMPROMISED: it meets a smaller eta only, which makes it less likely.
     ETA_UNREACHABLE: the same, where less than the wanted eta is not allowed. INFEASIBLE: no path of the class meets the goal and
-    the constraints. ITERATION_LIMIT: the solver did not converge. DEADLINE: the time limit came first.
+    the constraints. ITERATION_LIMIT: the result does not meet what it promises. DEADLINE: time or iterations ran out before it was
+    settled: effort and safety are estimated from its last iterate.
     LEFT_CLASS: the solution lies in another homotopy class.
     """
 
@@ -257,7 +258,7 @@ class Status(Enum):
     @property
     def has_likelihood(self) -> bool:
         """Whether a candidate that ended so takes part in the likelihood."""
-        return self in (Status.SOLVED, Status.COMPROMISED)
+        return self in (Status.SOLVED, Status.COMPROMISED, Status.DEADLINE)
 
     @property
     def remedy(self) -> str:
@@ -290,15 +291,15 @@ class Solution(Record):
 
     eta: achieved, the smallest over obstacles and steps, and with `lv`, `hc` and `optimal` also between the steps; eta_at:
     (obstacle id, step) where, with fractions of a step. eta_reachable: the largest eta found if the wanted one is unreachable.
-    safety_factor: k that belongs to eta; safety_shortfall: by how much it is below the wanted one, 0 where solved.
+    safety_factor: k that belongs to eta; safety_shortfall: by how much it is below the wanted one, 0 where solved, and what is
+    expected of it where time ran out.
     motor_covariance (N + 1, n, n): what motor noise alone causes, which eta is about; None where `covariance` is that.
     violation: by how much the mean comes nearer to a centre than sqrt(E[R^2] + tau) [m], 0 where it does not; violation_at:
     (obstacle id, step) where.
 
     multipliers: (obstacle id, step, value) of the active constraints, with `lv`, `hc` and `optimal` at fractions of a step; the
     value is the growth of J_aug for each metre more of required distance [m/s^6]; equivalent_weights: tau [m^2] and lambda
-    [1/s^6] of each active constraint. safety_factor_slope: derivative dk/ds along the penalty path of `lv` and `hc`, 0 where
-    unknown. is_complete: False where there was no time to look for a larger safety factor.
+    [1/s^6] of each active constraint. expected: the effort that is expected where time ran out, None elsewhere.
     qp_solves: number of QPs solved; iterations: of `algorithm1`, None for the others; solve_s: wall time [s].
     """
 
@@ -321,8 +322,7 @@ class Solution(Record):
     violation_at: tuple[str, float] | None = None
     multipliers: tuple[tuple[str, float, float], ...] = ()
     equivalent_weights: tuple[tuple[float, float], ...] = ()
-    safety_factor_slope: float = 0.0
-    is_complete: bool = True
+    expected: float | None = None
     qp_solves: int = 0
     iterations: int | None = None
     solve_s: float = 0.0
@@ -338,6 +338,11 @@ class Solution(Record):
         motor = self.covariance if self.motor_covariance is None else self.motor_covariance
         vars(other).update(vars(self), covariance=as_readonly(covariance), motor_covariance=motor)
         return other
+
+    @property
+    def expected_effort(self) -> float:
+        """The effort with which the class is compared [m^2/s^6]."""
+        return self.effort if self.expected is None else self.expected
 
     @property
     def path(self) -> Array:
@@ -375,7 +380,7 @@ class PredictedCandidate:
 
     candidate: the homotopy class; solution: its forward optimal control; sides: side on which the mean path passes each obstacle,
     by id. cost: effort to go, time cost, and the share of the effort since onset that all classes have in common [m^2/s^5];
-    likelihood in [0, 1]: 0 unless solved or compromised. age_s: 0, or how long ago the solution was found, of which this is the
+    likelihood in [0, 1]: 0 unless solved, compromised or estimated. age_s: 0, or how long ago the solution was found, of which this is the
     rest, if there was no time for a new one or it failed [s]. way: a number that stays the same for as long as the class is
     followed, whatever its label and its rank are. height: the movement along the normal of the plane, None where it is not
     predicted: the hand then stays at its height.
@@ -401,7 +406,7 @@ class PredictedCandidate:
 
     @property
     def has_likelihood(self) -> bool:
-        """Whether this candidate takes part in the likelihood: it is solved or compromised."""
+        """Whether this candidate takes part in the likelihood: it is solved, compromised or estimated."""
         return self.status.has_likelihood
 
     @property
@@ -461,7 +466,7 @@ class PredictedCandidate:
 class Prediction(Record):
     """The prediction that belongs to one hand sample.
 
-    candidates: solved and compromised ones, most likely first; then those without a likelihood, with their status.
+    candidates: solved, compromised and estimated ones, most likely first; then those without a likelihood, with their status.
     most_likely: label after hysteresis, None where no candidate has a likelihood. notes: facts for diagnostics (relaxed margins,
     merged classes, culled obstacles), as counts by name. solve_s: wall time of the whole prediction [s]. obstacles: all that were
     given, at the stamp of the hand; goals (g, 2) [m]. cleared (n,): whether the predicted height clears each obstacle, which
@@ -505,5 +510,5 @@ class Prediction(Record):
 
     @property
     def candidates_with_likelihood(self) -> tuple[PredictedCandidate, ...]:
-        """The candidates that take part in the likelihood, most likely first: solved and compromised ones."""
+        """The candidates that take part in the likelihood, most likely first."""
         return tuple(each for each in self.candidates if each.has_likelihood)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.errors import MessageError
-from foc_ros.core.ocp.contacts.smooth_path import compute_curve
+from foc_ros.core.dynamics.curve import compute_curve
 from foc_ros.core.types import (
     LEFT,
     NANOSECONDS,

@@ -24,7 +24,7 @@ from foc_ros.core.estimation.duration import is_passing
 from foc_ros.core.learning.goal_reached import AT_GOAL_M, find_goal_at_end
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
-from foc_ros.core.ocp.warm_start import Start, cold_start
+from foc_ros.core.ocp.start import Start, cold_start
 from foc_ros.core.types import Array, Record, Solution, Status
 
 from .estimates import Estimate, Estimates, clip_to_bounds

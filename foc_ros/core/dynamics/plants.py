@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from foc_ros.core.errors import InputError
 from foc_ros.core.types import Array, Record
 
+from .response import Response
+
 CACHED_HORIZONS = 16
 """Size of caches: one horizon per duration, for a prediction and a few before it, about 60 kB each at N = 50."""
 
@@ -72,12 +74,15 @@ class Horizon(Record):
     """The condensed dynamics of N steps: X(t) = A^t X(0) + the convolution of u with the impulse responses.
 
     u (2N,) is the stacked control: the first channel at steps 0..N-1, then the second. powers (N + 1, n, n): A^0..A^N; states
-    (n, 2, N + 1): impulse responses of the states, as in `apply_impulse_response`. dt [s].
+    (n, 2, N + 1): impulse responses of the states, as in `apply_impulse_response`. dt [s]. gain, unit: where responses of the
+    position differ by a factor only from those of another horizon, this factor and that horizon.
     """
 
     powers: Array
     states: Array
     dt: float
+    gain: float = 1.0
+    unit: Horizon | None = None
 
     @property
     def steps(self) -> int:
@@ -105,6 +110,11 @@ class Horizon(Record):
         motion = self.states[:4].copy()
         motion[2:] *= self.dt
         return motion
+
+    @cached_property
+    def position_response(self) -> Response:
+        """The response of the position at any time to a control in units of `gain`."""
+        return Response(self.motion) if self.unit is None else self.unit.position_response
 
     @cached_property
     def last(self) -> Array:
@@ -159,7 +169,7 @@ def build_triple_integrator_horizon(dt: float, steps: int) -> Horizon:
     """
     unit = _unit_horizon(steps)
     scale = compute_state_scale(dt)
-    return Horizon(unit.powers * (scale[:, None] / scale), unit.states * (dt**3 * scale)[:, None, None], dt)
+    return Horizon(unit.powers * (scale[:, None] / scale), unit.states * (dt**3 * scale)[:, None, None], dt, dt**3, unit)
 
 
 def find_states_at_goal(n: int, passing: bool = False) -> NDArray[np.bool_]:

@@ -27,7 +27,6 @@ import numpy as np
 
 from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.likelihood import CostModel
-from foc_ros.core.ocp.warm_start import interpolate_rest, resample_rest
 from foc_ros.core.types import NANOSECONDS, Array, Candidate, PredictedCandidate, Prediction, Record, Solution, as_readonly
 
 from .class_numbers import is_renamed
@@ -163,13 +162,25 @@ def hold_answer(answer: Answer, candidate: Candidate, stamp_ns: int, costs: Cost
     return PredictedCandidate(candidate, rest, sides, costs.compute_cost(rest), answer.predicted.likelihood, age_s)
 
 
+def interpolate_rest(states: Array, begin: float) -> Array:
+    """Return states (N + 1, ...), such as means or covariances, from the step `begin` on, at N steps."""
+    steps = len(states) - 1
+    at = np.linspace(begin, steps, steps + 1)
+    row = np.minimum(at.astype(np.intp), steps - 1)
+    share = (at - row).reshape(-1, *(1,) * (states.ndim - 1))
+    rest: Array = (1.0 - share) * states[row] + share * states[row + 1]
+    return rest
+
+
 def _shift(solution: Solution, age_s: float, left_s: float, message: str) -> Solution:
     """Return the rest of a solution from an age [s] on, at as many steps."""
     steps = len(solution.control)
     begin, motor = age_s / solution.dt, solution.motor_covariance
-    mean, covariance, control = map(as_readonly, resample_rest(solution.mean, solution.covariance, solution.control, begin))
+    mean, covariance = (as_readonly(interpolate_rest(each, begin)) for each in (solution.mean, solution.covariance))
     if motor is not None:
-        motor = as_readonly(resample_rest(solution.mean, motor, solution.control, begin)[1])
+        motor = as_readonly(interpolate_rest(motor, begin))
+    during = (begin + (steps - begin) * (np.arange(steps) + 0.5) / steps).astype(np.intp)
+    control = as_readonly(solution.control[np.minimum(during, steps - 1)])
     rest = replace(solution, mean=mean, covariance=covariance, motor_covariance=motor, control=control, message=message)
     return replace(rest, effort=float((control**2).sum()), dt=left_s / steps)
 

@@ -13,34 +13,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.core.kernels import Indices, Matrix, Tensor, Vector, compiled, compiled_with_caller
 from foc_ros.core.types import Array, Obstacles
-
-from .rounded_polygon import Polygons, find_offset
 
 CERTAIN_K = 1e6
 """Safety factor reported where the variance is zero: eta then differs from 1 by 1e-12."""
-
-
-class UncertainObstacles(NamedTuple):
-    """m rounded polygons whose centres and radii are Gaussian.
-
-    centre (m, 2): mean centres at step 0 [m]; drift (m, 2): how far they move in a step [m]; size_mean, size_variance (m,):
-    E[R^2] [m^2] and Var[R^2] [m^4]; centre_covariance (m, 2, 2) [m^2]; ignored_until (m,): steps from now before which an
-    obstacle does not count, because the hand is still leaving its margin; polygons: around the centres.
-    """
-
-    centre: Matrix
-    drift: Matrix
-    size_mean: Vector
-    size_variance: Vector
-    centre_covariance: Tensor
-    ignored_until: Vector
-    polygons: Polygons
 
 
 def k_of_eta(eta: float) -> float:
@@ -98,54 +77,25 @@ def centre_trajectories(centre: Array, drift: Array, steps: int) -> Array:
     return moved
 
 
-@compiled
-def find_first_alike(obstacles: UncertainObstacles, tolerance: float) -> Indices:
-    """Return for each obstacle the first one of the same shape, (m,).
+def compute_safety_factor(distance: Array, variance: Array, size_mean: Array, size_variance: Array) -> Array:
+    """Return k = -E[C] / sqrt(Var[C]) at some positions, linearised there; +-CERTAIN_K where nothing is uncertain.
 
-    Their centres, drifts, root mean square radii and vertices differ by less than a tolerance.
+    Parameters
+    ----------
+    distance : Array
+        Signed distance D from the polygon [m], of any shape (...).
+    variance : Array
+        Variance n' P n of the position along the normal [m^2], (...).
+    size_mean, size_variance : Array
+        E[R^2] [m^2] and Var[R^2] [m^4], which broadcast to (...).
+
+    Returns
+    -------
+    Array
+        (D |D| - E[R^2]) / sqrt(Var[R^2] + 4 D^2 n' P n), (...) (paper, equations 8-15).
     """
-    first, reach, polygons = np.arange(len(obstacles.centre)), np.sqrt(obstacles.size_mean), obstacles.polygons
-    for i in range(len(first)):
-        for j in range(i):
-            difference = abs(reach[i] - reach[j])
-            for axis in range(2):
-                difference = max(difference, abs(obstacles.centre[i, axis] - obstacles.centre[j, axis]))
-                difference = max(difference, abs(obstacles.drift[i, axis] - obstacles.drift[j, axis]))
-                for corner in range(polygons.corners[i]):
-                    apart = polygons.vertices[i, corner, axis] - polygons.vertices[j, corner, axis]
-                    difference = max(difference, abs(apart))
-            if difference < tolerance and polygons.corners[i] == polygons.corners[j]:
-                first[i] = j
-                break
-    return first
-
-
-@compiled_with_caller
-def safety_factor(mean: float, variance: float) -> float:
-    """Return k = -E / sqrt(Var) of one obstacle at one time; +-CERTAIN_K where the variance is zero."""
-    if variance > 0:
-        return float(min(max(-mean / np.sqrt(variance), -CERTAIN_K), CERTAIN_K))
-    return CERTAIN_K if mean <= 0 else -CERTAIN_K
-
-
-@compiled
-def constraint_moments(positions: Matrix, covariance: Matrix, obstacles: UncertainObstacles) -> tuple[Matrix, Matrix]:
-    """Return E[C] [m^2] and Var[C] [m^4] of m obstacles at steps 1..N, (m, N) each, linearised at mean positions.
-
-    positions (N, 2) [m]; covariance (3, N): rows xx, yy, xy [m^2]. E[C] is minus infinity where an obstacle does not count.
-    """
-    m, steps = len(obstacles.centre), len(positions)
-    mean, variance = np.empty((m, steps)), np.empty((m, steps))
-    for j in range(m):
-        own = obstacles.centre_covariance[j]
-        for t in range(steps):
-            x = positions[t, 0] - (obstacles.centre[j, 0] + (t + 1) * obstacles.drift[j, 0])
-            y = positions[t, 1] - (obstacles.centre[j, 1] + (t + 1) * obstacles.drift[j, 1])
-            xx, yy, xy = covariance[0, t] + own[0, 0], covariance[1, t] + own[1, 1], covariance[2, t] + own[0, 1]
-            offset = find_offset(obstacles.polygons, j, x, y)
-            x, y = offset.x, offset.y
-            mean[j, t] = (
-                obstacles.size_mean[j] - offset.side * (x * x + y * y) if t + 1.0 >= obstacles.ignored_until[j] else -np.inf
-            )
-            variance[j, t] = obstacles.size_variance[j] + 4 * (x * x * xx + y * y * yy + 2 * x * y * xy)
-    return mean, variance
+    square = distance * np.abs(distance)
+    spread = np.sqrt(size_variance + 4.0 * np.abs(square) * variance)
+    certain = np.where(square >= size_mean, CERTAIN_K, -CERTAIN_K)
+    k: Array = np.divide(square - size_mean, spread, out=certain, where=spread > 0.0)
+    return np.clip(k, -CERTAIN_K, CERTAIN_K)

@@ -21,13 +21,6 @@ INFEASIBLE = 1e-10
 """Accuracy of PIQP's proofs of infeasibility. With its default, 1e-4, it takes rows that hardly give way for a contradiction."""
 MAX_ITERATIONS = 100
 """Of one attempt; 5 to 15 are usual."""
-LARGEST_WORK = 1_000_000_000
-"""Bound on variables^2 (variables + rows) times the iterations of an attempt: 0.1 s, during which Python runs no other thread."""
-WORK_PER_S = 1e10
-"""The same work in one second."""
-USUAL_ITERATIONS = 15
-FEWEST_ITERATIONS = 10
-"""A problem for which the bound does not allow so many iterations is not tried."""
 
 
 class DenseQP(NamedTuple):
@@ -49,31 +42,17 @@ class Answer(NamedTuple):
     x: Array
 
 
-def solve_piqp(qp: DenseQP, attempts: int = len(ATTEMPTS)) -> Answer:
-    """Solve by PIQP, and if it fails again with other settings, up to a number of attempts.
-
-    PIQP can call a feasible problem infeasible, or miss an accuracy that rounding does not allow. A problem too large for
-    `LARGEST_WORK` counts as not solved.
-    """
-    variables, rows = len(qp.c), 0 if qp.g is None else len(qp.g)
-    iterations = min(MAX_ITERATIONS, LARGEST_WORK // max(variables**2 * (variables + rows), 1))
-    if iterations < FEWEST_ITERATIONS:
-        return Answer(False, np.zeros(variables))
+def solve_piqp(qp: DenseQP) -> Answer:
+    """Solve by PIQP, and if it fails again with other settings: it can miss an accuracy that rounding does not allow."""
     P = np.asfortranarray(qp.P)
     A = None if qp.A is None else np.asfortranarray(qp.A)
     G = None if qp.G is None else np.asfortranarray(qp.G)
-    for accuracy, share, scale_cost in ATTEMPTS[:attempts]:
+    for accuracy, share, scale_cost in ATTEMPTS:
         solver = _get_piqp(accuracy, share, scale_cost)
-        solver.settings.max_iter = iterations
         solver.setup(P, qp.c, A, qp.b, G, qp.g, None, qp.lower, None)
         if solver.solve() == piqp.PIQP_SOLVED:
             return Answer(True, np.array(solver.result.x))
     return Answer(False, np.array(solver.result.x))
-
-
-def estimate_time(variables: int, rows: int = 0) -> float:
-    """Return the time that PIQP usually takes at most [s]."""
-    return USUAL_ITERATIONS * variables**2 * (variables + rows) / WORK_PER_S
 
 
 class _SolversOfThread(threading.local):
@@ -92,7 +71,7 @@ def _get_piqp(accuracy: float, share: float, scale_cost: bool) -> piqp.DenseSolv
         solver = kept[accuracy, share, scale_cost] = piqp.DenseSolver()
         settings = solver.settings
         settings.eps_abs = settings.eps_rel = settings.eps_duality_gap_abs = settings.eps_duality_gap_rel = accuracy
-        settings.tau, settings.preconditioner_scale_cost = share, scale_cost
+        settings.tau, settings.preconditioner_scale_cost, settings.max_iter = share, scale_cost, MAX_ITERATIONS
         if hasattr(settings, 'eps_dual_inf'):  # from 0.7 on
             settings.eps_dual_inf = settings.eps_primal_inf = INFEASIBLE
     return kept[accuracy, share, scale_cost]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from foc_ros.core.dynamics.noise import stack_noise
+from foc_ros.core.obstacles.geometry import Edges, find_offset
 from foc_ros.core.types import Array
 
 from .problem import Problem
@@ -64,23 +65,11 @@ def _clear(problem: Problem, control: Array, samples: int, generator: np.random.
     drift = _gaussian(obstacles.centre_covariance, samples, generator)
     clear: Array = np.empty((samples, len(obstacles), steps), dtype=np.bool_)
     for row in range(len(obstacles)):
-        vertices = obstacles.vertices[row, : obstacles.corners[row]]
-        distance = measure_distances(positions - problem.centres[row] - drift[:, row, None], vertices)
+        relative = positions - problem.centres[row] - drift[:, row, None]
+        edges = Edges(*(each[row] for each in problem.edges))
+        distance = find_offset(relative[..., 0], relative[..., 1], edges).distance
         clear[:, row] = distance >= np.abs(radius[:, row, None])
     return clear
-
-
-def measure_distances(points: Array, vertices: Array) -> Array:
-    """Return the signed distances (...) [m] of points (..., 2) from a convex polygon (v, 2), without kernels."""
-    edges = np.roll(vertices, -1, axis=0) - vertices
-    nearest, is_inside = np.full(points.shape[:-1], np.inf), np.full(points.shape[:-1], len(vertices) > 2)
-    for vertex, edge in zip(vertices, edges, strict=True):
-        apart = points - vertex
-        share = np.clip(apart @ edge / max(float(edge @ edge), np.finfo(float).tiny), 0.0, 1.0)
-        nearest = np.minimum(nearest, ((apart - share[..., None] * edge) ** 2).sum(axis=-1))
-        is_inside &= edge[0] * apart[..., 1] - edge[1] * apart[..., 0] > 0.0
-    distances: Array = np.sqrt(nearest) * np.where(is_inside, -1.0, 1.0)
-    return distances
 
 
 def _gaussian(covariance: Array, samples: int, generator: np.random.Generator) -> Array:

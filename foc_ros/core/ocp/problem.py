@@ -10,29 +10,16 @@ from typing import TypedDict, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.dynamics.condensed import PositionNoise, position_variances, variance_weights
+from foc_ros.core.dynamics.condensed import variance_weights
 from foc_ros.core.dynamics.noise import stack_noise
 from foc_ros.core.dynamics.plants import Horizon, find_states_at_goal
 from foc_ros.core.errors import SceneError
-from foc_ros.core.kernels import freeze
-from foc_ros.core.obstacles.chance_constraint import (
-    CANTELLI,
-    RiskBound,
-    UncertainObstacles,
-    centre_trajectories,
-    find_first_alike,
-    size_moments,
-)
-from foc_ros.core.obstacles.rounded_polygon import Polygons, measure_offsets, tabulate_polygons
+from foc_ros.core.obstacles.chance_constraint import CANTELLI, RiskBound, centre_trajectories, compute_safety_factor, size_moments
+from foc_ros.core.obstacles.geometry import Edges, find_offset, tabulate_edges
 from foc_ros.core.safety_preference import HARD, SafetyPreference
 from foc_ros.core.types import Array, Obstacles, Record, as_readonly
 
-from .contacts.hermite import compute_trajectory
-from .terms import ChanceTerms, CostTerms, Motion, MovingObstacles, ProblemTerms
-
 BOTH = np.ones(2)
-SAME_SHAPE = 1e-6
-"""Difference between two obstacles, relative to the scene, below which they count as the same."""
 SMALLEST_EXTENT = 1e-6
 """Least size of a scene [m]."""
 
@@ -99,28 +86,9 @@ class Problem(Record):
         return max(math.hypot(x, y), SMALLEST_EXTENT, float(self.obstacles.radius.max(initial=0.0)))
 
     @cached_property
-    def terms(self) -> ProblemTerms:
-        """The data of the problem as kernels take them."""
-        scale = np.array([1.0, 1.0, self.horizon.dt, self.horizon.dt])
-        initial = self.initial_covariance
-        errors = self.error_map[:, :4].swapaxes(0, 1) if initial.any() else np.zeros((4, 0, len(initial)))
-        free = np.ascontiguousarray(self.free_covariance[1:, (0, 1, 0), (0, 1, 1)].T)
-        chance = ChanceTerms(
-            PositionNoise(self.horizon.maps, self.noise_variance, free),
-            np.ascontiguousarray(errors * scale[:, None, None]),
-            initial,
-            UncertainObstacles(
-                self.obstacles.centre,
-                self.drift,
-                *self.size,
-                self.obstacles.centre_covariance,
-                self.ignored_until,
-                self.polygons,
-            ),
-        )
-        motion = Motion(self.horizon.motion, np.ascontiguousarray(self.free[:, :4].T * scale[:, None]))
-        cost = CostTerms(self.weighted_variance, self.summed_variance, *self.goal_rows)
-        return freeze(ProblemTerms(motion, cost, chance, self.centre_trajectories, self.extent))
+    def edges(self) -> Edges:
+        """The edges of the polygons of the obstacles, (m, V)."""
+        return tabulate_edges(self.obstacles.vertices, self.obstacles.corners)
 
     @cached_property
     def free(self) -> Array:
@@ -151,26 +119,18 @@ class Problem(Record):
         return self.centre_trajectories[1:].swapaxes(0, 1)
 
     @cached_property
-    def first_alike(self) -> NDArray[np.intp]:
-        """For each obstacle the row of the first one that is the same shape, (m,): of equal ones only one is in contact."""
-        return find_first_alike(self.terms.chance.obstacles, SAME_SHAPE * self.extent)
-
-    @cached_property
     def inside_margin(self) -> NDArray[np.bool_]:
         """Whether the hand is now inside the margin of each obstacle, (m,); never without a recovery time."""
         if self.recovery_s <= 0 or not len(self.obstacles):
             return np.zeros(len(self.obstacles), dtype=np.bool_)
-        offset, distance = self._offset_now
+        x, y = (self.initial_mean[:2] - self.obstacles.centre).T
+        found = find_offset(x, y, self.edges)
+        normal = np.stack((found.normal_x, found.normal_y), axis=1)
         covariance = self.initial_covariance[:2, :2] + self.obstacles.centre_covariance
-        variance = self.size[1] + 4 * (offset[:, None] @ covariance @ offset[:, :, None]).ravel()
-        inside: NDArray[np.bool_] = self.size[0] - distance * np.abs(distance) + self.wanted_k * np.sqrt(variance) > 0.0
+        variance = np.einsum('ji,jik,jk->j', normal, covariance, normal)
+        k = compute_safety_factor(found.distance, variance, *self.size)
+        inside: NDArray[np.bool_] = k < self.wanted_k
         return inside
-
-    @property
-    def ignored_until(self) -> Array:
-        """Steps from now before which each obstacle does not count, because the hand is still leaving its margin, (m,)."""
-        ignored: Array = self.inside_margin.astype(np.float64) * (self.recovery_s / self.horizon.dt)
-        return ignored
 
     @cached_property
     def size(self) -> tuple[Array, Array]:
@@ -216,51 +176,15 @@ class Problem(Record):
             np.concatenate((softness, np.tile(0.5 / self.stage_weights[stage], steps - 1))),
         )
 
-    def obstacles_with_reach(self, tau: float) -> MovingObstacles:
-        """Return the obstacles with the distance to keep from their polygons, sqrt(E[R^2] + tau), for tau [m^2].
-
-        Less is required where the hand is nearer now, and has a recovery time: see `clearance.required_distance`.
-        """
-        known = self._known_reach.get(tau)
-        if known is not None:
-            return known
-        reach: Array = np.sqrt(self.size[0] + tau)
-        missing, pace = np.zeros(len(reach)), 0.0
-        if self.recovery_s > 0:
-            missing, pace = reach - self._offset_now[1], self.horizon.dt / self.recovery_s
-        obstacles = MovingObstacles(
-            self.obstacles.centre, self.drift, as_readonly(reach), as_readonly(missing), pace, self.polygons
-        )
-        self._known_reach[tau] = obstacles
-        return obstacles
-
-    @cached_property
-    def _known_reach(self) -> dict[float, MovingObstacles]:
-        """The obstacles by tau, which are needed several times for each."""
-        return {}
-
-    @cached_property
-    def _offset_now(self) -> tuple[Array, Array]:
-        """The hand relative to the nearest point of each polygon now, (m, 2) [m], and its signed distance, (m,) [m]."""
-        offset, distance = measure_offsets(self.initial_mean[:2], self.obstacles)
-        return offset[0], distance[0]
-
-    @cached_property
-    def polygons(self) -> Polygons:
-        """The polygons of the obstacles, as kernels take them."""
-        return tabulate_polygons(self.obstacles)
-
-    def trajectory(self, control: Array) -> Array:
-        """Return the mean x, y, vx, vy of a stacked control (2N,) at steps 0..N, (4, N + 1), velocities per step [m]."""
-        return compute_trajectory(self.terms.motion, np.ascontiguousarray(control, dtype=float))
+    def states(self, control: Array) -> Array:
+        """Return the mean state of a stacked control (2N,) at steps 0..N, (N + 1, n)."""
+        moved = self.free.copy()
+        moved[1:] += self.horizon.response @ np.asarray(control, dtype=float)
+        return moved
 
     def positions(self, control: Array) -> Array:
         """Return the mean positions of a stacked control (2N,) at steps 1..N, (N, 2) [m]."""
-        return np.ascontiguousarray(self.trajectory(control)[:2, 1:].T)
-
-    def position_variance(self, control: Array) -> Array:
-        """Return the position covariance of a stacked control (2N,) at steps 1..N as rows xx, yy, xy, (3, N) [m^2]."""
-        return position_variances(self.terms.chance.noise, np.ascontiguousarray(control, dtype=float))
+        return self.states(control)[1:, :2]
 
 
 class ProblemOptions(TypedDict, total=False):

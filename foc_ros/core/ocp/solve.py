@@ -1,7 +1,8 @@
-"""The forward optimal control of one candidate: a strategy is applied to a problem, and its result evaluated in full."""
+"""The forward optimal control of candidates: a strategy is applied to their problems, and its results evaluated in full."""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,111 +10,171 @@ from dataclasses import replace
 import numpy as np
 
 from foc_ros.core.config import FocConfig
-from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
-from foc_ros.core.dynamics.impulse_response import apply_impulse_response
+from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.dynamics.noise import propagate_covariance
 from foc_ros.core.errors import InputError
-from foc_ros.core.kernels import Matrix, Tensor, Vector, compiled
+from foc_ros.core.obstacles.geometry import find_offset
 from foc_ros.core.registry import STRATEGIES
 from foc_ros.core.types import Array, Solution, Status, as_readonly
 
-from .clearance import find_deepest
-from .minimum_safety_factor import MinimumSafetyFactor, find_minimum_safety_factor
+from .margin import Contacts, Margins
 from .problem import Problem
-from .strategies import StrategyResult, give_up_out_of_time
-from .warm_start import Start
+from .start import Start
+from .strategies import StrategyResult
 
 ETA_TOLERANCE = 1e-5
 """How far a solution may fall short of eta by rounding."""
+REMAINING = 0.5
+"""Part of what a QP promised by which the loss still falls after its step: the median in the random scenes of the tests."""
 NO_VIOLATION = 1e-7
 """Shortfall of a distance that counts as rounding [m]."""
 
 
 def solve_problem(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline = NEVER) -> Solution:
-    """Solve one problem in the homotopy class in which it starts, by the strategy of the settings.
+    """Solve one problem in the homotopy class in which it starts: see `solve_problems`."""
+    return solve_problems([problem], [start], settings, deadline)[0]
+
+
+def solve_problems(
+    problems: Sequence[Problem], starts: Sequence[Start], settings: FocConfig, deadline: Deadline = NEVER
+) -> list[Solution]:
+    """Solve problems, each in the homotopy class in which it starts, by the strategy of the settings.
 
     Parameters
     ----------
-    problem
-        The problem.
-    start
-        Where the strategy begins.
+    problems
+        The problems. Those with the same response of the position to the control advance together.
+    starts
+        Where the strategy begins, for each.
     settings
         The strategy, its parameters, and the QP backend.
     deadline
-        Checked before each QP.
+        Looked at once an iteration of all problems.
 
     Returns
     -------
-    Solution
-        If the problem has no solution, its status says so, and its mean is the best that was found: the largest eta that the
+    list[Solution]
+        If a problem has no solution, its status says so, and its mean is the best that was found: the largest eta that the
         strategy reached, or the smallest violation. No exception is raised for that.
     """
-    strategy = STRATEGIES.get(settings.strategy)  # the first call imports it, which is no part of the time of a solve
-    began = time.perf_counter()
-    if settings.qp_backend != problem.qp_backend:
-        problem = replace(problem, qp_backend=settings.qp_backend)
-    try:
-        result = strategy(problem, start, settings, deadline)
-    except OutOfTimeError as error:
-        result = give_up_out_of_time(problem, error)
-    if not isinstance(result, StrategyResult):
-        raise InputError(f'strategy {settings.strategy}', 'a StrategyResult as its result', repr(result))
-    minimum = result.minimum
-    if minimum is None:
-        minimum = find_minimum_safety_factor(problem, result.control, between_steps=False)
-    eta = problem.risk.find_probability(minimum.k)
-    if result.status is Status.SOLVED and result.aims_at_eta and eta < problem.eta - ETA_TOLERANCE:
-        result = replace(result, status=Status.ITERATION_LIMIT, message=f'the solution achieves eta {eta:.6g} only')
-    if result.status is Status.ETA_UNREACHABLE and not problem.preference.is_hard:
-        result = replace(result, status=Status.COMPROMISED)
-    return _evaluate(problem, result, minimum, began)
+    strategy = STRATEGIES.get(settings.strategy)
+    groups: dict[int, list[int]] = {}
+    for row, problem in enumerate(problems):
+        groups.setdefault(id(problem.horizon.position_response), []).append(row)
+    solved: dict[int, Solution] = {}
+    for rows in groups.values():
+        group = [
+            each if each.qp_backend == settings.qp_backend else replace(each, qp_backend=settings.qp_backend)
+            for each in (problems[row] for row in rows)
+        ]
+        began = time.perf_counter()
+        results = strategy(group, [starts[row] for row in rows], settings, deadline)
+        if not isinstance(results, list) or not all(isinstance(each, StrategyResult) for each in results):
+            raise InputError(f'strategy {settings.strategy}', 'a list of StrategyResult as its result', repr(results))
+        solutions = _evaluate(group, results)
+        share_s = (time.perf_counter() - began) / len(rows)
+        solved |= {row: replace(each, solve_s=share_s) for row, each in zip(rows, solutions, strict=True)}
+    return [solved[row] for row in range(len(problems))]
 
 
-def _evaluate(problem: Problem, result: StrategyResult, minimum: MinimumSafetyFactor, began: float) -> Solution:
-    """Return the solution of a result that began at a time of `time.perf_counter` [s]."""
-    horizon, control, contacts = problem.horizon, result.control, result.contacts
-    mean = problem.free + apply_impulse_response(horizon.states, control).T
-    covariance = propagate_covariance(horizon, problem.free_covariance, problem.noise_variance, control)
-    violation, violated = compute_violation(problem, mean, result.tau)
-    weights, eta = result.equivalent_weights, problem.risk.find_probability(minimum.k)
-    names = [problem.obstacles.ids[row] for row in contacts.obstacle.tolist()]
+def find_least_safety_factor(problem: Problem, control: Array) -> tuple[float, int, float]:
+    """Return the least safety factor of a stacked control (2N,) over all obstacles and times, and where it is.
+
+    Returns
+    -------
+    float, int, float
+        k, `CERTAIN_K` without obstacles; the row of the obstacle; the time in steps, from the end of the first step on.
+    """
+    margins = Margins([problem], np.zeros(1), is_chance=True)
+    k, obstacle, moment = margins.find_least_factors(np.asarray(control, dtype=float)[None] * problem.horizon.gain)
+    return float(k[0]), int(obstacle[0]), float(moment[0])
+
+
+def _evaluate(problems: Sequence[Problem], results: Sequence[StrategyResult]) -> list[Solution]:
+    """Return the solutions of problems with the same response, with the least safety factors over all times."""
+    margins = Margins(problems, np.zeros(len(problems)), is_chance=True)
+    control = np.stack([each.control * problem.horizon.gain for problem, each in zip(problems, results, strict=True)])
+    minima = zip(*(each.tolist() for each in margins.find_least_factors(control)), strict=True)
+    weights = _find_weights(margins, control, results)
+    return [_evaluate_one(*each) for each in zip(problems, results, minima, weights, strict=True)]
+
+
+def _evaluate_one(
+    problem: Problem, result: StrategyResult, minimum: tuple[float, int, float], weights: tuple[tuple[float, float], ...]
+) -> Solution:
+    (k, row, moment), risk, control = minimum, problem.risk, result.control
+    eta, status, message = risk.find_probability(k), result.status, result.message
+    if status is Status.SOLVED and result.aims_at_eta and eta < problem.eta - ETA_TOLERANCE:
+        status, message = Status.ITERATION_LIMIT, f'the solution achieves eta {eta:.6g} only'
+    if status is Status.ETA_UNREACHABLE and not problem.preference.is_hard:
+        status = Status.COMPROMISED
+    mean = problem.states(control)
+    covariance = propagate_covariance(problem.horizon, problem.free_covariance, problem.noise_variance, control)
+    violation, violated = compute_violation(problem, mean, result.tau) if status is Status.INFEASIBLE or result.tau else (0.0, None)
+    effort, names = float(control @ control), problem.obstacles.ids
+    shortfall, expected = 0.0 if status is Status.SOLVED else max(problem.wanted_k - k, 0.0), None
+    if status is Status.DEADLINE:
+        expected, shortfall = _expect(problem, effort, shortfall, REMAINING * result.gain)
+    obstacles, times, pushes = (each.tolist() for each in result.forces)
     return Solution(
-        status=result.status,
-        message=_complete_message(problem, result, violation),
-        dt=horizon.dt,
+        status=status,
+        message=_complete_message(problem, status, message, violation),
+        dt=problem.horizon.dt,
         mean=as_readonly(mean),
         covariance=as_readonly(covariance),
-        control=control.reshape(2, -1).T,
-        effort=float(control @ control),
+        control=as_readonly(np.ascontiguousarray(control.reshape(2, -1).T)),
+        effort=effort,
         costs=compute_cost_terms(problem, control, mean, covariance, result.lam),
         tau=result.tau,
         lam=result.lam,
         eta=eta,
-        eta_at=_name(problem.obstacles.ids, (minimum.obstacle, minimum.time)) if len(problem.obstacles) else None,
-        eta_reachable=eta if result.status is Status.ETA_UNREACHABLE else None,
-        safety_factor=minimum.k,
-        safety_shortfall=0.0 if result.status is Status.SOLVED else max(problem.wanted_k - minimum.k, 0.0),
+        eta_at=(names[row], moment) if len(problem.obstacles) else None,
+        eta_reachable=eta if status is Status.ETA_UNREACHABLE else None,
+        safety_factor=k,
+        safety_shortfall=shortfall,
         violation=violation,
-        violation_at=_name(problem.obstacles.ids, violated),
-        multipliers=tuple(zip(names, contacts.time.tolist(), contacts.multiplier.tolist(), strict=True)),
-        equivalent_weights=((result.tau, result.lam),) * len(names) if weights is None else tuple(weights),
-        safety_factor_slope=result.safety_factor_slope,
-        is_complete=result.is_complete,
+        violation_at=None if violated is None else (names[violated[0]], violated[1]),
+        multipliers=tuple((names[j], t, y * effort) for j, t, y in zip(obstacles, times, pushes, strict=True)),
+        equivalent_weights=weights,
+        expected=expected,
         qp_solves=result.qp_solves,
         iterations=result.iterations,
-        solve_s=time.perf_counter() - began,
     )
 
 
-def _name(ids: Sequence[str], place: tuple[int, float] | None) -> tuple[str, float] | None:
-    return None if place is None else (ids[place[0]], place[1])
+def _expect(problem: Problem, effort: float, shortfall: float, gain: float) -> tuple[float, float]:
+    """Return the effort and the shortfall of safety that are expected at the end of a sequence, whose loss falls by a gain [ln J]."""
+    preference = problem.preference
+    if preference.is_hard or preference.beta == 0.0:
+        return effort * math.exp(-gain), 0.0
+    rate = preference.shortfall / preference.beta
+    less = min(shortfall, gain / rate) if rate > 0.0 else 0.0
+    return effort * math.exp(-(gain - rate * less)), shortfall - less
 
 
-def _complete_message(problem: Problem, result: StrategyResult, violation: float) -> str:
-    """Return the message of a result with the size of its violation and the obstacles whose margins do not count yet."""
-    message = result.message
-    if result.status is Status.INFEASIBLE and violation > 0:
+def _find_weights(margins: Margins, control: Array, results: Sequence[StrategyResult]) -> list[tuple[tuple[float, float], ...]]:
+    """Return the (tau [m^2], lambda [1/s^6]) of the contacts of each result, for controls (b, 2N) in units of `Horizon.gain`.
+
+    For a constraint at k they are those with which it would hold: tau = k sqrt(Var[C]) is by how much E[C] has to be below zero,
+    and lambda = y k D / sqrt(Var[C]), for a multiplier y [m/s^6], the cost of a variance along its normal at its time.
+    """
+    counts = [len(each.forces.time) for each in results]
+    obstacle, time, push = (np.concatenate([each.forces[i] for each in results]) for i in range(3))
+    problem = np.repeat(np.arange(len(results)), counts)
+    spread, distance = margins.measure_spread(Contacts(problem, obstacle.astype(np.intp), time), control)
+    k = np.array([each.at_k or 0.0 for each in results])[problem]
+    effort = np.array([float(each.control @ each.control) for each in results])[problem]
+    pairs = list(zip((k * spread).tolist(), (push * effort * k * distance / spread).tolist(), strict=True))
+    ends = np.cumsum(counts).tolist()
+    return [
+        tuple(pairs[end - count : end]) if each.at_k is not None else ((each.tau, each.lam),) * count
+        for each, count, end in zip(results, counts, ends, strict=True)
+    ]
+
+
+def _complete_message(problem: Problem, status: Status, message: str, violation: float) -> str:
+    """Return a message with the size of the violation and the obstacles whose margins do not count yet."""
+    if status is Status.INFEASIBLE and violation > 0:
         message += f', by up to {violation:.3g} m'
     left = [name for name, is_inside in zip(problem.obstacles.ids, problem.inside_margin.tolist(), strict=True) if is_inside]
     if left:
@@ -126,30 +187,26 @@ def compute_cost_terms(problem: Problem, control: Array, mean: Array, covariance
 
     control (2N,); mean (N + 1, n) and covariance (N + 1, n, n) that follow from it; lam: lambda [1/s^6].
     """
-    weights = problem.terminal_weights, problem.stage_weights
-    mean_error, variance, summed = sum_errors(mean, covariance, problem.goal, *weights)
-    effort = float(control @ control)
-    return {'effort': effort, 'mean_error': mean_error, 'variance': variance, 'lambda_variance': lam * summed}
-
-
-@compiled
-def sum_errors(mean: Matrix, covariance: Tensor, goal: Vector, terminal: Vector, stage: Vector) -> tuple[float, float, float]:
-    """Return weighted squared errors of a mean (N + 1, n), weighted variances, and the sum of the variances of x and y."""
-    times, n = mean.shape
-    squared, variance, summed = 0.0, 0.0, 0.0
-    for t in range(1, times):
-        for i in range(n):
-            weight = terminal[i] if t == times - 1 else stage[i]
-            squared += weight * (mean[t, i] - goal[i]) ** 2
-            variance += weight * covariance[t, i, i]
-        summed += covariance[t, 0, 0] + covariance[t, 1, 1]
-    return squared, variance, summed
+    weights = np.tile(problem.stage_weights, (len(mean) - 1, 1))
+    weights[-1] = problem.terminal_weights
+    variance = np.einsum('tii->ti', covariance[1:])
+    return {
+        'effort': float(control @ control),
+        'mean_error': float((weights * (mean[1:] - problem.goal) ** 2).sum()),
+        'variance': float((weights * variance).sum()),
+        'lambda_variance': lam * float(variance[:, :2].sum()),
+    }
 
 
 def compute_violation(problem: Problem, mean: Array, tau: float) -> tuple[float, tuple[int, int] | None]:
-    """Return by how much a mean (N + 1, n) comes nearer than required [m], and where: row of the obstacle and step 1..N.
+    """Return by how much a mean (N + 1, n) comes nearer than sqrt(E[R^2] + tau) at the steps [m], and where: obstacle and step.
 
-    0 and None where it never does. What is required is `Problem.obstacles`.
+    0 and None where it never does.
     """
-    missing, row, step = find_deepest(np.ascontiguousarray(mean[1:, :2]), problem.obstacles_with_reach(tau))
-    return (missing, (row, step)) if missing > NO_VIOLATION else (0.0, None)
+    if not len(problem.obstacles):
+        return 0.0, None
+    relative = mean[1:, None, :2] - problem.centre_trajectories[1:]
+    missing = np.sqrt(problem.size[0] + tau) - find_offset(relative[..., 0], relative[..., 1], problem.edges).distance
+    step, row = np.unravel_index(int(missing.argmax()), missing.shape)
+    deepest = float(missing[step, row])
+    return (deepest, (int(row), int(step) + 1)) if deepest > NO_VIOLATION else (0.0, None)

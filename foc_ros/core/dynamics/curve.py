@@ -6,7 +6,7 @@ import numpy as np
 
 from foc_ros.core.types import Array
 
-from .hermite import interpolate
+from .response import hermite, pair_steps
 
 LEAST_POINTS = 50
 """Number of points from which a curve looks smooth."""
@@ -22,5 +22,6 @@ def compute_curve(path: Array, velocity: Array, dt: float) -> Array:
     parts = -(-LEAST_POINTS // max(steps, 1))
     if steps < 1 or parts == 1:
         return path
-    trajectory = np.ascontiguousarray(np.concatenate([path, dt * velocity], axis=1).T)
-    return np.array([interpolate(trajectory, time, 0) for time in np.arange(parts * steps + 1) / parts])
+    ends = pair_steps(np.stack((path, dt * velocity), axis=1))
+    points: Array = (hermite(np.arange(parts) / parts) @ ends).reshape(-1, 2)
+    return np.concatenate((points, path[-1:]))

@@ -1,0 +1,92 @@
+"""The nearest point of a convex polygon: all that the numeric core knows of the shape of an obstacle.
+
+An obstacle is the set of points within a distance R of a convex polygon with one vertex (circle), two (capsule) or more (box,
+hull). With q(p) the point of the polygon nearest to p and d = p - q(p), the signed distance D is |d| outside the polygon and -|d|
+inside it, and n = d / D points away from the obstacle. Where q is a vertex n turns as p moves; where q is on an edge it does not.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foc_ros.core.types import Array
+
+SMALLEST_DISTANCE = 1e-9
+"""Distance [m] below which a point counts as on the polygon, where its normal is not defined: 1 nm."""
+
+
+class Edges(NamedTuple):
+    """The edges of convex polygons about their centres, padded to one number V of edges by edges without length.
+
+    x, y: where each edge begins [m]; along_x, along_y: from there to its end [m]; inverse_square: 1 / length^2 [1/m^2], 0 without
+    length; is_solid: whether the polygon has an inside. The last axis of all is that of the edges.
+    """
+
+    x: Array
+    y: Array
+    along_x: Array
+    along_y: Array
+    inverse_square: Array
+    is_solid: NDArray[np.bool_]
+
+    def take(self, rows: NDArray[np.intp]) -> Edges:
+        """Return the edges of the polygons in some rows of the first axis."""
+        return Edges(*(each[rows] for each in self))
+
+
+class Offset(NamedTuple):
+    """Points relative to polygons: signed distance D [m], outward unit normal n, and whether the nearest point is on an edge."""
+
+    distance: Array
+    normal_x: Array
+    normal_y: Array
+    is_on_edge: NDArray[np.bool_]
+
+
+def tabulate_edges(vertices: Array, corners: Array) -> Edges:
+    """Return the edges of polygons (..., V) with vertices (..., V, 2) [m], of which the first `corners` (...) are used."""
+    begin = np.where((np.arange(vertices.shape[-2]) < corners[..., None])[..., None], vertices, vertices[..., :1, :])
+    along = np.roll(begin, -1, axis=-2) - begin
+    square = (along**2).sum(axis=-1)
+    inverse = np.divide(1.0, square, out=np.zeros_like(square), where=square > 0.0)
+    return Edges(begin[..., 0], begin[..., 1], along[..., 0], along[..., 1], inverse, (corners > 2.0)[..., None])
+
+
+def find_offset(x: Array, y: Array, edges: Edges) -> Offset:
+    """Return the positions of points relative to polygons.
+
+    Parameters
+    ----------
+    x, y : Array
+        Points relative to the centres of the polygons [m], of any shape (...).
+    edges : Edges
+        Edges of the polygons; each field has a shape that broadcasts to (..., V).
+
+    Returns
+    -------
+    Offset
+        Arrays of shape (...).
+    """
+    if edges.x.shape[-1] == 1:
+        return _point(x - edges.x[..., 0], y - edges.y[..., 0], np.zeros(x.shape, dtype=np.bool_), np.zeros(x.shape, dtype=np.bool_))
+    from_x, from_y = x[..., None] - edges.x, y[..., None] - edges.y
+    share = (from_x * edges.along_x + from_y * edges.along_y) * edges.inverse_square
+    is_inside = (edges.along_x * from_y >= edges.along_y * from_x).all(axis=-1) & edges.is_solid[..., 0]
+    held = np.minimum(np.maximum(share, 0.0), 1.0)
+    off_x, off_y = from_x - held * edges.along_x, from_y - held * edges.along_y
+    nearest = (off_x * off_x + off_y * off_y).argmin(axis=-1)[..., None]
+    x, y, share = (np.take_along_axis(each, nearest, axis=-1)[..., 0] for each in (off_x, off_y, share))
+    return _point(x, y, is_inside, (share > 0.0) & (share < 1.0))
+
+
+def _point(x: Array, y: Array, is_inside: NDArray[np.bool_], is_on_edge: NDArray[np.bool_]) -> Offset:
+    """Return the offset for a vector from the nearest point; one without length points along the y axis."""
+    length = np.sqrt(x * x + y * y)
+    is_short = length < SMALLEST_DISTANCE
+    if is_short.any():
+        x, y, length = np.where(is_short, 0.0, x), np.where(is_short, SMALLEST_DISTANCE, y), np.maximum(length, SMALLEST_DISTANCE)
+    distance = np.where(is_inside, -length, length)
+    return Offset(distance, x / distance, y / distance, is_on_edge)

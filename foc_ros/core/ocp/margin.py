@@ -1,0 +1,479 @@
+"""The margin: by how much the mean movement clears an obstacle at a time, beyond what its uncertainty asks for.
+
+With D the signed distance of the mean from the polygon, n the outward normal, P the covariance of the position relative to the
+obstacle, and the moments of the radius R,
+
+    g(u, t; k, tau) = D - k s - sqrt(k^2 s^2 + E),    s^2 = n' P n + Var[R^2] / (4 D^2),    E = E[R^2] + tau,
+
+is zero where E[C] + tau + k sqrt(Var[C]) = E + 2 k D s - D^2 is (paper, equations 8-15): it is the same condition as a distance.
+An obstacle holds the movement off where the safety factor k(t) = (D^2 - E) / (2 D s) is least. There the margin has the gradient
+g_u and, by the envelope theorem, the Hessian g_uu - g_ut g_ut' / g_tt, so that contacts slide along obstacles.
+
+All functions take several problems at once, because NumPy takes as long for one as for a few.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foc_ros.core.dynamics.response import hermite, hermite_quintic, pair_steps
+from foc_ros.core.obstacles.chance_constraint import CERTAIN_K, compute_safety_factor
+from foc_ros.core.obstacles.geometry import Edges, find_offset, tabulate_edges
+from foc_ros.core.types import Array
+
+from .problem import Problem
+
+Indices = NDArray[np.intp]
+
+LEAST_STDDEV = 1e-6
+"""Standard deviation, relative to the scene, that is added to every other one: without any, k has no effect on the margin."""
+LEAST_REACH = 1e-6
+"""Least distance to keep from a polygon, relative to the scene: where none is asked for, a sharp corner has no normal."""
+ELASTIC_STDDEV = 1e-2
+"""Standard deviation, relative to the scene, with which k measures a distance that is missing where no chance is constrained."""
+DIFFERENCE = 5e-3
+"""Time on both sides of a contact by whose gradients its sliding is found [steps]."""
+LEAST_BEND = 3e-2
+"""Least second derivative of a margin in time, relative to the scene and the whole time: along a flat side the contact is anywhere."""
+BRACKET = np.linspace(-1.0, 1.0, 9)
+"""Times, relative to a bracket, at which the least safety factor is sought; the next bracket is a quarter of it."""
+NARROWINGS = 4
+"""Brackets: the last points are 5e-4 steps apart, and a parabola passes through three of them."""
+FEW_NARROWINGS = 2
+"""The same for circles, beside which a safety factor changes smoothly with time."""
+FACTORS = 5
+"""Vectors of which the second derivatives of a margin consist, besides a diagonal."""
+
+
+class Contacts(NamedTuple):
+    """Places where obstacles may hold the mean off: row of the problem, row of the obstacle, and time [steps]; (q,) each."""
+
+    problem: Indices
+    obstacle: Indices
+    time: Array
+
+    def take(self, rows: NDArray[np.bool_] | Indices) -> Contacts:
+        """Return some of them."""
+        return Contacts(self.problem[rows], self.obstacle[rows], self.time[rows])
+
+    def join(self, *others: Contacts) -> Contacts:
+        """Return these and others."""
+        return Contacts(*(np.concatenate(each) for each in zip(self, *others, strict=True)))
+
+
+class Motion(NamedTuple):
+    """Movements of r problems over their N steps: what is known at both ends of each step, with rates per step.
+
+    mean (r, N, 4, 2): x, y [m], and their rates; variance (r, N, 6, 3): xx, yy, xy [m^2], their rates and second derivatives.
+    """
+
+    mean: Array
+    variance: Array
+
+
+class Margin(NamedTuple):
+    """Margins g [m] at some places, of any shape (...), and what they follow from.
+
+    distance: D, with what the recovery allows [m]; normal_x, normal_y; stddev: s [m]; root: sqrt(k^2 s^2 + E) [m]; variance_x,
+    variance_y: P n [m^2]; trace: of P [m^2]; is_on_edge: whether the nearest point is on an edge; factor: the safety factor k(t),
+    linear in D where the mean is inside the obstacle.
+    """
+
+    value: Array
+    distance: Array
+    normal_x: Array
+    normal_y: Array
+    stddev: Array
+    root: Array
+    variance_x: Array
+    variance_y: Array
+    trace: Array
+    is_on_edge: NDArray[np.bool_]
+    factor: Array
+
+
+class Gradients(NamedTuple):
+    """Margins at q places, linearised.
+
+    value (q,) [m]; gradient (q, 2N), with respect to the control; stddev_rate (q,): -dg/dk [m]; diagonal (q, 2N): what a unit of
+    the multiplier adds to the diagonal of the Hessian of the Lagrangian; factors (q, 5, 2N) and weights (q, 5, 5): the remaining
+    part of it, sum_ab weights_ab factors_a factors_b'.
+    """
+
+    value: Array
+    gradient: Array
+    stddev_rate: Array
+    diagonal: Array
+    factors: Array
+    weights: Array
+
+
+class Margins:
+    """The margins of several problems with the same response to the control.
+
+    Parameters
+    ----------
+    problems : Sequence[Problem]
+        b problems of N steps; the table of obstacles with the largest number m of rows sets the shape of all.
+    tau : Array
+        Clearance term of each, (b,) [m^2].
+    is_chance : bool
+        Whether the margin holds against the uncertainty of hand and obstacles. Otherwise k measures a missing distance, in units
+        of `ELASTIC_STDDEV`.
+    between : bool
+        Whether margins are kept between the steps too, as contacts that slide. Otherwise they are kept at the steps.
+    """
+
+    def __init__(self, problems: Sequence[Problem], tau: Array, *, is_chance: bool, between: bool = True) -> None:
+        self.problems, self.is_chance, self.between = problems, is_chance, between
+        self.response = problems[0].horizon.position_response
+        self.steps = self.response.steps
+        points = 2 if between else 1
+        self.times = np.arange(points, points * self.steps + 1) / points
+        self._step, share = self.response.locate(self.times)
+        self._weight, self._quintic = hermite(share), hermite_quintic(share)
+        self.extent = np.array([each.extent for each in problems])
+        self.step_s = np.array([each.horizon.dt for each in problems])
+        self.noise_variance = np.stack([each.noise_variance for each in problems])
+        self.count = max(len(each.obstacles) for each in problems)
+        self._set_free_motion()
+        self._set_obstacles(tau)
+
+    def _set_free_motion(self) -> None:
+        """Set the movements without control: their means, and the covariances that uncertain starts cause."""
+        rate = np.ones((len(self.problems), 1, 2, 1))
+        rate[:, 0, 1, 0] = self.step_s
+        means = np.stack([each.free[:, :4] for each in self.problems]).reshape(-1, self.steps + 1, 2, 2) * rate
+        variance = np.zeros((len(self.problems), self.steps, 6, 3))
+        for row, problem in enumerate(self.problems):
+            if problem.initial_covariance.any():
+                variance[row] = _spread_start(problem)
+        self._free = Motion(np.concatenate((means[:, :-1], means[:, 1:]), axis=2), variance)
+
+    def _set_obstacles(self, tau: Array) -> None:
+        """Stack the obstacles of the problems; rows that a problem does not have never count."""
+        tables = [each.obstacles for each in self.problems]
+        size, width = len(tables), max(each.vertices.shape[1] for each in tables)
+
+        def stack(read: str, *shape: int) -> Array:
+            stacked = np.zeros((size, self.count, *shape))
+            for row, table in enumerate(tables):
+                values = getattr(table, read)
+                stacked[(row, slice(len(table)), *(slice(n) for n in values.shape[1:]))] = values
+            return stacked
+
+        self.counts = np.arange(self.count) < np.array([len(each) for each in tables])[:, None]
+        self.is_polygon = stack('corners') > 1.0
+        self.centre, self.drift = stack('centre', 2), stack('velocity', 2) * self.step_s[:, None, None]
+        covariance = stack('centre_covariance', 2, 2)
+        self.centre_variance = covariance[..., (0, 1, 0), (0, 1, 1)]
+        radius, deviation = stack('radius'), stack('radius_stddev')
+        self.size_mean = radius**2 + deviation**2
+        self.size_variance = 4.0 * radius**2 * deviation**2 + 2.0 * deviation**4
+        self.reach_square = np.maximum(self.size_mean + tau[:, None], (LEAST_REACH * self.extent[:, None]) ** 2)
+        self.edges = tabulate_edges(stack('vertices', width, 2), stack('corners'))
+        recovery = np.array([each.recovery_s for each in self.problems]) / self.step_s
+        self.recovery_steps = np.where(self.counts, recovery[:, None], 0.0)
+        self.missing = np.zeros_like(radius)
+        if recovery.any() and self.count:
+            self.missing = self._measure_missing()
+
+    def _measure_missing(self) -> Array:
+        """Return by how much the hand is inside the margin of each obstacle now, (b, m) [m]."""
+        x, y = (np.stack([each.initial_mean[:2] for each in self.problems])[:, None] - self.centre).transpose(2, 0, 1)
+        variance = self.centre_variance + self._free.variance[:, 0, 0][:, None]
+        k = np.array([each.wanted_k for each in self.problems])[:, None] * self.is_chance
+        where = np.arange(len(self.problems))[:, None], np.arange(self.count)
+        inside = -self._measure(x, y, variance, where, self.edges, np.zeros(1), k).value
+        return np.where(self.recovery_steps > 0.0, np.maximum(inside, 0.0), 0.0)
+
+    def move(self, rows: Indices, control: Array) -> Motion:
+        """Return the movements of problems (r,) under controls (r, 2N), in units of `Horizon.gain`."""
+        mean = (control @ self.response.mean_map).reshape(len(rows), self.steps, 4, 2)
+        spread = self.noise_variance[rows] * control * control
+        variance = (spread @ self.response.variance_map).reshape(len(rows), self.steps, 6, 3)
+        return Motion(mean + self._free.mean[rows], variance + self._free.variance[rows])
+
+    def find_path(self, motion: Motion) -> Array:
+        """Return the mean positions on the grid, (r, 2, T) [m]."""
+        path: Array = (self._weight[:, None] @ motion.mean[:, self._step])[:, :, 0]
+        return path.swapaxes(1, 2)
+
+    def find_step(self, step: Array) -> Array:
+        """Return how changes (r, 2N) of controls displace the mean on the grid, (r, 2, T) [m]."""
+        mean = (step @ self.response.mean_map).reshape(len(step), self.steps, 4, 2)
+        displaced: Array = (self._weight[:, None] @ mean[:, self._step])[:, :, 0]
+        return displaced.swapaxes(1, 2)
+
+    def measure_grid(self, rows: Indices, motion: Motion, k: Array) -> Margin:
+        """Return the margins of movements of problems (r,) on the grid, (r, m, T), for safety factors (r,)."""
+        x, y = self.find_path(motion).swapaxes(0, 1)[:, :, None]
+        variance = (self._quintic[:, None] @ motion.variance[:, self._step])[:, None, :, 0]
+        centre = self.centre[rows][:, :, None] + self.times[:, None] * self.drift[rows][:, :, None]
+        edges = Edges(*(each[rows][:, :, None] for each in self.edges))
+        where = rows[:, None, None], np.arange(self.count)[:, None]
+        variance = variance + self.centre_variance[rows][:, :, None]
+        found = self._measure(x - centre[..., 0], y - centre[..., 1], variance, where, edges, self.times, k[:, None, None])
+        is_there = self.counts[rows, :, None]
+        value, distance, factor = (np.where(is_there, each, np.inf) for each in (found.value, found.distance, found.factor))
+        return found._replace(value=value, distance=distance, factor=factor)
+
+    def measure(self, places: Contacts, at: Indices, motion: Motion, k: Array) -> Margin:
+        """Return margins at q places.
+
+        Parameters
+        ----------
+        places : Contacts
+            The places.
+        at : Indices
+            Row of the movement of each place, (q,).
+        motion : Motion
+            The movements. Covariances are interpolated between the steps, by quintics.
+        k : Array
+            Safety factor for each place, (q,).
+        """
+        step, share = self.response.locate(places.time)
+        mean = (hermite(share)[:, None] @ motion.mean[at, step])[:, 0]
+        variance = (hermite_quintic(share)[:, None] @ motion.variance[at, step])[:, 0]
+        return self._measure_places(places, mean, variance, k)
+
+    def _measure_places(self, places: Contacts, mean: Array, variance: Array, k: Array) -> Margin:
+        """Return margins at q places, for positions (q, 2) and their covariances (q, 3)."""
+        where = places.problem, places.obstacle
+        x, y = (mean - self.centre[where] - places.time[:, None] * self.drift[where]).T
+        edges = Edges(*(each[where] for each in self.edges))
+        return self._measure(x, y, variance + self.centre_variance[where], where, edges, places.time, k)
+
+    def _measure(
+        self, x: Array, y: Array, variance: Array, where: tuple[Indices, Indices], edges: Edges, time: Array, k: Array
+    ) -> Margin:
+        """Return margins at points relative to centres, for covariances (..., 3); where: rows of the problems and obstacles."""
+        found, reach = find_offset(x, y, edges), self.reach_square[where]
+        nx, ny, distance = found.normal_x, found.normal_y, found.distance
+        xx, yy, xy = variance[..., 0], variance[..., 1], variance[..., 2]
+        variance_x, variance_y = xx * nx + xy * ny, xy * nx + yy * ny
+        if self.missing.any():
+            distance = distance + self.missing[where] * self._allow(self.recovery_steps[where], time)
+        if self.is_chance:
+            # a mean that is out of the obstacle is farther than half of its radius from the polygon
+            own = self.size_variance[where] / (4.0 * np.maximum(distance * distance, 0.25 * reach))
+            least = (LEAST_STDDEV * self.extent[where[0]]) ** 2
+            stddev = np.sqrt(np.maximum(nx * variance_x + ny * variance_y, 0.0) + own + least)
+        else:
+            stddev = np.broadcast_to(ELASTIC_STDDEV * self.extent[where[0]], distance.shape)
+        held, radius = k * stddev, np.sqrt(reach)
+        root = np.sqrt(held * held + reach)
+        is_outside, beyond = distance > radius, distance - radius
+        factor = np.where(is_outside, beyond * (distance + radius) / (2.0 * np.where(is_outside, distance, 1.0)), beyond) / stddev
+        value = distance - held - root
+        return Margin(value, distance, nx, ny, stddev, root, variance_x, variance_y, xx + yy, found.is_on_edge, factor)
+
+    @staticmethod
+    def _allow(recovery_steps: Array, time: Array) -> Array:
+        """Return the share of the missing distance that is still allowed: it falls as a minimum-jerk movement does."""
+        s = np.divide(time, recovery_steps, out=np.ones(np.broadcast(time, recovery_steps).shape), where=recovery_steps > 0.0)
+        s = np.minimum(s, 1.0)
+        return 1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+
+    def sweep(self, rows: Indices, path: Array) -> Array:
+        """Return the angles [rad] that the line from each centre to a path (r, 2, T) on the grid sweeps, (r, m)."""
+        start = np.stack([self.problems[row].initial_mean[:2] for row in rows.tolist()])
+        return self._sweep(rows, np.concatenate((start[..., None], path), axis=2), np.concatenate(([0.0], self.times)))
+
+    def sweep_steps(self, paths: Array) -> Array:
+        """Return the same for positions (b, N + 1, 2) of all problems at steps 0..N, (b, m)."""
+        return self._sweep(np.arange(len(paths)), paths.swapaxes(1, 2), np.arange(self.steps + 1.0))
+
+    def _sweep(self, rows: Indices, path: Array, times: Array) -> Array:
+        centre = self.centre[rows][..., None] + times * self.drift[rows][..., None]
+        x, y = (path[:, None] - centre).transpose(2, 0, 1, 3)
+        turned = x[..., :-1] * y[..., 1:] - y[..., :-1] * x[..., 1:]
+        angles: Array = np.arctan2(turned, x[..., :-1] * x[..., 1:] + y[..., :-1] * y[..., 1:]).sum(axis=2)
+        return np.where(self.counts[rows], angles, 0.0)
+
+    def find_minima(
+        self, rows: Indices, motion: Motion, k: Array, grid: Margin, is_wanted: NDArray[np.bool_]
+    ) -> tuple[Contacts, Array]:
+        """Return the local minima in time of the safety factors, and these.
+
+        Parameters
+        ----------
+        rows, motion, k
+            As for `measure_grid`.
+        grid : Margin
+            What it returned for them.
+        is_wanted : NDArray[np.bool_]
+            Which points of the grid may be minima that matter, (r, m, T).
+
+        Returns
+        -------
+        Contacts, Array
+            Minima with refined times, and the safety factors there, (q,).
+        """
+        factor = grid.factor
+        before, after = np.full_like(factor, np.inf), np.full_like(factor, np.inf)
+        before[..., 1:], after[..., :-1] = factor[..., :-1], factor[..., 1:]
+        at, obstacle, place = np.nonzero((factor <= before) & (factor < after) & is_wanted)
+        problem, time, apart = rows[at], self.times[place], 0.5
+        least = factor[at, obstacle, place]
+        if not len(at) or not self.between:
+            return Contacts(problem, obstacle, time), least
+        several = [np.tile(each, len(BRACKET)) for each in (problem, obstacle, at)]
+        best = np.arange(len(at))
+        for _ in range(NARROWINGS if self.is_polygon.any() else FEW_NARROWINGS):
+            tried = np.clip(time + apart * BRACKET[:, None], 1.0, float(self.steps))
+            found = self.measure(Contacts(several[0], several[1], tried.ravel()), several[2], motion, k[several[2]])
+            factors, is_on_edge = (each.reshape(len(BRACKET), -1) for each in (found.factor, found.is_on_edge))
+            row = np.clip(factors.argmin(axis=0), 2, len(BRACKET) - 3)
+            time, spacing, apart = tried[row, best], apart * (BRACKET[1] - BRACKET[0]), apart / 4.0
+        least = np.minimum(least, factors.min(axis=0))
+        near = np.stack([factors[row + step, best] for step in range(-2, 3)])
+        is_kink = is_on_edge[row - 2, best] != is_on_edge[row + 2, best]
+        shift, lowest = _find_lowest(near, is_kink)
+        is_inside = (time - 2.0 * spacing > 1.0) & (time + 2.0 * spacing < self.steps)
+        time = np.where(is_inside, time + spacing * shift, tried[factors.argmin(axis=0), best])
+        return Contacts(problem, obstacle, time), np.where(is_inside, np.minimum(least, lowest), least)
+
+    def find_least_factors(self, control: Array) -> tuple[Array, Indices, Array]:
+        """Return the least safety factors of controls (b, 2N) over all obstacles and times, and where they are.
+
+        Between two points of the grid an obstacle comes nearer by no more than the hand moves in half of the time. Wherever that
+        may lead below the least factor on the grid, the time is refined.
+
+        Returns
+        -------
+        Array, Indices, Array
+            Safety factors k (b,), `CERTAIN_K` without obstacles; rows of the obstacles; times [steps].
+        """
+        rows = np.arange(len(control))
+        k, row, moment = np.full(len(rows), CERTAIN_K), np.zeros(len(rows), dtype=np.intp), np.zeros(len(rows))
+        if not self.count:
+            return k, row, moment
+        motion, none = self.move(rows, control), np.zeros(len(rows))
+        grid = self.measure_grid(rows, motion, none)
+        counts = self.counts[..., None] & (self.times >= self.recovery_steps[..., None])
+        factor = np.where(counts, grid.factor, np.inf)
+        centre = self.centre[..., None] + self.times * self.drift[..., None]
+        moved = np.hypot(*np.diff(self.find_path(motion)[:, None] - centre, axis=3).swapaxes(0, 2)).swapaxes(0, 1)
+        nearer = 0.5 * np.maximum(np.pad(moved, ((0, 0), (0, 0), (1, 0))), np.pad(moved, ((0, 0), (0, 0), (0, 1))))
+        lowest = np.maximum(grid.distance - nearer, np.sqrt(self.reach_square)[..., None])
+        bold = (lowest**2 - self.reach_square[..., None]) / (2.0 * lowest * grid.stddev)
+        may_be_least = counts & (bold <= np.maximum(factor.min(axis=(1, 2)), 0.0)[:, None, None])
+        places, _ = self.find_minima(rows, motion, none, grid._replace(factor=factor), may_be_least)
+        found = self._measure_exactly(places, control)
+        for which in np.argsort(-found, kind='stable').tolist():
+            problem = places.problem[which]
+            k[problem], row[problem], moment[problem] = found[which], places.obstacle[which], places.time[which]
+        return k, row, moment
+
+    def _measure_exactly(self, places: Contacts, control: Array) -> Array:
+        """Return the safety factors of controls (b, 2N) at q places as the paper has them, (q,)."""
+        margin, _ = self._respond(places, control[places.problem], np.zeros(len(places.time)))
+        along = margin.normal_x * margin.variance_x + margin.normal_y * margin.variance_y
+        where = places.problem, places.obstacle
+        return compute_safety_factor(margin.distance, along, self.size_mean[where], self.size_variance[where])
+
+    def _respond(self, places: Contacts, control: Array, k: Array) -> tuple[Margin, Array]:
+        """Return margins at q places with exact covariances, and the response (q, 2, 2N) of the position there."""
+        response = self.response.at(places.time)
+        step, share = self.response.locate(places.time)
+        free = (hermite(share)[:, None] @ self._free.mean[places.problem, step])[:, 0]
+        start = (hermite_quintic(share)[:, None] @ self._free.variance[places.problem, step])[:, 0]
+        spread = (self.noise_variance[places.problem] * control * control)[:, None]
+        products = np.stack((response[:, 0] ** 2, response[:, 1] ** 2, response[:, 0] * response[:, 1]), axis=1)
+        mean = free + (response @ control[..., None])[..., 0]
+        variance = start + (products @ spread.swapaxes(1, 2))[..., 0]
+        return self._measure_places(places, mean, variance, k), response
+
+    def measure_spread(self, places: Contacts, control: Array) -> tuple[Array, Array]:
+        """Return sqrt(Var[C]) [m^2] and the distance D [m] at q contacts of controls (b, 2N)."""
+        margin, _ = self._respond(places, control[places.problem], np.zeros(len(places.time)))
+        return 2.0 * np.abs(margin.distance) * margin.stddev, margin.distance
+
+    def linearise(self, places: Contacts, control: Array, k: Array) -> Gradients:
+        """Return margins at q places with their first and second derivatives; control (q, 2N) and k (q,) of each place."""
+        count = len(places.time)
+        beside = np.clip(np.concatenate((places.time - DIFFERENCE, places.time + DIFFERENCE)), 1.0, float(self.steps))
+        whole = Contacts(np.tile(places.problem, 3), np.tile(places.obstacle, 3), np.concatenate((places.time, beside)))
+        control, k = np.tile(control, (3, 1)), np.tile(k, 3)
+        margin, response = self._respond(whole, control, k)
+        noise = self.noise_variance[whole.problem] * control
+        nx, ny = margin.normal_x[:, None], margin.normal_y[:, None]
+        along, aside = nx * response[:, 0] + ny * response[:, 1], nx * response[:, 1] - ny * response[:, 0]
+        stddev, distance = margin.stddev, margin.distance
+        # what the variance w = s^2 costs, -dg/dw, and how the normal turns: not where an edge is nearest
+        worth = self.is_chance * (k + k * k * stddev / margin.root) / (2.0 * stddev)
+        turn = np.where(margin.is_on_edge, 0.0, 1.0 / distance)
+        across = 2.0 * (margin.normal_x * margin.variance_y - margin.normal_y * margin.variance_x)
+        is_far = distance**2 > 0.25 * self.reach_square[whole.problem, whole.obstacle]
+        size = np.where(is_far, self.size_variance[whole.problem, whole.obstacle] / 4.0, 0.0)
+        spread = 2.0 * noise * along**2 + (across * turn)[:, None] * aside - (2.0 * size / distance**3)[:, None] * along  # dw/du
+        gradient = along - worth[:, None] * spread
+        own, earlier, later = slice(0, count), slice(count, 2 * count), slice(2 * count, None)
+        apart = whole.time[later] - whole.time[earlier]
+        rise, fall = margin.value[later] - margin.value[own], margin.value[earlier] - margin.value[own]
+        bend = 4.0 * (rise + fall) / apart**2
+        slide = (gradient[later] - gradient[earlier]) / apart[:, None]
+        # where the nearest point passes from an edge to a corner, the margin has a kink in time: the least margin moves with both
+        # sides, by so much of each that it does not change with time
+        is_kink = (margin.is_on_edge[later] != margin.is_on_edge[earlier]) & (rise > 0.0) & (fall > 0.0)
+        share = np.divide(rise, rise + fall, out=np.zeros(count), where=is_kink)[:, None]
+        gradient = np.where(is_kink[:, None], share * gradient[earlier] + (1.0 - share) * gradient[later], gradient[own])
+        bend = np.where(is_kink, np.inf, bend)
+        factors = np.stack((aside[own], along[own], 4.0 * (noise * along * aside)[own], spread[own], slide), axis=1)
+        margin = Margin(*(each[own] for each in margin))
+        weights = self._weigh_factors(places, margin, k[own], worth[own], turn[own], across[own], size[own], bend)
+        diagonal = (2.0 * worth[own])[:, None] * self.noise_variance[places.problem] * along[own] ** 2
+        rate = margin.stddev * (1.0 + k[own] * margin.stddev / margin.root)
+        return Gradients(margin.value, gradient, rate, diagonal, factors, weights)
+
+    def _weigh_factors(
+        self, places: Contacts, margin: Margin, k: Array, worth: Array, turn: Array, across: Array, size: Array, bend: Array
+    ) -> Array:
+        """Return the weights (q, 5, 5) of the factors: of the displacement across and along the normal, and its effect on P, w, t."""
+        weights = np.zeros((len(k), FACTORS, FACTORS))
+        difference = 2.0 * margin.trace - 4.0 * (margin.normal_x * margin.variance_x + margin.normal_y * margin.variance_y)
+        weights[:, 0, 0] = turn * (-1.0 + worth * (turn * difference - 2.0 * size / margin.distance**3))
+        weights[:, 0, 1] = weights[:, 1, 0] = -worth * across * turn**2
+        weights[:, 1, 1] = 6.0 * worth * size / margin.distance**4
+        weights[:, 0, 2] = weights[:, 2, 0] = worth * turn
+        reach = self.reach_square[places.problem, places.obstacle]
+        weights[:, 3, 3] = self.is_chance * k * k * reach / (4.0 * margin.stddev**2 * margin.root**3) - worth / (2.0 * margin.stddev**2)
+        is_inside = (places.time > 1.0) & (places.time < self.steps) & self.between
+        floor = LEAST_BEND * self.extent[places.problem] / self.steps**2
+        weights[:, 4, 4] = np.where(is_inside, 1.0 / np.maximum(bend, floor), 0.0)
+        return weights
+
+
+def _find_lowest(values: Array, is_kink: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Return where the least of five even values (5, q) is, counted from the middle, and the least value, (q,).
+
+    It is the vertex of a parabola, or where the lines through the first two and the last two values meet.
+    """
+    first, low, middle, high, last = values
+    bend, fall, rise = low - 2.0 * middle + high, low - first, last - high
+    vertex = np.divide(0.5 * (low - high), bend, out=np.zeros_like(bend), where=bend > 0.0)
+    vertex = np.clip(vertex, -0.5, 0.5)
+    meeting = np.divide(low - high + fall + rise, rise - fall, out=np.zeros_like(bend), where=rise > fall)
+    is_kink = is_kink & (fall < 0.0) & (rise > 0.0) & (np.abs(meeting) <= 1.0)
+    shift = np.where(is_kink, meeting, vertex)
+    lowest = np.where(is_kink, low + fall * (meeting + 1.0), middle - 0.5 * bend * vertex**2)
+    return shift, np.where(is_kink | (bend > 0.0), lowest, middle)
+
+
+def _spread_start(problem: Problem) -> Array:
+    """Return the covariances xx, yy, xy that an uncertain start causes, with both derivatives, at both ends of each step, (N, 6, 3)."""
+    rate = np.array([1.0, problem.horizon.dt])[:, None, None]
+    begin, change, end, end_change = pair_steps(problem.error_map[:, :4].reshape(len(problem.error_map), 2, 2, -1) * rate).swapaxes(0, 1)
+    bends = 6.0 * (end - begin) - 4.0 * change - 2.0 * end_change, 6.0 * (begin - end) + 2.0 * change + 4.0 * end_change
+    known = []
+    for place, rates, bend in ((begin, change, bends[0]), (end, end_change, bends[1])):
+        carried = place @ problem.initial_covariance
+        moving, bent = carried @ rates.swapaxes(1, 2), carried @ bend.swapaxes(1, 2)
+        square = rates @ problem.initial_covariance @ rates.swapaxes(1, 2)
+        known += [carried @ place.swapaxes(1, 2), moving + moving.swapaxes(1, 2), bent + bent.swapaxes(1, 2) + 2.0 * square]
+    return np.stack(known, axis=1)[..., (0, 1, 0), (0, 1, 1)]
