@@ -1,0 +1,145 @@
+"""Initial guesses: the positions of a hand that moves along a path in time, smooth and with room to the obstacles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.types import Array, Obstacles
+
+from .names import Names
+from .sides import compute_swept_angles, is_same_class
+
+SLOPE = 0.5
+"""A hand in a margin leaves it by this much for each metre of its path, and enters the margin of its goal likewise."""
+MAX_SPEED_RATIO = 2.5
+"""Largest ratio of v T to L for which the timing does not overshoot."""
+ROOM = 0.002
+"""Distance from the grown obstacles that a guess keeps where there is room [m]."""
+SMOOTHINGS, PUSHES = 2, 3
+"""How often a guess is averaged with its neighbours, and how often it is moved away from the obstacles, with room and without."""
+CLEAR = 1e-12
+"""Depth in a grown obstacle that does not count [m]."""
+
+
+def compute_path_lengths(path: Array) -> Array:
+    """Compute the lengths (m,) [m] of a path (m, 2) [m] from its beginning to each of its points."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+
+
+def compute_progress(length: float, speed: float, duration_s: float, steps: int) -> Array:
+    """Compute the length along a path at each step: minimum jerk from a speed along the path to rest at its end.
+
+    s = L (10 t^3 - 15 t^4 + 6 t^5) + v T (t - 6 t^3 + 8 t^4 - 3 t^5) with t in [0, 1]. The path would overshoot with v T > 2.5 L
+    and begin backwards with v < 0, so v is kept between these bounds.
+
+    Parameters
+    ----------
+    length, speed, duration_s : float
+        Length of the path [m], speed along it at its beginning [m/s] and duration [s].
+    steps : int
+        Number N of time steps.
+
+    Returns
+    -------
+    Array
+        Lengths at steps 0..N, (N + 1,) [m].
+    """
+    t = np.linspace(0.0, 1.0, steps + 1)
+    carried = min(max(speed * duration_s, 0.0), MAX_SPEED_RATIO * length)
+    along = length * t**3 * (10.0 + t * (6.0 * t - 15.0)) + carried * t * (1.0 + t**2 * (t * (8.0 - 3.0 * t) - 6.0))
+    return np.clip(along, 0.0, length)
+
+
+def timed(path: Array, velocity: Array, duration_s: float, steps: int) -> Array:
+    """Return the positions of a hand that moves along a path with the timing of the guesses.
+
+    Parameters
+    ----------
+    path : Array
+        Points (m, 2) [m], m >= 2.
+    velocity : Array
+        Velocity at the beginning (2,) [m/s].
+    duration_s : float
+        Duration [s].
+    steps : int
+        Number N of time steps.
+
+    Returns
+    -------
+    Array
+        Positions at steps 0..N, (N + 1, 2) [m].
+    """
+    along, step = compute_path_lengths(path), path[1] - path[0]
+    heading = step / max(float(np.hypot(*step)), np.finfo(float).tiny)
+    at = compute_progress(float(along[-1]), float(heading @ velocity), duration_s, steps)
+    return np.column_stack([np.interp(at, along, axis) for axis in path.T])
+
+
+def make_guesses(taut: Sequence[Array], goals: Sequence[int], obstacles: Obstacles, names: Names) -> list[Array]:
+    """Smooth the timed positions on taut paths, which bend at vertices of outlines, and move them away from the obstacles.
+
+    If hand or goal lies in the margin of an obstacle, the guess leaves or enters the margin gradually. A guess that smoothing
+    brought to the other side of an obstacle stays taut.
+
+    Parameters
+    ----------
+    taut : Sequence[Array]
+        Positions at steps 0..N of k paths, each (N + 1, 2) [m].
+    goals : Sequence[int]
+        Row of the goal of each path.
+    obstacles : Obstacles
+        The n obstacles.
+    names : Names
+        How they count.
+
+    Returns
+    -------
+    list[Array]
+        Guesses, each (N + 1, 2) [m].
+    """
+    if not taut:
+        return []
+    before, count = np.array(taut), len(taut[0])
+    gap = np.hypot(*(before.reshape(-1, 1, 2) - obstacles.centre).transpose(2, 0, 1)) - obstacles.extent
+    is_near = (gap < names.radius - obstacles.radius + ROOM).any(axis=0)
+    is_near |= gap.min(axis=0, initial=np.inf) < np.hypot(*np.diff(before, axis=1).transpose(2, 0, 1)).max(initial=0.0)
+    is_near &= names.blocks[list(goals)].any(axis=0)
+    near = np.flatnonzero(is_near)
+    guesses = before.copy()
+    for _ in range(SMOOTHINGS):
+        guesses[:, 1:-1] += (guesses[:, :-2] + guesses[:, 2:] - 2.0 * guesses[:, 1:-1]) / 4.0
+    if not len(near):
+        return list(guesses)
+    shapes = obstacles.take(near)
+    wanted = np.array([_measure_wanted(path, goal, shapes, names, near) for path, goal in zip(before, goals, strict=True)])
+    points, wanted = guesses[:, 1:-1].reshape(-1, 2), wanted[:, 1:-1].reshape(-1, len(near))
+    for room in [ROOM] * PUSHES + [0.0] * PUSHES:
+        points = _push(points, wanted + room, shapes)
+    _, distance = measure_offsets(points, shapes)
+    is_clear = (distance >= wanted - CLEAR).all(axis=1)
+    guesses[:, 1:-1] = np.where(is_clear[:, None], points, before[:, 1:-1].reshape(-1, 2)).reshape(len(taut), count - 2, 2)
+    angles = [[compute_swept_angles(path, shapes.centre) for path in pair] for pair in zip(guesses, before, strict=True)]
+    return [guess if is_same_class(*pair) else path for guess, path, pair in zip(guesses, before, angles, strict=True)]
+
+
+def _measure_wanted(path: Array, goal: int, shapes: Obstacles, names: Names, rows: Array) -> Array:
+    """Return the distance (N + 1, r) [m] that each position wants from the polygons of some obstacles (r,)."""
+    along, radius = compute_path_lengths(path)[:, None], names.radius[rows]
+    _, ends = measure_offsets(path[[0, -1]], shapes)
+    leaving = np.where(names.holds_hand[rows], ends[0] + SLOPE * along, np.inf)
+    entering = np.where(names.holds_goal[goal, rows], ends[1] + SLOPE * (along[-1] - along), np.inf)
+    wanted: Array = np.where(names.blocks[goal, rows], np.minimum(radius, np.minimum(leaving, entering)), -np.inf)
+    return wanted
+
+
+def _push(points: Array, wanted: Array, shapes: Obstacles) -> Array:
+    """Move each point (q, 2) away from the one of the obstacles to which it is too near by most, to the wanted distance (q, r)."""
+    offset, distance = measure_offsets(points, shapes)
+    rows, worst = np.arange(len(points)), (wanted - distance).argmax(axis=1)
+    away, apart = offset[rows, worst], distance[rows, worst]
+    missing = np.maximum(wanted[rows, worst] - apart, 0.0)
+    moved: Array = points + away * (missing / np.where(apart == 0.0, np.inf, apart))[:, None]
+    return moved

@@ -1,0 +1,198 @@
+"""Outlines: convex polygons around rounded polygons, and straight lines that they block.
+
+The outline of a rounded polygon touches it along each of its edges and at some directions between them. Where two shapes leave a
+narrow gap, both outlines also touch their shape where the other one is nearest. So two outlines leave a gap open if and only if
+the shapes do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.types import Array, Obstacles, make_obstacles
+
+Flags = NDArray[np.bool_]
+
+ARC = np.pi / 6.0
+"""Largest change of direction from one edge of an outline to the next [rad]: 12 edges go round a circle."""
+NARROW = 0.04
+"""An outline stands out of its shape by 1 / cos(ARC / 2) - 1 of the radius at most; a gap is narrow below this share."""
+SAME = 1e-7
+"""Edges whose directions differ by less count as one [rad]."""
+GRAZE = 1e-9
+"""A line may enter an outline this deep [m]: shapes in a row share tangents, up to rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outlines:
+    """The outlines of n shapes, each with e vertices, of which the last may be repeated.
+
+    vertices (n, e, 2): anticlockwise [m]; normals (n, e, 2), offsets (n, e): the outline consists of the points p with
+    normal . p <= offset for each edge [m], edge k ending at vertex k; count (n,): number of vertices without repetitions.
+    centre (n, 2): of the obstacles [m]; middle (n, 2), extent (n,): a point inside, and the largest distance of a vertex from it.
+    """
+
+    centre: Array
+    vertices: Array
+    normals: Array
+    offsets: Array
+    count: NDArray[np.intp]
+    middle: Array
+    extent: Array
+
+    def __len__(self) -> int:
+        return len(self.count)
+
+    def take(self, rows: NDArray[np.intp] | Flags) -> Outlines:
+        """Return some of the outlines."""
+        return Outlines(*[array[rows] for array in vars(self).values()])
+
+    def measure_scale(self, point: Array) -> Array:
+        """Return the size (n,), as a multiple, at which each outline does not hold a point (2,) [m]: 1 unless it holds it now."""
+        reach = (self.normals * self.middle[:, None]).sum(axis=2)
+        scale: Array = np.minimum((self.normals @ point - reach) / (self.offsets - reach), 1.0).max(axis=1, initial=0.0)
+        return np.where(scale < 1.0, scale * (1.0 - SAME), 1.0)
+
+    def shrink(self, scale: Array) -> Outlines:
+        """Return the outlines, shrunk towards their middle to a multiple (n,) of their size."""
+        if (scale == 1.0).all():
+            return self
+        reach = (self.normals * self.middle[:, None]).sum(axis=2)
+        return replace(
+            self,
+            vertices=self.middle[:, None] + scale[:, None, None] * (self.vertices - self.middle[:, None]),
+            offsets=reach + scale[:, None] * (self.offsets - reach),
+            extent=scale * self.extent,
+        )
+
+    def holds(self, points: Array) -> Flags:
+        """Tell which of points (q, 2) lie inside which outline, (q, n)."""
+        depth = np.tensordot(points, self.normals, axes=(1, 2)) - self.offsets
+        is_inside: Flags = (depth < -GRAZE).all(axis=2)
+        return is_inside
+
+    def block(self, begin: Array, end: Array) -> Flags:
+        """Tell which outlines block which straight lines from begin (m, 2) to end (m, 2) [m]; (m, n)."""
+        line, to_middle = end - begin, self.middle - begin[:, None]
+        square = np.maximum((line**2).sum(axis=1), np.finfo(float).tiny)
+        share = np.clip((to_middle @ line[..., None])[..., 0] / square[:, None], 0.0, 1.0)
+        apart = to_middle - share[..., None] * line[:, None]
+        flags: Flags = (apart[..., 0] ** 2 + apart[..., 1] ** 2) < self.extent**2
+        row, column = np.nonzero(flags)
+        flags[row, column] = self.take(column).cut(begin[row], end[row])
+        return flags
+
+    def cut(self, begin: Array, end: Array) -> Flags:
+        """Tell whether each outline blocks a straight line of its own, from begin (n, 2) to end (n, 2) [m]; (n,)."""
+        before = (self.normals @ begin[..., None])[..., 0] - (self.offsets - GRAZE)
+        after = (self.normals @ end[..., None])[..., 0] - (self.offsets - GRAZE)
+        is_out, ends_out = before >= 0.0, after >= 0.0
+        share = before / np.where(is_out == ends_out, 1.0, before - after)
+        enters = np.where(is_out, np.where(ends_out, np.inf, share), 0.0).max(axis=1, initial=0.0)
+        leaves = np.where(ends_out & ~is_out, share, 1.0).min(axis=1, initial=1.0)
+        flags: Flags = enters < leaves
+        return flags
+
+
+def outline_obstacles(obstacles: Obstacles, radius: Array) -> Outlines:
+    """Return the outlines of obstacles; the last ones are kept, for obstacles that stay the same.
+
+    Parameters
+    ----------
+    obstacles : Obstacles
+        The n obstacles.
+    radius : Array
+        Radius of each with the clearance, (n,) [m].
+
+    Returns
+    -------
+    Outlines
+        Their outlines.
+    """
+    return _outline(*[np.asarray(each).tobytes() for each in (obstacles.centre, radius, obstacles.vertices, obstacles.corners)])
+
+
+def measure_gaps(obstacles: Obstacles) -> tuple[Array, Array]:
+    """Measure how far the polygons of obstacles lie apart; the last result is kept, for obstacles that stay the same.
+
+    Parameters
+    ----------
+    obstacles : Obstacles
+        The n obstacles.
+
+    Returns
+    -------
+    Array, Array
+        Distances of each pair (n, n) [m], infinite for an obstacle and itself, and the vectors (n, n, 2) [m] from the point of
+        the second polygon that is nearest to the first one to this.
+    """
+    return _measure_gaps(obstacles.centre.tobytes(), obstacles.vertices.tobytes(), obstacles.corners.tobytes())
+
+
+@lru_cache(maxsize=4)
+def _measure_gaps(centre: bytes, vertices: bytes, corners: bytes) -> tuple[Array, Array]:
+    obstacles = _read(centre, vertices, corners)
+    n, most = obstacles.vertices.shape[:2]
+    offset, distance = measure_offsets((obstacles.centre[:, None] + obstacles.vertices).reshape(-1, 2), obstacles)
+    is_corner = np.arange(most) < obstacles.corners[:, None]
+    distance = np.where(is_corner[..., None], np.maximum(distance.reshape(n, most, n), 0.0), np.inf)
+    nearest, rows = distance.argmin(axis=1), np.arange(n)
+    gap, apart = distance[rows[:, None], nearest, rows], offset.reshape(n, most, n, 2)[rows[:, None], nearest, rows]
+    # of two polygons, the vertex that is nearest to the other one may belong to either
+    is_other = gap.T < gap
+    gap, apart = np.where(is_other, gap.T, gap), np.where(is_other[..., None], -apart.transpose(1, 0, 2), apart)
+    np.fill_diagonal(gap, np.inf)
+    return gap, apart
+
+
+def _read(centre: bytes, vertices: bytes, corners: bytes) -> Obstacles:
+    """Return obstacles with the given centres, vertices and numbers of vertices."""
+    number = np.frombuffer(corners, dtype=np.intp)
+    polygons = np.frombuffer(vertices).reshape(len(number), -1, 2) if len(number) else np.zeros((0, 1, 2))
+    return replace(make_obstacles(np.frombuffer(centre).reshape(-1, 2), 0.0), vertices=polygons, corners=number)
+
+
+@lru_cache(maxsize=4)
+def _outline(centre: bytes, radius: bytes, vertices: bytes, corners: bytes) -> Outlines:
+    obstacles, radii = _read(centre, vertices, corners), np.frombuffer(radius)
+    gap, apart = _measure_gaps(centre, vertices, corners)
+    both = radii[:, None] + radii
+    is_narrow = (gap > both) & (gap < (1.0 + NARROW) * both)
+    towards = np.arctan2(-apart[..., 1], -apart[..., 0])
+    traced = [
+        _trace(obstacles.vertices[row, : obstacles.corners[row]], radii[row], towards[row, is_narrow[row]])
+        for row in range(len(radii))
+    ]
+    count = np.array([len(points) for points, _ in traced], dtype=np.intp)
+    most = count.max(initial=1)
+    padded = [np.concatenate([part, part[[-1] * (most - len(part[:]))]]) for each in traced for part in each]
+    points, normals = np.array(padded).reshape(-1, 2, most, 2).transpose(1, 0, 2, 3)
+    points = points + obstacles.centre[:, None]
+    is_vertex = (np.arange(most) < count[:, None])[..., None]
+    middle = np.where(is_vertex, points, 0.0).sum(axis=1) / count[:, None]
+    extent = np.hypot(*(points - middle[:, None]).transpose(2, 0, 1)).max(axis=1, initial=0.0)
+    return Outlines(obstacles.centre, points, normals, (normals * points).sum(axis=2), count, middle, extent)
+
+
+def _trace(polygon: Array, radius: float, touching: Array) -> tuple[Array, Array]:
+    """Return the vertices (e, 2) [m] of the outline of a rounded polygon (v, 2), and the normals (e, 2) of the edges before them.
+
+    touching: directions [rad] in which the outline touches the shape, in addition to those of the edges.
+    """
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    edges = edges[np.hypot(*edges.T) > GRAZE]
+    directions = np.sort(np.arctan2(-edges[:, 0], edges[:, 1])) if len(edges) else np.zeros(1)
+    wide = np.diff(directions, append=directions[0] + 2.0 * np.pi)
+    parts = np.maximum(np.ceil(wide / ARC - SAME), 1.0).astype(int)
+    arcs = [first + turn * np.arange(k) / k for first, turn, k in zip(directions, wide, parts, strict=True)]
+    angles = np.sort(np.mod(np.concatenate([*arcs, touching]), 2.0 * np.pi))
+    angles = angles[np.diff(angles, append=angles[0] + 2.0 * np.pi) > SAME]
+    half = np.diff(angles, append=angles[0] + 2.0 * np.pi) / 2.0
+    middle = np.column_stack([np.cos(angles + half), np.sin(angles + half)])
+    corner = polygon[(middle @ polygon.T).argmax(axis=1)]
+    return corner + (radius / np.cos(half))[:, None] * middle, np.column_stack([np.cos(angles), np.sin(angles)])

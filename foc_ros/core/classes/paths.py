@@ -1,0 +1,172 @@
+"""Best-first search over the visibility graph for the shortest path of each homotopy class to one goal.
+
+A state is a node and a signature: how often the path has crossed the ray from the centre of each named obstacle. Two paths between
+the same ends pass these obstacles on the same sides if and only if their signatures agree (Bhattacharya, Likhachev and Kumar,
+"Topological constraints in search-based robot path planning", 2012). The first path that arrives with a signature is therefore
+the shortest one of its class.
+
+A signature is one number with three bits for each named obstacle: 5 plus the number of crossings, which is -1, 0 or 1. A path that
+winds further is not followed.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from heapq import heappop, heappush
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foc_ros.core.deadline import Deadline
+from foc_ros.core.types import Array
+
+from .graph import Graph, Lines, Rows
+from .sides import TURN, compute_bearings, count_crossings
+
+COAST_S = 0.2
+"""A path that leaves at an angle p to the velocity v ranks as if |v| (1 - cos p) times this longer: a hand coasts first."""
+TIE = 2e-9
+"""Paths are given together if their keys differ by less [m]: they may rank alike to the nanometre."""
+BITS, NEUTRAL = 3, 5
+"""Bits of a signature for each obstacle, and their value where the path has not crossed the ray."""
+WORD = 20
+"""Number of obstacles whose bits NumPy adds up in one integer."""
+LOOK = 200
+"""Number of states after which the search looks at the clock again."""
+
+
+class Arrival(NamedTuple):
+    """A path that has reached the goal: length plus what coasting adds [m], points (m, 2) [m], swept angles (k,) [rad]."""
+
+    key: float
+    points: Array
+    swept: list[float]
+
+
+@dataclass(frozen=True, eq=False)
+class PathQuery:
+    """Which paths to look for.
+
+    hand, goal: lines from both to the nodes of a graph; rest (v,): least length from each node to the goal [m]; named (k,): rows of
+    the obstacles in the names; velocity (2,): of the hand [m/s]; max_states: number that the search may look at; deadline: after
+    it, the search ends once it has found a path.
+    """
+
+    graph: Graph
+    hand: Lines
+    goal: Lines
+    rest: list[float]
+    named: Rows
+    velocity: Array
+    max_states: int
+    deadline: Deadline
+
+
+def find_shortest_paths(query: PathQuery, notes: Counter[str]) -> Iterator[list[Arrival]]:
+    """Yield the shortest path of each class, in the order of their keys, equally long ones together.
+
+    Parameters
+    ----------
+    query : PathQuery
+        Which paths to look for.
+    notes : Counter[str]
+        `search_cut` is increased if states are left at the largest number, `search_late` if the deadline ends the search.
+
+    Yields
+    ------
+    list[Arrival]
+        Paths of different classes whose keys are equal.
+    """
+    graph, goal, named = query.graph, query.goal, query.named
+    first, head, length = graph.lists
+    codes, ends = _encode_graph(graph, named.tobytes()), len(query.rest)
+    rest = [*query.rest, 0.0]
+    to_goal = dict(zip(goal.nodes.tolist(), zip(goal.length.tolist(), _encode(-goal.crossings, named), strict=True), strict=True))
+    ones = sum(1 << BITS * row for row in range(len(named)))
+    is_within = ones << BITS - 1
+    bearing_change = compute_bearings(goal.point - graph.centre[named]) - compute_bearings(query.hand.point - graph.centre[named])
+    frontier, entries = list[tuple[float, int, float, int, int, int]](), 0
+    for node, key, code in _leave_hand(query):
+        if rest[node] < np.inf:
+            heappush(frontier, (key + rest[node], entries, key, node, NEUTRAL * ones + code, -1))
+            entries += 1
+    seen, node_of, before, tied, is_first = set[tuple[int, int]](), list[int](), list[int](), list[Arrival](), True
+    while frontier and len(node_of) < query.max_states:
+        if tied and frontier[0][0] > tied[0].key + TIE:
+            yield tied
+            tied, is_first = [], False
+        if not is_first and len(node_of) % LOOK == 0 and query.deadline.has_passed:
+            notes['search_late'] += 1
+            return
+        _, _, key, node, code, state = heappop(frontier)
+        if (node, code) in seen:
+            continue
+        seen.add((node, code))
+        node_of.append(node)
+        before.append(state)
+        state = len(before) - 1
+        if node == ends:
+            turns = [(code >> BITS * row & 7) - NEUTRAL for row in range(len(named))]
+            swept = (bearing_change + TURN * np.array(turns)).tolist()
+            if all(abs(angle) < TURN for angle in swept):
+                tied.append(Arrival(key, _collect_points(query, node_of, before), swept))
+            continue
+        following = [(head[line], length[line], codes[line]) for line in range(first[node], first[node + 1])]
+        if node in to_goal:
+            following.append((ends, *to_goal[node]))
+        for other, step, crossed in following:
+            extended = code + crossed
+            if extended & is_within != is_within or extended & extended >> 1 & extended >> 2 & ones:
+                continue  # it winds about an obstacle
+            if rest[other] < np.inf and (other, extended) not in seen:
+                heappush(frontier, (key + step + rest[other], entries, key + step, other, extended, state))
+                entries += 1
+    if tied:
+        yield tied
+    notes['search_cut'] += bool(frontier)
+
+
+def _leave_hand(query: PathQuery) -> Iterator[tuple[int, float, int]]:
+    """Yield the lines that leave the hand: the node at the end, length plus what coasting adds [m], and crossings, encoded.
+
+    The node after the last one of the graph is the goal.
+    """
+    graph, hand, goal = query.graph, query.hand, query.goal
+    nodes, length, ends, crossings = hand.nodes, hand.length, graph.points[hand.nodes], hand.crossings
+    direct = graph.outlines.shrink(np.minimum(hand.scale, goal.scale)).block(hand.point[None], goal.point[None])
+    if not direct.any():
+        nodes, ends = np.append(nodes, len(graph.points)), np.vstack([ends, goal.point])
+        length = np.append(length, np.hypot(*(goal.point - hand.point)))
+        crossings = np.vstack([crossings, count_crossings(hand.point - graph.centre, goal.point - graph.centre)])
+    along = (ends - hand.point) @ query.velocity / np.maximum(length, np.finfo(float).tiny)
+    key = length + COAST_S * (np.hypot(*query.velocity) - along)
+    yield from zip(nodes.tolist(), key.tolist(), _encode(crossings, query.named), strict=True)
+
+
+def _collect_points(query: PathQuery, node_of: list[int], before: list[int]) -> Array:
+    """Return the points (m, 2) [m] of the path from the hand to the last state."""
+    nodes, state = list[int](), before[-1]
+    while state >= 0:
+        nodes.append(node_of[state])
+        state = before[state]
+    return np.vstack([query.hand.point, query.graph.points[nodes[::-1]], query.goal.point])
+
+
+@lru_cache(maxsize=8)
+def _encode_graph(graph: Graph, named: bytes) -> list[int]:
+    """Return what the lines of a graph cross, encoded; kept while graph and names stay the same."""
+    return _encode(graph.crossings, np.frombuffer(named, dtype=np.intp))
+
+
+def _encode(crossings: NDArray[np.int8], named: Rows) -> list[int]:
+    """Return the crossings (m, n) of the rays of named obstacles (k,) as one number for each line, to be added to signatures."""
+    codes = [0] * len(crossings)
+    for begin in range(0, len(named), WORD):
+        part = crossings[:, named[begin : begin + WORD]].astype(np.int64)
+        words = (part @ (1 << BITS * np.arange(part.shape[1]))).tolist()
+        codes = [code + (word << BITS * begin) for code, word in zip(codes, words, strict=True)]
+    return codes
