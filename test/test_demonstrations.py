@@ -7,10 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foc_ros.core.config import Config, HomotopyConfig, replace_values
-from foc_ros.core.errors import FocError
-from foc_ros.core.homotopy import find_path_sides
-from foc_ros.core.homotopy.demonstrations import (
+from foc_ros.core.classes import find_path_sides
+from foc_ros.core.classes.library import (
     MOST,
     POINTS,
     GuessTiming,
@@ -18,6 +16,8 @@ from foc_ros.core.homotopy.demonstrations import (
     recall_demonstrations,
     record_demonstration,
 )
+from foc_ros.core.config import Config, HomotopyConfig, replace_values
+from foc_ros.core.errors import FocError
 from foc_ros.core.learning.experience import make_library
 from foc_ros.core.memory.memory import Memory
 from foc_ros.core.predictor import predict

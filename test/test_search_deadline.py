@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from homotopy_scenes import CLEARANCE, find, random_scene
 
+from foc_ros.core.classes import Turn, search
 from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.homotopy import Turn, search
-from foc_ros.core.homotopy import path_search as paths
 from foc_ros.core.types import make_obstacles
 
 GOALS = np.column_stack([np.full(6, 0.4), np.linspace(-0.2, 0.2, 6)])

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +22,62 @@ from .outlines import Flags, Outlines
 from .sides import count_crossings
 
 Rows = NDArray[np.intp]
+Crossings = NDArray[np.int8]
 
 BOTH_SIDES = 1e-15
 """Product of two cross products [m^4] up to which the neighbours of a vertex count as being on one side of a line, or on it."""
 SHORTEST = 1e-12
 """Least length of a line [m]: vertices of different outlines may coincide."""
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """The v vertices of n outlines, those of the first outline first.
+
+    points, before, after (v, 2): each vertex, and the ones before and after it [m]; following (v,): row of the one after it;
+    owner (v,): row of its outline; is_free (v,): whether it lies in no other outline.
+    """
+
+    outlines: Outlines
+    points: Array
+    before: Array
+    after: Array
+    following: Rows
+    owner: Rows
+    is_free: Flags
+
+    @cached_property
+    def offsets(self) -> Array:
+        """The vertices relative to the centres of the obstacles (v, n, 2) [m]."""
+        return self.points[:, None] - self.outlines.centre
+
+    def touch(self, rows: Rows, points: Array) -> Flags:
+        """Tell whether the lines from vertices (p,) to points (q, 2) leave its outline on one side, (p, q)."""
+        at, left = self.points[rows], []
+        for neighbour in (self.before, self.after):
+            edge = neighbour[rows] - at
+            aside = np.column_stack([edge[:, 1], -edge[:, 0]])
+            left.append(aside @ points.T - (aside * at).sum(axis=1)[:, None])
+        flags: Flags = left[0] * left[1] >= -BOTH_SIDES
+        return flags
+
+    def find_tangents(self) -> tuple[Rows, Rows]:
+        """Return the rows at both ends of the lines that touch two outlines, whatever lies between."""
+        pairs, free = [np.zeros((2, 0), dtype=np.intp)], np.flatnonzero(self.is_free)
+        bounds = np.searchsorted(self.owner[free], np.arange(len(self.outlines) + 1)).tolist()
+        # one outline after the other: arrays of all pairs would be large, which is slow
+        for begin, end in pairwise(bounds):
+            own, later = free[begin:end], free[end:]
+            touches = self.touch(own, self.points[later]) & self.touch(later, self.points[own]).T
+            row, column = np.nonzero(touches)
+            pairs.append(np.array([own[row], later[column]]))
+        tail, head = np.concatenate(pairs, axis=1)
+        return tail, head
+
+    def find_edges(self) -> tuple[Rows, Rows]:
+        """Return the rows at both ends of the edges of the outlines, whatever covers them in the middle."""
+        tail = np.flatnonzero(self.is_free & self.is_free[self.following])
+        return tail, self.following[tail]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,29 +92,22 @@ class Lines:
     scale: Array
     nodes: Rows
     length: Array
-    crossings: NDArray[np.int8]
+    crossings: Crossings
 
 
 @dataclass(frozen=True, eq=False)
 class Graph(Record):
-    """Nodes are the vertices of the outlines, those of the first outline first; m lines join them, each in both directions.
+    """A visibility graph: v nodes, and m lines between them, in the order of the nodes that they leave.
 
-    points, before, after (v, 2): each node, and the vertices before and after it [m]; owner (v,): row of its outline; is_free
-    (v,): whether it lies in no other outline. centre (n, 2): of the obstacles [m]. first (v + 1,): the first line of each node;
-    head (m,): node at the end of each line; length (m,) [m]; crossings (m, n): of the ray of each centre.
+    first (v + 1,): the first line of each node; head (m,): node at the end of each line; length (m,) [m]; crossings (m, n): how
+    often each line crosses the ray of each centre. Each line is there in both directions.
     """
 
-    outlines: Outlines
-    centre: Array
-    points: Array
-    before: Array
-    after: Array
-    owner: Rows
-    is_free: Flags
+    nodes: Nodes
     first: Rows
     head: Rows
     length: Array
-    crossings: NDArray[np.int8]
+    crossings: Crossings
 
     @cached_property
     def lists(self) -> tuple[list[int], list[int], list[float]]:
@@ -71,36 +116,21 @@ class Graph(Record):
 
     def join(self, point: Array) -> Lines:
         """Return the lines from a point (2,) [m] to the nodes of the graph that are visible from it."""
-        scale = self.outlines.measure_scale(point)
-        is_holding = (scale < 1.0)[self.owner]
-        nodes = np.flatnonzero(self.is_free & (is_holding | self._touches(slice(None), self.points - point)))
-        begin = np.broadcast_to(point, (len(nodes), 2))
-        nodes = nodes[~self.outlines.shrink(scale).block(begin, self.points[nodes]).any(axis=1)]
-        length = np.hypot(*(self.points[nodes] - point).T)
-        crossings = count_crossings(np.broadcast_to(point - self.centre, (len(nodes), *self.centre.shape)), self._offsets[nodes])
-        return Lines(point, scale, nodes, length, crossings)
+        nodes, outlines = self.nodes, self.nodes.outlines
+        scale, free = outlines.measure_scale(point), np.flatnonzero(nodes.is_free)
+        is_holding = (scale < 1.0)[nodes.owner[free]]
+        rows = free[is_holding | nodes.touch(free, point[None])[:, 0]]
+        rows = rows[~outlines.shrink(scale).block(np.broadcast_to(point, (len(rows), 2)), nodes.points[rows])]
+        length = np.hypot(*(nodes.points[rows] - point).T)
+        return Lines(point, scale, rows, length, count_crossings(point - outlines.centre, nodes.offsets[rows]))
 
     def measure_rest(self, goal: Lines) -> list[float]:
         """Return the length of the shortest path from each node to a goal [m], infinite if there is none."""
-        count = len(self.points)
         first = np.append(self.first, self.first[-1] + len(goal.nodes))
         head, length = np.append(self.head, goal.nodes), np.append(self.length, goal.length)
-        lines = csr_matrix((np.maximum(length, SHORTEST), head, first), shape=(count + 1, count + 1))
-        rest: list[float] = dijkstra(lines, indices=count)[:-1].tolist()
+        lines = csr_matrix((np.maximum(length, SHORTEST), head, first), shape=(len(first) - 1, len(first) - 1))
+        rest: list[float] = dijkstra(lines, indices=len(first) - 2)[:-1].tolist()
         return rest
-
-    @cached_property
-    def _offsets(self) -> Array:
-        """The nodes relative to the centres (v, n, 2) [m]."""
-        return self.points[:, None] - self.centre
-
-    def _touches(self, nodes: Rows | slice, line: Array) -> Flags:
-        """Tell whether lines (m, 2) through nodes (m,) leave the rest of the node's outline on one side."""
-        after, before = self.after[nodes] - self.points[nodes], self.before[nodes] - self.points[nodes]
-        left = line[:, 0] * after[:, 1] - line[:, 1] * after[:, 0]
-        other = line[:, 0] * before[:, 1] - line[:, 1] * before[:, 0]
-        flags: Flags = left * other >= -BOTH_SIDES
-        return flags
 
 
 @lru_cache(maxsize=4)
@@ -117,40 +147,23 @@ def build_graph(outlines: Outlines) -> Graph:
     Graph
         The graph.
     """
-    most, centre = outlines.vertices.shape[1], outlines.centre
-    is_vertex, n = np.arange(most) < outlines.count[:, None], len(outlines)
-    points, owner = outlines.vertices[is_vertex], np.repeat(np.arange(n), outlines.count)
-    starts = np.cumsum(outlines.count) - outlines.count
-    place = np.arange(len(points)) - starts[owner]
-    following, previous = (starts[owner] + (place + step) % outlines.count[owner] for step in (1, -1))
-    is_covered = outlines.holds(points)
-    is_covered[np.arange(len(points)), owner] = False
-    none, is_free = np.zeros(0, dtype=np.intp), ~is_covered.any(axis=1)
-    graph = Graph(
-        outlines, centre, points, points[previous], points[following], owner, is_free, none, none, none, np.zeros((0, n), np.int8)
-    )
-    free = np.flatnonzero(is_free)
-    tail, head = (free[each] for each in np.nonzero(owner[free][:, None] < owner[free]))
-    line = points[head] - points[tail]
-    touching = np.flatnonzero(graph._touches(tail, line) & graph._touches(head, line))
-    edges = free[is_free[following[free]]]
-    tail, head = np.append(tail[touching], edges), np.append(head[touching], following[edges])
-    is_open = ~outlines.block(points[tail], points[head]).any(axis=1)
+    nodes = _list_nodes(outlines)
+    tail, head = np.concatenate([nodes.find_tangents(), nodes.find_edges()], axis=1)
+    is_open = ~outlines.block(nodes.points[tail], nodes.points[head])
     tail, head = tail[is_open], head[is_open]
-    length = np.hypot(*(points[head] - points[tail]).T)
-    crossings = count_crossings(graph._offsets[tail], graph._offsets[head])
-    order = np.argsort(np.append(tail, head), kind='stable')
-    first = np.searchsorted(np.append(tail, head)[order], np.arange(len(points) + 1))
-    return Graph(
-        outlines,
-        centre,
-        points,
-        graph.before,
-        graph.after,
-        owner,
-        is_free,
-        first,
-        np.append(head, tail)[order],
-        np.append(length, length)[order],
-        np.concatenate([crossings, -crossings])[order],
-    )
+    length = np.hypot(*(nodes.points[head] - nodes.points[tail]).T)
+    crossings = count_crossings(nodes.offsets[tail], nodes.offsets[head])
+    tails, heads = np.append(tail, head), np.append(head, tail)
+    order = np.argsort(tails, kind='stable')
+    first = np.searchsorted(tails[order], np.arange(len(nodes.points) + 1))
+    return Graph(nodes, first, heads[order], np.append(length, length)[order], np.concatenate([crossings, -crossings])[order])
+
+
+def _list_nodes(outlines: Outlines) -> Nodes:
+    """Return the vertices of outlines."""
+    points = outlines.vertices[np.arange(outlines.vertices.shape[1]) < outlines.count[:, None]]
+    owner, starts = np.repeat(np.arange(len(outlines)), outlines.count), np.cumsum(outlines.count) - outlines.count
+    place, count = np.arange(len(points)) - starts[owner], outlines.count[owner]
+    following, previous = starts[owner] + (place + 1) % count, starts[owner] + (place - 1) % count
+    is_free = ~outlines.hold(points, owner)
+    return Nodes(outlines, points, points[previous], points[following], following, owner, is_free)

@@ -9,6 +9,7 @@ import numpy as np
 from foc_ros.core.obstacles.rounded_polygon import measure_offsets
 from foc_ros.core.types import Array, Obstacles
 
+from .graph import Rows
 from .names import Names
 from .sides import compute_swept_angles, is_same_class
 
@@ -119,13 +120,13 @@ def make_guesses(taut: Sequence[Array], goals: Sequence[int], obstacles: Obstacl
     for room in [ROOM] * PUSHES + [0.0] * PUSHES:
         points = _push(points, wanted + room, shapes)
     _, distance = measure_offsets(points, shapes)
-    is_clear = (distance >= wanted - CLEAR).all(axis=1)
-    guesses[:, 1:-1] = np.where(is_clear[:, None], points, before[:, 1:-1].reshape(-1, 2)).reshape(len(taut), count - 2, 2)
+    is_clear = (distance >= wanted - CLEAR).all(axis=1, keepdims=True)
+    guesses[:, 1:-1] = np.where(is_clear, points, before[:, 1:-1].reshape(-1, 2)).reshape(len(taut), count - 2, 2)
     angles = [[compute_swept_angles(path, shapes.centre) for path in pair] for pair in zip(guesses, before, strict=True)]
     return [guess if is_same_class(*pair) else path for guess, path, pair in zip(guesses, before, angles, strict=True)]
 
 
-def _measure_wanted(path: Array, goal: int, shapes: Obstacles, names: Names, rows: Array) -> Array:
+def _measure_wanted(path: Array, goal: int, shapes: Obstacles, names: Names, rows: Rows) -> Array:
     """Return the distance (N + 1, r) [m] that each position wants from the polygons of some obstacles (r,)."""
     along, radius = compute_path_lengths(path)[:, None], names.radius[rows]
     _, ends = measure_offsets(path[[0, -1]], shapes)
@@ -136,7 +137,7 @@ def _measure_wanted(path: Array, goal: int, shapes: Obstacles, names: Names, row
 
 
 def _push(points: Array, wanted: Array, shapes: Obstacles) -> Array:
-    """Move each point (q, 2) away from the one of the obstacles to which it is too near by most, to the wanted distance (q, r)."""
+    """Move each point (q, 2) to the wanted distance (q, r) from the one of r obstacles to which it is too near by most."""
     offset, distance = measure_offsets(points, shapes)
     rows, worst = np.arange(len(points)), (wanted - distance).argmax(axis=1)
     away, apart = offset[rows, worst], distance[rows, worst]

@@ -33,9 +33,9 @@ MIN_SIZE = 1e-6
 class Names:
     """How n obstacles count on the way from the hand to g goals.
 
-    radius (n,): of each with the clearance [m], less where a gap is kept open; outlines: of this size. holds_hand (n,), holds_goal
-    (g, n): whether an obstacle of this size holds the hand or the goal; blocks (g, n): false for an obstacle, without the
-    clearance, that holds the goal itself. is_named (g, n): whether the names of the paths to a goal contain an obstacle.
+    radius (n,): of each with the clearance [m], less where a gap is kept open; outlines: of this size. holds_hand (n,),
+    holds_goal (g, n): whether an obstacle of this size holds the hand or the goal; blocks (g, n): false for an obstacle, without
+    the clearance, that holds the goal. is_named (g, n): whether the names of the paths to a goal contain an obstacle.
     """
 
     radius: Array
@@ -92,18 +92,23 @@ def find_names(hand: Array, goals: Array, obstacles: Obstacles, clearance: float
     goal_of = np.array([candidate.goal for candidate in previous], dtype=np.intp)
     for goal in {candidate.goal for candidate in previous if candidate.goal < len(goals)}:
         slack[goal] = np.where(sides[goal_of == goal].any(axis=0), 0.0, ENTER)
-    is_named, at_hand = np.zeros_like(blocks), outlines.measure_scale(hand)
-    scale = np.minimum(at_hand, [outlines.measure_scale(goal) for goal in goals]).reshape(blocks.shape)
-    goal, row = np.nonzero(blocks & (scale > 0.0))
-    ends, size, slack = (hand, goals[goal]), scale[goal, row], slack[goal, row]
-    polygons = size[:, None, None] * obstacles.vertices[row]
-    relative = [end - obstacles.centre[row] for end in ends]
-    is_between_ends = is_between(polygons, obstacles.corners[row], *relative, slack)
-    goal, row, size, slack = (each[is_between_ends] for each in (goal, row, size, slack))
-    near, ends = outlines.take(row).shrink(size), (np.broadcast_to(hand, (len(row), 2)), goals[goal])
-    limit = FAR_SIDE * np.maximum(np.hypot(*(ends[1] - ends[0]).T), MIN_SIZE) - slack
-    is_named[goal, row] = near.cut(*ends) | (_measure_far_side(near, obstacles.centre[row], *ends) <= limit)
+    is_named = _find_named(outlines, obstacles, hand, goals, blocks, slack)
     return Names(radius, outlines, distance[0] <= radius, distance[1:] <= radius, blocks, is_named)
+
+
+def _find_named(outlines: Outlines, obstacles: Obstacles, hand: Array, goals: Array, blocks: Flags, slack: Array) -> Flags:
+    """Return which obstacles are named on the way to each goal, (g, n); outlines shrink if they hold the hand or the goal."""
+    scales = [np.minimum(outlines.measure_scale(hand), outlines.measure_scale(goal)) for goal in goals]
+    scale, is_named = np.reshape(scales, blocks.shape), np.zeros_like(blocks)
+    goal, row = np.nonzero(blocks & (scale > MIN_SIZE))
+    polygons, corners = scale[goal, row][:, None, None] * obstacles.vertices[row], obstacles.corners[row]
+    ends = hand - obstacles.centre[row], goals[goal] - obstacles.centre[row]
+    is_beside = is_between(polygons, corners, *ends, slack[goal, row])
+    goal, row = goal[is_beside], row[is_beside]
+    near, begin, end = outlines.take(row).shrink(scale[goal, row]), np.broadcast_to(hand, (len(row), 2)), goals[goal]
+    limit = FAR_SIDE * np.maximum(np.hypot(*(end - begin).T), MIN_SIZE) - slack[goal, row]
+    is_named[goal, row] = near.cut(begin, end) | (_measure_far_side(near, begin, end) <= limit)
+    return is_named
 
 
 def _tabulate_sides(obstacles: Obstacles, previous: Sequence[Candidate]) -> Rows:
@@ -123,15 +128,15 @@ def _keep_gaps_open(obstacles: Obstacles, radius: Array, clearance: float, sides
     if not len(first):
         return radius
     missing = radius[first] + radius[second] - measure_gaps(obstacles)[0][first, second]
-    is_kept = (-OPEN < missing) & (missing < min(NARROWER, clearance))
+    is_kept = (missing > -OPEN) & (missing < min(NARROWER, clearance))
     reduced = radius.copy()
     np.minimum.at(reduced, first[is_kept], radius[first[is_kept]] - (missing[is_kept] / 2.0 + OPEN))
     return reduced
 
 
-def _measure_far_side(outlines: Outlines, centre: Array, hand: Array, goal: Array) -> Array:
+def _measure_far_side(outlines: Outlines, hand: Array, goal: Array) -> Array:
     """Return the length (n,) [m] of the path round that side of each outline on which the straight line does not pass it."""
-    bearing = compute_bearings(goal - centre) - compute_bearings(hand - centre)
+    bearing = compute_bearings(goal - outlines.centre) - compute_bearings(hand - outlines.centre)
     is_clockwise = np.mod(bearing, 2.0 * np.pi) < np.pi
     edges = np.hypot(*(outlines.vertices - np.roll(outlines.vertices, 1, axis=1)).transpose(2, 0, 1))
     reached = np.cumsum(edges, axis=1)

@@ -19,11 +19,15 @@ from foc_ros.core.types import Array, Obstacles, make_obstacles
 Flags = NDArray[np.bool_]
 
 ARC = np.pi / 6.0
-"""Largest change of direction from one edge of an outline to the next [rad]: 12 edges go round a circle."""
+"""Largest change of direction from one edge of an outline to the next [rad]: 12 edges or more go round a circle."""
+STAND_OUT = 0.001
+"""Largest distance of an outline from its shape [m]."""
 NARROW = 0.04
-"""An outline stands out of its shape by 1 / cos(ARC / 2) - 1 of the radius at most; a gap is narrow below this share."""
+"""An outline stands out of its shape by less than this share of the radius; a gap is narrow below this share of both radii."""
 SAME = 1e-7
 """Edges whose directions differ by less count as one [rad]."""
+CHUNK = 512
+"""So many lines are compared with the outlines at once: larger arrays do not fit into the cache."""
 GRAZE = 1e-9
 """A line may enter an outline this deep [m]: shapes in a row share tangents, up to rounding."""
 
@@ -34,7 +38,7 @@ class Outlines:
 
     vertices (n, e, 2): anticlockwise [m]; normals (n, e, 2), offsets (n, e): the outline consists of the points p with
     normal . p <= offset for each edge [m], edge k ending at vertex k; count (n,): number of vertices without repetitions.
-    centre (n, 2): of the obstacles [m]; middle (n, 2), extent (n,): a point inside, and the largest distance of a vertex from it.
+    centre (n, 2): of the obstacles; middle (n, 2), extent (n,): a point inside, and the largest distance of a vertex from it.
     """
 
     centre: Array
@@ -43,6 +47,7 @@ class Outlines:
     offsets: Array
     count: NDArray[np.intp]
     middle: Array
+    inner: Array
     extent: Array
 
     def __len__(self) -> int:
@@ -67,30 +72,42 @@ class Outlines:
             self,
             vertices=self.middle[:, None] + scale[:, None, None] * (self.vertices - self.middle[:, None]),
             offsets=reach + scale[:, None] * (self.offsets - reach),
+            inner=scale * self.inner,
             extent=scale * self.extent,
         )
 
-    def holds(self, points: Array) -> Flags:
-        """Tell which of points (q, 2) lie inside which outline, (q, n)."""
-        depth = np.tensordot(points, self.normals, axes=(1, 2)) - self.offsets
-        is_inside: Flags = (depth < -GRAZE).all(axis=2)
-        return is_inside
+    def hold(self, points: Array, owner: NDArray[np.intp]) -> Flags:
+        """Tell which of points (q, 2) [m] lie in an outline other than their owner (q,), (q,)."""
+        apart = points[:, None] - self.middle
+        is_near = apart[..., 0] ** 2 + apart[..., 1] ** 2 < self.extent**2
+        is_near[np.arange(len(points)), owner] = False
+        row, column = np.nonzero(is_near)
+        flags = np.zeros(len(points), dtype=np.bool_)
+        flags[row[self.take(column).cut(points[row], points[row])]] = True
+        return flags
 
     def block(self, begin: Array, end: Array) -> Flags:
-        """Tell which outlines block which straight lines from begin (m, 2) to end (m, 2) [m]; (m, n)."""
-        line, to_middle = end - begin, self.middle - begin[:, None]
-        square = np.maximum((line**2).sum(axis=1), np.finfo(float).tiny)
-        share = np.clip((to_middle @ line[..., None])[..., 0] / square[:, None], 0.0, 1.0)
-        apart = to_middle - share[..., None] * line[:, None]
-        flags: Flags = (apart[..., 0] ** 2 + apart[..., 1] ** 2) < self.extent**2
-        row, column = np.nonzero(flags)
-        flags[row, column] = self.take(column).cut(begin[row], end[row])
+        """Tell which straight lines from begin (m, 2) to end (m, 2) [m] some outline blocks, (m,)."""
+        if len(begin) > CHUNK:
+            return np.concatenate(
+                [self.block(begin[at : at + CHUNK], end[at : at + CHUNK]) for at in range(0, len(begin), CHUNK)]
+            )
+        line = end - begin
+        length = np.hypot(*line.T)
+        ahead = line / np.maximum(length, np.finfo(float).tiny)[:, None]
+        aside = np.column_stack([-ahead[:, 1], ahead[:, 0]])
+        along = ahead @ self.middle.T - (ahead * begin).sum(axis=1)[:, None]
+        beyond = along - np.clip(along, 0.0, length[:, None])
+        square = (aside @ self.middle.T - (aside * begin).sum(axis=1)[:, None]) ** 2 + beyond**2
+        flags: Flags = (square < np.maximum(self.inner - GRAZE, 0.0) ** 2).any(axis=1)
+        row, column = np.nonzero((square < self.extent**2) & ~flags[:, None])
+        flags[row[self.take(column).cut(begin[row], end[row])]] = True
         return flags
 
     def cut(self, begin: Array, end: Array) -> Flags:
         """Tell whether each outline blocks a straight line of its own, from begin (n, 2) to end (n, 2) [m]; (n,)."""
-        before = (self.normals @ begin[..., None])[..., 0] - (self.offsets - GRAZE)
-        after = (self.normals @ end[..., None])[..., 0] - (self.offsets - GRAZE)
+        x, y, bar = self.normals[..., 0], self.normals[..., 1], self.offsets - GRAZE
+        before, after = (x * point[:, :1] + y * point[:, 1:] - bar for point in (begin, end))
         is_out, ends_out = before >= 0.0, after >= 0.0
         share = before / np.where(is_out == ends_out, 1.0, before - after)
         enters = np.where(is_out, np.where(ends_out, np.inf, share), 0.0).max(axis=1, initial=0.0)
@@ -144,7 +161,7 @@ def _measure_gaps(centre: bytes, vertices: bytes, corners: bytes) -> tuple[Array
     nearest, rows = distance.argmin(axis=1), np.arange(n)
     gap, apart = distance[rows[:, None], nearest, rows], offset.reshape(n, most, n, 2)[rows[:, None], nearest, rows]
     # of two polygons, the vertex that is nearest to the other one may belong to either
-    is_other = gap.T < gap
+    is_other = gap > gap.T
     gap, apart = np.where(is_other, gap.T, gap), np.where(is_other[..., None], -apart.transpose(1, 0, 2), apart)
     np.fill_diagonal(gap, np.inf)
     return gap, apart
@@ -164,33 +181,40 @@ def _outline(centre: bytes, radius: bytes, vertices: bytes, corners: bytes) -> O
     both = radii[:, None] + radii
     is_narrow = (gap > both) & (gap < (1.0 + NARROW) * both)
     towards = np.arctan2(-apart[..., 1], -apart[..., 0])
-    traced = [
-        _trace(obstacles.vertices[row, : obstacles.corners[row]], radii[row], towards[row, is_narrow[row]])
-        for row in range(len(radii))
-    ]
+    traced = []
+    for row, (polygon, size) in enumerate(zip(obstacles.vertices, radii.tolist(), strict=True)):
+        touching = towards[row, is_narrow[row]].tobytes()
+        traced.append(_trace(polygon[: obstacles.corners[row]].tobytes(), size, touching))
     count = np.array([len(points) for points, _ in traced], dtype=np.intp)
     most = count.max(initial=1)
-    padded = [np.concatenate([part, part[[-1] * (most - len(part[:]))]]) for each in traced for part in each]
-    points, normals = np.array(padded).reshape(-1, 2, most, 2).transpose(1, 0, 2, 3)
-    points = points + obstacles.centre[:, None]
+    points, normals = np.zeros((2, len(traced), most, 2))
+    for row, each in enumerate(traced):
+        points[row, : count[row]], normals[row, : count[row]] = each
+        points[row, count[row] :], normals[row, count[row] :] = each[0][-1], each[1][-1]
+    points += obstacles.centre[:, None]
     is_vertex = (np.arange(most) < count[:, None])[..., None]
     middle = np.where(is_vertex, points, 0.0).sum(axis=1) / count[:, None]
+    offsets = (normals * points).sum(axis=2)
+    inner = (offsets - (normals * middle[:, None]).sum(axis=2)).min(axis=1, initial=np.inf)
     extent = np.hypot(*(points - middle[:, None]).transpose(2, 0, 1)).max(axis=1, initial=0.0)
-    return Outlines(obstacles.centre, points, normals, (normals * points).sum(axis=2), count, middle, extent)
+    return Outlines(obstacles.centre, points, normals, offsets, count, middle, inner, extent)
 
 
-def _trace(polygon: Array, radius: float, touching: Array) -> tuple[Array, Array]:
+@lru_cache(maxsize=256)
+def _trace(vertices: bytes, radius: float, touching: bytes) -> tuple[Array, Array]:
     """Return the vertices (e, 2) [m] of the outline of a rounded polygon (v, 2), and the normals (e, 2) of the edges before them.
 
     touching: directions [rad] in which the outline touches the shape, in addition to those of the edges.
     """
+    polygon = np.frombuffer(vertices).reshape(-1, 2)
     edges = np.roll(polygon, -1, axis=0) - polygon
     edges = edges[np.hypot(*edges.T) > GRAZE]
     directions = np.sort(np.arctan2(-edges[:, 0], edges[:, 1])) if len(edges) else np.zeros(1)
     wide = np.diff(directions, append=directions[0] + 2.0 * np.pi)
-    parts = np.maximum(np.ceil(wide / ARC - SAME), 1.0).astype(int)
+    widest = min(ARC, 2.0 * np.arccos(radius / (radius + STAND_OUT)))
+    parts = np.maximum(np.ceil(wide / widest - SAME), 1.0).astype(int)
     arcs = [first + turn * np.arange(k) / k for first, turn, k in zip(directions, wide, parts, strict=True)]
-    angles = np.sort(np.mod(np.concatenate([*arcs, touching]), 2.0 * np.pi))
+    angles = np.sort(np.mod(np.concatenate([*arcs, np.frombuffer(touching)]), 2.0 * np.pi))
     angles = angles[np.diff(angles, append=angles[0] + 2.0 * np.pi) > SAME]
     half = np.diff(angles, append=angles[0] + 2.0 * np.pi) / 2.0
     middle = np.column_stack([np.cos(angles + half), np.sin(angles + half)])

@@ -1,12 +1,12 @@
 """Best-first search over the visibility graph for the shortest path of each homotopy class to one goal.
 
-A state is a node and a signature: how often the path has crossed the ray from the centre of each named obstacle. Two paths between
-the same ends pass these obstacles on the same sides if and only if their signatures agree (Bhattacharya, Likhachev and Kumar,
-"Topological constraints in search-based robot path planning", 2012). The first path that arrives with a signature is therefore
-the shortest one of its class.
+A state is a node and a signature: how often the path has crossed the ray from the centre of each named obstacle. Two paths
+between the same ends pass these obstacles on the same sides if and only if their signatures agree (Bhattacharya, Likhachev and
+Kumar, "Topological constraints in search-based robot path planning", 2012). The first path that arrives with a signature is
+therefore the shortest one of its class.
 
-A signature is one number with three bits for each named obstacle: 5 plus the number of crossings, which is -1, 0 or 1. A path that
-winds further is not followed.
+A signature is one number with three bits for each named obstacle: 5 plus the number of crossings, which is -1, 0 or 1. A path
+that winds further is not followed.
 """
 
 from __future__ import annotations
@@ -19,12 +19,11 @@ from heapq import heappop, heappush
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.types import Array
 
-from .graph import Graph, Lines, Rows
+from .graph import BOTH_SIDES, Crossings, Graph, Lines, Rows
 from .sides import TURN, compute_bearings, count_crossings
 
 COAST_S = 0.2
@@ -51,9 +50,9 @@ class Arrival(NamedTuple):
 class PathQuery:
     """Which paths to look for.
 
-    hand, goal: lines from both to the nodes of a graph; rest (v,): least length from each node to the goal [m]; named (k,): rows of
-    the obstacles in the names; velocity (2,): of the hand [m/s]; max_states: number that the search may look at; deadline: after
-    it, the search ends once it has found a path.
+    hand, goal: lines from both to the nodes of a graph; rest (v,): least length from each node to the goal [m]; named (k,): rows
+    of the obstacles in the names; velocity (2,): of the hand [m/s]; max_states: number that the search may look at; deadline:
+    after it, the search ends once it has found a path.
     """
 
     graph: Graph
@@ -81,14 +80,14 @@ def find_shortest_paths(query: PathQuery, notes: Counter[str]) -> Iterator[list[
     list[Arrival]
         Paths of different classes whose keys are equal.
     """
-    graph, goal, named = query.graph, query.goal, query.named
+    graph, goal, named, centre = query.graph, query.goal, query.named, query.graph.nodes.outlines.centre
     first, head, length = graph.lists
     codes, ends = _encode_graph(graph, named.tobytes()), len(query.rest)
     rest = [*query.rest, 0.0]
     to_goal = dict(zip(goal.nodes.tolist(), zip(goal.length.tolist(), _encode(-goal.crossings, named), strict=True), strict=True))
     ones = sum(1 << BITS * row for row in range(len(named)))
     is_within = ones << BITS - 1
-    bearing_change = compute_bearings(goal.point - graph.centre[named]) - compute_bearings(query.hand.point - graph.centre[named])
+    bearing_change = compute_bearings(goal.point - centre[named]) - compute_bearings(query.hand.point - centre[named])
     frontier, entries = list[tuple[float, int, float, int, int, int]](), 0
     for node, key, code in _leave_hand(query):
         if rest[node] < np.inf:
@@ -118,6 +117,8 @@ def find_shortest_paths(query: PathQuery, notes: Counter[str]) -> Iterator[list[
         following = [(head[line], length[line], codes[line]) for line in range(first[node], first[node + 1])]
         if node in to_goal:
             following.append((ends, *to_goal[node]))
+        if before[state] < 0:
+            following = [each for each in following if _is_taut(query, node, each[0])]
         for other, step, crossed in following:
             extended = code + crossed
             if extended & is_within != is_within or extended & extended >> 1 & extended >> 2 & ones:
@@ -135,16 +136,30 @@ def _leave_hand(query: PathQuery) -> Iterator[tuple[int, float, int]]:
 
     The node after the last one of the graph is the goal.
     """
-    graph, hand, goal = query.graph, query.hand, query.goal
-    nodes, length, ends, crossings = hand.nodes, hand.length, graph.points[hand.nodes], hand.crossings
-    direct = graph.outlines.shrink(np.minimum(hand.scale, goal.scale)).block(hand.point[None], goal.point[None])
-    if not direct.any():
-        nodes, ends = np.append(nodes, len(graph.points)), np.vstack([ends, goal.point])
+    points, outlines, hand, goal = query.graph.nodes.points, query.graph.nodes.outlines, query.hand, query.goal
+    nodes, length, ends, crossings = hand.nodes, hand.length, points[hand.nodes], hand.crossings
+    direct = outlines.shrink(np.minimum(hand.scale, goal.scale)).block(hand.point[None], goal.point[None])
+    if not direct[0]:
+        nodes, ends = np.append(nodes, len(points)), np.vstack([ends, goal.point])
         length = np.append(length, np.hypot(*(goal.point - hand.point)))
-        crossings = np.vstack([crossings, count_crossings(hand.point - graph.centre, goal.point - graph.centre)])
+        crossings = np.vstack([crossings, count_crossings(hand.point - outlines.centre, goal.point - outlines.centre)])
     along = (ends - hand.point) @ query.velocity / np.maximum(length, np.finfo(float).tiny)
     key = length + COAST_S * (np.hypot(*query.velocity) - along)
     yield from zip(nodes.tolist(), key.tolist(), _encode(crossings, query.named), strict=True)
+
+
+def _is_taut(query: PathQuery, node: int, other: int) -> bool:
+    """Tell whether a path from the hand bends at a node round its outline, on the way to another node or the goal.
+
+    Other bends never shorten a path, but might let it leave the hand more nearly along its velocity.
+    """
+    nodes = query.graph.nodes
+    if query.hand.scale[nodes.owner[node]] < 1.0:
+        return True  # the path leaves this outline
+    at = nodes.points[node]
+    (x, y), outline = at - query.hand.point, nodes.before[node] + nodes.after[node] - 2.0 * at
+    ahead = (query.goal.point if other == len(nodes.points) else nodes.points[other]) - at
+    return bool((x * outline[1] - y * outline[0]) * (x * ahead[1] - y * ahead[0]) >= -BOTH_SIDES)
 
 
 def _collect_points(query: PathQuery, node_of: list[int], before: list[int]) -> Array:
@@ -153,7 +168,7 @@ def _collect_points(query: PathQuery, node_of: list[int], before: list[int]) -> 
     while state >= 0:
         nodes.append(node_of[state])
         state = before[state]
-    return np.vstack([query.hand.point, query.graph.points[nodes[::-1]], query.goal.point])
+    return np.vstack([query.hand.point, query.graph.nodes.points[nodes[::-1]], query.goal.point])
 
 
 @lru_cache(maxsize=8)
@@ -162,7 +177,7 @@ def _encode_graph(graph: Graph, named: bytes) -> list[int]:
     return _encode(graph.crossings, np.frombuffer(named, dtype=np.intp))
 
 
-def _encode(crossings: NDArray[np.int8], named: Rows) -> list[int]:
+def _encode(crossings: Crossings, named: Rows) -> list[int]:
     """Return the crossings (m, n) of the rays of named obstacles (k,) as one number for each line, to be added to signatures."""
     codes = [0] * len(crossings)
     for begin in range(0, len(named), WORD):

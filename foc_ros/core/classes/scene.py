@@ -15,7 +15,7 @@ from foc_ros.core.obstacles.culling import cull_obstacles
 from foc_ros.core.obstacles.rounded_polygon import measure_offsets
 from foc_ros.core.types import LEFT, RIGHT, Array, Candidate, Obstacles, as_readonly
 
-from .graph import Graph, Lines, build_graph
+from .graph import Graph, Lines, Rows, build_graph
 from .guess import compute_path_lengths, make_guesses, timed
 from .names import find_names, name_course
 from .outlines import outline_obstacles
@@ -68,7 +68,7 @@ class SearchScene:
     ) -> None:
         self._hand, self._velocity = hand_mean[:4].astype(float).reshape(2, 2)
         is_on_hand = np.hypot(*(goals - self._hand).T) < OFF_HAND
-        self._goals = np.where(is_on_hand[:, None], self._hand + [OFF_HAND, 0.0], goals)
+        self._goals = np.where(is_on_hand[:, None], self._hand + np.array([OFF_HAND, 0.0]), goals)
         self._near = cull_obstacles(obstacles, self._hand, self._goals, 0.0, MOST)
         kept = {*self._near.ids}
         self._others = obstacles.take([row for row, name in enumerate(obstacles.ids) if name not in kept])
@@ -107,7 +107,7 @@ class SearchScene:
         }
         return tuple([each.known or made[each.label] for each in classes])
 
-    def _connect_hand(self, rows: Array) -> tuple[Graph, Lines]:
+    def _connect_hand(self, rows: Rows) -> tuple[Graph, Lines]:
         """Return the graph of the obstacles that block the paths to a goal, and the lines from the hand to its nodes."""
         key = rows.tobytes()
         if key not in self._graphs:
@@ -130,6 +130,6 @@ class SearchScene:
 
 @lru_cache(maxsize=128)
 def _join_goal(graph: Graph, x: float, y: float) -> tuple[Lines, list[float]]:
-    """Return the lines from a goal to the nodes of a graph, and the length of the shortest path from each node to the goal [m]."""
+    """Return the lines from a goal to the nodes of a graph, and the length of the shortest path from each node to it [m]."""
     lines = graph.join(np.array([x, y]))
     return lines, graph.measure_rest(lines)

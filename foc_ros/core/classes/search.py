@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import time
 from bisect import insort
-from collections import Counter
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from heapq import merge
 from itertools import chain
@@ -118,10 +117,10 @@ def search(
         goal_inside=int(is_inside.sum()),
     )
     known, followed = _list_known(previous, {*obstacles.ids}, len(goals)), {each.label for each in previous}
-    bests, others, next_goal = _find_bests(scene, len(goals), known, followed, turn)
+    bests, courses, others, next_goal = _find_bests(scene, len(goals), known, followed, turn)
     count = max(config.max_candidates, min(len(goals), MOST_CANDIDATES))
     kept = sorted(bests, key=lambda each: _rank(each, followed))[:count]
-    chosen = [*kept, *_choose_others(scene, kept, others, known, count - len(kept), followed, turn.deadline)]
+    chosen = [*kept, *_choose_others(scene, kept, courses, others, known, count - len(kept), followed, turn.deadline)]
     candidates = scene.make_candidates(sorted(chosen), duration_s, steps)
     return Search(candidates, {name: number for name, number in notes.items() if number}, next_goal)
 
@@ -143,18 +142,19 @@ def _rank(found: PathClass, followed: Collection[str]) -> tuple[float, str]:
 
 def _find_bests(
     scene: SearchScene, goals: int, known: Sequence[PathClass], followed: Collection[str], turn: Turn
-) -> tuple[list[PathClass], list[Iterable[PathClass]], int]:
-    """Return the best class to each goal, the others in the order of their keys, and the first goal that was not searched, or 0.
+) -> tuple[list[PathClass], dict[str, int], list[Iterable[PathClass]], int]:
+    """Return the best class to each goal, courses of shortest classes, the others by their keys, and the first goal left out, or 0.
 
-    A goal that has a known class is not searched if there is no time, unless it is the one at which the search begins.
+    A goal that has a known class is left out if there is no time, unless it is the one at which the search begins.
     """
-    bests, others, next_goal, longest_s = list[PathClass](), list[Iterable[PathClass]](), 0, 0.0
+    bests, firsts, others, next_goal, longest_s = list[PathClass](), list[PathClass](), list[Iterable[PathClass]](), 0, 0.0
     for goal in sorted(range(goals), key=lambda goal: (goal < turn.first_goal, goal)):
         best_known = min((each for each in known if each.goal == goal), key=lambda each: _rank(each, followed), default=None)
         if longest_s and best_known is not None and turn.deadline.left_s < longest_s:
             next_goal = next_goal if scene.notes['search_late'] else goal
             scene.notes['search_late'] += 1
             bests.append(best_known)
+            firsts.append(best_known)
             continue
         began, seen, stream = time.perf_counter(), list[PathClass](), scene.find_classes(goal, turn.deadline)
         awaited = {label for label in followed if label.startswith(f'goal{goal}:')}
@@ -165,15 +165,18 @@ def _find_bests(
                 break
         if seen:
             bests.append(min(seen, key=lambda each: _rank(each, followed)))
+            firsts.append(seen[0])
             others.append(chain([each for each in seen if each is not bests[-1]], stream))
         scene.notes['no_way'] += not seen
         longest_s = max(longest_s, time.perf_counter() - began)
-    return bests, others, next_goal
+    courses = {each.course: each.goal for each in sorted(firsts, key=lambda each: each[:2], reverse=True)}
+    return bests, courses, others, next_goal
 
 
 def _choose_others(
     scene: SearchScene,
     bests: Sequence[PathClass],
+    courses: Mapping[str, int],
     streams: Sequence[Iterable[PathClass]],
     known: Sequence[PathClass],
     room: int,
@@ -185,8 +188,8 @@ def _choose_others(
     They rank by their keys, multiplied by REPEAT or STAY where they apply. If the time ends, known classes of the previous
     prediction take the place of those that were not found again.
     """
-    goal_of_course = {each.course: each.goal for each in sorted(bests, reverse=True)}
-    labels, chosen = {each.label for each in bests}, list[tuple[float, str, PathClass]]()
+    goal_of_course, labels = dict(courses), {each.label for each in bests}
+    chosen = list[tuple[float, str, PathClass]]()
 
     def add(found: PathClass) -> None:
         factor = REPEAT if goal_of_course.setdefault(found.course, found.goal) != found.goal else 1.0

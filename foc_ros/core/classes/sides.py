@@ -115,9 +115,7 @@ def find_path_sides(path: Array, obstacles: Obstacles, centres: Array | None = N
     return {obstacles.ids[row]: LEFT if angles[row] < 0.0 else RIGHT for row in np.flatnonzero(is_passed).tolist()}
 
 
-def is_between(
-    vertices: Array, corners: NDArray[np.intp], begin: Array, end: Array, slack: Array | float
-) -> NDArray[np.bool_]:
+def is_between(vertices: Array, corners: NDArray[np.intp], begin: Array, end: Array, slack: Array | float) -> NDArray[np.bool_]:
     """Tell which polygons have a point whose foot on a line lies between the ends of the line, by more than a slack.
 
     vertices (n, V, 2), begin, end (n, 2): of the polygons and the lines, relative to the centres [m]; corners (n,): number of

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from foc_ros.core.classes import compute_swept_angles
 from foc_ros.core.dynamics.condensed import largest_shift
-from foc_ros.core.homotopy import compute_swept_angles, is_same_class, sweep_angles
 from foc_ros.core.kernels import Matrix, Vector, compiled, compiled_separately, freeze
 from foc_ros.core.obstacles.rounded_polygon import find_normal, find_offset, measure_half_widths
 from foc_ros.core.ocp.clearance import SMALLEST_DISTANCE, find_deepest, find_penetrations, required_distance
@@ -22,6 +22,7 @@ from .active_set import CLEAR, NEWTON_TOLERANCE, update_active_contacts
 from .contacts import Contacts
 from .hermite import compute_trajectory, interpolate, interpolation_row
 from .newton import newton_on_contacts
+from .swept_angles import is_same_class, sweep_angles
 
 STAYS = 3e-7
 """Largest move of the mean, relative to the scene, at which a linearisation counts as returning its own control."""

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.core.homotopy import is_same_class, sweep_angles
 from foc_ros.core.kernels import Indices, Vector, compiled, compiled_separately, freeze
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.terms import MovingObstacles, ProblemTerms
@@ -17,6 +16,7 @@ from .contacts import Contacts
 from .hermite import compute_trajectory
 from .surrogate import evaluate_margin, find_shortfalls
 from .surrogate_newton import Preference, newton_on_surrogate
+from .swept_angles import is_same_class, sweep_angles
 
 NEWTON_TOLERANCE = 1e-6
 """Largest move of a contact, relative to the scene, at which the Newton iteration ends."""

@@ -13,9 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from foc_ros.core.classes import compute_swept_angles
 from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
-from foc_ros.core.homotopy import compute_swept_angles
 from foc_ros.core.ocp.minimum_safety_factor import find_minimum_safety_factor
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.warm_start import Start, correct_to_goal

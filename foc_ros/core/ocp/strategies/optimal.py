@@ -18,9 +18,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from foc_ros.core.classes import compute_swept_angles
 from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
-from foc_ros.core.homotopy import compute_swept_angles
 from foc_ros.core.kernels import freeze
 from foc_ros.core.ocp.contacts.contacts import Contacts
 from foc_ros.core.ocp.contacts.kkt_point import compute_class_angles
