@@ -162,8 +162,10 @@ def build_graph(outlines: Outlines) -> Graph:
 def _list_nodes(outlines: Outlines) -> Nodes:
     """Return the vertices of outlines."""
     points = outlines.vertices[np.arange(outlines.vertices.shape[1]) < outlines.count[:, None]]
-    owner, starts = np.repeat(np.arange(len(outlines)), outlines.count), np.cumsum(outlines.count) - outlines.count
-    place, count = np.arange(len(points)) - starts[owner], outlines.count[owner]
-    following, previous = starts[owner] + (place + 1) % count, starts[owner] + (place - 1) % count
+    owner, number = np.repeat(np.arange(len(outlines)), outlines.count), np.arange(len(points))
+    last = np.cumsum(outlines.count) - 1
+    first = last - outlines.count + 1
+    following = np.where(number == last[owner], first[owner], number + 1)
+    previous = np.where(number == first[owner], last[owner], number - 1)
     is_free = ~outlines.hold(points, owner)
     return Nodes(outlines, points, points[previous], points[following], following, owner, is_free)

@@ -23,7 +23,7 @@ import numpy as np
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.types import Array
 
-from .graph import BOTH_SIDES, Crossings, Graph, Lines, Rows
+from .graph import Crossings, Graph, Lines, Rows
 from .sides import TURN, compute_bearings, count_crossings
 
 COAST_S = 0.2
@@ -34,6 +34,8 @@ BITS, NEUTRAL = 3, 5
 """Bits of a signature for each obstacle, and their value where the path has not crossed the ray."""
 WORD = 20
 """Number of obstacles whose bits NumPy adds up in one integer."""
+TAUT = 1e-12
+"""Cross product of two successive lines of a path, or of a line and an edge, that counts as straight on [m^2]."""
 LOOK = 200
 """Number of states after which the search looks at the clock again."""
 
@@ -157,9 +159,16 @@ def _is_taut(query: PathQuery, node: int, other: int) -> bool:
     if query.hand.scale[nodes.owner[node]] < 1.0:
         return True  # the path leaves this outline
     at = nodes.points[node]
-    (x, y), outline = at - query.hand.point, nodes.before[node] + nodes.after[node] - 2.0 * at
-    ahead = (query.goal.point if other == len(nodes.points) else nodes.points[other]) - at
-    return bool((x * outline[1] - y * outline[0]) * (x * ahead[1] - y * ahead[0]) >= -BOTH_SIDES)
+    line, ahead = at - query.hand.point, (query.goal.point if other == len(nodes.points) else nodes.points[other]) - at
+    before, after = nodes.before[node] - at, nodes.after[node] - at
+    is_left = _cross(line, before + after) > 0.0
+    bend, rest = _cross(line, ahead), _cross(ahead, after if is_left else before)
+    return min(bend, rest) >= -TAUT if is_left else max(bend, rest) <= TAUT
+
+
+def _cross(one: Array, other: Array) -> float:
+    """Return the cross product of two vectors (2,): positive if the second one points to the left of the first."""
+    return float(one[0] * other[1] - one[1] * other[0])
 
 
 def _collect_points(query: PathQuery, node_of: list[int], before: list[int]) -> Array:

@@ -143,7 +143,7 @@ def _rank(found: PathClass, followed: Collection[str]) -> tuple[float, str]:
 def _find_bests(
     scene: SearchScene, goals: int, known: Sequence[PathClass], followed: Collection[str], turn: Turn
 ) -> tuple[list[PathClass], dict[str, int], list[Iterable[PathClass]], int]:
-    """Return the best class to each goal, courses of shortest classes, the others by their keys, and the first goal left out, or 0.
+    """Return the best class to each goal, the goals by the courses of their shortest classes, the other classes, a goal left out.
 
     A goal that has a known class is left out if there is no time, unless it is the one at which the search begins.
     """
