@@ -19,8 +19,14 @@ MAX_SPEED_RATIO = 2.5
 """Largest ratio of v T to L for which the timing does not overshoot."""
 ROOM = 0.002
 """Distance from the grown obstacles that a guess keeps where there is room [m]."""
-SMOOTHINGS, PUSHES = 2, 3
-"""How often a guess is averaged with its neighbours, and how often it is moved away from the obstacles, with room and without."""
+ROOMS = ROOM, ROOM, ROOM, 0.0
+"""To this distance from the grown obstacles a guess is moved after each smoothing [m]: the last smoothing uses up the room."""
+ROOM = 0.002
+"""Distance from the grown obstacles that a guess keeps where there is room [m]."""
+ROOMS = ROOM, ROOM, ROOM, 0.0
+"""To this distance from the grown obstacles a guess is moved after each smoothing [m]: the last smoothing uses up the room."""
+SMOOTHINGS = 2
+"""How often the positions of a guess are averaged with their neighbours before they are moved away from the obstacles."""
 CLEAR = 1e-12
 """Depth in a grown obstacle that does not count [m]."""
 
@@ -103,25 +109,19 @@ def make_guesses(taut: Sequence[Array], goals: Sequence[int], obstacles: Obstacl
     """
     if not taut:
         return []
-    before, count = np.array(taut), len(taut[0])
-    gap = np.hypot(*(before.reshape(-1, 1, 2) - obstacles.centre).transpose(2, 0, 1)) - obstacles.extent
-    is_near = (gap < names.radius - obstacles.radius + ROOM).any(axis=0)
-    is_near |= gap.min(axis=0, initial=np.inf) < np.hypot(*np.diff(before, axis=1).transpose(2, 0, 1)).max(initial=0.0)
-    is_near &= names.blocks[list(goals)].any(axis=0)
-    near = np.flatnonzero(is_near)
-    guesses = before.copy()
-    for _ in range(SMOOTHINGS):
-        guesses[:, 1:-1] += (guesses[:, :-2] + guesses[:, 2:] - 2.0 * guesses[:, 1:-1]) / 4.0
-    if not len(near):
-        return list(guesses)
+    before, guesses = np.array(taut), np.array(taut)
+    step = np.hypot(*np.diff(before, axis=1).transpose(2, 0, 1)).max(initial=0.0)
+    apart = np.hypot(*(before.reshape(-1, 1, 2) - obstacles.centre).transpose(2, 0, 1)) - obstacles.extent
+    near = np.flatnonzero((apart < names.radius - obstacles.radius + ROOM + step).any(axis=0))
     shapes = obstacles.take(near)
     wanted = np.array([_measure_wanted(path, goal, shapes, names, near) for path, goal in zip(before, goals, strict=True)])
-    points, wanted = guesses[:, 1:-1].reshape(-1, 2), wanted[:, 1:-1].reshape(-1, len(near))
-    for room in [ROOM] * PUSHES + [0.0] * PUSHES:
-        points = _push(points, wanted + room, shapes)
-    _, distance = measure_offsets(points, shapes)
-    is_clear = (distance >= wanted - CLEAR).all(axis=1, keepdims=True)
-    guesses[:, 1:-1] = np.where(is_clear, points, before[:, 1:-1].reshape(-1, 2)).reshape(len(taut), count - 2, 2)
+    for room in ROOMS:
+        guesses[:, 1:-1] += (guesses[:, :-2] + guesses[:, 2:] - 2.0 * guesses[:, 1:-1]) / 4.0
+        guesses = _push(guesses, wanted + room, shapes)
+    guesses = _push(guesses, wanted, shapes)
+    _, distance = measure_offsets(guesses.reshape(-1, 2), shapes)
+    is_clear = (distance.reshape(wanted.shape) >= wanted - CLEAR).all(axis=2, keepdims=True)
+    guesses = np.where(is_clear, guesses, before)
     angles = [[compute_swept_angles(path, shapes.centre) for path in pair] for pair in zip(guesses, before, strict=True)]
     return [guess if is_same_class(*pair) else path for guess, path, pair in zip(guesses, before, angles, strict=True)]
 
@@ -136,11 +136,16 @@ def _measure_wanted(path: Array, goal: int, shapes: Obstacles, names: Names, row
     return wanted
 
 
-def _push(points: Array, wanted: Array, shapes: Obstacles) -> Array:
-    """Move each point (q, 2) to the wanted distance (q, r) from the one of r obstacles to which it is too near by most."""
+def _push(paths: Array, wanted: Array, shapes: Obstacles) -> Array:
+    """Move positions (k, N + 1, 2) to the wanted distance (k, N + 1, r) from that obstacle to which each is too near by most."""
+    if not len(shapes):
+        return paths
+    points, wanted = paths.reshape(-1, 2), wanted.reshape(-1, len(shapes))
     offset, distance = measure_offsets(points, shapes)
     rows, worst = np.arange(len(points)), (wanted - distance).argmax(axis=1)
     away, apart = offset[rows, worst], distance[rows, worst]
     missing = np.maximum(wanted[rows, worst] - apart, 0.0)
     moved: Array = points + away * (missing / np.where(apart == 0.0, np.inf, apart))[:, None]
+    moved = moved.reshape(paths.shape)
+    moved[:, [0, -1]] = paths[:, [0, -1]]
     return moved
