@@ -11,7 +11,7 @@ from foc_ros.core.types import Array, Obstacles
 
 from .graph import Rows
 from .names import Names
-from .sides import compute_swept_angles, is_same_class
+from .sides import sweep
 
 SLOPE = 0.5
 """A hand in a margin leaves it by this much for each metre of its path, and enters the margin of its goal likewise."""
@@ -114,7 +114,7 @@ def make_guesses(taut: Sequence[Array], goals: Sequence[int], obstacles: Obstacl
     apart = np.hypot(*(before.reshape(-1, 1, 2) - obstacles.centre).transpose(2, 0, 1)) - obstacles.extent
     near = np.flatnonzero((apart < names.radius - obstacles.radius + ROOM + step).any(axis=0))
     shapes = obstacles.take(near)
-    wanted = np.array([_measure_wanted(path, goal, shapes, names, near) for path, goal in zip(before, goals, strict=True)])
+    wanted = _measure_wanted(before, list(goals), shapes, names, near)
     for room in ROOMS:
         guesses[:, 1:-1] += (guesses[:, :-2] + guesses[:, 2:] - 2.0 * guesses[:, 1:-1]) / 4.0
         guesses = _push(guesses, wanted + room, shapes)
@@ -122,17 +122,21 @@ def make_guesses(taut: Sequence[Array], goals: Sequence[int], obstacles: Obstacl
     _, distance = measure_offsets(guesses.reshape(-1, 2), shapes)
     is_clear = (distance.reshape(wanted.shape) >= wanted - CLEAR).all(axis=2, keepdims=True)
     guesses = np.where(is_clear, guesses, before)
-    angles = [[compute_swept_angles(path, shapes.centre) for path in pair] for pair in zip(guesses, before, strict=True)]
-    return [guess if is_same_class(*pair) else path for guess, path, pair in zip(guesses, before, angles, strict=True)]
+    angles = [sweep(each[:, :, None] - shapes.centre) for each in (guesses, before)]
+    apart = np.abs(angles[0] - angles[1]).max(axis=1, initial=0.0)
+    return list(np.where(apart[:, None, None] < np.pi, guesses, before))
 
 
-def _measure_wanted(path: Array, goal: int, shapes: Obstacles, names: Names, rows: Rows) -> Array:
-    """Return the distance (N + 1, r) [m] that each position wants from the polygons of some obstacles (r,)."""
-    along, radius = compute_path_lengths(path)[:, None], names.radius[rows]
-    _, ends = measure_offsets(path[[0, -1]], shapes)
-    leaving = np.where(names.holds_hand[rows], ends[0] + SLOPE * along, np.inf)
-    entering = np.where(names.holds_goal[goal, rows], ends[1] + SLOPE * (along[-1] - along), np.inf)
-    wanted: Array = np.where(names.blocks[goal, rows], np.minimum(radius, np.minimum(leaving, entering)), -np.inf)
+def _measure_wanted(paths: Array, goals: list[int], shapes: Obstacles, names: Names, rows: Rows) -> Array:
+    """Return the distance (k, N + 1, r) [m] that positions (k, N + 1, 2) want from the polygons of some obstacles (r,)."""
+    steps = np.hypot(*np.diff(paths, axis=1, prepend=paths[:, :1]).transpose(2, 0, 1))
+    along, goal = np.cumsum(steps, axis=1)[..., None], np.array(goals)[:, None]
+    _, ends = measure_offsets(paths[:, [0, -1]].reshape(-1, 2), shapes)
+    at_hand, at_goal = ends.reshape(len(paths), 2, 1, len(rows)).transpose(1, 0, 2, 3)
+    leaving = np.where(names.holds_hand[rows], at_hand + SLOPE * along, np.inf)
+    entering = np.where(names.holds_goal[goal, rows][:, None], at_goal + SLOPE * (along[:, -1:] - along), np.inf)
+    held = np.minimum(names.radius[rows], np.minimum(leaving, entering))
+    wanted: Array = np.where(names.blocks[goal, rows][:, None], held, -np.inf)
     return wanted
 
 

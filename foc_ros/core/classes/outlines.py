@@ -7,16 +7,20 @@ the shapes do.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, wraps
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.obstacles.rounded_polygon import measure_offsets
-from foc_ros.core.types import Array, Obstacles, make_obstacles
+from foc_ros.core.types import Array, Obstacles
 
 Flags = NDArray[np.bool_]
+P = ParamSpec('P')
+T = TypeVar('T')
 
 ARC = np.pi / 6.0
 """Largest change of direction from one edge of an outline to the next [rad]: 12 edges or more go round a circle."""
@@ -28,6 +32,8 @@ SAME = 1e-7
 """Edges whose directions differ by less count as one [rad]."""
 CHUNK = 512
 """So many lines are compared with the outlines at once: larger arrays do not fit into the cache."""
+KEPT = 4
+"""Number of results that are kept."""
 GRAZE = 1e-9
 """A line may enter an outline this deep [m]: shapes in a row share tangents, up to rounding."""
 
@@ -116,26 +122,28 @@ class Outlines:
         return flags
 
 
-def outline_obstacles(obstacles: Obstacles, radius: Array) -> Outlines:
-    """Return the outlines of obstacles; the last ones are kept, for obstacles that stay the same.
+def keep_last(function: Callable[P, T]) -> Callable[P, T]:
+    """Let a function of obstacles and arrays keep its last results, for obstacles that have the same place and shape."""
+    kept = dict[tuple[bytes, ...], T]()
 
-    Parameters
-    ----------
-    obstacles : Obstacles
-        The n obstacles.
-    radius : Array
-        Radius of each with the clearance, (n,) [m].
+    @wraps(function)
+    def look_up(*args: P.args, **kwargs: P.kwargs) -> T:
+        arrays = list[NDArray[Any]]()
+        for each in args:
+            arrays += [each.centre, each.vertices, each.corners] if isinstance(each, Obstacles) else [np.asarray(each)]
+        key = tuple([array.tobytes() for array in arrays])
+        if key not in kept:
+            if len(kept) == KEPT:
+                del kept[next(iter(kept))]
+            kept[key] = function(*args, **kwargs)
+        return kept[key]
 
-    Returns
-    -------
-    Outlines
-        Their outlines.
-    """
-    return _outline(*[np.asarray(each).tobytes() for each in (obstacles.centre, radius, obstacles.vertices, obstacles.corners)])
+    return look_up
 
 
+@keep_last
 def measure_gaps(obstacles: Obstacles) -> tuple[Array, Array]:
-    """Measure how far the polygons of obstacles lie apart; the last result is kept, for obstacles that stay the same.
+    """Measure how far the polygons of obstacles lie apart.
 
     Parameters
     ----------
@@ -148,12 +156,6 @@ def measure_gaps(obstacles: Obstacles) -> tuple[Array, Array]:
         Distances of each pair (n, n) [m], infinite for an obstacle and itself, and the vectors (n, n, 2) [m] from the point of
         the second polygon that is nearest to the first one to this.
     """
-    return _measure_gaps(obstacles.centre.tobytes(), obstacles.vertices.tobytes(), obstacles.corners.tobytes())
-
-
-@lru_cache(maxsize=4)
-def _measure_gaps(centre: bytes, vertices: bytes, corners: bytes) -> tuple[Array, Array]:
-    obstacles = _read(centre, vertices, corners)
     n, most = obstacles.vertices.shape[:2]
     offset, distance = measure_offsets((obstacles.centre[:, None] + obstacles.vertices).reshape(-1, 2), obstacles)
     is_corner = np.arange(most) < obstacles.corners[:, None]
@@ -167,33 +169,37 @@ def _measure_gaps(centre: bytes, vertices: bytes, corners: bytes) -> tuple[Array
     return gap, apart
 
 
-def _read(centre: bytes, vertices: bytes, corners: bytes) -> Obstacles:
-    """Return obstacles with the given centres, vertices and numbers of vertices."""
-    number = np.frombuffer(corners, dtype=np.intp)
-    polygons = np.frombuffer(vertices).reshape(len(number), -1, 2) if len(number) else np.zeros((0, 1, 2))
-    return replace(make_obstacles(np.frombuffer(centre).reshape(-1, 2), 0.0), vertices=polygons, corners=number)
+@keep_last
+def outline_obstacles(obstacles: Obstacles, radius: Array) -> Outlines:
+    """Return the outlines of obstacles; they are the same object for obstacles that stay the same.
 
+    Parameters
+    ----------
+    obstacles : Obstacles
+        The n obstacles.
+    radius : Array
+        Radius of each with the clearance, (n,) [m].
 
-@lru_cache(maxsize=4)
-def _outline(centre: bytes, radius: bytes, vertices: bytes, corners: bytes) -> Outlines:
-    obstacles, radii = _read(centre, vertices, corners), np.frombuffer(radius)
-    gap, apart = _measure_gaps(centre, vertices, corners)
-    both = radii[:, None] + radii
+    Returns
+    -------
+    Outlines
+        Their outlines.
+    """
+    gap, apart = measure_gaps(obstacles)
+    both = radius[:, None] + radius
     is_narrow = (gap > both) & (gap < (1.0 + NARROW) * both)
     towards = np.arctan2(-apart[..., 1], -apart[..., 0])
     traced = []
-    for row, (polygon, size) in enumerate(zip(obstacles.vertices, radii.tolist(), strict=True)):
+    for row, (polygon, size) in enumerate(zip(obstacles.vertices, radius.tolist(), strict=True)):
         touching = towards[row, is_narrow[row]].tobytes()
         traced.append(_trace(polygon[: obstacles.corners[row]].tobytes(), size, touching))
     count = np.array([len(points) for points, _ in traced], dtype=np.intp)
-    most = count.max(initial=1)
-    points, normals = np.zeros((2, len(traced), most, 2))
-    for row, each in enumerate(traced):
-        points[row, : count[row]], normals[row, : count[row]] = each
-        points[row, count[row] :], normals[row, count[row] :] = each[0][-1], each[1][-1]
-    points += obstacles.centre[:, None]
-    is_vertex = (np.arange(most) < count[:, None])[..., None]
-    middle = np.where(is_vertex, points, 0.0).sum(axis=1) / count[:, None]
+    shape = len(traced), int(count.max(initial=1)), 2
+    rows = np.minimum(np.arange(shape[1]), count[:, None] - 1)
+    points = np.reshape([each[kept] for (each, _), kept in zip(traced, rows, strict=True)], shape) + obstacles.centre[:, None]
+    normals = np.reshape([each[kept] for (_, each), kept in zip(traced, rows, strict=True)], shape)
+    is_vertex = np.arange(points.shape[1]) < count[:, None]
+    middle = np.where(is_vertex[..., None], points, 0.0).sum(axis=1) / count[:, None]
     offsets = (normals * points).sum(axis=2)
     inner = (offsets - (normals * middle[:, None]).sum(axis=2)).min(axis=1, initial=np.inf)
     extent = np.hypot(*(points - middle[:, None]).transpose(2, 0, 1)).max(axis=1, initial=0.0)

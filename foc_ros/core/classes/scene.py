@@ -38,18 +38,26 @@ GRAZE = 1e-6
 class PathClass(NamedTuple):
     """A homotopy class to a goal (row), represented by its shortest path.
 
-    key, length plus what coasting adds [m], and label: by these, classes rank. course: the label without the goal; sides: LEFT or
-    RIGHT by id; points (m, 2) [m]: the path; known: the candidate of the previous prediction, where there was no time to find the
-    class again.
+    key, length plus what coasting adds [m], and label: by these, classes rank. sides: LEFT or RIGHT by id; points (m, 2) [m]: the
+    path; known: the candidate of the previous prediction, where there was no time to find the class again.
     """
 
     key: float
     label: str
     goal: int
-    course: str
     sides: tuple[tuple[str, int], ...]
     points: Array
     known: Candidate | None = None
+
+    @property
+    def course(self) -> str:
+        """The label without the goal."""
+        return self.label.partition(':')[2]
+
+    @property
+    def named(self) -> set[str]:
+        """The ids of the obstacles in the name."""
+        return {identity for identity, _ in self.sides}
 
 
 class SearchScene:
@@ -59,6 +67,8 @@ class SearchScene:
     ----------
     names : Names
         How the obstacles that are near count.
+    known : list[PathClass]
+        The classes of the previous prediction that still fit the scene, in the order of their length.
     notes : Counter[str]
         Counts of what is decided, see `search.Search`.
     """
@@ -74,7 +84,14 @@ class SearchScene:
         self._others = obstacles.take([row for row, name in enumerate(obstacles.ids) if name not in kept])
         self._clearance, self._max_states = config.clearance, STATES + STATES_PER_CANDIDATE * config.max_candidates
         self.names = find_names(self._hand, self._goals, self._near, config.clearance, previous)
-        self.notes: Counter[str] = Counter()
+        ids, fitting = {*obstacles.ids}, [each for each in previous if each.goal < len(goals)]
+        known = [PathClass(each.length, each.label, each.goal, each.sides, each.guess, each) for each in fitting]
+        self.known = sorted([each for each in known if each.named <= ids], key=lambda each: each[:2])
+        self.notes = Counter(
+            hand_inside=int(self.names.holds_hand.sum()),
+            goal_near=int((self.names.holds_goal & self.names.blocks).any(axis=1).sum()),
+            goal_inside=int((~self.names.blocks).any(axis=1).sum()),
+        )
         self._graphs: dict[bytes, tuple[Graph, Lines]] = {}
 
     def find_classes(self, goal: int, deadline: Deadline) -> Iterator[PathClass]:
@@ -90,8 +107,7 @@ class SearchScene:
             classes = []
             for key, points, swept in tied:
                 sides = tuple([(ids[row], LEFT if swept[row] < 0.0 else RIGHT) for row in order])
-                course = name_course(sides)
-                classes.append(PathClass(round(key, DIGITS), f'goal{goal}:{course}', goal, course, sides, points))
+                classes.append(PathClass(round(key, DIGITS), f'goal{goal}:{name_course(sides)}', goal, sides, points))
             yield from [each for each in sorted(classes) if not self._is_left_out(each.points)]
 
     def make_candidates(self, classes: Sequence[PathClass], duration_s: Sequence[float], steps: int) -> tuple[Candidate, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from bisect import insort
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from heapq import merge
 from itertools import chain
@@ -15,7 +15,6 @@ from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.errors import SceneError
 from foc_ros.core.types import Array, Candidate, Obstacles
 
-from .names import name_course
 from .scene import PathClass, SearchScene
 
 REPEAT = 1.5
@@ -109,107 +108,91 @@ def search(
     if not len(goals):
         return Search(())
     scene = SearchScene(hand_mean, goals, obstacles, config, previous)
-    names, notes = scene.names, scene.notes
-    is_inside = ~names.blocks.all(axis=1)
-    notes.update(
-        hand_inside=int(names.holds_hand.sum()),
-        goal_near=int((names.holds_goal.any(axis=1) & ~is_inside).sum()),
-        goal_inside=int(is_inside.sum()),
-    )
-    known, followed = _list_known(previous, {*obstacles.ids}, len(goals)), {each.label for each in previous}
-    bests, courses, others, next_goal = _find_bests(scene, len(goals), known, followed, turn)
+    ranking = _Ranking(scene, {each.label for each in previous}, turn.deadline)
+    next_goal = ranking.find_bests(sorted(range(len(goals)), key=lambda goal: (goal < turn.first_goal, goal)))
     count = max(config.max_candidates, min(len(goals), MOST_CANDIDATES))
-    kept = sorted(bests, key=lambda each: _rank(each, followed))[:count]
-    chosen = [*kept, *_choose_others(scene, kept, courses, others, known, count - len(kept), followed, turn.deadline)]
-    candidates = scene.make_candidates(sorted(chosen), duration_s, steps)
-    return Search(candidates, {name: number for name, number in notes.items() if number}, next_goal)
+    candidates = scene.make_candidates(ranking.choose(count), duration_s, steps)
+    return Search(candidates, {name: number for name, number in scene.notes.items() if number}, next_goal)
 
 
-def _list_known(previous: Sequence[Candidate], ids: Collection[str], goals: int) -> list[PathClass]:
-    """Return the classes of previous candidates that still fit the scene, in the order of their length."""
-    known = [
-        PathClass(each.length, each.label, each.goal, name_course(each.sides), each.sides, each.guess, each)
-        for each in previous
-        if each.goal < goals and all(identity in ids for identity, _ in each.sides)
-    ]
-    return sorted(known, key=lambda each: each[:2])
+class _Ranking:
+    """Finds and ranks classes to all goals.
 
-
-def _rank(found: PathClass, followed: Collection[str]) -> tuple[float, str]:
-    """Return by what a class is compared with others to the same goal; followed: labels of the previous prediction."""
-    return found.key * (STAY if found.label in followed else 1.0), found.label
-
-
-def _find_bests(
-    scene: SearchScene, goals: int, known: Sequence[PathClass], followed: Collection[str], turn: Turn
-) -> tuple[list[PathClass], dict[str, int], list[Iterable[PathClass]], int]:
-    """Return the best class to each goal, the goals by the courses of their shortest classes, the other classes, a goal left out.
-
-    A goal that has a known class is left out if there is no time, unless it is the one at which the search begins.
+    A class ranks by its key, which is multiplied by STAY if it was followed in the previous prediction (labels), and by REPEAT if
+    it passes all obstacles as the shortest class to another goal does, or one that ranks before it.
     """
-    bests, firsts, others, next_goal, longest_s = list[PathClass](), list[PathClass](), list[Iterable[PathClass]](), 0, 0.0
-    for goal in sorted(range(goals), key=lambda goal: (goal < turn.first_goal, goal)):
-        best_known = min((each for each in known if each.goal == goal), key=lambda each: _rank(each, followed), default=None)
-        if longest_s and best_known is not None and turn.deadline.left_s < longest_s:
-            next_goal = next_goal if scene.notes['search_late'] else goal
-            scene.notes['search_late'] += 1
-            bests.append(best_known)
-            firsts.append(best_known)
-            continue
-        began, seen, stream = time.perf_counter(), list[PathClass](), scene.find_classes(goal, turn.deadline)
-        awaited = {label for label in followed if label.startswith(f'goal{goal}:')}
+
+    def __init__(self, scene: SearchScene, followed: Collection[str], deadline: Deadline) -> None:
+        self._scene, self._followed, self._deadline = scene, followed, deadline
+        self._bests: list[PathClass] = []
+        self._shortest: list[PathClass] = []
+        self._others: list[Iterable[PathClass]] = []
+
+    def find_bests(self, goals: Sequence[int]) -> int:
+        """Find the best class to each of some goals; return the first goal for which there was no time, or 0.
+
+        Only a goal that has a class from the previous prediction may have to wait, and never the first one.
+        """
+        next_goal, longest_s = 0, 0.0
+        for goal in goals:
+            known = [each for each in self._scene.known if each.goal == goal]
+            if known and goal != goals[0] and self._deadline.left_s < longest_s:
+                next_goal = next_goal if self._scene.notes['search_late'] else goal
+                self._scene.notes['search_late'] += 1
+                self._bests.append(known[0])
+                self._shortest.append(known[0])
+                continue
+            began = time.perf_counter()
+            self._find_best(goal)
+            longest_s = max(longest_s, time.perf_counter() - began)
+        return next_goal
+
+    def _find_best(self, goal: int) -> None:
+        """Find the best class to a goal: the shortest one, unless one that was followed is nearly as short."""
+        stream, seen = self._scene.find_classes(goal, self._deadline), list[PathClass]()
+        awaited = {label for label in self._followed if label.startswith(f'goal{goal}:')}
         for found in stream:
             seen.append(found)
             awaited.discard(found.label)
-            if not awaited or seen[0].label in followed or STAY * found.key > seen[0].key:
+            if not awaited or seen[0].label in self._followed or STAY * found.key > seen[0].key:
                 break
         if seen:
-            bests.append(min(seen, key=lambda each: _rank(each, followed)))
-            firsts.append(seen[0])
-            others.append(chain([each for each in seen if each is not bests[-1]], stream))
-        scene.notes['no_way'] += not seen
-        longest_s = max(longest_s, time.perf_counter() - began)
-    courses = {each.course: each.goal for each in sorted(firsts, key=lambda each: each[:2], reverse=True)}
-    return bests, courses, others, next_goal
+            best = min(seen, key=self._rank)
+            self._bests.append(best)
+            self._shortest.append(seen[0])
+            self._others.append(chain([each for each in seen if each is not best], stream))
+        self._scene.notes['no_way'] += not seen
 
+    def choose(self, count: int) -> list[PathClass]:
+        """Choose some classes, shortest first: the best one to each goal, as far as there is room, then others by their rank.
 
-def _choose_others(
-    scene: SearchScene,
-    bests: Sequence[PathClass],
-    courses: Mapping[str, int],
-    streams: Sequence[Iterable[PathClass]],
-    known: Sequence[PathClass],
-    room: int,
-    followed: Collection[str],
-    deadline: Deadline,
-) -> list[PathClass]:
-    """Choose as many classes as there is room for, besides the best one to each goal.
+        If the time ends, known classes of the previous prediction take the place of those that were not found again.
+        """
+        bests = sorted(self._bests, key=self._rank)[:count]
+        goal_of = {each.course: each.goal for each in sorted(self._shortest, reverse=True)}
+        chosen, labels, room = list[tuple[float, str, PathClass]](), {each.label for each in bests}, count - len(bests)
 
-    They rank by their keys, multiplied by REPEAT or STAY where they apply. If the time ends, known classes of the previous
-    prediction take the place of those that were not found again.
-    """
-    goal_of_course, labels = dict(courses), {each.label for each in bests}
-    chosen = list[tuple[float, str, PathClass]]()
+        def add(found: PathClass) -> None:
+            factor = REPEAT if goal_of.setdefault(found.course, found.goal) != found.goal else 1.0
+            insort(chosen, (factor * self._rank(found)[0], found.label, found))
+            labels.add(found.label)
 
-    def add(found: PathClass) -> None:
-        factor = REPEAT if goal_of_course.setdefault(found.course, found.goal) != found.goal else 1.0
-        insort(chosen, (_rank(found, followed)[0] * factor, found.label, found))
-        labels.add(found.label)
-
-    is_late = deadline.has_passed
-    for found in merge(*streams) if room and not is_late else ():
-        factor = STAY if not labels.issuperset(followed) else 1.0
-        if len(chosen) >= room and factor * found.key > chosen[room - 1][0]:
-            break
-        add(found)
-        is_late = deadline.has_passed
-        if is_late:
-            break
-    scene.notes['search_late'] += is_late
-    if scene.notes['search_late']:
-        names = {each.goal: {identity for identity, _ in each.sides} for each in [*bests, *[each for *_, each in chosen]]}
-        for each in known:
+        is_late = room > 0 and self._deadline.has_passed
+        for found in merge(*self._others) if room and not is_late else ():
+            if len(chosen) >= room and found.key * (1.0 if labels.issuperset(self._followed) else STAY) > chosen[room - 1][0]:
+                break
+            add(found)
+            is_late = self._deadline.has_passed
+            if is_late:
+                break
+        self._scene.notes['search_late'] += is_late
+        if self._scene.notes['search_late']:
             # beside others to its goal, a class has to have the same obstacles in its name, so that no class comes twice
-            if each.label not in labels and names.get(each.goal) == {identity for identity, _ in each.sides}:
-                add(each)
-    return [each for *_, each in chosen[:room]]
+            named = {each.goal: each.named for each in [*bests, *[found for *_, found in chosen]]}
+            for each in self._scene.known:
+                if each.label not in labels and named.get(each.goal) == each.named:
+                    add(each)
+        return sorted([*bests, *[found for *_, found in chosen[:room]]])
+
+    def _rank(self, found: PathClass) -> tuple[float, str]:
+        return found.key * (STAY if found.label in self._followed else 1.0), found.label

@@ -71,9 +71,13 @@ def compute_swept_angles(path: Array, centres: Array) -> Array:
         raise SceneError('path', 'points (m, 2), m >= 1', f'an array {path.shape}')
     if centres.ndim == 3 and len(centres) != len(path):
         raise SceneError('centres', f'one row for each of the {len(path)} points', f'{len(centres)} rows')
-    offset = path[:, None] - centres
-    bearing = compute_bearings(offset[[0, -1]])
-    angles: Array = bearing[1] - bearing[0] + TURN * count_crossings(offset[:-1], offset[1:]).sum(axis=0)
+    return sweep(path[:, None] - centres)
+
+
+def sweep(offset: Array) -> Array:
+    """Return the angles (..., n) [rad] that paths sweep about centres; offset (..., m, n, 2): of their points [m]."""
+    turns = count_crossings(offset[..., :-1, :, :], offset[..., 1:, :, :]).sum(axis=-2)
+    angles: Array = compute_bearings(offset[..., -1, :, :]) - compute_bearings(offset[..., 0, :, :]) + TURN * turns
     return angles
 
 
