@@ -34,14 +34,13 @@ SHORTEST = 1e-12
 class Nodes:
     """The v vertices of n outlines, those of the first outline first.
 
-    points, before, after (v, 2): each vertex, and the ones before and after it [m]; following (v,): row of the one after it;
-    owner (v,): row of its outline; is_free (v,): whether it lies in no other outline.
+    points (v, 2) [m]; previous, following (v,): rows of the vertices before and after each on its outline; owner (v,): row of its
+    outline; is_free (v,): whether it lies in no other outline.
     """
 
     outlines: Outlines
     points: Array
-    before: Array
-    after: Array
+    previous: Rows
     following: Rows
     owner: Rows
     is_free: Flags
@@ -51,11 +50,16 @@ class Nodes:
         """The vertices relative to the centres of the obstacles (v, n, 2) [m]."""
         return self.points[:, None] - self.outlines.centre
 
+    @cached_property
+    def places(self) -> list[tuple[float, float]]:
+        """The vertices as a list, which Python reads faster."""
+        return list(map(tuple, self.points.tolist()))
+
     def touch(self, rows: Rows, points: Array) -> Flags:
         """Tell whether the lines from vertices (p,) to points (q, 2) leave its outline on one side, (p, q)."""
         at, left = self.points[rows], []
-        for neighbour in (self.before, self.after):
-            edge = neighbour[rows] - at
+        for neighbour in (self.previous, self.following):
+            edge = self.points[neighbour[rows]] - at
             aside = np.column_stack([edge[:, 1], -edge[:, 0]])
             left.append(aside @ points.T - (aside * at).sum(axis=1)[:, None])
         flags: Flags = left[0] * left[1] >= -BOTH_SIDES
@@ -168,4 +172,4 @@ def _list_nodes(outlines: Outlines) -> Nodes:
     following = np.where(number == last[owner], first[owner], number + 1)
     previous = np.where(number == first[owner], last[owner], number - 1)
     is_free = ~outlines.hold(points, owner)
-    return Nodes(outlines, points, points[previous], points[following], following, owner, is_free)
+    return Nodes(outlines, points, previous, following, owner, is_free)

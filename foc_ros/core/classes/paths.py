@@ -95,14 +95,15 @@ def find_shortest_paths(query: PathQuery, notes: Counter[str]) -> Iterator[list[
         if rest[node] < np.inf:
             heappush(frontier, (key + rest[node], entries, key, node, NEUTRAL * ones + code, -1))
             entries += 1
-    seen, node_of, before, tied, is_first = set[tuple[int, int]](), list[int](), list[int](), list[Arrival](), True
-    while frontier and len(node_of) < query.max_states:
+    seen, node_of, before, tied, found = set[tuple[int, int]](), list[int](), list[int](), list[Arrival](), 0
+    # each named obstacle is passed on two sides
+    while frontier and len(node_of) < query.max_states and found < 1 << len(named):
         if tied and frontier[0][0] > tied[0].key + TIE:
             yield tied
-            tied, is_first = [], False
-        if not is_first and len(node_of) % LOOK == 0 and query.deadline.has_passed:
+            tied = []
+        if found and len(node_of) % LOOK == 0 and query.deadline.has_passed:
             notes['search_late'] += 1
-            return
+            break
         _, _, key, node, code, state = heappop(frontier)
         if (node, code) in seen:
             continue
@@ -115,6 +116,7 @@ def find_shortest_paths(query: PathQuery, notes: Counter[str]) -> Iterator[list[
             swept = (bearing_change + TURN * np.array(turns)).tolist()
             if all(abs(angle) < TURN for angle in swept):
                 tied.append(Arrival(key, _collect_points(query, node_of, before), swept))
+                found += 1
             continue
         following = [(head[line], length[line], codes[line]) for line in range(first[node], first[node + 1])]
         if node in to_goal:
@@ -130,7 +132,7 @@ def find_shortest_paths(query: PathQuery, notes: Counter[str]) -> Iterator[list[
                 entries += 1
     if tied:
         yield tied
-    notes['search_cut'] += bool(frontier)
+    notes['search_cut'] += len(node_of) >= query.max_states
 
 
 def _leave_hand(query: PathQuery) -> Iterator[tuple[int, float, int]]:
@@ -155,20 +157,20 @@ def _is_taut(query: PathQuery, node: int, other: int) -> bool:
 
     Other bends never shorten a path, but might let it leave the hand more nearly along its velocity.
     """
-    nodes = query.graph.nodes
+    nodes, (hand_x, hand_y), (goal_x, goal_y) = query.graph.nodes, query.hand.point.tolist(), query.goal.point.tolist()
+    places = nodes.places
     if query.hand.scale[nodes.owner[node]] < 1.0:
         return True  # the path leaves this outline
-    at = nodes.points[node]
-    line, ahead = at - query.hand.point, (query.goal.point if other == len(nodes.points) else nodes.points[other]) - at
-    before, after = nodes.before[node] - at, nodes.after[node] - at
-    is_left = _cross(line, before + after) > 0.0
-    bend, rest = _cross(line, ahead), _cross(ahead, after if is_left else before)
+    hand, at, ahead = (hand_x, hand_y), places[node], (goal_x, goal_y) if other == len(places) else places[other]
+    before, after = places[nodes.previous[node]], places[nodes.following[node]]
+    is_left = _turn(hand, at, before) + _turn(hand, at, after) > 0.0
+    bend, rest = _turn(hand, at, ahead), _turn(at, ahead, after if is_left else before)
     return min(bend, rest) >= -TAUT if is_left else max(bend, rest) <= TAUT
 
 
-def _cross(one: Array, other: Array) -> float:
-    """Return the cross product of two vectors (2,): positive if the second one points to the left of the first."""
-    return float(one[0] * other[1] - one[1] * other[0])
+def _turn(at: tuple[float, float], one: tuple[float, float], other: tuple[float, float]) -> float:
+    """Return the cross product [m^2] of the vectors from a point to two others: positive if the second is left of the first."""
+    return (one[0] - at[0]) * (other[1] - at[1]) - (one[1] - at[1]) * (other[0] - at[0])
 
 
 def _collect_points(query: PathQuery, node_of: list[int], before: list[int]) -> Array:
