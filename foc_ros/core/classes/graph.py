@@ -139,18 +139,7 @@ class Graph(Record):
 
 @lru_cache(maxsize=4)
 def build_graph(outlines: Outlines) -> Graph:
-    """Build the visibility graph of outlines; the last graphs are kept.
-
-    Parameters
-    ----------
-    outlines : Outlines
-        The n outlines.
-
-    Returns
-    -------
-    Graph
-        The graph.
-    """
+    """Build the visibility graph of outlines; the last graphs are kept."""
     nodes = _list_nodes(outlines)
     tail, head = np.concatenate([nodes.find_tangents(), nodes.find_edges()], axis=1)
     is_open = ~outlines.block(nodes.points[tail], nodes.points[head])

@@ -37,22 +37,10 @@ def compute_path_lengths(path: Array) -> Array:
 
 
 def compute_progress(length: float, speed: float, duration_s: float, steps: int) -> Array:
-    """Compute the length along a path at each step: minimum jerk from a speed along the path to rest at its end.
+    """Compute the length along a path at steps 0..N (N + 1,) [m]: minimum jerk from a speed [m/s] along it to rest at its end.
 
     s = L (10 t^3 - 15 t^4 + 6 t^5) + v T (t - 6 t^3 + 8 t^4 - 3 t^5) with t in [0, 1]. The path would overshoot with v T > 2.5 L
     and begin backwards with v < 0, so v is kept between these bounds.
-
-    Parameters
-    ----------
-    length, speed, duration_s : float
-        Length of the path [m], speed along it at its beginning [m/s] and duration [s].
-    steps : int
-        Number N of time steps.
-
-    Returns
-    -------
-    Array
-        Lengths at steps 0..N, (N + 1,) [m].
     """
     t = np.linspace(0.0, 1.0, steps + 1)
     carried = min(max(speed * duration_s, 0.0), MAX_SPEED_RATIO * length)
@@ -86,26 +74,10 @@ def timed(path: Array, velocity: Array, duration_s: float, steps: int) -> Array:
 
 
 def make_guesses(taut: Sequence[Array], goals: Sequence[int], obstacles: Obstacles, names: Names) -> list[Array]:
-    """Smooth the timed positions on taut paths, which bend at vertices of outlines, and move them away from the obstacles.
+    """Smooth the timed positions (N + 1, 2) [m] on taut paths to goals (rows), and move them away from the obstacles.
 
     If hand or goal lies in the margin of an obstacle, the guess leaves or enters the margin gradually. A guess that smoothing
-    brought to the other side of an obstacle stays taut.
-
-    Parameters
-    ----------
-    taut : Sequence[Array]
-        Positions at steps 0..N of k paths, each (N + 1, 2) [m].
-    goals : Sequence[int]
-        Row of the goal of each path.
-    obstacles : Obstacles
-        The n obstacles.
-    names : Names
-        How they count.
-
-    Returns
-    -------
-    list[Array]
-        Guesses, each (N + 1, 2) [m].
+    brought to the other side of an obstacle stays taut. names: how the obstacles count.
     """
     if not taut:
         return []

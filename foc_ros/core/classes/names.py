@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from foc_ros.core.obstacles.culling import cull_obstacles
 from foc_ros.core.obstacles.rounded_polygon import measure_offsets
 from foc_ros.core.types import LEFT, Array, Candidate, Obstacles
 
@@ -17,6 +18,8 @@ from .graph import Rows
 from .outlines import Flags, Outlines, measure_gaps, outline_obstacles
 from .sides import compute_bearings, is_between
 
+MOST = 64
+"""Largest number of obstacles in names and graphs."""
 FAR_SIDE = 2.0
 """An obstacle is out of the way if the path round its far side is longer than this times the straight line."""
 ENTER = 0.005
@@ -72,8 +75,14 @@ def named_obstacles(
     list[set[str]]
         Ids for each goal.
     """
+    obstacles = take_near(obstacles, hand, goals)
     names = find_names(hand, goals, obstacles, clearance, previous)
     return [{obstacles.ids[row] for row in np.flatnonzero(is_named)} for is_named in names.is_named]
+
+
+def take_near(obstacles: Obstacles, hand: Array, goals: Array) -> Obstacles:
+    """Return the obstacles that names may contain and graphs consist of: those with the least detour, MOST of them."""
+    return cull_obstacles(obstacles, hand, goals, 0.0, MOST)
 
 
 def find_names(hand: Array, goals: Array, obstacles: Obstacles, clearance: float, previous: Sequence[Candidate]) -> Names:

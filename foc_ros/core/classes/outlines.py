@@ -143,18 +143,9 @@ def keep_last(function: Callable[P, T]) -> Callable[P, T]:
 
 @keep_last
 def measure_gaps(obstacles: Obstacles) -> tuple[Array, Array]:
-    """Measure how far the polygons of obstacles lie apart.
+    """Return how far the polygons of each two obstacles lie apart (n, n) [m], and the vectors (n, n, 2) [m] across the gaps.
 
-    Parameters
-    ----------
-    obstacles : Obstacles
-        The n obstacles.
-
-    Returns
-    -------
-    Array, Array
-        Distances of each pair (n, n) [m], infinite for an obstacle and itself, and the vectors (n, n, 2) [m] from the point of
-        the second polygon that is nearest to the first one to this.
+    These lead from the second polygon to the first. The distance of an obstacle from itself is infinite.
     """
     n, most = obstacles.vertices.shape[:2]
     offset, distance = measure_offsets((obstacles.centre[:, None] + obstacles.vertices).reshape(-1, 2), obstacles)
@@ -171,20 +162,7 @@ def measure_gaps(obstacles: Obstacles) -> tuple[Array, Array]:
 
 @keep_last
 def outline_obstacles(obstacles: Obstacles, radius: Array) -> Outlines:
-    """Return the outlines of obstacles; they are the same object for obstacles that stay the same.
-
-    Parameters
-    ----------
-    obstacles : Obstacles
-        The n obstacles.
-    radius : Array
-        Radius of each with the clearance, (n,) [m].
-
-    Returns
-    -------
-    Outlines
-        Their outlines.
-    """
+    """Return the outlines of obstacles of a radius (n,) [m]; the same object for obstacles that stay the same."""
     gap, apart = measure_gaps(obstacles)
     both = radius[:, None] + radius
     is_narrow = (gap > both) & (gap < (1.0 + NARROW) * both)

@@ -70,17 +70,7 @@ class PathQuery:
 def find_shortest_paths(query: PathQuery, notes: Counter[str]) -> Iterator[list[Arrival]]:
     """Yield the shortest path of each class, in the order of their keys, equally long ones together.
 
-    Parameters
-    ----------
-    query : PathQuery
-        Which paths to look for.
-    notes : Counter[str]
-        `search_cut` is increased if states are left at the largest number, `search_late` if the deadline ends the search.
-
-    Yields
-    ------
-    list[Arrival]
-        Paths of different classes whose keys are equal.
+    notes: `search_cut` is increased if states are left at the largest number, `search_late` if the deadline ends the search.
     """
     graph, goal, named, centre = query.graph, query.goal, query.named, query.graph.nodes.outlines.centre
     first, head, length = graph.lists

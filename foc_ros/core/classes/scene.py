@@ -11,18 +11,15 @@ import numpy as np
 
 from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.obstacles.culling import cull_obstacles
 from foc_ros.core.obstacles.rounded_polygon import measure_offsets
 from foc_ros.core.types import LEFT, RIGHT, Array, Candidate, Obstacles, as_readonly
 
 from .graph import Graph, Lines, Rows, build_graph
 from .guess import compute_path_lengths, make_guesses, timed
-from .names import find_names, name_course
+from .names import find_names, name_course, take_near
 from .outlines import outline_obstacles
 from .paths import PathQuery, find_shortest_paths
 
-MOST = 64
-"""Largest number of obstacles in a graph."""
 STATES, STATES_PER_CANDIDATE = 1000, 300
 """Number of states that the search for one goal may look at; a few dozen are enough for four candidates."""
 OFF_HAND = 1e-9
@@ -79,7 +76,7 @@ class SearchScene:
         self._hand, self._velocity = hand_mean[:4].astype(float).reshape(2, 2)
         is_on_hand = np.hypot(*(goals - self._hand).T) < OFF_HAND
         self._goals = np.where(is_on_hand[:, None], self._hand + np.array([OFF_HAND, 0.0]), goals)
-        self._near = cull_obstacles(obstacles, self._hand, self._goals, 0.0, MOST)
+        self._near = take_near(obstacles, self._hand, self._goals)
         kept = {*self._near.ids}
         self._others = obstacles.take([row for row, name in enumerate(obstacles.ids) if name not in kept])
         self._clearance, self._max_states = config.clearance, STATES + STATES_PER_CANDIDATE * config.max_candidates

@@ -21,17 +21,9 @@ TURN = 2.0 * np.pi
 
 
 def count_crossings(begin: Array, end: Array) -> NDArray[np.int8]:
-    """Count how often straight lines cross the rays of centres: -1, 0 or 1 for each.
+    """Count how often straight lines cross the rays of centres, (...): -1, 0, or 1 for an anticlockwise crossing.
 
-    Parameters
-    ----------
-    begin, end : Array
-        Ends of the lines relative to the centres, (..., 2) [m].
-
-    Returns
-    -------
-    NDArray[np.int8]
-        1 for an anticlockwise crossing, -1 for a clockwise one, (...).
+    begin, end (..., 2): ends of the lines relative to the centres [m].
     """
     is_above, ends_above = begin[..., 1] >= 0.0, end[..., 1] >= 0.0
     left = begin[..., 0] * end[..., 1] - begin[..., 1] * end[..., 0]
@@ -152,23 +144,11 @@ class BranchTimes(Record):
 
 
 def compute_branch_times(outcomes: Sequence[PredictedCandidate], obstacles: Obstacles) -> BranchTimes:
-    """Compute when the mean paths of candidates separate.
+    """Compute when the mean paths of candidates separate; obstacles: where they are now.
 
     Two paths from one hand pass an obstacle on different sides if the angles that they sweep about it differ by more than half a
     turn. They separate at the first such obstacle, when the first of the two is nearest to it. A parabola through three
     steps gives this time, so that it does not jump.
-
-    Parameters
-    ----------
-    outcomes : Sequence[PredictedCandidate]
-        The k candidates.
-    obstacles : Obstacles
-        Where the obstacles are now, with their velocities.
-
-    Returns
-    -------
-    BranchTimes
-        Times of all pairs.
     """
     if not outcomes:
         return BranchTimes(np.zeros((0, 0)), np.zeros(0, dtype=np.intp))
