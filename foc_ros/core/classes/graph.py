@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from foc_ros.core.types import Array, Record
 
-from .outlines import Flags, Outlines
+from .outlines import KEPT, Flags, Outlines
 from .sides import count_crossings
 
 Rows = NDArray[np.intp]
@@ -137,7 +137,7 @@ class Graph(Record):
         return rest
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=KEPT)
 def build_graph(outlines: Outlines) -> Graph:
     """Build the visibility graph of outlines; the last graphs are kept."""
     nodes = _list_nodes(outlines)

@@ -19,11 +19,11 @@ MAX_SPEED_RATIO = 2.5
 """Largest ratio of v T to L for which the timing does not overshoot."""
 ROOM = 0.002
 """Distance from the grown obstacles that a guess keeps where there is room [m]."""
-ROOMS = ROOM, ROOM, ROOM, 0.0
+ROOMS = ROOM, ROOM, 0.0
 """To this distance from the grown obstacles a guess is moved after each smoothing [m]: the last smoothing uses up the room."""
 ROOM = 0.002
 """Distance from the grown obstacles that a guess keeps where there is room [m]."""
-ROOMS = ROOM, ROOM, ROOM, 0.0
+ROOMS = ROOM, ROOM, 0.0
 """To this distance from the grown obstacles a guess is moved after each smoothing [m]: the last smoothing uses up the room."""
 SMOOTHINGS = 2
 """How often the positions of a guess are averaged with their neighbours before they are moved away from the obstacles."""

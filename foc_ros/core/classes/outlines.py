@@ -32,8 +32,8 @@ SAME = 1e-7
 """Edges whose directions differ by less count as one [rad]."""
 CHUNK = 512
 """So many lines are compared with the outlines at once: larger arrays do not fit into the cache."""
-KEPT = 4
-"""Number of results that are kept."""
+KEPT = 16
+"""Number of results that are kept: goals inside different obstacles have graphs of their own."""
 GRAZE = 1e-9
 """A line may enter an outline this deep [m]: shapes in a row share tangents, up to rounding."""
 

@@ -172,7 +172,7 @@ def _collect_points(query: PathQuery, node_of: list[int], before: list[int]) -> 
     return np.vstack([query.hand.point, query.graph.nodes.points[nodes[::-1]], query.goal.point])
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=64)
 def _encode_graph(graph: Graph, named: bytes) -> list[int]:
     """Return what the lines of a graph cross, encoded; kept while graph and names stay the same."""
     return _encode(graph.crossings, np.frombuffer(named, dtype=np.intp))
