@@ -182,11 +182,12 @@ def _deform(path: Array, hand: Array, goal: Array) -> Array | None:
 
 
 def _is_free(path: Array, obstacles: Obstacles) -> bool:
-    """Tell whether no point of a path lies in an obstacle, other than those that hold its first point."""
+    """Tell whether no point of a path lies in an obstacle, other than those that hold its first or its last point."""
     share = np.arange(PARTS)[:, None] / PARTS
     points = (path[:-1, None] + share * (path[1:] - path[:-1])[:, None]).reshape(-1, 2)
     _, distance = measure_offsets(np.vstack([points, path[-1:]]), obstacles)
-    return not bool(((distance < obstacles.radius).any(axis=0) & (distance[0] > obstacles.radius)).any())
+    is_inside = distance < obstacles.radius
+    return not bool((is_inside.any(axis=0) & ~is_inside[0] & ~is_inside[-1]).any())
 
 
 def _is_near(points: Array, others: Array) -> bool:

@@ -129,7 +129,7 @@ def keep_last(function: Callable[P, T]) -> Callable[P, T]:
     @wraps(function)
     def look_up(*args: P.args, **kwargs: P.kwargs) -> T:
         arrays = list[NDArray[Any]]()
-        for each in args:
+        for each in (*args, *kwargs.values()):
             arrays += [each.centre, each.vertices, each.corners] if isinstance(each, Obstacles) else [np.asarray(each)]
         key = tuple([array.tobytes() for array in arrays])
         if key not in kept:
