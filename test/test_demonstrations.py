@@ -92,6 +92,12 @@ def test_when_a_demonstration_is_recalled(change, kept):
     assert len(recall(DEMONSTRATION, **change)) == kept
 
 
+def test_a_demonstration_may_end_in_an_obstacle_that_holds_the_goal():
+    obstacles = make_obstacles([*OBSTACLES.centre, [0.3, 0.01]], [0.015, 0.015, 0.015, 0.03])
+    (one,) = recall(record_demonstration('world', bow(0.1), obstacles), obstacles=obstacles)
+    assert one.label == 'goal0:+0+1+2'
+
+
 def test_only_the_shortest_demonstrations_are_recalled():
     demonstrations = [record_demonstration('world', bow(height), OBSTACLES) for height in (-0.1, 0.03, -0.03, 0.1)]
     found = recall(demonstrations)
