@@ -36,13 +36,12 @@ MIN_SIZE = 1e-6
 class Names:
     """How n obstacles count on the way from the hand to g goals.
 
-    radius (n,): of each with the clearance [m], less where a gap is kept open; outlines: of this size. holds_hand (n,),
-    holds_goal (g, n): whether an obstacle of this size holds the hand or the goal; blocks (g, n): false for an obstacle, without
-    the clearance, that holds the goal. is_named (g, n): whether the names of the paths to a goal contain an obstacle.
+    radius (n,): of each with the clearance [m], less where a gap is kept open. holds_hand (n,), holds_goal (g, n): whether an
+    obstacle of this size holds the hand or the goal; blocks (g, n): false for an obstacle, without the clearance, that holds the
+    goal. is_named (g, n): whether the names of the paths to a goal contain an obstacle.
     """
 
     radius: Array
-    outlines: Outlines
     holds_hand: Flags
     holds_goal: Flags
     blocks: Flags
@@ -94,15 +93,14 @@ def find_names(hand: Array, goals: Array, obstacles: Obstacles, clearance: float
     """
     sides = _tabulate_sides(obstacles, previous)
     radius = _keep_gaps_open(obstacles, np.maximum(obstacles.radius + clearance, MIN_SIZE), clearance, sides)
-    outlines = outline_obstacles(obstacles, radius)
     _, distance = measure_offsets(np.vstack([hand, goals]), obstacles)
     blocks = distance[1:] >= obstacles.radius
     slack = np.zeros((len(goals), len(obstacles)))
     goal_of = np.array([candidate.goal for candidate in previous], dtype=np.intp)
     for goal in {candidate.goal for candidate in previous if candidate.goal < len(goals)}:
         slack[goal] = np.where(sides[goal_of == goal].any(axis=0), 0.0, ENTER)
-    is_named = _find_named(outlines, obstacles, hand, goals, blocks, slack)
-    return Names(radius, outlines, distance[0] <= radius, distance[1:] <= radius, blocks, is_named)
+    is_named = _find_named(outline_obstacles(obstacles, radius), obstacles, hand, goals, blocks, slack)
+    return Names(radius, distance[0] <= radius, distance[1:] <= radius, blocks, is_named)
 
 
 def _find_named(outlines: Outlines, obstacles: Obstacles, hand: Array, goals: Array, blocks: Flags, slack: Array) -> Flags:

@@ -8,8 +8,8 @@ the shapes do.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import lru_cache, wraps
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial, wraps
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -32,7 +32,7 @@ SAME = 1e-7
 """Edges whose directions differ by less count as one [rad]."""
 CHUNK = 512
 """So many lines are compared with the outlines at once: larger arrays do not fit into the cache."""
-KEPT = 16
+KEPT = 32
 """Number of results that are kept: goals inside different obstacles have graphs of their own."""
 GRAZE = 1e-9
 """A line may enter an outline this deep [m]: shapes in a row share tangents, up to rounding."""
@@ -44,7 +44,8 @@ class Outlines:
 
     vertices (n, e, 2): anticlockwise [m]; normals (n, e, 2), offsets (n, e): the outline consists of the points p with
     normal . p <= offset for each edge [m], edge k ending at vertex k; count (n,): number of vertices without repetitions.
-    centre (n, 2): of the obstacles; middle (n, 2), extent (n,): a point inside, and the largest distance of a vertex from it.
+    centre (n, 2): of the obstacles; middle (n, 2): a point inside [m]; inner, extent (n,): the least distance of an edge from it,
+    and the largest of a vertex [m].
     """
 
     centre: Array
@@ -122,21 +123,30 @@ class Outlines:
         return flags
 
 
+@dataclass(frozen=True)
+class _Call:
+    """A call of a function with obstacles and arrays; calls with the same values are equal."""
+
+    key: tuple[bytes, ...]
+    run: Callable[[], Any] = field(compare=False)
+
+
+@lru_cache(maxsize=KEPT)
+def _answer(call: _Call) -> Any:
+    return call.run()
+
+
 def keep_last(function: Callable[P, T]) -> Callable[P, T]:
     """Let a function of obstacles and arrays keep its last results, for obstacles that have the same place and shape."""
-    kept = dict[tuple[bytes, ...], T]()
 
     @wraps(function)
     def look_up(*args: P.args, **kwargs: P.kwargs) -> T:
         arrays = list[NDArray[Any]]()
         for each in (*args, *kwargs.values()):
             arrays += [each.centre, each.vertices, each.corners] if isinstance(each, Obstacles) else [np.asarray(each)]
-        key = tuple([array.tobytes() for array in arrays])
-        if key not in kept:
-            if len(kept) == KEPT:
-                del kept[next(iter(kept))]
-            kept[key] = function(*args, **kwargs)
-        return kept[key]
+        name = function.__name__.encode()
+        result: T = _answer(_Call((name, *[array.tobytes() for array in arrays]), partial(function, *args, **kwargs)))
+        return result
 
     return look_up
 
