@@ -79,8 +79,6 @@ $(STAMP): setup.py setup.cfg pyproject.toml
 	@test -e $@ || $(PYTHON) -m venv --clear $(VENV_OPTIONS) $(VENV) || { echo 'make: no venv in $(PYTHON); on Debian and Ubuntu: apt install python3-venv' >&2; exit 1; }
 	@echo 'setup: installing foc_ros[$(EXTRAS)], some minutes'
 	@$(PIP) install --progress-bar off --editable '.[$(EXTRAS)]' | sed -un 's/^Collecting \([^ ]*\).*/  \1/p; s/^Installing collected packages.*/  installing them, one or two minutes/p'
-	@echo "setup: compiling the solver's kernels once, two to ten minutes"
-	@$(BIN)/python -m foc_ros warm-up
 	@touch $@
 
 help:

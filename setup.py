@@ -39,7 +39,6 @@ setup(
     python_requires='>=3.11',
     install_requires=[
         'mcap>=1.1',
-        'numba>=0.58,<0.69',  # the kernels use classes that numba does not publish: these versions are tried
         'numpy>=1.23',
         'pebble>=5',
         'piqp>=0.6',

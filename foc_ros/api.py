@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 
 from foc_ros.core import types
 from foc_ros.core.checks import check_array, check_number, check_vector
+from foc_ros.core.classes.library import Demonstration
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import InputError, SceneError
 from foc_ros.core.estimation.kalman_filter import FilterState, describe_jump, update
 from foc_ros.core.guidance.step import GuidanceInput, GuidanceOutput, GuidanceState, guide
-from foc_ros.core.homotopy.demonstrations import Demonstration
 from foc_ros.core.learning.experience import make_library
 from foc_ros.core.memory.memory import Memory
 from foc_ros.core.obstacles.scene import ObstacleSource

@@ -27,8 +27,8 @@ from foc_ros.analysis.learn_demonstrations import learn_recording
 from foc_ros.analysis.parallel import collect, collect_all, open_executor
 from foc_ros.analysis.recordings import Recording, find_recordings
 from foc_ros.cli.arguments import add_worker_arguments
+from foc_ros.core.classes.library import Demonstration
 from foc_ros.core.config import ExperienceConfig
-from foc_ros.core.homotopy.demonstrations import Demonstration
 from foc_ros.core.learning.experience import Library, find_evidence, follow_recordings, make_library
 from foc_ros.core.types import Array, HandState, make_obstacles
 from foc_ros.io.class_library import save_library

@@ -9,7 +9,7 @@ from prediction_samples import outcome, prediction
 
 from foc_ros.core.config import Config, GuidanceConfig
 from foc_ros.core.guidance.step import GuidanceInput, GuidanceOutput, GuidanceState, guide
-from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Prediction, Status, make_obstacles
 
 SAMPLES, PERIOD = 12, 0.005

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from foc_ros.core.classes import Search, search
 from foc_ros.core.config import HomotopyConfig
-from foc_ros.core.homotopy import Search, search
 from foc_ros.core.types import Obstacles, make_obstacles
 
 CLEARANCE = 0.005

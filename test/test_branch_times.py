@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from foc_ros.core.classes.sides import BranchTimes, compute_branch_times
 from foc_ros.core.config import LikelihoodConfig
-from foc_ros.core.homotopy.branch_times import BranchTimes, compute_branch_times
 from foc_ros.core.likelihood import compute_likelihoods, compute_shared_cost
 from foc_ros.core.types import Array, Candidate, PredictedCandidate, Solution, Status, make_obstacles
 

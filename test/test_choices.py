@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from foc_ros.core.classes.rows import Decisions
 from foc_ros.core.config import Config, LikelihoodConfig, replace_values
-from foc_ros.core.homotopy.decisions import Decisions
 from foc_ros.core.learning.choices import FACTORS, HORIZONS, OWN_SPREAD, Choice, Preferences
 from foc_ros.core.likelihood import compute_likelihoods, compute_lookahead_share
 from foc_ros.core.pipeline import Pipeline

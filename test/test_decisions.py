@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from foc_ros.core.classes.rows import Decisions, find_decisions
 from foc_ros.core.config import Config, LikelihoodConfig
-from foc_ros.core.homotopy.decisions import Decisions, find_decisions
 from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.memory.memory import Memory
 from foc_ros.core.predictor import predict

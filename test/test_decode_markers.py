@@ -14,7 +14,7 @@ from message_helpers import SECOND, both_kinds, marker, marker_array, message_ty
 from scipy.spatial.transform import Rotation
 
 from foc_ros.core.errors import MessageError
-from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import make_box_polygon
 from foc_ros.ros.messages import decode_markers
 from foc_ros.ros.messages.decode_markers import MarkerTable

@@ -7,10 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foc_ros.core.config import Config, HomotopyConfig, replace_values
-from foc_ros.core.errors import FocError
-from foc_ros.core.homotopy import find_path_sides
-from foc_ros.core.homotopy.demonstrations import (
+from foc_ros.core.classes import find_path_sides
+from foc_ros.core.classes.library import (
     MOST,
     POINTS,
     GuessTiming,
@@ -18,6 +16,8 @@ from foc_ros.core.homotopy.demonstrations import (
     recall_demonstrations,
     record_demonstration,
 )
+from foc_ros.core.config import Config, HomotopyConfig, replace_values
+from foc_ros.core.errors import FocError
 from foc_ros.core.learning.experience import make_library
 from foc_ros.core.memory.memory import Memory
 from foc_ros.core.predictor import predict
@@ -90,6 +90,12 @@ def test_a_class_that_the_search_found_is_not_recalled():
 )
 def test_when_a_demonstration_is_recalled(change, kept):
     assert len(recall(DEMONSTRATION, **change)) == kept
+
+
+def test_a_demonstration_may_end_in_an_obstacle_that_holds_the_goal():
+    obstacles = make_obstacles([*OBSTACLES.centre, [0.3, 0.01]], [0.015, 0.015, 0.015, 0.03])
+    (one,) = recall(record_demonstration('world', bow(0.1), obstacles), obstacles=obstacles)
+    assert one.label == 'goal0:+0+1+2'
 
 
 def test_only_the_shortest_demonstrations_are_recalled():

@@ -9,7 +9,7 @@ import pytest
 from reach_helpers import bowed, case_guess, case_problem, random_scene, reach, reference_cases, solved
 from varied_reaches import varied_reach
 
-from foc_ros.core.homotopy import find_path_sides
+from foc_ros.core.classes import find_path_sides
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.types import Solution, Status
 

@@ -13,7 +13,7 @@ from message_helpers import STORE, both_kinds, message_types
 from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction, three_ways
 
 from foc_ros.core.errors import FocError
-from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
 from foc_ros.core.types import PredictedCandidate, Prediction, Status, make_obstacles
 from foc_ros.ros.messages.encode_prediction import OUTPUTS, encode_outputs

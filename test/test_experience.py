@@ -10,14 +10,14 @@ from scipy.interpolate import CubicHermiteSpline
 from test_demonstrations import GOAL, OBSTACLES, bow
 
 from foc_ros.cli.main import main
+from foc_ros.core.classes import find_path_sides
+from foc_ros.core.classes.library import STEP_S, record_demonstration
+from foc_ros.core.classes.rows import Decisions
 from foc_ros.core.config import Config, ExperienceConfig
 from foc_ros.core.errors import InputError
-from foc_ros.core.homotopy import find_path_sides
-from foc_ros.core.homotopy.decisions import Decisions
-from foc_ros.core.homotopy.demonstrations import STEP_S, record_demonstration
 from foc_ros.core.learning.experience import NO_LIBRARY, compare_with_class, find_evidence, make_library, update_likelihoods
 from foc_ros.core.memory.memory import Memory
-from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import LEFT, RIGHT, Candidate, HandState, make_obstacles
 from foc_ros.io.class_library import load_library, save_library

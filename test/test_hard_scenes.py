@@ -47,13 +47,14 @@ def test_a_hand_inside_an_obstacle_leaves_it_or_says_why_not() -> None:
     assert not [outcome for outcome in prediction.solved_candidates if outcome.solution.eta < CONFIG.foc.eta]
 
 
-def test_a_goal_inside_an_obstacle_has_no_way_to_it_and_another_goal_keeps_its_own() -> None:
+def test_an_obstacle_that_holds_a_goal_does_not_hide_it_and_another_goal_keeps_its_candidates() -> None:
     obstacle = make_obstacles([[0.3, 0.01]], [0.03], 0.001)
     prediction = predicted(obstacle)
-    assert prediction.candidates == ()
+    assert [outcome.label for outcome in prediction.candidates] == ['goal0:']
     assert prediction.notes['goal_inside'] == 1
     prediction = predicted(obstacle, np.array([[0.3, 0.0], [0.0, 0.3]]))
-    assert {outcome.candidate.goal for outcome in prediction.solved_candidates} == {1}
+    assert {outcome.candidate.goal for outcome in prediction.candidates} == {0, 1}
+    assert 1 in {outcome.candidate.goal for outcome in prediction.solved_candidates}
 
 
 def test_a_ring_around_the_hand_has_no_way_through() -> None:

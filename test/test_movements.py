@@ -13,8 +13,8 @@ from test_demonstrations import GOAL, OBSTACLES, bow
 from foc_ros.analysis.learn_demonstrations import learn_recording
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.analysis.replay import Replay
+from foc_ros.core.classes.library import MOST_STATES, is_same_recording
 from foc_ros.core.config import Config
-from foc_ros.core.homotopy.demonstrations import MOST_STATES, is_same_recording
 from foc_ros.core.learning import movements as learning
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, HandSample

@@ -15,8 +15,8 @@ from node_helpers import GOALS, QUICK, ROWS, TYPES, Bench, figures, hand_path  #
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
+from foc_ros.core.classes.library import is_same_recording  # noqa: E402
 from foc_ros.core.config import Config, replace_values  # noqa: E402
-from foc_ros.core.homotopy.demonstrations import is_same_recording  # noqa: E402
 from foc_ros.core.pipeline import Pipeline  # noqa: E402
 from foc_ros.ros import health  # noqa: E402
 from foc_ros.ros.intake import Intake  # noqa: E402

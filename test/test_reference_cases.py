@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from reach_helpers import case_guess, case_problem, reference_cases, solved
 
-from foc_ros.core.homotopy import find_path_sides
+from foc_ros.core.classes import find_path_sides
 from foc_ros.core.types import Status
 
 CASES = pytest.mark.parametrize('case', reference_cases())

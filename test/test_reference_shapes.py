@@ -5,7 +5,7 @@ import json
 import pytest
 from reach_helpers import REFERENCE_SHAPES, case_guess, shapes_problem, solved
 
-from foc_ros.core.homotopy import find_path_sides
+from foc_ros.core.classes import find_path_sides
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.types import Solution, Status
 

@@ -17,7 +17,7 @@ from node_helpers import GOALS, ROWS, TYPES, Bench, figures, hand_path  # noqa: 
 from ros_helpers import Graph  # noqa: E402
 
 from foc_ros.core.config import Config, replace_values  # noqa: E402
-from foc_ros.core.obstacles.rounded_polygon import measure_offsets  # noqa: E402
+from foc_ros.core.obstacles.geometry import measure_offsets  # noqa: E402
 from foc_ros.core.obstacles.shapes import make_box_polygon  # noqa: E402
 from foc_ros.ros.transform_tree import TransformTree  # noqa: E402
 from foc_ros.ros.transforms import Transforms, TransformUnavailableError  # noqa: E402

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from foc_ros.core.classes.library import Demonstration
 from foc_ros.core.config import ONLINE, Config
 from foc_ros.core.errors import RecordingError
-from foc_ros.core.homotopy.demonstrations import Demonstration
 
 from .recordings import Recording
 from .replay import Replay

@@ -19,7 +19,7 @@ REPEATED_S = 2.0
 PATIENCE_S = 1.0
 """Longest time for which an interrupt waits for code in which an exception would be lost; after it the process is ended [s]."""
 
-LOSING_MODULES = ('importlib._bootstrap', '_frozen_importlib', 'numba.core.serialize')
+LOSING_MODULES = ('importlib._bootstrap', '_frozen_importlib')
 """Modules that native code calls without passing on an exception."""
 
 
@@ -27,9 +27,8 @@ LOSING_MODULES = ('importlib._bootstrap', '_frozen_importlib', 'numba.core.seria
 def handle_interrupts() -> Iterator[None]:
     """Raise KeyboardInterrupt on SIGINT within the context, and again until the context is left.
 
-    Three kinds of code cannot pass on an exception. Callbacks of the import system and modules that an extension module imports
-    lose it. Where a kernel returns a named tuple, in numba's look-up of its class and in its constructor, it would end the
-    process with a segmentation fault. An interrupt that arrives there is delayed until this code has ended.
+    Callbacks of the import system, and modules that an extension module imports, lose an exception. An interrupt that arrives
+    there is delayed until this code has ended.
     """
     usual = signal.default_int_handler
     if signal.getsignal(signal.SIGINT) is not usual or threading.current_thread() is not threading.main_thread():

@@ -7,8 +7,8 @@ import json
 import sys
 
 from foc_ros.analysis.learn_demonstrations import learn_recording
+from foc_ros.core.classes.library import Demonstration
 from foc_ros.core.errors import FocError, InputError, RecordingError
-from foc_ros.core.homotopy.demonstrations import Demonstration
 from foc_ros.io.class_library import MOST_WAYS, save_library
 from foc_ros.io.terminal import show_progress
 

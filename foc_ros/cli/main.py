@@ -12,7 +12,6 @@ import os
 import re
 import sys
 from collections.abc import Sequence
-from contextlib import nullcontext
 from importlib import import_module
 from io import TextIOWrapper
 from pathlib import Path
@@ -21,7 +20,6 @@ from typing import Any, NoReturn
 from foc_ros.core.errors import FocError, list_messages, suggest
 
 from . import arguments as declarations
-from .compiling import show_compilation
 from .inputs import read_inputs
 from .interrupts import INTERRUPTED, handle_interrupts
 
@@ -41,7 +39,6 @@ COMMANDS = {
 }
 """Purpose of each command. With an underscore for a hyphen, `arguments` declares its arguments in `add_NAME_arguments(parser)`,
 and the module of its name defines `run(arguments) -> exit code`."""
-COMPUTING = ('paper', 'solve', 'replay', 'fit', 'evaluate', 'simulate')
 """Commands whose modules import the solver; `demo`, `node` and `warm-up` show its compilation themselves."""
 
 
@@ -121,8 +118,7 @@ def _parse_and_run(given: list[str]) -> int:
             commands.choices[parsed.command].reject(rest)
         parsed.rest = rest
         read_inputs(parsed)
-        with show_compilation() if parsed.command in COMPUTING else nullcontext():
-            module = import_module(f'.{_get_module_name(parsed.command)}', __package__)
+        module = import_module(f'.{_get_module_name(parsed.command)}', __package__)
         return int(module.run(parsed))
     except SystemExit as leaving:  # after --help, or wrong arguments
         return int(leaving.code or 0)

@@ -11,8 +11,6 @@ from importlib.util import find_spec
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError
 
-from .compiling import show_compilation
-
 SWITCH_S = 0.001
 """Longest time for which a thread keeps Python's global lock while another one waits for it [s]."""
 
@@ -28,11 +26,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 async def _serve(arguments: argparse.Namespace, config: Config) -> None:
-    with show_compilation():
-        from foc_ros.play.address import describe_page, is_loopback
-        from foc_ros.play.predictors import LibraryPredictor, LivePredictor, Receive
-        from foc_ros.play.server import listen, serve
-        from foc_ros.play.session import Session
+    from foc_ros.play.address import describe_page, is_loopback
+    from foc_ros.play.predictors import LibraryPredictor, LivePredictor, Receive
+    from foc_ros.play.server import listen, serve
+    from foc_ros.play.session import Session
 
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

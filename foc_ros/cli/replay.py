@@ -15,8 +15,8 @@ from typing import TextIO
 from foc_ros.analysis.replay import Replay, Step
 from foc_ros.analysis.replay_guidance import GuidanceReplay, GuidanceStep
 from foc_ros.analysis.replay_summary import Summary, facts
+from foc_ros.core.classes.library import is_same_recording
 from foc_ros.core.config import ONLINE, Config
-from foc_ros.core.homotopy.demonstrations import is_same_recording
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
 from foc_ros.io.class_library import save_library
 from foc_ros.io.json_output import encode_guidance, encode_prediction

@@ -9,12 +9,12 @@ from typing import Protocol
 
 import numpy as np
 
+from .classes import find_path_sides
+from .classes.rows import find_decisions, tabulate_sides
+from .classes.sides import compute_branch_times
 from .config import ONLINE, Config, FocConfig
 from .deadline import NEVER, Deadline
 from .heading_bias import make_reaches
-from .homotopy import find_path_sides
-from .homotopy.branch_times import compute_branch_times
-from .homotopy.decisions import find_decisions, tabulate_sides
 from .learning.choices import Choice
 from .likelihood import CostModel, compute_likelihoods, compute_lookahead_share
 from .ocp.problem import Problem

@@ -49,13 +49,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .classes.rows import Decisions
+from .classes.sides import BranchTimes
 from .config import WHOLE_WAY_S, Config, LikelihoodConfig
 from .dynamics.plant_models import make_plant_model
 from .errors import InputError
 from .estimation.duration import get_time_price
 from .heading_bias import Reaches
-from .homotopy.branch_times import BranchTimes
-from .homotopy.decisions import Decisions
 from .registry import LIKELIHOOD_RULES
 from .safety_preference import COST_FLOOR, SafetyPreference
 from .types import Array, Solution

@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from .classes.library import Demonstration
 from .config import Config
 from .deadline import NEVER, Deadline
 from .errors import FocError
 from .estimation.kalman_filter import FilterState, describe_jump, update
-from .homotopy.demonstrations import Demonstration
 from .learning.experience import Library, make_library
 from .learning.learnt import Learnt
 from .memory.memory import Memory

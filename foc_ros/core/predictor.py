@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .candidates import rank_candidates, solve_candidates
+from .classes import Search, Turn, search
+from .classes.library import GuessTiming, recall_demonstrations
 from .config import REFERENCE_STEP_S, Config, EstimatorConfig
 from .deadline import NEVER, Deadline
 from .dynamics.noise import scale_noise
@@ -17,8 +19,6 @@ from .dynamics.plant_models import make_plant_model
 from .dynamics.predictive_covariance import SharedCovariances, widen_covariance
 from .estimation.duration import choose_candidate_durations, estimate_times_to_go, is_passing, limit_change
 from .height import HeightPredictor
-from .homotopy import Search, Turn, search
-from .homotopy.demonstrations import GuessTiming, recall_demonstrations
 from .learning.dispersion import scale_covariance
 from .learning.experience import NO_LIBRARY, Library, pool_recordings
 from .likelihood import CostModel, make_cost_model, make_preference, select_most_likely

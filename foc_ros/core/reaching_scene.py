@@ -40,7 +40,7 @@ class ReachingScene(Record):
 
 def check_outside(field: str, point: Array, obstacles: Obstacles) -> None:
     """Raise SceneError, which names the field, if a point (2,) [m] lies inside the mean boundary of an obstacle."""
-    from .obstacles.rounded_polygon import measure_offsets  # imports numba, which a wrong scene file need not wait for
+    from .obstacles.geometry import measure_offsets  # imports numba, which a wrong scene file need not wait for
 
     distances = measure_offsets(point, obstacles)[1][0]
     for row in np.flatnonzero(distances < obstacles.radius)[:1]:

@@ -90,11 +90,3 @@ PLANTS = Registry(
 )
 QP_BACKENDS = QPBackendRegistry('QP backend', {'piqp': 'foc_ros.core.ocp.backend:solve_piqp'})
 LIKELIHOOD_RULES = Registry('likelihood rule', {'cost_ratio': 'foc_ros.core.likelihood:cost_ratio_logs'})
-
-
-def import_all() -> None:
-    """Import every built-in part; their kernels are compiled, which takes a minute or two once on a machine."""
-    import_module('foc_ros.core.pipeline')
-    for registry in (STRATEGIES, PLANTS, QP_BACKENDS, LIKELIHOOD_RULES):
-        for name in registry:
-            registry.get(name)

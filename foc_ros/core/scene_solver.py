@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from .candidates import rank_candidates, solve_candidates
+from .classes import find_path_sides, search
 from .dynamics.plant_models import make_plant_model
 from .estimation.duration import is_passing
-from .homotopy import find_path_sides, search
 from .ocp.problem import Problem
 from .predictor import build_problem
 from .reaching_scene import ReachingScene

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from foc_ros.core.classes.library import MOST_STATES, POINTS, Demonstration
 from foc_ros.core.errors import InputError, RecordingError
-from foc_ros.core.homotopy.demonstrations import MOST_STATES, POINTS, Demonstration
 from foc_ros.core.types import LEFT, RIGHT, Array
 
 from .documents import MAX_BYTES, read_document

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
 from foc_ros.core.types import Array, Obstacles
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_obstacles

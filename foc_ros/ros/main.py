@@ -7,7 +7,6 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from functools import partial
 from types import FrameType
 from typing import Any
 
@@ -20,8 +19,6 @@ SPIN_S = 0.1
 SWITCH_S = 0.0002
 """Longest time for which the thread of the predictions keeps the others waiting for the interpreter [s]. An update of guidance
 gives the interpreter away several times, so with 0.001 it took up to 12 ms (`scripts/measure_guidance.py`)."""
-LOGGED_KERNELS = 10
-"""Number of compiled kernels after which the log says so again."""
 END_S = 0.5
 """Time after which a prediction that is still being computed does not delay the end of the process [s]."""
 
@@ -75,7 +72,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _reject(error)
     import rclpy
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-    from rclpy.logging import get_logger
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
 
@@ -91,13 +87,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         context.try_shutdown()
         return _reject(error)
     stop.resume(forerunner.destroy_node)
-    from foc_ros.core.kernels.compilation import follow_compilation
-    from foc_ros.core.registry import import_all
+    from .node import FocNode
 
-    with follow_compilation(partial(_log_compilation, get_logger('foc'))):
-        from .node import FocNode  # imports kernels too
-
-        import_all()
     stop.defer()
     try:
         node = FocNode(context=context)
@@ -148,17 +139,6 @@ def _reject(error: Exception) -> int:
     for message in list_messages(error):
         print(f'foc_node: {" ".join(message.split())}', file=sys.stderr)
     return 2
-
-
-def _log_compilation(logger: Any, done: int) -> None:
-    """Log that kernels are compiled, and how many of them are."""
-    from foc_ros.core.kernels.compilation import count_kernels
-
-    total = count_kernels()
-    if done == 0:
-        logger.info(f'compiling the solver for this machine, up to {total} kernels; this happens once (see foc_ros warm-up)')
-    elif done % LOGGED_KERNELS == 0:
-        logger.info(f'compiled {done} of up to {total} kernels')
 
 
 if __name__ == '__main__':

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.homotopy import compute_swept_angles
-from foc_ros.core.homotopy.rows import WALL, Rows, locate_rows
+from foc_ros.core.classes import compute_swept_angles
+from foc_ros.core.classes.rows import WALL, Rows, locate_rows
 from foc_ros.core.learning.goal_reached import find_reached_goal
-from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import LEFT, NANOSECONDS, RIGHT, Array, Obstacles, Record
 
 TIMES_S = tuple(0.125 * step for step in range(1, 9))

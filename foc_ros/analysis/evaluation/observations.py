@@ -14,13 +14,12 @@ from scipy.interpolate import CubicHermiteSpline
 
 from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay, Step
+from foc_ros.core.classes.rows import Decisions, Rows, find_decisions, find_direction, find_rows
+from foc_ros.core.classes.sides import BranchTimes, compute_branch_times
 from foc_ros.core.config import Config
 from foc_ros.core.dynamics.predictive_covariance import compute_duration_sensitivity
 from foc_ros.core.errors import FocError, RecordingError
 from foc_ros.core.estimation.duration import get_time_price, is_passing
-from foc_ros.core.homotopy.branch_times import BranchTimes, compute_branch_times
-from foc_ros.core.homotopy.decisions import Decisions, find_decisions
-from foc_ros.core.homotopy.rows import Rows, find_direction, find_rows
 from foc_ros.core.obstacles.chance_constraint import centre_trajectories
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Obstacles, PredictedCandidate, Prediction, Record, Solution
 

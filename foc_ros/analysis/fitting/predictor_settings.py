@@ -12,8 +12,8 @@ from itertools import product
 import numpy as np
 
 from foc_ros.analysis.evaluation.ground_truth import find_open_gaps
+from foc_ros.core.classes.rows import find_direction, find_rows, locate_rows
 from foc_ros.core.config import ARRIVALS, Config, flatten, replace_values
-from foc_ros.core.homotopy.rows import find_direction, find_rows, locate_rows
 
 from .duration_fit import CONSTANTS, fit_other_models
 from .estimates import Estimate, Estimates, clip_to_bounds

@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
+from foc_ros.core.classes import find_path_sides
 from foc_ros.core.config import FocConfig
 from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
-from foc_ros.core.homotopy import find_path_sides
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start

@@ -10,7 +10,7 @@ from scipy.interpolate import make_interp_spline
 from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError, RecordingError
-from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.topics import HAND

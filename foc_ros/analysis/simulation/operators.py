@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from foc_ros.core.errors import FocError
-from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import Array, Obstacles, Record, make_obstacles
 
 from .intended_path import DT, IntendedPath, plan_path

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import Array, Obstacles
 
 RATIONALITY = 50.0

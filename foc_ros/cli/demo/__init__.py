@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import argparse
 
-from foc_ros.cli.compiling import show_compilation
-
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the demo; return 1 if the node fails, 130 after an interrupt."""
     print('A recorded hand moves among a box, three posts and a wall; the node predicts where it goes. Loading ...', flush=True)
-    with show_compilation():
-        from .command import run as run_command  # not before: its import takes seconds
+    from .command import run as run_command  # not before: its import takes seconds
+
     return run_command(arguments)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.config import GuidanceConfig
-from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import Array, Obstacles
 
 from .reference import normalize

@@ -30,11 +30,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from foc_ros.core.classes import find_path_sides
+from foc_ros.core.classes.rows import Decisions
+from foc_ros.core.classes.sides import BranchTimes
 from foc_ros.core.config import WHOLE_WAY_S, LikelihoodConfig, clip_values
 from foc_ros.core.heading_bias import Reaches
-from foc_ros.core.homotopy import find_path_sides
-from foc_ros.core.homotopy.branch_times import BranchTimes
-from foc_ros.core.homotopy.decisions import Decisions
 from foc_ros.core.likelihood import compute_likelihoods, compute_lookahead_share
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Obstacles, Record, as_readonly
 

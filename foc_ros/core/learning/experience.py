@@ -29,9 +29,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from foc_ros.core.classes.library import NEAR, STEP_S, Demonstration, is_same_demonstration
+from foc_ros.core.classes.rows import Decisions, find_decisions, tabulate_sides
 from foc_ros.core.config import ExperienceConfig
-from foc_ros.core.homotopy.decisions import Decisions, find_decisions, tabulate_sides
-from foc_ros.core.homotopy.demonstrations import NEAR, STEP_S, Demonstration, is_same_demonstration
 from foc_ros.core.types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Record, Solution
 
 from .recorded_paths import RecordedPaths, fade_weights, pool_path, stays_in_class

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from foc_ros.core.classes.library import MOST_STATES, STEP_S, Demonstration, record_demonstration
 from foc_ros.core.errors import RecordingError
-from foc_ros.core.homotopy.demonstrations import MOST_STATES, STEP_S, Demonstration, record_demonstration
 from foc_ros.core.obstacles.scene import Scene
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Record
 

@@ -22,9 +22,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.homotopy import find_path_sides
+from foc_ros.core.classes import find_path_sides
 from foc_ros.core.obstacles.chance_constraint import centre_trajectories
-from foc_ros.core.obstacles.rounded_polygon import measure_offsets
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Record, Solution, as_readonly
 
 FADE_S = 0.25

@@ -6,7 +6,7 @@ import numpy as np
 
 from foc_ros.core.types import Array, Obstacles
 
-from .rounded_polygon import measure_offsets
+from .geometry import measure_offsets
 
 
 def cull_obstacles(obstacles: Obstacles, hand: Array, goals: Array, duration_s: float, most: int) -> Obstacles:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.types import Array
+from foc_ros.core.types import Array, Obstacles
 
 SMALLEST_DISTANCE = 1e-9
 """Distance [m] below which a point counts as on the polygon, where its normal is not defined: 1 nm."""
@@ -90,3 +90,27 @@ def _point(x: Array, y: Array, is_inside: NDArray[np.bool_], is_on_edge: NDArray
         x, y, length = np.where(is_short, 0.0, x), np.where(is_short, SMALLEST_DISTANCE, y), np.maximum(length, SMALLEST_DISTANCE)
     distance = np.where(is_inside, -length, length)
     return Offset(distance, x / distance, y / distance, is_on_edge)
+
+
+def measure_offsets(points: Array, obstacles: Obstacles, centres: Array | None = None) -> tuple[Array, Array]:
+    """Return the positions of points relative to the polygons of obstacles.
+
+    Parameters
+    ----------
+    points : Array
+        Points (q, 2) [m].
+    obstacles : Obstacles
+        n obstacles.
+    centres : Array, optional
+        Where the obstacles are at each point, (q, n, 2) [m], if they move.
+
+    Returns
+    -------
+    Array, Array
+        d (q, n, 2) [m], from the nearest point of each polygon, and signed distances (q, n) [m]. Distances are from the polygons: the
+        boundary of a circle is at its radius.
+    """
+    relative = np.reshape(points, (-1, 1, 2)) - (obstacles.centre[None] if centres is None else centres)
+    found = find_offset(relative[..., 0], relative[..., 1], tabulate_edges(obstacles.vertices, obstacles.corners))
+    offsets = np.stack((found.normal_x, found.normal_y), axis=-1) * found.distance[..., None]
+    return offsets, found.distance

@@ -6,7 +6,7 @@ import numpy as np
 
 from foc_ros.core.types import Array, Obstacles
 
-from .rounded_polygon import TURN
+TURN = 2.0 * np.pi
 
 
 def trace_outline(polygon: Array, radius: float, points: int = 64) -> Array:

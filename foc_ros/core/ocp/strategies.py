@@ -26,7 +26,7 @@ from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.types import Array, Status
 
-from .margin import Contacts, Indices, Margins
+from .margin import Contacts, Margins
 from .problem import Problem
 from .solver import LARGEST_RATE, Iterates, Solver
 from .start import NO_FORCES, Forces, Start, follow

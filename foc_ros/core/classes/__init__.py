@@ -5,10 +5,10 @@ decisions that tell candidates apart.
 May import `foc_ros.core.dynamics`, `obstacles`, `estimation` and the ground modules.
 """
 
-from .guesses import timed
+from .guess import timed
+from .names import named_obstacles
 from .search import Search, Turn, search
-from .search_scene import named_obstacles
-from .sides import compute_swept_angles, find_path_sides, is_same_class, sweep_angles
+from .sides import compute_swept_angles, find_path_sides, is_same_class
 
 __all__ = [
     'Search',
@@ -18,6 +18,5 @@ __all__ = [
     'is_same_class',
     'named_obstacles',
     'search',
-    'sweep_angles',
     'timed',
 ]

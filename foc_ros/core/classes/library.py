@@ -15,13 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.config import HomotopyConfig
-from foc_ros.core.obstacles.boundary import find_segment_squares
-from foc_ros.core.obstacles.rounded_polygon import measure_offsets, tabulate_polygons
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import LEFT, RIGHT, Array, Candidate, HandState, Obstacles, Record
 
-from .class_search import name_course
-from .guesses import compute_path_lengths, timed
-from .search_scene import named_obstacles
+from .guess import compute_path_lengths, timed
+from .names import name_course, named_obstacles
 from .sides import find_path_sides
 
 NEAR = 0.02
@@ -30,6 +28,8 @@ ASIDE = 0.1
 """Largest distance of the hand from the demonstrated path [m]."""
 POINTS = 65
 """Number of points of a demonstrated path."""
+PARTS = 4
+"""Each segment of such a path is compared with the obstacles at so many points: these lie about 2 mm apart."""
 STEP_S, MOST_STATES = 0.05, 400
 """Time from one state of a recording to the next [s], and the largest number of states."""
 DIGITS = 6
@@ -182,10 +182,12 @@ def _deform(path: Array, hand: Array, goal: Array) -> Array | None:
 
 
 def _is_free(path: Array, obstacles: Obstacles) -> bool:
-    """Tell whether no segment of a path runs through an obstacle, other than those that hold its first point."""
-    squares = find_segment_squares(np.ascontiguousarray(path), obstacles.centre, tabulate_polygons(obstacles))
-    _, distance = measure_offsets(path[:1], obstacles)
-    return not bool(((squares < obstacles.radius**2) & (distance[0] > obstacles.radius)).any())
+    """Tell whether no point of a path lies in an obstacle, other than those that hold its first or its last point."""
+    share = np.arange(PARTS)[:, None] / PARTS
+    points = (path[:-1, None] + share * (path[1:] - path[:-1])[:, None]).reshape(-1, 2)
+    _, distance = measure_offsets(np.vstack([points, path[-1:]]), obstacles)
+    is_inside = distance < obstacles.radius
+    return not bool((is_inside.any(axis=0) & ~is_inside[0] & ~is_inside[-1]).any())
 
 
 def _is_near(points: Array, others: Array) -> bool:

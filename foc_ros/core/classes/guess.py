@@ -1,0 +1,127 @@
+"""Initial guesses: the positions of a hand that moves along a path in time, smooth and with room to the obstacles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.types import Array, Obstacles
+
+from .graph import Rows
+from .names import Names
+from .sides import sweep
+
+SLOPE = 0.5
+"""A hand in a margin leaves it by this much for each metre of its path, and enters the margin of its goal likewise."""
+MAX_SPEED_RATIO = 2.5
+"""Largest ratio of v T to L for which the timing does not overshoot."""
+ROOM = 0.002
+"""Distance from the grown obstacles that a guess keeps where there is room [m]."""
+ROOMS = ROOM, ROOM, 0.0
+"""To this distance from the grown obstacles a guess is moved after each smoothing [m]: the last smoothing uses up the room."""
+ROOM = 0.002
+"""Distance from the grown obstacles that a guess keeps where there is room [m]."""
+ROOMS = ROOM, ROOM, 0.0
+"""To this distance from the grown obstacles a guess is moved after each smoothing [m]: the last smoothing uses up the room."""
+SMOOTHINGS = 2
+"""How often the positions of a guess are averaged with their neighbours before they are moved away from the obstacles."""
+CLEAR = 1e-12
+"""Depth in a grown obstacle that does not count [m]."""
+
+
+def compute_path_lengths(path: Array) -> Array:
+    """Compute the lengths (m,) [m] of a path (m, 2) [m] from its beginning to each of its points."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+
+
+def compute_progress(length: float, speed: float, duration_s: float, steps: int) -> Array:
+    """Compute the length along a path at steps 0..N (N + 1,) [m]: minimum jerk from a speed [m/s] along it to rest at its end.
+
+    s = L (10 t^3 - 15 t^4 + 6 t^5) + v T (t - 6 t^3 + 8 t^4 - 3 t^5) with t in [0, 1]. The path would overshoot with v T > 2.5 L
+    and begin backwards with v < 0, so v is kept between these bounds.
+    """
+    t = np.linspace(0.0, 1.0, steps + 1)
+    carried = min(max(speed * duration_s, 0.0), MAX_SPEED_RATIO * length)
+    along = length * t**3 * (10.0 + t * (6.0 * t - 15.0)) + carried * t * (1.0 + t**2 * (t * (8.0 - 3.0 * t) - 6.0))
+    return np.clip(along, 0.0, length)
+
+
+def timed(path: Array, velocity: Array, duration_s: float, steps: int) -> Array:
+    """Return the positions of a hand that moves along a path with the timing of the guesses.
+
+    Parameters
+    ----------
+    path : Array
+        Points (m, 2) [m], m >= 2.
+    velocity : Array
+        Velocity at the beginning (2,) [m/s].
+    duration_s : float
+        Duration [s].
+    steps : int
+        Number N of time steps.
+
+    Returns
+    -------
+    Array
+        Positions at steps 0..N, (N + 1, 2) [m].
+    """
+    along, step = compute_path_lengths(path), path[1] - path[0]
+    heading = step / max(float(np.hypot(*step)), np.finfo(float).tiny)
+    at = compute_progress(float(along[-1]), float(heading @ velocity), duration_s, steps)
+    return np.column_stack([np.interp(at, along, axis) for axis in path.T])
+
+
+def make_guesses(taut: Sequence[Array], goals: Sequence[int], obstacles: Obstacles, names: Names) -> list[Array]:
+    """Smooth the timed positions (N + 1, 2) [m] on taut paths to goals (rows), and move them away from the obstacles.
+
+    If hand or goal lies in the margin of an obstacle, the guess leaves or enters the margin gradually. A guess that smoothing
+    brought to the other side of an obstacle stays taut. names: how the obstacles count.
+    """
+    if not taut:
+        return []
+    before, guesses = np.array(taut), np.array(taut)
+    step = np.hypot(*np.diff(before, axis=1).transpose(2, 0, 1)).max(initial=0.0)
+    apart = np.hypot(*(before.reshape(-1, 1, 2) - obstacles.centre).transpose(2, 0, 1)) - obstacles.extent
+    near = np.flatnonzero((apart < names.radius - obstacles.radius + ROOM + step).any(axis=0))
+    shapes = obstacles.take(near)
+    wanted = _measure_wanted(before, list(goals), shapes, names, near)
+    for room in ROOMS:
+        guesses[:, 1:-1] += (guesses[:, :-2] + guesses[:, 2:] - 2.0 * guesses[:, 1:-1]) / 4.0
+        guesses = _push(guesses, wanted + room, shapes)
+    guesses = _push(guesses, wanted, shapes)
+    _, distance = measure_offsets(guesses.reshape(-1, 2), shapes)
+    is_clear = (distance.reshape(wanted.shape) >= wanted - CLEAR).all(axis=2, keepdims=True)
+    guesses = np.where(is_clear, guesses, before)
+    angles = [sweep(each[:, :, None] - shapes.centre) for each in (guesses, before)]
+    apart = np.abs(angles[0] - angles[1]).max(axis=1, initial=0.0)
+    return list(np.where(apart[:, None, None] < np.pi, guesses, before))
+
+
+def _measure_wanted(paths: Array, goals: list[int], shapes: Obstacles, names: Names, rows: Rows) -> Array:
+    """Return the distance (k, N + 1, r) [m] that positions (k, N + 1, 2) want from the polygons of some obstacles (r,)."""
+    steps = np.hypot(*np.diff(paths, axis=1, prepend=paths[:, :1]).transpose(2, 0, 1))
+    along, goal = np.cumsum(steps, axis=1)[..., None], np.array(goals)[:, None]
+    _, ends = measure_offsets(paths[:, [0, -1]].reshape(-1, 2), shapes)
+    at_hand, at_goal = ends.reshape(len(paths), 2, 1, len(rows)).transpose(1, 0, 2, 3)
+    leaving = np.where(names.holds_hand[rows], at_hand + SLOPE * along, np.inf)
+    entering = np.where(names.holds_goal[goal, rows][:, None], at_goal + SLOPE * (along[:, -1:] - along), np.inf)
+    held = np.minimum(names.radius[rows], np.minimum(leaving, entering))
+    wanted: Array = np.where(names.blocks[goal, rows][:, None], held, -np.inf)
+    return wanted
+
+
+def _push(paths: Array, wanted: Array, shapes: Obstacles) -> Array:
+    """Move positions (k, N + 1, 2) to the wanted distance (k, N + 1, r) from that obstacle to which each is too near by most."""
+    if not len(shapes):
+        return paths
+    points, wanted = paths.reshape(-1, 2), wanted.reshape(-1, len(shapes))
+    offset, distance = measure_offsets(points, shapes)
+    rows, worst = np.arange(len(points)), (wanted - distance).argmax(axis=1)
+    away, apart = offset[rows, worst], distance[rows, worst]
+    missing = np.maximum(wanted[rows, worst] - apart, 0.0)
+    moved: Array = points + away * (missing / np.where(apart == 0.0, np.inf, apart))[:, None]
+    moved = moved.reshape(paths.shape)
+    moved[:, [0, -1]] = paths[:, [0, -1]]
+    return moved

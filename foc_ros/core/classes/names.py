@@ -1,0 +1,161 @@
+"""Names: which obstacles the names of the classes to a goal contain, and how large the obstacles count.
+
+The candidates of the previous prediction add hysteresis: noise then changes neither the names nor the gaps that are open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from foc_ros.core.obstacles.culling import cull_obstacles
+from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.types import LEFT, Array, Candidate, Obstacles
+
+from .graph import Rows
+from .outlines import Flags, Outlines, measure_gaps, outline_obstacles
+from .sides import compute_bearings, is_between
+
+MOST = 64
+"""Largest number of obstacles in names and graphs."""
+FAR_SIDE = 2.0
+"""An obstacle is out of the way if the path round its far side is longer than this times the straight line."""
+ENTER = 0.005
+"""An obstacle that was in no name to a goal enters the names only if it is this much within the bounds [m]."""
+NARROWER = 0.004
+"""A gap that a candidate went through stays open until it is this much, or the clearance, too narrow [m]."""
+OPEN = 1e-6
+"""Width of a gap that is kept open [m]."""
+MIN_SIZE = 1e-6
+"""Least radius of an obstacle and least distance of a goal [m]: a point has no side."""
+
+
+@dataclass(frozen=True, eq=False)
+class Names:
+    """How n obstacles count on the way from the hand to g goals.
+
+    radius (n,): of each with the clearance [m], less where a gap is kept open. holds_hand (n,), holds_goal (g, n): whether an
+    obstacle of this size holds the hand or the goal; blocks (g, n): false for an obstacle, without the clearance, that holds the
+    goal. is_named (g, n): whether the names of the paths to a goal contain an obstacle.
+    """
+
+    radius: Array
+    holds_hand: Flags
+    holds_goal: Flags
+    blocks: Flags
+    is_named: Flags
+
+
+def name_course(sides: Sequence[tuple[str, int]]) -> str:
+    """Return the part of a label that says on which side each obstacle is passed."""
+    return ''.join([('+' if side == LEFT else '-') + identity for identity, side in sides])
+
+
+def named_obstacles(
+    hand: Array, goals: Array, obstacles: Obstacles, clearance: float, previous: Sequence[Candidate]
+) -> list[set[str]]:
+    """Return the ids of the obstacles that the names of the paths to each goal contain.
+
+    Parameters
+    ----------
+    hand, goals : Array
+        Positions (2,) and (g, 2) [m].
+    obstacles : Obstacles
+        The obstacles.
+    clearance : float
+        Distance that the hand needs from an obstacle [m].
+    previous : Sequence[Candidate]
+        The candidates of the previous prediction.
+
+    Returns
+    -------
+    list[set[str]]
+        Ids for each goal.
+    """
+    obstacles = take_near(obstacles, hand, goals)
+    names = find_names(hand, goals, obstacles, clearance, previous)
+    return [{obstacles.ids[row] for row in np.flatnonzero(is_named)} for is_named in names.is_named]
+
+
+def take_near(obstacles: Obstacles, hand: Array, goals: Array) -> Obstacles:
+    """Return the obstacles that names may contain and graphs consist of: those with the least detour, MOST of them."""
+    return cull_obstacles(obstacles, hand, goals, 0.0, MOST)
+
+
+def find_names(hand: Array, goals: Array, obstacles: Obstacles, clearance: float, previous: Sequence[Candidate]) -> Names:
+    """Find out which obstacles the names contain; arguments as in `named_obstacles`.
+
+    An obstacle is named if the foot of some point of its polygon lies between hand and goal, and it either blocks the straight
+    line or a path round its far side is short enough. As no other obstacle has an influence, a name stays the same if other
+    obstacles appear, vanish or move.
+    """
+    sides = _tabulate_sides(obstacles, previous)
+    radius = _keep_gaps_open(obstacles, np.maximum(obstacles.radius + clearance, MIN_SIZE), clearance, sides)
+    _, distance = measure_offsets(np.vstack([hand, goals]), obstacles)
+    blocks = distance[1:] >= obstacles.radius
+    slack = np.zeros((len(goals), len(obstacles)))
+    goal_of = np.array([candidate.goal for candidate in previous], dtype=np.intp)
+    for goal in {candidate.goal for candidate in previous if candidate.goal < len(goals)}:
+        slack[goal] = np.where(sides[goal_of == goal].any(axis=0), 0.0, ENTER)
+    is_named = _find_named(outline_obstacles(obstacles, radius), obstacles, hand, goals, blocks, slack)
+    return Names(radius, distance[0] <= radius, distance[1:] <= radius, blocks, is_named)
+
+
+def _find_named(outlines: Outlines, obstacles: Obstacles, hand: Array, goals: Array, blocks: Flags, slack: Array) -> Flags:
+    """Return which obstacles are named on the way to each goal, (g, n); outlines shrink if they hold the hand or the goal."""
+    scales = [np.minimum(outlines.measure_scale(hand), outlines.measure_scale(goal)) for goal in goals]
+    scale, is_named = np.reshape(scales, blocks.shape), np.zeros_like(blocks)
+    goal, row = np.nonzero(blocks & (scale > MIN_SIZE))
+    polygons, corners = scale[goal, row][:, None, None] * obstacles.vertices[row], obstacles.corners[row]
+    ends = hand - obstacles.centre[row], goals[goal] - obstacles.centre[row]
+    is_beside = is_between(polygons, corners, *ends, slack[goal, row])
+    goal, row = goal[is_beside], row[is_beside]
+    near, begin, end = outlines.take(row).shrink(scale[goal, row]), np.broadcast_to(hand, (len(row), 2)), goals[goal]
+    limit = FAR_SIDE * np.maximum(np.hypot(*(end - begin).T), MIN_SIZE) - slack[goal, row]
+    is_named[goal, row] = near.cut(begin, end) | (_measure_far_side(near, begin, end) <= limit)
+    return is_named
+
+
+def _tabulate_sides(obstacles: Obstacles, previous: Sequence[Candidate]) -> Rows:
+    """Return on which side each previous candidate passes each obstacle (p, n), 0 if its name does not contain the obstacle."""
+    table, row = np.zeros((len(previous), len(obstacles)), dtype=np.intp), {name: row for row, name in enumerate(obstacles.ids)}
+    for p, candidate in enumerate(previous):
+        for identity, side in candidate.sides:
+            if identity in row:
+                table[p, row[identity]] = side
+    return table
+
+
+def _keep_gaps_open(obstacles: Obstacles, radius: Array, clearance: float, sides: Rows) -> Array:
+    """Return the radii (n,) [m], each reduced by half of what is missing in a gap that some candidate went through."""
+    is_taken = (sides > 0).astype(int).T @ (sides < 0)
+    first, second = np.nonzero(is_taken + is_taken.T)
+    if not len(first):
+        return radius
+    missing = radius[first] + radius[second] - measure_gaps(obstacles)[0][first, second]
+    is_kept = (missing > -OPEN) & (missing < min(NARROWER, clearance))
+    reduced = radius.copy()
+    np.minimum.at(reduced, first[is_kept], radius[first[is_kept]] - (missing[is_kept] / 2.0 + OPEN))
+    return reduced
+
+
+def _measure_far_side(outlines: Outlines, hand: Array, goal: Array) -> Array:
+    """Return the length (n,) [m] of the path round that side of each outline on which the straight line does not pass it."""
+    bearing = compute_bearings(goal - outlines.centre) - compute_bearings(hand - outlines.centre)
+    is_clockwise = np.mod(bearing, 2.0 * np.pi) < np.pi
+    edges = np.hypot(*(outlines.vertices - np.roll(outlines.vertices, 1, axis=1)).transpose(2, 0, 1))
+    reached = np.cumsum(edges, axis=1)
+    rows, touching = np.arange(len(outlines)), []
+    for point, sense in ((hand, 1.0), (goal, -1.0)):
+        to = outlines.vertices - point[:, None]
+        following = np.roll(to, -1, axis=1)
+        turn = np.where(is_clockwise, sense, -sense)[:, None] * (to[..., 0] * following[..., 1] - to[..., 1] * following[..., 0])
+        # the first vertex behind which the outline turns back, as seen from the point
+        touching.append(((turn <= 0.0) & (np.roll(turn, 1, axis=1) > 0.0)).argmax(axis=1))
+    first, last = touching
+    arc = np.where(is_clockwise, 1.0, -1.0) * (reached[rows, first] - reached[rows, last])
+    ends = [np.hypot(*(outlines.vertices[rows, row] - point).T) for row, point in ((first, hand), (last, goal))]
+    length: Array = ends[0] + np.mod(arc, np.maximum(reached[:, -1], MIN_SIZE)) + ends[1]
+    return length

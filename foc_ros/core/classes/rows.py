@@ -1,0 +1,127 @@
+"""Rows of obstacles, and the decisions that tell classes apart: which gap each takes in the next row, and where it turns back.
+
+Obstacles whose extents along the direction of movement overlap stand in one row, which the hand passes through one of its gaps;
+an obstacle by itself is a row with two gaps. A wall, along which the hand moves from the start to the goals, is in no row: it
+bounds the outer gaps of the rows.
+
+An obstacle is open if some classes pass it on the left and others on the right. The next row is the first row of open obstacles
+that is still ahead of the hand. Where no row is ahead, the next decision is that between the goals. A class weaves through a row
+if it passes one obstacle on its right side, and another one, farther to the right, on its left side: it goes through several
+gaps of this row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foc_ros.core.obstacles.chance_constraint import centre_trajectories
+from foc_ros.core.types import LEFT, RIGHT, Array, HandState, Obstacles, Solution
+
+from .sides import compute_swept_angles
+
+Rows = NDArray[np.int64]
+WALL = -1
+"""The row of an obstacle that is in none."""
+NO_OBSTACLES = np.zeros(0, dtype=np.intp)
+"""The row of an obstacle that is in none."""
+
+
+def find_direction(start: Array, goals: Array) -> Array:
+    """Return the unit vector (2,) from a start (2,) [m] to the mean of the goals (g, 2) [m]; x where they coincide."""
+    offset: Array = goals.mean(axis=0) - start
+    length = float(np.hypot(*offset))
+    return offset / length if length > 0.0 else np.array([1.0, 0.0])
+
+
+def find_rows(obstacles: Obstacles, direction: Array, start: Array, goals: Array) -> Rows:
+    """Return the row (n,) of each obstacle, counted along a unit vector (2,), or WALL; start (2,), goals (g, 2) [m]."""
+    low, high = _find_extents(obstacles, direction)
+    row = np.full(len(obstacles), WALL, dtype=np.int64)
+    standing = np.flatnonzero(~find_walls(obstacles, np.vstack([start, goals])))
+    order = standing[np.argsort(low[standing], kind='stable')]
+    is_first = np.append(True, low[order[1:]] > np.maximum.accumulate(high[order])[:-1])
+    row[order] = np.cumsum(is_first[: len(order)]) - 1
+    return row
+
+
+def find_walls(obstacles: Obstacles, points: Array) -> NDArray[np.bool_]:
+    """Tell which obstacles (n,) have an edge beside which all points (q, 2) [m] lie: outside of it, and between its ends."""
+    vertices, number, corners = obstacles.vertices, np.arange(obstacles.vertices.shape[1]), obstacles.corners[:, None]
+    following = np.where(number + 1 < corners, number + 1, 0)
+    edges = np.take_along_axis(vertices, following[..., None], axis=1) - vertices
+    offset = points[:, None, None] - (obstacles.centre[:, None] + vertices)
+    along = (offset * edges).sum(axis=-1)
+    is_outside = edges[..., 0] * offset[..., 1] - edges[..., 1] * offset[..., 0] < 0.0
+    is_beside = is_outside & (along > 0.0) & (along < (edges**2).sum(axis=-1)) & (number < corners)
+    is_wall: NDArray[np.bool_] = is_beside.all(axis=0).any(axis=1)
+    return is_wall
+
+
+def _find_extents(obstacles: Obstacles, direction: Array) -> tuple[Array, Array]:
+    """Return the ends (n,) of the obstacles along a unit vector (2,) [m]."""
+    along, position = obstacles.vertices @ direction, obstacles.centre @ direction
+    return position + along.min(axis=1) - obstacles.radius, position + along.max(axis=1) + obstacles.radius
+
+
+def locate_rows(position: Array, row: Rows) -> Array:
+    """Return the position (r,) [m] of each row: the mean of its obstacles; position (n,) [m] and row (n,) of the obstacles."""
+    row, position = row[row != WALL], position[row != WALL]
+    located: Array = np.bincount(row, position) / np.bincount(row)
+    return located
+
+
+class Decisions(NamedTuple):
+    """The decisions of k classes.
+
+    next_gap, way (k,): numbers of the gap that each takes in the next row, and of its way. Classes of one way take the same gaps
+    in all rows ahead, whatever their goals. Where no row is ahead, the gap and the way of a class are its goal. woven (k,):
+    how many rows each weaves through. next_row (m,): the obstacles of the next row, none where no row is ahead.
+    """
+
+    next_gap: NDArray[np.intp]
+    way: NDArray[np.intp]
+    woven: NDArray[np.intp]
+    next_row: NDArray[np.intp] = NO_OBSTACLES
+
+
+def tabulate_sides(solutions: Sequence[Solution], obstacles: Obstacles) -> NDArray[np.int8]:
+    """Return LEFT or RIGHT, (k, n): the side on which the mean path of each solution passes each obstacle."""
+    angles = [
+        compute_swept_angles(each.path, centre_trajectories(obstacles.centre, each.dt * obstacles.velocity, len(each.mean) - 1))
+        for each in solutions
+    ]
+    return np.where(np.array(angles).reshape(len(solutions), len(obstacles)) < 0.0, LEFT, RIGHT).astype(np.int8)
+
+
+def find_decisions(
+    sides: NDArray[np.int8], goal: NDArray[np.intp], obstacles: Obstacles, hand: HandState, goals: Array
+) -> Decisions:
+    """Find the decisions of classes that pass obstacles on sides (k, n) and lead to goals (k,), rows of goals (g, 2) [m]."""
+    here, start = hand.mean[:2], hand.mean[:2] if hand.onset_position is None else hand.onset_position
+    direction = find_direction(start, goals)
+    is_open = (sides != sides[:1]).any(axis=0)
+    open_obstacles, is_left = np.flatnonzero(is_open), sides[:, is_open] == LEFT
+    obstacles = obstacles.take(open_obstacles)
+    row, along = find_rows(obstacles, direction, start, goals), obstacles.centre @ direction
+    is_ahead = np.append(locate_rows(along, row) > here @ direction, False)[row]  # a wall is in the last row here
+    order = np.lexsort((obstacles.centre @ np.array([-direction[1], direction[0]]), row))
+    order = order[is_ahead[order]]
+    if not len(order):
+        number = np.unique(goal, return_inverse=True)[1]
+        return Decisions(number, number, np.zeros(len(sides), dtype=np.intp))
+    row, is_left = row[order], is_left[:, order]
+    turns_back = np.zeros_like(is_left)
+    turns_back[:, 1:] = (is_left[:, 1:] > is_left[:, :-1]) & (row[1:] == row[:-1])
+    woven = np.logical_or.reduceat(turns_back, np.flatnonzero(np.diff(row, prepend=WALL)), axis=1).sum(axis=1)
+    is_next = row == row[0]
+    return Decisions(_number_rows(is_left[:, is_next]), _number_rows(is_left), woven, open_obstacles[order[is_next]])
+
+
+def _number_rows(table: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return a number (k,) for each row of a table (k, n), the same for equal rows."""
+    numbers = dict[bytes, int]()
+    return np.array([numbers.setdefault(each.tobytes(), len(numbers)) for each in table], dtype=np.intp)

@@ -1,0 +1,148 @@
+"""The scene of a search: the obstacles near the hand and the goals, their graph, and the classes of the paths to each goal."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from foc_ros.core.config import HomotopyConfig
+from foc_ros.core.deadline import Deadline
+from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.types import LEFT, RIGHT, Array, Candidate, Obstacles, as_readonly
+
+from .graph import Graph, Lines, Rows, build_graph
+from .guess import compute_path_lengths, make_guesses, timed
+from .names import find_names, name_course, take_near
+from .outlines import outline_obstacles
+from .paths import PathQuery, find_shortest_paths
+
+STATES, STATES_PER_CANDIDATE = 1000, 300
+"""Number of states that the search for one goal may look at; a few dozen are enough for four candidates."""
+OFF_HAND = 1e-9
+"""A goal that lies on the hand is moved away by this much [m]."""
+DIGITS = 9
+"""Paths rank by their length to so many decimals: rounding errors do not decide between equal lengths."""
+FINENESS = 257
+"""Number of points at which a path is compared with obstacles that are not in the graph."""
+GRAZE = 1e-6
+"""Depth of a path in such an obstacle that does not count [m]."""
+
+
+class PathClass(NamedTuple):
+    """A homotopy class to a goal (row), represented by its shortest path.
+
+    key, length plus what coasting adds [m], and label: by these, classes rank. sides: LEFT or RIGHT by id; points (m, 2) [m]: the
+    path; known: the candidate of the previous prediction, where there was no time to find the class again.
+    """
+
+    key: float
+    label: str
+    goal: int
+    sides: tuple[tuple[str, int], ...]
+    points: Array
+    known: Candidate | None = None
+
+    @property
+    def course(self) -> str:
+        """The label without the goal."""
+        return self.label.partition(':')[2]
+
+    @property
+    def named(self) -> set[str]:
+        """The ids of the obstacles in the name."""
+        return {identity for identity, _ in self.sides}
+
+
+class SearchScene:
+    """A hand with its velocity, goals and obstacles; arguments as in `search.search`.
+
+    Attributes
+    ----------
+    names : Names
+        How the obstacles that are near count.
+    known : list[PathClass]
+        The classes of the previous prediction that still fit the scene, in the order of their length.
+    notes : Counter[str]
+        Counts of what is decided, see `search.Search`.
+    """
+
+    def __init__(
+        self, hand_mean: Array, goals: Array, obstacles: Obstacles, config: HomotopyConfig, previous: Sequence[Candidate]
+    ) -> None:
+        self._hand, self._velocity = hand_mean[:4].astype(float).reshape(2, 2)
+        is_on_hand = np.hypot(*(goals - self._hand).T) < OFF_HAND
+        self._goals = np.where(is_on_hand[:, None], self._hand + np.array([OFF_HAND, 0.0]), goals)
+        self._near = take_near(obstacles, self._hand, self._goals)
+        kept = {*self._near.ids}
+        self._others = obstacles.take([row for row, name in enumerate(obstacles.ids) if name not in kept])
+        self._clearance, self._max_states = config.clearance, STATES + STATES_PER_CANDIDATE * config.max_candidates
+        self.names = find_names(self._hand, self._goals, self._near, config.clearance, previous)
+        ids, fitting = {*obstacles.ids}, [each for each in previous if each.goal < len(goals)]
+        known = [PathClass(each.length, each.label, each.goal, each.sides, each.guess, each) for each in fitting]
+        self.known = sorted([each for each in known if each.named <= ids], key=lambda each: each[:2])
+        self.notes = Counter(
+            hand_inside=int(self.names.holds_hand.sum()),
+            goal_near=int((self.names.holds_goal & self.names.blocks).any(axis=1).sum()),
+            goal_inside=int((~self.names.blocks).any(axis=1).sum()),
+        )
+        self._graphs: dict[bytes, tuple[Graph, Lines]] = {}
+
+    def find_classes(self, goal: int, deadline: Deadline) -> Iterator[PathClass]:
+        """Yield each class to a goal once, in the order of their rank; after the deadline, the first one only."""
+        rows = np.flatnonzero(self.names.blocks[goal])
+        graph, hand = self._connect_hand(rows)
+        lines, rest = _join_goal(graph, *self._goals[goal].tolist())
+        named = np.flatnonzero(self.names.is_named[goal, rows])
+        ids = [self._near.ids[row] for row in rows[named].tolist()]
+        order = sorted(range(len(ids)), key=ids.__getitem__)
+        query = PathQuery(graph, hand, lines, rest, named, self._velocity, self._max_states, deadline)
+        for tied in find_shortest_paths(query, self.notes):
+            classes = []
+            for key, points, swept in tied:
+                sides = tuple([(ids[row], LEFT if swept[row] < 0.0 else RIGHT) for row in order])
+                classes.append(PathClass(round(key, DIGITS), f'goal{goal}:{name_course(sides)}', goal, sides, points))
+            yield from [each for each in sorted(classes) if not self._is_left_out(each.points)]
+
+    def make_candidates(self, classes: Sequence[PathClass], duration_s: Sequence[float], steps: int) -> tuple[Candidate, ...]:
+        """Return the candidates of classes, with guesses for the time to go to each goal [s]."""
+        found = [each for each in classes if each.known is None]
+        taut = [timed(each.points, self._velocity, duration_s[each.goal], steps) for each in found]
+        guesses = make_guesses(taut, [each.goal for each in found], self._near, self.names)
+        made = {
+            each.label: Candidate(
+                each.label, each.goal, each.sides, as_readonly(guess), float(compute_path_lengths(each.points)[-1])
+            )
+            for each, guess in zip(found, guesses, strict=True)
+        }
+        return tuple([each.known or made[each.label] for each in classes])
+
+    def _connect_hand(self, rows: Rows) -> tuple[Graph, Lines]:
+        """Return the graph of the obstacles that block the paths to a goal, and the lines from the hand to its nodes."""
+        key = rows.tobytes()
+        if key not in self._graphs:
+            shapes = self._near if len(rows) == len(self._near) else self._near.take(rows)
+            graph = build_graph(outline_obstacles(shapes, self.names.radius[rows]))
+            self._graphs[key] = graph, graph.join(self._hand)
+        return self._graphs[key]
+
+    def _is_left_out(self, points: Array) -> bool:
+        """Tell, and count, whether a path meets obstacles that are not in the graph."""
+        if not len(self._others):
+            return False
+        along = compute_path_lengths(points)
+        at = np.linspace(0.0, along[-1], FINENESS)
+        _, distance = measure_offsets(np.column_stack([np.interp(at, along, axis) for axis in points.T]), self._others)
+        is_met = bool((distance < self._others.radius + self._clearance - GRAZE).any())
+        self.notes['left_out'] += is_met
+        return is_met
+
+
+@lru_cache(maxsize=128)
+def _join_goal(graph: Graph, x: float, y: float) -> tuple[Lines, list[float]]:
+    """Return the lines from a goal to the nodes of a graph, and the length of the shortest path from each node to it [m]."""
+    lines = graph.join(np.array([x, y]))
+    return lines, graph.measure_rest(lines)

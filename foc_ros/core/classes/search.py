@@ -1,0 +1,198 @@
+"""The search for homotopy classes: hand, goals and obstacles in; named candidates, each with a timed initial guess, out."""
+
+from __future__ import annotations
+
+import time
+from bisect import insort
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, field
+from heapq import merge
+from itertools import chain
+from typing import NamedTuple
+
+from foc_ros.core.config import MOST_CANDIDATES, HomotopyConfig
+from foc_ros.core.deadline import NEVER, Deadline
+from foc_ros.core.errors import SceneError
+from foc_ros.core.types import Array, Candidate, Obstacles
+
+from .scene import PathClass, SearchScene
+
+REPEAT = 1.5
+"""A class that passes all obstacles as a class to another goal does ranks as if it were this times as long: it adds little."""
+STAY = 0.95
+"""A class of the previous prediction ranks as if it were this times as long: noise does not swap classes of equal length."""
+
+
+class Turn(NamedTuple):
+    """How long a search may take, and the goal (row) at which it begins, so that all goals have their turn if time is short."""
+
+    deadline: Deadline = NEVER
+    first_goal: int = 0
+
+
+ALL = Turn()
+
+
+@dataclass(frozen=True)
+class Search:
+    """What a search has found.
+
+    Attributes
+    ----------
+    candidates : tuple[Candidate, ...]
+        The candidates, shortest first.
+    notes : dict[str, int]
+        Counts by name, none of them 0. hand_inside: obstacles whose margin holds the hand. goal_near: goals in the margin of an
+        obstacle. goal_inside: goals inside an obstacle, which does not block the paths to them. no_way: goals without candidates.
+        left_out: classes whose path meets obstacles that the graph does not contain. search_cut: goals whose search ended at the
+        largest number of states. search_late: searches that the deadline ended or prevented.
+    next_goal : int
+        Row of the first goal that the deadline left out, at which the next search should begin; 0 if there was time for all.
+    """
+
+    candidates: tuple[Candidate, ...]
+    notes: dict[str, int] = field(default_factory=dict)
+    next_goal: int = 0
+
+
+def search(
+    hand_mean: Array,
+    goals: Array,
+    obstacles: Obstacles,
+    config: HomotopyConfig,
+    duration_s: Sequence[float],
+    steps: int,
+    previous: Sequence[Candidate] = (),
+    turn: Turn = ALL,
+) -> Search:
+    """Find the best `config.max_candidates` homotopy classes between the hand and the goals.
+
+    If there are more goals than that, the search finds one class to each goal, up to `MOST_CANDIDATES`. Obstacles are grown by
+    `config.clearance`. The uncertainty of the radius is left to the chance constraint, which weighs it by eta.
+
+    Parameters
+    ----------
+    hand_mean : Array
+        State mean (6,), SI units.
+    goals : Array
+        Positions (g, 2) [m].
+    obstacles : Obstacles
+        The obstacles, where they are now.
+    config : HomotopyConfig
+        Number of candidates and clearance.
+    duration_s : Sequence[float]
+        Time to go to each goal [s].
+    steps : int
+        Number N of time steps of the guesses.
+    previous : Sequence[Candidate], optional
+        Candidates of the previous prediction. They stay unless others are clearly better. Where the deadline leaves no time to
+        search, they are returned as they are.
+    turn : Turn, optional
+        The deadline, and the goal at which the search begins. The first class to this goal, and to each goal without a previous
+        candidate, is searched whatever the time.
+
+    Returns
+    -------
+    Search
+        Candidates and notes.
+
+    Raises
+    ------
+    SceneError
+        If the arguments do not fit each other.
+    """
+    if hand_mean.shape != (6,) or goals.ndim != 2 or goals.shape[1] != 2:
+        raise SceneError('hand_mean, goals', 'arrays (6,) and (g, 2)', f'{hand_mean.shape} and {goals.shape}')
+    if len(duration_s) != len(goals):
+        raise SceneError('duration_s', f'one for each of the {len(goals)} goals', len(duration_s))
+    if not len(goals):
+        return Search(())
+    scene = SearchScene(hand_mean, goals, obstacles, config, previous)
+    ranking = _Ranking(scene, {each.label for each in previous}, turn.deadline)
+    next_goal = ranking.find_bests(sorted(range(len(goals)), key=lambda goal: (goal < turn.first_goal, goal)))
+    count = max(config.max_candidates, min(len(goals), MOST_CANDIDATES))
+    candidates = scene.make_candidates(ranking.choose(count), duration_s, steps)
+    return Search(candidates, {name: number for name, number in scene.notes.items() if number}, next_goal)
+
+
+class _Ranking:
+    """Finds and ranks classes to all goals.
+
+    A class ranks by its key, which is multiplied by STAY if it was followed in the previous prediction (labels), and by REPEAT if
+    it passes all obstacles as the shortest class to another goal does, or one that ranks before it.
+    """
+
+    def __init__(self, scene: SearchScene, followed: Collection[str], deadline: Deadline) -> None:
+        self._scene, self._followed, self._deadline = scene, followed, deadline
+        self._bests: list[PathClass] = []
+        self._shortest: list[PathClass] = []
+        self._others: list[Iterable[PathClass]] = []
+
+    def find_bests(self, goals: Sequence[int]) -> int:
+        """Find the best class to each of some goals; return the first goal for which there was no time, or 0.
+
+        Only a goal that has a class from the previous prediction may have to wait, and never the first one.
+        """
+        next_goal, longest_s = 0, 0.0
+        for goal in goals:
+            known = [each for each in self._scene.known if each.goal == goal]
+            if known and goal != goals[0] and self._deadline.left_s < longest_s:
+                next_goal = next_goal if self._scene.notes['search_late'] else goal
+                self._scene.notes['search_late'] += 1
+                self._bests.append(known[0])
+                self._shortest.append(known[0])
+                continue
+            began = time.perf_counter()
+            self._find_best(goal)
+            longest_s = max(longest_s, time.perf_counter() - began)
+        return next_goal
+
+    def _find_best(self, goal: int) -> None:
+        """Find the best class to a goal: the shortest one, unless one that was followed is nearly as short."""
+        stream, seen = self._scene.find_classes(goal, self._deadline), list[PathClass]()
+        awaited = {label for label in self._followed if label.startswith(f'goal{goal}:')}
+        for found in stream:
+            seen.append(found)
+            awaited.discard(found.label)
+            if not awaited or seen[0].label in self._followed or STAY * found.key > seen[0].key:
+                break
+        if seen:
+            best = min(seen, key=self._rank)
+            self._bests.append(best)
+            self._shortest.append(seen[0])
+            self._others.append(chain([each for each in seen if each is not best], stream))
+        self._scene.notes['no_way'] += not seen
+
+    def choose(self, count: int) -> list[PathClass]:
+        """Choose some classes, shortest first: the best one to each goal, as far as there is room, then others by their rank.
+
+        If the time ends, known classes of the previous prediction take the place of those that were not found again.
+        """
+        bests = sorted(self._bests, key=self._rank)[:count]
+        goal_of = {each.course: each.goal for each in sorted(self._shortest, reverse=True)}
+        chosen, labels, room = list[tuple[float, str, PathClass]](), {each.label for each in bests}, count - len(bests)
+
+        def add(found: PathClass) -> None:
+            factor = REPEAT if goal_of.setdefault(found.course, found.goal) != found.goal else 1.0
+            insort(chosen, (factor * self._rank(found)[0], found.label, found))
+            labels.add(found.label)
+
+        is_late = room > 0 and self._deadline.has_passed
+        for found in merge(*self._others) if room and not is_late else ():
+            if len(chosen) >= room and found.key * (1.0 if labels.issuperset(self._followed) else STAY) > chosen[room - 1][0]:
+                break
+            add(found)
+            is_late = self._deadline.has_passed
+            if is_late:
+                break
+        self._scene.notes['search_late'] += is_late
+        if self._scene.notes['search_late']:
+            # beside others to its goal, a class has to have the same obstacles in its name, so that no class comes twice
+            named = {each.goal: each.named for each in [*bests, *[found for *_, found in chosen]]}
+            for each in self._scene.known:
+                if each.label not in labels and named.get(each.goal) == each.named:
+                    add(each)
+        return sorted([*bests, *[found for *_, found in chosen[:room]]])
+
+    def _rank(self, found: PathClass) -> tuple[float, str]:
+        return found.key * (STAY if found.label in self._followed else 1.0), found.label

@@ -1,0 +1,175 @@
+"""On which side a path passes an obstacle, and when the paths of several candidates separate, computed from the paths alone.
+
+A path crosses the ray that leaves the centre of an obstacle along -x. The number of these crossings (anticlockwise ones positive)
+and the directions of the two ends, as seen from the centre, give the angle that the path sweeps about the centre.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foc_ros.core.errors import SceneError
+from foc_ros.core.obstacles.chance_constraint import centre_trajectories
+from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.types import LEFT, RIGHT, Array, Obstacles, PredictedCandidate, Record
+
+TURN = 2.0 * np.pi
+
+
+def count_crossings(begin: Array, end: Array) -> NDArray[np.int8]:
+    """Count how often straight lines cross the rays of centres, (...): -1, 0, or 1 for an anticlockwise crossing.
+
+    begin, end (..., 2): ends of the lines relative to the centres [m].
+    """
+    is_above, ends_above = begin[..., 1] >= 0.0, end[..., 1] >= 0.0
+    left = begin[..., 0] * end[..., 1] - begin[..., 1] * end[..., 0]
+    anticlockwise, clockwise = is_above & ~ends_above & (left > 0.0), ~is_above & ends_above & (left < 0.0)
+    return anticlockwise.astype(np.int8) - clockwise.astype(np.int8)
+
+
+def compute_bearings(offset: Array) -> Array:
+    """Return the directions [rad] of points (..., 2) from a centre; a negative zero counts as zero, as in `count_crossings`."""
+    bearing: Array = np.arctan2(offset[..., 1] + 0.0, offset[..., 0] + 0.0)
+    return bearing
+
+
+def compute_swept_angles(path: Array, centres: Array) -> Array:
+    """Compute the angle that a path sweeps about each centre, anticlockwise positive.
+
+    The angle is exact if no step of the path turns by pi or more about a centre.
+
+    Parameters
+    ----------
+    path : Array
+        Points (m, 2) [m], m >= 1.
+    centres : Array
+        Centres (n, 2) [m], or (m, n, 2) if they move: the centres at each point of the path.
+
+    Returns
+    -------
+    Array
+        Angles (n,) [rad].
+
+    Raises
+    ------
+    SceneError
+        If the shapes do not fit each other.
+    """
+    if path.ndim != 2 or path.shape[1] != 2 or not len(path):
+        raise SceneError('path', 'points (m, 2), m >= 1', f'an array {path.shape}')
+    if centres.ndim == 3 and len(centres) != len(path):
+        raise SceneError('centres', f'one row for each of the {len(path)} points', f'{len(centres)} rows')
+    return sweep(path[:, None] - centres)
+
+
+def sweep(offset: Array) -> Array:
+    """Return the angles (..., n) [rad] that paths sweep about centres; offset (..., m, n, 2): of their points [m]."""
+    turns = count_crossings(offset[..., :-1, :, :], offset[..., 1:, :, :]).sum(axis=-2)
+    angles: Array = compute_bearings(offset[..., -1, :, :]) - compute_bearings(offset[..., 0, :, :]) + TURN * turns
+    return angles
+
+
+def is_same_class(angles: Array, others: Array) -> bool:
+    """Tell whether two paths with the same ends, which sweep the angles (n,) [rad], pass all n centres on the same sides."""
+    return bool((np.abs(angles - others) < np.pi).all())
+
+
+def find_path_sides(path: Array, obstacles: Obstacles, centres: Array | None = None) -> dict[str, int]:
+    """Find the side on which a path passes each obstacle.
+
+    A path that sweeps clockwise about a centre passes the obstacle on the left. A path passes an obstacle if the foot of
+    some point of its polygon on the chord from the first to the last point lies strictly between the two, or if the path winds
+    about the centre by more than half a turn. If the obstacle moves, points are relative to it.
+
+    Parameters
+    ----------
+    path : Array
+        Points (m, 2) [m], m >= 1.
+    obstacles : Obstacles
+        The n obstacles.
+    centres : Array, optional
+        Centres (m, n, 2) [m] of the obstacles at each point of the path, if they move.
+
+    Returns
+    -------
+    dict[str, int]
+        LEFT or RIGHT by the id of each obstacle that is passed.
+
+    Raises
+    ------
+    SceneError
+        If the shapes do not fit each other.
+    """
+    rows = obstacles.centre if centres is None else centres
+    angles = compute_swept_angles(path, rows)
+    first, last = (path[0] - rows, path[-1] - rows) if centres is None else (path[0] - rows[0], path[-1] - rows[-1])
+    is_passed = is_between(obstacles.vertices, obstacles.corners, first, last, 0.0) | (np.abs(angles) > np.pi)
+    return {obstacles.ids[row]: LEFT if angles[row] < 0.0 else RIGHT for row in np.flatnonzero(is_passed).tolist()}
+
+
+def is_between(vertices: Array, corners: NDArray[np.intp], begin: Array, end: Array, slack: Array | float) -> NDArray[np.bool_]:
+    """Tell which polygons have a point whose foot on a line lies between the ends of the line, by more than a slack.
+
+    vertices (n, V, 2), begin, end (n, 2): of the polygons and the lines, relative to the centres [m]; corners (n,): number of
+    vertices; slack (n,): least distance of the foot from both ends [m].
+    """
+    line = end - begin
+    square = (line**2).sum(axis=-1)
+    margin = slack * np.sqrt(square)
+    foot = ((vertices - begin[..., None, :]) * line[..., None, :]).sum(axis=-1)
+    is_corner = np.arange(vertices.shape[1]) < corners[:, None]
+    first, last = np.where(is_corner, foot, np.inf).min(axis=-1), np.where(is_corner, foot, -np.inf).max(axis=-1)
+    flags: NDArray[np.bool_] = (margin < last) & (first < square - margin)
+    return flags
+
+
+@dataclass(frozen=True, eq=False)
+class BranchTimes(Record):
+    """When k paths separate.
+
+    after_s (k, k): time until two of them separate [s], infinite for paths that never separate, and on the diagonal. path_class
+    (k,): paths with equal numbers pass all obstacles on the same sides, though they may lead to different goals.
+    """
+
+    after_s: Array
+    path_class: NDArray[np.intp]
+
+    def take(self, rows: NDArray[np.intp]) -> BranchTimes:
+        """Return the branch times of some of the paths."""
+        return BranchTimes(self.after_s[np.ix_(rows, rows)], self.path_class[rows])
+
+
+def compute_branch_times(outcomes: Sequence[PredictedCandidate], obstacles: Obstacles) -> BranchTimes:
+    """Compute when the mean paths of candidates separate; obstacles: where they are now.
+
+    Two paths from one hand pass an obstacle on different sides if the angles that they sweep about it differ by more than half a
+    turn. They separate at the first such obstacle, when the first of the two is nearest to it. A parabola through three
+    steps gives this time, so that it does not jump.
+    """
+    if not outcomes:
+        return BranchTimes(np.zeros((0, 0)), np.zeros(0, dtype=np.intp))
+    angles, times = [], []
+    for solution in [outcome.solution for outcome in outcomes]:
+        centre = centre_trajectories(obstacles.centre, solution.dt * obstacles.velocity, len(solution.mean) - 1)
+        angles.append(compute_swept_angles(solution.path, centre))
+        _, distance = measure_offsets(solution.path, obstacles, centre)
+        times.append(solution.dt * _find_minima(distance))
+    swept, passing_s = np.array(angles), np.array(times)
+    is_opposite = np.abs(swept[:, None] - swept) > np.pi
+    after_s = np.where(is_opposite, np.minimum(passing_s[:, None], passing_s), np.inf).min(axis=2, initial=np.inf)
+    return BranchTimes(after_s, np.isinf(after_s).argmax(axis=1))
+
+
+def _find_minima(distance: Array) -> Array:
+    """Return where the distances (N + 1, n) at steps are smallest, in steps (n,)."""
+    row, column = distance.argmin(axis=0), np.arange(distance.shape[1])
+    inner = np.clip(row, 1, len(distance) - 2)
+    before, here, after = (distance[inner + step, column] for step in (-1, 0, 1))
+    bend = before - 2.0 * here + after
+    offset = 0.5 * (before - after) / np.where(bend > 0.0, bend, np.inf)
+    minima: Array = np.where(bend > 0.0, np.clip(inner + np.clip(offset, -1.0, 1.0), 0.0, len(distance) - 1.0), row)
+    return minima
