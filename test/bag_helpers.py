@@ -64,14 +64,16 @@ def write_mcap(
     items: Iterable[tuple[str, int, Any]],
     per_chunk: int = 1000,
     odd: Mapping[str, tuple[str, str, str, bytes]] = MappingProxyType({}),
+    **options: Any,
 ) -> list[int]:
     """Write an MCAP file as a recorder does, with a number of messages in each chunk; return where the chunks end.
 
-    odd: by topic, encoding of messages, name, encoding and text of the schema, for a channel with one message.
+    odd: by topic, encoding of messages, name, encoding and text of the schema, for a channel with one message; options: of the
+    library's writer.
     """
     ends, channels = [], {}
     with path.open('wb') as stream:
-        writer = Writer(stream)
+        writer = Writer(stream, **options)
         writer.start('ros2')
         for topic, (encoding, name, form, text) in odd.items():
             channel = writer.register_channel(topic, encoding, writer.register_schema(name, form, text) if name else 0)

@@ -18,7 +18,7 @@ from io import TextIOWrapper
 from pathlib import Path
 from typing import Any, NoReturn
 
-from foc_ros.core.errors import FocError, list_messages, suggest
+from foc_ros.core.errors import FocError, list_messages, print_warnings, suggest
 
 from . import arguments as declarations
 from .compiling import show_compilation
@@ -80,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout = Path(os.devnull).open('w', encoding='utf-8')  # noqa: SIM115  it stays open until the process ends
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        with handle_interrupts():
+        with handle_interrupts(), print_warnings(' '.join(['foc_ros', *given[:1]])):
             code = _parse_and_run(given)
             sys.stdout.flush()
     except KeyboardInterrupt:

@@ -107,8 +107,6 @@ def _play(arguments: argparse.Namespace, replay: Replay, consumers: list[Consume
                     take(step, each)
             for consume in consumers:
                 consume(step)
-        for warning in reader.warnings:
-            print(f'foc_ros replay: {arguments.bag}: {warning}', file=sys.stderr)
         return reader.duration_s
 
 

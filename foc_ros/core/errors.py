@@ -5,7 +5,10 @@ An expected failure (infeasible, unreachable, out of time) is a :class:`foc_ros.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import sys
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from difflib import get_close_matches
 from typing import Any, TypeVar
 
@@ -52,6 +55,32 @@ class MessageError(InputError):
 
 class RecordingError(FocError):
     """A file that cannot be read or written; the message names the file and the reason."""
+
+
+class FocWarning(UserWarning):
+    """Input that is used, although a part of it is missing or it is probably not meant so; the message says what and why."""
+
+
+def warn(text: str) -> None:
+    """Issue a FocWarning."""
+    warnings.warn(text, FocWarning, stacklevel=2)
+
+
+@contextmanager
+def print_warnings(program: str) -> Iterator[None]:
+    """Print each FocWarning as one line on standard error, after the name of the program."""
+    with warnings.catch_warnings():
+        warnings.simplefilter('always', FocWarning)
+        usual = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *place: Any, **options: Any) -> None:
+            if issubclass(category, FocWarning):
+                print(f'{program}: {" ".join(str(message).split())}', file=sys.stderr)
+            else:
+                usual(message, category, *place, **options)
+
+        warnings.showwarning = show
+        yield
 
 
 E = TypeVar('E', bound=FocError)

@@ -59,9 +59,14 @@ class Intake:
         return self.take(role, arrival.message, arrival.error)
 
     def take(self, role: str, message: Any, transform_error: str = '') -> SampleStatus | None:
-        """Take one message; None if it cannot be decoded. transform_error: why it is not in the working frame."""
+        """Take one message, or the error of its decoding; None if it cannot be decoded.
+
+        transform_error: why it is not in the working frame.
+        """
         refused_before = self.pipeline.refused
         try:
+            if isinstance(message, MessageError):
+                raise message
             status = self._handlers[role](message)
         except MessageError as error:
             self.refuse(role, error)
