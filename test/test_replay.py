@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -116,10 +117,59 @@ def test_what_cannot_be_used_is_counted_and_the_rest_goes_on(tmp_path: Path) -> 
     with BagReader(bag) as reader:
         stamps = [step.prediction.stamp_ns for step in replayed.steps(reader) if step.prediction]
     assert stamps == [ns(time) for time, _ in reach(FEW)]
-    expected = {'hand_pose_invalid': 1, 'hand_wrong_frame': 1, 'obstacles_invalid': 1, 'hand_late': 1}
+    expected = {'hand_lost': 1, 'hand_wrong_frame': 1, 'obstacles_invalid': 1, 'hand_late': 1}
     counts = replayed.intake.counts
     assert {name: counts.get(name) for name in expected} == expected
     assert counts['obstacles_dropped_not_finite'] == 1
+
+
+def by_stamp(*given: list[tuple[str, int, Any]]) -> list[tuple[str, int, Any]]:
+    return sorted(chain.from_iterable(given), key=lambda each: each[1])
+
+
+def test_stamps_that_repeat_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As of a clock of whole seconds."""
+    given = messages(seconds=FEW)
+    poses = [each for each in given if each[0] == '/hand_pose']
+    whole = [(topic, stamp_ns, encode_hand_pose(TYPES, ns(0), FRAME, (0.1, 0.0, 0.0))) for topic, stamp_ns, _ in poses]
+    assert run(write_bag(tmp_path / 'whole', by_stamp([each for each in given if each[0] != '/hand_pose'], whole))) == 0
+    words = f'{len(poses) - 1} of {len(poses)} messages of hand_pose refused, the last: hand_pose: stamps repeat: '
+    assert words in capsys.readouterr().err
+
+
+def test_poses_without_data_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def empty(stamp_ns: int) -> tuple[str, int, Any]:
+        pose = TYPES.make('geometry_msgs/msg/Pose')
+        header = make_header(TYPES, stamp_ns, FRAME)
+        return '/hand_pose', stamp_ns, TYPES.make('geometry_msgs/msg/PoseStamped', header=header, pose=pose)
+
+    bag = write_bag(tmp_path / 'lost', by_stamp(messages(seconds=FEW), [empty(ns(each)) for each in (0.01, 0.03, 0.05)]))
+    assert run(bag, '--json') == 0
+    captured = capsys.readouterr()
+    summary = json.loads(captured.out)['summary']
+    assert summary['refused'] == {'hand_lost': 3} and summary['predictions'] == len(reach(FEW))
+    assert '3 of 9 messages of hand_pose refused, the last: hand_pose: pose: expected a position' in captured.err
+
+
+def test_a_hand_that_does_not_move_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    last = [(ns(0.2 + i / 10), encode_hand_pose(TYPES, ns(0.2 + i / 10), FRAME, (0.1, 0.0, 0.0))) for i in range(15)]
+    assert run(write_bag(tmp_path / 'frozen', [*messages(seconds=FEW), *(('/hand_pose', *each) for each in last)])) == 0
+    assert capsys.readouterr().err == 'foc_ros replay: the hand does not move: the same position for 1.4 s\n'
+
+
+def test_transforms_and_markers_that_are_left_out_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    marker = TYPES.make('visualization_msgs/msg/Marker', header=make_header(TYPES, ns(0), FRAME), type=9)
+    array = TYPES.make('visualization_msgs/msg/MarkerArray', markers=[marker, marker])
+    moved = TYPES.make('geometry_msgs/msg/TransformStamped', header=make_header(TYPES, ns(0), 'base'), child_frame_id='base')
+    tree = TYPES.make('tf2_msgs/msg/TFMessage', transforms=[moved])
+    given = [('/tf', ns(-0.09), tree), ('/obstacle_markers', ns(-0.08), array)]
+    assert run(write_bag(tmp_path / 'odd', by_stamp(messages(seconds=FEW), given))) == 0
+    assert capsys.readouterr().err == (
+        'foc_ros replay: 1 parts of tf left out (not_usable); 2 parts of obstacle_markers left out (not_a_shape)\n'
+    )
+    only = [each for each in messages(seconds=FEW) if each[0] != '/obstacles']
+    assert run(write_bag(tmp_path / 'none', by_stamp(only, given))) == 3
+    assert '2 parts of obstacle_markers left out (not_a_shape); no obstacles received' in capsys.readouterr().err
 
 
 def test_a_table_is_printed_without_json(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -279,4 +329,4 @@ def test_another_recording_begins_without_scene_frame_and_transforms(tmp_path: P
     assert found and replayed.pipeline.frame_id is not None
     replayed.forget_scene()
     assert replayed.pipeline.frame_id is None and not replayed.pipeline.scene.sources and replayed.pipeline.scene.goals is None
-    assert replayed.describe_refusals() == ''
+    assert replayed.describe_losses() == ''

@@ -132,7 +132,7 @@ def collect_all(function: Callable[[T], R], items: Sequence[tuple[str, T]], exec
 
 
 def call_guarded(function: Callable[[T], R], item: T) -> tuple[R | Failure, list[str]]:
-    """Return the result of a function, or its failure in words, because an exception may not survive pickling; and its warnings."""
+    """Return the result of a function, or its failure in words, as an exception may not survive pickling, and its warnings."""
     with warnings.catch_warnings(record=True) as issued:
         warnings.simplefilter('always', FocWarning)
         result: R | Failure

@@ -53,6 +53,10 @@ class MessageError(InputError):
     """A message that cannot be converted."""
 
 
+class LostHandError(MessageError):
+    """A hand pose by which a tracker says that it has no data."""
+
+
 class RecordingError(FocError):
     """A file that cannot be read or written; the message names the file and the reason."""
 

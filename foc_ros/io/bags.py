@@ -26,7 +26,8 @@ from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 from foc_ros.core.errors import RecordingError, warn
 
 from . import topics
-from .channels import TYPESTORE, Channel, StoredFile
+from .channels import TYPESTORE as TYPESTORE
+from .channels import StoredFile
 from .checksums import add_checksums
 from .mcap_files import McapFile
 from .sqlite_files import SqliteFile
@@ -261,7 +262,10 @@ def _list_files(folder: Path) -> tuple[list[Path], int | None]:
         return list(found.values()), None
     try:
         stated = yaml.safe_load(metadata.read_text('utf-8'))['rosbag2_bagfile_information']
-        names, count = [_strip_compression(PurePath(each).name) for each in stated['relative_file_paths']], stated['message_count']
+        names, count = (
+            [_strip_compression(PurePath(each).name) for each in stated['relative_file_paths']],
+            stated['message_count'],
+        )
         if not names or not isinstance(count, int):
             raise ValueError('it names no file, or no number of messages')
     except Exception as error:  # whatever stands in it

@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from urllib.parse import quote
 
-from foc_ros.core.errors import RecordingError, warn
+from foc_ros.core.errors import RecordingError
 
 from .channels import Channel
 
@@ -64,7 +64,9 @@ class SqliteFile:
             raise RecordingError(f'damaged: {" ".join(state.split())}')
         with path.open('rb') as stream:
             is_logged = stream.read(_WAL_FLAG + 1)[_WAL_FLAG:] == b'\2'
-        self.doubt = 'written with a -wal file, which is not here; the last messages may be missing' if is_logged and not logs else ''
+        self.doubt = (
+            'written with a -wal file, which is not here; the last messages may be missing' if is_logged and not logs else ''
+        )
         self.channels = list(self._list_channels())
         query = 'SELECT count(*), min(timestamp), max(timestamp) FROM messages NOT INDEXED'
         self.message_count, *times_ns = self._database.execute(query).fetchone()

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from foc_ros.core.errors import MessageError
+from foc_ros.core.errors import LostHandError, MessageError
 from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
@@ -19,18 +19,25 @@ from .messages.decode_point_cloud import decode_point_cloud
 from .messages.decode_poses import decode_goal, decode_goals, decode_hand_sample, decode_stamp
 from .transforms import Arrival
 
+DROPPED = '_dropped_'
+"""Between input and reason in the name of a count of parts of messages that were left out."""
+STILL_S = 1.0
+"""Time with the same position after which this is told [s]: a tracker that repeats its last pose, or a hand that rests in a simulation."""
+
 
 class Intake:
     """Takes messages by the name of their input; one that cannot be decoded changes nothing and is counted.
 
     A hand pose less than `estimator.min_interval_s` after the last used one is skipped and counted, and nothing of it but its
     stamp is looked at. A marker whose lifetime ends before the stamp of the last hand sample does not exist for it. Attributes:
-    pipeline; sample: the last decoded hand sample; last_refusal: why the last refused message was refused.
+    pipeline; sample: the last decoded hand sample; still_since_ns: stamp since which its position is the same; last_refusal: why
+    the last refused message was refused.
     """
 
     def __init__(self, pipeline: Pipeline) -> None:
         self.pipeline = pipeline
         self.sample: HandSample | None = None
+        self.still_since_ns = 0
         self.last_refusal: str | None = None
         self._markers = MarkerTable()
         self._markers_ns = 0
@@ -77,13 +84,23 @@ class Intake:
 
     def refuse(self, role: str, error: MessageError) -> None:
         """Count a message that cannot be decoded."""
-        self._counts[f'{role}_invalid'] += 1
+        self._counts['hand_lost' if isinstance(error, LostHandError) else f'{role}_invalid'] += 1
         self.last_refusal = f'{role}: {error}'
+
+    def describe_still_hand(self) -> str:
+        """Return in words for how long all poses have had the same position; empty if that is less than `STILL_S`."""
+        still_s = (self.sample.stamp_ns - self.still_since_ns) / NANOSECONDS if self.sample is not None else 0.0
+        return f'the hand does not move: the same position for {still_s:.1f} s' if still_s >= STILL_S else ''
 
     def is_skipped(self, stamp_ns: int) -> bool:
         """Return whether a hand pose of a stamp [ns] will be skipped if it is the next one."""
         hand, interval_s = self.pipeline.hand_state, self.pipeline.config.estimator.min_interval_s
         return hand is not None and 0 < stamp_ns - hand.stamp_ns < int(interval_s * NANOSECONDS)
+
+    def count_dropped(self, role: str, reason: str, count: int) -> None:
+        """Count parts of messages of an input, or of transforms, that were left out."""
+        if count:
+            self._counts[f'{role}{DROPPED}{reason}'] += count
 
     def count_skipped(self) -> SampleStatus:
         """Count a hand pose that is skipped."""
@@ -101,7 +118,11 @@ class Intake:
     def _take_hand(self, message: Any) -> SampleStatus:
         if self.is_skipped(decode_stamp(message.header)):
             return self.count_skipped()
-        self.sample = decode_hand_sample(message, self.pipeline.config.plane)
+        sample, before = decode_hand_sample(message, self.pipeline.config.plane), self.sample
+        is_same = before is not None and (*before.position, before.height) == (*sample.position, sample.height)
+        if not is_same or sample.stamp_ns < self.still_since_ns:
+            self.still_since_ns = sample.stamp_ns
+        self.sample = sample
         status = self.pipeline.add_hand_sample(self.sample)
         start_ns, end_ns = self._markers_unchanged
         if status.is_taken and not start_ns <= self.sample.stamp_ns < end_ns:
@@ -164,5 +185,6 @@ class Intake:
 
     def _count_dropped(self, role: str, dropped: Mapping[str, int], status: SampleStatus) -> SampleStatus:
         if status.is_taken:
-            self._counts.update({f'{role}_dropped_{reason}': count for reason, count in dropped.items()})
+            for reason, count in dropped.items():
+                self.count_dropped(role, reason, count)
         return status

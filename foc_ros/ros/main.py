@@ -11,7 +11,7 @@ from functools import partial
 from types import FrameType
 from typing import Any
 
-from foc_ros.core.errors import FocError, ParameterError, list_messages
+from foc_ros.core.errors import FocError, ParameterError, list_messages, print_warnings
 
 from .parameters import check_parameters
 
@@ -70,7 +70,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     stop = StopSignals()
     given = ['foc_node', *(sys.argv[1:] if arguments is None else arguments)]
     try:
-        check_parameters(given)
+        with print_warnings('foc_node'):
+            check_parameters(given)
     except ParameterError as error:
         return _reject(error)
     import rclpy

@@ -17,7 +17,7 @@ from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.topics import HAND
 
-from .messages.decode_poses import decode_stamp
+from .messages.decode_poses import check_hand_pose, decode_stamp
 from .messages.transform_messages import Transform, transform_message
 
 MOST_HELD = 1000
@@ -101,6 +101,8 @@ class Transforms:
         is_unneeded = role == HAND and self._is_skipped(decode_stamp(message.header))
         if self._source is None or frame_id is None or is_unneeded:
             return message, False
+        if role == HAND:
+            check_hand_pose(message.pose)  # a transform would move the position 0
         try:
             return transform_message(role, message, frame_id, config.plane, partial(self._find, frame_id)), False
         except TransformUnavailableError:

@@ -16,7 +16,7 @@ from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay, Step
 from foc_ros.core.config import Config
 from foc_ros.core.dynamics.predictive_covariance import compute_duration_sensitivity
-from foc_ros.core.errors import FocError, RecordingError
+from foc_ros.core.errors import FocError, RecordingError, warn
 from foc_ros.core.estimation.duration import get_time_price, is_passing
 from foc_ros.core.homotopy.branch_times import BranchTimes, compute_branch_times
 from foc_ros.core.homotopy.decisions import Decisions, find_decisions
@@ -127,9 +127,12 @@ def observe(recording: Recording, config: Config, replayed: Replay | None = None
         if step.prediction is not None and step.prediction.candidates_with_likelihood:
             assert replayed.pipeline.hand_state is not None
             made.append((step, replayed.pipeline.hand_state, replayed.pipeline.adapted_config))
+    losses = replayed.describe_losses()
     if not made:
-        reason = replayed.describe_refusals() or replayed.pipeline.not_ready_reason() or 'no candidate could be solved'
+        reason = losses or replayed.pipeline.not_ready_reason() or 'no candidate could be solved'
         raise RecordingError(f'{recording.name}: nothing could be predicted: {reason}')
+    if losses:
+        warn(losses)
     goals = made[-1][0].scene.goals
     assert goals is not None
     path = RecordedPath(np.array(stamps), np.array(positions), goals)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from foc_ros.core.errors import MessageError
+from foc_ros.core.errors import LostHandError, MessageError
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, as_readonly
 
 from .plane import project
@@ -16,18 +16,39 @@ MAX_COORDINATE = 1e4
 """Largest coordinate of a hand, a goal or an obstacle [m]; a larger one has a wrong unit."""
 
 MAX_GOALS = 256
+NORM_ERROR = 0.1
+"""Difference from 1 of the norm of a rotation that is one, rounded or not normalised."""
 
 
 def decode_hand_sample(message: Any, plane: str) -> HandSample:
     """Decode a geometry_msgs/PoseStamped as a hand sample; the orientation is not used.
 
-    Raises MessageError for a coordinate that is not finite or beyond MAX_COORDINATE, and for a stamp of 0, which means "not set".
+    Raises LostHandError for a pose without data, and MessageError for a coordinate beyond MAX_COORDINATE and for a stamp of 0,
+    which means "not set".
     """
+    check_hand_pose(message.pose)
     stamp_ns = decode_stamp(message.header)
     if stamp_ns == 0:
         raise MessageError('header.stamp', 'a time after 0', '0 s')
     position, height = project(_decode_point(message.pose.position, 'pose.position'), plane)
     return HandSample(stamp_ns, as_readonly(position), float(height), str(message.header.frame_id))
+
+
+def check_hand_pose(pose: Any) -> None:
+    """Raise LostHandError for a geometry_msgs/Pose by which a tracker says that it does not see the hand.
+
+    It has no finite position, or the position 0 with an orientation that is none. A tracker that measures no orientation may leave
+    it empty, but then its hand is hardly ever at 0 exactly.
+    """
+    place, turn = (pose.position.x, pose.position.y, pose.position.z), pose.orientation
+    for axis, value in zip('xyz', place, strict=True):
+        if not math.isfinite(value):
+            raise LostHandError(f'pose.position.{axis}', 'a finite number [m]', value)
+    norm = math.hypot(turn.x, turn.y, turn.z, turn.w)
+    if not any(place) and not abs(norm - 1.0) < NORM_ERROR:
+        raise LostHandError(
+            'pose', 'a position, or an orientation of norm 1', f'0 and norm {norm:g}: the tracker has lost the hand'
+        )
 
 
 class DecodedGoals(NamedTuple):
