@@ -94,9 +94,7 @@ class Replay:
         self._begin_recording()
 
     def describe_losses(self) -> str:
-        """Return how many messages of each input were refused, with the last reason of each kind, and how many parts of messages
-        were left out; empty if none was.
-        """
+        """Return how many messages were refused, with the last reason of each kind, and how many of their parts were left out."""
         refused = [
             f'{count} of {self._received[key[0]]} messages of {key[0]} refused, the last: {self._reasons[key]}'
             for key, count in self._refused.items()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import shutil
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from heapq import merge
@@ -32,7 +32,7 @@ from .checksums import add_checksums
 from .mcap_files import McapFile
 from .sqlite_files import SqliteFile
 
-FILE_TYPES = {'.mcap': McapFile, '.db3': SqliteFile}
+FILE_TYPES: dict[str, Callable[[Path], StoredFile]] = {'.mcap': McapFile, '.db3': SqliteFile}
 COMPRESSED = ('.zstd', '.zst')
 """What follows these suffixes where the file as a whole is compressed."""
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
@@ -143,7 +143,7 @@ class BagReader:
             with zstandard.open(path, 'rb') as packed, (folder / path.stem).open('wb') as unpacked:
                 shutil.copyfileobj(packed, unpacked)
             path = folder / path.stem
-        file: StoredFile = FILE_TYPES[path.suffix](path)
+        file = FILE_TYPES[path.suffix](path)
         self._stack.callback(file.close)
         return file
 

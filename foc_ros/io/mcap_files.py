@@ -49,7 +49,9 @@ class McapFile:
         if self._is_indexed:
             self._stream.seek(0)
             reader = make_reader(self._stream, validate_crcs=True)
-            found = (message for _, _, message in reader.iter_messages(topics={each.topic for each in channels}))
+            found: Iterator[Message] = (
+                message for _, _, message in reader.iter_messages(topics={each.topic for each in channels})
+            )
         else:
             messages = [each for each in self._records() if isinstance(each, Message) and each.channel_id in by_key]
             found = iter(sorted(messages, key=lambda each: each.log_time))

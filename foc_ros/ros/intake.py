@@ -22,7 +22,7 @@ from .transforms import Arrival
 DROPPED = '_dropped_'
 """Between input and reason in the name of a count of parts of messages that were left out."""
 STILL_S = 1.0
-"""Time with the same position after which this is told [s]: a tracker that repeats its last pose, or a hand that rests in a simulation."""
+"""Time with the same position after which this is told [s]: a tracker repeats its last pose, or a simulated hand rests."""
 
 
 class Intake:

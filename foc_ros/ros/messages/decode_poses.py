@@ -37,8 +37,8 @@ def decode_hand_sample(message: Any, plane: str) -> HandSample:
 def check_hand_pose(pose: Any) -> None:
     """Raise LostHandError for a geometry_msgs/Pose by which a tracker says that it does not see the hand.
 
-    It has no finite position, or the position 0 with an orientation that is none. A tracker that measures no orientation may leave
-    it empty, but then its hand is hardly ever at 0 exactly.
+    It has no finite position, or the position 0 with an orientation that is none. A tracker that measures no orientation may
+    leave it empty, but then its hand is hardly ever at 0 exactly.
     """
     place, turn = (pose.position.x, pose.position.y, pose.position.z), pose.orientation
     for axis, value in zip('xyz', place, strict=True):
