@@ -19,6 +19,7 @@ from .csv_recordings import (
     read_movement_rows,
     read_scenes,
     recorded_messages,
+    warn_of_units,
 )
 
 RECORDINGS, OBSTACLES, GOALS, LABELS = 'recordings.csv', 'obstacles.csv', 'goals.csv', 'labels.csv'
@@ -101,6 +102,7 @@ def read_tables(data: Path) -> dict[str, TableRecording]:
     failures = [each for each in movements.values() if isinstance(each, RecordingError)]
     if scenes is None or len(failures) == len(movements):
         raise join_errors([*errors, *failures])
+    warn_of_units(data / RECORDINGS, [each for each in movements.values() if isinstance(each, Movement)])
     return {name: TableRecording(name, movement, scenes.find(name)) for name, movement in movements.items()}
 
 
