@@ -90,6 +90,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         forerunner = _join_graph(context)
     except (FocError, RuntimeError, ValueError) as error:
         context.try_shutdown()
+        if 'initialize logging' in str(error):
+            error.add_note('ROS_LOG_DIR names another directory for the log')
         return _reject(error)
     stop.resume(forerunner.destroy_node)
     from foc_ros.core.kernels.compilation import follow_compilation
