@@ -55,7 +55,7 @@ class SqliteFile:
             for each in (path, *logs):
                 shutil.copyfile(each, folder / each.name)
             path = folder / path.name
-        mode = 'rwc' if logs else 'ro&immutable=1'
+        mode = 'rw' if logs else 'ro&immutable=1'
         # in a URI, a file name may not contain %, # and ? as they are
         self._database = sqlite3.connect(f'file:{quote(str(path.resolve()))}?mode={mode}', uri=True)
         self._stack.callback(self._database.close)
@@ -64,13 +64,14 @@ class SqliteFile:
             raise RecordingError(f'damaged: {" ".join(state.split())}')
         with path.open('rb') as stream:
             is_logged = stream.read(_WAL_FLAG + 1)[_WAL_FLAG:] == b'\2'
-        self.doubt = (
-            'written with a -wal file, which is not here; the last messages may be missing' if is_logged and not logs else ''
-        )
         self.channels = list(self._list_channels())
-        query = 'SELECT count(*), min(timestamp), max(timestamp) FROM messages NOT INDEXED'
-        self.message_count, *times_ns = self._database.execute(query).fetchone()
+        query = 'SELECT count(*), max(rowid) - min(rowid) + 1, min(timestamp), max(timestamp) FROM messages NOT INDEXED'
+        self.message_count, written, *times_ns = self._database.execute(query).fetchone()
         self.times_ns = times_ns[0] or 0, times_ns[1] or 0
+        gaps = (written or 0) - self.message_count
+        self.doubt = f'{gaps} messages between its first and its last are missing' if gaps else ''
+        if is_logged and not logs:
+            self.doubt = 'written with a -wal file, which is not here; the last messages may be missing'
         if lost := self.message_count - sum(each.count for each in self.channels):
             raise RecordingError(f'damaged: {lost} of its {self.message_count} messages belong to no topic')
 
