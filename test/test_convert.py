@@ -312,6 +312,13 @@ def test_other_separators_and_decimal_commas_are_read(tmp_path: Path, separator:
     assert movement.stamps_ns == usual.stamps_ns and np.array_equal(movement.positions, usual.positions)
 
 
+def test_empty_columns_of_a_spreadsheet_are_not_read(tmp_path: Path) -> None:
+    folder = write_folder(tmp_path / 'tables')
+    for file in folder.iterdir():
+        file.write_text(file.read_text().replace('\n', ',,\n'))
+    assert len(read_tables(folder)['a'].read_movement().stamps_ns) == 50
+
+
 def test_decimal_commas_between_commas_are_named(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r'expected \d cells, got \d \(are there decimal commas\?'):
         read_tables(write_folder(tmp_path / 'other', ',', True).rename(tmp_path / 'renamed'))

@@ -151,6 +151,22 @@ def test_poses_without_data_are_counted(tmp_path: Path, capsys: pytest.CaptureFi
     assert '3 of 9 messages of hand_pose refused, the last: hand_pose: pose: expected a position' in captured.err
 
 
+def test_a_slash_before_a_frame_is_no_part_of_its_name(tmp_path: Path) -> None:
+    """As ROS 1 named frames; in any input, in a transform and in the parameter."""
+    turned = TYPES.make('geometry_msgs/msg/Transform', rotation=TYPES.make('geometry_msgs/msg/Quaternion', w=1.0))
+    link = TYPES.make(
+        'geometry_msgs/msg/TransformStamped', header=make_header(TYPES, 0, '/world'), child_frame_id='/tool', transform=turned
+    )
+    given = [('/tf_static', ns(-0.1), TYPES.make('tf2_msgs/msg/TFMessage', transforms=[link]))]
+    for topic, stamp_ns, message in messages(seconds=FEW):
+        if topic == '/hand_pose':
+            header = make_header(TYPES, stamp_ns, '/tool')
+            message = TYPES.make('geometry_msgs/msg/PoseStamped', header=header, pose=message.pose)
+        given.append((topic, stamp_ns, message))
+    bag, config = write_bag(tmp_path / 'slashes', given), replace_values(CONFIG, {'frame_id': '/world'})
+    assert len(list(replay(bag, config))) == len(reach(FEW))
+
+
 def test_a_hand_that_does_not_move_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     last = [(ns(0.2 + i / 10), encode_hand_pose(TYPES, ns(0.2 + i / 10), FRAME, (0.1, 0.0, 0.0))) for i in range(15)]
     assert run(write_bag(tmp_path / 'frozen', [*messages(seconds=FEW), *(('/hand_pose', *each) for each in last)])) == 0

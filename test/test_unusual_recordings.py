@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 import struct
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,9 +15,9 @@ import zstandard
 from bag_helpers import STORE, messages, write_bag, write_mcap
 from mcap.writer import CompressionType, IndexType
 
-from foc_ros.analysis.recordings import BagRecording
+from foc_ros.analysis.recordings import BagRecording, find_recordings
 from foc_ros.cli.main import main
-from foc_ros.core.errors import FocWarning, RecordingError
+from foc_ros.core.errors import FocWarning, MessageError, RecordingError
 from foc_ros.io.bags import BagReader
 
 Content = list[tuple[str, int, bytes]]
@@ -238,7 +240,11 @@ def test_zeros_after_a_message_are_padding(tmp_path: Path, zeros: int) -> None:
         )
 
 
-@pytest.mark.parametrize('rename', [lambda name: name.replace('/msg/', '/'), lambda name: name.replace('/', '::')])
+def name_by_dds(name: str) -> str:
+    return '::'.join([*name.split('/')[:-1], 'dds_', name.split('/')[-1] + '_'])
+
+
+@pytest.mark.parametrize('rename', [lambda name: name.replace('/msg/', '/'), lambda name: name.replace('/', '::'), name_by_dds])
 def test_a_type_name_may_be_that_of_older_recorders(tmp_path: Path, rename: Callable[[str], str]) -> None:
     write_sqlite(tmp_path / 'one.db3', rename=rename).close()
     assert read(tmp_path / 'one.db3') == WHOLE
@@ -258,6 +264,48 @@ def test_an_encoding_that_is_not_read_is_named(tmp_path: Path, encoding: str, wo
     for name in ('one.db3', 'one.mcap'):
         with pytest.raises(RecordingError, match=rf'/hand_pose \(geometry_msgs/msg/PoseStamped {words}'):
             read(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ('change', 'is_told'),
+    [
+        (lambda text: text.replace('\n', '\r\n'), False),
+        (lambda text: text.partition('=====')[0], False),
+        (lambda text: '', False),
+        (lambda text: '?!', True),
+    ],
+)
+def test_definitions_may_be_those_of_another_system(tmp_path: Path, change: Callable[[str], str], is_told: bool) -> None:
+    """With the line ends of Windows, without those of other types, empty, or such that they cannot be parsed."""
+    database = write_sqlite(tmp_path / 'one.db3')
+    database.execute('CREATE TABLE message_definitions(topic_type TEXT, encoding TEXT, encoded_message_definition TEXT)')
+    for kind in SHORT_KINDS.values():
+        text = change(STORE.generate_msgdef(kind, ros_version=2)[0])
+        database.execute('INSERT INTO message_definitions VALUES(?, ?, ?)', (kind, 'ros2msg', text))
+    database.commit()
+    database.close()
+    with warnings.catch_warnings(record=True) as issued:
+        warnings.simplefilter('always')
+        with BagReader(tmp_path / 'one.db3') as reader:
+            assert not any(isinstance(item.message, MessageError) for item in reader)
+    assert bool(issued) == is_told and all('cannot be read, and that of ROS is used' in str(each.message) for each in issued)
+
+
+def test_metadata_beside_folders_of_bags_hide_nothing(tmp_path: Path) -> None:
+    write_bag(tmp_path / 'one', SHORT)
+    write_metadata(tmp_path, ['one.mcap'], len(WHOLE))
+    assert list(find_recordings(tmp_path)) == ['one']
+
+
+def test_a_file_name_need_not_be_text(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As a name in Latin-1 that was written by another system."""
+    file = tmp_path / os.fsdecode(b'caf\xe9.db3')
+    write_sqlite(file).close()
+    assert (
+        main(['replay', str(file), '--report', str(tmp_path / 'report'), '--output', str(tmp_path / os.fsdecode(b'\xe9'))]) == 0
+    )
+    assert capsys.readouterr().err == ''
+    assert 'caf?.db3' in (tmp_path / 'report' / 'index.html').read_text('utf-8')
 
 
 def test_a_bag_of_ros_1_is_named(tmp_path: Path) -> None:

@@ -70,7 +70,7 @@ def find_recordings(data: Path) -> dict[str, Recording]:
     """
     if (data / RECORDINGS).exists():
         return dict(read_tables(data))
-    if data.is_file() or (data / 'metadata.yaml').exists():
+    if data.is_file() or ((data / 'metadata.yaml').exists() and any(map(is_bag_file, data.iterdir()))):
         check_bag(data)
         bags = [data.resolve()]
     elif data.is_dir():

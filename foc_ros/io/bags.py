@@ -206,16 +206,16 @@ class BagWriter:
         self._write(item.topic, item.log_ns, item.raw, connection)
 
     def _write(self, topic: str, log_ns: int, raw: bytes | memoryview, connection: Mapping[str, Any]) -> None:
-        if topic not in self._connections:
-            self._connections[topic] = self._writer.add_connection(topic, **connection)
         with self._named_errors():
+            if topic not in self._connections:
+                self._connections[topic] = self._writer.add_connection(topic, **connection)
             self._writer.write(self._connections[topic], log_ns, raw)
 
     @contextmanager
     def _named_errors(self) -> Iterator[None]:
         try:
             yield
-        except (OSError, WriterError) as error:
+        except (OSError, WriterError, ValueError, KeyError) as error:  # such as a type without a definition
             raise RecordingError(f'{self.path}: cannot be written: {error}') from error
 
 

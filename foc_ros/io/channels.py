@@ -17,7 +17,7 @@ from rosbags.rosbag2.metadata import parse_qos
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from foc_ros.core.errors import MessageError
+from foc_ros.core.errors import MessageError, warn
 
 TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 """Message definitions for written bags, and for what a recording does not define itself."""
@@ -50,8 +50,9 @@ class Channel:
 
     @cached_property
     def msgtype(self) -> str:
-        """The message type as ROS 2 names it; for a channel that is not read, this in words."""
-        name = re.sub(r'^([^/]+)/([^/]+)$', r'\1/msg/\2', self.kind.replace('::', '/'))
+        """The message type as ROS 2 names it, also where that of DDS is stored; for a channel that is not read, this in words."""
+        name = self.kind.replace('::', '/')
+        name = re.sub(r'^(\w+)/(?:msg/)?(?:dds_/)?(\w+?)_*$', r'\1/msg/\2', name)
         if self.is_read:
             return name
         if self.encoding == 'ros1':
@@ -61,12 +62,15 @@ class Channel:
     @cached_property
     def typestore(self) -> Typestore:
         """The definitions of the recording, and :data:`TYPESTORE` for what they do not contain."""
-        store = get_typestore(Stores.EMPTY)
-        if self.form == 'ros2idl':
-            for part in re.split(r'^=+\nIDL: .*\n', self.definition, flags=re.MULTILINE):
-                store.register(get_types_from_idl(part) if part else {})
-        elif self.form == 'ros2msg' and self.definition.strip():
-            store.register(get_types_from_msg(self.definition, self.msgtype))
+        store, text = get_typestore(Stores.EMPTY), '\n'.join(self.definition.splitlines())
+        try:
+            if self.form == 'ros2idl':
+                for part in re.split(r'^=+\nIDL: .*\n', text, flags=re.MULTILINE):
+                    store.register(get_types_from_idl(part) if part else {})
+            elif self.form == 'ros2msg' and text.strip():
+                store.register(get_types_from_msg(text, self.msgtype))
+        except Exception:  # any text may stand there
+            warn(f'topic {self.topic}: its definition of {self.msgtype} cannot be read, and that of ROS is used')
         store.fielddefs = {**TYPESTORE.fielddefs, **store.fielddefs}
         store.types = {**TYPESTORE.types, **store.types}
         return store

@@ -151,7 +151,8 @@ def _check_header(
     missing = [name for name in needed if not any(set(kind) <= set(header) for kind in ((name,), instead.get(name, (name,))))]
     if missing:
         raise RecordingError(f'{file}: row 1: no column {", ".join(missing)}; it has {", ".join(header)}')
-    if len(set(header)) < len(header):
+    named = [name for name in header if name]  # a spreadsheet adds empty columns
+    if len(set(named)) < len(named):
         raise RecordingError(f'{file}: row 1: a column is named twice: {", ".join(header)}')
     absent = [name for name in optional if name not in header]
     misspelt = [

@@ -57,7 +57,7 @@ class SqliteFile:
             path = folder / path.name
         mode = 'rw' if logs else 'ro&immutable=1'
         # in a URI, a file name may not contain %, # and ? as they are
-        self._database = sqlite3.connect(f'file:{quote(str(path.resolve()))}?mode={mode}', uri=True)
+        self._database = sqlite3.connect(f'file:{quote(bytes(path.resolve()))}?mode={mode}', uri=True)
         self._stack.callback(self._database.close)
         (state,) = self._database.execute('PRAGMA quick_check(1)').fetchone()
         if state != 'ok':

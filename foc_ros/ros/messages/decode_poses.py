@@ -31,7 +31,7 @@ def decode_hand_sample(message: Any, plane: str) -> HandSample:
     if stamp_ns == 0:
         raise MessageError('header.stamp', 'a time after 0', '0 s')
     position, height = project(_decode_point(message.pose.position, 'pose.position'), plane)
-    return HandSample(stamp_ns, as_readonly(position), float(height), str(message.header.frame_id))
+    return HandSample(stamp_ns, as_readonly(position), float(height), decode_frame(message.header))
 
 
 def check_hand_pose(pose: Any) -> None:
@@ -65,13 +65,13 @@ def decode_goals(message: Any, plane: str) -> DecodedGoals:
         raise MessageError('poses', f'at most {MAX_GOALS} goals', len(message.poses))
     points = [_decode_point(pose.position, f'poses[{i}].position') for i, pose in enumerate(message.poses)]
     goals, heights = project(np.array(points, dtype=float).reshape(-1, 3), plane)
-    return DecodedGoals(goals, str(message.header.frame_id), heights)
+    return DecodedGoals(goals, decode_frame(message.header), heights)
 
 
 def decode_goal(message: Any, plane: str) -> DecodedGoals:
     """Decode a geometry_msgs/PoseStamped as one goal; the stamp is not used."""
     goals, heights = project([_decode_point(message.pose.position, 'pose.position')], plane)
-    return DecodedGoals(goals, str(message.header.frame_id), heights)
+    return DecodedGoals(goals, decode_frame(message.header), heights)
 
 
 def decode_stamp(header: Any, field: str = 'header.stamp') -> int:
@@ -82,6 +82,11 @@ def decode_stamp(header: Any, field: str = 'header.stamp') -> int:
     if not 0 <= nanoseconds < NANOSECONDS:
         raise MessageError(f'{field}.nanosec', f'below {NANOSECONDS}', nanoseconds)
     return seconds * NANOSECONDS + nanoseconds
+
+
+def decode_frame(header: Any) -> str:
+    """Decode the frame of a std_msgs/Header; a slash before it, as in ROS 1, does not make it another frame."""
+    return str(header.frame_id).lstrip('/')
 
 
 def _decode_point(point: Any, field: str) -> tuple[float, float, float]:
