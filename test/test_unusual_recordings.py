@@ -312,3 +312,15 @@ def test_a_bag_of_ros_1_is_named(tmp_path: Path) -> None:
     (tmp_path / 'old.bag').write_bytes(b'#ROSBAG V2.0\n')
     with pytest.raises(RecordingError, match='a bag of ROS 1: convert it to ROS 2'):
         read(tmp_path / 'old.bag')
+
+
+def test_a_value_that_is_no_message_is_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    database = write_sqlite(tmp_path / 'one.db3')
+    (key,) = database.execute("SELECT id FROM topics WHERE name = '/hand_pose'").fetchone()
+    for value in (None, 10**12, 'text', 0.5):
+        database.execute('INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)', (key, WHOLE[-1][1], value))
+    database.commit()
+    database.close()
+    (tmp_path / 'link.db3').symlink_to(tmp_path / 'one.db3')
+    assert main(['replay', str(tmp_path / 'link.db3')]) == 0
+    assert 'hand_pose_invalid 4' in capsys.readouterr().out

@@ -79,8 +79,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if sys.stdout is None:  # the process was started with its standard output closed
         sys.stdout = Path(os.devnull).open('w', encoding='utf-8')  # noqa: SIM115  it stays open until the process ends
     if arguments is None and sys.getfilesystemencoding() != 'utf-8':  # it could not even name the files that it is given
-        os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], {**os.environ, 'PYTHONUTF8': '1'})  # noqa: S606
-    os.environ['MPLBACKEND'] = 'agg'  # pictures are files; the backend of a notebook or of a desktop may not exist here
+        os.execv(sys.executable, [sys.executable, '-X', 'utf8', *sys.orig_argv[1:]])  # noqa: S606
+    if arguments is None:  # pictures are files; the backend of a notebook or of a desktop may not exist here
+        os.environ['MPLBACKEND'] = 'agg'
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         with handle_interrupts(), print_warnings(' '.join(['foc_ros', *given[:1]])):

@@ -45,9 +45,10 @@ class SqliteFile:
         keys = ', '.join(map(str, by_key))
         query = f'SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({keys}) ORDER BY timestamp, rowid'  # noqa: S608
         for key, log_ns, raw in self._database.execute(query):
-            yield by_key[key], log_ns, bytes(raw)
+            yield by_key[key], log_ns, raw if isinstance(raw, bytes) else b''
 
     def _open(self, path: Path) -> None:
+        path = path.resolve()  # the logs are beside the file itself, not beside a link to it
         logs = [log for log in (path.with_name(path.name + end) for end in LOGS) if log.exists() and log.stat().st_size]
         self.loss = f'the recorder was killed: what it had not written to {logs[0].name} is missing' if logs else ''
         if logs:
@@ -57,7 +58,7 @@ class SqliteFile:
             path = folder / path.name
         mode = 'rw' if logs else 'ro&immutable=1'
         # in a URI, a file name may not contain %, # and ? as they are
-        self._database = sqlite3.connect(f'file:{quote(bytes(path.resolve()))}?mode={mode}', uri=True)
+        self._database = sqlite3.connect(f'file:{quote(bytes(path))}?mode={mode}', uri=True)
         self._stack.callback(self._database.close)
         (state,) = self._database.execute('PRAGMA quick_check(1)').fetchone()
         if state != 'ok':
@@ -85,4 +86,4 @@ class SqliteFile:
         counts = dict(self._database.execute('SELECT topic_id, count(*) FROM messages NOT INDEXED GROUP BY topic_id'))
         query = f'SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id'  # noqa: S608
         for key, topic, kind, encoding, offered in self._database.execute(query):
-            yield Channel(key, topic, kind, encoding, *definitions.get(kind, ('', '')), offered, counts.get(key, 0))
+            yield Channel(key, topic, kind or '', encoding, *definitions.get(kind, ('', '')), offered, counts.get(key, 0))
