@@ -63,14 +63,10 @@ class McapFile:
         is_cut = not _has_footer(self._stream)
         self.doubt = ''
         self.loss = 'the recorder was killed; read up to the last whole chunk' if is_cut else ''
-        summary = None if is_cut else make_reader(self._stream).get_summary()
-        self._is_indexed = summary is not None and _is_complete(summary)
-        if summary is None or not self._is_indexed:
-            stated = summary.statistics if summary is not None else None
+        summary = None if is_cut else self._read_summary()
+        self._is_indexed = summary is not None
+        if summary is None:
             summary = self._scan()
-            if stated is not None and stated.message_count != summary.statistics.message_count:
-                count = summary.statistics.message_count
-                raise RecordingError(f'damaged or cut short: {count} of its {stated.message_count} messages can be read')
         statistics, schemas = summary.statistics, summary.schemas
         self.message_count = statistics.message_count
         self.times_ns = statistics.message_start_time, statistics.message_end_time
@@ -78,6 +74,14 @@ class McapFile:
             _describe(channel, schemas.get(channel.schema_id), statistics.channel_message_counts.get(channel.id, 0))
             for channel in summary.channels.values()
         ]
+
+    def _read_summary(self) -> Summary | None:
+        """Return the summary at the end of the file, None where it does not describe everything."""
+        try:
+            summary = make_reader(self._stream).get_summary()
+            return summary if summary is not None and _is_complete(summary) else None
+        except Exception:  # the offset in the footer may lead anywhere
+            return None
 
     def _records(self) -> Iterator[object]:
         """Yield the records of the file, those of its chunks too; without a footer, up to the last whole one."""
@@ -89,7 +93,7 @@ class McapFile:
                 raise
 
     def _scan(self) -> Summary:
-        """Return the summary of the records themselves."""
+        """Return the summary of the records themselves, which must be as many as the statistics state if there are any."""
         summary, counts, start_ns, end_ns = Summary(), Counter[int](), 1 << 64, 0
         for record in self._records():
             if isinstance(record, Schema):
@@ -99,6 +103,8 @@ class McapFile:
             elif isinstance(record, Message):
                 counts[record.channel_id] += 1
                 start_ns, end_ns = min(start_ns, record.log_time), max(end_ns, record.log_time)
+            elif isinstance(record, Statistics) and record.message_count != counts.total():
+                raise RecordingError(f'damaged or cut short: {counts.total()} of its {record.message_count} messages can be read')
         if lost := sum(count for key, count in counts.items() if key not in summary.channels):
             raise RecordingError(f'damaged: {lost} of its {counts.total()} messages belong to no channel')
         sizes = len(summary.schemas), len(summary.channels)
