@@ -110,22 +110,25 @@ class Replay:
             except (AttributeError, TypeError, ValueError) as error:  # the recording defines the message in another way than ROS
                 self.intake.refuse(role, MessageError('message', f'the fields of {TYPES[role]}', error))
                 status = None
-            self._received[role] += 1
-            if status is None or status.is_refused:
-                key = role, 'invalid' if status is None else status.value
-                self._refused[key] += 1
-                self._reasons[key] = self.intake.last_refusal or ''
+            self._note(role, status)
             yield self._held[role].popleft(), status
 
     def _take_transforms(self, item: Item) -> None:
-        self._received[item.role] += 1
         if isinstance(item.message, MessageError):
             self.intake.refuse(item.role, item.message)
-            self._refused[item.role, 'invalid'] += 1
-            self._reasons[item.role, 'invalid'] = self.intake.last_refusal or ''
-        else:
-            left_out = self._tree.add(item.message, is_static=item.role == STATIC_TRANSFORMS)
-            self.intake.count_dropped(item.role, 'not_usable', left_out)
+            self._note(item.role, None)
+            return
+        left_out = self._tree.add(item.message, is_static=item.role == STATIC_TRANSFORMS)
+        self.intake.count_dropped(item.role, 'not_usable', left_out)
+        self._note(item.role, SampleStatus.ACCEPTED)
+
+    def _note(self, role: str, status: SampleStatus | None) -> None:
+        """Count a message, and why it was refused if it was."""
+        self._received[role] += 1
+        if status is None or status.is_refused:
+            key = role, 'invalid' if status is None else status.value
+            self._refused[key] += 1
+            self._reasons[key] = self.intake.last_refusal or ''
 
 
 def replay(bag: Path | str, config: Config, chosen: Mapping[str, str] | None = None) -> Iterator[Prediction]:

@@ -72,17 +72,13 @@ def warn(text: str) -> None:
 
 @contextmanager
 def print_warnings(program: str) -> Iterator[None]:
-    """Print each FocWarning as one line on standard error, after the name of the program."""
+    """Print each warning as one line on standard error, after the name of the program, without its place in the code."""
+
+    def show(message: Warning | str, *_: object, **__: object) -> None:
+        print(f'{program}: {" ".join(str(message).split())}', file=sys.stderr)
+
     with warnings.catch_warnings():
         warnings.simplefilter('always', FocWarning)
-        usual = warnings.showwarning
-
-        def show(message: Warning | str, category: type[Warning], *place: Any, **options: Any) -> None:
-            if issubclass(category, FocWarning):
-                print(f'{program}: {" ".join(str(message).split())}', file=sys.stderr)
-            else:
-                usual(message, category, *place, **options)
-
         warnings.showwarning = show
         yield
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import shutil
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from heapq import merge
@@ -19,7 +19,7 @@ from types import TracebackType
 from typing import Any
 
 import yaml
-import zstandard
+import zstandard  # a requirement of mcap
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 
@@ -27,12 +27,11 @@ from foc_ros.core.errors import RecordingError, warn
 
 from . import topics
 from .channels import TYPESTORE as TYPESTORE
-from .channels import StoredFile
 from .checksums import add_checksums
 from .mcap_files import McapFile
 from .sqlite_files import SqliteFile
 
-FILE_TYPES: dict[str, Callable[[Path], StoredFile]] = {'.mcap': McapFile, '.db3': SqliteFile}
+FILE_TYPES: dict[str, type[McapFile | SqliteFile]] = {'.mcap': McapFile, '.db3': SqliteFile}
 COMPRESSED = ('.zstd', '.zst')
 """What follows these suffixes where the file as a whole is compressed."""
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
@@ -137,7 +136,7 @@ class BagReader:
         self.roles = self._assign_topics()
         self._transforms = topics.find_transforms({each.topic: each.msgtype for each in self._channels})
 
-    def _open_file(self, path: Path) -> StoredFile:
+    def _open_file(self, path: Path) -> McapFile | SqliteFile:
         if path.suffix in COMPRESSED:
             folder = Path(self._stack.enter_context(TemporaryDirectory()))
             with zstandard.open(path, 'rb') as packed, (folder / path.stem).open('wb') as unpacked:

@@ -7,10 +7,9 @@ its type says so wherever a message lists the topics.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 from rosbags.interfaces import Qos
 from rosbags.rosbag2.metadata import parse_qos
@@ -91,23 +90,3 @@ class Channel:
             except Exception as error:  # wrong bytes make the decoder fail in many ways
                 reason = error
         return MessageError('message', f'a serialized {self.msgtype}', f'{len(raw)} other bytes ({reason})')
-
-
-class StoredFile(Protocol):
-    """One file of a recording, to be closed after use.
-
-    Attributes: channels; message_count, of all channels; times_ns, of the first and the last message; loss, why messages that the
-    recorder received are missing, empty if the file is whole; doubt, why they may be missing where nothing states their number.
-    """
-
-    channels: list[Channel]
-    message_count: int
-    times_ns: tuple[int, int]
-    loss: str
-    doubt: str
-
-    def messages(self, channels: list[Channel]) -> Iterator[tuple[Channel, int, bytes]]:
-        """Yield channel, log time [ns] and bytes of every message of some channels, in the order of their log times."""
-
-    def close(self) -> None:
-        """Close the file."""

@@ -28,7 +28,11 @@ MAGIC = b'\x89MCAP0\r\n'
 
 
 class McapFile:
-    """A file; see :class:`foc_ros.io.channels.StoredFile`."""
+    """A file, to be closed after use.
+
+    Attributes: channels; message_count, of all channels; times_ns, of the first and the last message; loss, why messages that the
+    recorder received are missing, empty if the file is whole; doubt, why they may be missing where nothing states their number.
+    """
 
     def __init__(self, path: Path) -> None:
         check_checksums(path)

@@ -25,7 +25,7 @@ _WAL_FLAG = 18
 
 
 class SqliteFile:
-    """A file; see :class:`foc_ros.io.channels.StoredFile`."""
+    """A file, to be closed after use, with the attributes of :class:`foc_ros.io.mcap_files.McapFile`."""
 
     def __init__(self, path: Path) -> None:
         self._stack = ExitStack()
