@@ -261,10 +261,8 @@ def _list_files(folder: Path) -> tuple[list[Path], int | None]:
         return list(found.values()), None
     try:
         stated = yaml.safe_load(metadata.read_text('utf-8'))['rosbag2_bagfile_information']
-        names, count = (
-            [_strip_compression(PurePath(each).name) for each in stated['relative_file_paths']],
-            stated['message_count'],
-        )
+        count = stated['message_count']
+        names = list(dict.fromkeys(_strip_compression(PurePath(each).name) for each in stated['relative_file_paths']))
         if not names or not isinstance(count, int):
             raise ValueError('it names no file, or no number of messages')
     except Exception as error:  # whatever stands in it
