@@ -30,14 +30,13 @@ class Intake:
 
     A hand pose less than `estimator.min_interval_s` after the last used one is skipped and counted, and nothing of it but its
     stamp is looked at. A marker whose lifetime ends before the stamp of the last hand sample does not exist for it. Attributes:
-    pipeline; sample: the last decoded hand sample; still_since_ns: stamp since which its position is the same; last_refusal: why
-    the last refused message was refused.
+    pipeline; sample: the last decoded hand sample; last_refusal: why the last refused message was refused.
     """
 
     def __init__(self, pipeline: Pipeline) -> None:
         self.pipeline = pipeline
         self.sample: HandSample | None = None
-        self.still_since_ns = 0
+        self._still: HandSample | None = None  # the first of those that were used with the same position as the last one
         self.last_refusal: str | None = None
         self._markers = MarkerTable()
         self._markers_ns = 0
@@ -89,7 +88,9 @@ class Intake:
 
     def describe_still_hand(self) -> str:
         """Return in words for how long all poses have had the same position; empty if that is less than `STILL_S`."""
-        still_s = (self.sample.stamp_ns - self.still_since_ns) / NANOSECONDS if self.sample is not None else 0.0
+        still_s = 0.0
+        if self.sample is not None and self._still is not None:
+            still_s = (self.sample.stamp_ns - self._still.stamp_ns) / NANOSECONDS
         return f'the hand does not move: the same position for {still_s:.1f} s' if still_s >= STILL_S else ''
 
     def is_skipped(self, stamp_ns: int) -> bool:
@@ -118,12 +119,12 @@ class Intake:
     def _take_hand(self, message: Any) -> SampleStatus:
         if self.is_skipped(decode_stamp(message.header)):
             return self.count_skipped()
-        sample, before = decode_hand_sample(message, self.pipeline.config.plane), self.sample
-        is_same = before is not None and (*before.position, before.height) == (*sample.position, sample.height)
-        if not is_same or sample.stamp_ns < self.still_since_ns:
-            self.still_since_ns = sample.stamp_ns
-        self.sample = sample
-        status = self.pipeline.add_hand_sample(self.sample)
+        self.sample = sample = decode_hand_sample(message, self.pipeline.config.plane)
+        status = self.pipeline.add_hand_sample(sample)
+        still = self._still
+        is_same = still is not None and (*still.position, still.height) == (*sample.position, sample.height)
+        if status.is_taken and (not is_same or status.is_restart):
+            self._still = sample
         start_ns, end_ns = self._markers_unchanged
         if status.is_taken and not start_ns <= self.sample.stamp_ns < end_ns:
             self._set_markers(self._markers)
