@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from foc_ros.core.dynamics.plant_models import PlantModel as PlantModel
     from foc_ros.core.dynamics.plants import Plant as Plant
     from foc_ros.core.errors import FocError as FocError
+    from foc_ros.core.errors import FocWarning as FocWarning
     from foc_ros.core.errors import InputError as InputError
     from foc_ros.core.errors import MessageError as MessageError
     from foc_ros.core.errors import ParameterError as ParameterError
@@ -44,7 +45,7 @@ _MODULES = {
     'core.config': 'Config',
     'core.dynamics.plant_models': 'PlantModel',
     'core.dynamics.plants': 'Plant',
-    'core.errors': 'FocError InputError MessageError ParameterError RecordingError SceneError',
+    'core.errors': 'FocError FocWarning InputError MessageError ParameterError RecordingError SceneError',
     'core.guidance.step': 'GuidanceOutput GuidanceStatus',
     'core.obstacles.shapes': 'Box Capsule Circle Hull',
     'core.ocp.monte_carlo': 'MonteCarlo',

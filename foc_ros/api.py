@@ -533,7 +533,8 @@ def replay(recording: str | Path, config: Config | None = None, topics: Mapping[
     Parameters
     ----------
     recording : path
-        A bag: MCAP or SQLite file, or its folder. `RecordingError` is raised if it cannot be read.
+        A bag: MCAP or SQLite file, or its folder. `RecordingError` is raised if it cannot be read, and `FocWarning` issued if a
+        part of it is missing.
     config : Config, optional
         Parameters; the defaults if not given.
     topics : mapping, optional

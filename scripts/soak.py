@@ -38,7 +38,7 @@ REPORT_S = 5.0
 FRAME = 'world'
 GOALS = np.array([[0.3, 0.0, 0.0], [0.3, 0.1, 0.0]])
 ROWS = [(0.15, 0.02, 0.0, 0.03, 0.002, 7), (0.2, 0.08, 0.0, 0.02, 0.002, 8)]
-BAD_POSES = {'nan': 'hand_pose_invalid', 'camera': 'hand_wrong_frame', 'again': 'hand_duplicate', 'late': 'hand_late'}
+BAD_POSES = {'nan': 'hand_lost', 'camera': 'hand_wrong_frame', 'again': 'hand_duplicate', 'late': 'hand_late'}
 """The node's count of each kind of bad pose; a late pose right after a reset starts a movement, and is not counted."""
 FAULTS = (*BAD_POSES, 'burst', 'truncated', 'negative', 'flip', 'parameter', 'wrong parameter', 'crowd', 'clutch', 'reset')
 BURST, BURST_NS = 20, 100_000

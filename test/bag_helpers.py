@@ -64,14 +64,17 @@ def write_mcap(
     items: Iterable[tuple[str, int, Any]],
     per_chunk: int = 1000,
     odd: Mapping[str, tuple[str, str, str, bytes]] = MappingProxyType({}),
+    kinds: Mapping[str, str] = MappingProxyType({}),
+    **options: Any,
 ) -> list[int]:
     """Write an MCAP file as a recorder does, with a number of messages in each chunk; return where the chunks end.
 
-    odd: by topic, encoding of messages, name, encoding and text of the schema, for a channel with one message.
+    odd: by topic, encoding of messages, name, encoding and text of the schema, for a channel with one message; kinds: other names
+    of message types; options: of the library's writer.
     """
     ends, channels = [], {}
     with path.open('wb') as stream:
-        writer = Writer(stream)
+        writer = Writer(stream, **options)
         writer.start('ros2')
         for topic, (encoding, name, form, text) in odd.items():
             channel = writer.register_channel(topic, encoding, writer.register_schema(name, form, text) if name else 0)
@@ -80,7 +83,9 @@ def write_mcap(
             kind = message.__msgtype__
             if topic not in channels:
                 text = STORE.generate_msgdef(kind, ros_version=2)[0].encode()
-                channels[topic] = writer.register_channel(topic, 'cdr', writer.register_schema(kind, 'ros2msg', text))
+                channels[topic] = writer.register_channel(
+                    topic, 'cdr', writer.register_schema(kinds.get(kind, kind), 'ros2msg', text)
+                )
             writer.add_message(channels[topic], stamp_ns, bytes(STORE.serialize_cdr(message, kind)), stamp_ns)
             if i % per_chunk == 0:
                 writer.flush()

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from foc_ros.analysis.recordings import read_tables
 from foc_ros.cli.main import main
 from foc_ros.core.errors import RecordingError
 from foc_ros.io.bags import BagReader
@@ -159,7 +160,7 @@ def test_an_existing_bag_stops_before_anything_is_written(tmp_path: Path, capsys
     ('which', 'text', 'message'),
     [
         ('recordings', 'recording,t_s,x_m\na,0,0\n', 'r.csv: row 1: no column y_m; it has recording, t_s, x_m'),
-        ('recordings', 'recording;t_s;x_m;y_m\na;0;0;0\n', 'r.csv: row 1: no column recording, t_s, x_m, y_m'),
+        ('recordings', 'recording:t_s:x_m:y_m\na:0:0:0\n', 'r.csv: row 1: no column recording, t_s, x_m, y_m'),
         ('recordings', 'recording,t_s,x_m,y_m,y_m\na,0,0,0,0\n', 'r.csv: row 1: a column is named twice'),
         ('recordings', '', 'r.csv: the file is empty: expected columns recording, t_s, x_m, y_m'),
         ('recordings', 'recording,t_s,x_m,y_m\n', 'r.csv: expected at least one row, got none'),
@@ -262,3 +263,62 @@ def test_a_misspelt_column_is_named(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert convert(tmp_path, obstacles=f'x_m,y_m,radius_m,{name},yaw_deg\n0,0,1,0,0\n') == 2
     error = capsys.readouterr().err
     assert error.endswith(f'o.csv: row 1: unknown column {name} (did you mean radius_stddev_m?)\n')
+
+
+def write_folder(folder: Path, separator: str = ',', comma: bool = False, seconds: float = 1.0, metres: float = 1.0) -> Path:
+    """A reach of 0.3 m in 1 s in other units, with another separator and with decimal commas."""
+    times = np.arange(0.0, 1.0, 0.02)
+    rows = [['recording', 't_s', 'x_m', 'y_m']]
+    rows += [['a, b' if comma else 'a', *(f'{x:.9f}' for x in (t * seconds, 0.3 * metres * t**2, 0.0))] for t in times]
+    tables = {'recordings': rows, 'goals': [['x_m', 'y_m'], ['0.3', '0.0']], 'obstacles': [['x_m', 'y_m', 'radius_m']]}
+    folder.mkdir()
+    for name, table_rows in tables.items():
+        lines = [separator.join(each.replace('.', ',') if comma else each for each in row) for row in table_rows]
+        (folder / f'{name}.csv').write_text('\n'.join(lines) + '\n')
+    return folder
+
+
+@pytest.mark.parametrize(
+    ('units', 'words'),
+    [
+        ({'seconds': 1e3}, 't_s of recording a seems to be in ms: the median time between two poses is 20 s'),
+        ({'seconds': 1 / 3600}, 't_s of recording a seems to be in h: the median time between two poses is 5.56e-06 s'),
+        ({'seconds': 1 / 86400}, 't_s of recording a seems to be in days: the median time between two poses is 2.31e-07 s'),
+        ({'metres': 1e3}, 'the position of recording a seems to be in mm: the hand moves at 576 m/s'),
+        ({'metres': 1e2}, 'the position of recording a seems to be in cm: the hand moves at 57.6 m/s'),
+        ({}, ''),
+    ],
+)
+def test_units_that_cannot_be_right_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], units: dict[str, float], words: str
+) -> None:
+    folder = write_folder(tmp_path / 'tables', **units)
+    assert main(['convert', str(folder), '--output', str(tmp_path / 'bags')]) == 0
+    table_words = f'foc_ros convert: {folder / "recordings.csv"}: {words}\n' if words else ''
+    assert capsys.readouterr().err == table_words
+    single = ['convert', str(folder / 'recordings.csv'), '--obstacles', str(folder / 'obstacles.csv')]
+    assert main([*single, '--output', str(tmp_path / 'others')]) == 0
+    assert capsys.readouterr().err == table_words
+
+
+@pytest.mark.parametrize(
+    ('separator', 'comma'), [(';', False), ('\t', False), ('|', False), (' ', False), (';', True), ('\t', True), (' ; ', True)]
+)
+def test_other_separators_and_decimal_commas_are_read(tmp_path: Path, separator: str, comma: bool) -> None:
+    usual = read_tables(write_folder(tmp_path / 'usual'))['a'].read_movement()
+    (found,) = read_tables(write_folder(tmp_path / 'other', separator, comma)).values()
+    movement = found.read_movement()
+    assert movement.name == ('a, b' if comma else 'a')
+    assert movement.stamps_ns == usual.stamps_ns and np.array_equal(movement.positions, usual.positions)
+
+
+def test_empty_columns_of_a_spreadsheet_are_not_read(tmp_path: Path) -> None:
+    folder = write_folder(tmp_path / 'tables')
+    for file in folder.iterdir():
+        file.write_text(file.read_text().replace('\n', ',,\n'))
+    assert len(read_tables(folder)['a'].read_movement().stamps_ns) == 50
+
+
+def test_decimal_commas_between_commas_are_named(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r'expected \d cells, got \d \(are there decimal commas\?'):
+        read_tables(write_folder(tmp_path / 'other', ',', True).rename(tmp_path / 'renamed'))

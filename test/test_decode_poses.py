@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from message_helpers import SECOND, both_kinds, message_types, pose_array, pose_stamped
 
-from foc_ros.core.errors import MessageError
+from foc_ros.core.errors import LostHandError, MessageError
 from foc_ros.ros.messages.decode_poses import MAX_GOALS, decode_goal, decode_goals, decode_hand_sample
 from foc_ros.ros.messages.types import MessageTypes
 
@@ -32,6 +32,19 @@ def test_the_orientation_is_not_used(types: MessageTypes) -> None:
     message = pose_stamped(types, (0.1, 0.2, 0.3))
     message.pose.orientation = types.make('geometry_msgs/msg/Quaternion', x=float('nan'), y=7.0, z=0.0, w=0.0)
     assert tuple(decode_hand_sample(message, 'xy').position) == (0.1, 0.2)
+
+
+@both_kinds
+@pytest.mark.parametrize('turn', [(0, 0, 0, 0), (0, 0, 0, 1e-3), (9, 9, 9, 9), (math.nan, 0, 0, 1), (math.inf, 0, 0, 0)])
+def test_the_position_0_without_an_orientation_means_no_data(types: MessageTypes, turn: tuple[float, ...]) -> None:
+    message = pose_stamped(types, (0.0, 0.0, 0.0))
+    assert decode_hand_sample(message, 'xy').height == 0.0
+    message.pose.orientation = types.make('geometry_msgs/msg/Quaternion', **dict(zip('xyzw', turn, strict=True)))
+    with pytest.raises(LostHandError, match='the tracker has lost the hand'):
+        decode_hand_sample(message, 'xy')
+    for sign in (1.0, -1.0, 0.95):
+        message.pose.orientation = types.make('geometry_msgs/msg/Quaternion', y=0.6 * sign, w=0.8 * sign)
+        assert decode_hand_sample(message, 'xy').height == 0.0
 
 
 @both_kinds

@@ -40,6 +40,15 @@ def test_one_silent_input_stops_predictions(times: dict[str, float], words: str 
     assert build_freshness(**times).find_not_ready_reason(10.0, NEVER, BOTH) is None
 
 
+def test_a_hand_whose_poses_are_refused_is_not_silent() -> None:
+    freshness = build_freshness(hand_pose=8.0)
+    freshness.note_refused(9.9, 'hand_pose: stamps repeat')
+    found = freshness.find_not_ready_reason(10.0, CONFIG, ())
+    assert found == ('hand_refused', 'no hand_pose could be used for 2.0 s, the last: hand_pose: stamps repeat')
+    found = freshness.find_not_ready_reason(12.0, CONFIG, ())
+    assert found is not None and 'silent for 4.0 s' in found[1]
+
+
 def test_a_source_that_is_received_again_is_not_silent() -> None:
     freshness = build_freshness(hand_pose=10.0, obstacles=1.0)
     assert freshness.find_not_ready_reason(10.0, CONFIG, ['cloud']) is not None

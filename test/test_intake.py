@@ -110,7 +110,7 @@ def test_markers_in_another_frame_are_discarded(intake: Intake) -> None:
         (
             'hand_pose',
             pose_stamped(TYPES, (float('nan'), 0, 0)),
-            'hand_pose_invalid',
+            'hand_lost',
             'hand_pose: pose.position.x: expected a finite',
         ),
         (

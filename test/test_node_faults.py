@@ -154,6 +154,48 @@ def test_a_silent_hand_is_reported(ros: Graph) -> None:
     assert re.match(r'no prediction: hand_pose silent for \d+\.\d s', status.message)
 
 
+@pytest.mark.parametrize('is_moving', [True, False])
+def test_stamps_that_repeat_are_no_silence(ros: Graph, is_moving: bool) -> None:
+    """As of a clock of whole seconds, and of a driver that repeats its last message."""
+    bench = Bench(ros, parameters={'estimator.hand_timeout_s': 0.05})
+    bench.publish_scene()
+    bench.move(hand_path(2))
+    for i in range(1, 12):
+        bench.deliver('hand_pose', pose_stamped(TYPES, (0.01 * i * is_moving, 0.0, 0.0), bench.node.pipeline.hand_state.stamp_ns))
+        ros.spin_for(0.01)
+    status = bench.health()
+    assert status.level == b'\x01' and 'silent' not in status.message
+    assert re.match(
+        r'no prediction: no hand_pose could be used for \d\.\d s, the last: hand_pose: stamps repeat: ', status.message
+    )
+    assert 'stamps repeat: 11 of 13 poses have that of the pose before' in status.message
+
+
+def test_a_pose_without_data_is_a_lost_hand(ros: Graph) -> None:
+    bench = Bench(ros, parameters={'estimator.hand_timeout_s': 0.05})
+    bench.publish_scene()
+    bench.move(hand_path(2))
+    for i in range(1, 12):
+        lost = pose_stamped(TYPES, (0.0, 0.0, 0.0), bench.node.pipeline.hand_state.stamp_ns + i * SECOND // 50)
+        lost.pose.orientation.w = 0.0
+        bench.deliver('hand_pose', lost)
+        ros.spin_for(0.01)
+    status = bench.health()
+    assert status.level == b'\x01' and 'hand_lost 11' in status.message
+    assert re.match(r'no prediction: no hand_pose could be used for .* the tracker has lost the hand', status.message)
+
+
+def test_a_hand_that_does_not_move_is_told(ros: Graph) -> None:
+    bench = Bench(ros)
+    bench.publish_scene()
+    start = hand_path(1)[0]
+    stamp_ns = start.header.stamp.sec * SECOND + start.header.stamp.nanosec
+    bench.move(pose_stamped(TYPES, (0.01, 0.0, 0.0), stamp_ns + i * SECOND // 10) for i in range(15))
+    bench.wait_for('prediction', 1)
+    status = bench.health()
+    assert status.level == b'\x00' and status.message == 'predicting; the hand does not move: the same position for 1.4 s'
+
+
 @pytest.mark.parametrize('where', ['begin', 'predict', 'encode_outputs'])
 def test_an_internal_error_is_counted_and_reported_and_the_node_goes_on(
     ros: Graph, monkeypatch: pytest.MonkeyPatch, where: str

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import re
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,7 @@ from hypothesis import strategies as st
 from ros_helpers import Graph
 
 from foc_ros.core.config import Config, flatten, list_parameters, replace_values
-from foc_ros.core.errors import FocError, ParameterError, RecordingError
+from foc_ros.core.errors import FocError, FocWarning, ParameterError, RecordingError
 from foc_ros.ros import parameters as module
 from foc_ros.ros.parameters import check_parameters, dump_parameter_file, load_parameter_file
 
@@ -90,7 +92,8 @@ def test_parameters_of_others_in_the_file_are_skipped(tmp_path: Path) -> None:
     rate_hz: 20
 foc: {ros__parameters: {rate_hz: 25}}
 """
-    config = load(tmp_path, text)
+    with pytest.warns(FocWarning, match='params.yaml: /other_node does not apply to the node /foc$'):
+        config = load(tmp_path, text)
     assert config.rate_hz == 25.0
     assert isinstance(config.rate_hz, float)
 
@@ -118,9 +121,9 @@ foc: {ros__parameters: {rate_hz: 25}}
         ('/**: {ros__parameters: [1, 2]}', '/**: expected ros__parameters with parameters below it'),
         ('/**: {rate_hz: 5}', '/**: expected ros__parameters with parameters below it'),
         ('foc:', 'foc: expected ros__parameters with parameters below it, got None'),
-        ('/other: {ros__parameters: {rate_hz: 5}}', 'expected a section /** or foc or /foc, got /other'),
-        ('[1, 2]', 'expected a section /** or foc or /foc, got list'),
-        ('', 'expected a section /** or foc or /foc, got NoneType'),
+        ('/other: {ros__parameters: {rate_hz: 5}}', 'expected a section for the node /foc, such as /** or /foc, got /other'),
+        ('[1, 2]', 'expected a section for the node /foc, such as /** or /foc, got list'),
+        ('', 'expected a section for the node /foc, such as /** or /foc, got an empty file'),
     ],
 )
 def test_a_wrong_file_is_refused_with_its_reason(tmp_path: Path, text: str, words: str) -> None:
@@ -159,11 +162,8 @@ def node_with(ros: Graph, **overrides: object) -> Any:
 @pytest.mark.parametrize(
     'arguments',
     [
-        ['-r', '__ns:=/arm', '-p', 'rate_hz:=-1.0'],
-        ['-r', '__node:=arm', '-p', 'rate_hz:=-1.0'],
         ['-p', 'arm:rate_hz:=-1.0'],
         ['-p', 'rate_hz:={'],
-        ['--params-file', 'arm.yaml', '-p', 'rate_hz:=-1.0'],
         ['--params-file', 'no.yaml'],
         ['-p', 'budget_s:=1e-3', '-p', 'likelihood.shortfall:=.inf'],
         ['-p', 'frame_id:=2026-11-24'],
@@ -175,8 +175,48 @@ def test_what_depends_on_the_name_of_the_node_is_left_to_the_node(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    Path('arm.yaml').write_text('arm: {ros__parameters: {rate_hz: 5.0}}')
     check_parameters(['foc_node', '--ros-args', *arguments])
+
+
+SECTIONS = ['/**', '/*', 'foc', '/foc', '/**/foc', '/*/foc', '/**/**', '/arm/foc', '/arm/*', '/arm/**', 'arm/foc', '/arm/left/*']
+
+
+@pytest.mark.parametrize('namespace', ['/', '/arm', '/arm/left'])
+def test_sections_apply_as_ros_applies_them(tmp_path: Path, namespace: str) -> None:
+    """All pairs of sections, of which the later one wins, in the node and in what is checked before it."""
+    from ros_helpers import graph
+
+    file = tmp_path / 'params.yaml'
+    node, arguments = (
+        f'{namespace}/foc'.replace('//', '/'),
+        ['--ros-args', '--params-file', str(file), '-r', f'__ns:={namespace}'],
+    )
+    for first, second in itertools.permutations(SECTIONS, 2):
+        rates = {first: 5.0, second: 6.0}
+        file.write_text('\n'.join(f'{name}: {{ros__parameters: {{rate_hz: {rate}}}}}' for name, rate in rates.items()))
+        applied = [rate for name, rate in rates.items() if module._applies(f'/{name.lstrip("/")}', node)]
+        with warnings.catch_warnings():
+            warnings.simplefilter('ignore', FocWarning)
+            assert module._read_values(file, node, is_needed=False) == ({'rate_hz': applied[-1]} if applied else {})
+            if namespace == '/' and applied:
+                assert load_parameter_file(file).rate_hz == applied[-1]
+        if first in SECTIONS[::4]:  # a node takes a while
+            with graph(arguments) as ros:
+                overrides = node_with(ros).get_parameters_by_prefix('')
+                assert [each.value for name, each in overrides.items() if name == 'rate_hz'] == applied[-1:]
+
+
+def test_a_section_that_does_not_apply_is_named(tmp_path: Path) -> None:
+    file = tmp_path / 'params.yaml'
+    file.write_text('arm: {foc: {ros__parameters: {rate_hz: -1.0}}}\n/**: {ros__parameters: {rate_hz: 6}}')
+    with pytest.warns(FocWarning, match='params.yaml: /arm/foc does not apply to the node /foc$'):
+        assert load_parameter_file(file).rate_hz == 6.0
+    arguments = ['foc_node', '--ros-args', '--params-file', str(file)]
+    with pytest.warns(FocWarning, match='does not apply to the node /foc$'):
+        check_parameters(arguments)
+    for others in (['-r', '__ns:=/left'], ['-r', '__node:=arm'], ['--remap', '__name:=arm']):
+        with pytest.warns(FocWarning, match='/arm/foc does not apply to the node /(left/foc|arm)$'):
+            check_parameters([*arguments, *others])
 
 
 def test_a_later_argument_replaces_an_earlier_one(tmp_path: Path) -> None:

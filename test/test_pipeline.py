@@ -178,7 +178,12 @@ def test_a_rejected_message_changes_nothing_and_is_counted_with_its_reason(recor
     pipeline = ready()
     pipeline.add_hand_sample(hand(100.0))
     rejections = [
-        (lambda: pipeline.add_hand_sample(hand(100.0)), SampleStatus.DUPLICATE, 'hand_duplicate', '0 s behind the newest one'),
+        (
+            lambda: pipeline.add_hand_sample(hand(100.0)),
+            SampleStatus.DUPLICATE,
+            'hand_duplicate',
+            'stamps repeat: 1000100000000 ns',
+        ),
         (lambda: pipeline.add_hand_sample(hand(90.0)), SampleStatus.LATE, 'hand_late', '0.01 s behind the newest one'),
         (
             lambda: pipeline.add_hand_sample(hand(110.0, frame='camera')),

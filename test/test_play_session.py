@@ -57,7 +57,7 @@ def test_tasks_leave_bags_that_fit_and_evaluate_read(page: Page) -> None:
     stamps = [step.sample.stamp_ns for step in steps if step.sample is not None]
     assert {round(gap) for gap in np.diff(stamps)} == {20_000_000}
     assert any(step.prediction is not None and step.prediction.candidates_with_likelihood for step in steps)
-    assert replay.describe_refusals() == ''
+    assert replay.describe_losses() == ''
     with BagReader(folder / recorder.SESSION) as reader:
         assert sum(item.role == 'hand_pose' for item in reader) > len(stamps)
 
@@ -316,6 +316,6 @@ def test_the_library_predicts_and_reports_the_session(tmp_path: Path, monkeypatc
         assert ((path >= [low_x, low_y]) & (path <= [high_x, high_y])).all()
         np.testing.assert_allclose(path[-1], FIRST_SCENE.goals[each['goal']], atol=2e-3)
     with BagReader(Path(page.last('settings')['session']) / recorder.SESSION) as reader:
-        topics = {each.topic for each in reader._connections}
+        topics = {each.topic for each in reader._channels}
         assert {TYPES[item.role] for item in reader} == {TYPES[role] for role in ('hand_pose', 'obstacles', 'goals')}
     assert topics == {'/hand_pose', '/obstacles', '/goals', '/foc/prediction', '/foc/likelihoods'}

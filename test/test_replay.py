@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -116,10 +117,75 @@ def test_what_cannot_be_used_is_counted_and_the_rest_goes_on(tmp_path: Path) -> 
     with BagReader(bag) as reader:
         stamps = [step.prediction.stamp_ns for step in replayed.steps(reader) if step.prediction]
     assert stamps == [ns(time) for time, _ in reach(FEW)]
-    expected = {'hand_pose_invalid': 1, 'hand_wrong_frame': 1, 'obstacles_invalid': 1, 'hand_late': 1}
+    expected = {'hand_lost': 1, 'hand_wrong_frame': 1, 'obstacles_invalid': 1, 'hand_late': 1}
     counts = replayed.intake.counts
     assert {name: counts.get(name) for name in expected} == expected
     assert counts['obstacles_dropped_not_finite'] == 1
+
+
+def by_stamp(*given: list[tuple[str, int, Any]]) -> list[tuple[str, int, Any]]:
+    return sorted(chain.from_iterable(given), key=lambda each: each[1])
+
+
+def test_stamps_that_repeat_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As of a clock of whole seconds."""
+    given = messages(seconds=FEW)
+    poses = [each for each in given if each[0] == '/hand_pose']
+    whole = [(topic, stamp_ns, encode_hand_pose(TYPES, ns(0), FRAME, (0.1, 0.0, 0.0))) for topic, stamp_ns, _ in poses]
+    assert run(write_bag(tmp_path / 'whole', by_stamp([each for each in given if each[0] != '/hand_pose'], whole))) == 0
+    words = f'{len(poses) - 1} of {len(poses)} messages of hand_pose refused, the last: hand_pose: stamps repeat: '
+    assert words in capsys.readouterr().err
+
+
+def test_poses_without_data_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def empty(stamp_ns: int) -> tuple[str, int, Any]:
+        pose = TYPES.make('geometry_msgs/msg/Pose')
+        header = make_header(TYPES, stamp_ns, FRAME)
+        return '/hand_pose', stamp_ns, TYPES.make('geometry_msgs/msg/PoseStamped', header=header, pose=pose)
+
+    bag = write_bag(tmp_path / 'lost', by_stamp(messages(seconds=FEW), [empty(ns(each)) for each in (0.01, 0.03, 0.05)]))
+    assert run(bag, '--json') == 0
+    captured = capsys.readouterr()
+    summary = json.loads(captured.out)['summary']
+    assert summary['refused'] == {'hand_lost': 3} and summary['predictions'] == len(reach(FEW))
+    assert '3 of 9 messages of hand_pose refused, the last: hand_pose: pose: expected a position' in captured.err
+
+
+def test_a_slash_before_a_frame_is_no_part_of_its_name(tmp_path: Path) -> None:
+    """As ROS 1 named frames; in any input, in a transform and in the parameter."""
+    turned = TYPES.make('geometry_msgs/msg/Transform', rotation=TYPES.make('geometry_msgs/msg/Quaternion', w=1.0))
+    link = TYPES.make(
+        'geometry_msgs/msg/TransformStamped', header=make_header(TYPES, 0, '/world'), child_frame_id='/tool', transform=turned
+    )
+    given = [('/tf_static', ns(-0.1), TYPES.make('tf2_msgs/msg/TFMessage', transforms=[link]))]
+    for topic, stamp_ns, message in messages(seconds=FEW):
+        if topic == '/hand_pose':
+            header = make_header(TYPES, stamp_ns, '/tool')
+            message = TYPES.make('geometry_msgs/msg/PoseStamped', header=header, pose=message.pose)
+        given.append((topic, stamp_ns, message))
+    bag, config = write_bag(tmp_path / 'slashes', given), replace_values(CONFIG, {'frame_id': '/world'})
+    assert len(list(replay(bag, config))) == len(reach(FEW))
+
+
+def test_a_hand_that_does_not_move_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    last = [(ns(0.2 + i / 10), encode_hand_pose(TYPES, ns(0.2 + i / 10), FRAME, (0.1, 0.0, 0.0))) for i in range(15)]
+    assert run(write_bag(tmp_path / 'frozen', [*messages(seconds=FEW), *(('/hand_pose', *each) for each in last)])) == 0
+    assert capsys.readouterr().err == 'foc_ros replay: the hand does not move: the same position for 1.4 s\n'
+
+
+def test_transforms_and_markers_that_are_left_out_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    marker = TYPES.make('visualization_msgs/msg/Marker', header=make_header(TYPES, ns(0), FRAME), type=9)
+    array = TYPES.make('visualization_msgs/msg/MarkerArray', markers=[marker, marker])
+    moved = TYPES.make('geometry_msgs/msg/TransformStamped', header=make_header(TYPES, ns(0), 'base'), child_frame_id='base')
+    tree = TYPES.make('tf2_msgs/msg/TFMessage', transforms=[moved])
+    given = [('/tf', ns(-0.09), tree), ('/obstacle_markers', ns(-0.08), array)]
+    assert run(write_bag(tmp_path / 'odd', by_stamp(messages(seconds=FEW), given))) == 0
+    assert capsys.readouterr().err == (
+        'foc_ros replay: 1 parts of tf left out (not_usable); 2 parts of obstacle_markers left out (not_a_shape)\n'
+    )
+    only = [each for each in messages(seconds=FEW) if each[0] != '/obstacles']
+    assert run(write_bag(tmp_path / 'none', by_stamp(only, given))) == 3
+    assert '2 parts of obstacle_markers left out (not_a_shape); no obstacles received' in capsys.readouterr().err
 
 
 def test_a_table_is_printed_without_json(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -170,11 +236,14 @@ def test_an_output_that_exists_is_left_alone(bag: Path, capsys: pytest.CaptureFi
         assert len(list(reader)) == len(messages(seconds=FEW))
 
 
-def test_a_cut_bag_leaves_neither_json_nor_output(tmp_path: Path, bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    metadata = (bag / 'metadata.yaml').read_text()
-    count = len(messages(seconds=FEW))
-    (bag / 'metadata.yaml').write_text(metadata.replace(f'message_count: {count}', f'message_count: {count + 1}'))
-    assert run(bag, '--json', '--output', str(tmp_path / 'out')) == 2
+def test_a_damaged_recording_leaves_neither_json_nor_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / 'damaged.mcap'
+    ends = write_mcap(file, messages(seconds=FEW), per_chunk=5)
+    data = bytearray(file.read_bytes())
+    place = data.rindex(b'\x28\xb5\x2f\xfd', 0, ends[1])  # the last chunk's messages, after those of others are replayed
+    data[place + 20 : place + 40] = bytes(20)
+    file.write_bytes(data)
+    assert run(file, '--json', '--output', str(tmp_path / 'out')) == 2
     out, err = capsys.readouterr()
     assert out == '' and 'damaged or cut short' in err and not (tmp_path / 'out').exists()
 
@@ -276,4 +345,4 @@ def test_another_recording_begins_without_scene_frame_and_transforms(tmp_path: P
     assert found and replayed.pipeline.frame_id is not None
     replayed.forget_scene()
     assert replayed.pipeline.frame_id is None and not replayed.pipeline.scene.sources and replayed.pipeline.scene.goals is None
-    assert replayed.describe_refusals() == ''
+    assert replayed.describe_losses() == ''

@@ -212,6 +212,19 @@ def test_a_file_that_cannot_be_parsed_is_refused(tmp_path: Path, name: str, text
 
 
 @pytest.mark.parametrize('name', ['s.json', 's.yaml'])
+def test_a_mark_of_the_byte_order_is_skipped(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text('\ufeff{"start": [0, 0], "goal": [1, 0], "duration_s": 2}', 'utf-8')
+    assert load_scene(tmp_path / name).duration_s == 2.0
+
+
+@pytest.mark.parametrize('number', ['1:30', '-1:30', '1:30.5', '190:20:30'])
+def test_numbers_of_base_60_are_texts_as_for_ros(tmp_path: Path, number: str) -> None:
+    (tmp_path / 's.yaml').write_text(f'{{start: [0, 0], goal: [1, 0], duration_s: {number}}}', 'utf-8')
+    with pytest.raises(SceneError, match=f'^duration_s: expected a .*, got .?{re.escape(number)}'):
+        load_scene(tmp_path / 's.yaml')
+
+
+@pytest.mark.parametrize('name', ['s.json', 's.yaml'])
 @pytest.mark.parametrize('number', ['9' * 25, '-' + '9' * 400, '9' * 5000, '1e400', '-1.0e+400'])
 @pytest.mark.parametrize('field', ['steps', 'max_candidates', 'duration_s', 'start_stddev', 'eta'])
 def test_a_number_beyond_all_floats_is_refused_with_field_value_and_bound(

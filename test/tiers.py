@@ -39,6 +39,8 @@ LONG = (
     'test_play_session.py::test_a_fit_and_its_comparison',
     'test_report_page.py::test_*a_broken_page*',
     'test_report_page.py::test_a_long_recording_says_where_the_slider_stops',
+    # many more damaged files
+    'test_fuzz_inputs.py::test_many_*',
     # the commands of the documentation
     'test_shown_commands.py::test_commands_work_as_shown',
     # a node under load, and a process that is stopped or killed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sized
 from dataclasses import dataclass, field
 from heapq import merge
@@ -10,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.errors import FocError, RecordingError, collect, collect_all, join_errors
+from foc_ros.core.errors import FocError, RecordingError, collect, collect_all, join_errors, warn
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.bags import TYPESTORE, BagWriter
 from foc_ros.io.csv_tables import Column, Row, parse_rows, read_rows
@@ -28,6 +29,11 @@ EPOCH_NS = NANOSECONDS
 """Stamp of t_s = 0. It is not 0, which means `not set` in a message."""
 LATEST_S, LONGEST_S = 2e9, 86400.0
 """Bounds on a time (a stamp has 31 bits for seconds) and on a recording's length (beyond a day, two clocks are mixed up) [s]."""
+SHORTEST_STEP_S, LONGEST_STEP_S, FASTEST = 1e-4, 1.0, 20.0
+"""Median times between two poses that a tracker has [s], and a speed that no hand has [m/s]; beyond them, a unit is wrong."""
+USUAL_STEP_S, FASTEST_CM = 0.01, 200.0
+"""Step with which units of time are compared [s], and speed beyond which a position is rather in mm than in cm [m/s]."""
+TIME_UNITS = {'ns': 1e-9, 'us': 1e-6, 'ms': 1e-3, 'min': 60.0, 'h': 3600.0, 'days': 86400.0}
 SCENE_PERIOD_NS, SCENE_LEAD_NS = NANOSECONDS // 2, NANOSECONDS // 10
 """The scene is sent twice a second, for the first time a tenth of a second before the first hand pose."""
 
@@ -49,7 +55,9 @@ def read_movements(file: Path) -> list[Movement]:
     movements = [collect(errors, parse_movement, name, rows) for name, rows in found.items()]
     if errors:
         raise join_errors(errors)
-    return [each for each in movements if each is not None]
+    found_movements = [each for each in movements if each is not None]
+    warn_of_units(file, found_movements)
+    return found_movements
 
 
 def read_movement_rows(file: Path) -> dict[str, list[Row]]:
@@ -78,6 +86,35 @@ def parse_movement(name: str, table: Iterable[Row]) -> Movement:
 
     parse_rows(table, parse)
     return Movement(name, tuple(EPOCH_NS + round(each[0] * NANOSECONDS) for each in samples), np.array(samples)[:, 1:])
+
+
+def warn_of_units(file: Path, movements: Iterable[Movement]) -> None:
+    """Warn of the recordings of a table whose times or positions cannot be in s and m, once for each unit that is more likely."""
+    doubts: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for each in movements:
+        column, unit, reason = _find_likely_unit(each)
+        if unit:
+            doubts.setdefault((column, unit), []).append((each.name, reason))
+    for (column, unit), found in doubts.items():
+        name, reason = found[0]
+        others = f' and {len(found) - 1} others' if found[1:] else ''
+        warn(f'{file}: {column} of recording {name}{others} seems to be in {unit}: {reason}')
+
+
+def _find_likely_unit(movement: Movement) -> tuple[str, str, str]:
+    """Return a column, the unit that it is likely in and the reason; empty texts if the numbers can be right."""
+    steps_s = np.diff(movement.stamps_ns) / NANOSECONDS
+    moves_m = np.linalg.norm(np.diff(movement.positions, axis=0), axis=1)[steps_s > 0.0]
+    steps_s = steps_s[steps_s > 0.0]
+    if not len(steps_s):
+        return '', '', ''
+    step_s = float(np.median(steps_s))
+    if not SHORTEST_STEP_S <= step_s <= LONGEST_STEP_S:
+        unit = min(TIME_UNITS, key=lambda each: abs(math.log(step_s * TIME_UNITS[each] / USUAL_STEP_S)))
+        return 't_s', unit, f'the median time between two poses is {step_s:.3g} s'
+    speed = float(np.quantile(moves_m / steps_s, 0.99))
+    unit = '' if speed <= FASTEST else 'mm' if speed > FASTEST_CM else 'cm'
+    return 'the position', unit, f'the hand moves at {speed:.3g} m/s'
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from foc_ros.core.classes.library import Demonstration
 from foc_ros.core.config import ONLINE, Config
-from foc_ros.core.errors import RecordingError
+from foc_ros.core.errors import RecordingError, warn
 
 from .recordings import Recording
 from .replay import Replay
@@ -19,8 +19,11 @@ def learn_recording(recording: Recording, config: Config) -> tuple[Demonstration
     for _ in replayed.take(recording.items()):
         pass
     movements = replayed.pipeline.learnt.movements.finish()
+    losses = replayed.describe_losses()
     if not movements.learnt:
         standing = f'no movement: the hand was never faster than {config.estimator.onset_speed:g} m/s'
-        unused = replayed.describe_refusals() or replayed.pipeline.not_ready_reason()
+        unused = losses or replayed.pipeline.not_ready_reason()
         raise RecordingError(f'{recording.name}: {movements.refusal or unused or standing}')
+    if losses:
+        warn(f'{recording.name}: {losses}')
     return movements.learnt

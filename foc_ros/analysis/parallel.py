@@ -11,6 +11,7 @@ import os
 import pickle
 import threading
 import traceback
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, Executor, Future, wait
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from typing import Any, TypeVar
 
 from pebble import ProcessExpired, ProcessPool
 
-from foc_ros.core.errors import FocError, RecordingError
+from foc_ros.core.errors import FocError, FocWarning, RecordingError, warn
 from foc_ros.io.terminal import show_progress
 
 from .dask_cluster import DaskExecutor
@@ -93,13 +94,16 @@ def run(function: Callable[[T], R], items: Sequence[tuple[str, T]], executor: Ex
     try:
         for (name, item), future in zip(items, futures, strict=True):
             try:
-                yield name, future.result()
+                result, texts = future.result()
             except ProcessExpired:
-                yield name, Failure('its worker process was killed')
+                result, texts = Failure('its worker process was killed'), []
             except CancelledError as error:
                 raise RecordingError(f'{name}: the executor gave up before its turn') from error
             except Exception:
-                yield name, _run_alone(function, item, futures, executor)
+                result, texts = _run_alone(function, item, futures, executor)
+            for text in texts:
+                warn(f'{name}: {text}')
+            yield name, result
     finally:
         for future in futures:
             future.cancel()
@@ -127,18 +131,25 @@ def collect_all(function: Callable[[T], R], items: Sequence[tuple[str, T]], exec
     return results
 
 
-def call_guarded(function: Callable[[T], R], item: T) -> R | Failure:
-    """Return the result of the function, or its failure in words, because an exception may not survive pickling."""
-    try:
-        return function(item)
-    except FocError as error:
-        return Failure(' '.join(str(error).split()))
-    except Exception as error:
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        return Failure(f'{type(error).__name__}: {" ".join(str(error).split())} ({Path(place.filename).name}:{place.lineno})')
+def call_guarded(function: Callable[[T], R], item: T) -> tuple[R | Failure, list[str]]:
+    """Return the result of a function, or its failure in words, as an exception may not survive pickling, and its warnings."""
+    with warnings.catch_warnings(record=True) as issued:
+        warnings.simplefilter('always', FocWarning)
+        result: R | Failure
+        try:
+            result = function(item)
+        except FocError as error:
+            result = Failure(' '.join(str(error).split()))
+        except Exception as error:
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            words = f'{type(error).__name__}: {" ".join(str(error).split())} ({Path(place.filename).name}:{place.lineno})'
+            result = Failure(words)
+    return result, [str(each.message) for each in issued if issubclass(each.category, FocWarning)]
 
 
-def _run_alone(function: Callable[[T], R], item: T, futures: Sequence[Future[R | Failure]], executor: Executor) -> R | Failure:
+def _run_alone(
+    function: Callable[[T], R], item: T, futures: Sequence[Future[Any]], executor: Executor
+) -> tuple[R | Failure, list[str]]:
     """Compute an item again after all others.
 
     A Dask scheduler blames the death of a worker on all tasks that waited there; alone, only the guilty one fails again.
@@ -147,7 +158,7 @@ def _run_alone(function: Callable[[T], R], item: T, futures: Sequence[Future[R |
     try:
         return executor.submit(call_guarded, function, item).result()
     except Exception as error:
-        return Failure(f'its worker was lost: {type(error).__name__}: {" ".join(str(error).split())}')
+        return Failure(f'its worker was lost: {type(error).__name__}: {" ".join(str(error).split())}'), []
 
 
 def open_executor(arguments: argparse.Namespace) -> Executor:

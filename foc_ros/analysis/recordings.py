@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from foc_ros.core.errors import FocError, RecordingError, collect, join_errors
-from foc_ros.io.bags import BagReader, Item, check_bag
+from foc_ros.io.bags import BagReader, Item, check_bag, is_bag_file
 from foc_ros.io.csv_tables import Row
 
 from .box_scenes import BoxScenes
@@ -19,11 +19,11 @@ from .csv_recordings import (
     read_movement_rows,
     read_scenes,
     recorded_messages,
+    warn_of_units,
 )
 
 RECORDINGS, OBSTACLES, GOALS, LABELS = 'recordings.csv', 'obstacles.csv', 'goals.csv', 'labels.csv'
 SCENES, TRIALS = 'scenes.csv', 'trials.csv'
-BAG_SUFFIXES = ('.mcap', '.db3')
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,7 @@ class BagRecording:
 
     def items(self) -> Iterator[Item]:
         """Yield the recorded messages; raises RecordingError, also for a recording of which only a part can be read."""
-        with BagReader(self.path) as reader:
-            if reader.warnings:
-                raise RecordingError(f'{self.path}: {"; ".join(reader.warnings)}')
+        with BagReader(self.path, is_whole=True) as reader:
             yield from reader
 
 
@@ -72,7 +70,7 @@ def find_recordings(data: Path) -> dict[str, Recording]:
     """
     if (data / RECORDINGS).exists():
         return dict(read_tables(data))
-    if data.is_file() or (data / 'metadata.yaml').exists():
+    if data.is_file() or ((data / 'metadata.yaml').exists() and any(map(is_bag_file, data.iterdir()))):
         check_bag(data)
         bags = [data.resolve()]
     elif data.is_dir():
@@ -104,6 +102,7 @@ def read_tables(data: Path) -> dict[str, TableRecording]:
     failures = [each for each in movements.values() if isinstance(each, RecordingError)]
     if scenes is None or len(failures) == len(movements):
         raise join_errors([*errors, *failures])
+    warn_of_units(data / RECORDINGS, [each for each in movements.values() if isinstance(each, Movement)])
     return {name: TableRecording(name, movement, scenes.find(name)) for name, movement in movements.items()}
 
 
@@ -124,4 +123,4 @@ def _may_be_bag(path: Path) -> bool:
     """Tell bags from other files; a directory with bag files but without metadata counts, so that it is reported as broken."""
     if path.name.startswith('.'):
         return False
-    return path.suffix in BAG_SUFFIXES if path.is_file() else any(file.suffix in BAG_SUFFIXES for file in path.iterdir())
+    return is_bag_file(path) or (path.is_dir() and any(map(is_bag_file, path.iterdir())))

@@ -10,13 +10,14 @@ from pathlib import Path
 
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
+from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacles.scene import Scene
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, HandSample, Prediction, SampleStatus
 from foc_ros.io.bags import BagReader, Item
 from foc_ros.io.class_library import load_library
-from foc_ros.io.topics import HAND, STATIC_TRANSFORMS, TRANSFORMS
-from foc_ros.ros.intake import Intake
+from foc_ros.io.topics import HAND, STATIC_TRANSFORMS, TRANSFORMS, TYPES
+from foc_ros.ros.intake import DROPPED, Intake
 from foc_ros.ros.transform_tree import TransformTree
 from foc_ros.ros.transforms import Transforms
 
@@ -55,8 +56,9 @@ class Replay:
         self._tree = TransformTree()
         self._transforms = Transforms(self._tree, self.intake.is_skipped)
         self._received: Counter[str] = Counter()
-        self._refused: Counter[str] = Counter()
-        self._reasons: dict[str, str] = {}
+        self._refused: Counter[tuple[str, str]] = Counter()
+        self._reasons: dict[tuple[str, str], str] = {}
+        self._counts_before = Counter(self.intake.counts)
 
     def take(self, items: Iterable[Item]) -> Iterator[tuple[Item, SampleStatus | None]]:
         """Pass the messages to the pipeline in the order in which the node does, without predicting.
@@ -66,7 +68,7 @@ class Replay:
         for item in items:
             now_s = item.log_ns / NANOSECONDS
             if item.role in (TRANSFORMS, STATIC_TRANSFORMS):
-                self._tree.add(item.message, is_static=item.role == STATIC_TRANSFORMS)
+                self._take_transforms(item)
                 yield item, None
             else:
                 self._held[item.role].append(item)
@@ -91,21 +93,42 @@ class Replay:
         self.pipeline.forget_scene()
         self._begin_recording()
 
-    def describe_refusals(self) -> str:
-        """Return how many messages of each input were refused, with the last reason; empty if none was."""
-        return '; '.join(
-            f'{count} of {self._received[role]} messages of {role} refused, the last: {self._reasons[role]}'
-            for role, count in self._refused.items()
-        )
+    def describe_losses(self) -> str:
+        """Return how many messages were refused, with the last reason of each kind, and how many of their parts were left out."""
+        refused = [
+            f'{count} of {self._received[key[0]]} messages of {key[0]} refused, the last: {self._reasons[key]}'
+            for key, count in self._refused.items()
+        ]
+        counts = Counter(self.intake.counts) - self._counts_before
+        parts = [(count, *name.split(DROPPED)) for name, count in counts.items() if DROPPED in name]
+        return '; '.join([*refused, *(f'{count} parts of {role} left out ({reason})' for count, role, reason in parts)])
 
     def _release(self, role: str, now_s: float) -> Iterator[tuple[Item, SampleStatus | None]]:
         for arrival in self._transforms.release(role, self.pipeline.frame_id, self.pipeline.config, now_s):
-            status = self.intake.take_arrival(role, arrival)
-            self._received[role] += 1
-            if status is None or status.is_refused:
-                self._refused[role] += 1
-                self._reasons[role] = self.intake.last_refusal or ''
+            try:
+                status = self.intake.take_arrival(role, arrival)
+            except (AttributeError, TypeError, ValueError) as error:  # the recording defines the message in another way than ROS
+                self.intake.refuse(role, MessageError('message', f'the fields of {TYPES[role]}', error))
+                status = None
+            self._note(role, status)
             yield self._held[role].popleft(), status
+
+    def _take_transforms(self, item: Item) -> None:
+        if isinstance(item.message, MessageError):
+            self.intake.refuse(item.role, item.message)
+            self._note(item.role, None)
+            return
+        left_out = self._tree.add(item.message, is_static=item.role == STATIC_TRANSFORMS)
+        self.intake.count_dropped(item.role, 'not_usable', left_out)
+        self._note(item.role, SampleStatus.ACCEPTED)
+
+    def _note(self, role: str, status: SampleStatus | None) -> None:
+        """Count a message, and why it was refused if it was."""
+        self._received[role] += 1
+        if status is None or status.is_refused:
+            key = role, 'invalid' if status is None else status.value
+            self._refused[key] += 1
+            self._reasons[key] = self.intake.last_refusal or ''
 
 
 def replay(bag: Path | str, config: Config, chosen: Mapping[str, str] | None = None) -> Iterator[Prediction]:

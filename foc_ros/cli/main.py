@@ -17,7 +17,7 @@ from io import TextIOWrapper
 from pathlib import Path
 from typing import Any, NoReturn
 
-from foc_ros.core.errors import FocError, list_messages, suggest
+from foc_ros.core.errors import FocError, list_messages, print_warnings, suggest
 
 from . import arguments as declarations
 from .inputs import read_inputs
@@ -75,9 +75,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return the exit code; arguments: those of the process by default, without its name."""
     if sys.stdout is None:  # the process was started with its standard output closed
         sys.stdout = Path(os.devnull).open('w', encoding='utf-8')  # noqa: SIM115  it stays open until the process ends
+    if arguments is None and sys.getfilesystemencoding() != 'utf-8':  # it could not even name the files that it is given
+        os.execv(sys.executable, [sys.executable, '-X', 'utf8', *sys.orig_argv[1:]])  # noqa: S606
+    if arguments is None:  # pictures are files; the backend of a notebook or of a desktop may not exist here
+        os.environ['MPLBACKEND'] = 'agg'
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        with handle_interrupts():
+        with handle_interrupts(), print_warnings(' '.join(['foc_ros', *given[:1]])):
             code = _parse_and_run(given)
             sys.stdout.flush()
     except KeyboardInterrupt:

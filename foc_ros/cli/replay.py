@@ -71,9 +71,12 @@ def run(arguments: argparse.Namespace) -> int:
             show_table(('', str(arguments.bag)), facts(answer).items())
             if report is not None:
                 show_address(arguments.report / 'index.html')
+    losses = list(filter(None, [replay.describe_losses(), replay.intake.describe_still_hand()]))
     if summary.solved:
+        for each in losses:
+            print(f'foc_ros replay: {each}', file=sys.stderr)
         return 0
-    reason = replay.describe_refusals() or replay.pipeline.not_ready_reason() or 'see the candidates not solved'
+    reason = '; '.join([*losses, replay.pipeline.not_ready_reason() or 'see the candidates not solved'])
     print(f'foc_ros replay: no prediction has a solved candidate: {reason}', file=sys.stderr)
     return 3
 
@@ -107,8 +110,6 @@ def _play(arguments: argparse.Namespace, replay: Replay, consumers: list[Consume
                     take(step, each)
             for consume in consumers:
                 consume(step)
-        for warning in reader.warnings:
-            print(f'foc_ros replay: {arguments.bag}: {warning}', file=sys.stderr)
         return reader.duration_s
 
 

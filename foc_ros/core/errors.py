@@ -5,7 +5,10 @@ An expected failure (infeasible, unreachable, out of time) is a :class:`foc_ros.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import sys
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from difflib import get_close_matches
 from typing import Any, TypeVar
 
@@ -50,8 +53,34 @@ class MessageError(InputError):
     """A message that cannot be converted."""
 
 
+class LostHandError(MessageError):
+    """A hand pose by which a tracker says that it has no data."""
+
+
 class RecordingError(FocError):
     """A file that cannot be read or written; the message names the file and the reason."""
+
+
+class FocWarning(UserWarning):
+    """Input that is used, although a part of it is missing or it is probably not meant so; the message says what and why."""
+
+
+def warn(text: str) -> None:
+    """Issue a FocWarning."""
+    warnings.warn(text, FocWarning, stacklevel=2)
+
+
+@contextmanager
+def print_warnings(program: str) -> Iterator[None]:
+    """Print each warning as one line on standard error, after the name of the program, without its place in the code."""
+
+    def show(message: Warning | str, *_: object, **__: object) -> None:
+        print(f'{program}: {" ".join(str(message).split())}', file=sys.stderr)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter('always', FocWarning)
+        warnings.showwarning = show
+        yield
 
 
 E = TypeVar('E', bound=FocError)

@@ -58,7 +58,7 @@ class Pipeline:
         self.scene = Scene()
         self.is_engaged = True
         self.learnt, self._library = Learnt(), make_library(self.given)
-        self.frame_id = config.frame_id or None
+        self.frame_id = config.frame_id.lstrip('/') or None
         self._rejections = Rejections()
         self._memory = Memory()
         self._is_new = False
@@ -234,7 +234,7 @@ class Pipeline:
 
     def forget_scene(self) -> None:
         """Forget obstacles, goals and the working frame, unless the parameter fixes it."""
-        self.scene, self.frame_id = Scene(), self.config.frame_id or None
+        self.scene, self.frame_id = Scene(), self.config.frame_id.lstrip('/') or None
 
     def reset(self) -> None:
         """Forget the movement and the operator; keep the scene, the working frame and the counts."""
@@ -250,9 +250,10 @@ class Pipeline:
         if config.plane != self.config.plane:
             self.reset()
             self.scene = Scene()
-        if config.frame_id and config.frame_id != self.frame_id:
+        frame_id = config.frame_id.lstrip('/')
+        if frame_id and frame_id != self.frame_id:
             self.reset()
-            self._fix_frame(config.frame_id)
+            self._fix_frame(frame_id)
         self._learn(self.learnt.reconfigure(self.config, config))
         self.config = config
         if self._task is not None:

@@ -28,6 +28,9 @@ class Rejections:
 
     def reject_stamp(self, kind: str, topic: str, stamp_ns: int, newest_ns: int) -> None:
         """Reject a stamp [ns] that is not after the newest one."""
+        if stamp_ns == newest_ns:
+            self.reject(kind, f'{topic}: stamps repeat: {stamp_ns} ns is that of the message before')
+            return
         seconds = (newest_ns - stamp_ns) / NANOSECONDS
         self.reject(kind, f'{topic}: the stamp {stamp_ns} ns is {seconds:g} s behind the newest one, {newest_ns} ns')
 

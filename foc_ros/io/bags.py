@@ -1,41 +1,49 @@
 """ROS 2 bags, read and written without ROS.
 
 The messages read are counted against the number that the bag states, and its bytes are compared with its checksums, so that none
-is lost or changed unnoticed. Every fault of the file is raised as one :class:`RecordingError` with its name and the reason.
+is lost or changed unnoticed. Every fault of the file is raised as one :class:`RecordingError` with its name and the reason; what
+is missing from a recording that can be read all the same is a :class:`FocWarning`.
 """
 
 from __future__ import annotations
 
-import re
 import shutil
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from heapq import merge
 from pathlib import Path, PurePath
+from tempfile import TemporaryDirectory
 from types import TracebackType
 from typing import Any
 
 import yaml
-from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefinitionFormat
-from rosbags.rosbag2 import Reader, StoragePlugin, Writer, WriterError
-from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
-from rosbags.typesys.store import Typestore
+import zstandard  # a requirement of mcap
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 
-from foc_ros.core.errors import RecordingError
+from foc_ros.core.errors import RecordingError, warn
 
 from . import topics
-from .checksums import add_checksums, check_checksums
+from .channels import TYPESTORE as TYPESTORE
+from .checksums import add_checksums
 from .mcap_files import McapFile
+from .sqlite_files import SqliteFile
 
-TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
-"""Message definitions for written bags, and for bags without definitions (sqlite3 before ROS 2 Iron)."""
+FILE_TYPES: dict[str, type[McapFile | SqliteFile]] = {'.mcap': McapFile, '.db3': SqliteFile}
+COMPRESSED = ('.zstd', '.zst')
+"""What follows these suffixes where the file as a whole is compressed."""
+ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
+"""Begin of a message that is compressed by itself; one in CDR begins with a zero."""
 
 
 @dataclass(frozen=True)
 class Item:
-    """One recorded message: the name of its input, its topic, log time [ns], the decoded message, and its bytes."""
+    """One recorded message: the name of its input, its topic, log time [ns], the decoded message, and its bytes.
+
+    The message is a MessageError where the bytes cannot be decoded.
+    """
 
     role: str
     topic: str
@@ -47,16 +55,28 @@ class Item:
 class BagReader:
     """The predictor's inputs in a recording, as an iterator in order of log time, within a context manager.
 
-    Other topics are not read, and their definitions are not parsed.
+    Other topics are not read, and their definitions are not parsed. Raises RecordingError on opening and on iteration.
 
-    path: bag directory, or one .mcap or .db3 file; chosen: topic by name of the input, overriding names and types. Attributes:
-    roles: the topic of every input found; message_count: of the whole bag; duration_s: from the first to the last message;
-    warnings: what was wrong with the file and could be read all the same. Raises RecordingError on opening and on iteration.
+    Parameters
+    ----------
+    path
+        Bag directory, with or without metadata.yaml, or one .mcap or .db3 file; each file may be compressed with zstd.
+    chosen
+        Topic by name of the input, overriding names and types.
+    is_whole
+        Whether a recording of which a part is missing is an error; otherwise it is a warning.
+
+    Attributes
+    ----------
+    roles
+        The topic of every input found.
+    message_count, duration_s
+        Of the whole bag; from the first to the last message.
     """
 
-    def __init__(self, path: Path | str, chosen: Mapping[str, str] | None = None) -> None:
+    def __init__(self, path: Path | str, chosen: Mapping[str, str] | None = None, *, is_whole: bool = False) -> None:
         self.path = Path(path)
-        self._chosen = chosen
+        self._chosen, self._is_whole = chosen, is_whole
 
     def __enter__(self) -> BagReader:
         self._stack = ExitStack()
@@ -74,73 +94,69 @@ class BagReader:
     def __iter__(self) -> Iterator[Item]:
         """Yield every message of an input."""
         roles = {topic: role for role, topic in self.roles.items()} | self._transforms
-        needed = [each for each in self._connections if each.topic in roles]
-        typestore = _build_typestore(needed)
+        needed = [[each for each in file.channels if each.is_read and each.topic in roles] for file in self._files]
         counts: Counter[str] = Counter()
         with _named_errors(self.path):
-            for connection, log_ns, raw in self._read(needed):
-                counts[connection.topic] += 1
-                message = typestore.deserialize_cdr(raw, connection.msgtype)
-                yield Item(roles[connection.topic], connection.topic, log_ns, message, raw)
-            missing = sum(each.msgcount for each in needed) - counts.total()
-            if missing or (self.message_count != self._counted and not self.warnings):
-                found = self._counted - missing
+            parts = [file.messages(channels) for file, channels in zip(self._files, needed, strict=True)]
+            for channel, log_ns, stored in merge(*parts, key=lambda each: each[1]):
+                counts[channel.topic] += 1
+                raw = _decompress(stored) if stored.startswith(ZSTD_MAGIC) else stored
+                yield Item(roles[channel.topic], channel.topic, log_ns, channel.decode(raw), raw)
+            if missing := sum(each.count for channels in needed for each in channels) - counts.total():
+                found = self.message_count - missing
                 raise RecordingError(f'damaged or cut short: {found} of its {self.message_count} messages can be read')
             if not counts[self.roles[topics.HAND]]:
                 raise RecordingError(f'topic {self.roles[topics.HAND]} holds no message')
 
     def describe_connection(self, topic: str) -> dict[str, Any]:
         """Return a topic's type, definitions and offered quality of service, as a writer needs them."""
-        connection = next(each for each in self._connections if each.topic == topic)
-        offered = connection.ext.offered_qos_profiles if isinstance(connection.ext, ConnectionExtRosbag2) else []
-        return {'msgtype': connection.msgtype, 'typestore': _build_typestore([connection]), 'offered_qos_profiles': offered}
+        channel = next(each for each in self._channels if each.topic == topic and each.is_read)
+        return {'msgtype': channel.msgtype, 'typestore': channel.typestore, 'offered_qos_profiles': channel.read_qos()}
 
     def _open(self) -> None:
         _refuse_unreadable(self.path)
-        stated = _read_metadata(self.path)
-        self.warnings: list[str] = []
-        if self.path.suffix == '.mcap' or (stated.get('storage_identifier') == 'mcap' and not stated.get('compression_mode')):
-            self._open_mcap(stated)
-        else:
-            reader = self._stack.enter_context(Reader(self.path))
-            self._connections = reader.connections
-            self._read: Callable[[Collection[Connection]], Iterator[tuple[Connection, int, bytes]]] = reader.messages
-            self.message_count, self.duration_s = reader.message_count, reader.duration * 1e-9
-            self._counted = sum(each.msgcount for each in reader.connections)
+        paths, stated = _list_files(self.path) if self.path.is_dir() else ([self.path], None)
+        self._files = [self._open_file(each) for each in paths]
+        self._channels = [each for file in self._files for each in file.channels]
+        self.message_count = sum(file.message_count for file in self._files)
         if not self.message_count:
-            raise RecordingError('damaged or cut short: no whole chunk' if self.warnings else 'holds no messages')
-        self.roles = self._assign_topics()
-        self._transforms = topics.find_transforms({each.topic: each.msgtype for each in self._connections})
-
-    def _open_mcap(self, stated: Mapping[str, Any]) -> None:
-        """Open the files of a bag; stated: what its metadata.yaml says about them, nothing for a single file."""
-        names = stated.get('relative_file_paths')
-        paths = [self.path / PurePath(each).name for each in names] if names else sorted(self.path.glob('*.mcap')) or [self.path]
-        files = []
-        for path in paths:
-            check_checksums(path)
-            file = McapFile(path)
-            self._stack.callback(file.close)
-            files.append(file)
-            if file.is_cut:
-                self.warnings.append(f'{path.name}: the recorder was killed; read up to the last whole chunk')
-        self._connections = [each._replace(owner=file) for file in files for each in file.connections]
-        self._counted = sum(file.message_count for file in files)
-        self.message_count = self._counted if self.warnings else stated.get('message_count', self._counted)
-        times_ns = [each for file in files if file.message_count for each in file.times_ns] or [0]
+            is_cut = any(file.loss for file in self._files)
+            raise RecordingError('damaged or cut short: no whole chunk' if is_cut else 'holds no messages')
+        times_ns = [each for file in self._files if file.message_count for each in file.times_ns]
         self.duration_s = (max(times_ns) - min(times_ns)) * 1e-9
+        for path, file in zip(paths, self._files, strict=True):
+            if file.loss:
+                self._report_loss(f'{path.name}: {file.loss}')
+            elif file.doubt and stated is None:
+                warn(f'{self.path}: {path.name}: {file.doubt}')
+        if stated is not None and stated > self.message_count:
+            self._report_loss(f'metadata.yaml states {stated} messages, and the files hold {self.message_count}')
+        elif stated is not None and stated < self.message_count:
+            warn(f'{self.path}: metadata.yaml is wrong: it states {stated} messages, and the files hold {self.message_count}')
+        self.roles = self._assign_topics()
+        self._transforms = topics.find_transforms({each.topic: each.msgtype for each in self._channels})
 
-        def read(needed: Collection[Connection]) -> Iterator[tuple[Connection, int, bytes]]:
-            parts = [file.messages([each for each in needed if each.owner is file]) for file in files]
-            return merge(*parts, key=lambda part: part[1])
+    def _open_file(self, path: Path) -> McapFile | SqliteFile:
+        if path.suffix in COMPRESSED:
+            folder = Path(self._stack.enter_context(TemporaryDirectory()))
+            with zstandard.open(path, 'rb') as packed, (folder / path.stem).open('wb') as unpacked:
+                shutil.copyfileobj(packed, unpacked)
+            path = folder / path.stem
+        file = FILE_TYPES[path.suffix](path)
+        self._stack.callback(file.close)
+        return file
 
-        self._read = read
+    def _report_loss(self, text: str) -> None:
+        if self._is_whole:
+            raise RecordingError(text)
+        warn(f'{self.path}: {text}')
 
     def _assign_topics(self) -> dict[str, str]:
-        kinds = {each.topic: each.msgtype for each in self._connections}
+        # a topic that is read hides one of the same name that is not
+        kinds = {each.topic: each.msgtype for each in sorted(self._channels, key=lambda each: each.is_read)}
         roles = topics.assign_topics(kinds, self._chosen)
-        for each in self._connections:
-            if each.topic in roles.values() and each.msgtype != kinds[each.topic]:
+        for each in self._channels:
+            if each.is_read and each.topic in roles.values() and each.msgtype != kinds[each.topic]:
                 raise RecordingError(f'topic {each.topic}: expected one message type, got {each.msgtype} and {kinds[each.topic]}')
         return roles
 
@@ -189,16 +205,16 @@ class BagWriter:
         self._write(item.topic, item.log_ns, item.raw, connection)
 
     def _write(self, topic: str, log_ns: int, raw: bytes | memoryview, connection: Mapping[str, Any]) -> None:
-        if topic not in self._connections:
-            self._connections[topic] = self._writer.add_connection(topic, **connection)
         with self._named_errors():
+            if topic not in self._connections:
+                self._connections[topic] = self._writer.add_connection(topic, **connection)
             self._writer.write(self._connections[topic], log_ns, raw)
 
     @contextmanager
     def _named_errors(self) -> Iterator[None]:
         try:
             yield
-        except (OSError, WriterError) as error:
+        except (OSError, WriterError, ValueError, KeyError) as error:  # such as a type without a definition
             raise RecordingError(f'{self.path}: cannot be written: {error}') from error
 
 
@@ -214,36 +230,64 @@ def check_new_bag(path: Path) -> None:
         raise RecordingError(f'{path}: exists already and is not overwritten; choose another name')
 
 
-def _build_typestore(connections: Iterable[Connection]) -> Typestore:
-    """Return the types of some connections by the definitions in the bag, or by :data:`TYPESTORE` if it has none."""
-    typestore = get_typestore(Stores.EMPTY)
-    for each in connections:
-        if each.msgdef.format == MessageDefinitionFormat.MSG:
-            typestore.register(get_types_from_msg(each.msgdef.data, each.msgtype))
-        elif each.msgdef.format == MessageDefinitionFormat.IDL:
-            for part in re.split(r'^=+\nIDL: .*\n', each.msgdef.data, flags=re.MULTILINE):
-                typestore.register(get_types_from_idl(part) if part else {})
-        else:
-            return TYPESTORE
-    return typestore
+def is_bag_file(path: Path) -> bool:
+    """Return whether a file has the name of a recording."""
+    return path.is_file() and _strip_compression(path.name).endswith(tuple(FILE_TYPES))
 
 
-def _read_metadata(path: Path) -> dict[str, Any]:
-    """Return what metadata.yaml says about a bag; without the file, that it has MCAP files."""
-    file = path / 'metadata.yaml'
-    if not path.is_dir() or not file.exists():
-        return {'storage_identifier': 'mcap'} if path.is_dir() else {}
-    stated: dict[str, Any] = yaml.safe_load(file.read_text('utf-8'))['rosbag2_bagfile_information']
-    return stated
+def _strip_compression(name: str) -> str:
+    return PurePath(name).stem if name.endswith(COMPRESSED) else name
+
+
+def _decompress(data: bytes) -> bytes:
+    """Return the content of compressed bytes, which may not state its size; the bytes themselves where they are damaged."""
+    try:
+        return zstandard.ZstdDecompressor().decompressobj().decompress(data)
+    except zstandard.ZstdError:
+        return data
+
+
+def _list_files(folder: Path) -> tuple[list[Path], int | None]:
+    """Return the files of a bag directory and the number of messages that its metadata.yaml states, None if it has none.
+
+    The file is not needed to read a bag, so a wrong one is only named.
+    """
+    found: dict[str, Path] = {}
+    for path in sorted(folder.iterdir()):
+        if is_bag_file(path):
+            found.setdefault(_strip_compression(path.name), path)
+    metadata = folder / 'metadata.yaml'
+    if not metadata.exists():
+        return list(found.values()), None
+    try:
+        stated = yaml.safe_load(metadata.read_text('utf-8'))['rosbag2_bagfile_information']
+        count = stated['message_count']
+        names = list(dict.fromkeys(_strip_compression(PurePath(each).name) for each in stated['relative_file_paths']))
+        if not names or not isinstance(count, int):
+            raise ValueError('it names no file, or no number of messages')
+    except Exception as error:  # whatever stands in it
+        reason = ' '.join(str(error).split()) or type(error).__name__
+        warn(f'{metadata}: not the metadata of a bag, and not used ({type(error).__name__}: {reason})')
+        return list(found.values()), None
+    if not set(names) & set(found):
+        warn(f'{metadata}: of another bag, and not used: it names {", ".join(names)}, and here is {", ".join(found) or "none"}')
+        return list(found.values()), None
+    if missing := [name for name in names if name not in found]:
+        warn(f'{folder}: {", ".join(missing)}, which metadata.yaml names, is missing')
+    if others := [name for name in found if name not in names]:
+        warn(f'{folder}: {", ".join(others)}, which metadata.yaml does not name, is not read')
+    return [found[name] for name in names if name in found], count
 
 
 def _refuse_unreadable(path: Path) -> None:
     """Raise RecordingError for the usual mistakes; the reader finds the others."""
     if not path.exists():
         raise RecordingError('no such file or directory')
-    if path.is_dir() and not (path / 'metadata.yaml').exists() and not any(path.glob('*.mcap')):
-        raise RecordingError('no metadata.yaml and no .mcap file in the directory: not a bag')
-    if path.is_file() and path.suffix not in ('.mcap', '.db3'):
+    if path.is_dir() and not any(map(is_bag_file, path.iterdir())):
+        raise RecordingError('no .mcap or .db3 file in the directory: not a bag')
+    if path.is_file() and path.suffix == '.bag':
+        raise RecordingError('a bag of ROS 1: convert it to ROS 2, for example with rosbags-convert')
+    if not path.is_dir() and not is_bag_file(path):
         raise RecordingError('expected a bag directory, a .mcap or a .db3 file')
     if path.is_file() and not path.stat().st_size:
         raise RecordingError('the file is empty')
@@ -260,6 +304,8 @@ def _named_errors(path: Path) -> Iterator[None]:
         yield
     except RecordingError as error:
         raise RecordingError(f'{path}: {error}') from error
+    except PermissionError as error:
+        raise RecordingError(f'{path}: cannot be read: {error.strerror}') from error
     except Exception as error:
         reason = ' '.join(str(error).split()) or type(error).__name__
         raise RecordingError(f'{path}: cannot be read, it is damaged or cut short ({reason})') from error

@@ -9,6 +9,7 @@ import csv
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -21,6 +22,8 @@ MAX_BYTES = 1_000_000_000
 """Size of a day of motion capture at 200 Hz."""
 MOST_ERRORS = 100
 """Wrong rows after which a table is not read further."""
+SEPARATORS = (',', ';', '\t', '|', ' ')
+"""What may stand between two cells; with another one than the comma, a number may have a decimal comma."""
 SIMILARITY = 0.8
 """Similarity to a missing column from which an unknown one is taken for a misspelt one: `radius_stdev_m` is, `yaw_deg` is not."""
 
@@ -36,11 +39,12 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Row:
-    """One line of a table, and its cells by column name."""
+    """One line of a table, its cells by column name, and the decimal mark of its numbers, in addition to the point."""
 
     file: Path
     line: int
     cells: dict[str, str]
+    decimal_mark: str = '.'
 
     def read_numbers(self, *columns: Column) -> list[float]:
         """Return the cells of some columns; raises RecordingError, with a note for every further wrong cell."""
@@ -51,7 +55,7 @@ class Row:
         if column not in self.cells and default is not None:
             return default
         try:
-            value = float(self.cells[column])
+            value = float(self.cells[column].replace(self.decimal_mark, '.'))
         except ValueError:
             value = math.nan
         if not low <= value <= high:
@@ -93,6 +97,8 @@ def read_rows(
 ) -> Iterator[Row]:
     """Yield the rows of a CSV file with a header; empty lines are skipped, and other columns are allowed.
 
+    The separator is one of :data:`SEPARATORS`, found in the header.
+
     optional: columns that may be missing; instead: columns that together replace a needed one.
 
     Raises RecordingError for a file that cannot be read, for one that lacks a needed column, names a column twice or has a
@@ -102,17 +108,24 @@ def read_rows(
         with file.open(newline='', encoding='utf-8-sig') as stream:
             if file.stat().st_size > MAX_BYTES:
                 raise RecordingError(f'{file}: expected at most {MAX_BYTES:,} bytes, got {file.stat().st_size:,}')
-            reader = csv.reader(stream, strict=True)
+            first = stream.readline()
+            separator = _find_separator(first, {*needed, *optional})
+            decimal_mark = '.' if separator == ',' else ','
+            reader = csv.reader(chain([first], stream), delimiter=separator, skipinitialspace=True, strict=True)
             header = _check_header(file, next(reader, []), needed, optional, instead)
             errors: list[RecordingError] = []
             for cells in reader:
                 if len(errors) == MOST_ERRORS:
                     break
                 if any(cell.strip() for cell in cells) and len(cells) != len(header):
-                    words = f'expected {len(header)} cells, got {len(cells)}'
+                    hint = (
+                        ' (are there decimal commas? then separate the cells by semicolons)' if len(cells) > len(header) else ''
+                    )
+                    words = f'expected {len(header)} cells, got {len(cells)}{hint}'
                     errors.append(RecordingError(f'{file}: row {reader.line_num}: {words}'))
                 elif any(cell.strip() for cell in cells):
-                    yield Row(file, reader.line_num, {name: cell.strip() for name, cell in zip(header, cells, strict=True)})
+                    named = {name: cell.strip() for name, cell in zip(header, cells, strict=True)}
+                    yield Row(file, reader.line_num, named, decimal_mark)
             if errors:
                 raise join_errors(errors)
     except OSError as error:
@@ -121,6 +134,11 @@ def read_rows(
         raise RecordingError(f'{file}: expected UTF-8 text, got byte {error.object[error.start]:#04x}') from error
     except csv.Error as error:
         raise RecordingError(f'{file}: not a CSV table: {error}') from error
+
+
+def _find_separator(header: str, columns: set[str]) -> str:
+    """Return the separator by which a line has the most names of columns; the comma if all are equal."""
+    return max(SEPARATORS, key=lambda each: len({cell.strip(' "\r\n') for cell in header.split(each)} & columns))
 
 
 def _check_header(
@@ -133,7 +151,8 @@ def _check_header(
     missing = [name for name in needed if not any(set(kind) <= set(header) for kind in ((name,), instead.get(name, (name,))))]
     if missing:
         raise RecordingError(f'{file}: row 1: no column {", ".join(missing)}; it has {", ".join(header)}')
-    if len(set(header)) < len(header):
+    named = [name for name in header if name]  # a spreadsheet adds empty columns
+    if len(set(named)) < len(named):
         raise RecordingError(f'{file}: row 1: a column is named twice: {", ".join(header)}')
     absent = [name for name in optional if name not in header]
     misspelt = [

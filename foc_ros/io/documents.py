@@ -45,10 +45,15 @@ class _StrictLoader(yaml.SafeLoader):
 
     def construct_yaml_int(self, node: yaml.ScalarNode) -> Any:
         """Return the number; see :data:`MAX_DIGITS`."""
-        return super().construct_yaml_int(node) if len(node.value) <= MAX_DIGITS else node.value
+        return super().construct_yaml_int(node) if len(node.value) <= MAX_DIGITS and ':' not in node.value else node.value
+
+    def construct_yaml_float(self, node: yaml.ScalarNode) -> Any:
+        """Return the number; `1:30.0` remains a text, as it is for ROS and YAML 1.2, and does not become 90.0."""
+        return super().construct_yaml_float(node) if ':' not in node.value else node.value
 
 
 _StrictLoader.add_constructor('tag:yaml.org,2002:int', _StrictLoader.construct_yaml_int)
+_StrictLoader.add_constructor('tag:yaml.org,2002:float', _StrictLoader.construct_yaml_float)
 # as for ROS, and YAML 1.2, 1e-3 is a number; for PyYAML only 1.0e-3 is one
 _EXPONENT = re.compile(r'[-+]?[0-9]+e[-+]?[0-9]+$', re.IGNORECASE)
 _StrictLoader.add_implicit_resolver('tag:yaml.org,2002:float', _EXPONENT, list('-+0123456789'))
@@ -62,7 +67,7 @@ def read_document(file: Path) -> Any:
             held = opened.read(MAX_BYTES + 1)
         if len(held) > MAX_BYTES:
             raise RecordingError(f'{file}: expected at most {MAX_BYTES:,} bytes, got more')
-        text = held.decode('utf-8')
+        text = held.decode('utf-8-sig')
         document = _parse_json(text) if is_json else parse_yaml(text)
         _check_depth(document)
         return document

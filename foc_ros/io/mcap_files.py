@@ -1,75 +1,91 @@
-"""One MCAP file: its channels of ROS messages, and the messages of those that are needed.
+"""One MCAP file: its channels, and the messages of those that are needed.
 
-Channels with another encoding than that of ROS, such as JSON, are left out, and no definition of a message is parsed here. A file
-without its footer, whose recorder was killed, is read up to its last whole chunk.
+The summary at the end of a file is used only where it describes everything; otherwise the file is scanned. A file without its
+footer, whose recorder was killed, is read up to its last whole chunk.
 """
 
 from __future__ import annotations
 
 import struct
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 from mcap.exceptions import EndOfFile
 from mcap.reader import make_reader
-from mcap.records import Channel, Message, Schema, Statistics
+from mcap.records import Channel as ChannelRecord
+from mcap.records import Message, Schema, Statistics
 from mcap.stream_reader import MAGIC_SIZE, StreamReader
-from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefinition, MessageDefinitionFormat
-from rosbags.rosbag2.metadata import parse_qos
+from mcap.summary import Summary
+
+from foc_ros.core.errors import RecordingError
+
+from .channels import Channel
+from .checksums import check_checksums
 
 MAGIC = b'\x89MCAP0\r\n'
-FORMATS = {'ros2msg': MessageDefinitionFormat.MSG, 'ros2idl': MessageDefinitionFormat.IDL}
 
 
 class McapFile:
     """A file, to be closed after use.
 
-    Attributes: path; connections, in rosbags' terms, with the number of messages that the file states or, without a footer, has;
-    message_count, of all channels; times_ns, of the first and the last message; is_cut, whether the footer is missing.
+    Attributes: channels; message_count, of all channels; times_ns, of the first and the last message; loss, why messages that the
+    recorder received are missing, empty if the file is whole; doubt, why they may be missing where nothing states their number.
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
+        check_checksums(path)
         self._stream = path.open('rb')
         try:
-            self.is_cut = not _has_footer(self._stream)
-            summary = None if self.is_cut else make_reader(self._stream).get_summary()
-            statistics = summary.statistics if summary is not None else None
-            if summary is None or statistics is None:
-                schemas, channels, statistics = self._scan()
-            else:
-                schemas, channels = summary.schemas, summary.channels
+            self._open()
         except BaseException:
             self.close()
             raise
-        counts = statistics.channel_message_counts
-        self.message_count = statistics.message_count
-        self.times_ns = statistics.message_start_time, statistics.message_end_time
-        self.connections = [
-            _describe(channel, schemas.get(channel.schema_id), counts.get(channel.id, 0))
-            for channel in channels.values()
-            if channel.message_encoding == 'cdr' and channel.schema_id in schemas
-        ]
 
     def close(self) -> None:
         """Close the file."""
         self._stream.close()
 
-    def messages(self, connections: Collection[Connection]) -> Iterator[tuple[Connection, int, bytes]]:
-        """Yield connection, log time [ns] and bytes of every message of some connections, in order of log time."""
-        wanted = {each.id: each for each in connections}
-        if self.is_cut:
-            found = [each for each in self._records() if isinstance(each, Message) and each.channel_id in wanted]
-            for message in sorted(found, key=lambda each: each.log_time):
-                yield wanted[message.channel_id], message.log_time, message.data
-            return
-        self._stream.seek(0)
-        reader = make_reader(self._stream, validate_crcs=True)
-        for _, channel, message in reader.iter_messages(topics={each.topic for each in connections}):
-            if channel.id in wanted:
-                yield wanted[channel.id], message.log_time, message.data
+    def messages(self, channels: list[Channel]) -> Iterator[tuple[Channel, int, bytes]]:
+        """Yield channel, log time [ns] and bytes of every message of some channels, in the order of their log times."""
+        by_key = {each.key: each for each in channels}
+        if self._is_indexed:
+            self._stream.seek(0)
+            reader = make_reader(self._stream, validate_crcs=True)
+            found: Iterator[Message] = (
+                message for _, _, message in reader.iter_messages(topics={each.topic for each in channels})
+            )
+        else:
+            messages = [each for each in self._records() if isinstance(each, Message) and each.channel_id in by_key]
+            found = iter(sorted(messages, key=lambda each: each.log_time))
+        for message in found:
+            if message.channel_id in by_key:
+                yield by_key[message.channel_id], message.log_time, message.data
+
+    def _open(self) -> None:
+        is_cut = not _has_footer(self._stream)
+        self.doubt = ''
+        self.loss = 'the recorder was killed; read up to the last whole chunk' if is_cut else ''
+        summary = None if is_cut else self._read_summary()
+        self._is_indexed = summary is not None
+        if summary is None:
+            summary = self._scan()
+        statistics, schemas = summary.statistics, summary.schemas
+        self.message_count = statistics.message_count
+        self.times_ns = statistics.message_start_time, statistics.message_end_time
+        self.channels = [
+            _describe(channel, schemas.get(channel.schema_id), statistics.channel_message_counts.get(channel.id, 0))
+            for channel in summary.channels.values()
+        ]
+
+    def _read_summary(self) -> Summary | None:
+        """Return the summary at the end of the file, None where it does not describe everything."""
+        try:
+            summary = make_reader(self._stream).get_summary()
+            return summary if summary is not None and _is_complete(summary) else None
+        except Exception:  # the offset in the footer may lead anywhere
+            return None
 
     def _records(self) -> Iterator[object]:
         """Yield the records of the file, those of its chunks too; without a footer, up to the last whole one."""
@@ -77,25 +93,27 @@ class McapFile:
         try:
             yield from StreamReader(self._stream, validate_crcs=True).records
         except (EndOfFile, struct.error):  # the last record has no end, or no head
-            if not self.is_cut:
+            if not self.loss:
                 raise
 
-    def _scan(self) -> tuple[dict[int, Schema], dict[int, Channel], Statistics]:
-        """Return schemas and channels by id, and the statistics, of a file that has no summary of them."""
-        schemas: dict[int, Schema] = {}
-        channels: dict[int, Channel] = {}
-        counts: Counter[int] = Counter()
-        start_ns, end_ns = 1 << 63, 0
+    def _scan(self) -> Summary:
+        """Return the summary of the records themselves, which must be as many as the statistics state if there are any."""
+        summary, counts, start_ns, end_ns = Summary(), Counter[int](), 1 << 64, 0
         for record in self._records():
             if isinstance(record, Schema):
-                schemas[record.id] = record
-            elif isinstance(record, Channel):
-                channels[record.id] = record
+                summary.schemas[record.id] = record
+            elif isinstance(record, ChannelRecord):
+                summary.channels[record.id] = record
             elif isinstance(record, Message):
                 counts[record.channel_id] += 1
                 start_ns, end_ns = min(start_ns, record.log_time), max(end_ns, record.log_time)
-        statistics = Statistics(0, len(channels), dict(counts), 0, counts.total(), end_ns, start_ns, 0, len(schemas))
-        return schemas, channels, statistics
+            elif isinstance(record, Statistics) and record.message_count != counts.total():
+                raise RecordingError(f'damaged or cut short: {counts.total()} of its {record.message_count} messages can be read')
+        if lost := sum(count for key, count in counts.items() if key not in summary.channels):
+            raise RecordingError(f'damaged: {lost} of its {counts.total()} messages belong to no channel')
+        sizes = len(summary.schemas), len(summary.channels)
+        summary.statistics = Statistics(0, sizes[1], dict(counts), 0, counts.total(), end_ns, start_ns, 0, sizes[0])
+        return summary
 
 
 def _has_footer(stream: BinaryIO) -> bool:
@@ -107,10 +125,21 @@ def _has_footer(stream: BinaryIO) -> bool:
     return has_magic
 
 
-def _describe(channel: Channel, schema: Schema | None, count: int) -> Connection:
-    assert schema is not None
-    form = FORMATS.get(schema.encoding, MessageDefinitionFormat.NONE)
-    definition = MessageDefinition(form, schema.data.decode(errors='replace'))
-    qos = parse_qos(channel.metadata.get('offered_qos_profiles', ''))
-    extension = ConnectionExtRosbag2(channel.message_encoding, qos)
-    return Connection(channel.id, channel.topic, schema.name, definition, '', count, extension, None)
+def _is_complete(summary: Summary) -> bool:
+    """Return whether a summary has all of its records, each of which is optional."""
+    stated = summary.statistics
+    if stated is None or set(stated.channel_message_counts) - set(summary.channels):
+        return False
+    schemas = {each.schema_id for each in summary.channels.values()} - {0}
+    return (
+        (len(summary.channels), len(summary.chunk_indexes)) == (stated.channel_count, stated.chunk_count)
+        and schemas <= set(summary.schemas)
+        and sum(stated.channel_message_counts.values()) == stated.message_count
+        and (stated.chunk_count > 0 or stated.message_count == 0)
+    )
+
+
+def _describe(channel: ChannelRecord, schema: Schema | None, count: int) -> Channel:
+    name, form, text = ('', '', b'') if schema is None else (schema.name, schema.encoding, schema.data)
+    qos = channel.metadata.get('offered_qos_profiles', '')
+    return Channel(channel.id, channel.topic, name, channel.message_encoding, form, text.decode(errors='replace'), qos, count)

@@ -95,7 +95,7 @@ def write_report(
     try:
         directory.mkdir(parents=True, exist_ok=True)
         pictures = _write_pictures(directory, hand, tracks, spans)
-        page_file.write_text(html, encoding='utf-8')
+        page_file.write_text(html, encoding='utf-8', errors='replace')
         numbers_file.write_text(json.dumps(numbers, indent=1, allow_nan=False), encoding='utf-8')
     except OSError as error:
         raise InputError('report directory', 'a directory that can be written', f'{directory}: {error.strerror}') from error

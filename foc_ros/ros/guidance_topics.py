@@ -15,6 +15,7 @@ from foc_ros.io.topics import COMMAND
 from .endpoints import create_guidance_publishers
 from .guidance_loop import GuidanceLoop
 from .health import THROTTLE_S
+from .messages.decode_poses import decode_frame
 from .messages.encode_guidance import GUIDANCE_OUTPUTS, TWIST, Place, blend_twist, encode_guidance_markers
 from .messages.types import MessageTypes, RclpyTypes
 
@@ -65,7 +66,7 @@ class GuidanceTopics:
         if not config.guidance.enabled:
             return
         if output is not None and place is not None and monotonic() - output.t <= config.guidance.hold_s:
-            frame_id = command.header.frame_id
+            frame_id = decode_frame(command.header)
             if frame_id == place.frame_id:
                 command = blend_twist(output, command, config.plane, types)
             else:

@@ -5,6 +5,7 @@ Times named `now_s` are of the steady clock [s].
 
 from __future__ import annotations
 
+import math
 from collections import Counter, deque
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -52,6 +53,11 @@ class Freshness:
         self._age_s = 0.0
         self._has_ros_time = False
         self._is_moving = False
+        self._refused_s, self._refusal = -math.inf, ''
+
+    def note_refused(self, now_s: float, reason: str) -> None:
+        """Store why a hand pose was refused that arrived at a time."""
+        self._refused_s, self._refusal = now_s, reason
 
     def note_received(self, role: str, now_s: float) -> None:
         """Store the time at which a message was accepted."""
@@ -83,6 +89,8 @@ class Freshness:
         """
         limit_s = config.estimator.hand_timeout_s
         silence_s = now_s - self.received_s(HAND, now_s)
+        if 0.0 < limit_s < silence_s and now_s - self._refused_s <= limit_s:
+            return 'hand_refused', f'no hand_pose could be used for {silence_s:.1f} s, the last: {self._refusal}'
         if 0.0 < limit_s < silence_s:
             return 'hand_silent', f'hand_pose silent for {silence_s:.1f} s (estimator.hand_timeout_s is {limit_s:g})'
         if self._has_ros_time and 0.0 < limit_s < abs(self._age_s):
@@ -191,6 +199,8 @@ class Monitor:
         pipeline, seconds = intake.pipeline, max(now_s - self._reported_s, 1e-3)
         totals = Counter(intake.counts) + self._counts
         recent = totals - self._counts_before
+        hand = self._inputs.get(HAND, _Input())
+        repeated, poses = recent['hand_duplicate'], hand.received - hand.received_before
         values = {
             'state': state,
             'engaged': str(pipeline.is_engaged),
@@ -213,13 +223,16 @@ class Monitor:
         for entry in self._inputs.values():
             entry.received_before = entry.received
         reasons = [*unheard, *([] if not_ready_reason is None else [f'no prediction: {not_ready_reason}'])]
+        if 2 * repeated >= poses > 0:
+            reasons.append(f'hand_pose: stamps repeat: {repeated} of {poses} poses have that of the pose before')
         if busy_s > BUSY_S:
             reasons.append(f'busy: a prediction has been computed for {busy_s:.1f} s')
         if recent['predict_too_late']:
             reasons.append(f'busy: {self._late}')
         if self._is_punctual(recent, now_s):
             del recent[DROPPED]
-        return Health(*self._judge(pipeline, recent, state, reasons), values)
+        level, message = self._judge(pipeline, recent, state, reasons)
+        return Health(level, '; '.join(filter(None, [message, intake.describe_still_hand()])), values)
 
     def _is_punctual(self, recent: Counter[str], now_s: float) -> bool:
         """Return whether predictions are fresh and within their budget, so that hand samples between them are not missed."""

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from foc_ros.core.errors import MessageError
+from foc_ros.core.errors import LostHandError, MessageError
 from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
@@ -18,6 +18,11 @@ from .messages.decode_objects import CollisionTable, decode_detections
 from .messages.decode_point_cloud import decode_point_cloud
 from .messages.decode_poses import decode_goal, decode_goals, decode_hand_sample, decode_stamp
 from .transforms import Arrival
+
+DROPPED = '_dropped_'
+"""Between input and reason in the name of a count of parts of messages that were left out."""
+STILL_S = 1.0
+"""Time with the same position after which this is told [s]: a tracker repeats its last pose, or a simulated hand rests."""
 
 
 class Intake:
@@ -31,6 +36,7 @@ class Intake:
     def __init__(self, pipeline: Pipeline) -> None:
         self.pipeline = pipeline
         self.sample: HandSample | None = None
+        self._still: HandSample | None = None  # the first of those that were used with the same position as the last one
         self.last_refusal: str | None = None
         self._markers = MarkerTable()
         self._markers_ns = 0
@@ -59,9 +65,14 @@ class Intake:
         return self.take(role, arrival.message, arrival.error)
 
     def take(self, role: str, message: Any, transform_error: str = '') -> SampleStatus | None:
-        """Take one message; None if it cannot be decoded. transform_error: why it is not in the working frame."""
+        """Take one message, or the error of its decoding; None if it cannot be decoded.
+
+        transform_error: why it is not in the working frame.
+        """
         refused_before = self.pipeline.refused
         try:
+            if isinstance(message, MessageError):
+                raise message
             status = self._handlers[role](message)
         except MessageError as error:
             self.refuse(role, error)
@@ -72,13 +83,25 @@ class Intake:
 
     def refuse(self, role: str, error: MessageError) -> None:
         """Count a message that cannot be decoded."""
-        self._counts[f'{role}_invalid'] += 1
+        self._counts['hand_lost' if isinstance(error, LostHandError) else f'{role}_invalid'] += 1
         self.last_refusal = f'{role}: {error}'
+
+    def describe_still_hand(self) -> str:
+        """Return in words for how long all poses have had the same position; empty if that is less than `STILL_S`."""
+        still_s = 0.0
+        if self.sample is not None and self._still is not None:
+            still_s = (self.sample.stamp_ns - self._still.stamp_ns) / NANOSECONDS
+        return f'the hand does not move: the same position for {still_s:.1f} s' if still_s >= STILL_S else ''
 
     def is_skipped(self, stamp_ns: int) -> bool:
         """Return whether a hand pose of a stamp [ns] will be skipped if it is the next one."""
         hand, interval_s = self.pipeline.hand_state, self.pipeline.config.estimator.min_interval_s
         return hand is not None and 0 < stamp_ns - hand.stamp_ns < int(interval_s * NANOSECONDS)
+
+    def count_dropped(self, role: str, reason: str, count: int) -> None:
+        """Count parts of messages of an input, or of transforms, that were left out."""
+        if count:
+            self._counts[f'{role}{DROPPED}{reason}'] += count
 
     def count_skipped(self) -> SampleStatus:
         """Count a hand pose that is skipped."""
@@ -96,8 +119,12 @@ class Intake:
     def _take_hand(self, message: Any) -> SampleStatus:
         if self.is_skipped(decode_stamp(message.header)):
             return self.count_skipped()
-        self.sample = decode_hand_sample(message, self.pipeline.config.plane)
-        status = self.pipeline.add_hand_sample(self.sample)
+        self.sample = sample = decode_hand_sample(message, self.pipeline.config.plane)
+        status = self.pipeline.add_hand_sample(sample)
+        still = self._still
+        is_same = still is not None and (*still.position, still.height) == (*sample.position, sample.height)
+        if status.is_taken and (not is_same or status.is_restart):
+            self._still = sample
         start_ns, end_ns = self._markers_unchanged
         if status.is_taken and not start_ns <= self.sample.stamp_ns < end_ns:
             self._set_markers(self._markers)
@@ -159,5 +186,6 @@ class Intake:
 
     def _count_dropped(self, role: str, dropped: Mapping[str, int], status: SampleStatus) -> SampleStatus:
         if status.is_taken:
-            self._counts.update({f'{role}_dropped_{reason}': count for reason, count in dropped.items()})
+            for reason, count in dropped.items():
+                self.count_dropped(role, reason, count)
         return status

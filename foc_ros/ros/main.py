@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import Any
 
-from foc_ros.core.errors import FocError, ParameterError, list_messages
+from foc_ros.core.errors import FocError, ParameterError, list_messages, print_warnings
 
 from .parameters import check_parameters
 
@@ -67,7 +67,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     stop = StopSignals()
     given = ['foc_node', *(sys.argv[1:] if arguments is None else arguments)]
     try:
-        check_parameters(given)
+        with print_warnings('foc_node'):
+            check_parameters(given)
     except ParameterError as error:
         return _reject(error)
     import rclpy
@@ -85,6 +86,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         forerunner = _join_graph(context)
     except (FocError, RuntimeError, ValueError) as error:
         context.try_shutdown()
+        if 'initialize logging' in str(error):
+            error.add_note('ROS_LOG_DIR names another directory for the log')
         return _reject(error)
     stop.resume(forerunner.destroy_node)
     from .node import FocNode

@@ -266,6 +266,8 @@ class FocNode(LifecycleNode):
         is_refused = status is None or status.is_refused
         refused, received = self._monitor.note_message(role, received_s, is_refused=is_refused)
         if is_refused:
+            if role == HAND:
+                self._freshness.note_refused(received_s, self.intake.last_refusal or '')
             text = f'{self.intake.last_refusal} ({refused} of {received} refused so far)'
             self._loggers[role].warning(text, throttle_duration_sec=THROTTLE_S)
 

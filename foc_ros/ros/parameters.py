@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,11 +16,12 @@ from typing import Any
 import yaml
 
 from foc_ros.core.config import Config, Parameter, flatten, list_parameters, replace_values
-from foc_ros.core.errors import FocError, InputError, ParameterError
+from foc_ros.core.errors import FocError, InputError, ParameterError, warn
 from foc_ros.io.documents import parse_yaml, read_document
 
-NODE_KEYS = ('/**', 'foc', '/foc')
-"""Sections of a parameter file that the node reads under its default name."""
+NODE = '/foc'
+"""Name of the node, with its namespace, unless it is started with another one."""
+_REMAP = re.compile(r'__(node|name|ns):=(\S+)')
 AUTOSTART = 'autostart'
 NODE_ONLY = ('use_sim_time', 'start_type_description_service', 'qos_overrides', AUTOSTART)
 """Parameters of the node alone, which may stand in the same file; the predictor does not use them."""
@@ -30,27 +32,26 @@ _WIDTH = 100
 def load_parameter_file(path: Path | str) -> Config:
     """Return the configuration of a ROS 2 parameter file; parameters that it does not contain have their defaults.
 
-    Later sections override earlier ones; sections of other nodes and parameters of the node alone are skipped. Raises
-    ParameterError, naming the parameter, for one that is unknown or out of bounds, with a note for every further one, and
-    RecordingError if the file is no YAML.
+    Later sections override earlier ones; sections that do not apply to the node `NODE` are skipped with a warning, and parameters
+    of the node alone without one. Raises ParameterError, naming the parameter, for one that is unknown or out of bounds, with a
+    note for every further one, and where no section applies, and RecordingError if the file is no YAML.
     """
-    return replace_values(Config(), _read_values(path))
+    return replace_values(Config(), _read_values(path, NODE, is_needed=True))
 
 
 def check_parameters(arguments: Sequence[str]) -> None:
     """Raise ParameterError for wrong parameters in the ROS arguments of a node, before the node is imported, which takes seconds.
 
-    This leaves to the node what it cannot read as simply as ROS would: a node with another name or namespace, a file without a
-    section for the default name, parameters of one node among several, and texts that PyYAML takes for dates or numbers. The
-    node checks all that it is given.
+    This leaves to the node what it cannot read as simply as ROS would: parameters of one node among several, and texts that
+    PyYAML takes for dates or numbers. The node checks all that it is given.
     """
     values: dict[str, object] = {}
+    names = {'node': 'foc', 'ns': ''} | {key.replace('name', 'node'): value for key, value in _REMAP.findall(' '.join(arguments))}
+    node = f'/{names["ns"].strip("/")}/{names["node"]}'.replace('//', '/')
     try:
         for option, given in pairwise(arguments):
-            if any(rule in given for rule in ('__node:=', '__name:=', '__ns:=')):
-                return
             if option == '--params-file':
-                values.update(_read_values(given))
+                values.update(_read_values(given, node, is_needed=False))
             elif option in ('-p', '--param'):
                 name, _, text = given.partition(':=')
                 if ':' in name:
@@ -64,23 +65,49 @@ def check_parameters(arguments: Sequence[str]) -> None:
     replace_values(Config(), values)
 
 
-def _read_values(path: Path | str) -> dict[str, object]:
-    """Return the values of a parameter file by dotted name; see `load_parameter_file`."""
+def _read_values(path: Path | str, node: str, *, is_needed: bool) -> dict[str, object]:
+    """Return the values of a parameter file for a node by dotted name; see `load_parameter_file`.
+
+    is_needed: whether a file without a section for the node is an error.
+    """
     document = read_document(Path(path))
-    if not isinstance(document, Mapping) or not any(key in NODE_KEYS for key in document):
-        keys = ', '.join(map(str, document)) if isinstance(document, Mapping) else type(document).__name__
-        raise ParameterError(str(path), f'a section {" or ".join(NODE_KEYS)}', keys or 'an empty file')
+    expected = f'a section for the node {node}, such as /** or {node}'
+    if not isinstance(document, Mapping):
+        raise ParameterError(str(path), expected, 'an empty file' if document is None else type(document).__name__)
     values: dict[str, object] = {}
-    for key, section in document.items():
-        if key in NODE_KEYS:
-            if not isinstance(section, Mapping) or not isinstance(section.get('ros__parameters'), Mapping):
-                raise ParameterError(f'{path}: {key}', 'ros__parameters with parameters below it', repr(section)[:_WIDTH])
-            given = list(_flatten_group(section['ros__parameters']))
-            names = Counter(name for name, _ in given)
+    sections = list(_list_sections(document, str(path)))
+    others = [name for name, _ in sections if not _applies(name, node)]
+    if is_needed and len(others) == len(sections):
+        raise ParameterError(str(path), expected, ', '.join(others) or 'none')
+    if others:
+        warn(f'{path}: {", ".join(others)} {"does" if len(others) == 1 else "do"} not apply to the node {node}')
+    for name, section in sections:
+        if name not in others:
+            given = list(_flatten_group(section))
+            names = Counter(each for each, _ in given)
             if len(names) < len(given):
-                raise ParameterError(names.most_common(1)[0][0], f'one value in section {key}', 'two, nested and dotted')
+                raise ParameterError(names.most_common(1)[0][0], f'one value in section {name}', 'two, nested and dotted')
             values.update(given)
     return values
+
+
+def _list_sections(group: Mapping[Any, object], path: str, name: str = '') -> Iterator[tuple[str, Mapping[Any, object]]]:
+    """Yield the sections of a parameter file, each with the name of its nodes, which may be nested."""
+    for key, value in group.items():
+        inner = name if key == 'ros__parameters' else f'{name}/{str(key).strip("/")}'
+        if not isinstance(value, Mapping) or (not value and inner != name):
+            given = group if name else value
+            raise ParameterError(f'{path}: {name or inner}', 'ros__parameters with parameters below it', repr(given)[:_WIDTH])
+        if inner == name:
+            yield name, value
+        else:
+            yield from _list_sections(value, path, inner)
+
+
+def _applies(section: str, node: str) -> bool:
+    """Return whether rcl applies a section to a node: `*` stands for one part of its name, `**` for any number of them."""
+    pattern = re.escape(section).replace(r'/\*\*', r'(/\w+)*').replace(r'/\*', r'/\w+')
+    return re.fullmatch(pattern, node) is not None
 
 
 def _flatten_group(group: Mapping[Any, object], prefix: str = '') -> Iterator[tuple[str, object]]:

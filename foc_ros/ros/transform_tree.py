@@ -85,11 +85,12 @@ class TransformTree:
     def __init__(self) -> None:
         self._frames: dict[str, _Frame] = {}
 
-    def add(self, message: Any, *, is_static: bool) -> None:
-        """Add the transforms of a tf2_msgs/TFMessage.
+    def add(self, message: Any, *, is_static: bool) -> int:
+        """Add the transforms of a tf2_msgs/TFMessage, and return how many are left out.
 
-        One with a wrong stamp, with a number that is not finite, or without a rotation is left out.
+        These have a wrong stamp, a number that is not finite, no rotation, or one frame as both parent and child.
         """
+        left_out = 0
         for each in message.transforms:
             position = np.array([getattr(each.transform.translation, axis) for axis in 'xyz'], dtype=float)
             quaternion = np.array([getattr(each.transform.rotation, axis) for axis in 'xyzw'], dtype=float)
@@ -97,13 +98,15 @@ class TransformTree:
             try:
                 stamp_ns = decode_stamp(each.header)
             except MessageError:
-                continue
-            if not (np.isfinite([*position, *quaternion]).all() and quaternion.any()) or child == parent:
+                stamp_ns = -1
+            if stamp_ns < 0 or not (np.isfinite([*position, *quaternion]).all() and quaternion.any()) or child == parent:
+                left_out += 1
                 continue
             frame = self._frames.get(child)
             if frame is None or (frame.parent, frame.is_static) != (parent, is_static):
                 frame = self._frames[child] = _Frame(parent, is_static)
             frame.add(_Pose(stamp_ns, position, quaternion))
+        return left_out
 
     def look_up(self, target: str, source: str, stamp_ns: int) -> Transform:
         """Return the transform from one frame to another at a stamp [ns], the newest one for a stamp of 0.

@@ -17,7 +17,7 @@ from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.topics import HAND
 
-from .messages.decode_poses import decode_stamp
+from .messages.decode_poses import check_hand_pose, decode_frame, decode_stamp
 from .messages.transform_messages import Transform, transform_message
 
 MOST_HELD = 1000
@@ -101,6 +101,8 @@ class Transforms:
         is_unneeded = role == HAND and self._is_skipped(decode_stamp(message.header))
         if self._source is None or frame_id is None or is_unneeded:
             return message, False
+        if role == HAND:
+            check_hand_pose(message.pose)  # a transform would move the position 0
         try:
             return transform_message(role, message, frame_id, config.plane, partial(self._find, frame_id)), False
         except TransformUnavailableError:
@@ -111,7 +113,7 @@ class Transforms:
 
     def _find(self, frame_id: str, header: Any) -> Transform:
         assert self._source is not None
-        return self._source.look_up(frame_id, header.frame_id, decode_stamp(header))
+        return self._source.look_up(frame_id, decode_frame(header), decode_stamp(header))
 
     def _find_newest(self, frame_id: str, tolerance_s: float, header: Any) -> Transform:
         """Return the transform for a header or else the newest one, if its stamp differs by the tolerance [s] at most."""
@@ -119,7 +121,7 @@ class Transforms:
             return self._find(frame_id, header)
         except TransformUnavailableError as reason:
             assert self._source is not None
-            newest = self._source.look_up(frame_id, header.frame_id, 0)
+            newest = self._source.look_up(frame_id, decode_frame(header), 0)
             late_s = (decode_stamp(header) - newest.stamp_ns) / NANOSECONDS
             if abs(late_s) > tolerance_s:
                 text = f'{reason}; the newest one is {abs(late_s):.3g} s {"older" if late_s > 0.0 else "newer"} than the message'

@@ -18,7 +18,7 @@ from foc_ros.core.classes.rows import Decisions, Rows, find_decisions, find_dire
 from foc_ros.core.classes.sides import BranchTimes, compute_branch_times
 from foc_ros.core.config import Config
 from foc_ros.core.dynamics.predictive_covariance import compute_duration_sensitivity
-from foc_ros.core.errors import FocError, RecordingError
+from foc_ros.core.errors import FocError, RecordingError, warn
 from foc_ros.core.estimation.duration import get_time_price, is_passing
 from foc_ros.core.obstacles.chance_constraint import centre_trajectories
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Obstacles, PredictedCandidate, Prediction, Record, Solution
@@ -126,9 +126,12 @@ def observe(recording: Recording, config: Config, replayed: Replay | None = None
         if step.prediction is not None and step.prediction.candidates_with_likelihood:
             assert replayed.pipeline.hand_state is not None
             made.append((step, replayed.pipeline.hand_state, replayed.pipeline.adapted_config))
+    losses = replayed.describe_losses()
     if not made:
-        reason = replayed.describe_refusals() or replayed.pipeline.not_ready_reason() or 'no candidate could be solved'
+        reason = losses or replayed.pipeline.not_ready_reason() or 'no candidate could be solved'
         raise RecordingError(f'{recording.name}: nothing could be predicted: {reason}')
+    if losses:
+        warn(losses)
     goals = made[-1][0].scene.goals
     assert goals is not None
     path = RecordedPath(np.array(stamps), np.array(positions), goals)

@@ -54,7 +54,7 @@ def write_page(directory: Path, name: str, page: str) -> None:
     check_replaceable('--report', directory / name)
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        (directory / name).write_text(page, encoding='utf-8')
+        (directory / name).write_text(page, encoding='utf-8', errors='replace')
     except OSError as error:
         raise InputError('--report', 'a folder that can be written', f'{directory}: {error.strerror}') from error
 

@@ -20,7 +20,7 @@ from foc_ros.core.types import NANOSECONDS, UNKNOWN_HEIGHTS, Array, Obstacles, m
 
 from .decode_objects import encode_name
 from .decode_point_cloud import MAX_ROWS
-from .decode_poses import MAX_COORDINATE, check_coordinate, decode_stamp
+from .decode_poses import MAX_COORDINATE, check_coordinate, decode_frame, decode_stamp
 from .plane import compute_rotation, make_heights, project, project_box
 
 ADD, DELETE, DELETE_ALL = 0, 2, 3
@@ -91,7 +91,7 @@ class MarkerTable:
             elif marker.action == DELETE or reason == 'not_a_shape':
                 held.pop(key, None)
             elif reason is None:
-                given = str(marker.header.frame_id)
+                given = decode_frame(marker.header)
                 if held and given != frame_id:
                     raise MessageError(f'{name}.header.frame_id', f"'{frame_id}', as the other markers", f"'{given}'")
                 frame_id = given

@@ -19,7 +19,7 @@ from foc_ros.core.obstacles.shapes import make_hull_polygon
 from foc_ros.core.types import UNKNOWN_HEIGHTS, Array, Obstacles, make_obstacles
 
 from .decode_point_cloud import MAX_ROWS, DecodedCloud
-from .decode_poses import MAX_COORDINATE, check_coordinate, decode_stamp
+from .decode_poses import MAX_COORDINATE, check_coordinate, decode_frame, decode_stamp
 from .plane import compute_rotation, make_heights, project, project_box
 
 ADD, REMOVE, APPEND, MOVE = range(4)
@@ -69,7 +69,7 @@ class CollisionTable:
         Boxes, spheres and cylinders are obstacles; other primitives, meshes and planes are counted. Raises MessageError, and then
         nothing is changed, for a wrong operation, number of dimensions or poses, size or coordinate, or another frame.
         """
-        stamp_ns, frame_id, name = decode_stamp(message.header), str(message.header.frame_id), str(message.id)
+        stamp_ns, frame_id, name = decode_stamp(message.header), decode_frame(message.header), str(message.id)
         operation = message.operation[0] if isinstance(message.operation, bytes) else int(message.operation)
         held = dict(self.objects)
         if operation == REMOVE:
@@ -109,13 +109,13 @@ def decode_detections(message: Any, plane: str, radius_stddev: float) -> Decoded
     MessageError for a negative size, a box without an extent in the plane, a coordinate beyond MAX_COORDINATE, another frame than
     that of the array, or too many detections.
     """
-    stamp_ns, frame_id = decode_stamp(message.header), str(message.header.frame_id)
+    stamp_ns, frame_id = decode_stamp(message.header), decode_frame(message.header)
     if len(message.detections) > MAX_ROWS:
         raise MessageError('detections', f'at most {MAX_ROWS} obstacles', len(message.detections))
     outlines: dict[str, Outline] = {}
     dropped = Counter[str]()
     for row, each in enumerate(message.detections):
-        label, own_frame = f'detections[{row}]', str(each.header.frame_id)
+        label, own_frame = f'detections[{row}]', decode_frame(each.header)
         if own_frame not in ('', frame_id):
             raise MessageError(f'{label}.header.frame_id', f"'{frame_id}', as the array", f"'{own_frame}'")
         centre, size = each.bbox.center, (each.bbox.size.x, each.bbox.size.y, each.bbox.size.z)

@@ -13,7 +13,7 @@ from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacles.shapes import tabulate_boxes
 from foc_ros.core.types import Array, Obstacles, make_obstacles
 
-from .decode_poses import MAX_COORDINATE, decode_stamp
+from .decode_poses import MAX_COORDINATE, decode_frame, decode_stamp
 from .plane import make_heights, project
 
 REQUIRED = ('x', 'y', 'z', 'radius')
@@ -51,7 +51,7 @@ def decode_point_cloud(message: Any, plane: str) -> DecodedCloud:
     missing or of the wrong type, a radius, size or deviation is negative, a row with the fields of a box has neither size nor
     radius, or a number is beyond MAX_COORDINATE.
     """
-    stamp_ns, frame_id = decode_stamp(message.header), str(message.header.frame_id)
+    stamp_ns, frame_id = decode_stamp(message.header), decode_frame(message.header)
     table = read_table(message)
     if not len(table):
         return DecodedCloud(make_obstacles(), stamp_ns, frame_id, {})

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from foc_ros.core.errors import MessageError
+from foc_ros.core.errors import LostHandError, MessageError
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, as_readonly
 
 from .plane import project
@@ -16,18 +16,39 @@ MAX_COORDINATE = 1e4
 """Largest coordinate of a hand, a goal or an obstacle [m]; a larger one has a wrong unit."""
 
 MAX_GOALS = 256
+NORM_ERROR = 0.1
+"""Difference from 1 of the norm of a rotation that is one, rounded or not normalised."""
 
 
 def decode_hand_sample(message: Any, plane: str) -> HandSample:
     """Decode a geometry_msgs/PoseStamped as a hand sample; the orientation is not used.
 
-    Raises MessageError for a coordinate that is not finite or beyond MAX_COORDINATE, and for a stamp of 0, which means "not set".
+    Raises LostHandError for a pose without data, and MessageError for a coordinate beyond MAX_COORDINATE and for a stamp of 0,
+    which means "not set".
     """
+    check_hand_pose(message.pose)
     stamp_ns = decode_stamp(message.header)
     if stamp_ns == 0:
         raise MessageError('header.stamp', 'a time after 0', '0 s')
     position, height = project(_decode_point(message.pose.position, 'pose.position'), plane)
-    return HandSample(stamp_ns, as_readonly(position), float(height), str(message.header.frame_id))
+    return HandSample(stamp_ns, as_readonly(position), float(height), decode_frame(message.header))
+
+
+def check_hand_pose(pose: Any) -> None:
+    """Raise LostHandError for a geometry_msgs/Pose by which a tracker says that it does not see the hand.
+
+    It has no finite position, or the position 0 with an orientation that is none. A tracker that measures no orientation may
+    leave it empty, but then its hand is hardly ever at 0 exactly.
+    """
+    place, turn = (pose.position.x, pose.position.y, pose.position.z), pose.orientation
+    for axis, value in zip('xyz', place, strict=True):
+        if not math.isfinite(value):
+            raise LostHandError(f'pose.position.{axis}', 'a finite number [m]', value)
+    norm = math.hypot(turn.x, turn.y, turn.z, turn.w)
+    if not any(place) and not abs(norm - 1.0) < NORM_ERROR:
+        raise LostHandError(
+            'pose', 'a position, or an orientation of norm 1', f'0 and norm {norm:g}: the tracker has lost the hand'
+        )
 
 
 class DecodedGoals(NamedTuple):
@@ -44,13 +65,13 @@ def decode_goals(message: Any, plane: str) -> DecodedGoals:
         raise MessageError('poses', f'at most {MAX_GOALS} goals', len(message.poses))
     points = [_decode_point(pose.position, f'poses[{i}].position') for i, pose in enumerate(message.poses)]
     goals, heights = project(np.array(points, dtype=float).reshape(-1, 3), plane)
-    return DecodedGoals(goals, str(message.header.frame_id), heights)
+    return DecodedGoals(goals, decode_frame(message.header), heights)
 
 
 def decode_goal(message: Any, plane: str) -> DecodedGoals:
     """Decode a geometry_msgs/PoseStamped as one goal; the stamp is not used."""
     goals, heights = project([_decode_point(message.pose.position, 'pose.position')], plane)
-    return DecodedGoals(goals, str(message.header.frame_id), heights)
+    return DecodedGoals(goals, decode_frame(message.header), heights)
 
 
 def decode_stamp(header: Any, field: str = 'header.stamp') -> int:
@@ -61,6 +82,11 @@ def decode_stamp(header: Any, field: str = 'header.stamp') -> int:
     if not 0 <= nanoseconds < NANOSECONDS:
         raise MessageError(f'{field}.nanosec', f'below {NANOSECONDS}', nanoseconds)
     return seconds * NANOSECONDS + nanoseconds
+
+
+def decode_frame(header: Any) -> str:
+    """Decode the frame of a std_msgs/Header; a slash before it, as in ROS 1, does not make it another frame."""
+    return str(header.frame_id).lstrip('/')
 
 
 def _decode_point(point: Any, field: str) -> tuple[float, float, float]:

@@ -14,6 +14,7 @@ from foc_ros.io.topics import CLOUD, DETECTIONS, GOALS, MARKERS
 
 from .decode_markers import ADD
 from .decode_point_cloud import read_table
+from .decode_poses import decode_frame
 from .plane import compute_rotation, lift, project
 
 MOST_TILT = 1e-3
@@ -68,7 +69,7 @@ def transform_message(role: str, message: Any, frame_id: str, plane: str, find: 
 
 
 def _transform(role: str, message: Any, frame_id: str, plane: str, find: FindTransform) -> Any:
-    if message.header.frame_id == frame_id:
+    if decode_frame(message.header) == frame_id:
         return message
     found = find(message.header)
     rotation, shift = compute_rotation(found.rotation), _read_xyz(found.translation)

@@ -1,0 +1,53 @@
+"""Commands in unusual environments: they work, or one sentence says why not."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from bag_helpers import messages, write_bag
+
+from foc_ros.io.bags import BagReader
+
+HOMELESS = {'HOME': '/dev/null', 'XDG_CACHE_HOME': '/dev/null', 'XDG_CONFIG_HOME': '/dev/null'}
+ASCII = {'LC_ALL': 'C', 'PYTHONUTF8': '0', 'PYTHONCOERCECLOCALE': '0'}
+
+
+def start(*arguments: str, options: tuple[str, ...] = (), **environment: str) -> subprocess.Popen[str]:
+    command = [sys.executable, *options, '-m', 'foc_ros', *arguments]
+    given = {**os.environ, **environment}
+    return subprocess.Popen(command, env=given, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding='utf-8')
+
+
+@pytest.mark.parametrize(
+    ('environment', 'options'), [({'MPLBACKEND': 'notabackend'}, ()), (HOMELESS, ()), (ASCII, ()), ({'LC_ALL': 'POSIX'}, ('-O',))]
+)
+def test_a_report_and_a_bag_are_written(tmp_path: Path, environment: dict[str, str], options: tuple[str, ...]) -> None:
+    bag = write_bag(tmp_path / 'été 手', messages(seconds=0.1))
+    written = '--report', str(tmp_path / 'Bild ü'), '--output', str(tmp_path / 'out 手')
+    process = start('replay', str(bag), *written, options=options, **environment)
+    out, err = process.communicate()
+    assert process.returncode == 0 and 'Traceback' not in err and f'report: {(tmp_path / "Bild ü").as_uri()}' in out
+    assert (tmp_path / 'Bild ü' / 'overview.png').exists() and 'été 手' in (tmp_path / 'Bild ü' / 'index.html').read_text('utf-8')
+    with BagReader(tmp_path / 'out 手') as reader:
+        assert len(list(reader)) == len(messages(seconds=0.1))
+
+
+def test_a_node_without_a_place_for_its_log_says_so() -> None:
+    pytest.importorskip('rclpy')
+    process = start('node', **HOMELESS, ROS_LOG_DIR='/dev/null/log')
+    assert process.communicate()[1].splitlines()[-1] == 'foc_node: ROS_LOG_DIR names another directory for the log'
+    assert process.returncode == 2
+
+
+def test_of_two_processes_with_one_output_one_writes_it(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'bag', messages(seconds=0.1))
+    both = [start('replay', str(bag), '--output', str(tmp_path / 'out')) for _ in range(2)]
+    errors = sorted(process.communicate()[1] for process in both)
+    assert sorted(process.returncode for process in both) == [0, 2]
+    assert errors == ['', f'foc_ros replay: {tmp_path / "out"}: exists already and is not overwritten; choose another name\n']
+    with BagReader(tmp_path / 'out') as reader:
+        assert len(list(reader)) == len(messages(seconds=0.1))

@@ -1,0 +1,157 @@
+"""Damaged recordings and tables: bits, cuts, and records left out or doubled end in words, and nothing is lost unsaid."""
+
+from __future__ import annotations
+
+import json
+import random
+import re
+import sqlite3
+import struct
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from bag_helpers import messages, write_mcap, write_parameters
+from mcap.writer import CompressionType, IndexType
+from test_unusual_recordings import WHOLE, write_metadata, write_sqlite
+
+from foc_ros.cli.main import main
+from foc_ros.io.bags import BagReader
+
+FEW, MANY = 40, 500
+LONGEST_S = 10.0
+GIVEN = messages(seconds=0.3)
+POSES = sum(topic == '/hand_pose' for topic, _, _ in GIVEN)
+WRITERS = (
+    {},
+    {'use_chunking': False},
+    {'compression': CompressionType.LZ4, 'enable_crcs': False},
+    {'index_types': IndexType.NONE, 'repeat_channels': False},
+)
+
+
+def write_recording(folder: Path, source: random.Random) -> Path:
+    """Write a recording of a kind by chance into a new folder, and return its file."""
+    folder.mkdir(parents=True)
+    kind = source.randrange(6)
+    if kind < 4:
+        write_mcap(folder / 'one.mcap', GIVEN, per_chunk=7, **WRITERS[kind])
+        return folder / 'one.mcap'
+    write_sqlite(folder / 'one.db3', mode='WAL' if kind == 5 else 'DELETE').close()
+    return folder / 'one.db3'
+
+
+def change_bytes(data: bytes, source: random.Random) -> bytes:
+    """Change bits, cut the end, or leave out or double a part."""
+    start, size = source.randrange(len(data)), source.choice((1, 9, 200))
+    kind = source.randrange(4)
+    if kind == 0:
+        changed = bytearray(data)
+        for _ in range(source.choice((1, 3, 30))):
+            changed[source.randrange(len(data))] ^= 1 << source.randrange(8)
+        return bytes(changed)
+    if kind == 1:
+        return data[:start]
+    return data[:start] + (data[start : start + size] * 2 if kind == 2 else b'') + data[start + size :]
+
+
+def list_records(data: bytes) -> Iterator[tuple[int, int]]:
+    """Yield begin and end of the records of an MCAP file."""
+    place = 8
+    while place < len(data) - 8:
+        end = place + 9 + struct.unpack_from('<Q', data, place + 1)[0]
+        yield place, end
+        place = end
+
+
+def change_records(file: Path, source: random.Random) -> None:
+    """Leave out or double one record."""
+    is_doubled = source.random() < 0.5
+    if file.suffix == '.mcap':
+        data = file.read_bytes()
+        start, end = source.choice(list(list_records(data)))
+        file.write_bytes(data[:start] + 2 * is_doubled * data[start:end] + data[end:])
+        return
+    database = sqlite3.connect(file)
+    table = source.choice(('messages', 'messages', 'topics'))
+    keys = database.execute(f'SELECT id FROM {table} ORDER BY id').fetchall()
+    (key,) = source.choice(keys[1:-1] if table == 'messages' else keys)  # without its last message, a file is whole
+    if not is_doubled:
+        database.execute(f'DELETE FROM {table} WHERE id = ?', (key,))
+    elif table == 'messages':
+        database.execute(
+            'INSERT INTO messages(topic_id, timestamp, data) SELECT topic_id, timestamp, data FROM messages WHERE id = ?', (key,)
+        )
+    else:
+        database.execute(
+            'INSERT INTO topics SELECT id + 9, name, type, serialization_format, offered_qos_profiles FROM topics WHERE id = ?',
+            (key,),
+        )
+    database.commit()
+    database.close()
+
+
+def check_recording(folder: Path, number: int, capsys: pytest.CaptureFixture[str], parameters: str) -> None:
+    source = random.Random(number)
+    file = write_recording(folder / str(number), source)
+    if source.random() < 0.5:
+        write_metadata(file.parent, [file.name], len(WHOLE))
+    if source.random() < 0.6:
+        file.write_bytes(change_bytes(file.read_bytes(), source))
+    else:
+        change_records(file, source)
+    begin = time.monotonic()
+    path = source.choice((file, file.parent))
+    code = main(['replay', str(path), '--json', '--params', parameters])
+    assert time.monotonic() - begin < LONGEST_S
+    out, err = capsys.readouterr()
+    assert code in (0, 2, 3) and (code == 0 or err) and 'Traceback' not in err
+    if code == 0 and not err:
+        assert json.loads(out)['summary']['samples'] == POSES, number
+        with BagReader(path) as reader:
+            assert len(list(reader)) >= len(WHOLE), number  # SQLite alone does not tell a doubled row from two
+
+
+def check_tables(folder: Path, number: int, capsys: pytest.CaptureFixture[str]) -> None:
+    source, tables = random.Random(number), folder / str(number)
+    tables.mkdir()
+    rows = [f'{name},{0.02 * i:.2f},{0.001 * i * i:.4f},0.1' for name in ('a', 'b') for i in range(20)]
+    texts = {
+        'recordings.csv': '\n'.join(['recording,t_s,x_m,y_m', *rows, '']),
+        'goals.csv': 'x_m,y_m\n0.3,0.1\n0.4,0\n',
+        'obstacles.csv': 'x_m,y_m,radius_m\n0.15,0,0.03\n',
+    }
+    changed = source.choice((*texts, 'recordings.csv', 'recordings.csv'))
+    for name, text in texts.items():
+        data = text.replace(',', source.choice(',,;\t')).encode()
+        (tables / name).write_bytes(change_bytes(data, source) if name == changed else data)
+    begin = time.monotonic()
+    code = main(['convert', str(tables), '--output', str(tables / 'bags')])
+    assert time.monotonic() - begin < LONGEST_S
+    out, err = capsys.readouterr()
+    assert code in (0, 2) and (code == 0 or err) and 'Traceback' not in err
+    if code == 0:
+        given = (tables / 'recordings.csv').read_text().splitlines()[1:]
+        read = re.search(r'with (\d+) hand poses', out)
+        assert read is not None and int(read[1]) == sum(bool(line.strip()) for line in given), number
+
+
+def test_damaged_recordings_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for number in range(FEW):
+        check_recording(tmp_path, number, capsys, write_parameters(tmp_path))
+
+
+def test_damaged_tables_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for number in range(FEW):
+        check_tables(tmp_path, number, capsys)
+
+
+def test_many_damaged_recordings_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for number in range(FEW, FEW + MANY):
+        check_recording(tmp_path, number, capsys, write_parameters(tmp_path))
+
+
+def test_many_damaged_tables_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for number in range(FEW, FEW + MANY):
+        check_tables(tmp_path, number, capsys)

@@ -1,0 +1,326 @@
+"""Recordings as recorders, converters and accidents leave them: each is read as a whole, or what is missing is named."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+import struct
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zstandard
+from bag_helpers import STORE, messages, write_bag, write_mcap
+from mcap.writer import CompressionType, IndexType
+
+from foc_ros.analysis.recordings import BagRecording, find_recordings
+from foc_ros.cli.main import main
+from foc_ros.core.errors import FocWarning, MessageError, RecordingError
+from foc_ros.io.bags import BagReader
+
+Content = list[tuple[str, int, bytes]]
+SHORT = messages(seconds=0.3)
+WHOLE = sorted((topic, stamp_ns, bytes(STORE.serialize_cdr(made, made.__msgtype__))) for topic, stamp_ns, made in SHORT)
+TOPICS = 'CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT'
+MESSAGES = 'CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)'
+
+
+def read(path: Path, **options: Any) -> Content:
+    with BagReader(path, **options) as reader:
+        return sorted((item.topic, item.log_ns, item.raw) for item in reader)
+
+
+def write_sqlite(
+    file: Path,
+    content: Content = WHOLE,
+    encoding: str = 'cdr',
+    rename: Callable[[str], str] = str,
+    mode: str = 'DELETE',
+) -> sqlite3.Connection:
+    """Write a file as ROS 2 Foxy does, which has no definitions; return the open database."""
+    database = sqlite3.connect(file)
+    database.execute(f'PRAGMA journal_mode={mode}')
+    database.execute(f"{TOPICS}, offered_qos_profiles TEXT DEFAULT '')")
+    database.execute(MESSAGES)
+    kinds = {topic: made.__msgtype__ for topic, _, made in SHORT}
+    keys = {topic: key for key, topic in enumerate(kinds, 1)}
+    rows = [(key, topic, rename(kinds[topic]), encoding) for topic, key in keys.items()]
+    database.executemany('INSERT INTO topics(id, name, type, serialization_format) VALUES(?, ?, ?, ?)', rows)
+    values = [(keys[topic], stamp_ns, raw) for topic, stamp_ns, raw in content]
+    database.executemany('INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)', values)
+    database.commit()
+    return database
+
+
+def write_metadata(folder: Path, names: list[str], count: int) -> None:
+    text = f'rosbag2_bagfile_information:\n  relative_file_paths: {names}\n  message_count: {count}\n'
+    (folder / 'metadata.yaml').write_text(text)
+
+
+@pytest.mark.parametrize('share', [1.0, 0.5])
+def test_a_killed_sqlite_recorder_leaves_a_log_that_is_read_with_a_warning(tmp_path: Path, share: float) -> None:
+    first = len(WHOLE) // 2
+    database = write_sqlite(tmp_path / 'live.db3', WHOLE[:first], mode='WAL')
+    database.execute('PRAGMA wal_checkpoint(TRUNCATE)')
+    for topic, stamp_ns, raw in WHOLE[first:]:
+        (key,) = database.execute('SELECT id FROM topics WHERE name = ?', (topic,)).fetchone()
+        database.execute('INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)', (key, stamp_ns, raw))
+        database.commit()
+    (tmp_path / 'copy').mkdir()
+    file = tmp_path / 'copy' / 'killed_0.db3'
+    file.write_bytes((tmp_path / 'live.db3').read_bytes())
+    log = (tmp_path / 'live.db3-wal').read_bytes()
+    file.with_name('killed_0.db3-wal').write_bytes(log[: int(share * len(log))])
+    database.close()
+    before = sorted(each.name for each in file.parent.iterdir())
+    with pytest.warns(FocWarning, match=r'killed_0\.db3: the recorder was killed: what it had not written to killed_0\.db3-wal'):
+        found = read(file)
+    assert found == WHOLE if share == 1.0 else first < len(found) < len(WHOLE)
+    with pytest.raises(RecordingError, match='the recorder was killed'):  # a part of a movement cannot be evaluated
+        list(BagRecording('killed', file.parent).items())
+    assert sorted(each.name for each in file.parent.iterdir()) == before
+    file.with_name('killed_0.db3-wal').unlink()
+    with pytest.warns(FocWarning, match='written with a -wal file, which is not here; the last messages may be missing'):
+        assert len(read(file)) == first
+    write_metadata(file.parent, [file.name], len(WHOLE))
+    with pytest.warns(FocWarning, match=f'metadata.yaml states {len(WHOLE)} messages, and the files hold {first}'):
+        read(file.parent)
+
+
+@pytest.mark.parametrize(
+    'options',
+    [
+        {'repeat_channels': False},
+        {'repeat_schemas': False},
+        {'use_statistics': False},
+        {'index_types': IndexType.NONE},
+        {'index_types': IndexType.MESSAGE},
+        {'index_types': IndexType.CHUNK},
+        {'use_chunking': False},
+        {'use_chunking': False, 'repeat_channels': False, 'repeat_schemas': False},
+        {'compression': CompressionType.LZ4, 'use_summary_offsets': False, 'enable_crcs': False},
+        {'repeat_channels': False, 'use_statistics': False, 'index_types': IndexType.NONE, 'repeat_schemas': False},
+    ],
+)
+def test_every_record_of_a_summary_is_optional(tmp_path: Path, options: dict[str, Any]) -> None:
+    write_mcap(tmp_path / 'lean.mcap', SHORT, per_chunk=7, **options)
+    assert read(tmp_path / 'lean.mcap') == WHOLE
+
+
+def test_a_summary_without_counts_for_each_channel_is_completed(tmp_path: Path) -> None:
+    write_mcap(tmp_path / 'whole.mcap', SHORT, enable_crcs=False, use_summary_offsets=False)
+    data = bytearray((tmp_path / 'whole.mcap').read_bytes())
+    (start,) = struct.unpack_from('<Q', data, len(data) - 8 - 20)
+    while data[start] != 0x0B:  # statistics
+        start += 9 + struct.unpack_from('<Q', data, start + 1)[0]
+    (length,) = struct.unpack_from('<Q', data, start + 1)
+    counts = start + 9 + length - 3 * 10  # of three channels, at its end
+    struct.pack_into('<Q', data, start + 1, length - 3 * 10)
+    struct.pack_into('<I', data, counts - 4, 0)
+    (tmp_path / 'lean.mcap').write_bytes(data[:counts] + data[counts + 3 * 10 :])
+    assert read(tmp_path / 'lean.mcap') == WHOLE
+
+
+def test_a_scan_counts_what_the_statistics_state(tmp_path: Path) -> None:
+    ends = write_mcap(tmp_path / 'whole.mcap', SHORT, per_chunk=6, index_types=IndexType.NONE)
+    data = (tmp_path / 'whole.mcap').read_bytes()
+    (tmp_path / 'less.mcap').write_bytes(data[: ends[0]] + data[ends[1] :])  # a chunk was left out
+    with pytest.raises(RecordingError, match=f'{len(WHOLE) - 6} of its {len(WHOLE)} messages can be read|damaged'):
+        read(tmp_path / 'less.mcap')
+
+
+def test_a_folder_of_sqlite_files_without_metadata_is_a_bag(tmp_path: Path) -> None:
+    write_sqlite(tmp_path / 'one_0.db3', WHOLE[:9]).close()
+    write_sqlite(tmp_path / 'one_1.db3', WHOLE[9:]).close()
+    assert read(tmp_path) == WHOLE
+
+
+@pytest.mark.parametrize('kind', ['.mcap', '.db3'])
+@pytest.mark.parametrize('is_folder', [True, False])
+def test_files_and_messages_may_be_compressed(tmp_path: Path, kind: str, is_folder: bool) -> None:
+    plain, bag = tmp_path / f'plain{kind}', tmp_path / 'bag'
+    bag.mkdir()
+    if kind == '.mcap':
+        write_mcap(plain, SHORT)
+    else:
+        write_sqlite(plain).close()
+    packed = bag / f'plain{kind}.zstd'
+    packed.write_bytes(zstandard.compress(plain.read_bytes()))
+    write_metadata(bag, [f'somewhere/plain{kind}'], len(WHOLE))
+    assert read(bag if is_folder else packed) == WHOLE
+    packed.write_bytes(packed.read_bytes()[:-40])
+    with pytest.raises(RecordingError, match='damaged'):
+        read(packed, is_whole=True)
+    write_sqlite(tmp_path / 'single.db3', [(topic, stamp_ns, zstandard.compress(raw)) for topic, stamp_ns, raw in WHOLE]).close()
+    assert read(tmp_path / 'single.db3') == WHOLE
+
+
+@pytest.mark.parametrize(
+    ('metadata', 'words'),
+    [
+        ('', 'not the metadata of a bag, and not used'),
+        ('hello', 'not the metadata of a bag, and not used'),
+        ('rosbag2_bagfile_information: {version: 99}', 'not the metadata of a bag, and not used'),
+        ('rosbag2_bagfile_information: {relative_file_paths: [], message_count: 3}', 'it names no file'),
+        ('rosbag2_bagfile_information: {relative_file_paths: 7', 'not the metadata of a bag, and not used'),
+        ('rosbag2_bagfile_information: {relative_file_paths: [other.db3], message_count: 3}', 'of another bag, and not used'),
+        (
+            'rosbag2_bagfile_information: {relative_file_paths: [one.mcap], message_count: 3}',
+            'metadata.yaml is wrong: it states 3',
+        ),
+        ('rosbag2_bagfile_information: {relative_file_paths: [one.mcap], message_count: 99}', 'states 99 messages'),
+        (
+            'rosbag2_bagfile_information: {relative_file_paths: [one.mcap, two.mcap], message_count: 19}',
+            'two.mcap, which .* missing',
+        ),
+    ],
+)
+def test_wrong_metadata_is_named_and_hides_nothing(tmp_path: Path, metadata: str, words: str) -> None:
+    bag = write_bag(tmp_path / 'one', SHORT)
+    (bag / 'metadata.yaml').write_text(metadata)
+    with pytest.warns(FocWarning, match=words):
+        assert read(bag) == WHOLE
+
+
+def test_a_file_that_the_metadata_do_not_name_is_named(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'one', SHORT)
+    write_mcap(bag / 'two.mcap', SHORT)
+    with pytest.warns(FocWarning, match=r'two\.mcap, which metadata\.yaml does not name, is not read'):
+        assert read(bag) == WHOLE
+
+
+@pytest.mark.parametrize(
+    'name', ['a%20b', 'a#b', 'a?mode=rw', "it's", 'a "b"', 'a b', 'été 手', '%41', 'a&immutable=0', '-x', 'a\nb']
+)
+@pytest.mark.parametrize('kind', ['.mcap', '.db3'])
+def test_a_path_opens_the_file_that_it_names(tmp_path: Path, name: str, kind: str) -> None:
+    (tmp_path / name).mkdir()
+    for other in ('a b', 'a', 'A', 'a%2520b'):
+        (tmp_path / other).mkdir(exist_ok=True)
+        write_sqlite(tmp_path / other / f'{other}.db3', WHOLE[:3]).close() if not (
+            tmp_path / other / f'{other}.db3'
+        ).exists() else None
+    file = tmp_path / name / f'{name}{kind}'
+    file.unlink(missing_ok=True)
+    if kind == '.mcap':
+        write_mcap(file, SHORT)
+    else:
+        write_sqlite(file).close()
+    assert read(file) == WHOLE
+
+
+@pytest.mark.parametrize('wrong', [b'', b'\x00', b'\x00\x01\x00\x00', b'\x00\x03' + bytes(60), bytes(500), b'?!' * 40])
+@pytest.mark.parametrize('topic', ['/hand_pose', '/obstacles', '/goals'])
+def test_a_message_that_cannot_be_decoded_is_counted_and_the_rest_is_replayed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], topic: str, wrong: bytes
+) -> None:
+    place = [each[0] for each in WHOLE].index(topic) + 1
+    changed = [*WHOLE[:place], (topic, WHOLE[place][1], wrong), *WHOLE[place + 1 :]]
+    write_sqlite(tmp_path / 'one.db3', changed).close()
+    assert main(['replay', str(tmp_path / 'one.db3')]) == 0
+    out, err = capsys.readouterr()
+    assert f'{topic[1:]}_invalid 1' in out and '1 of ' in err and f'a serialized {SHORT_KINDS[topic]}' in err
+
+
+SHORT_KINDS = {topic: made.__msgtype__ for topic, _, made in SHORT}
+
+
+@pytest.mark.parametrize('zeros', range(9))
+def test_zeros_after_a_message_are_padding(tmp_path: Path, zeros: int) -> None:
+    padded = [(topic, stamp_ns, raw + bytes(zeros)) for topic, stamp_ns, raw in WHOLE]
+    write_sqlite(tmp_path / 'one.db3', padded).close()
+    with BagReader(tmp_path / 'one.db3') as reader:
+        assert (
+            sorted(
+                (each.topic, each.log_ns, bytes(STORE.serialize_cdr(each.message, SHORT_KINDS[each.topic]))) for each in reader
+            )
+            == WHOLE
+        )
+
+
+def name_by_dds(name: str) -> str:
+    return '::'.join([*name.split('/')[:-1], 'dds_', name.split('/')[-1] + '_'])
+
+
+@pytest.mark.parametrize('rename', [lambda name: name.replace('/msg/', '/'), lambda name: name.replace('/', '::'), name_by_dds])
+def test_a_type_name_may_be_that_of_older_recorders(tmp_path: Path, rename: Callable[[str], str]) -> None:
+    write_sqlite(tmp_path / 'one.db3', rename=rename).close()
+    assert read(tmp_path / 'one.db3') == WHOLE
+    renamed = {made.__msgtype__: rename(made.__msgtype__) for _, _, made in SHORT}
+    write_mcap(tmp_path / 'one.mcap', SHORT, kinds=renamed)
+    assert read(tmp_path / 'one.mcap') == WHOLE
+
+
+@pytest.mark.parametrize(
+    ('encoding', 'words'),
+    [('ros1', 'in ROS 1 encoding, which is not read: convert'), ('json', 'in encoding json, which'), ('', 'in encoding unknown')],
+)
+def test_an_encoding_that_is_not_read_is_named(tmp_path: Path, encoding: str, words: str) -> None:
+    write_sqlite(tmp_path / 'one.db3', encoding=encoding).close()
+    odd = {topic: (encoding, kind.replace('/msg/', '/'), 'ros1msg', b'') for topic, kind in SHORT_KINDS.items()}
+    write_mcap(tmp_path / 'one.mcap', [], odd=odd)
+    for name in ('one.db3', 'one.mcap'):
+        with pytest.raises(RecordingError, match=rf'/hand_pose \(geometry_msgs/msg/PoseStamped {words}'):
+            read(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ('change', 'is_told'),
+    [
+        (lambda text: text.replace('\n', '\r\n'), False),
+        (lambda text: text.partition('=====')[0], False),
+        (lambda text: '', False),
+        (lambda text: '?!', True),
+    ],
+)
+def test_definitions_may_be_those_of_another_system(tmp_path: Path, change: Callable[[str], str], is_told: bool) -> None:
+    """With the line ends of Windows, without those of other types, empty, or such that they cannot be parsed."""
+    database = write_sqlite(tmp_path / 'one.db3')
+    database.execute('CREATE TABLE message_definitions(topic_type TEXT, encoding TEXT, encoded_message_definition TEXT)')
+    for kind in SHORT_KINDS.values():
+        text = change(STORE.generate_msgdef(kind, ros_version=2)[0])
+        database.execute('INSERT INTO message_definitions VALUES(?, ?, ?)', (kind, 'ros2msg', text))
+    database.commit()
+    database.close()
+    with warnings.catch_warnings(record=True) as issued:
+        warnings.simplefilter('always')
+        with BagReader(tmp_path / 'one.db3') as reader:
+            assert not any(isinstance(item.message, MessageError) for item in reader)
+    assert bool(issued) == is_told and all('cannot be read, and that of ROS is used' in str(each.message) for each in issued)
+
+
+def test_metadata_beside_folders_of_bags_hide_nothing(tmp_path: Path) -> None:
+    write_bag(tmp_path / 'one', SHORT)
+    write_metadata(tmp_path, ['one.mcap'], len(WHOLE))
+    assert list(find_recordings(tmp_path)) == ['one']
+
+
+def test_a_file_name_need_not_be_text(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As a name in Latin-1 that was written by another system."""
+    file = tmp_path / os.fsdecode(b'caf\xe9.db3')
+    write_sqlite(file).close()
+    assert (
+        main(['replay', str(file), '--report', str(tmp_path / 'report'), '--output', str(tmp_path / os.fsdecode(b'\xe9'))]) == 0
+    )
+    assert capsys.readouterr().err == ''
+    assert 'caf?.db3' in (tmp_path / 'report' / 'index.html').read_text('utf-8')
+
+
+def test_a_bag_of_ros_1_is_named(tmp_path: Path) -> None:
+    (tmp_path / 'old.bag').write_bytes(b'#ROSBAG V2.0\n')
+    with pytest.raises(RecordingError, match='a bag of ROS 1: convert it to ROS 2'):
+        read(tmp_path / 'old.bag')
+
+
+def test_a_value_that_is_no_message_is_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    database = write_sqlite(tmp_path / 'one.db3')
+    (key,) = database.execute("SELECT id FROM topics WHERE name = '/hand_pose'").fetchone()
+    for value in (None, 10**12, 'text', 0.5):
+        database.execute('INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)', (key, WHOLE[-1][1], value))
+    database.commit()
+    database.close()
+    (tmp_path / 'link.db3').symlink_to(tmp_path / 'one.db3')
+    assert main(['replay', str(tmp_path / 'link.db3')]) == 0
+    assert 'hand_pose_invalid 4' in capsys.readouterr().out
