@@ -153,7 +153,7 @@ class Ipopt(Peer):
         self.upper = np.concatenate((np.full(margins.numel(), np.inf), np.zeros(equal.numel())))
         self.lower_variables = np.concatenate((np.full(4 * n, -np.inf), np.zeros(2 * n)))
         program = {'x': casadi.vertcat(u, q, v), 'f': casadi.dot(u, u) / n, 'g': casadi.vertcat(margins, equal), 'p': p}
-        options = OPTIONS | {'ipopt.print_level': 0, 'ipopt.sb': 'yes', 'ipopt.mu_strategy': barrier}
+        options = OPTIONS | {'ipopt.print_level': 0, 'ipopt.sb': 'yes', 'ipopt.mu_strategy': barrier, 'ipopt.max_iter': 500}
         self.solver = casadi.nlpsol('peer', 'ipopt', program, options)
 
     def _build_start(self, problem: Problem, u: Array) -> Array:

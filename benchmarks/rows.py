@@ -159,7 +159,7 @@ class TickSequence:
 
 
 def measure_tick(build: Callable[[], scenes.Reach], scene: str, is_quick: bool) -> Result:
-    """Compare whole warm ticks with Fatrop, which solves only the problem of the most likely class."""
+    """Compare whole warm ticks with IPOPT, which solves only the problem of the most likely class."""
     from peers import build_fastest
 
     sequence, repetitions = TickSequence(build()), 3 if is_quick else 25
@@ -167,14 +167,14 @@ def measure_tick(build: Callable[[], scenes.Reach], scene: str, is_quick: bool) 
     sequence.tick()
     best = sequence.predictions[-1].solved_candidates[0]
     problem = dict(sequence.list_problems())[best.label]
-    peer = build_fastest('Fatrop', problem, best.solution.control)
+    peer = build_fastest('IPOPT', problem, best.solution.control)
     arguments = peer.prepare(problem, best.solution.control)
     times = time_in_turn({'ours': lambda: None, 'peer': lambda: peer.solve(arguments)}, repetitions)
     ticks = [sequence.tick() for _ in range(repetitions)]
     control = peer.read_control(problem, peer.solve(arguments))
     return Result(
         Timing(f'a warm tick, {scene}', compute_median_ms(ticks)),
-        Timing('Fatrop, its most likely class alone, from our solution of 10 ms ago', compute_median_ms(times['peer'])),
+        Timing('IPOPT, its most likely class alone, from our solution of 10 ms ago', compute_median_ms(times['peer'])),
         _compare([best.solution], [control if peer.converged else None]),
         repetitions,
         {'solved': sequence.describe(), 'slowest_ms': 1e3 * max(ticks), 'first_tick_ms': 1e3 * cold},
