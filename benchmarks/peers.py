@@ -49,9 +49,9 @@ def build_margins(problem: Problem, x: Any, y: Any, variance_x: Any, variance_y:
 
 def _find_offset(vertices: Array, x: Any, y: Any) -> tuple[Any, Any, Any]:
     """Return the signed distance from a box around the origin, and the offset from its nearest point [m]."""
-    sides = [(vertices[0] - vertices[1]) / 2, (vertices[1] - vertices[2]) / 2]
+    sides: list[Array] = [(vertices[0] - vertices[1]) / 2, (vertices[1] - vertices[2]) / 2]
     halves = [float(np.hypot(*side)) for side in sides]
-    axes = [side / half for side, half in zip(sides, halves, strict=True)]
+    axes: list[Array] = [side / half for side, half in zip(sides, halves, strict=True)]
     along = [x * axis[0] + y * axis[1] for axis in axes]
     beyond = [value - casadi.fmax(-half, casadi.fmin(half, value)) for value, half in zip(along, halves, strict=True)]
     inside = casadi.fmin(casadi.fmax(*(casadi.fabs(value) - half for value, half in zip(along, halves, strict=True))), 0)
@@ -75,7 +75,7 @@ class Peer:
     def __init__(self, problem: Problem) -> None:
         self.steps = problem.horizon.steps
         rows, targets, _ = problem.goal_rows
-        least = np.linalg.lstsq(rows, targets, rcond=None)[0]
+        least: Array = np.linalg.lstsq(rows, targets, rcond=None)[0]
         self.control_unit = float(np.abs(self.scale_control(problem, least)).max())
         """Largest control of the plan without obstacles."""
         self.lower, self.upper = np.zeros(0), np.zeros(0)
@@ -233,7 +233,7 @@ PEERS: dict[str, Callable[..., Peer]] = {'IPOPT': Ipopt, 'Fatrop': Fatrop}
 def build_fastest(name: str, problem: Problem, control: Array) -> Peer:
     """Return a program with the barrier that is fastest from a control (N, 2), of those that find the least effort."""
     kind: Any = PEERS[name]
-    solved = []
+    solved: list[tuple[float, float, Peer]] = []
     for barrier in kind.barriers:
         peer = kind(problem, barrier)
         arguments = peer.prepare(problem, control)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
@@ -19,6 +20,7 @@ from measurement import Agreement, Result, Timing, compute_median_ms, time_call,
 
 from foc_ros.analysis.replay import replay
 from foc_ros.core import predictor
+from foc_ros.core.candidates import solve_candidates
 from foc_ros.core.config import Config, FocConfig
 from foc_ros.core.memory.memory import Memory
 from foc_ros.core.ocp.problem import Problem
@@ -49,7 +51,9 @@ def measure_cold(build: Callable[[], Obstacles], name: str, is_quick: bool) -> R
     ours, control = solve(), peer.read_control(problem, peer.solve(arguments))
     return Result(
         Timing('one class, from a guess', compute_median_ms(times['ours'])),
-        Timing(f'{name}, from the least effort through the middle of the guess, built beforehand', compute_median_ms(times['peer'])),
+        Timing(
+            f'{name}, from the least effort through the middle of the guess, built beforehand', compute_median_ms(times['peer'])
+        ),
         _compare([ours], [control if peer.converged else None]),
         repetitions,
         {'qps_ours': ours.qp_solves, 'iterations_peer': peer.iterations},
@@ -67,15 +71,14 @@ def measure_warm(build: Callable[[], Obstacles], name: str, is_quick: bool) -> R
     control = peer.read_control(problem, peer.solve(peer.prepare(problem, fit_guess(problem, scenes.build_guess()))))
     found, theirs, times, peer_times = [], [], [], []
     for tick in range(ticks):
-        mean, dt = _follow_plan(ours, generator), ours.dt
-        problem = scenes.build_problem(obstacles, mean, scenes.DURATION_S - (tick + 1) * TICK_S)
-        shifted = resample(Solution(**(vars(ours) | {'control': control})), TICK_S, problem.horizon.dt, scenes.STEPS)[1]
+        mean, left_s = _follow_plan(ours, generator), scenes.DURATION_S - (tick + 1) * TICK_S
+        problem = scenes.build_problem(obstacles, mean, left_s)
+        shifted = resample(replace(ours, control=control), TICK_S, problem.horizon.dt, scenes.STEPS)[1]
         arguments = peer.prepare(problem, shifted.reshape(2, -1).T)
         began = time.perf_counter()
-        problem = scenes.build_problem(obstacles, mean, scenes.DURATION_S - (tick + 1) * TICK_S)
+        problem = scenes.build_problem(obstacles, mean, left_s)
         ours = solve_problem(problem, warm_start(ours, problem), SETTINGS)
         times.append(time.perf_counter() - began)
-        assert dt > ours.dt
         began = time.perf_counter()
         variables = peer.solve(arguments)
         peer_times.append(time.perf_counter() - began)
@@ -142,11 +145,10 @@ class TickSequence:
     def list_problems(self) -> list[tuple[str, Problem]]:
         """Return label and problem of each candidate of the present tick."""
         found: list[tuple[str, Problem]] = []
-        solve = predictor.solve_candidates
 
         def record(candidates: Sequence[Candidate], problems: Any, *rest: Any) -> list[PredictedCandidate]:
             found.extend((each.label, problems[row]) for row, each in enumerate(candidates))
-            return solve(candidates, problems, *rest)
+            return solve_candidates(candidates, problems, *rest)
 
         with patch.object(predictor, 'solve_candidates', record):
             self.predict(self.memory)

@@ -31,7 +31,7 @@ TRACKER_STDDEV = 0.0001
 
 
 def build_circles() -> Obstacles:
-    """Return three circles that can all be passed on the left. All solvers end in the same minimum here, but not in every scene."""
+    """Return three circles that can all be passed on the left. All solvers end in the same minimum here."""
     return make_obstacles([[0.12, -0.01], [0.16, -0.02], [0.2, -0.05]], [0.03, 0.025, 0.025], [0.003, 0.002, 0.002])
 
 

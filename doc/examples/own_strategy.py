@@ -10,7 +10,7 @@ from foc_ros.cli.main import main
 def solve_cheaper(problems, starts, settings, deadline):
     """Return for each problem the result of lv or hc, whichever is solved with less effort."""
     results = [foc_ros.get_strategy(name)(problems, starts, settings, deadline) for name in ('lv', 'hc')]
-    return [min(pair, key=rank) for pair in zip(*results)]
+    return [min(pair, key=rank) for pair in zip(*results, strict=True)]
 
 
 def rank(result):
