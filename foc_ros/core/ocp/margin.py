@@ -42,7 +42,7 @@ LEAST_BEND = 3e-2
 BRACKET = np.linspace(-1.0, 1.0, 9)
 """Times, relative to a bracket, at which the least safety factor is sought; the next bracket is a quarter of it."""
 NARROWINGS = 4
-"""Brackets: the last points are 5e-4 steps apart, and a parabola passes through three of them."""
+"""Brackets: the last points are 2e-3 steps apart, and a parabola or two lines pass through them."""
 FEW_NARROWINGS = 2
 """The same for circles, beside which a safety factor changes smoothly with time."""
 FACTORS = 5
@@ -341,7 +341,7 @@ class Margins:
     def find_least_factors(self, control: Array) -> tuple[Array, Indices, Array]:
         """Return the least safety factors of controls (b, 2N) over all obstacles and times, and where they are.
 
-        Between two points of the grid an obstacle comes nearer by no more than the hand moves in half of the time. Wherever that
+        Between two steps an obstacle comes nearer by no more than the hand moves relative to it. Wherever that
         may lead below the least factor on the grid, the time is refined.
 
         Returns
@@ -359,7 +359,7 @@ class Margins:
         factor = np.where(counts, grid.factor, np.inf)
         centre = self.centre[..., None] + self.times * self.drift[..., None]
         moved = np.hypot(*np.diff(self.find_path(motion)[:, None] - centre, axis=3).swapaxes(0, 2)).swapaxes(0, 1)
-        nearer = 0.5 * np.maximum(np.pad(moved, ((0, 0), (0, 0), (1, 0))), np.pad(moved, ((0, 0), (0, 0), (0, 1))))
+        nearer = np.maximum(np.pad(moved, ((0, 0), (0, 0), (1, 0))), np.pad(moved, ((0, 0), (0, 0), (0, 1))))
         lowest = np.maximum(grid.distance - nearer, np.sqrt(self.reach_square)[..., None])
         bold = (lowest**2 - self.reach_square[..., None]) / (2.0 * lowest * grid.stddev)
         may_be_least = counts & (bold <= np.maximum(factor.min(axis=(1, 2)), 0.0)[:, None, None])

@@ -17,6 +17,7 @@ a budget, r'y <= rate. A line search on the function above refuses controls that
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -39,6 +40,8 @@ NEAR_FACTOR = 1.5
 """Safety factor relative to the wanted one below which it has one too."""
 BESIDE = 0.3
 """Time on both sides of a contact with a polygon at which there are rows too: its margin may have a kink [steps]."""
+APART = 0.05
+"""Time from other contacts beyond which one that held the mean off is kept: along a side there may be two [steps]."""
 SAME = 1e-3
 """Time between contacts that count as one [steps]."""
 HELD = 1e-5
@@ -58,17 +61,22 @@ SMALL_GAIN = 2e-8
 """Gain that the QP promises, as a logarithm of cost, below which a problem is solved."""
 SMALL_FACTOR = 1e-9
 """Relative difference of a safety factor that counts as rounding."""
+LARGEST_TOLERANCE = 2e-3
+"""Largest gain of such a step for classes that are unlikely."""
+LARGEST_EXCESS = 20.0
 LAST_GAIN = 3e-4
 """Gain of a whole step after which a problem is solved: Newton steps converge quadratically."""
 LAST_FACTOR = 1e-6
 """Relative difference up to which the step has to reach its safety factor."""
-STALLED_GAIN = 1e-4
+STALLED_GAIN = 2e-5
 """The same, below which a problem is solved that no step improves: rounding."""
 ROUNDS = 3
 """Most times that rows are added to a QP for places at which its solution breaks margins."""
 VIOLATED = 1e-3
 """Broken margin, relative to the scene, for which a row is added."""
-MOST_TRIALS = 12
+MOST_TRIALS = 5
+SHORTER = 0.25
+"""Share of a step that is tried where it fails."""
 BUNDLES = 1
 """Trials of a whole step, before which rows are added where the last one failed; then steps are halved."""
 SUFFICIENT = 1e-4
@@ -88,7 +96,7 @@ class Evaluation:
     """What the sequence knows of the controls of r problems.
 
     cost (r,): J, in units of `gain`^2; loss (r,): the function that is minimised; factor (r,): the safety factor k; angles (r, m):
-    swept angles [rad]; margin (r, m, T), normal (r, 2, m, T): on the grid; contacts: minima of the safety factors near the movement.
+    swept angles [rad]; margin (r, m, T), normal (r, 2, m, T): on the grid; contacts, factors (q,): minima of the safety factors near the movement.
     """
 
     cost: Array
@@ -98,13 +106,15 @@ class Evaluation:
     margin: Array
     normal: Array
     contacts: Contacts
+    factors: Array
 
     def put(self, rows: Indices, other: Evaluation, taken: NDArray[np.bool_], problems: Indices) -> None:
         """Take rows over from the evaluation of some problems: those that are marked."""
         self.cost[rows], self.loss[rows], self.factor[rows] = other.cost[taken], other.loss[taken], other.factor[taken]
         self.angles[rows], self.margin[rows], self.normal[rows] = other.angles[taken], other.margin[taken], other.normal[taken]
-        kept = self.contacts.take(~np.isin(self.contacts.problem, problems[taken]))
-        self.contacts = kept.join(other.contacts.take(np.isin(other.contacts.problem, problems[taken])))
+        old, new = ~np.isin(self.contacts.problem, problems[taken]), np.isin(other.contacts.problem, problems[taken])
+        self.contacts = self.contacts.take(old).join(other.contacts.take(new))
+        self.factors = np.concatenate((self.factors[old], other.factors[new]))
 
 
 @dataclass
@@ -177,6 +187,9 @@ class Solver:
         tables = [terms[id(each)] for each in problems]
         self.weights = np.stack([each[0] + l * each[1] for each, l in zip(tables, lam.tolist(), strict=True)])
         self.fixed = np.array([each[2] for each in tables])
+        # by this the losses of problems with different steps differ from those of costs in m^2/s^5
+        self.scale = np.array([math.log(each.horizon.dt) - 2.0 * math.log(each.horizon.gain) for each in problems])
+        self.beta = np.array([each.preference.beta for each in problems])
         self.goal_rows, self.goal_targets, self.soft_rows, self.soft_targets, self.soft_weights = (
             _pad([each[i] for each in tables]) for i in range(3, 8)
         )
@@ -225,7 +238,7 @@ class Solver:
         cost = self.compute_cost(rows, control)
         loss = self.compute_loss(rows, cost, found)
         normal = np.stack((grid.normal_x, grid.normal_y), axis=1)
-        return Evaluation(cost, loss, found, margins.sweep(rows, margins.find_path(motion)), grid.value, normal, contacts)
+        return Evaluation(cost, loss, found, margins.sweep(rows, margins.find_path(motion)), grid.value, normal, contacts, factors)
 
     # ---- the sequence
 
@@ -287,7 +300,8 @@ class Solver:
             tried = rows[place]
             at, is_good = self._try(now, plan, place, share)
             good = tried[is_good]
-            is_last = is_good & (plan.gain[place] < LAST_GAIN) & (at.factor > plan.k[place] - LAST_FACTOR * (1.0 + plan.k[place]))
+            is_last = is_good & (plan.gain[place] < LAST_GAIN * self._tolerate(now, tried)) & (at.loss <= now.at.loss[tried])
+            is_last &= at.factor > plan.k[place] - LAST_FACTOR * (1.0 + plan.k[place])
             if share == 1.0:
                 now.is_done[tried[is_last]] = now.is_settled[tried[is_last]] = True
             now.control[good] += share * plan.step[place[is_good]]
@@ -295,11 +309,11 @@ class Solver:
             now.at.put(good, at, is_good, tried)
             is_open[place[is_good]] = False
             # what rounding hides is not worth another trial
-            stalled = is_open & (plan.gain < STALLED_GAIN)
+            stalled = is_open & (plan.gain < STALLED_GAIN * self._tolerate(now, rows))
             now.is_done[rows[stalled]] = now.is_settled[rows[stalled]] = True
             is_open &= ~stalled
             if attempt >= BUNDLES:
-                share *= 0.5
+                share *= SHORTER
                 continue
             # a margin with a kink was linearised on one side of it: where the trial is least there is a row now
             new = at.contacts.take(np.isin(at.contacts.problem, tried[~is_good]))
@@ -322,6 +336,15 @@ class Solver:
         at = self.evaluate(rows, now.control[rows] + share * plan.step[place], k)
         bound = now.bound[rows] - SUFFICIENT * share * plan.gain[place] + ROUNDING
         return at, (at.loss <= bound) & (np.abs(at.angles - now.angles[rows]) < np.pi).all(axis=1)
+
+    def _tolerate(self, now: Iterates, rows: Indices) -> Array:
+        """Return by how much more than that of the best class the loss of some classes may be inexact, (r,).
+
+        A likelihood changes by a share of itself: a class that is a hundred times less likely may be a hundred times less exact.
+        """
+        loss = now.at.loss + self.scale
+        dearer = np.minimum(self.beta[rows] * (loss[rows] - loss.min()), LARGEST_EXCESS)
+        return np.minimum(np.exp(dearer), LARGEST_TOLERANCE / LAST_GAIN)
 
     def _end(self, now: Iterates, plan: Plan) -> NDArray[np.bool_]:
         """Mark the problems as solved that have nothing to gain any more; return which of the plan they are, (r,)."""
@@ -398,8 +421,7 @@ class Solver:
         side = vectors.swapaxes(1, 2) @ np.linalg.solve(lower, rest[:, :bent, bent:])
         dual = rest[:, bent:, bent:] - side.swapaxes(1, 2) @ (reduce[:, :, None] * side)
         value, rate = spread(lin.value), spread(lin.stddev_rate)
-        known_pad = np.zeros((len(rows), width))
-        multipliers, short = np.zeros((len(rows), width)), np.zeros(len(rows))
+        multipliers = np.zeros((len(rows), width))
         counts = np.bincount(at, minlength=len(rows))
         for b in range(len(rows)):
             n = counts[b]
@@ -452,23 +474,26 @@ class Solver:
         """Return the places at which the QPs have rows, and the multipliers that are known there."""
         minima = now.at.contacts.take(np.isin(now.at.contacts.problem, rows))
         margins, last = self.margins, float(self.margins.steps)
-        is_polygon = margins.is_polygon[minima.problem, minima.obstacle]
-        kinks = minima.take(is_polygon & margins.between)
-        beside = [Contacts(kinks.problem, kinks.obstacle, np.clip(kinks.time + apart, 1.0, last)) for apart in (-BESIDE, BESIDE)]
         kept = np.isin(now.contacts.problem, rows) & (now.multipliers > 0.0)
         held, multipliers = now.contacts.take(kept), now.multipliers[kept]
         largest = np.zeros(len(margins.problems))
         np.maximum.at(largest, held.problem, multipliers)
-        strong = (multipliers > HELD * largest[held.problem]) & margins.is_polygon[held.problem, held.obstacle]
-        places = minima
-        for more in (further.take(np.isin(further.problem, rows)), held.take(strong), *beside):
-            places = places.join(more.take(~_is_known(more, places, SAME)))
+        strong = held.take(multipliers > HELD * largest[held.problem])
+        places, more = minima, [(further.take(np.isin(further.problem, rows)), SAME), (strong, APART)]
+        is_polygon = margins.is_polygon[minima.problem, minima.obstacle]
+        if margins.between and is_polygon.any():
+            kinks = minima.take(is_polygon)
+            times = (np.clip(kinks.time + apart, 1.0, last) for apart in (-BESIDE, BESIDE))
+            more += [(Contacts(kinks.problem, kinks.obstacle, time), SAME) for time in times]
+        for others, apart in more:
+            if len(others.time):
+                places = places.join(others.take(~_is_known(others, places, apart)))
         known = np.zeros(len(places.time))
         if len(multipliers) and len(known):
-            apart = np.abs(held.time[:, None] - places.time)
-            apart[(held.problem[:, None] != places.problem) | (held.obstacle[:, None] != places.obstacle)] = np.inf
-            nearest = apart.argmin(axis=1)
-            is_there = np.isfinite(apart[np.arange(len(nearest)), nearest])
+            far = np.abs(held.time[:, None] - places.time)
+            far[(held.problem[:, None] != places.problem) | (held.obstacle[:, None] != places.obstacle)] = np.inf
+            nearest = far.argmin(axis=1)
+            is_there = np.isfinite(far[np.arange(len(nearest)), nearest])
             np.add.at(known, nearest[is_there], multipliers[is_there])
         known[known < HELD * largest[places.problem]] = 0.0
         return places, known
