@@ -61,7 +61,7 @@ SMALL_GAIN = 2e-8
 """Gain that the QP promises, as a logarithm of cost, below which a problem is solved."""
 SMALL_FACTOR = 1e-9
 """Relative difference of a safety factor that counts as rounding."""
-LARGEST_TOLERANCE = 2e-3
+LARGEST_TOLERANCE = 5e-3
 """Largest gain of such a step for classes that are unlikely."""
 LARGEST_EXCESS = 20.0
 LAST_GAIN = 3e-4
@@ -372,7 +372,8 @@ class Solver:
         where[rows] = np.arange(len(rows))
         at = where[places.problem]
         control, k_now = now.control[rows], now.k[rows]
-        lin = margins.linearise(places, control[at], k_now[at])
+        held = known > 0.0
+        lin = margins.linearise(places, control[at], k_now[at], held)
         slot, width = _number(at, len(rows))
         size = control.shape[1]
 
@@ -386,13 +387,12 @@ class Solver:
         soft = self.soft_weights[rows]
         gradient = (self.weights[rows] * control + ((soft * missed)[:, None] @ self.soft_rows[rows])[:, 0]) * (2.0 / cost)
         diagonal = self.weights[rows] * (2.0 / cost)
-        np.add.at(diagonal, at, known[:, None] * lin.diagonal)
-        held = known > 0.0
+        np.add.at(diagonal, at[held], known[held, None] * lin.diagonal)
         held_slot, held_width = _number(at[held], len(rows))
         factors = np.zeros((len(rows), held_width, FACTORS, size))
         weights = np.zeros((len(rows), held_width, FACTORS, held_width, FACTORS))
-        factors[at[held], held_slot] = lin.factors[held]
-        weights[at[held], held_slot, :, held_slot] = known[held, None, None] * lin.weights[held]
+        factors[at[held], held_slot] = lin.factors
+        weights[at[held], held_slot, :, held_slot] = known[held, None, None] * lin.weights
         soft_count = soft.shape[1]
         bent = FACTORS * held_width + soft_count + 1
         curvature = np.zeros((len(rows), bent, bent))
