@@ -65,6 +65,9 @@ class Contacts(NamedTuple):
         return Contacts(*(np.concatenate(each) for each in zip(self, *others, strict=True)))
 
 
+NO_CONTACTS = Contacts(np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp), np.zeros(0))
+
+
 class Motion(NamedTuple):
     """Movements of r problems over their N steps: what is known at both ends of each step, with rates per step.
 

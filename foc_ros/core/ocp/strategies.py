@@ -189,7 +189,7 @@ def solve_at(
     else:
         last = before.now
         control, contacts, multipliers, k, angles = last.control.copy(), last.contacts, last.multipliers, last.k.copy(), last.angles
-    now = solver.begin(solver.meet_goal(control), contacts, multipliers, np.where(k > 0.0, np.minimum(k, wanted), wanted), angles)
+    now = solver.begin(control, contacts, multipliers, np.where(k > 0.0, np.minimum(k, wanted), wanted), angles)
     if most is None:
         solver.run(now, deadline)
     else:
