@@ -93,7 +93,7 @@ def test_the_message_of_an_unreachable_eta_names_the_largest_that_is_reached(str
     solution = solved(one_obstacle(0.999, (0.6, 0.6)), BOWED, strategy)
     assert solution.status is Status.ETA_UNREACHABLE
     assert 0 < solution.eta < 0.999
-    said = float(re.search(r'the largest .*?(0\.\d+)', solution.message)[1])
+    said = float(re.search(r': .*?(0\.\d+)', solution.message)[1])
     assert said == pytest.approx(solution.eta, abs=1e-3)
     easier = solved(one_obstacle(0.8 * solution.eta, (0.6, 0.6)), BOWED, strategy)
     assert easier.status is Status.SOLVED
@@ -174,7 +174,7 @@ def test_algorithm1_as_printed_overshoots_the_solution_of_the_continuous_path():
     if stepped.status is Status.SOLVED:
         assert stepped.effort >= followed.effort * (1 - 1e-6)
     else:
-        assert 'infeasible' in stepped.message or 'not settled' in stepped.message
+        assert any(words in stepped.message for words in ('infeasible', 'not settled', 'achieves eta'))
     gentle = solved(problem, BOWED, 'algorithm1', algorithm1_growth=1.5)
     assert gentle.status is Status.SOLVED
     assert gentle.eta >= 0.9 - 0.02, 'at the steps; between them it may be a little less'
