@@ -7,11 +7,13 @@ import foc_ros
 from foc_ros.cli.main import main
 
 
-def solve_cheaper(problem, start, settings, deadline):
-    """Return the result of lv or hc, whichever is solved with less effort."""
-    results = [foc_ros.get_strategy(name)(problem, start, settings, deadline) for name in ('lv', 'hc')]
-    solved = [result for result in results if result.status is foc_ros.Status.SOLVED]
-    return min(solved or results, key=lambda result: result.control @ result.control)
+def solve_cheaper(problems, starts, settings, deadline):
+    """Return for each problem the result of lv or hc, whichever is solved with less effort."""
+    results = [foc_ros.get_strategy(name)(problems, starts, settings, deadline) for name in ('lv', 'hc')]
+    return [
+        min(pair, key=lambda result: (result.status is not foc_ros.Status.SOLVED, result.control @ result.control))
+        for pair in zip(*results, strict=True)
+    ]
 
 
 # before the program starts, and again in each of its worker processes, which import this file
