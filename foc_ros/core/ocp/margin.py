@@ -369,8 +369,9 @@ class Margins:
         centre = self.centre[..., None] + self.times * self.drift[..., None]
         moved = np.hypot(*np.diff(self.find_path(motion)[:, None] - centre, axis=3).swapaxes(0, 2)).swapaxes(0, 1)
         nearer = np.maximum(np.pad(moved, ((0, 0), (0, 0), (1, 0))), np.pad(moved, ((0, 0), (0, 0), (0, 1))))
-        lowest = np.maximum(grid.distance - nearer, np.sqrt(self.reach_square)[..., None])
-        bold = (lowest**2 - self.reach_square[..., None]) / (2.0 * lowest * grid.stddev)
+        reach = np.sqrt(self.reach_square)[..., None]
+        lowest = np.maximum(grid.distance - nearer, reach)
+        bold = (lowest - reach) * (lowest + reach) / (2.0 * lowest * grid.stddev)
         may_be_least = counts & (bold <= np.maximum(factor.min(axis=(1, 2)), 0.0)[:, None, None])
         places, _ = self.find_minima(rows, motion, none, grid._replace(factor=factor), may_be_least)
         found = self._measure_exactly(places, control)

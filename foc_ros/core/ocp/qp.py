@@ -133,7 +133,9 @@ def _meet_goal(stack: Array, diagonal: Array, goal: Array) -> tuple[Array, Array
     """Return what is left of rows (r, n, 2N) when the goal is met, over the diagonal, and its Gram matrix (r, n, n)."""
     scaled = goal / diagonal[:, None]
     square = scaled @ goal.swapaxes(1, 2)
-    square += (~goal.any(axis=2))[..., None] * np.eye(goal.shape[1])
+    # of a goal that a few steps cannot meet, or of which rows are missing, what there is
+    largest = np.einsum('bii->bi', square).max(axis=1)[:, None, None]
+    square += (1e-12 + (~goal.any(axis=2))[..., None]) * largest * np.eye(goal.shape[1])
     stack = stack - np.linalg.solve(square, scaled @ stack.swapaxes(1, 2)).swapaxes(1, 2) @ goal
     left = stack / diagonal[:, None]
     return left, left @ stack.swapaxes(1, 2)

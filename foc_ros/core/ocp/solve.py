@@ -71,8 +71,9 @@ def solve_problems(
         ]
         began = time.perf_counter()
         results = strategy(group, [starts[row] for row in rows], settings, deadline)
-        if not isinstance(results, list) or not all(isinstance(each, StrategyResult) for each in results):
-            raise InputError(f'strategy {settings.strategy}', 'a list of StrategyResult as its result', repr(results))
+        is_list = isinstance(results, list) and len(results) == len(group)
+        if not is_list or not all(isinstance(each, StrategyResult) for each in results):
+            raise InputError(f'strategy {settings.strategy}', 'a list of StrategyResult, one for each problem', repr(results))
         solutions = _evaluate(group, results)
         share_s = (time.perf_counter() - began) / len(rows)
         solved |= {row: replace(each, solve_s=share_s) for row, each in zip(rows, solutions, strict=True)}

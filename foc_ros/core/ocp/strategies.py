@@ -143,8 +143,11 @@ class Point:
         rows = np.arange(len(self.k))
         motion, none = margins.move(rows, self.now.control), np.zeros(len(rows))
         grid = margins.measure_grid(rows, motion, none)
-        short: NDArray[np.bool_] = grid.value.min(axis=(1, 2), initial=np.inf) < -TOUCHING * margins.extent
-        leaps = np.abs(margins.turn(rows, margins.find_path(motion))).max(axis=(1, 2), initial=0.0) > LEAP
+        places, _ = margins.find_minima(rows, motion, none, grid, np.isfinite(grid.factor))
+        least = np.full(len(rows), np.inf)
+        np.minimum.at(least, places.problem, margins.measure(places, places.problem, motion, none[places.problem]).value)
+        short = least < -TOUCHING * margins.extent
+        leaps: NDArray[np.bool_] = np.abs(margins.turn(rows, margins.find_path(motion))).max(axis=(1, 2), initial=0.0) > LEAP
         return short | leaps
 
 
@@ -514,7 +517,7 @@ def solve_algorithm1(
 
 
 def _run_algorithm1(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline) -> StrategyResult:
-    chance = Margins([problem], np.zeros(1), is_chance=True, between=False)
+    chance = Margins([problem], np.zeros(1), is_chance=True)
     tau, lam, effort, point, iteration = 0.0, 1.0, math.inf, None, 0
     for iteration in range(1, MOST_STEPS + 1):
         if point is not None and not deadline.allows():
