@@ -64,7 +64,7 @@ def solve_candidates(
 
 
 def _begin(candidate: Candidate, problem: Problem, previous: Solution | None) -> Start:
-    """Return the earlier solution of a candidate as its start, or its guess where that solution passes an obstacle on another side."""
+    """Return the earlier solution of a candidate as its start, or its guess where that passes an obstacle on another side."""
     if previous is None:
         return cold_start(candidate.guess)
     start = warm_start(previous, problem)

@@ -38,7 +38,7 @@ ELASTIC_STDDEV = 1e-2
 DIFFERENCE = 5e-3
 """Time on both sides of a contact by whose gradients its sliding is found [steps]."""
 LEAST_BEND = 3e-2
-"""Least second derivative of a margin in time, relative to the scene and the whole time: along a flat side the contact is anywhere."""
+"""Least second derivative of a margin in time, relative to scene and whole time: along a flat side the contact is anywhere."""
 BRACKET = np.linspace(-1.0, 1.0, 9)
 """Times, relative to a bracket, at which the least safety factor is sought; the next bracket is a quarter of it."""
 NARROWINGS = 4
@@ -98,13 +98,32 @@ class Margin(NamedTuple):
     is_on_edge: NDArray[np.bool_]
     factor: Array
 
+    def take(self, rows: Indices) -> Margin:
+        """Return some of them."""
+        return Margin(*(each[rows] for each in self))  # type: ignore[arg-type]  # all fields are arrays
+
+
+class Turning(NamedTuple):
+    """What the second derivatives of q margins follow from.
+
+    k; worth: -dg/dw of the variance w = s^2; turn: 1 / D where the normal turns, else 0 [1/m]; across: dw by the angle of the
+    normal; size: Var[R^2] / 4 where it counts [m^4]; bend: second derivative in time. All are (q,).
+    """
+
+    k: Array
+    worth: Array
+    turn: Array
+    across: Array
+    size: Array
+    bend: Array
+
 
 class Gradients(NamedTuple):
     """Margins at q places, linearised.
 
-    value (q,) [m]; gradient (q, 2N), with respect to the control; stddev_rate (q,): -dg/dk [m]. For the h places that hold the mean
-    off, diagonal (h, 2N): what a unit of the multiplier adds to the diagonal of the Hessian of the Lagrangian; factors (h, 5, 2N)
-    and weights (h, 5, 5): the remaining part of it, sum_ab weights_ab factors_a factors_b'.
+    value (q,) [m]; gradient (q, 2N), with respect to the control; stddev_rate (q,): -dg/dk [m]. For the h places that hold the
+    mean off, diagonal (h, 2N): what a unit of the multiplier adds to the diagonal of the Hessian of the Lagrangian; factors
+    (h, 5, 2N) and weights (h, 5, 5): the remaining part of it, sum_ab weights_ab factors_a factors_b'.
     """
 
     value: Array
@@ -166,7 +185,8 @@ class Margins:
             stacked = np.zeros((size, self.count, *shape))
             for row, table in enumerate(tables):
                 values = getattr(table, read)
-                stacked[(row, slice(len(table)), *(slice(n) for n in values.shape[1:]))] = values
+                part = tuple(slice(n) for n in values.shape)
+                stacked[row][part] = values
             return stacked
 
         self.counts = np.arange(self.count) < np.array([len(each) for each in tables])[:, None]
@@ -217,7 +237,7 @@ class Margins:
         x, y = self.find_path(motion).swapaxes(0, 1)[:, :, None]
         variance = (self._quintic[:, None] @ motion.variance[:, self._step])[:, None, :, 0]
         centre = self.centre[rows][:, :, None] + self.times[:, None] * self.drift[rows][:, :, None]
-        edges = Edges(*(each[rows][:, :, None] for each in self.edges))
+        edges = self.edges.take(rows).take((slice(None), slice(None), None))
         where = rows[:, None, None], np.arange(self.count)[:, None]
         variance = variance + self.centre_variance[rows][:, :, None]
         found = self._measure(x - centre[..., 0], y - centre[..., 1], variance, where, edges, self.times, k[:, None, None])
@@ -248,7 +268,7 @@ class Margins:
         """Return margins at q places, for positions (q, 2) and their covariances (q, 3)."""
         where = places.problem, places.obstacle
         x, y = (mean - self.centre[where] - places.time[:, None] * self.drift[where]).T
-        edges = Edges(*(each[where] for each in self.edges))
+        edges = self.edges.take(where)
         return self._measure(x, y, variance + self.centre_variance[where], where, edges, places.time, k)
 
     def _measure(
@@ -350,8 +370,8 @@ class Margins:
     def find_least_factors(self, control: Array) -> tuple[Array, Indices, Array]:
         """Return the least safety factors of controls (b, 2N) over all obstacles and times, and where they are.
 
-        Between two steps an obstacle comes nearer by no more than the hand moves relative to it. Wherever that
-        may lead below the least factor on the grid, the time is refined.
+        Between two points of the grid an obstacle comes nearer by no more than the hand moves relative to it. Wherever that may
+        lead below the least factor on the grid, the time is refined.
 
         Returns
         -------
@@ -450,15 +470,14 @@ class Margins:
         gradient[held] = np.where(is_kink[:, None], mixed, gradient[held])
         bend = np.where(is_kink, np.inf, bend)
         factors = np.stack((aside[held], along[held], 4.0 * noise[held] * along[held] * aside[held], spread[held], slide), axis=1)
-        of_held = Margin(*(each[held] for each in margin))
-        weights = self._weigh_factors(places.take(held), of_held, k[held], worth[held], turn[held], across[held], size[held], bend)
+        terms = Turning(k[held], worth[held], turn[held], across[held], size[held], bend)
+        weights = self._weigh_factors(places.take(held), margin.take(held), terms)
         diagonal = (2.0 * worth[held])[:, None] * self.noise_variance[whole.problem[held]] * along[held] ** 2
         return Gradients(margin.value[:count], gradient, rate[:count], diagonal, factors, weights)
 
-    def _weigh_factors(
-        self, places: Contacts, margin: Margin, k: Array, worth: Array, turn: Array, across: Array, size: Array, bend: Array
-    ) -> Array:
-        """Return the weights (q, 5, 5) of the factors: of the displacement across and along the normal, and its effect on P, w, t."""
+    def _weigh_factors(self, places: Contacts, margin: Margin, terms: Turning) -> Array:
+        """Return the weights (q, 5, 5) of the factors: displacement across and along the normal, and the effect on P, w and t."""
+        k, worth, turn, across, size, bend = terms
         weights = np.zeros((len(k), FACTORS, FACTORS))
         difference = 2.0 * margin.trace - 4.0 * (margin.normal_x * margin.variance_x + margin.normal_y * margin.variance_y)
         weights[:, 0, 0] = turn * (-1.0 + worth * (turn * difference - 2.0 * size / margin.distance**3))
@@ -466,7 +485,8 @@ class Margins:
         weights[:, 1, 1] = 6.0 * worth * size / margin.distance**4
         weights[:, 0, 2] = weights[:, 2, 0] = worth * turn
         reach = self.reach_square[places.problem, places.obstacle]
-        weights[:, 3, 3] = self.is_chance * k * k * reach / (4.0 * margin.stddev**2 * margin.root**3) - worth / (2.0 * margin.stddev**2)
+        variance = margin.stddev**2
+        weights[:, 3, 3] = self.is_chance * k * k * reach / (4.0 * variance * margin.root**3) - worth / (2.0 * variance)
         is_inside = (places.time > 1.0) & (places.time < self.steps) & self.between
         floor = LEAST_BEND * self.extent[places.problem] / self.steps**2
         weights[:, 4, 4] = np.where(is_inside, 1.0 / np.maximum(bend, floor), 0.0)
@@ -490,9 +510,10 @@ def _find_lowest(values: Array, is_kink: NDArray[np.bool_]) -> tuple[Array, Arra
 
 
 def _spread_start(problem: Problem) -> Array:
-    """Return the covariances xx, yy, xy that an uncertain start causes, with both derivatives, at both ends of each step, (N, 6, 3)."""
+    """Return the covariances xx, yy, xy of an uncertain start, with both derivatives, at both ends of each step, (N, 6, 3)."""
     rate = np.array([1.0, problem.horizon.dt])[:, None, None]
-    begin, change, end, end_change = pair_steps(problem.error_map[:, :4].reshape(len(problem.error_map), 2, 2, -1) * rate).swapaxes(0, 1)
+    errors = problem.error_map[:, :4].reshape(len(problem.error_map), 2, 2, -1) * rate
+    begin, change, end, end_change = pair_steps(errors).swapaxes(0, 1)
     bends = 6.0 * (end - begin) - 4.0 * change - 2.0 * end_change, 6.0 * (begin - end) + 2.0 * change + 4.0 * end_change
     known = []
     for place, rates, bend in ((begin, change, bends[0]), (end, end_change, bends[1])):

@@ -27,8 +27,9 @@ FLOOR, LEAST_FLOOR = 20.0, 300.0
 class Cost(NamedTuple):
     """The cost and the goal of one problem, for a control in units of `Horizon.gain`.
 
-    weights (2N,): of the squared control at lambda 0; variance (2N,): what lambda adds; fixed: part of the cost; goal_rows (e, 2N) of
-    unit length and goal_targets (e,): what the goal fixes; soft_rows (s, 2N), soft_targets and soft_weights (s,): what it weighs.
+    weights (2N,): of the squared control at lambda 0; variance (2N,): what lambda adds; fixed: part of the cost; goal_rows (e,
+    2N) of unit length and goal_targets (e,): what the goal fixes; soft_rows (s, 2N), soft_targets and soft_weights (s,): what it
+    weighs.
     """
 
     weights: Array
@@ -95,11 +96,13 @@ class Objective:
         """Return J of controls (r, 2N) of some problems, in units of `Horizon.gain`^2."""
         missed = (self.soft_rows[rows] @ control[..., None])[..., 0] - self.soft_targets[rows]
         cost: Array = (self.weights[rows] * control**2).sum(axis=1) + (self.soft_weights[rows] * missed**2).sum(axis=1)
-        return cost + self.fixed[rows]
+        cost += self.fixed[rows]
+        return cost
 
     def compute_loss(self, rows: Indices, cost: Array, k: Array) -> Array:
         """Return the loss (r,) for costs and safety factors (r,)."""
-        return np.log(cost) + self.compute_penalty(rows, k)
+        loss: Array = np.log(cost) + self.compute_penalty(rows, k)
+        return loss
 
     def compute_penalty(self, rows: Indices, k: Array) -> Array:
         """Return what missing safety costs, (r,)."""

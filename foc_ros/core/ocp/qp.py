@@ -6,7 +6,7 @@ margins g, gradients A and rates r = -dg/dk, each QP is
     minimise  1/2 p'H p + c'p + rate (k_wanted - k)+ + floor (-k)+   subject to  E p = 0,  g + A p - r (k - k_now) >= 0.
 
 Everything that it takes is a Gram matrix, in the metric of D, of what is left of the rows B, A and c when the goal is met. In the
-root of the part of B the Hessian has the eigenvalues of I + L'CL; those that are too small are raised, so that there is a minimum.
+root of the part of B the Hessian has the eigenvalues of I + L'CL; small ones are raised, so that there is a minimum.
 The dual has one unknown y >= 0 for each contact, and k is in it as a budget: r'y <= rate, beyond which each unit costs k_wanted.
 """
 
@@ -22,7 +22,7 @@ from .backend import Answer, DenseQP
 from .margin import FACTORS, Gradients, Indices
 
 LEAST_CURVATURE = 0.3
-"""Least eigenvalue of the Hessian relative to its diagonal part: with less, a step would be longer than what is known of margins."""
+"""Least eigenvalue of the Hessian relative to its diagonal part: with less, a step leaves the place where margins are known."""
 SOFT = 1e-11
 """Part of its length by which a contact row gives way: at the goal no control may move it."""
 JITTER = 1e-9
@@ -51,16 +51,19 @@ class Quadratic(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Contacts by problem: row of the problem and place among its contacts, (q,) each; width: the most of any problem."""
+    """Contacts by problem: row of the problem and place among its contacts, (q,) each.
+
+    width: the most contacts of any problem; problems: their number.
+    """
 
     problem: Indices
     slot: Indices
     width: int
-    count: int
+    problems: int
 
     def spread(self, values: Array) -> Array:
         """Return values (q, ...) of contacts by problem, (r, width, ...), zero where a problem has fewer."""
-        spread = np.zeros((self.count, self.width, *values.shape[1:]))
+        spread = np.zeros((self.problems, self.width, *values.shape[1:]))
         spread[self.problem, self.slot] = values
         return spread
 
@@ -93,7 +96,7 @@ class ReducedQP:
         held = multipliers > 0.0
         diagonal = quadratic.diagonal.copy()
         np.add.at(diagonal, rows.problem[held], multipliers[held, None] * gradients.diagonal)
-        bends, curvature = _stack_bends(quadratic, number_rows(rows.problem[held], rows.count), gradients, multipliers[held])
+        bends, curvature = _stack_bends(quadratic, number_rows(rows.problem[held], rows.problems), gradients, multipliers[held])
         length = np.sqrt((bends**2 / diagonal[:, None]).sum(axis=2))
         bends = bends / np.where(length > 0.0, length, 1.0)[..., None]
         curvature *= length[:, :, None] * length[:, None, :]
@@ -135,15 +138,14 @@ def _meet_goal(stack: Array, diagonal: Array, goal: Array) -> tuple[Array, Array
     square = scaled @ goal.swapaxes(1, 2)
     # of a goal that a few steps cannot meet, or of which rows are missing, what there is
     largest = np.einsum('bii->bi', square).max(axis=1)[:, None, None]
-    square += (1e-12 + (~goal.any(axis=2))[..., None]) * largest * np.eye(goal.shape[1])
+    is_missing = (goal == 0.0).all(axis=2).astype(float)
+    square += (1e-12 + is_missing)[..., None] * largest * np.eye(goal.shape[1])
     stack = stack - np.linalg.solve(square, scaled @ stack.swapaxes(1, 2)).swapaxes(1, 2) @ goal
     left = stack / diagonal[:, None]
     return left, left @ stack.swapaxes(1, 2)
 
 
-def solve_dual(
-    backend: Backend, square: Array, linear: Array, rate: Array, wanted_k: float, worth: float, floor: float
-) -> Array:
+def solve_dual(backend: Backend, square: Array, linear: Array, rate: Array, wanted_k: float, worth: float, floor: float) -> Array:
     """Return the multipliers (n,) of one QP.
 
     Parameters

@@ -112,7 +112,9 @@ def _evaluate_one(problem: Problem, result: StrategyResult, minimum: tuple[float
         status = Status.COMPROMISED
     mean = problem.states(control)
     covariance = propagate_covariance(problem.horizon, problem.free_covariance, problem.noise_variance, control)
-    violation, violated = compute_violation(problem, mean, result.tau) if status is Status.INFEASIBLE or result.tau else (0.0, None)
+    violation, violated = 0.0, None
+    if status is Status.INFEASIBLE or result.tau:
+        violation, violated = compute_violation(problem, mean, result.tau)
     effort, names = float(control @ control), problem.obstacles.ids
     shortfall, expected = 0.0 if status is Status.SOLVED else max(problem.wanted_k - k, 0.0), None
     if status is Status.DEADLINE:
@@ -145,7 +147,7 @@ def _evaluate_one(problem: Problem, result: StrategyResult, minimum: tuple[float
 
 
 def _expect(problem: Problem, effort: float, shortfall: float, gain: float) -> tuple[float, float]:
-    """Return the effort and the shortfall of safety that are expected at the end of a sequence, whose loss falls by a gain [ln J].
+    """Return the effort and the shortfall of safety that are expected when the loss has fallen by a gain [ln J].
 
     The effort does not fall below that of a movement without obstacles.
     """

@@ -5,9 +5,9 @@ For each problem it finds a control u and a safety factor k with the least loss 
     ln J(u) + rate max(0, k_wanted - k)    subject to    E u = e,  G_i(u; k) >= 0,
 
 with the margins G_i where the obstacles hold the mean off (`margin`). In the logarithm, costs are compared as likelihoods compare
-them, and the rate is what a unit of safety is worth: a class gives up as much of it as costs more. In each iteration the margins are
-linearised where they are least, a QP is solved (`qp`), and a step is taken along its solution that does not pass an obstacle on
-another side. Rows are added where the solution of the QP breaks margins, so that few are enough.
+them, and the rate is what a unit of safety is worth: a class gives up as much of it as costs more. In each iteration the margins
+are linearised where they are least, a QP is solved (`qp`), and a step is taken along its solution that does not pass an obstacle
+on another side. Rows are added where the solution of the QP breaks margins, so that few are enough.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ SAME = 1e-3
 HELD = 1e-5
 """Multiplier relative to the largest one from which a contact holds the mean off."""
 LARGEST_RATE, GENTLE_RATE = 1e3, 5.0
-"""Worth of a unit of safety in logarithms of cost where the wanted safety is a condition, and the one with which the search begins
-where it is larger: at a guess, margins tell little of what they cost."""
+"""Worth of a unit of safety in logarithms of cost where the wanted safety is a condition, and the one with which the search
+begins where it is larger: at a guess, margins tell little of what they cost."""
 ROUGH_GAIN = 1e-3
 """Gain, as a logarithm of cost, at which the search with the gentle worth ends."""
 SMALL_GAIN, SMALL_FACTOR = 2e-8, 1e-9
 """Gain that a QP promises below which a problem is solved, and relative difference of a safety factor that is rounding."""
 LAST_GAIN, LAST_FACTOR = 3e-4, 1e-6
-"""Gain of a whole step after which a problem is solved, and part of its safety factor that the step may miss: Newton steps converge
-quadratically."""
+"""Gain of a whole step after which a problem is solved, and part of its safety factor that the step may miss: Newton steps
+converge quadratically."""
 LARGEST_TOLERANCE = 5e-3
 """Largest gain of such a step for classes that are unlikely."""
 STALLED_GAIN = 2e-5
@@ -70,8 +70,9 @@ ACCURACY = 3e-10
 class Evaluation:
     """What the sequence knows of the controls of r problems.
 
-    cost (r,): J, in units of `gain`^2; loss (r,): the function that is minimised; factor (r,): the safety factor k; angles (r, m):
-    swept angles [rad]; margin (r, m, T), normal (r, 2, m, T): on the grid; contacts, factors (q,): minima of the safety factors near the movement.
+    cost (r,): J, in units of `gain`^2; loss (r,): what is minimised; factor (r,): the safety factor k; angles (r, m): swept
+    angles [rad]; margin (r, m, T), normal (r, 2, m, T): on the grid; contacts, factors (q,): minima of the safety factors near
+    the path.
     """
 
     cost: Array
@@ -297,7 +298,7 @@ class Solver:
         return found.take(~_is_known(found, plan.contacts, VIOLATED_APART))
 
     def _bundle(self, now: Iterates, plan: Plan, rows: Indices) -> Plan:
-        """Return a plan with rows where the trials of some problems came nearest: on the other side of a kink, or where it turned."""
+        """Return a plan with rows where the trials of some problems came nearest, as on the other side of a kink."""
         new = now.trial.take(np.isin(now.trial.problem, rows))
         new = new.take(~_is_known(new, plan.contacts, SAME))
         if not len(new.time):

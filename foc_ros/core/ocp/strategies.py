@@ -191,7 +191,8 @@ def solve_at(
         control, contacts, multipliers, k, angles = _stack_starts(solver, problems, starts)
     else:
         last = before.now
-        control, contacts, multipliers, k, angles = last.control.copy(), last.contacts, last.multipliers, last.k.copy(), last.angles
+        control, k, angles = last.control.copy(), last.k.copy(), last.angles
+        contacts, multipliers = last.contacts, last.multipliers
     now = solver.begin(control, contacts, multipliers, np.where(k > 0.0, np.minimum(k, wanted), wanted), angles)
     if most is None:
         solver.run(now, deadline)
@@ -203,7 +204,7 @@ def solve_at(
 def _stack_starts(
     solver: Solver, problems: Sequence[Problem], starts: Sequence[Start]
 ) -> tuple[Array, Contacts, Array, Array, Array]:
-    """Return controls (b, 2N), contacts and their multipliers (q,), safety factors (b,), and swept angles (b, m) of the classes."""
+    """Return controls (b, 2N), contacts, their multipliers (q,), safety factors (b,), and swept angles (b, m) of the classes."""
     margins = solver.margins
     rows = np.arange(len(problems))
     paths = np.stack([each.path for each in starts])
@@ -252,8 +253,8 @@ def solve_optimal(
 def _find_weights(point: Point, results: Sequence[StrategyResult]) -> list[tuple[tuple[float, float], ...]]:
     """Return the (tau [m^2], lambda [1/s^6]) with which each contact would be where it is.
 
-    tau = k sqrt(Var[C]) is by how much E[C] has to be below zero, and lambda = y k D / sqrt(Var[C]), for a multiplier y [m/s^6], is
-    the cost of a variance along its normal at its time.
+    tau = k sqrt(Var[C]) is by how much E[C] has to be below zero, and lambda = y k D / sqrt(Var[C]), for a multiplier y [m/s^6],
+    is the cost of a variance along its normal at its time.
     """
     counts = [len(each.forces.time) for each in results]
     obstacle, time, push = (np.concatenate([each.forces[i] for each in results]) for i in range(3))
@@ -289,7 +290,7 @@ def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult
 def solve_fixed(
     problems: Sequence[Problem], starts: Sequence[Start], settings: FocConfig, deadline: Deadline = NEVER
 ) -> list[StrategyResult]:
-    """Solve at the tau [m^2] and lambda [1/s^6] of the settings, at the steps; the eta that this gives is reported, none is wanted."""
+    """Solve at the tau [m^2] and lambda [1/s^6] of the settings, at the steps; the eta is what this gives."""
     tau, lam = np.full(len(problems), settings.tau), np.full(len(problems), settings.lam)
     point = solve_at(problems, starts, tau, lam, is_chance=False, between=False, deadline=deadline)
     touching, results = point.is_touching(), []
