@@ -457,7 +457,7 @@ class Margins:
         gradient = along - worth[:, None] * spread
         rate = stddev * (1.0 + k * stddev / margin.root)
         earlier, later = slice(count, count + len(held)), slice(count + len(held), None)
-        apart = whole.time[later] - whole.time[earlier]
+        apart = np.maximum(whole.time[later] - whole.time[earlier], np.finfo(float).tiny)
         rise, fall = margin.value[later] - margin.value[held], margin.value[earlier] - margin.value[held]
         bend = 4.0 * (rise + fall) / apart**2
         slide = (gradient[later] - gradient[earlier]) / apart[:, None]
