@@ -3,8 +3,8 @@
     tau = delta s,  lambda = lambda0 growth^s
 
 A small delta slows the hand down (low velocity, `lv`), a large one leads it past at a distance (high clearance, `hc`). The paper
-steps along the curve in whole s (algorithm 1); here s is continuous, so that the effort is a continuous function of eta, as ratios
-of costs need. The smallest s at which the wanted safety factor holds is chosen, or one with a smaller loss before it.
+steps along the curve in whole s (algorithm 1); here s is continuous, so that the effort is a continuous function of eta, as
+ratios of costs need. The smallest s at which the wanted safety factor holds is chosen, or one with a smaller loss before it.
 """
 
 from __future__ import annotations
