@@ -49,6 +49,8 @@ LAST_GAIN, LAST_FACTOR = 3e-4, 1e-6
 converge quadratically."""
 LARGEST_TOLERANCE = 5e-3
 """Largest gain of such a step for classes that are unlikely."""
+STALLED = 1e-2
+"""Part of a promised gain that a step brings at least where rounding does not hide it."""
 STALLED_GAIN = 2e-5
 """Gain below which a problem is solved that no step improves: rounding hides it."""
 ROUNDS = 3
@@ -250,8 +252,10 @@ class Solver:
         bound = now.bound[rows] - SUFFICIENT * share * plan.gain[place] + ROUNDING
         is_good = (at.loss <= bound) & (np.abs(at.angles - now.angles[rows]) < np.pi).all(axis=1)
         if share == 1.0:
-            is_last = is_good & (plan.gain[place] < LAST_GAIN * self._tolerate(now, rows)) & (at.loss <= now.at.loss[rows])
-            is_last &= at.factor > plan.k[place] - LAST_FACTOR * (1.0 + plan.k[place])
+            fallen = now.at.loss[rows] - at.loss
+            is_near = np.abs(fallen) < STALLED * plan.gain[place]  # what is left is rounding
+            is_near |= (fallen >= 0.0) & (at.factor > plan.k[place] - LAST_FACTOR * (1.0 + plan.k[place]))
+            is_last = is_good & is_near & (plan.gain[place] < LAST_GAIN * self._tolerate(now, rows))
             now.is_done[rows[is_last]] = now.is_settled[rows[is_last]] = True
         good = rows[is_good]
         now.control[good] = control[is_good]
