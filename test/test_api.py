@@ -4,6 +4,8 @@ import doctest
 import subprocess
 import sys
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -266,10 +268,10 @@ def test_representations_are_short(part, text):
 
 
 def test_a_strategy_from_outside_builds_on_another_one():
-    def solve_with_less(problem, start, settings, deadline):
-        result = foc_ros.get_strategy('lv')(problem, start, settings, deadline)
-        etas.append(foc_ros.compute_eta(problem, result.control))
-        return foc_ros.StrategyResult(result.status, 'as lv', result.control, result.contacts, result.tau, result.lam)
+    def solve_with_less(problems, starts, settings, deadline):
+        results = foc_ros.get_strategy('lv')(problems, starts, settings, deadline)
+        etas.extend(foc_ros.compute_eta(*each) for each in zip(problems, (each.control for each in results), strict=True))
+        return [replace(each, message='as lv') for each in results]
 
     etas = []
     foc_ros.register_strategy('as_lv', solve_with_less)

@@ -5,28 +5,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foc_ros.core.kernels import freeze
 from foc_ros.core.obstacles.chance_constraint import (
     CERTAIN_K,
     RiskBound,
-    UncertainObstacles,
     centre_trajectories,
-    constraint_moments,
+    compute_safety_factor,
     count_events,
     eta_of_k,
     k_of_eta,
-    safety_factor,
     size_moments,
 )
-from foc_ros.core.obstacles.rounded_polygon import tabulate_polygons
-from foc_ros.core.types import Obstacles, make_obstacles
-
-
-def uncertain_obstacles(obstacles: Obstacles, ignored_until: float = 0.0) -> UncertainObstacles:
-    n = len(obstacles)
-    drift, ignored = np.zeros((n, 2)), np.full(n, ignored_until)
-    size, polygons = size_moments(obstacles), tabulate_polygons(obstacles)
-    return freeze(UncertainObstacles(obstacles.centre, drift, *size, obstacles.centre_covariance, ignored, polygons))
+from foc_ros.core.types import make_obstacles
 
 
 @given(st.floats(0.0, 0.999))
@@ -57,32 +46,27 @@ def test_the_risk_of_a_path_counts_every_obstacle_at_every_step():
 
 
 def test_without_variance_k_is_certain_either_way():
-    assert (safety_factor(-1.0, 0.0), safety_factor(1.0, 0.0)) == (CERTAIN_K, -CERTAIN_K)
+    distance = np.array([0.05, 0.01, -0.05])
+    found = compute_safety_factor(distance, np.zeros(3), np.full(3, 9e-4), np.zeros(3))
+    np.testing.assert_array_equal(found, [CERTAIN_K, -CERTAIN_K, -CERTAIN_K])
 
 
-def test_moments_are_those_of_samples_for_correlated_axes_and_uncertain_centres():
+def test_the_safety_factor_is_that_of_samples_for_correlated_axes_and_uncertain_centres():
     generator = np.random.default_rng(5)
     samples = 400_000
     covariance = np.array([[4e-4, 1.5e-4], [1.5e-4, 2e-4]])
     centre_covariance = np.array([[1e-4, -5e-5], [-5e-5, 9e-5]])
     obstacle = make_obstacles([[0.1, 0.05]], [0.03], [0.004], centre_covariance=centre_covariance)
-    mean = np.array([0.16, 0.02])
-    d = mean - obstacle.centre[0]
-    E, V = constraint_moments(mean[None], covariance[[0, 1, 0], [0, 1, 1]].reshape(3, 1), uncertain_obstacles(obstacle))
-    E, V = E[0, 0], V[0, 0]
-    position = generator.multivariate_normal(mean, covariance, samples)
-    centre = generator.multivariate_normal(obstacle.centre[0], centre_covariance, samples)
+    d = np.array([0.06, -0.03])
+    distance = np.hypot(*d)
+    along = d @ (covariance + centre_covariance) @ d / distance**2
+    k = float(compute_safety_factor(distance, along, *size_moments(obstacle))[0])
+    position = d + generator.multivariate_normal(np.zeros(2), covariance, samples)
+    centre = generator.multivariate_normal(np.zeros(2), centre_covariance, samples)
     radius = generator.normal(0.03, 0.004, samples)
     C = radius**2 - d @ d - 2 * (position - centre - d) @ d
-    assert abs(C.mean() - E) < 4.5 * C.std() / np.sqrt(samples)
-    assert C.var() == pytest.approx(V, rel=0.01)
-    assert np.mean(C <= 0) >= eta_of_k(-E / np.sqrt(V))
-
-
-def test_a_circle_does_not_count_before_the_hand_has_left_its_margin():
-    circles = uncertain_obstacles(make_obstacles([[0.0, 0.0]], [0.03], [0.002]), ignored_until=2.5)
-    mean, _ = constraint_moments(np.zeros((4, 2)), np.zeros((3, 4)), circles)
-    np.testing.assert_array_equal(np.isneginf(mean), [[True, True, False, False]])
+    assert k == pytest.approx(-C.mean() / C.std(), rel=0.01)
+    assert np.mean(C <= 0) >= eta_of_k(k)
 
 
 def test_centres_move_with_their_velocity():

@@ -5,9 +5,8 @@ import pytest
 
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.estimation.duration import CHANGE_S, limit_change
-from foc_ros.core.memory.continuity import Past, carry_over, make_continuous
+from foc_ros.core.memory.continuity import Past, carry_over, interpolate_rest, make_continuous
 from foc_ros.core.memory.memory import Memory
-from foc_ros.core.ocp.start import resample_rest
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import LEFT, RIGHT, Candidate, HandState, PredictedCandidate, make_obstacles
 
@@ -75,12 +74,10 @@ def test_nothing_is_kept_for_a_goal_that_is_another_one():
 
 def test_the_rest_of_an_answer_is_where_the_answer_was_at_that_time():
     rng = np.random.default_rng(3)
-    mean, covariance, control = rng.normal(size=(21, 6)), rng.normal(size=(21, 6, 6)), rng.normal(size=(20, 2))
-    means, covariances, controls = resample_rest(mean, covariance, control, 10.0)
+    mean, covariance = rng.normal(size=(21, 6)), rng.normal(size=(21, 6, 6))
+    means, covariances = (interpolate_rest(each, 10.0) for each in (mean, covariance))
     np.testing.assert_allclose(means[::2], mean[10:], atol=1e-12)
     np.testing.assert_allclose(covariances[1::2], (covariance[10:-1] + covariance[11:]) / 2, atol=1e-12)
-    np.testing.assert_array_equal(controls, np.repeat(control[10:], 2, axis=0))
-    assert (controls**2).sum() * 0.5 == pytest.approx((control[10:] ** 2).sum()), 'the cost of the rest'
 
 
 def test_a_renamed_class_keeps_what_it_had():

@@ -11,7 +11,6 @@ import time
 from importlib import import_module
 from pathlib import Path
 
-import numba.core.serialize
 import pytest
 
 from foc_ros.cli import interrupts
@@ -36,7 +35,7 @@ def test_an_interrupt_is_raised_and_the_usual_handler_comes_back() -> None:
 
 
 def test_an_interrupt_waits_for_the_end_of_code_without_a_file() -> None:
-    """Named tuples are constructed by such code; an exception there would end the process if a kernel returns one."""
+    """Named tuples are constructed by such code."""
     reached = []
     code = compile('signal.raise_signal(signal.SIGINT)\nreached.append(True)', '<string>', 'exec')
     with pytest.raises(KeyboardInterrupt), handle_interrupts():  # noqa: PT012
@@ -52,16 +51,6 @@ def test_an_interrupt_waits_for_the_end_of_an_import(tmp_path: Path, monkeypatch
         import_module('slowly_imported')
         wait_for_interrupt()
     assert sys.modules.pop('slowly_imported').is_complete
-
-
-def test_an_interrupt_waits_for_the_class_of_a_named_tuple_that_a_kernel_returns() -> None:
-    """Numba looks it up in Python; an exception there would end the process with a segmentation fault."""
-    reached = []
-    code = compile('signal.raise_signal(signal.SIGINT)\nreached.append(True)', 'serialize.py', 'exec')
-    with pytest.raises(KeyboardInterrupt), handle_interrupts():  # noqa: PT012
-        exec(code, vars(numba.core.serialize) | {'signal': signal, 'reached': reached})
-        wait_for_interrupt()
-    assert reached == [True]
 
 
 def test_an_import_that_does_not_end_is_left(tmp_path: Path) -> None:

@@ -1,18 +1,14 @@
-"""The memory between predictions: solutions by label, under changed labels, and after a deadline."""
+"""The memory between predictions: solutions by label, under changed labels, and which of them are no start."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from foc_ros.core import candidates as outcomes
-from foc_ros.core.candidates import EarlierSolutions
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.deadline import Deadline, OutOfTimeError
 from foc_ros.core.estimation.kalman_filter import update
-from foc_ros.core.memory.memory import RETRY_AFTER, Memory
-from foc_ros.core.ocp.solve import solve_problem
+from foc_ros.core.memory.continuity import Past
+from foc_ros.core.memory.memory import Memory
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import LEFT, RIGHT, Candidate, HandSample, HandState, Status, make_obstacles
 
@@ -30,7 +26,7 @@ OVER_BOTH, BETWEEN = way({'a': LEFT, 'b': LEFT}), way({'a': LEFT, 'b': RIGHT})
 @pytest.fixture
 def memory() -> Memory:
     solutions = {one.label: object() for one in (OVER_BOTH, BETWEEN)}
-    return Memory(None, (OVER_BOTH, BETWEEN), EarlierSolutions(solutions, {OVER_BOTH.label: 0.2, BETWEEN.label: 0.8}))
+    return Memory(None, (OVER_BOTH, BETWEEN), solutions, Past(likelihoods={OVER_BOTH.label: 0.2, BETWEEN.label: 0.8}))
 
 
 @pytest.mark.parametrize(
@@ -47,11 +43,12 @@ def memory() -> Memory:
     ],
 )
 def test_a_candidate_is_found_by_its_present_or_its_earlier_label(memory, now, before):
-    found = memory.find_earlier([now]).solutions.get(now.label)
-    assert found is (None if before is None else memory.earlier.solutions[before.label])
+    found = memory.find_earlier([now], {0, 1}).get(now.label)
+    assert found is (None if before is None else memory.solutions[before.label])
+    assert not memory.find_earlier([now], {1}), 'the goal is another one'
 
 
-def reaching(x: float, memory: Memory, config: Config = CONFIG):
+def reaching(x: float, memory: Memory):
     """Predict for a hand at (x, 0) that moves, among two obstacles of which it passes the first at x = 0.1."""
     obstacles = make_obstacles([[0.1, 0.04], [0.2, -0.01]], 0.02, 0.001)
     state = None
@@ -59,7 +56,7 @@ def reaching(x: float, memory: Memory, config: Config = CONFIG):
         place = np.array([x - 0.004 * (39 - tick), 0.0])
         stamp_ns = 1_000_000_000 + round(x / 0.4 * 1e9) + 10_000_000 * tick
         state = update(state, HandSample(stamp_ns, place), CONFIG.estimator).state
-    return predict(config, state, obstacles, np.array([[0.3, 0.0]]), memory)
+    return predict(CONFIG, state, obstacles, np.array([[0.3, 0.0]]), memory)
 
 
 def test_when_an_obstacle_is_passed_the_candidates_keep_their_solutions():
@@ -67,7 +64,7 @@ def test_when_an_obstacle_is_passed_the_candidates_keep_their_solutions():
     warm, _ = reaching(0.101, memory)
     cold, _ = reaching(0.101, Memory())
     labels = {outcome.candidate.label for outcome in warm.solved_candidates}
-    assert labels.isdisjoint(memory.earlier.solutions), 'all names are new ones'
+    assert labels.isdisjoint(memory.solutions), 'all names are new ones'
     assert labels == {outcome.candidate.label for outcome in cold.solved_candidates}
     for one in warm.solved_candidates:
         other = next(each for each in cold.solved_candidates if each.candidate.label == one.candidate.label)
@@ -75,44 +72,12 @@ def test_when_an_obstacle_is_passed_the_candidates_keep_their_solutions():
         np.testing.assert_allclose(one.solution.path, other.solution.path, atol=1e-4)
 
 
-def test_a_candidate_stopped_by_the_deadline_continues_from_there(monkeypatch):
-    config = replace_values(CONFIG, {'likelihood.shortfall': math.inf})
-    looks = []
-
-    def stop_after_a_few(*_):
-        looks.append(1)
-        if len(looks) > 4:
-            raise OutOfTimeError
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Deadline, 'check', stop_after_a_few)
-        late, memory = reaching(0.0, Memory(), config)
-    assert {outcome.solution.status for outcome in late.candidates} == {Status.DEADLINE}
-    assert memory.earlier.solutions, 'the first candidate had some time'
-    assert all(solution.multipliers for solution in memory.earlier.solutions.values())
-    after, _ = reaching(0.0, memory, config)
-    assert set(memory.earlier.solutions) <= {outcome.candidate.label for outcome in after.candidates_with_likelihood}
-
-
-def test_an_unreachable_candidate_is_followed_and_restarted_at_intervals(monkeypatch):
-    starts = []
-    monkeypatch.setattr(outcomes, 'solve_problem', lambda *given: starts.append(given[1].lam is None) or solve_problem(*given))
-    config = replace_values(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0, 'likelihood.shortfall': math.inf})
-    memory, begun = Memory(), []
-    for tick in range(2 * RETRY_AFTER + 3):
-        state = HandState(10_000_000 * tick, np.zeros(6), np.zeros((6, 6)))
-        starts.clear()
-        prediction, memory = predict(config, state, make_obstacles([[0.15, 0.0]], 0.03, 0.003), np.array([[0.3, 0.0]]), memory)
-        assert {outcome.solution.status for outcome in prediction.candidates} == {Status.ETA_UNREACHABLE}
-        begun.append(any(starts))
-    assert [tick for tick, restarted in enumerate(begun) if restarted] == [0, RETRY_AFTER + 1, 2 * RETRY_AFTER + 2]
-
-
-def test_a_class_whose_safety_factor_had_no_time_to_rise_keeps_its_turn():
-    state = HandState(0, np.zeros(6), np.zeros((6, 6)))
-    prediction, memory = predict(CONFIG, state, make_obstacles([[0.15, 0.0]], 0.03, 0.003), np.array([[0.3, 0.0]]), Memory())
-    complete, waiting = prediction.candidates
-    waiting = replace(waiting, solution=replace(waiting.solution, is_complete=False))
-    earlier, _ = memory.remember([complete.candidate, waiting.candidate], [complete, waiting], memory.earlier, {}, 20_000_000)
-    assert earlier.turns == {complete.label: (20_000_000, 20_000_000), waiting.label: (20_000_000, 0)}
-    assert [earlier.sort_by_turn(each) for each in ([complete, waiting], [waiting, complete])] == [[1, 0], [0, 1]]
+def test_an_earlier_solution_on_another_side_is_no_start():
+    """An obstacle jumps over the earlier paths: both classes are solved from their guesses, and none leaves its class."""
+    hand, goals = HandState(0, np.zeros(6), np.zeros((6, 6))), np.array([[0.3, 0.0]])
+    _, memory = predict(CONFIG, hand, make_obstacles([[0.15, -0.02]], 0.02, 0.001), goals, Memory())
+    later, jumped = replace(hand, stamp_ns=20_000_000), make_obstacles([[0.15, 0.02]], 0.02, 0.001)
+    warm, cold = (predict(CONFIG, later, jumped, goals, each)[0] for each in (memory, Memory()))
+    assert {each.label: each.status for each in warm.candidates} == {'goal0:+0': Status.SOLVED, 'goal0:-0': Status.SOLVED}
+    for one, other in zip(warm.candidates, cold.candidates, strict=True):
+        assert (one.label, one.cost) == (other.label, pytest.approx(other.cost, rel=1e-5))

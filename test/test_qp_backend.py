@@ -1,7 +1,5 @@
 """QP backends: each solves a problem as PIQP does, for every strategy, and one from outside the package is used by its name."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from reach_helpers import bowed, one_obstacle, reach
@@ -9,10 +7,8 @@ from reach_helpers import bowed, one_obstacle, reach
 from foc_ros.core.config import FocConfig
 from foc_ros.core.errors import InputError
 from foc_ros.core.ocp.backend import Answer, DenseQP, solve_named, solve_piqp
-from foc_ros.core.ocp.qp import clearance_qp, effort_cost
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
-from foc_ros.core.ocp.working_set import WorkingSet, solve, solve_full
 from foc_ros.core.registry import QP_BACKENDS
 from foc_ros.core.types import Status, make_obstacles
 
@@ -37,20 +33,11 @@ def test_every_strategy_has_the_same_solution_by_another_backend(strategy, backe
 
 
 @OTHERS
-def test_a_full_qp_has_the_same_solution_by_another_backend(backend):
+def test_a_class_without_a_path_is_told_by_another_backend_too(backend):
     pytest.importorskip(backend, reason=f'optional data: the solver {backend} is not installed')
-    problem = one_obstacle()
-    qp = clearance_qp(problem, effort_cost(problem, 1e4), BOWED[1:], 5e-4)
-    fast, other = solve(qp, WorkingSet()), solve_full(qp, backend)
-    np.testing.assert_allclose(problem.positions(fast.control), problem.positions(other.control), atol=1e-6)
-
-
-@OTHERS
-def test_a_contradiction_is_infeasible_by_another_backend_too(backend):
-    pytest.importorskip(backend, reason=f'optional data: the solver {backend} is not installed')
-    wall = replace(reach(make_obstacles([[0.15, 0.02], [0.15, -0.02]], [0.03, 0.03])), qp_backend=backend)
-    qp = clearance_qp(wall, effort_cost(wall, 1.0), bowed((0, 0), (0.3, 0), 50, 0.0)[1:], 0.0)
-    assert solve(qp, WorkingSet()) is None
+    wall = reach(make_obstacles([[0.15, 0.02], [0.15, -0.02]], [0.03, 0.03]))
+    settings = FocConfig(strategy='optimal', qp_backend=backend)
+    assert solve_problem(wall, cold_start(bowed((0, 0), (0.3, 0), 50, 0.0)), settings).status is Status.INFEASIBLE
 
 
 @pytest.mark.parametrize('strategy', ['lv', 'optimal', 'fixed', 'algorithm1'])
@@ -88,10 +75,3 @@ def test_a_problem_on_which_piqp_oscillates_is_solved_with_other_settings():
     assert answer.x.min() > -1e-8
     assert gradient.min() > -1e-8
     assert abs(gradient @ answer.x) < 1e-7
-
-
-def test_a_problem_that_would_stop_all_other_threads_is_not_tried(monkeypatch):
-    monkeypatch.setattr('foc_ros.core.ocp.backend.LARGEST_WORK', 10 * 4**3)
-    easy = DenseQP(np.eye(4), np.ones(4), lower=np.zeros(4))
-    assert solve_piqp(easy).solved
-    assert not solve_piqp(easy._replace(G=np.eye(4), g=-np.ones(4))).solved

@@ -8,7 +8,6 @@ import pytest
 from reach_helpers import bowed, one_obstacle, random_scene, reach, solved
 
 from foc_ros.core.config import FocConfig
-from foc_ros.core.deadline import Deadline, OutOfTimeError
 from foc_ros.core.dynamics.plants import build_triple_integrator_horizon, condense, discretise_damped_mass
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacles.chance_constraint import eta_of_k
@@ -16,8 +15,7 @@ from foc_ros.core.ocp.solve import find_least_safety_factor
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
-from foc_ros.core.ocp.strategies.algorithm1 import solve_algorithm1
-from foc_ros.core.ocp.start import cold_start, correct_to_goal, warm_start
+from foc_ros.core.ocp.start import cold_start, warm_start
 from foc_ros.core.types import Status, make_obstacles
 
 BOWED = bowed((0, 0), (0.3, 0), 50, 0.05)
@@ -39,15 +37,13 @@ def test_result_is_consistent_with_itself(strategy):
     problem = one_obstacle()
     solution = solved(problem, BOWED, strategy)
     control = solution.control.T.ravel()
-    minimum = find_minimum_safety_factor(problem, control, between_steps=strategy != 'optimal')
+    k, row, moment = find_least_safety_factor(problem, control)
     assert solution.effort == pytest.approx(control @ control)
-    assert solution.eta == pytest.approx(eta_of_k(minimum.k))
+    assert solution.eta == pytest.approx(eta_of_k(k))
     assert solution.eta >= 0.9 - 1e-6
-    assert solution.eta_at is not None
-    identity, step = solution.eta_at
-    assert identity == '0'
-    assert minimum.k <= find_minimum_safety_factor(problem, control, between_steps=False).k * (1 + 1e-12)
-    assert (0, step) == minimum[1:]
+    assert solution.eta_at == ('0', moment)
+    assert row == 0
+    assert solution.safety_factor == k
     np.testing.assert_allclose(solution.path[1:], problem.positions(control), atol=1e-12)
     np.testing.assert_allclose(solution.mean[0], problem.initial_mean)
     np.testing.assert_allclose(solution.mean[-1], problem.goal, atol=1e-7)
@@ -97,7 +93,7 @@ def test_the_message_of_an_unreachable_eta_names_the_largest_that_is_reached(str
     solution = solved(one_obstacle(0.999, (0.6, 0.6)), BOWED, strategy)
     assert solution.status is Status.ETA_UNREACHABLE
     assert 0 < solution.eta < 0.999
-    said = float(re.search(r'the largest .*?(0\.\d+)', solution.message)[1])
+    said = float(re.search(r': .*?(0\.\d+)', solution.message)[1])
     assert said == pytest.approx(solution.eta, abs=1e-3)
     easier = solved(one_obstacle(0.8 * solution.eta, (0.6, 0.6)), BOWED, strategy)
     assert easier.status is Status.SOLVED
@@ -124,6 +120,22 @@ def test_a_hand_inside_a_margin_gets_out_of_it_in_the_recovery_time(strategy, st
     assert solution.status is Status.SOLVED
     assert 'near' in solution.message
     assert np.hypot(*solution.path[15:].T).min() > 0.02
+
+
+@EVERY
+def test_where_two_circles_leave_no_gap_there_is_no_way_between_two_steps_either(strategy):
+    """Rows at the steps alone would let the mean leap through the gap of 1 mm less than nothing."""
+    shut = reach(make_obstacles([[0.122, 0.03], [0.122, -0.03]], [0.0305, 0.0305]), noise=(0.0, 0.0), steps=10)
+    assert solved(shut, bowed((0, 0), (0.3, 0), 10, 0.0), strategy).status is Status.INFEASIBLE
+
+
+@EVERY
+def test_the_same_circle_twice_is_as_once(strategy):
+    twice = reach(make_obstacles([[0.12, 0.0]] * 2, [0.03] * 2, [0.003] * 2))
+    one, two = solved(one_obstacle(), BOWED, strategy), solved(twice, BOWED, strategy)
+    assert two.status is Status.SOLVED
+    np.testing.assert_allclose(two.path, one.path, atol=1e-5)
+    assert two.effort == pytest.approx(one.effort, rel=1e-5)
 
 
 @EVERY
@@ -157,16 +169,15 @@ def test_every_strategy_solves_for_a_damped_mass(strategy):
 
 def test_algorithm1_as_printed_overshoots_the_solution_of_the_continuous_path():
     problem = one_obstacle(0.9)
-    stepped = solve_algorithm1(problem, cold_start(BOWED), FocConfig(algorithm1_growth=10.0))
+    stepped = solved(problem, BOWED, 'algorithm1', algorithm1_growth=10.0)
     followed = solved(problem, BOWED, 'lv', growth=10.0)
-    effort = stepped.control @ stepped.control
     if stepped.status is Status.SOLVED:
-        assert effort >= followed.effort * (1 - 1e-6)
+        assert stepped.effort >= followed.effort * (1 - 1e-6)
     else:
-        assert 'infeasible' in stepped.message or 'not settled' in stepped.message
-    gentle = solve_algorithm1(problem, cold_start(BOWED), FocConfig(algorithm1_growth=1.5))
+        assert any(words in stepped.message for words in ('infeasible', 'not settled', 'achieves eta'))
+    gentle = solved(problem, BOWED, 'algorithm1', algorithm1_growth=1.5)
     assert gentle.status is Status.SOLVED
-    assert eta_of_k(find_minimum_safety_factor(problem, gentle.control, between_steps=False).k) >= 0.9
+    assert gentle.eta >= 0.9 - 0.02, 'at the steps; between them it may be a little less'
 
 
 @EVERY
@@ -185,44 +196,10 @@ def test_a_warm_start_is_corrected_to_the_goal_from_where_the_hand_really_is(str
     state = np.array([0.002, 0.001, 0.03, 0.01, 0.8, 0.2])  # not where the plan would be, and far from its acceleration
     problem = replace(one_obstacle(0.86), initial_mean=state)
     start = warm_start(before, problem)
-    times = np.array([10.0, 20.0])
-    control = correct_to_goal(problem, start.control, start.positions, times)
-    np.testing.assert_allclose(problem.free[-1] + problem.horizon.response[-1] @ control, problem.goal, atol=1e-6)
-    np.testing.assert_allclose(problem.positions(control)[[9, 19]], start.positions[[9, 19]], atol=1e-7)
     found = solve_problem(problem, start, FocConfig(strategy=strategy))
     fresh = solve_problem(problem, cold_start(BOWED), FocConfig(strategy=strategy))
     assert found.status is fresh.status is Status.SOLVED
     np.testing.assert_allclose(found.path, fresh.path, atol=1e-5)
-
-
-@pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal', 'fixed', 'algorithm1'])
-def test_a_deadline_ends_the_search_and_one_that_is_not_reached_changes_nothing(strategy):
-    problem, settings = one_obstacle(0.94), FocConfig(strategy=strategy, algorithm1_growth=1.5)
-    late = solve_problem(problem, cold_start(BOWED), settings, Deadline(0.0))
-    assert late.status is Status.DEADLINE
-    assert 'out of time' in late.message
-    assert np.isfinite(late.mean).all()
-    free, ample = (
-        solve_problem(problem, cold_start(BOWED), settings),
-        solve_problem(problem, cold_start(BOWED), settings, Deadline(1e3)),
-    )
-    assert ample.status is free.status is Status.SOLVED
-    np.testing.assert_array_equal(ample.mean, free.mean)
-
-
-@pytest.mark.parametrize(('strategy', 'checks'), [('lv', 3), ('optimal', 2)])
-def test_a_deadline_in_the_middle_leaves_the_best_so_far(strategy, checks, monkeypatch):
-    calls = iter(range(10_000))
-
-    def check(*_):
-        if next(calls) == checks:
-            raise OutOfTimeError
-
-    monkeypatch.setattr('foc_ros.core.deadline.Deadline.check', check)
-    solution = solved(one_obstacle(0.94), BOWED, strategy)
-    assert solution.status is Status.DEADLINE
-    assert 0 <= solution.eta < 0.94
-    assert f'eta {solution.eta:.4g}' in solution.message
 
 
 @EVERY

@@ -10,12 +10,10 @@ from foc_ros.cli.main import main
 def solve_cheaper(problems, starts, settings, deadline):
     """Return for each problem the result of lv or hc, whichever is solved with less effort."""
     results = [foc_ros.get_strategy(name)(problems, starts, settings, deadline) for name in ('lv', 'hc')]
-    return [min(pair, key=rank) for pair in zip(*results, strict=True)]
-
-
-def rank(result):
-    """Return what is least for the best result: solved ones come first."""
-    return result.status is not foc_ros.Status.SOLVED, result.control @ result.control
+    return [
+        min(pair, key=lambda result: (result.status is not foc_ros.Status.SOLVED, result.control @ result.control))
+        for pair in zip(*results, strict=True)
+    ]
 
 
 # before the program starts, and again in each of its worker processes, which import this file

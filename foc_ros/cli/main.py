@@ -76,6 +76,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout = Path(os.devnull).open('w', encoding='utf-8')  # noqa: SIM115  it stays open until the process ends
     if arguments is None and sys.getfilesystemencoding() != 'utf-8':  # it could not even name the files that it is given
         os.execv(sys.executable, [sys.executable, '-X', 'utf8', *sys.orig_argv[1:]])  # noqa: S606
+    if arguments is None:  # matrices are small: threads of a linear algebra library would only wait for each other
+        os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     if arguments is None:  # pictures are files; the backend of a notebook or of a desktop may not exist here
         os.environ['MPLBACKEND'] = 'agg'
     given = list(sys.argv[1:] if arguments is None else arguments)

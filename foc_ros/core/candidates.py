@@ -19,7 +19,7 @@ from .learning.choices import Choice
 from .likelihood import CostModel, compute_likelihoods, compute_lookahead_share
 from .ocp.problem import Problem
 from .ocp.solve import solve_problems
-from .ocp.start import cold_start, warm_start
+from .ocp.start import Start, cold_start, warm_start
 from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Solution, Status
 
 EFFORT_ONLY = CostModel()
@@ -57,19 +57,32 @@ def solve_candidates(
     deadline
         When the solutions have to be ready. A class that is not ready then has an estimate, and says so.
     """
-    starts = []
-    for row, candidate in enumerate(candidates):
-        previous = earlier.get(candidate.label)
-        starts.append(cold_start(candidate.guess) if previous is None else warm_start(previous, problems[row]))
     needed = [problems[row] for row in range(len(candidates))]
+    starts = [_begin(each, problem, earlier.get(each.label)) for each, problem in zip(candidates, needed, strict=True)]
     solutions = solve_problems(needed, starts, settings, deadline)
     return [_classify(*each, costs) for each in zip(candidates, solutions, needed, strict=True)]
 
 
+def _begin(candidate: Candidate, problem: Problem, previous: Solution | None) -> Start:
+    """Return the earlier solution of a candidate as its start, or its guess where that passes an obstacle on another side."""
+    if previous is None:
+        return cold_start(candidate.guess)
+    start = warm_start(previous, problem)
+    return start if _is_in_class(candidate, _find_sides(start.path, problem)) else cold_start(candidate.guess)
+
+
+def _find_sides(path: Array, problem: Problem) -> dict[str, int]:
+    return find_path_sides(path, problem.obstacles, problem.centre_trajectories)
+
+
+def _is_in_class(candidate: Candidate, sides: Mapping[str, int]) -> bool:
+    return all(sides.get(identity, side) == side for identity, side in candidate.sides)
+
+
 def _classify(candidate: Candidate, solution: Solution, problem: Problem, costs: CostModel) -> PredictedCandidate:
     """Find the class in which a solution is, and its cost. The status says if it left the candidate's."""
-    sides = find_path_sides(solution.path, problem.obstacles, problem.centre_trajectories)
-    if solution.status.has_likelihood and any(sides.get(identity, side) != side for identity, side in candidate.sides):
+    sides = _find_sides(solution.path, problem)
+    if solution.status.has_likelihood and not _is_in_class(candidate, sides):
         solution = replace(solution, status=Status.LEFT_CLASS, message='the solution moved into another homotopy class')
     return PredictedCandidate(candidate, solution, sides, costs.compute_cost(solution), 0.0)
 

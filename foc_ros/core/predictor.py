@@ -85,7 +85,7 @@ def predict(
     began, past = time.perf_counter(), memory.past.keep_goals(goals)
     scene = _prepare_scene(config, hand, obstacles, goals, goal_heights, past)
     found, candidates = _find_candidates(scene, config, memory, library, deadline)
-    costs, earlier = make_cost_model(scene.hand.effort_spent, config), memory.find_earlier(candidates)
+    costs, earlier = make_cost_model(scene.hand.effort_spent, config), memory.find_earlier(candidates, past.durations_s)
     solved = _solve(scene, config, candidates, costs, earlier, deadline)
     kept = keep_answers(candidates, solved, past, hand.stamp_ns, config.likelihood.hold_s, costs)
     ranked, choice = rank_candidates(kept, config, scene.near, scene.hand, goals)

@@ -242,8 +242,8 @@ class Status(Enum):
 
     SOLVED: the solution meets the wanted eta. COMPROMISED: it meets a smaller eta only, which makes it less likely.
     ETA_UNREACHABLE: the same, where less than the wanted eta is not allowed. INFEASIBLE: no path of the class meets the goal and
-    the constraints. ITERATION_LIMIT: the result does not meet what it promises. DEADLINE: time or iterations ran out before it was
-    settled: effort and safety are estimated from its last iterate.
+    the constraints. ITERATION_LIMIT: the result does not meet what it promises. DEADLINE: time or iterations ran out before it
+    was settled: effort and safety are estimated from its last iterate.
     LEFT_CLASS: the solution lies in another homotopy class.
     """
 
@@ -380,9 +380,9 @@ class PredictedCandidate:
 
     candidate: the homotopy class; solution: its forward optimal control; sides: side on which the mean path passes each obstacle,
     by id. cost: effort to go, time cost, and the share of the effort since onset that all classes have in common [m^2/s^5];
-    likelihood in [0, 1]: 0 unless solved, compromised or estimated. age_s: 0, or how long ago the solution was found, of which this is the
-    rest, if there was no time for a new one or it failed [s]. way: a number that stays the same for as long as the class is
-    followed, whatever its label and its rank are. height: the movement along the normal of the plane, None where it is not
+    likelihood in [0, 1]: 0 unless solved, compromised or estimated. age_s: 0, or how long ago the solution was found, of which
+    this is the rest, if it failed [s]. way: a number that stays the same for as long as the class
+    is followed, whatever its label and its rank are. height: the movement along the normal of the plane, None where it is not
     predicted: the hand then stays at its height.
     """
 

@@ -65,6 +65,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments: ROS arguments (`--ros-args ...`) without the program's name; by default those of the process.
     """
     stop = StopSignals()
+    # with matrices of a hundred columns the threads of a linear algebra library only wait for each other; NumPy is not loaded yet
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     given = ['foc_node', *(sys.argv[1:] if arguments is None else arguments)]
     try:
         with print_warnings('foc_node'):

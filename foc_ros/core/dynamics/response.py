@@ -21,7 +21,7 @@ def hermite(share: Array) -> Array:
 
 
 def hermite_quintic(share: Array) -> Array:
-    """Return the weights (..., 6) of value, rate and second derivative at the beginning and the end of a step, for shares in [0, 1]."""
+    """Return the weights (..., 6) of value, rate and second derivative at both ends of a step, for shares in [0, 1]."""
     s, left = share, 1.0 - share
     s2, s3, left2, left3 = s * s, s * s * s, left * left, left * left * left
     begin = left3 * (1.0 + 3.0 * s + 6.0 * s2), left3 * s * (1.0 + 3.0 * s), 0.5 * left3 * s2
@@ -48,7 +48,8 @@ class Response:
     def __init__(self, motion: Array) -> None:
         self.steps = motion.shape[-1] - 1
         since = np.arange(self.steps + 1)[:, None] - np.arange(self.steps)
-        at_steps = motion[..., np.maximum(since, 0)].transpose(2, 0, 1, 3)  # a later control has no effect: the response is 0 at 0
+        # a later control has no effect: the response at 0 is 0
+        at_steps = motion[..., np.maximum(since, 0)].transpose(2, 0, 1, 3)
         self.within = pair_steps(at_steps.reshape(self.steps + 1, 2, 2, -1))
 
     def at(self, times: Array) -> Array:
@@ -79,7 +80,7 @@ class Response:
 
     @cached_property
     def variance_map(self) -> Array:
-        """Matrix (2N, 18 N) from the variance of each control to what `Motion` holds of the covariances xx, yy, xy over each step."""
+        """Matrix (2N, 18 N) from the variance of each control to xx, yy, xy and both their derivatives over each step."""
         begin, rate, end, end_rate = self.within.swapaxes(0, 1)
         bends = 6.0 * (end - begin) - 4.0 * rate - 2.0 * end_rate, 6.0 * (begin - end) + 2.0 * rate + 4.0 * end_rate
         known = []

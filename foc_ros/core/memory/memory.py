@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from foc_ros.core.learning.choices import Choice
@@ -33,15 +33,17 @@ class Memory:
         """Return the memory with which a new movement begins: empty, but no number of a class is given again."""
         return Memory(numbers=self.numbers.forget())
 
-    def find_earlier(self, candidates: Sequence[Candidate]) -> Mapping[str, Solution]:
+    def find_earlier(self, candidates: Sequence[Candidate], goals: Collection[int]) -> Mapping[str, Solution]:
         """Return the earlier solutions of candidates under their present labels, also if their labels have changed.
+
+        Only those to some of the goals, by row: the goals that are where they were.
 
         The labels of all candidates change at once when an obstacle is passed or comes into reach. A candidate without a solution
         takes over that of an earlier one that passes all obstacles of both labels on the same sides, of the most likely if there
         are several.
         """
-        solutions = dict(self.solutions)
-        before = [each for each in self.candidates if each.label in solutions]
+        before = [each for each in self.candidates if each.label in self.solutions and each.goal in goals]
+        solutions = {each.label: self.solutions[each.label] for each in before}
         before.sort(key=lambda each: (-self.past.likelihoods.get(each.label, 0.0), each.label))
         for candidate in candidates:
             if candidate.label not in solutions:

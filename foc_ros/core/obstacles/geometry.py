@@ -7,7 +7,7 @@ inside it, and n = d / D points away from the obstacle. Where q is a vertex n tu
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +32,9 @@ class Edges(NamedTuple):
     inverse_square: Array
     is_solid: NDArray[np.bool_]
 
-    def take(self, rows: NDArray[np.intp]) -> Edges:
-        """Return the edges of the polygons in some rows of the first axis."""
-        return Edges(*(each[rows] for each in self))
+    def take(self, key: Any) -> Edges:
+        """Return the edges at an index of the axes before the last one."""
+        return Edges(self.x[key], self.y[key], self.along_x[key], self.along_y[key], self.inverse_square[key], self.is_solid[key])
 
 
 class Offset(NamedTuple):
@@ -46,13 +46,13 @@ class Offset(NamedTuple):
     is_on_edge: NDArray[np.bool_]
 
 
-def tabulate_edges(vertices: Array, corners: Array) -> Edges:
+def tabulate_edges(vertices: Array, corners: NDArray[Any]) -> Edges:
     """Return the edges of polygons (..., V) with vertices (..., V, 2) [m], of which the first `corners` (...) are used."""
     begin = np.where((np.arange(vertices.shape[-2]) < corners[..., None])[..., None], vertices, vertices[..., :1, :])
     along = np.roll(begin, -1, axis=-2) - begin
     square = (along**2).sum(axis=-1)
     inverse = np.divide(1.0, square, out=np.zeros_like(square), where=square > 0.0)
-    return Edges(begin[..., 0], begin[..., 1], along[..., 0], along[..., 1], inverse, (corners > 2.0)[..., None])
+    return Edges(begin[..., 0], begin[..., 1], along[..., 0], along[..., 1], inverse, (corners > 2)[..., None])
 
 
 def find_offset(x: Array, y: Array, edges: Edges) -> Offset:
@@ -71,7 +71,8 @@ def find_offset(x: Array, y: Array, edges: Edges) -> Offset:
         Arrays of shape (...).
     """
     if edges.x.shape[-1] == 1:
-        return _point(x - edges.x[..., 0], y - edges.y[..., 0], np.zeros(x.shape, dtype=np.bool_), np.zeros(x.shape, dtype=np.bool_))
+        no = np.zeros(x.shape, dtype=np.bool_)
+        return _point(x - edges.x[..., 0], y - edges.y[..., 0], no, no)
     from_x, from_y = x[..., None] - edges.x, y[..., None] - edges.y
     share = (from_x * edges.along_x + from_y * edges.along_y) * edges.inverse_square
     is_inside = (edges.along_x * from_y >= edges.along_y * from_x).all(axis=-1) & edges.is_solid[..., 0]
@@ -107,8 +108,8 @@ def measure_offsets(points: Array, obstacles: Obstacles, centres: Array | None =
     Returns
     -------
     Array, Array
-        d (q, n, 2) [m], from the nearest point of each polygon, and signed distances (q, n) [m]. Distances are from the polygons: the
-        boundary of a circle is at its radius.
+        d (q, n, 2) [m], from the nearest point of each polygon, and signed distances (q, n) [m] from the polygons: the boundary
+        of a circle is at its radius.
     """
     relative = np.reshape(points, (-1, 1, 2)) - (obstacles.centre[None] if centres is None else centres)
     found = find_offset(relative[..., 0], relative[..., 1], tabulate_edges(obstacles.vertices, obstacles.corners))

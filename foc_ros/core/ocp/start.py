@@ -65,7 +65,7 @@ def warm_start(previous: Solution, problem: Problem) -> Start:
 
 
 def resample(previous: Solution, elapsed_s: float, dt: float, steps: int) -> tuple[Array, Array]:
-    """Return the path (steps + 1, 2) and the stacked control (2 steps,) of a solution at new steps of dt [s], from elapsed_s on."""
+    """Return path (steps + 1, 2) and stacked control (2 steps,) of a solution at new steps of dt [s], from elapsed_s on."""
     count = len(previous.control)
     at = np.clip((elapsed_s + dt * np.arange(steps + 1)) / previous.dt, 0.0, count)
     step = np.minimum(at.astype(np.intp), count - 1)

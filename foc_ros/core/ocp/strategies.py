@@ -1,12 +1,8 @@
 """Strategies: curves of (k, tau, lambda) and the rule that chooses a point on them.
 
-`optimal` minimises the effort at a safety factor k itself, and gives way where k is not worth its effort. `lv` and `hc` follow
-
-    tau = delta s,  lambda = lambda0 growth^s
-
-with a small delta, which slows the hand down (low velocity), or a large one, which leads it past at a distance (high clearance),
-to the smallest s at which the wanted k holds, or to the s with the least loss before it. `fixed` is one point, and `algorithm1`
-walks in whole s as printed in the paper. All solve the same problem with the same `Solver`.
+`optimal` minimises the effort at a safety factor k itself, and gives way where k is not worth its effort. `fixed` is one point of
+tau and lambda, `algorithm1` walks along them in whole steps as printed in the paper, and `lv` and `hc` look for the best point
+(`curve`). All solve the same problem with the same `Solver`.
 
 A strategy from outside the package is registered by name and then used like these:
 ``foc_ros.core.registry.STRATEGIES.register('mine', solve_mine)``, with `FocConfig(strategy='mine')`.
@@ -15,9 +11,9 @@ A strategy from outside the package is registered by name and then used like the
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, TypeAlias
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,25 +27,16 @@ from .problem import Problem
 from .solver import LARGEST_RATE, Iterates, Solver
 from .start import NO_FORCES, Forces, Start, follow
 
+INFEASIBLE = 'no path between the obstacles in this homotopy class meets the goal: the path shown violates them least'
 CLOSE = 5e-6
 """Relative excess over the wanted k that is aimed at."""
 REACHED = 1e-5
 """Relative shortfall of k that counts as rounding."""
 TOUCHING = 1e-3
 """Distance that the mean lacks, relative to the scene, up to which a class has a path."""
-STRIDE, LONGEST = 4.0, 60.0
-"""First stride along the curve of `lv` and `hc`, and its end: with a growth of 2, lambda has grown by 1e18 there."""
-LARGEST_SHARE = 1e6
-"""Weight of the variances relative to the effort at which the curve ends: k has stopped growing."""
-NARROW = 1e-5
-"""Interval in s at which the search ends, and relative difference of k from the wanted one."""
-FLAT = 2e-3
-"""Interval in s at which the search for the least loss ends: the loss differs by its square."""
-GOLDEN = 0.381966
-FURTHER_LOSS = 1e-3
-"""How much a loss may rise before the curve is not followed any further."""
+LEAP = 2.0
+"""Angle by which the direction of an obstacle turns between two points of the grid if the mean leaps over it [rad]."""
 STALLED = 1e-6
-MOST_TRIALS = 60
 MOST_STEPS = 500
 """Most QPs of `algorithm1`."""
 LARGEST_LAMBDA = 1e150
@@ -72,8 +59,10 @@ class StrategyResult:
         Clearance term [m^2] and weight of the variances lambda [1/s^6] that the control belongs to.
     qp_solves, iterations
         QPs solved; iterations of a loop that the strategy counts besides, None if there is none.
-    at_k
-        Safety factor of the constraint that the control meets, None where it meets tau and lam.
+    minimum
+        The least safety factor of the control, the row of its obstacle and its time [steps]; None where it is to be found.
+    weights
+        The (tau, lambda) of each contact for which it would be there, None where these are tau and lam.
     aims_at_eta
         Whether a control with less than the wanted eta is no solution.
     gain
@@ -88,7 +77,8 @@ class StrategyResult:
     lam: float = 0.0
     qp_solves: int = 0
     iterations: int | None = None
-    at_k: float | None = None
+    minimum: tuple[float, int, float] | None = None
+    weights: tuple[tuple[float, float], ...] | None = None
     aims_at_eta: bool = True
     gain: float = 0.0
 
@@ -122,13 +112,28 @@ class Point:
         """ln J up to a constant, (b,)."""
         return np.log(self.now.at.cost)
 
+    def find_minima(self) -> list[tuple[float, int, float]]:
+        """Return the least safety factors, their obstacles and times, from the contacts of the last iterate where these tell."""
+        margins, at = self.solver.margins, self.now.at
+        if margins.missing.any() or not np.isfinite(at.factor).all():
+            return list(zip(*(each.tolist() for each in margins.find_least_factors(self.now.control)), strict=True))
+        order = np.lexsort((at.factors, at.contacts.problem))
+        first = order[np.searchsorted(at.contacts.problem[order], np.arange(len(self.k)))]
+        contacts = at.contacts.take(first)
+        return list(zip(at.factors[first].tolist(), contacts.obstacle.tolist(), contacts.time.tolist(), strict=True))
+
     def is_touching(self) -> NDArray[np.bool_]:
-        """Return whether the mean enters an obstacle or its clearance, (b,)."""
+        """Return whether the mean enters an obstacle or its clearance, or leaps over one between two points of the grid, (b,)."""
         margins = self.solver.margins
         rows = np.arange(len(self.k))
-        grid = margins.measure_grid(rows, margins.move(rows, self.now.control), np.zeros(len(rows)))
-        short: NDArray[np.bool_] = grid.value.min(axis=(1, 2), initial=np.inf) < -TOUCHING * margins.extent
-        return short
+        motion, none = margins.move(rows, self.now.control), np.zeros(len(rows))
+        grid = margins.measure_grid(rows, motion, none)
+        places, _ = margins.find_minima(rows, motion, none, grid, np.isfinite(grid.factor))
+        least = np.full(len(rows), np.inf)
+        np.minimum.at(least, places.problem, margins.measure(places, places.problem, motion, none[places.problem]).value)
+        short = least < -TOUCHING * margins.extent
+        leaps: NDArray[np.bool_] = np.abs(margins.turn(rows, margins.find_path(motion))).max(axis=(1, 2), initial=0.0) > LEAP
+        return short | leaps
 
 
 def solve_at(
@@ -171,8 +176,9 @@ def solve_at(
         control, contacts, multipliers, k, angles = _stack_starts(solver, problems, starts)
     else:
         last = before.now
-        control, contacts, multipliers, k, angles = last.control.copy(), last.contacts, last.multipliers, last.k.copy(), last.angles
-    now = solver.begin(solver.meet_goal(control), contacts, multipliers, np.where(k > 0.0, np.minimum(k, wanted), wanted), angles)
+        control, k, angles = last.control.copy(), last.k.copy(), last.angles
+        contacts, multipliers = last.contacts, last.multipliers
+    now = solver.begin(control, contacts, multipliers, np.where(k > 0.0, np.minimum(k, wanted), wanted), angles)
     if most is None:
         solver.run(now, deadline)
     else:
@@ -183,7 +189,7 @@ def solve_at(
 def _stack_starts(
     solver: Solver, problems: Sequence[Problem], starts: Sequence[Start]
 ) -> tuple[Array, Contacts, Array, Array, Array]:
-    """Return controls (b, 2N), contacts and their multipliers (q,), safety factors (b,), and swept angles (b, m) of the classes."""
+    """Return controls (b, 2N), contacts, their multipliers (q,), safety factors (b,), and swept angles (b, m) of the classes."""
     margins = solver.margins
     rows = np.arange(len(problems))
     paths = np.stack([each.path for each in starts])
@@ -207,7 +213,7 @@ def _stack_starts(
     return np.stack(controls), contacts, multipliers, np.array([each.safety_factor for each in starts]), angles
 
 
-def _collect(point: Point, row: int, status: Status, message: str, **rest: object) -> StrategyResult:
+def collect(point: Point, row: int, status: Status, message: str, **rest: object) -> StrategyResult:
     """Return the result of one problem at a point."""
     now, solver = point.now, point.solver
     mine = (now.contacts.problem == row) & (now.multipliers > 0.0)
@@ -224,7 +230,26 @@ def solve_optimal(
     zeros = np.zeros(len(problems))
     point = solve_at(problems, starts, zeros, zeros, is_chance=True, deadline=deadline)
     touching = point.is_touching() if (point.k < 0.0).any() else zeros
-    return [_finish_optimal(point, row, bool(touching[row])) for row in range(len(problems))]
+    results = [_finish_optimal(point, row, bool(touching[row])) for row in range(len(problems))]
+    minima, weights = point.find_minima(), _find_weights(point, results)
+    return [replace(each, minimum=least, weights=pairs) for each, least, pairs in zip(results, minima, weights, strict=True)]
+
+
+def _find_weights(point: Point, results: Sequence[StrategyResult]) -> list[tuple[tuple[float, float], ...]]:
+    """Return the (tau [m^2], lambda [1/s^6]) with which each contact would be where it is.
+
+    tau = k sqrt(Var[C]) is by how much E[C] has to be below zero, and lambda = y k D / sqrt(Var[C]), for a multiplier y [m/s^6],
+    is the cost of a variance along its normal at its time.
+    """
+    counts = [len(each.forces.time) for each in results]
+    obstacle, time, push = (np.concatenate([each.forces[i] for each in results]) for i in range(3))
+    problem = np.repeat(np.arange(len(results)), counts)
+    spread, distance = point.solver.margins.measure_spread(Contacts(problem, obstacle, time), point.now.control)
+    k = point.k[problem]
+    effort = np.array([float(each.control @ each.control) for each in results])[problem]
+    pairs = list(zip((k * spread).tolist(), (push * effort * k * distance / spread).tolist(), strict=True))
+    ends = np.cumsum(counts).tolist()
+    return [tuple(pairs[end - count : end]) for count, end in zip(counts, ends, strict=True)]
 
 
 def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult:
@@ -232,25 +257,24 @@ def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult
     k = float(point.k[row])
     reached = problem.risk.find_probability(k)
     if k >= problem.wanted_k * (1.0 - REACHED) and now.is_done[row]:
-        return _collect(point, row, Status.SOLVED, 'solved', at_k=k)
+        return collect(point, row, Status.SOLVED, 'solved')
     if not now.is_done[row]:
         cause = 'out of time' if now.iterations[row] < point.solver.most else 'not settled'
         message = f'{cause}: eta {reached:.4g} so far, and the likelihood is estimated'
-        return _collect(point, row, Status.DEADLINE, message, at_k=k, aims_at_eta=False)
+        return collect(point, row, Status.DEADLINE, message, aims_at_eta=False)
     if is_touching:
-        message = 'no path between the obstacles in this homotopy class meets the goal: the path shown violates them least'
-        return _collect(point, row, Status.INFEASIBLE, message, at_k=k)
+        return collect(point, row, Status.INFEASIBLE, INFEASIBLE)
     if problem.preference.is_hard:
         message = f'eta {problem.eta:g} is out of reach: the largest found is {reached:.4g}'
     else:
         message = f'eta {reached:.4g} only: more would cost more than likelihood.shortfall, or is out of reach'
-    return _collect(point, row, Status.ETA_UNREACHABLE, message, at_k=k)
+    return collect(point, row, Status.ETA_UNREACHABLE, message)
 
 
 def solve_fixed(
     problems: Sequence[Problem], starts: Sequence[Start], settings: FocConfig, deadline: Deadline = NEVER
 ) -> list[StrategyResult]:
-    """Solve at the tau [m^2] and lambda [1/s^6] of the settings, at the steps; the eta that this gives is reported, none is wanted."""
+    """Solve at the tau [m^2] and lambda [1/s^6] of the settings, at the steps; the eta is what this gives."""
     tau, lam = np.full(len(problems), settings.tau), np.full(len(problems), settings.lam)
     point = solve_at(problems, starts, tau, lam, is_chance=False, between=False, deadline=deadline)
     touching, results = point.is_touching(), []
@@ -266,196 +290,8 @@ def _finish_curve(point: Point, row: int, is_touching: bool, status: Status, mes
         is_late = point.now.iterations[row] < point.solver.most
         status, message = Status.DEADLINE, f'{"out of time" if is_late else "not settled"}: the likelihood is estimated'
     elif is_touching:
-        status = Status.INFEASIBLE
-        message = 'no path between the obstacles in this homotopy class meets the goal: the path shown violates them least'
-    return _collect(point, row, status, message, **rest)
-
-
-@dataclass(frozen=True)
-class Curve:
-    """tau = delta s [m^2], lambda = first_lambda growth^s [1/s^6]."""
-
-    delta: float
-    growth: float
-    first_lambda: float
-
-    def at(self, s: Array) -> tuple[Array, Array]:
-        """Return tau and lambda (b,) at s >= 0 (b,)."""
-        return self.delta * s, self.first_lambda * self.growth**s
-
-    def find_s(self, lam: float) -> float:
-        """Return the s of a lambda on the curve."""
-        if not lam > self.first_lambda > 0.0:
-            return 0.0
-        return math.log(lam / self.first_lambda) / math.log(self.growth)
-
-    def find_end(self, problem: Problem) -> float:
-        """Return the s at which nothing but the variances counts, or `LONGEST`."""
-        weight = self.first_lambda * float(problem.summed_variance.max())
-        return min(LONGEST, max(0.0, math.log(LARGEST_SHARE / weight) / math.log(self.growth))) if weight > 0.0 else LONGEST
-
-
-@dataclass(frozen=True, eq=False)
-class Sample:
-    """One point of a curve: s, the safety factor k, the loss, and the result; is_path: whether the mean keeps its clearance."""
-
-    s: float
-    k: float
-    loss: float
-    result: StrategyResult
-    is_path: bool
-
-
-Choice: TypeAlias = Generator[float, Sample, Sample | None]
-
-
-def choose_sample(wanted_k: float, is_hard: bool, first_s: float, end: float) -> Choice:
-    """Look for the point of a curve with the least loss: yield an s, receive its sample, and return the best one.
-
-    k grows along the curve, but for dips, and so does the effort. The loss therefore falls as long as k is cheap, and rises after
-    the s at which the wanted k holds. Where it holds nowhere and is a condition, the sample with the largest k is returned, and
-    None where there is no path at all.
-    """
-    before = yield first_s
-    if not before.is_path and first_s > 0.0:
-        before = yield 0.0
-    if not before.is_path:
-        return None
-    samples, stride = [before], STRIDE if first_s == 0.0 else STRIDE / 8
-    while before.k >= wanted_k and before.s > 0.0:
-        before = yield max(before.s - stride, 0.0)
-        samples, stride = [before, *samples], 2.0 * stride
-    after = samples[-1]
-    while after.k < wanted_k and after.s < end and (is_hard or _may_improve(after, samples)):
-        after = yield min(after.s + stride, end)
-        if not after.is_path:
-            after, stride = samples[-1], stride / 4.0
-            if stride < NARROW:
-                break
-            continue
-        samples, stride = [*samples, after], 2.0 * stride
-    low = max((each for each in samples if each.k < wanted_k), key=lambda each: each.s, default=None)
-    high = min((each for each in samples if each.k >= wanted_k), key=lambda each: each.s, default=None)
-    if low is not None and high is not None:
-        high = yield from _find_root(wanted_k, low, high)
-    samples = [each for each in samples if high is None or each.s < high.s] + ([high] if high is not None else [])
-    if is_hard:
-        return high or max(samples, key=lambda each: each.k)
-    return (yield from _find_least(samples))
-
-
-def _may_improve(after: Sample, samples: list[Sample]) -> bool:
-    """Return whether the effort alone is not yet a larger loss than the least so far; samples: in the order of s."""
-    return after.loss - after.result.gain <= min(each.loss for each in samples) + FURTHER_LOSS
-
-
-def _find_root(wanted_k: float, low: Sample, high: Sample) -> Generator[float, Sample, Sample]:
-    """Return the sample with the smallest s, between two, at which the wanted k holds: regula falsi and bisections in turn."""
-    for trial in range(MOST_TRIALS):
-        if high.s - low.s < NARROW or high.k < wanted_k * (1.0 + NARROW):
-            break
-        share = (wanted_k * (1.0 + 0.5 * NARROW) - low.k) / (high.k - low.k)
-        if trial % 3 == 2:
-            share = 0.5
-        new = yield low.s + min(max(share, 1e-3), 1.0 - 1e-3) * (high.s - low.s)
-        low, high = (low, new) if new.k >= wanted_k else (new, high)
-    return high
-
-
-def _find_least(samples: list[Sample]) -> Generator[float, Sample, Sample]:
-    """Return the sample with the least loss, sought by golden sections beside the lowest of some samples in the order of s."""
-    middle = min(range(len(samples)), key=lambda i: samples[i].loss)
-    best, low, high = samples[middle], samples[max(middle - 1, 0)].s, samples[min(middle + 1, len(samples) - 1)].s
-    while high - low > FLAT:
-        left = best.s - low > high - best.s
-        new = yield best.s + GOLDEN * ((low if left else high) - best.s)
-        if new.loss < best.loss and new.is_path:
-            low, high, best = (low, best.s, new) if left else (best.s, high, new)
-        else:
-            low, high = (new.s, high) if left else (low, new.s)
-    return best
-
-
-def follow_curve(
-    problems: Sequence[Problem], starts: Sequence[Start], curve: Curve, deadline: Deadline = NEVER
-) -> list[StrategyResult]:
-    """Find the best point of a curve for each problem; all problems are solved together, each at the s that it asks for.
-
-    A warm start begins at the s of the earlier solution.
-    """
-    s = np.array([0.0 if each.lam is None else curve.find_s(each.lam) for each in starts])
-    ends = [curve.find_end(each) for each in problems]
-    s = np.minimum(s, ends)
-    choices = [
-        choose_sample(problem.wanted_k, problem.preference.is_hard, first, end)
-        for problem, first, end in zip(problems, s.tolist(), ends, strict=True)
-    ]
-    for choice in choices:
-        next(choice)
-    chance = Margins(problems, np.zeros(len(problems)), is_chance=True)
-    results: dict[int, StrategyResult] = {}
-    best: dict[int, Sample] = {}
-    point: Point | None = None
-    solves = np.zeros(len(problems), dtype=np.intp)
-    while len(results) < len(problems):
-        point = solve_at(problems, starts, *curve.at(s), is_chance=False, deadline=deadline, before=point)
-        solves += point.now.iterations
-        k, *_ = chance.find_least_factors(point.now.control)
-        touching = point.is_touching()
-        is_late = not deadline.allows()
-        for row, problem in enumerate(problems):
-            if row in results:
-                continue
-            sample = _sample(point, row, float(s[row]), float(k[row]), bool(touching[row]), curve)
-            if sample.is_path and (row not in best or sample.loss < best[row].loss):
-                best[row] = sample
-            try:
-                s[row] = choices[row].send(sample)
-            except StopIteration as end:
-                results[row] = _finish_choice(problem, end.value, sample, int(solves[row]))
-                continue
-            if is_late:
-                found = best.get(row, sample)
-                reached = problem.risk.find_probability(found.k)
-                message = f'out of time: eta {reached:.4g} so far, and the likelihood is estimated'
-                results[row] = replace(found.result, status=Status.DEADLINE, message=message, qp_solves=int(solves[row]), aims_at_eta=False)
-    return [results[row] for row in range(len(problems))]
-
-
-def _sample(point: Point, row: int, s: float, k: float, is_touching: bool, curve: Curve) -> Sample:
-    """Return the sample of a problem at a point of the curve."""
-    tau, lam = curve.at(np.array(s))
-    result = _collect(point, row, Status.SOLVED, 'solved', tau=float(tau), lam=float(lam))
-    problem = point.solver.margins.problems[row]
-    loss = problem.preference.compute_loss(float(result.control @ result.control), min(k, problem.wanted_k), problem.wanted_k)
-    return Sample(s, k, loss, result, bool(point.now.is_done[row]) and not is_touching)
-
-
-def _finish_choice(problem: Problem, chosen: Sample | None, last: Sample, solves: int) -> StrategyResult:
-    """Return the result of a search that has ended."""
-    if chosen is None:
-        message = 'no path between the obstacles in this homotopy class meets the goal: the path shown violates them least'
-        return replace(last.result, status=Status.INFEASIBLE, message=message, qp_solves=solves)
-    if chosen.k >= problem.wanted_k * (1.0 - REACHED):
-        return replace(chosen.result, qp_solves=solves)
-    reached = problem.risk.find_probability(chosen.k)
-    cause = 'out of reach' if problem.preference.is_hard else 'out of reach or not worth its effort'
-    message = f'eta {problem.eta:g} is {cause}: {reached:.4g} is kept, at s = {chosen.s:.3g}'
-    return replace(chosen.result, status=Status.ETA_UNREACHABLE, message=message, qp_solves=solves)
-
-
-def solve_lv(
-    problems: Sequence[Problem], starts: Sequence[Start], settings: FocConfig, deadline: Deadline = NEVER
-) -> list[StrategyResult]:
-    """Solve by slowing down."""
-    return follow_curve(problems, starts, Curve(settings.lv_delta, settings.growth, settings.lam), deadline)
-
-
-def solve_hc(
-    problems: Sequence[Problem], starts: Sequence[Start], settings: FocConfig, deadline: Deadline = NEVER
-) -> list[StrategyResult]:
-    """Solve by keeping a distance."""
-    return follow_curve(problems, starts, Curve(settings.hc_delta, settings.growth, settings.lam), deadline)
+        status, message = Status.INFEASIBLE, INFEASIBLE
+    return collect(point, row, status, message, **rest)
 
 
 def solve_algorithm1(
@@ -471,29 +307,27 @@ def solve_algorithm1(
 
 
 def _run_algorithm1(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline) -> StrategyResult:
-    chance = Margins([problem], np.zeros(1), is_chance=True, between=False)
-    tau, lam, effort, point = 0.0, 1.0, math.inf, None
+    chance = Margins([problem], np.zeros(1), is_chance=True)
+    tau, lam, effort, point, iteration = 0.0, 1.0, math.inf, None, 0
     for iteration in range(1, MOST_STEPS + 1):
-        if not deadline.allows():
-            break
+        if point is not None and not deadline.allows():
+            message = f'out of time after {iteration - 1} QPs: the likelihood is estimated'
+            return collect(point, 0, Status.DEADLINE, message, tau=tau, lam=lam, iterations=iteration - 1, aims_at_eta=False)
         one = np.array([tau]), np.array([lam])
         point = solve_at([problem], [start], *one, is_chance=False, between=False, before=point, most=1)
         last, effort = effort, float((point.now.control**2).sum()) / problem.horizon.gain**2
         k = float(chance.find_least_factors(point.now.control)[0][0])
         weights = {'tau': tau, 'lam': lam, 'iterations': iteration}
         if k >= problem.wanted_k and abs(effort - last) < settings.algorithm1_xi:
-            return _collect(point, 0, Status.SOLVED, 'solved', **weights)
+            return collect(point, 0, Status.SOLVED, 'solved', **weights)
         if point.is_touching()[0] and point.now.gain[0] < STALLED:
             message = f'QP {iteration} is infeasible at tau = {tau:.3g}, lambda = {lam:.3g}'
-            return _collect(point, 0, Status.INFEASIBLE, message, **weights)
+            return collect(point, 0, Status.INFEASIBLE, message, **weights)
         if k < problem.wanted_k:
             if lam * settings.algorithm1_growth > LARGEST_LAMBDA:
                 message = f'lambda = {lam:.3g} after {iteration} QPs, and the surrogate is still violated'
-                return _collect(point, 0, Status.ITERATION_LIMIT, message, **weights)
+                return collect(point, 0, Status.ITERATION_LIMIT, message, **weights)
             tau, lam = tau + settings.algorithm1_delta, lam * settings.algorithm1_growth
-    if point is None:
-        point = solve_at([problem], [start], np.zeros(1), np.ones(1), is_chance=False, between=False, most=0)
-        return _collect(point, 0, Status.DEADLINE, 'out of time')
+    assert point is not None
     message = f'not settled after {MOST_STEPS} QPs at tau = {tau:.3g}, lambda = {lam:.3g}'
-    status = Status.ITERATION_LIMIT if deadline.allows() else Status.DEADLINE
-    return _collect(point, 0, status, message, tau=tau, lam=lam, iterations=MOST_STEPS)
+    return collect(point, 0, Status.ITERATION_LIMIT, message, tau=tau, lam=lam, iterations=MOST_STEPS)

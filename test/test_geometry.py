@@ -1,4 +1,4 @@
-"""Rounded polygons against brute force: the nearest point, the side, the support vertex, widths; and what shapes refuse."""
+"""Convex polygons against brute force: the nearest point, its side and its normal; and what shapes refuse."""
 
 from dataclasses import replace
 
@@ -8,15 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foc_ros.core.errors import SceneError
-from foc_ros.core.obstacles.rounded_polygon import (
-    find_normal,
-    find_offset,
-    find_support,
-    measure_extent,
-    measure_half_widths,
-    measure_offsets,
-    tabulate_polygons,
-)
+from foc_ros.core.obstacles.geometry import SMALLEST_DISTANCE, Offset, find_offset, measure_offsets, tabulate_edges
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, collect_obstacles, make_box_polygon, make_hull_polygon
 from foc_ros.core.types import make_obstacles
 
@@ -36,10 +28,10 @@ def random_polygon(generator: np.random.Generator) -> np.ndarray:
     return make_hull_polygon(generator.uniform(-0.1, 0.1, (generator.integers(3, 9), 2)))[1]
 
 
-def make_polygons(*polygons: np.ndarray):
-    """Return polygons as kernels take them."""
-    n = len(polygons)
-    return tabulate_polygons(make_obstacles(np.zeros((n, 2)), np.full(n, 0.01), polygons=list(polygons)))
+def locate(polygon: np.ndarray, points: np.ndarray, spare: int = 3) -> Offset:
+    """Return where points (..., 2) are relative to a polygon, which its table holds with some unused vertices."""
+    vertices = np.concatenate((polygon, np.zeros((spare, 2))))
+    return find_offset(points[..., 0], points[..., 1], tabulate_edges(vertices, np.array(len(polygon))))
 
 
 def find_nearest(polygon: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, float, bool]:
@@ -59,83 +51,68 @@ def find_nearest(polygon: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, fl
 def test_the_offset_is_that_of_the_nearest_point_of_the_boundary(seed):
     generator = np.random.default_rng(seed)
     polygon, point = random_polygon(generator), generator.uniform(-0.2, 0.2, 2)
-    found = find_offset(make_polygons(polygon), 0, *point)
+    found = locate(polygon, point)
     nearest, side, is_at_vertex = find_nearest(polygon, point)
     distance = np.hypot(*(point - nearest))
-    assert found.side == side
-    assert np.hypot(found.x, found.y) == pytest.approx(distance, abs=1e-8)
-    assert np.hypot(found.x, found.y) <= distance + 1e-12
+    away = found.distance * np.array([found.normal_x, found.normal_y])
+    assert np.sign(found.distance) == side
+    assert abs(found.distance) == pytest.approx(distance, abs=1e-8)
+    assert abs(found.distance) <= distance + 1e-12
     assert is_at_vertex or found.is_on_edge
     if not found.is_on_edge:
-        assert np.hypot(*(polygon - point + [found.x, found.y]).T).min() < 1e-12
+        assert np.hypot(*(polygon - point + away).T).min() < 1e-12
     if distance > 1e-3:
-        np.testing.assert_allclose([found.x, found.y], point - nearest, atol=2e-5)
+        np.testing.assert_allclose(away, point - nearest, atol=2e-5)
 
 
 @MANY
 @given(SEEDS)
 def test_the_normal_is_the_gradient_of_the_signed_distance(seed):
-    generator = np.random.default_rng(seed)
-    obstacles = make_obstacles([[0.01, -0.02]], [0.01], polygons=[random_polygon(generator)])
-    point, h = generator.uniform(-0.2, 0.2, 2), 1e-6
-
-    def measure(at: np.ndarray) -> float:
-        return float(measure_offsets(at, obstacles)[1][0, 0])
-
-    sampled = [
-        [find_offset(tabulate_polygons(obstacles), 0, *(point + h * np.array(e) - obstacles.centre[0]))]
-        for e in ((1, 0), (-1, 0), (0, 1), (0, -1))
-    ]
-    features = {(each[0].side, each[0].is_on_edge) for each in sampled}
-    distance, *normal = find_normal(find_offset(tabulate_polygons(obstacles), 0, *(point - obstacles.centre[0])), 1e-12)
-    assert distance == pytest.approx(measure(point), abs=1e-12)
-    assert np.hypot(*normal) == pytest.approx(1.0)
-    gradient = [(measure(point + e) - measure(point - e)) / (2 * h) for e in h * np.eye(2)]
-    if len(features) == 1 and np.hypot(*gradient) > 0.999:  # not across the line inside from which two edges are equally near
-        np.testing.assert_allclose(normal, gradient, atol=1e-4)
+    generator, h = np.random.default_rng(seed), 1e-6
+    polygon, point = random_polygon(generator), generator.uniform(-0.2, 0.2, 2)
+    found = locate(polygon, point)
+    beside = locate(polygon, point + h * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]]))
+    assert np.hypot(found.normal_x, found.normal_y) == pytest.approx(1.0)
+    gradient = (beside.distance[::2] - beside.distance[1::2]) / (2 * h)
+    is_one_feature = len({*zip(beside.distance > 0.0, beside.is_on_edge, strict=True)}) == 1
+    if is_one_feature and np.hypot(*gradient) > 0.999:  # not across the line inside from which two edges are equally near
+        np.testing.assert_allclose([found.normal_x, found.normal_y], gradient, atol=1e-4)
 
 
-@MANY
-@given(SEEDS, st.floats(-4, 4))
-def test_the_support_vertex_is_the_farthest_and_widths_are_those_of_all_directions(seed, angle):
-    polygon = random_polygon(np.random.default_rng(seed))
-    polygons = make_polygons(np.zeros((1, 2)), polygon)
-    direction = np.array([np.cos(angle), np.sin(angle)])
-    along = polygon @ direction
-    assert along[find_support(polygons, 1, *direction)] == along.max()
-    assert measure_extent(polygons, 1) == pytest.approx(np.hypot(*polygon.T).max())
-    turns = np.linspace(0.0, np.pi, 20_001)
-    widths = np.ptp(polygon @ np.array([np.cos(turns), np.sin(turns)]), axis=0)
-    half = measure_half_widths(polygons)
-    assert half[0] == 0.0
-    if len(polygon) < 3:
-        assert half[1] == 0.0
-    else:
-        assert half[1] <= widths.min() / 2 + 1e-12
-        assert half[1] == pytest.approx(widths.min() / 2, abs=5e-5)
+@pytest.mark.parametrize('corners', [[[0.0, 0.0]], [[0.0, 0.0], [0.1, 0.0]], make_box_polygon((0.2, 0.2), 0.0) + 0.1])
+def test_a_point_on_the_polygon_has_a_normal_all_the_same(corners):
+    found = locate(np.asarray(corners), np.zeros(2))
+    assert abs(found.distance) == pytest.approx(SMALLEST_DISTANCE)
+    assert np.hypot(found.normal_x, found.normal_y) == pytest.approx(1.0)
 
 
-def test_of_equal_support_vertices_the_first_counts():
-    assert find_support(make_polygons(make_box_polygon((0.2, 0.1), 0.0)), 0, 1.0, 0.0) == 0
+def test_many_points_about_many_polygons_are_as_each_alone():
+    generator = np.random.default_rng(4)
+    polygons, points = [random_polygon(generator) for _ in range(6)], generator.uniform(-0.2, 0.2, (5, 6, 2))
+    table = make_obstacles(np.zeros((6, 2)), np.full(6, 0.01), polygons=polygons)
+    found = find_offset(points[..., 0], points[..., 1], tabulate_edges(table.vertices, table.corners))
+    for j, polygon in enumerate(polygons):
+        for many, one in zip(found, locate(polygon, points[:, j]), strict=True):
+            np.testing.assert_array_equal(many[:, j], one)
 
 
 @pytest.mark.parametrize('yaw', [0.0, 0.3, np.pi / 2, -2.0])
 def test_the_places_about_a_box(yaw):
     """A point beyond each corner, beside each edge, and inside, near each edge."""
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-    polygons = make_polygons(make_box_polygon((0.2, 0.1), yaw))
     expected = {
-        (0.13, 0.09): (0.03, 0.04, 1.0, False),
-        (-0.13, -0.09): (-0.03, -0.04, 1.0, False),
-        (0.14, 0.01): (0.04, 0.0, 1.0, True),
-        (-0.05, -0.08): (0.0, -0.03, 1.0, True),
-        (0.09, 0.0): (-0.01, 0.0, -1.0, True),
-        (0.02, -0.03): (0.0, 0.02, -1.0, True),
+        (0.13, 0.09): (0.05, (0.6, 0.8), False),
+        (-0.13, -0.09): (0.05, (-0.6, -0.8), False),
+        (0.14, 0.01): (0.04, (1.0, 0.0), True),
+        (-0.05, -0.08): (0.03, (0.0, -1.0), True),
+        (0.09, 0.0): (-0.01, (1.0, 0.0), True),
+        (0.02, -0.03): (-0.02, (0.0, -1.0), True),
     }
-    for point, (x, y, side, is_on_edge) in expected.items():
-        found = find_offset(polygons, 0, *(turn @ point))
-        np.testing.assert_allclose([found.x, found.y], turn @ [x, y], atol=1e-15)
-        assert (found.side, found.is_on_edge) == (side, is_on_edge)
+    for point, (distance, normal, is_on_edge) in expected.items():
+        found = locate(make_box_polygon((0.2, 0.1), yaw), turn @ point)
+        assert found.distance == pytest.approx(distance, abs=1e-15)
+        np.testing.assert_allclose([found.normal_x, found.normal_y], turn @ normal, atol=1e-14)
+        assert found.is_on_edge == is_on_edge
 
 
 def test_offsets_of_points_follow_centres_that_move():

@@ -1,0 +1,138 @@
+"""Parts from outside the package, each one function: a strategy, a plant, a likelihood rule and a QP backend."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from reach_helpers import bowed, one_obstacle, reach, solved
+
+import foc_ros
+from foc_ros.core.config import FocConfig
+from foc_ros.core.deadline import Deadline
+from foc_ros.core.dynamics.plant_models import PlantModel
+from foc_ros.core.dynamics.plants import Plant
+from foc_ros.core.errors import InputError
+from foc_ros.core.obstacles.chance_constraint import k_of_eta
+from foc_ros.core.ocp.backend import Answer, DenseQP
+from foc_ros.core.ocp.problem import Problem
+from foc_ros.core.ocp.start import Start
+from foc_ros.core.ocp.strategies import Strategy, StrategyResult, solve_fixed
+from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
+from foc_ros.core.types import Status, make_obstacles
+
+BOWED = bowed((0, 0), (0.3, 0), 50, 0.08)
+CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003)
+
+
+def solve_margin(
+    problems: Sequence[Problem], starts: Sequence[Start], settings: FocConfig, deadline: Deadline
+) -> list[StrategyResult]:
+    """Keep a little more than k standard deviations of the radius at the steps, as for a hand without noise."""
+    results = []
+    for problem, start in zip(problems, starts, strict=True):
+        tau = 1.2 * k_of_eta(problem.eta) * float(np.sqrt(problem.size[1]).max(initial=0.0))
+        results += solve_fixed([problem], [start], replace(settings, tau=tau), deadline)
+    return [replace(each, aims_at_eta=True) for each in results]
+
+
+def discretise_double_integrator(dt: float) -> Plant:
+    A = np.block([[np.eye(2), dt * np.eye(2)], [np.zeros((2, 2)), np.eye(2)]])
+    return Plant(A, np.vstack([dt**2 / 2 * np.eye(2), dt * np.eye(2)]), dt)
+
+
+def solve_by_active_sets(qp: DenseQP) -> Answer:
+    """Solve a strictly convex QP by trying rows as equalities: add the most broken one, drop those that pull."""
+    rows = np.concatenate([np.zeros((0, len(qp.c))) if qp.G is None else qp.G, np.eye(len(qp.c))])
+    limits = np.concatenate([np.zeros(0) if qp.g is None else qp.g, qp.lower])
+    active: list[int] = []
+    for _ in range(200):
+        G = rows[active]
+        kkt = np.block([[qp.P, -G.T], [G, 1e-13 * np.eye(len(active))]])
+        found = np.linalg.solve(kkt, np.concatenate([-qp.c, limits[active]]))
+        x, forces = found[: len(qp.c)], found[len(qp.c) :]
+        if len(active) and forces.min() < -1e-12:
+            del active[int(forces.argmin())]
+            continue
+        missing = rows @ x - limits
+        if missing.min() > -1e-11:
+            return Answer(True, x)
+        active.append(int(missing.argmin()))
+    return Answer(False, x)
+
+
+@pytest.fixture(autouse=True)
+def parts(monkeypatch):
+    for registry in (STRATEGIES, PLANTS, LIKELIHOOD_RULES, QP_BACKENDS):
+        monkeypatch.setattr(registry, '_parts', dict(registry._parts))
+    strategy: Strategy = solve_margin
+    foc_ros.register_strategy('margin', strategy)
+    foc_ros.register_plant('double', lambda settings: PlantModel(discretise_double_integrator))
+    foc_ros.register_likelihood_rule('linear', lambda costs, config: -config.beta * costs)
+    foc_ros.register_qp_backend('active sets', solve_by_active_sets)
+
+
+def test_a_strategy_is_solved_by_its_name():
+    problem = one_obstacle(0.8, noise=(0.0, 0.0))
+    solution = solved(problem, BOWED, 'margin')
+    assert solution.status is Status.SOLVED
+    assert solution.eta >= 0.8 - 1e-5
+    assert solution.tau == pytest.approx(1.2 * 2 * 2 * 0.03 * 0.003, rel=1e-2)
+    assert np.hypot(*(solution.path - [0.12, 0.0]).T).min() > np.sqrt(0.03**2 + 0.003**2 + solution.tau) - 1e-6
+    assert solution.equivalent_weights == ((solution.tau, 1.0),) * len(solution.multipliers)
+    assert solution.qp_solves >= 1
+
+
+def test_a_strategy_that_falls_short_of_eta_is_not_called_solved():
+    solution = solved(one_obstacle(0.9, noise=(0.15, 0.15)), BOWED, 'margin')
+    assert solution.status is Status.ITERATION_LIMIT
+    assert f'achieves eta {solution.eta:.6g} only' in solution.message
+
+
+def test_where_nothing_is_feasible_a_strategy_returns_the_best_effort():
+    covered = reach(make_obstacles([[0.3, 0.01]], [0.03]))
+    assert solved(covered, BOWED, 'margin').status is Status.INFEASIBLE
+
+
+def test_a_strategy_solves_all_classes_of_a_scene():
+    config = foc_ros.Config().with_values({'foc.noise_x': 0.0, 'foc.noise_y': 0.0})
+    classes = foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], strategy='margin', config=config)
+    assert {each.label for each in classes} == {'goal0:+0', 'goal0:-0'}
+    assert {each.status for each in classes} == {Status.SOLVED}
+
+
+def test_a_name_that_is_not_registered_is_refused():
+    with pytest.raises(InputError, match='lv, hc, optimal, algorithm1, fixed, margin'):
+        solved(one_obstacle(), BOWED, 'nothing')
+
+
+@pytest.mark.parametrize('given', [None, [], [None]])
+def test_a_strategy_without_results_is_named(given):
+    STRATEGIES.register('forgetful', lambda problems, starts, settings, deadline: given)
+    with pytest.raises(InputError, match='strategy forgetful: expected a list of StrategyResult'):
+        solved(one_obstacle(), BOWED, 'forgetful')
+
+
+@pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
+def test_a_plant_is_solved_by_every_strategy(strategy):
+    config = foc_ros.Config().with_values({'foc.plant': 'double', 'foc.noise_x': 0.05, 'foc.noise_y': 0.05})
+    for each in foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], strategy=strategy, config=config):
+        assert each.status is Status.SOLVED
+        assert each.mean.shape == (51, 4)
+        assert foc_ros.monte_carlo(each.solution, 1000).step[2] >= 0.9
+
+
+def test_a_likelihood_rule_weighs_the_classes():
+    config = foc_ros.Config().with_values({'likelihood.rule': 'linear'})
+    classes = foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], config=config)
+    (first, second), (usual, _) = classes, foc_ros.solve_classes((0, 0), (0.3, 0), [CUP])
+    assert first.cost < second.cost
+    assert first.likelihood > usual.likelihood
+
+
+@pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal', 'fixed'])
+def test_a_qp_backend_has_the_same_solution(strategy):
+    one, other = (solved(one_obstacle(0.85), BOWED, strategy, tau=1e-3, qp_backend=each) for each in ('piqp', 'active sets'))
+    assert other.status is one.status is Status.SOLVED
+    np.testing.assert_allclose(other.path, one.path, atol=1e-5)
+    assert other.effort == pytest.approx(one.effort, rel=1e-5)
