@@ -112,7 +112,8 @@ def _compare(ours: Sequence[Solution], theirs: Sequence[Array | None], tolerance
     worst = max(excess, key=abs, default=np.inf)
     return Agreement(
         solved == converged == len(ours) and abs(worst) < tolerance,
-        f'solved {solved} of {len(ours)}, the peer {converged}; efforts differ by up to {100 * worst:+.3f} % ({100 * tolerance:g} % allowed)',
+        f'solved {solved} of {len(ours)}, the peer {converged}; '
+        f'efforts differ by up to {100 * worst:+.3f} % ({100 * tolerance:g} % allowed)',
     )
 
 
