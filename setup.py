@@ -59,7 +59,7 @@ setup(
         # the documentation as a web site
         'doc': ['furo>=2024.8', 'matplotlib>=3.6', 'myst-parser>=4', 'numpydoc>=1.7', 'sphinx>=8', 'sphinx-gallery>=0.17'],
         # what the benchmark compares with
-        'bench': ['casadi>=3.7', 'cvxpy>=1.4', 'daqp>=0.5', 'matplotlib>=3.6', 'scipy>=1.15'],
+        'bench': ['casadi>=3.7'],
         # the linters, and what builds and checks the distributions
         'lint': ['import-linter>=2.1', 'mypy>=1.11', 'ruff>=0.8', 'types-PyYAML'],
         'dist': ['build>=1.2', 'setuptools>=70.1', 'twine>=5'],

@@ -17,11 +17,16 @@ import foc_ros
 LARGEST_TAU, BISECTIONS = 0.01, 25
 
 
-def solve_constant_precision(problem, start, settings, deadline) -> foc_ros.StrategyResult:
-    """Return the solution with the smallest tau that meets eta at lambda = foc.lam."""
+def solve_constant_precision(problems, starts, settings, deadline) -> list[foc_ros.StrategyResult]:
+    """Return the solutions with the smallest tau that meets eta at lambda = foc.lam."""
+    return [find_least_tau(problem, start, settings, deadline) for problem, start in zip(problems, starts, strict=True)]
+
+
+def find_least_tau(problem, start, settings, deadline) -> foc_ros.StrategyResult:
+    """Return the solution of one problem."""
 
     def solve(tau: float) -> tuple[foc_ros.StrategyResult, bool]:
-        result = foc_ros.get_strategy('fixed')(problem, start, replace(settings, tau=tau), deadline)
+        (result,) = foc_ros.get_strategy('fixed')([problem], [start], replace(settings, tau=tau), deadline)
         is_enough = foc_ros.compute_eta(problem, result.control) >= problem.eta
         return replace(result, aims_at_eta=True), is_enough and result.status is foc_ros.Status.SOLVED
 

@@ -32,7 +32,7 @@ GAP_S, ANSWER_S, PUNCTUAL = 1.3, 0.05, 0.999
 ASK_EVERY = 10
 """Number of periods between two calls of the service."""
 START_S = 120.0
-"""Time within which a node has to start; a new machine compiles its kernels first [s]."""
+"""Time within which a node has to start [s]."""
 
 
 def scatter(count: int, radius: float, low: tuple[float, float], high: tuple[float, float]) -> list[tuple[float, ...]]:

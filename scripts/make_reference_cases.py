@@ -174,7 +174,7 @@ def solve_least_effort(case: dict[str, Any], eta: float) -> dict[str, Any] | Non
         clear.append((dx**2 + dy**2 - mean - var - k * casadi.sqrt(spread + 1e-18)) / mean)
     rows = casadi.vertcat(*clear)
     program = {'x': u, 'f': casadi.dot(u, u) / steps, 'g': casadi.vertcat(ends, rows)}
-    options = {'print_time': False, 'ipopt.print_level': 0, 'ipopt.sb': 'yes', 'ipopt.tol': 1e-10, 'ipopt.max_iter': 3000}
+    options: Any = {'print_time': False, 'ipopt.print_level': 0, 'ipopt.sb': 'yes', 'ipopt.tol': 1e-10, 'ipopt.max_iter': 3000}
     solver = casadi.nlpsol('reference', 'ipopt', program, options)
     path = guess_path(case)
     start = np.concatenate([np.linalg.lstsq(positions, axis, rcond=1e-6)[0] for axis in path.T]) / unit

@@ -33,7 +33,7 @@ SIZE_M = 0.03
 SLACKS_M2 = (1e-5, 1e-7, 1e-9)
 """What (p - q).(v_i - q) may exceed zero by: the programme with zero itself has no interior."""
 TOLERANCE_M = 2e-6
-OPTIONS = {
+OPTIONS: Any = {
     'print_time': False,
     'show_eval_warnings': False,
     'ipopt.print_level': 0,

@@ -74,16 +74,16 @@ def find_least_share(problem: Problem, solution: Solution) -> float:
 
 def _find_least_factor(problem: Problem, solution: Solution, step: int, share: float) -> float:
     """Return the smallest safety factor at a share of one step, from the state at its beginning and the control within it."""
-    circles, dt, u = problem.terms.chance.obstacles, share * solution.dt, solution.control[step]
+    (size_mean, size_variance), dt, u = problem.size, share * solution.dt, solution.control[step]
     one, axes = np.array([[1.0, dt, dt**2 / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]]), np.eye(2)
     forward, push = np.kron(one, axes), np.kron(np.array([[dt**3 / 6], [dt**2 / 2], [dt]]), axes)
     position = (forward @ solution.mean[step] + push @ u)[:2]
     noise = push @ np.diag((problem.noise * u) ** 2) @ push.T
-    covariance = (forward @ solution.covariance[step] @ forward.T + noise)[:2, :2] + circles.centre_covariance
-    offset = position - circles.centre - (step + share) * circles.drift
-    variance = circles.size_variance + 4.0 * np.einsum('ni,nij,nj->n', offset, covariance, offset)
-    factor = ((offset**2).sum(axis=1) - circles.size_mean) / np.sqrt(variance)
-    return float(factor[step + share >= circles.ignored_until].min(initial=np.inf))
+    covariance = (forward @ solution.covariance[step] @ forward.T + noise)[:2, :2] + problem.obstacles.centre_covariance
+    offset = position - problem.obstacles.centre - (step + share) * problem.drift
+    variance = size_variance + 4.0 * np.einsum('ni,nij,nj->n', offset, covariance, offset)
+    factor = ((offset**2).sum(axis=1) - size_mean) / np.sqrt(variance)
+    return float(factor.min(initial=np.inf))
 
 
 def measure_between(scenes: int, strategies: Sequence[str] = STRATEGIES) -> Iterator[list[str]]:

@@ -37,8 +37,8 @@ from foc_ros.ros.messages.types import RclpyTypes
 
 HAND_HZ, OBSTACLES_HZ, COUNT, LATE_S = 1000.0, 30.0, 50, 0.005
 PERIOD_S = 1.0 / Config().rate_hz
-START_S = 300.0
-"""Time within which a node has to be ready; a new machine compiles its kernels first [s]."""
+START_S = 60.0
+"""Time within which a node has to be ready [s]."""
 GOALS = np.array([[0.3, 0.0, 0.0]])
 
 

@@ -33,7 +33,6 @@ NOT_RUN = {
     '--params-file install/foc_ros/share/foc_ros/config/foc.yaml': 'scripts/colcon_check starts the same program',
     'python3 -m venv venv && . venv/bin/activate': ROOT_OR_NETWORK,
     "pip install '.[ros,report]'": ROOT_OR_NETWORK,
-    'foc_ros warm-up': 'compiles for minutes in a new folder; test_command_line.py runs it',
     'export AMENT_PREFIX_PATH=$VIRTUAL_ENV': SHELL,
     'foc_ros evaluate bags --report evaluation': FIT,
     'foc_ros fit recordings --output operator.yaml': FIT,

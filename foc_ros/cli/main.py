@@ -35,11 +35,10 @@ COMMANDS = {
     'evaluate': 'compare predictions with recordings of people, beside simple baselines',
     'simulate': 'compare guidance with other assistance for simulated operators',
     'convert': 'convert motion capture in CSV tables to bags',
-    'warm-up': 'compile the solver for this machine and keep it, so that nothing else has to',
+    'warm-up': 'nothing any more: the command will be removed',
 }
 """Purpose of each command. With an underscore for a hyphen, `arguments` declares its arguments in `add_NAME_arguments(parser)`,
 and the module of its name defines `run(arguments) -> exit code`."""
-"""Commands whose modules import the solver; `demo`, `node` and `warm-up` show its compilation themselves."""
 
 
 class _StoreOnce(argparse.Action):

@@ -6,6 +6,6 @@ import argparse
 
 
 def run(_: argparse.Namespace) -> int:
-    """Say that nothing is compiled."""
+    """Say that there is nothing to do."""
     print('there is nothing to do: foc_ros compiles nothing any more')
     return 0

@@ -105,7 +105,7 @@ class NodeProcess:
         self._log = log
 
     def __enter__(self) -> NodeProcess:
-        import_module('foc_ros.core.pipeline')  # compiles the kernels before a node has to answer in time
+        import_module('foc_ros.core.pipeline')  # reads the files that the node is about to read, so that it starts sooner
         with self._log.open('wb') as log:
             self._process = subprocess.Popen(
                 [sys.executable, '-m', 'foc_ros', 'node'],

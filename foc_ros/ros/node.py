@@ -100,7 +100,7 @@ class FocNode(LifecycleNode):
             raise FocError(self._start_error)
 
     def on_configure(self, _: LifecycleState) -> TransitionCallbackReturn:
-        """Create the topics, and compile what the first prediction needs."""
+        """Create the topics, and prepare what the first prediction needs."""
         self._create_pipeline()
         try:
             warm_up(self._live_parameters.config)

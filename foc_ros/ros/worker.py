@@ -1,6 +1,6 @@
 """The thread in which predictions are computed, so that the node answers services and publishes diagnostics meanwhile.
 
-The kernels run without Python's global lock. A running computation cannot be stopped from another thread. If its result is no
+A running computation cannot be stopped from another thread. If its result is no
 longer wanted, its deadline is cancelled, it ends when it next checks its deadline, and the result is ignored.
 """
 

@@ -1,0 +1,232 @@
+"""The rows of the benchmark: `ROWS` maps the name of each to a function of whether to be quick, which returns a `Result`.
+
+CasADi is imported only when a row is measured that compares with its solvers.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import scenes
+from measurement import Agreement, Result, Timing, compute_median_ms, time_call, time_in_turn
+
+from foc_ros.analysis.replay import replay
+from foc_ros.core import predictor
+from foc_ros.core.candidates import solve_candidates
+from foc_ros.core.config import Config, FocConfig
+from foc_ros.core.memory.memory import Memory
+from foc_ros.core.ocp.problem import Problem
+from foc_ros.core.ocp.solve import solve_problem
+from foc_ros.core.ocp.start import cold_start, resample, warm_start
+from foc_ros.core.types import NANOSECONDS, Candidate, Obstacles, PredictedCandidate, Prediction, Solution, Status
+
+Array = scenes.Array
+SETTINGS = FocConfig(strategy='optimal')
+TICK_S = 1.0 / scenes.RATE_HZ
+EFFORT_TOLERANCE = 0.02
+"""Largest relative difference of efforts: a peer keeps clear at the steps only, which takes a little less effort."""
+
+
+def measure_cold(build: Callable[[], Obstacles], name: str, is_quick: bool) -> Result:
+    """Compare one class, from a guess, with a peer. Our program builds the problem in every call, the peer beforehand."""
+    from peers import build_fastest, fit_guess
+
+    guess, problem = scenes.build_guess(), scenes.build_problem(build())
+    peer = build_fastest(name, problem, fit_guess(problem, guess))
+    arguments = peer.prepare(problem, fit_guess(problem, guess))
+
+    def solve() -> Solution:
+        return solve_problem(scenes.build_problem(build()), cold_start(guess), SETTINGS)
+
+    repetitions = 3 if is_quick else 25
+    times = time_in_turn({'ours': solve, 'peer': lambda: peer.solve(arguments)}, repetitions)
+    ours, control = solve(), peer.read_control(problem, peer.solve(arguments))
+    return Result(
+        Timing('one class, from a guess', compute_median_ms(times['ours'])),
+        Timing(
+            f'{name}, from the least effort through the middle of the guess, built beforehand', compute_median_ms(times['peer'])
+        ),
+        _compare([ours], [control if peer.converged else None]),
+        repetitions,
+        {'qps_ours': ours.qp_solves, 'iterations_peer': peer.iterations},
+    )
+
+
+def measure_warm(build: Callable[[], Obstacles], name: str, is_quick: bool) -> Result:
+    """Compare the ticks of a hand that follows its plan with noise, each from its own solution of the tick before."""
+    from peers import build_fastest, fit_guess
+
+    ticks, generator, obstacles = (4 if is_quick else 25), np.random.default_rng(0), build()
+    problem = scenes.build_problem(obstacles)
+    ours = solve_problem(problem, cold_start(scenes.build_guess()), SETTINGS)
+    peer = build_fastest(name, problem, fit_guess(problem, scenes.build_guess()))
+    control = peer.read_control(problem, peer.solve(peer.prepare(problem, fit_guess(problem, scenes.build_guess()))))
+    found, theirs, times, peer_times = [], [], [], []
+    for tick in range(ticks):
+        mean, left_s = _follow_plan(ours, generator), scenes.DURATION_S - (tick + 1) * TICK_S
+        problem = scenes.build_problem(obstacles, mean, left_s)
+        shifted = resample(replace(ours, control=control), TICK_S, problem.horizon.dt, scenes.STEPS)[1]
+        arguments = peer.prepare(problem, shifted.reshape(2, -1).T)
+        began = time.perf_counter()
+        problem = scenes.build_problem(obstacles, mean, left_s)
+        ours = solve_problem(problem, warm_start(ours, problem), SETTINGS)
+        times.append(time.perf_counter() - began)
+        began = time.perf_counter()
+        variables = peer.solve(arguments)
+        peer_times.append(time.perf_counter() - began)
+        control = peer.read_control(problem, variables)
+        found.append(ours)
+        theirs.append(control if peer.converged else None)
+    return Result(
+        Timing('one class, from the solution of 10 ms ago', compute_median_ms(times)),
+        Timing(f'{name}, from its solution of 10 ms ago, built beforehand', compute_median_ms(peer_times)),
+        _compare(found, theirs),
+        ticks,
+        {'slowest_ms': 1e3 * max(times), 'slowest_peer_ms': 1e3 * max(peer_times)},
+    )
+
+
+def _follow_plan(solution: Solution, generator: np.random.Generator) -> Array:
+    """Return the state that a plan has after a tick, with noise in its position."""
+    u, t = solution.control[0], TICK_S
+    x, v, a = solution.mean[0].reshape(3, 2)
+    state = np.concatenate((x + t * v + t**2 / 2 * a + t**3 / 6 * u, v + t * a + t**2 / 2 * u, a + t * u))
+    state[:2] += generator.normal(0.0, scenes.TRACKER_STDDEV, 2)
+    return state
+
+
+def _compare(ours: Sequence[Solution], theirs: Sequence[Array | None]) -> Agreement:
+    """Compare efforts with those of controls, None where a peer did not converge."""
+    pairs = zip(ours, theirs, strict=True)
+    excess = [mine.effort / float((control**2).sum()) - 1 for mine, control in pairs if control is not None]
+    solved = sum(each.status is Status.SOLVED for each in ours)
+    converged = sum(each is not None for each in theirs)
+    worst = max(excess, key=abs, default=np.inf)
+    return Agreement(
+        solved == converged == len(ours) and abs(worst) < EFFORT_TOLERANCE,
+        f'solved {solved} of {len(ours)}, the peer {converged}; efforts differ by up to {100 * worst:+.3f} % (2 % allowed)',
+    )
+
+
+class TickSequence:
+    """The ticks of a reach, repeated without end, as the node makes them."""
+
+    def __init__(self, reach: scenes.Reach) -> None:
+        self.reach, self.index, self.memory = reach, 0, Memory()
+        self.predictions: list[Prediction] = []
+        self.problems: list[Problem] = []
+
+    def tick(self) -> float:
+        """Make the next prediction that does not begin a movement, and return its time [s]."""
+        self.index %= len(self.reach.hands)
+        if self.index == 0:
+            self.memory = self.predict(Memory())[1]
+            self.index = 1
+        began = time.perf_counter()
+        prediction, self.memory = self.predict(self.memory)
+        seconds = time.perf_counter() - began
+        self.index += 1
+        self.predictions.append(prediction)
+        return seconds
+
+    def predict(self, memory: Memory) -> tuple[Prediction, Memory]:
+        """Make the prediction of the present tick."""
+        reach = self.reach
+        return predictor.predict(reach.config, reach.hands[self.index], reach.obstacles, reach.goals, memory)
+
+    def list_problems(self) -> list[tuple[str, Problem]]:
+        """Return label and problem of each candidate of the present tick."""
+        found: list[tuple[str, Problem]] = []
+
+        def record(candidates: Sequence[Candidate], problems: Any, *rest: Any) -> list[PredictedCandidate]:
+            found.extend((each.label, problems[row]) for row, each in enumerate(candidates))
+            return solve_candidates(candidates, problems, *rest)
+
+        with patch.object(predictor, 'solve_candidates', record):
+            self.predict(self.memory)
+        return found
+
+    def describe(self) -> str:
+        """Return how many candidates were solved, and of how many; the median over the ticks."""
+        counts = sorted((len(each.solved_candidates), len(each.candidates)) for each in self.predictions)
+        return '{} of {}'.format(*counts[len(counts) // 2])
+
+
+def measure_tick(build: Callable[[], scenes.Reach], scene: str, is_quick: bool) -> Result:
+    """Compare whole warm ticks with IPOPT, which solves only the problem of the most likely class."""
+    from peers import build_fastest
+
+    sequence, repetitions = TickSequence(build()), 3 if is_quick else 25
+    cold = time_call(lambda: sequence.predict(Memory()))
+    sequence.tick()
+    best = sequence.predictions[-1].solved_candidates[0]
+    problem = dict(sequence.list_problems())[best.label]
+    peer = build_fastest('IPOPT', problem, best.solution.control)
+    arguments = peer.prepare(problem, best.solution.control)
+    times = time_in_turn({'ours': lambda: None, 'peer': lambda: peer.solve(arguments)}, repetitions)
+    ticks = [sequence.tick() for _ in range(repetitions)]
+    control = peer.read_control(problem, peer.solve(arguments))
+    return Result(
+        Timing(f'a warm tick, {scene}', compute_median_ms(ticks)),
+        Timing('IPOPT, its most likely class alone, from our solution of 10 ms ago', compute_median_ms(times['peer'])),
+        _compare([best.solution], [control if peer.converged else None]),
+        repetitions,
+        {'solved': sequence.describe(), 'slowest_ms': 1e3 * max(ticks), 'first_tick_ms': 1e3 * cold},
+    )
+
+
+def measure_change(values: Mapping[str, object], far: int, change: str, is_quick: bool) -> Result:
+    """Compare a warm tick of four classes with one of more obstacles or of other parameters."""
+    base = scenes.build_4x8()
+    other = scenes.add_far_obstacles(base, far).change_config(dict(values))
+    sequences = {'ours': TickSequence(base), 'peer': TickSequence(other)}
+    repetitions = 3 if is_quick else 40
+    times = time_in_turn({name: each.tick for name, each in sequences.items()}, repetitions)
+    likelihoods = [{c.label: c.likelihood for c in each.predictions[-1].candidates} for each in sequences.values()]
+    differences = [abs(likelihoods[0].get(name, 0.0) - likelihoods[1].get(name, 0.0)) for name in set().union(*likelihoods)]
+    return Result(
+        Timing('a warm tick, 4 classes, 8 circles, N = 50', compute_median_ms(times['ours'])),
+        Timing(f'the same {change}', compute_median_ms(times['peer'])),
+        Agreement(max(differences) < 0.02, f'likelihoods differ by up to {max(differences):.1e} (0.02 allowed)'),
+        repetitions,
+        {'solved': sequences['peer'].describe()},
+    )
+
+
+def measure_replay(is_quick: bool) -> Result:
+    """Compare the replay of the packaged recording at default parameters with the time that it took to record."""
+    recording = Path(str(files('foc_ros'))) / 'recordings' / 'reaching.mcap'
+    answers: list[list[Prediction]] = []
+    times = [time_call(lambda: answers.append(list(replay(recording, Config())))) for _ in range(1 if is_quick else 3)]
+    stamps = [each.stamp_ns for each in answers[0]]
+    first, last = ([[c.likelihood for c in each.candidates] for each in answer] for answer in (answers[0], answers[-1]))
+    return Result(
+        Timing(f'replay of the packaged recording, {len(stamps)} predictions', compute_median_ms(times)),
+        Timing('the time it took to record', (stamps[-1] - stamps[0]) / NANOSECONDS * 1e3),
+        Agreement(first == last, 'the first and the last replay are the same to the last bit'),
+        len(times),
+        {'ms_per_prediction': compute_median_ms(times) / len(stamps)},
+    )
+
+
+SCENES = {'circles': scenes.build_circles, 'boxes': scenes.build_boxes}
+ROWS: dict[str, Callable[[bool], Result]] = {
+    f'{measure.__name__.removeprefix("measure_")}_{kind}_{name.lower()}': partial(measure, build, name)
+    for kind, build in SCENES.items()
+    for measure in (measure_cold, measure_warm)
+    for name in ('Fatrop', 'IPOPT')
+} | {
+    'tick_circles': partial(measure_tick, scenes.build_4x8, '4 classes, 8 circles'),
+    'tick_boxes': partial(measure_tick, scenes.build_4_boxes, '6 candidates, 2 goals, 4 sharp boxes'),
+    'far_obstacles': partial(measure_change, {}, 248, 'with 248 circles more, 1 to 3 m away'),
+    'steps_200': partial(measure_change, {'foc.steps': 200}, 0, 'with N = 200'),
+    'replay': measure_replay,
+}
