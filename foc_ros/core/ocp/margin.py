@@ -42,7 +42,7 @@ LEAST_BEND = 3e-2
 BRACKET = np.linspace(-1.0, 1.0, 9)
 """Times, relative to a bracket, at which the least safety factor is sought; the next bracket is a quarter of it."""
 NARROWINGS = 4
-"""Brackets: the last points are 5e-4 steps apart, and a parabola passes through three of them."""
+"""Brackets: the last points are 2e-3 steps apart, and a parabola or two lines pass through them."""
 FEW_NARROWINGS = 2
 """The same for circles, beside which a safety factor changes smoothly with time."""
 FACTORS = 5
@@ -63,6 +63,9 @@ class Contacts(NamedTuple):
     def join(self, *others: Contacts) -> Contacts:
         """Return these and others."""
         return Contacts(*(np.concatenate(each) for each in zip(self, *others, strict=True)))
+
+
+NO_CONTACTS = Contacts(np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp), np.zeros(0))
 
 
 class Motion(NamedTuple):
@@ -99,9 +102,9 @@ class Margin(NamedTuple):
 class Gradients(NamedTuple):
     """Margins at q places, linearised.
 
-    value (q,) [m]; gradient (q, 2N), with respect to the control; stddev_rate (q,): -dg/dk [m]; diagonal (q, 2N): what a unit of
-    the multiplier adds to the diagonal of the Hessian of the Lagrangian; factors (q, 5, 2N) and weights (q, 5, 5): the remaining
-    part of it, sum_ab weights_ab factors_a factors_b'.
+    value (q,) [m]; gradient (q, 2N), with respect to the control; stddev_rate (q,): -dg/dk [m]. For the h places that hold the mean
+    off, diagonal (h, 2N): what a unit of the multiplier adds to the diagonal of the Hessian of the Lagrangian; factors (h, 5, 2N)
+    and weights (h, 5, 5): the remaining part of it, sum_ab weights_ab factors_a factors_b'.
     """
 
     value: Array
@@ -281,19 +284,25 @@ class Margins:
 
     def sweep(self, rows: Indices, path: Array) -> Array:
         """Return the angles [rad] that the line from each centre to a path (r, 2, T) on the grid sweeps, (r, m)."""
+        angles: Array = self.turn(rows, path).sum(axis=2)
+        return angles
+
+    def turn(self, rows: Indices, path: Array) -> Array:
+        """Return by how much this line turns between the points of the grid, from now on, (r, m, T) [rad]."""
         start = np.stack([self.problems[row].initial_mean[:2] for row in rows.tolist()])
-        return self._sweep(rows, np.concatenate((start[..., None], path), axis=2), np.concatenate(([0.0], self.times)))
+        return self._turn(rows, np.concatenate((start[..., None], path), axis=2), np.concatenate(([0.0], self.times)))
 
     def sweep_steps(self, paths: Array) -> Array:
-        """Return the same for positions (b, N + 1, 2) of all problems at steps 0..N, (b, m)."""
-        return self._sweep(np.arange(len(paths)), paths.swapaxes(1, 2), np.arange(self.steps + 1.0))
+        """Return the swept angles of positions (b, N + 1, 2) of all problems at steps 0..N, (b, m)."""
+        angles: Array = self._turn(np.arange(len(paths)), paths.swapaxes(1, 2), np.arange(self.steps + 1.0)).sum(axis=2)
+        return angles
 
-    def _sweep(self, rows: Indices, path: Array, times: Array) -> Array:
+    def _turn(self, rows: Indices, path: Array, times: Array) -> Array:
         centre = self.centre[rows][..., None] + times * self.drift[rows][..., None]
         x, y = (path[:, None] - centre).transpose(2, 0, 1, 3)
         turned = x[..., :-1] * y[..., 1:] - y[..., :-1] * x[..., 1:]
-        angles: Array = np.arctan2(turned, x[..., :-1] * x[..., 1:] + y[..., :-1] * y[..., 1:]).sum(axis=2)
-        return np.where(self.counts[rows], angles, 0.0)
+        angles: Array = np.arctan2(turned, x[..., :-1] * x[..., 1:] + y[..., :-1] * y[..., 1:])
+        return np.where(self.counts[rows, :, None], angles, 0.0)
 
     def find_minima(
         self, rows: Indices, motion: Motion, k: Array, grid: Margin, is_wanted: NDArray[np.bool_]
@@ -341,7 +350,7 @@ class Margins:
     def find_least_factors(self, control: Array) -> tuple[Array, Indices, Array]:
         """Return the least safety factors of controls (b, 2N) over all obstacles and times, and where they are.
 
-        Between two points of the grid an obstacle comes nearer by no more than the hand moves in half of the time. Wherever that
+        Between two steps an obstacle comes nearer by no more than the hand moves relative to it. Wherever that
         may lead below the least factor on the grid, the time is refined.
 
         Returns
@@ -359,9 +368,10 @@ class Margins:
         factor = np.where(counts, grid.factor, np.inf)
         centre = self.centre[..., None] + self.times * self.drift[..., None]
         moved = np.hypot(*np.diff(self.find_path(motion)[:, None] - centre, axis=3).swapaxes(0, 2)).swapaxes(0, 1)
-        nearer = 0.5 * np.maximum(np.pad(moved, ((0, 0), (0, 0), (1, 0))), np.pad(moved, ((0, 0), (0, 0), (0, 1))))
-        lowest = np.maximum(grid.distance - nearer, np.sqrt(self.reach_square)[..., None])
-        bold = (lowest**2 - self.reach_square[..., None]) / (2.0 * lowest * grid.stddev)
+        nearer = np.maximum(np.pad(moved, ((0, 0), (0, 0), (1, 0))), np.pad(moved, ((0, 0), (0, 0), (0, 1))))
+        reach = np.sqrt(self.reach_square)[..., None]
+        lowest = np.maximum(grid.distance - nearer, reach)
+        bold = (lowest - reach) * (lowest + reach) / (2.0 * lowest * grid.stddev)
         may_be_least = counts & (bold <= np.maximum(factor.min(axis=(1, 2)), 0.0)[:, None, None])
         places, _ = self.find_minima(rows, motion, none, grid._replace(factor=factor), may_be_least)
         found = self._measure_exactly(places, control)
@@ -394,12 +404,24 @@ class Margins:
         margin, _ = self._respond(places, control[places.problem], np.zeros(len(places.time)))
         return 2.0 * np.abs(margin.distance) * margin.stddev, margin.distance
 
-    def linearise(self, places: Contacts, control: Array, k: Array) -> Gradients:
-        """Return margins at q places with their first and second derivatives; control (q, 2N) and k (q,) of each place."""
-        count = len(places.time)
-        beside = np.clip(np.concatenate((places.time - DIFFERENCE, places.time + DIFFERENCE)), 1.0, float(self.steps))
-        whole = Contacts(np.tile(places.problem, 3), np.tile(places.obstacle, 3), np.concatenate((places.time, beside)))
-        control, k = np.tile(control, (3, 1)), np.tile(k, 3)
+    def linearise(self, places: Contacts, control: Array, k: Array, is_held: NDArray[np.bool_]) -> Gradients:
+        """Return margins at q places with their first and second derivatives.
+
+        Parameters
+        ----------
+        places : Contacts
+            The places.
+        control, k : Array
+            Control (2N,) and safety factor for each place, (q, 2N) and (q,).
+        is_held : NDArray[np.bool_]
+            Which places hold the mean off, (q,): those that slide with it, and have second derivatives.
+        """
+        count, held = len(places.time), np.flatnonzero(is_held)
+        moments = places.time[held]
+        beside = np.clip(np.concatenate((moments - DIFFERENCE, moments + DIFFERENCE)), 1.0, float(self.steps))
+        rows = np.concatenate((np.arange(count), held, held))
+        whole = Contacts(places.problem[rows], places.obstacle[rows], np.concatenate((places.time, beside)))
+        control, k = control[rows], k[rows]
         margin, response = self._respond(whole, control, k)
         noise = self.noise_variance[whole.problem] * control
         nx, ny = margin.normal_x[:, None], margin.normal_y[:, None]
@@ -413,23 +435,25 @@ class Margins:
         size = np.where(is_far, self.size_variance[whole.problem, whole.obstacle] / 4.0, 0.0)
         spread = 2.0 * noise * along**2 + (across * turn)[:, None] * aside - (2.0 * size / distance**3)[:, None] * along  # dw/du
         gradient = along - worth[:, None] * spread
-        own, earlier, later = slice(0, count), slice(count, 2 * count), slice(2 * count, None)
+        rate = stddev * (1.0 + k * stddev / margin.root)
+        earlier, later = slice(count, count + len(held)), slice(count + len(held), None)
         apart = whole.time[later] - whole.time[earlier]
-        rise, fall = margin.value[later] - margin.value[own], margin.value[earlier] - margin.value[own]
+        rise, fall = margin.value[later] - margin.value[held], margin.value[earlier] - margin.value[held]
         bend = 4.0 * (rise + fall) / apart**2
         slide = (gradient[later] - gradient[earlier]) / apart[:, None]
         # where the nearest point passes from an edge to a corner, the margin has a kink in time: the least margin moves with both
         # sides, by so much of each that it does not change with time
         is_kink = (margin.is_on_edge[later] != margin.is_on_edge[earlier]) & (rise > 0.0) & (fall > 0.0)
-        share = np.divide(rise, rise + fall, out=np.zeros(count), where=is_kink)[:, None]
-        gradient = np.where(is_kink[:, None], share * gradient[earlier] + (1.0 - share) * gradient[later], gradient[own])
+        share = np.divide(rise, rise + fall, out=np.zeros(len(held)), where=is_kink)[:, None]
+        mixed = share * gradient[earlier] + (1.0 - share) * gradient[later]
+        gradient = gradient[:count]
+        gradient[held] = np.where(is_kink[:, None], mixed, gradient[held])
         bend = np.where(is_kink, np.inf, bend)
-        factors = np.stack((aside[own], along[own], 4.0 * (noise * along * aside)[own], spread[own], slide), axis=1)
-        margin = Margin(*(each[own] for each in margin))
-        weights = self._weigh_factors(places, margin, k[own], worth[own], turn[own], across[own], size[own], bend)
-        diagonal = (2.0 * worth[own])[:, None] * self.noise_variance[places.problem] * along[own] ** 2
-        rate = margin.stddev * (1.0 + k[own] * margin.stddev / margin.root)
-        return Gradients(margin.value, gradient, rate, diagonal, factors, weights)
+        factors = np.stack((aside[held], along[held], 4.0 * noise[held] * along[held] * aside[held], spread[held], slide), axis=1)
+        of_held = Margin(*(each[held] for each in margin))
+        weights = self._weigh_factors(places.take(held), of_held, k[held], worth[held], turn[held], across[held], size[held], bend)
+        diagonal = (2.0 * worth[held])[:, None] * self.noise_variance[whole.problem[held]] * along[held] ** 2
+        return Gradients(margin.value[:count], gradient, rate[:count], diagonal, factors, weights)
 
     def _weigh_factors(
         self, places: Contacts, margin: Margin, k: Array, worth: Array, turn: Array, across: Array, size: Array, bend: Array

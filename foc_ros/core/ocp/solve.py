@@ -17,7 +17,7 @@ from foc_ros.core.obstacles.geometry import find_offset
 from foc_ros.core.registry import STRATEGIES
 from foc_ros.core.types import Array, Solution, Status, as_readonly
 
-from .margin import Contacts, Margins
+from .margin import Margins
 from .problem import Problem
 from .start import Start
 from .strategies import StrategyResult
@@ -26,6 +26,8 @@ ETA_TOLERANCE = 1e-5
 """How far a solution may fall short of eta by rounding."""
 REMAINING = 0.5
 """Part of what a QP promised by which the loss still falls after its step: the median in the random scenes of the tests."""
+LARGEST_GAIN = 1.0
+"""Most by which a loss is expected to fall still: far from a solution a QP promises anything."""
 NO_VIOLATION = 1e-7
 """Shortfall of a distance that counts as rounding [m]."""
 
@@ -69,8 +71,9 @@ def solve_problems(
         ]
         began = time.perf_counter()
         results = strategy(group, [starts[row] for row in rows], settings, deadline)
-        if not isinstance(results, list) or not all(isinstance(each, StrategyResult) for each in results):
-            raise InputError(f'strategy {settings.strategy}', 'a list of StrategyResult as its result', repr(results))
+        is_list = isinstance(results, list) and len(results) == len(group)
+        if not is_list or not all(isinstance(each, StrategyResult) for each in results):
+            raise InputError(f'strategy {settings.strategy}', 'a list of StrategyResult, one for each problem', repr(results))
         solutions = _evaluate(group, results)
         share_s = (time.perf_counter() - began) / len(rows)
         solved |= {row: replace(each, solve_s=share_s) for row, each in zip(rows, solutions, strict=True)}
@@ -92,16 +95,15 @@ def find_least_safety_factor(problem: Problem, control: Array) -> tuple[float, i
 
 def _evaluate(problems: Sequence[Problem], results: Sequence[StrategyResult]) -> list[Solution]:
     """Return the solutions of problems with the same response, with the least safety factors over all times."""
-    margins = Margins(problems, np.zeros(len(problems)), is_chance=True)
-    control = np.stack([each.control * problem.horizon.gain for problem, each in zip(problems, results, strict=True)])
-    minima = zip(*(each.tolist() for each in margins.find_least_factors(control)), strict=True)
-    weights = _find_weights(margins, control, results)
-    return [_evaluate_one(*each) for each in zip(problems, results, minima, weights, strict=True)]
+    minima: Sequence[tuple[float, int, float] | None] = [each.minimum for each in results]
+    if None in minima:
+        margins = Margins(problems, np.zeros(len(problems)), is_chance=True)
+        control = np.stack([each.control * problem.horizon.gain for problem, each in zip(problems, results, strict=True)])
+        minima = list(zip(*(each.tolist() for each in margins.find_least_factors(control)), strict=True))
+    return [_evaluate_one(*each) for each in zip(problems, results, minima, strict=True)]  # type: ignore[arg-type]
 
 
-def _evaluate_one(
-    problem: Problem, result: StrategyResult, minimum: tuple[float, int, float], weights: tuple[tuple[float, float], ...]
-) -> Solution:
+def _evaluate_one(problem: Problem, result: StrategyResult, minimum: tuple[float, int, float]) -> Solution:
     (k, row, moment), risk, control = minimum, problem.risk, result.control
     eta, status, message = risk.find_probability(k), result.status, result.message
     if status is Status.SOLVED and result.aims_at_eta and eta < problem.eta - ETA_TOLERANCE:
@@ -114,7 +116,7 @@ def _evaluate_one(
     effort, names = float(control @ control), problem.obstacles.ids
     shortfall, expected = 0.0 if status is Status.SOLVED else max(problem.wanted_k - k, 0.0), None
     if status is Status.DEADLINE:
-        expected, shortfall = _expect(problem, effort, shortfall, REMAINING * result.gain)
+        expected, shortfall = _expect(problem, effort, shortfall, min(REMAINING * result.gain, LARGEST_GAIN))
     obstacles, times, pushes = (each.tolist() for each in result.forces)
     return Solution(
         status=status,
@@ -135,7 +137,7 @@ def _evaluate_one(
         violation=violation,
         violation_at=None if violated is None else (names[violated[0]], violated[1]),
         multipliers=tuple((names[j], t, y * effort) for j, t, y in zip(obstacles, times, pushes, strict=True)),
-        equivalent_weights=weights,
+        equivalent_weights=((result.tau, result.lam),) * len(times) if result.weights is None else result.weights,
         expected=expected,
         qp_solves=result.qp_solves,
         iterations=result.iterations,
@@ -143,33 +145,19 @@ def _evaluate_one(
 
 
 def _expect(problem: Problem, effort: float, shortfall: float, gain: float) -> tuple[float, float]:
-    """Return the effort and the shortfall of safety that are expected at the end of a sequence, whose loss falls by a gain [ln J]."""
-    preference = problem.preference
+    """Return the effort and the shortfall of safety that are expected at the end of a sequence, whose loss falls by a gain [ln J].
+
+    The effort does not fall below that of a movement without obstacles.
+    """
+    rows, targets, softness = problem.goal_rows
+    scale = np.sqrt((rows**2).sum(axis=1))[softness == 0.0]
+    free = np.linalg.lstsq(rows[softness == 0.0] / scale[:, None], targets[softness == 0.0] / scale, rcond=None)[0]
+    least, preference = float(free @ free), problem.preference
     if preference.is_hard or preference.beta == 0.0:
-        return effort * math.exp(-gain), 0.0
+        return max(effort * math.exp(-gain), min(least, effort)), 0.0
     rate = preference.shortfall / preference.beta
     less = min(shortfall, gain / rate) if rate > 0.0 else 0.0
-    return effort * math.exp(-(gain - rate * less)), shortfall - less
-
-
-def _find_weights(margins: Margins, control: Array, results: Sequence[StrategyResult]) -> list[tuple[tuple[float, float], ...]]:
-    """Return the (tau [m^2], lambda [1/s^6]) of the contacts of each result, for controls (b, 2N) in units of `Horizon.gain`.
-
-    For a constraint at k they are those with which it would hold: tau = k sqrt(Var[C]) is by how much E[C] has to be below zero,
-    and lambda = y k D / sqrt(Var[C]), for a multiplier y [m/s^6], the cost of a variance along its normal at its time.
-    """
-    counts = [len(each.forces.time) for each in results]
-    obstacle, time, push = (np.concatenate([each.forces[i] for each in results]) for i in range(3))
-    problem = np.repeat(np.arange(len(results)), counts)
-    spread, distance = margins.measure_spread(Contacts(problem, obstacle.astype(np.intp), time), control)
-    k = np.array([each.at_k or 0.0 for each in results])[problem]
-    effort = np.array([float(each.control @ each.control) for each in results])[problem]
-    pairs = list(zip((k * spread).tolist(), (push * effort * k * distance / spread).tolist(), strict=True))
-    ends = np.cumsum(counts).tolist()
-    return [
-        tuple(pairs[end - count : end]) if each.at_k is not None else ((each.tau, each.lam),) * count
-        for each, count, end in zip(results, counts, ends, strict=True)
-    ]
+    return max(effort * math.exp(-max(gain - rate * less, 0.0)), min(least, effort)), shortfall - less
 
 
 def _complete_message(problem: Problem, status: Status, message: str, violation: float) -> str:

@@ -1,23 +1,17 @@
 """One sequential QP for all strategies, and for all candidates of a prediction at once.
 
-For each problem it finds a control u and a safety factor k that minimise
+For each problem it finds a control u and a safety factor k with the least loss (`objective`)
 
-    ln J(u) + rate max(0, k_wanted - k) + floor_rate max(0, -k)    subject to    E u = e,  G_i(u; k) >= 0,
+    ln J(u) + rate max(0, k_wanted - k)    subject to    E u = e,  G_i(u; k) >= 0,
 
-with J the quadratic cost and G_i the least margins over time of the obstacles (`margin`). In the logarithm, costs are compared as
-likelihoods compare them; `rate` is what a unit of safety is worth, and a mean that meets an obstacle always costs more than the
-way round it. In each iteration the margins are linearised where they are least, and the QP
-
-    minimise  1/2 p'H p + p'(grad ln J) + rate max(0, k_wanted - k) + ...   subject to  E p = 0,  G_i + G_i' p - r_i (k - k_now) >= 0
-
-is solved by its dual. H is diagonal plus few rows: curvature of the margins, and -(grad ln J)(grad ln J)'. All that is needed of
-it is a Gram matrix of the goal, curvature and contact rows, so that the dual has one unknown for each contact: rate appears in it as
-a budget, r'y <= rate. A line search on the function above refuses controls that pass an obstacle on another side.
+with the margins G_i where the obstacles hold the mean off (`margin`). In the logarithm, costs are compared as likelihoods compare
+them, and the rate is what a unit of safety is worth: a class gives up as much of it as costs more. In each iteration the margins are
+linearised where they are least, a QP is solved (`qp`), and a step is taken along its solution that does not pass an obstacle on
+another side. Rows are added where the solution of the QP breaks margins, so that few are enough.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,62 +19,51 @@ from numpy.typing import NDArray
 
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.registry import QP_BACKENDS
-from foc_ros.core.safety_preference import COST_FLOOR
 from foc_ros.core.types import Array
 
-from .backend import DenseQP
-from .margin import FACTORS, Contacts, Indices, Margins
-from .problem import Problem
+from .margin import NO_CONTACTS, Contacts, Indices, Margins
+from .objective import Objective
+from .qp import ReducedQP, number_rows, solve_dual
 
 MOST_ITERATIONS = 60
-NEAR = 0.1
-"""Margin relative to the scene below which an obstacle has a row in the QP."""
-NEAR_FACTOR = 1.5
-"""Safety factor relative to the wanted one below which it has one too."""
+"""Iterations after which a problem counts as not settled; ten are usual from a guess, three from an earlier solution."""
+NEAR, NEAR_FACTOR = 0.1, 1.5
+"""Margin relative to the scene, and safety factor relative to the wanted one, below which an obstacle has a row in the QP."""
 BESIDE = 0.3
 """Time on both sides of a contact with a polygon at which there are rows too: its margin may have a kink [steps]."""
+APART = 0.05
+"""Time from other contacts beyond which one that held the mean off is kept: along a side there may be two [steps]."""
 SAME = 1e-3
 """Time between contacts that count as one [steps]."""
 HELD = 1e-5
 """Multiplier relative to the largest one from which a contact holds the mean off."""
-LARGEST_RATE = 1e3
-"""Worth of a unit of safety, in logarithms of cost, where the wanted safety is a condition: no class costs so much more."""
-GENTLE_RATE = 5.0
-"""Worth with which the search begins where it is larger: at a guess, margins tell little of what they cost."""
-FLOOR = 20.0
-"""How much more a mean inside an obstacle costs than a smaller safety factor, for a unit of it: by this factor, or `LEAST_FLOOR`."""
-LEAST_FLOOR = 300.0
+LARGEST_RATE, GENTLE_RATE = 1e3, 5.0
+"""Worth of a unit of safety in logarithms of cost where the wanted safety is a condition, and the one with which the search begins
+where it is larger: at a guess, margins tell little of what they cost."""
 ROUGH_GAIN = 1e-3
-"""Gain at which the search with the gentle worth ends."""
-LEAST_CURVATURE = 0.3
-"""Least eigenvalue of the Hessian relative to its diagonal part: less curvature would leave the QP without a minimum."""
-SMALL_GAIN = 2e-8
-"""Gain that the QP promises, as a logarithm of cost, below which a problem is solved."""
-SMALL_FACTOR = 1e-9
-"""Relative difference of a safety factor that counts as rounding."""
-LAST_GAIN = 3e-4
-"""Gain of a whole step after which a problem is solved: Newton steps converge quadratically."""
-LAST_FACTOR = 1e-6
-"""Relative difference up to which the step has to reach its safety factor."""
-STALLED_GAIN = 1e-4
-"""The same, below which a problem is solved that no step improves: rounding."""
+"""Gain, as a logarithm of cost, at which the search with the gentle worth ends."""
+SMALL_GAIN, SMALL_FACTOR = 2e-8, 1e-9
+"""Gain that a QP promises below which a problem is solved, and relative difference of a safety factor that is rounding."""
+LAST_GAIN, LAST_FACTOR = 3e-4, 1e-6
+"""Gain of a whole step after which a problem is solved, and part of its safety factor that the step may miss: Newton steps converge
+quadratically."""
+LARGEST_TOLERANCE = 5e-3
+"""Largest gain of such a step for classes that are unlikely."""
+STALLED_GAIN = 2e-5
+"""Gain below which a problem is solved that no step improves: rounding hides it."""
 ROUNDS = 3
 """Most times that rows are added to a QP for places at which its solution breaks margins."""
-VIOLATED = 1e-3
-"""Broken margin, relative to the scene, for which a row is added."""
-MOST_TRIALS = 12
-BUNDLES = 1
-"""Trials of a whole step, before which rows are added where the last one failed; then steps are halved."""
+VIOLATED, VIOLATED_APART = 1e-3, 0.25
+"""Broken margin, relative to the scene, for which a row is added, and its least time from other rows [steps]."""
+MOST_TRIALS, BUNDLES, SHORTER = 5, 1, 0.25
+"""Steps that are tried; those of them after which rows are added where a whole step failed; and the part that is tried next."""
 SUFFICIENT = 1e-4
 """Share of the promised gain that a step has to bring."""
-ROUNDING = 1e-11
-GG = 0.0
 GRACE = 0.02
-SOFT = 1e-11
-"""Part of the length of a contact row by which it gives way: near the goal no control may move it."""
-ROUNDED = 3e-10
+"""Loss by which the first step from a guess or an earlier solution may rise; later ones may rise to the last but one."""
+ROUNDING = 1e-11
+ACCURACY = 3e-10
 """Margin relative to the scene that counts as none: accuracy of a QP."""
-DEBUG = False
 
 
 @dataclass
@@ -88,7 +71,7 @@ class Evaluation:
     """What the sequence knows of the controls of r problems.
 
     cost (r,): J, in units of `gain`^2; loss (r,): the function that is minimised; factor (r,): the safety factor k; angles (r, m):
-    swept angles [rad]; margin (r, m, T), normal (r, 2, m, T): on the grid; contacts: minima of the safety factors near the movement.
+    swept angles [rad]; margin (r, m, T), normal (r, 2, m, T): on the grid; contacts, factors (q,): minima of the safety factors near the movement.
     """
 
     cost: Array
@@ -98,13 +81,15 @@ class Evaluation:
     margin: Array
     normal: Array
     contacts: Contacts
+    factors: Array
 
     def put(self, rows: Indices, other: Evaluation, taken: NDArray[np.bool_], problems: Indices) -> None:
         """Take rows over from the evaluation of some problems: those that are marked."""
         self.cost[rows], self.loss[rows], self.factor[rows] = other.cost[taken], other.loss[taken], other.factor[taken]
         self.angles[rows], self.margin[rows], self.normal[rows] = other.angles[taken], other.margin[taken], other.normal[taken]
-        kept = self.contacts.take(~np.isin(self.contacts.problem, problems[taken]))
-        self.contacts = kept.join(other.contacts.take(np.isin(other.contacts.problem, problems[taken])))
+        old, new = ~np.isin(self.contacts.problem, problems[taken]), np.isin(other.contacts.problem, problems[taken])
+        self.contacts = self.contacts.take(old).join(other.contacts.take(new))
+        self.factors = np.concatenate((self.factors[old], other.factors[new]))
 
 
 @dataclass
@@ -112,7 +97,7 @@ class Plan:
     """The solutions of the QPs of r problems.
 
     rows (r,): the problems; step (r, 2N); k (r,): planned safety factors; gain (r,): how much the loss falls to first order;
-    contacts and multipliers (q,): the rows of the QPs.
+    contacts and multipliers (q,): the rows of the QPs; further: those of them that were added.
     """
 
     rows: Indices
@@ -121,6 +106,7 @@ class Plan:
     gain: Array
     contacts: Contacts
     multipliers: Array
+    further: Contacts
 
     def replace(self, other: Plan) -> Plan:
         """Return the plans with those of some of the problems replaced."""
@@ -128,8 +114,9 @@ class Plan:
         for mine, new in ((self.step, other.step), (self.k, other.k), (self.gain, other.gain)):
             mine[place] = new
         kept = ~np.isin(self.contacts.problem, other.rows)
-        contacts, multipliers = self.contacts.take(kept).join(other.contacts), np.concatenate((self.multipliers[kept], other.multipliers))
-        return Plan(self.rows, self.step, self.k, self.gain, contacts, multipliers)
+        contacts = self.contacts.take(kept).join(other.contacts)
+        multipliers = np.concatenate((self.multipliers[kept], other.multipliers))
+        return Plan(self.rows, self.step, self.k, self.gain, contacts, multipliers, other.further)
 
 
 @dataclass
@@ -138,7 +125,8 @@ class Iterates:
 
     control (b, 2N), in units of `Horizon.gain`; k (b,): safety factor at which margins are linearised; at: what is known of the
     controls; contacts and multipliers (q,) of the last QPs; angles (b, m): swept angles of the class [rad]; is_done (b,): whether
-    the sequence has ended, is_settled (b,): at a minimum; gain (b,): what the last QP promised; iterations (b,).
+    the sequence has ended, is_settled (b,): at a minimum; gain (b,): what the last QP promised; iterations (b,);
+    bound (b,): what the loss must not exceed; trial: contacts of the last step that was tried.
     """
 
     control: Array
@@ -152,6 +140,7 @@ class Iterates:
     gain: Array
     iterations: Indices
     bound: Array
+    trial: Contacts = NO_CONTACTS
 
 
 class Solver:
@@ -168,95 +157,55 @@ class Solver:
     """
 
     def __init__(self, margins: Margins, wanted_k: Array, rate: Array, lam: Array) -> None:
-        self.margins, self.wanted_k = margins, wanted_k
-        self._set_rate(rate)
         problems = margins.problems
+        self.margins, self.wanted_k = margins, wanted_k
+        self.objective = Objective(problems, wanted_k, rate, lam)
         self.gain = np.array([each.horizon.gain for each in problems])
-        self.most, self.small_gain = MOST_ITERATIONS, SMALL_GAIN
-        terms = {id(each): _tabulate_cost(each) for each in problems}
-        tables = [terms[id(each)] for each in problems]
-        self.weights = np.stack([each[0] + l * each[1] for each, l in zip(tables, lam.tolist(), strict=True)])
-        self.fixed = np.array([each[2] for each in tables])
-        self.goal_rows, self.goal_targets, self.soft_rows, self.soft_targets, self.soft_weights = (
-            _pad([each[i] for each in tables]) for i in range(3, 8)
-        )
-        self.no_goal = (self.goal_rows == 0.0).all(axis=2)[..., None] * np.eye(self.goal_rows.shape[1])
-        backends = {each.qp_backend for each in problems}
-        self.backend = QP_BACKENDS.get(backends.pop() if len(backends) == 1 else 'piqp')
-
-    def _set_rate(self, rate: Array) -> None:
-        """Set the worth of a unit of safety, and that of a mean that stays out of the obstacles."""
-        self.rate, self.floor = rate, np.maximum(FLOOR * rate, LEAST_FLOOR)
-
-    # ---- the objective
-
-    def compute_cost(self, rows: Indices, control: Array) -> Array:
-        """Return J (r,) with its fixed part, in units of `gain`^2."""
-        missed = (self.soft_rows[rows] @ control[..., None])[..., 0] - self.soft_targets[rows]
-        cost: Array = (self.weights[rows] * control**2).sum(axis=1) + (self.soft_weights[rows] * missed**2).sum(axis=1)
-        return cost + self.fixed[rows]
-
-    def compute_loss(self, rows: Indices, cost: Array, k: Array) -> Array:
-        """Return the function that is minimised, (r,)."""
-        wanted, rate = self.wanted_k[rows], self.rate[rows]
-        short = np.maximum(wanted - np.maximum(k, np.minimum(wanted, 0.0)), 0.0)
-        return np.log(cost) + rate * short + self.floor[rows] * np.maximum(-k, 0.0)
-
-    def meet_goal(self, control: Array) -> Array:
-        """Return the nearest controls (b, 2N) that meet the goals exactly."""
-        rows = self.goal_rows
-        missing = self.goal_targets - (rows @ control[..., None])[..., 0]
-        square = rows @ rows.swapaxes(1, 2)
-        shares = np.linalg.pinv(square, hermitian=True) @ missing[..., None]
-        met: Array = control + (rows.swapaxes(1, 2) @ shares)[..., 0]
-        return met
-
-    def evaluate(self, rows: Indices, control: Array, k: Array) -> Evaluation:
-        """Return what the sequence has to know of some controls (r, 2N), linearised at safety factors (r,)."""
-        margins = self.margins
-        motion = margins.move(rows, control)
-        grid = margins.measure_grid(rows, motion, k)
-        is_near = (grid.value < NEAR * margins.extent[rows, None, None]) | (grid.factor < NEAR_FACTOR * self.wanted_k[rows, None, None])
-        contacts, factors = margins.find_minima(rows, motion, k, grid, is_near)
-        where = np.zeros(len(margins.problems), dtype=np.intp)
-        where[rows] = np.arange(len(rows))
-        found = np.full(len(rows), np.inf)
-        np.minimum.at(found, where[contacts.problem], factors)
-        cost = self.compute_cost(rows, control)
-        loss = self.compute_loss(rows, cost, found)
-        normal = np.stack((grid.normal_x, grid.normal_y), axis=1)
-        return Evaluation(cost, loss, found, margins.sweep(rows, margins.find_path(motion)), grid.value, normal, contacts)
-
-    # ---- the sequence
+        self.most, self._small_gain = MOST_ITERATIONS, SMALL_GAIN
+        self._backend = QP_BACKENDS.get(problems[0].qp_backend)
 
     def begin(self, control: Array, contacts: Contacts, multipliers: Array, k: Array, angles: Array) -> Iterates:
-        """Return the iterates at controls (b, 2N) that meet their goals, in the classes of some swept angles (b, m)."""
-        rows = np.arange(len(control))
-        at, no = self.evaluate(rows, control, k), np.zeros(len(control), dtype=np.bool_)
-        k = np.clip(at.factor, 0.0, self.wanted_k)
-        return Iterates(control, k, at, contacts, multipliers, angles, no, no.copy(), np.full(len(rows), np.inf), np.zeros_like(rows), at.loss + GRACE)
+        """Return the iterates at controls (b, 2N) moved to their goals, in the classes of some swept angles (b, m)."""
+        control, rows = self.objective.meet_goal(control), np.arange(len(control))
+        at = self.evaluate(rows, control, k)
+        no, k = np.zeros(len(rows), dtype=np.bool_), np.clip(at.factor, 0.0, self.wanted_k)
+        gain = np.full(len(rows), np.inf)
+        return Iterates(control, k, at, contacts, multipliers, angles, no, no.copy(), gain, np.zeros_like(rows), at.loss + GRACE)
+
+    def evaluate(self, rows: Indices, control: Array, k: Array) -> Evaluation:
+        """Return what the sequence has to know of controls (r, 2N) of some problems, linearised at safety factors (r,)."""
+        margins, objective = self.margins, self.objective
+        motion = margins.move(rows, control)
+        grid = margins.measure_grid(rows, motion, k)
+        is_near = grid.value < NEAR * margins.extent[rows, None, None]
+        is_near |= grid.factor < NEAR_FACTOR * self.wanted_k[rows, None, None]
+        contacts, factors = margins.find_minima(rows, motion, k, grid, is_near)
+        least = np.full(len(rows), np.inf)
+        np.minimum.at(least, np.searchsorted(rows, contacts.problem), factors)
+        cost, angles = objective.compute_cost(rows, control), margins.sweep(rows, margins.find_path(motion))
+        normal = np.stack((grid.normal_x, grid.normal_y), axis=1)
+        return Evaluation(cost, objective.compute_loss(rows, cost, least), least, angles, grid.value, normal, contacts, factors)
 
     def run(self, now: Iterates, deadline: Deadline = NEVER, most: int = MOST_ITERATIONS) -> None:
-        """Advance all problems together, an iteration at a time, until they are solved or the time is up.
-
-        Where safety is worth more than `GENTLE_RATE`, it is worth this at first.
-        """
-        self.most, rate = most, self.rate
+        """Advance all problems together, an iteration at a time, until they are solved or the time is up."""
+        self.most, rate = most, self.objective.rate
         if (rate > GENTLE_RATE).any():
-            self._set_rate(np.minimum(rate, GENTLE_RATE))
-            now.at.loss = self.compute_loss(np.arange(len(rate)), now.at.cost, now.at.factor)
-            now.bound = now.at.loss + GRACE
-            self._run(now, deadline, most, ROUGH_GAIN)
-            self._set_rate(rate)
-            now.at.loss = self.compute_loss(np.arange(len(rate)), now.at.cost, now.at.factor)
-            now.bound = now.at.loss + GRACE
-            now.is_done[:], now.is_settled[:] = False, False
-        self._run(now, deadline, most, SMALL_GAIN)
+            self._set_rate(now, np.minimum(rate, GENTLE_RATE))
+            self._run(now, deadline, ROUGH_GAIN)
+            self._set_rate(now, rate)
+        self._run(now, deadline, SMALL_GAIN)
 
-    def _run(self, now: Iterates, deadline: Deadline, most: int, small_gain: float) -> None:
+    def _set_rate(self, now: Iterates, rate: Array) -> None:
+        """Set the worth of safety, and let the sequence begin again where it is."""
+        self.objective.set_rate(rate)
+        now.at.loss = self.objective.compute_loss(np.arange(len(rate)), now.at.cost, now.at.factor)
+        now.bound = now.at.loss + GRACE
+        now.is_done[:], now.is_settled[:] = False, False
+
+    def _run(self, now: Iterates, deadline: Deadline, small_gain: float) -> None:
         """Advance the problems until their QPs promise a small gain."""
-        self.small_gain = small_gain
-        for count in range(most):
+        self._small_gain = small_gain
+        for count in range(self.most):
             # the first iteration is for everybody: a class that is found has a cost
             if now.is_done.all() or (count and not deadline.allows()):
                 break
@@ -264,242 +213,146 @@ class Solver:
             self.advance(now)
 
     def advance(self, now: Iterates) -> None:
-        """Advance all problems that are not done by one QP and one line search."""
-        rows = np.flatnonzero(~now.is_done)
-        none = np.zeros(0, dtype=np.intp)
-        further = Contacts(none, none, np.zeros(0))
-        plan = self.solve_qps(now, rows, further)
-        for _ in range(ROUNDS):
-            new = self.find_violated(now, plan)
-            again = np.unique(new.problem)
-            if not len(again):
-                break
-            further = further.join(new)
-            plan = plan.replace(self.solve_qps(now, again, further))
-        before = now.at.loss[rows].copy()
+        """Advance all problems that are not done by one QP and one step along its solution."""
+        plan = self._plan(now)
+        rows, before, share = plan.rows, now.at.loss[plan.rows].copy(), 1.0
         now.iterations[rows] += 1
         is_open = ~self._end(now, plan)
-        share = 1.0
-        for attempt in range(MOST_TRIALS):
+        for trial in range(MOST_TRIALS):
             if not is_open.any():
                 break
-            place = np.flatnonzero(is_open)
-            tried = rows[place]
-            at, is_good = self._try(now, plan, place, share)
-            good = tried[is_good]
-            is_last = is_good & (plan.gain[place] < LAST_GAIN) & (at.factor > plan.k[place] - LAST_FACTOR * (1.0 + plan.k[place]))
-            if share == 1.0:
-                now.is_done[tried[is_last]] = now.is_settled[tried[is_last]] = True
-            now.control[good] += share * plan.step[place[is_good]]
-            now.k[good] = np.clip(at.factor[is_good], 0.0, self.wanted_k[good])
-            now.at.put(good, at, is_good, tried)
-            is_open[place[is_good]] = False
+            failed = self._step(now, plan, np.flatnonzero(is_open), share)
+            is_open[:] = False
+            is_open[failed] = True
             # what rounding hides is not worth another trial
-            stalled = is_open & (plan.gain < STALLED_GAIN)
+            stalled = is_open & (plan.gain < STALLED_GAIN * self._tolerate(now, rows))
             now.is_done[rows[stalled]] = now.is_settled[rows[stalled]] = True
             is_open &= ~stalled
-            if attempt >= BUNDLES:
-                share *= 0.5
-                continue
-            # a margin with a kink was linearised on one side of it: where the trial is least there is a row now
-            new = at.contacts.take(np.isin(at.contacts.problem, tried[~is_good]))
-            new = new.take(~_is_known(new, plan.contacts, SAME))
-            again = np.unique(new.problem)
-            if len(again):
-                further = further.join(new)
-                plan = plan.replace(self.solve_qps(now, again, further))
+            if trial >= BUNDLES:
+                share *= SHORTER
+            elif is_open.any():
+                plan = self._bundle(now, plan, rows[is_open])
                 is_open &= ~self._end(now, plan)
         now.bound[rows] = np.maximum(before, now.at.loss[rows])
-        now.contacts, now.multipliers = plan.contacts, plan.multipliers
+        others = ~np.isin(now.contacts.problem, rows)
+        now.contacts = now.contacts.take(others).join(plan.contacts)
+        now.multipliers = np.concatenate((now.multipliers[others], plan.multipliers))
         now.gain[rows] = plan.gain
         now.is_done[rows[is_open]] = True
         now.is_settled[rows[is_open]] = plan.gain[is_open] < STALLED_GAIN
 
-    def _try(self, now: Iterates, plan: Plan, place: Indices, share: float) -> tuple[Evaluation, NDArray[np.bool_]]:
-        """Return the evaluation of a share of some steps, and whether they bring enough in their class."""
+    def _step(self, now: Iterates, plan: Plan, place: Indices, share: float) -> Indices:
+        """Take a share of some steps of a plan where that brings enough in their class; return the places of the others."""
         rows = plan.rows[place]
-        k = now.k[rows] + share * (plan.k[place] - now.k[rows])
-        at = self.evaluate(rows, now.control[rows] + share * plan.step[place], k)
+        control = now.control[rows] + share * plan.step[place]
+        at = self.evaluate(rows, control, now.k[rows] + share * (plan.k[place] - now.k[rows]))
         bound = now.bound[rows] - SUFFICIENT * share * plan.gain[place] + ROUNDING
-        return at, (at.loss <= bound) & (np.abs(at.angles - now.angles[rows]) < np.pi).all(axis=1)
+        is_good = (at.loss <= bound) & (np.abs(at.angles - now.angles[rows]) < np.pi).all(axis=1)
+        if share == 1.0:
+            is_last = is_good & (plan.gain[place] < LAST_GAIN * self._tolerate(now, rows)) & (at.loss <= now.at.loss[rows])
+            is_last &= at.factor > plan.k[place] - LAST_FACTOR * (1.0 + plan.k[place])
+            now.is_done[rows[is_last]] = now.is_settled[rows[is_last]] = True
+        good = rows[is_good]
+        now.control[good] = control[is_good]
+        now.k[good] = np.clip(at.factor[is_good], 0.0, self.wanted_k[good])
+        now.at.put(good, at, is_good, rows)
+        now.trial = at.contacts
+        return place[~is_good]
 
     def _end(self, now: Iterates, plan: Plan) -> NDArray[np.bool_]:
         """Mark the problems as solved that have nothing to gain any more; return which of the plan they are, (r,)."""
-        is_small = plan.gain < self.small_gain + SMALL_FACTOR * self.rate[plan.rows] * (1.0 + self.wanted_k[plan.rows])
+        rounding = SMALL_FACTOR * self.objective.rate[plan.rows] * (1.0 + self.wanted_k[plan.rows])
+        is_small: NDArray[np.bool_] = plan.gain < self._small_gain + rounding
         now.is_done[plan.rows[is_small]] = now.is_settled[plan.rows[is_small]] = True
         return is_small
 
-    def find_violated(self, now: Iterates, plan: Plan) -> Contacts:
+    def _tolerate(self, now: Iterates, rows: Indices) -> Array:
+        """Return by how much more than that of the best class the loss of some classes may be inexact, (r,).
+
+        A likelihood changes by a share of itself: a class that is a hundred times less likely may be a hundred times less exact.
+        """
+        most = LARGEST_TOLERANCE / LAST_GAIN
+        return np.exp(np.minimum(self.objective.compare(now.at.loss)[rows], np.log(most)))
+
+    def _plan(self, now: Iterates) -> Plan:
+        """Return the solutions of the QPs of all problems that are not done, with rows wherever they would break margins."""
+        plan = self._solve_qps(now, np.flatnonzero(~now.is_done), NO_CONTACTS)
+        for _ in range(ROUNDS):
+            broken = self._find_broken(now, plan)
+            if not len(broken.time):
+                break
+            plan = plan.replace(self._solve_qps(now, np.unique(broken.problem), plan.further.join(broken)))
+        return plan
+
+    def _find_broken(self, now: Iterates, plan: Plan) -> Contacts:
         """Return the places on the grid at which planned steps would break margins, as far as normals tell."""
         rows = plan.rows
         moved = self.margins.find_step(plan.step)[:, :, None]
         margin = now.at.margin[rows] + (now.at.normal[rows] * moved).sum(axis=1)
-        before = np.concatenate((np.full((*margin.shape[:2], 1), np.inf), margin[..., :-1]), axis=2)
-        after = np.concatenate((margin[..., 1:], np.full((*margin.shape[:2], 1), np.inf)), axis=2)
-        bound = -VIOLATED * self.margins.extent[rows]
-        row, obstacle, place = np.nonzero((margin <= before) & (margin < after) & (margin < bound[:, None, None]))
+        before, after = np.full_like(margin, np.inf), np.full_like(margin, np.inf)
+        before[..., 1:], after[..., :-1] = margin[..., :-1], margin[..., 1:]
+        bound = -VIOLATED * self.margins.extent[rows, None, None]
+        row, obstacle, place = np.nonzero((margin <= before) & (margin < after) & (margin < bound))
         found = Contacts(rows[row], obstacle, self.margins.times[place])
-        return found.take(~_is_known(found, plan.contacts, 0.25))
+        return found.take(~_is_known(found, plan.contacts, VIOLATED_APART))
 
-    def solve_qps(self, now: Iterates, rows: Indices, further: Contacts) -> Plan:
-        """Return the solutions of the QPs of some problems; further: places that have rows besides the contacts."""
-        margins = self.margins
-        places, known = self.choose_rows(now, rows, further)
-        where = np.zeros(len(margins.problems), dtype=np.intp)
-        where[rows] = np.arange(len(rows))
-        at = where[places.problem]
-        control, k_now = now.control[rows], now.k[rows]
-        lin = margins.linearise(places, control[at], k_now[at])
-        slot, width = _number(at, len(rows))
-        size = control.shape[1]
+    def _bundle(self, now: Iterates, plan: Plan, rows: Indices) -> Plan:
+        """Return a plan with rows where the trials of some problems came nearest: on the other side of a kink, or where it turned."""
+        new = now.trial.take(np.isin(now.trial.problem, rows))
+        new = new.take(~_is_known(new, plan.contacts, SAME))
+        if not len(new.time):
+            return plan
+        return plan.replace(self._solve_qps(now, np.unique(new.problem), plan.further.join(new)))
 
-        def spread(values: Array) -> Array:
-            padded = np.zeros((len(rows), width, *values.shape[1:]))
-            padded[at, slot] = values
-            return padded
-
-        cost = now.at.cost[rows][:, None]
-        missed = (self.soft_rows[rows] @ control[..., None])[..., 0] - self.soft_targets[rows]
-        soft = self.soft_weights[rows]
-        gradient = (self.weights[rows] * control + ((soft * missed)[:, None] @ self.soft_rows[rows])[:, 0]) * (2.0 / cost)
-        diagonal = self.weights[rows] * (2.0 / cost)
-        np.add.at(diagonal, at, known[:, None] * lin.diagonal)
-        held = known > 0.0
-        held_slot, held_width = _number(at[held], len(rows))
-        factors = np.zeros((len(rows), held_width, FACTORS, size))
-        weights = np.zeros((len(rows), held_width, FACTORS, held_width, FACTORS))
-        factors[at[held], held_slot] = lin.factors[held]
-        weights[at[held], held_slot, :, held_slot] = known[held, None, None] * lin.weights[held]
-        soft_count = soft.shape[1]
-        bent = FACTORS * held_width + soft_count + 1
-        curvature = np.zeros((len(rows), bent, bent))
-        curvature[:, : FACTORS * held_width, : FACTORS * held_width] = weights.reshape(len(rows), FACTORS * held_width, FACTORS * held_width)
-        place = np.arange(FACTORS * held_width, bent - 1)
-        curvature[:, place, place] = 2.0 * soft / cost
-        curvature[:, -1, -1] = GG
-        bends = np.concatenate((factors.reshape(len(rows), FACTORS * held_width, size), self.soft_rows[rows], gradient[:, None]), axis=1)
-        # factors of unit length, in the metric of the diagonal
-        length = np.sqrt((bends**2 / diagonal[:, None]).sum(axis=2))
-        bends /= np.where(length > 0.0, length, 1.0)[..., None]
-        curvature *= length[:, :, None] * length[:, None, :]
-        # what is left of all rows when the goal is met, in the metric of the diagonal: controls that move no end
-        stack = np.concatenate((bends, spread(lin.gradient), gradient[:, None]), axis=1)
-        soften = SOFT * (stack[:, bent:-1] ** 2 / diagonal[:, None]).sum(axis=2)
-        goal = self.goal_rows[rows]
-        scaled_goal = goal / diagonal[:, None]
-        square = scaled_goal @ goal.swapaxes(1, 2)
-        shares = np.linalg.solve(square + self.no_goal[rows], scaled_goal @ stack.swapaxes(1, 2))
-        stack = stack - shares.swapaxes(1, 2) @ goal
-        scaled = stack / diagonal[:, None]
-        rest = scaled @ stack.swapaxes(1, 2)
-        lower = np.linalg.cholesky(rest[:, :bent, :bent] + 1e-9 * np.eye(bent))
-        values, vectors = np.linalg.eigh(lower.swapaxes(1, 2) @ curvature @ lower)
-        reduce = 1.0 - 1.0 / np.maximum(1.0 + values, LEAST_CURVATURE)
-        side = vectors.swapaxes(1, 2) @ np.linalg.solve(lower, rest[:, :bent, bent:])
-        dual = rest[:, bent:, bent:] - side.swapaxes(1, 2) @ (reduce[:, :, None] * side)
-        value, rate = spread(lin.value), spread(lin.stddev_rate)
-        known_pad = np.zeros((len(rows), width))
-        multipliers, short = np.zeros((len(rows), width)), np.zeros(len(rows))
-        counts = np.bincount(at, minlength=len(rows))
-        for b in range(len(rows)):
-            n = counts[b]
-            y = self._solve_dual(rows[b], dual[b, :n, :n] + np.diag(soften[b, :n]), dual[b, :n, -1], value[b, :n], rate[b, :n], k_now[b]) if n else np.zeros(0)
-            multipliers[b, :n] = y
-        # the step follows from the multipliers by back substitution
-        coefficient = np.concatenate((multipliers, -np.ones((len(rows), 1))), axis=1)[..., None]
-        bent_part = -np.linalg.solve(lower.swapaxes(1, 2), vectors @ (reduce[:, :, None] * (side @ coefficient)))
-        step = (np.concatenate((bent_part, coefficient), axis=1).swapaxes(1, 2) @ scaled)[:, 0]
-        moved = (spread(lin.gradient) @ step[..., None])[..., 0] + value
+    def _solve_qps(self, now: Iterates, rows: Indices, further: Contacts) -> Plan:
+        """Return the solutions of the QPs of some problems (r,); further: places that have rows besides the contacts."""
+        margins, objective = self.margins, self.objective
+        places, known = self._choose_places(now, rows, further)
+        at, control, k_now = np.searchsorted(rows, places.problem), now.control[rows], now.k[rows]
+        gradients = margins.linearise(places, control[at], k_now[at], known > 0.0)
+        quadratic = objective.expand(rows, control, now.at.cost[rows])
+        numbered = number_rows(at, len(rows))
+        qp = ReducedQP(quadratic, numbered, gradients, known)
+        value, rate = numbered.spread(gradients.value), numbered.spread(gradients.stddev_rate)
+        counts, multipliers = np.bincount(at, minlength=len(rows)).tolist(), np.zeros((len(rows), numbered.width))
         wanted = self.wanted_k[rows]
-        with np.errstate(divide='ignore', invalid='ignore'):
-            lead = moved + ROUNDED * margins.extent[rows][:, None]
-            reached = np.where(rate > 0.0, k_now[:, None] + lead / rate, np.inf)
-        mask = np.arange(width) < counts[:, None]
-        k_new = np.minimum(np.where(mask, reached, np.inf).min(axis=1, initial=np.inf), wanted)
-        slope = (gradient * step).sum(axis=1)
-        model = slope + self._penalty(rows, k_new) - self._penalty(rows, now.at.factor[rows])
-        # the QP's own quadratic term is half of what its linear terms gain at the solution
-        gain = -model
-        if DEBUG: print('slope',slope,'model',model,'knew',k_new,'factor',now.at.factor[rows], 'y',multipliers, 'value',value,'moved',moved)
-        return Plan(rows, step, k_new, np.maximum(gain, 0.0), places, multipliers[at, slot])
+        linear = value - rate * (wanted - k_now)[:, None] - qp.gram[:, :-1, -1]
+        for row, (problem, n) in enumerate(zip(rows.tolist(), counts, strict=True)):
+            if n:
+                square = qp.gram[row, :n, :n] + np.diag(qp.soften[row, :n])
+                worth = float(wanted[row]), float(objective.rate[problem]), float(objective.floor[problem])
+                multipliers[row, :n] = solve_dual(self._backend, square, linear[row, :n], rate[row, :n], *worth)
+        step = qp.find_step(multipliers)
+        left = value + (qp.contact_rows @ step[..., None])[..., 0] + ACCURACY * margins.extent[rows, None]
+        is_there = np.arange(numbered.width) < np.array(counts)[:, None]
+        reached = np.divide(left, rate, out=np.full_like(left, np.inf), where=is_there & (rate > 0.0))
+        k = np.minimum(k_now + reached.min(axis=1, initial=np.inf), wanted)
+        gain = objective.compute_penalty(rows, now.at.factor[rows]) - objective.compute_penalty(rows, k)
+        gain -= (quadratic.gradient * step).sum(axis=1)
+        return Plan(rows, step, k, np.maximum(gain, 0.0), places, multipliers[numbered.problem, numbered.slot], further)
 
-    def _penalty(self, rows: Indices, k: Array) -> Array:
-        return self.compute_loss(rows, np.ones(len(rows)), k)
-
-    def _solve_dual(self, row: int, square: Array, pull: Array, value: Array, rate: Array, k_now: float) -> Array:
-        """Return the multipliers (n,) of one QP."""
-        wanted, worth = float(self.wanted_k[row]), float(self.rate[row])
-        linear = value - rate * (wanted - k_now) - pull
-        diagonal = np.maximum(np.diag(square), 1e-300)
-        unit = 1.0 / np.sqrt(diagonal)
-        size = max(float(np.abs(linear * unit).max()), 1e-12)
-        n = len(value)
-        P = np.zeros((n + 1, n + 1))
-        P[:n, :n] = square * unit[:, None] * unit + 1e-10 * np.eye(n)
-        P[n, n] = 1e-12
-        budget = rate * unit * size
-        # the part of the budget beyond `rate` pays for a mean inside an obstacle
-        most = float(self.floor[row])
-        scale = max(float(budget.max()), 1e-12)
-        G = np.zeros((2, n + 1))
-        G[0, :n], G[0, n], G[1, n] = -budget / scale, 1.0, -1.0
-        g = np.array([-worth / scale, -most / scale])
-        c = np.concatenate((linear * unit / size, [wanted * scale / size**2]))
-        answer = self.backend(DenseQP(P, c, None, None, G, g, np.zeros(n + 1)))
-        return np.maximum(answer.x[:n], 0.0) * unit * size
-
-    def choose_rows(self, now: Iterates, rows: Indices, further: Contacts) -> tuple[Contacts, Array]:
-        """Return the places at which the QPs have rows, and the multipliers that are known there."""
-        minima = now.at.contacts.take(np.isin(now.at.contacts.problem, rows))
+    def _choose_places(self, now: Iterates, rows: Indices, further: Contacts) -> tuple[Contacts, Array]:
+        """Return the places at which the QPs have rows, and what is known of their multipliers."""
         margins, last = self.margins, float(self.margins.steps)
-        is_polygon = margins.is_polygon[minima.problem, minima.obstacle]
-        kinks = minima.take(is_polygon & margins.between)
-        beside = [Contacts(kinks.problem, kinks.obstacle, np.clip(kinks.time + apart, 1.0, last)) for apart in (-BESIDE, BESIDE)]
+        minima = now.at.contacts.take(np.isin(now.at.contacts.problem, rows))
         kept = np.isin(now.contacts.problem, rows) & (now.multipliers > 0.0)
         held, multipliers = now.contacts.take(kept), now.multipliers[kept]
         largest = np.zeros(len(margins.problems))
         np.maximum.at(largest, held.problem, multipliers)
-        strong = (multipliers > HELD * largest[held.problem]) & margins.is_polygon[held.problem, held.obstacle]
+        strong = held.take(multipliers > HELD * largest[held.problem])
+        more = [(further.take(np.isin(further.problem, rows)), SAME), (strong, APART)]
+        is_polygon = margins.is_polygon[minima.problem, minima.obstacle]
+        if margins.between and is_polygon.any():
+            kinks = minima.take(is_polygon)
+            times = (np.clip(kinks.time + apart, 1.0, last) for apart in (-BESIDE, BESIDE))
+            more += [(Contacts(kinks.problem, kinks.obstacle, time), SAME) for time in times]
         places = minima
-        for more in (further.take(np.isin(further.problem, rows)), held.take(strong), *beside):
-            places = places.join(more.take(~_is_known(more, places, SAME)))
-        known = np.zeros(len(places.time))
-        if len(multipliers) and len(known):
-            apart = np.abs(held.time[:, None] - places.time)
-            apart[(held.problem[:, None] != places.problem) | (held.obstacle[:, None] != places.obstacle)] = np.inf
-            nearest = apart.argmin(axis=1)
-            is_there = np.isfinite(apart[np.arange(len(nearest)), nearest])
-            np.add.at(known, nearest[is_there], multipliers[is_there])
+        for others, apart in more:
+            if len(others.time):
+                places = places.join(others.take(~_is_known(others, places, apart)))
+        known = _move_multipliers(held, multipliers, places)
         known[known < HELD * largest[places.problem]] = 0.0
         return places, known
-
-
-def _tabulate_cost(problem: Problem) -> tuple[Array, Array, float, Array, Array, Array, Array, Array]:
-    """Return the cost of a problem and its goal, for a control in units of `Horizon.gain`.
-
-    Returns
-    -------
-    tuple
-        Weights of the squared control at lambda 0, (2N,), and what lambda adds, (2N,); the part of the cost that is fixed; rows
-        (r, 2N) of unit length and targets (r,) of what the goal fixes; rows (s, 2N), targets (s,) and weights (s,) of what has a
-        cost.
-    """
-    gain, dt = problem.horizon.gain, problem.horizon.dt
-    fixed = (problem.preference.fixed_cost / problem.preference.dt + COST_FLOOR / dt) * gain**2
-    rows, targets, softness = problem.goal_rows
-    hard = softness == 0.0
-    rows = rows / gain
-    length = np.sqrt((rows[hard] ** 2).sum(axis=1))
-    soft = rows[~hard], targets[~hard], 0.5 * gain**2 / softness[~hard]
-    return 1.0 + problem.weighted_variance, problem.summed_variance, fixed, rows[hard] / length[:, None], targets[hard] / length, *soft
-
-
-def _pad(tables: Sequence[Array]) -> Array:
-    """Return arrays with different numbers of rows as one, filled up by zeros."""
-    most = max(len(each) for each in tables)
-    if all(len(each) == most for each in tables):
-        return np.stack(tables)
-    return np.stack([np.pad(each, [(0, most - len(each))] + [(0, 0)] * (each.ndim - 1)) for each in tables])
 
 
 def _is_known(places: Contacts, known: Contacts, apart: float) -> NDArray[np.bool_]:
@@ -509,11 +362,14 @@ def _is_known(places: Contacts, known: Contacts, apart: float) -> NDArray[np.boo
     return found
 
 
-def _number(group: Indices, groups: int) -> tuple[Indices, int]:
-    """Return the place of each entry within its group, (q,), and the largest size of a group; entries are in any order."""
-    order = np.argsort(group, kind='stable')
-    counts = np.bincount(group, minlength=groups)
-    first = np.concatenate(([0], np.cumsum(counts)[:-1]))
-    slot = np.empty(len(group), dtype=np.intp)
-    slot[order] = np.arange(len(group)) - first[group[order]]
-    return slot, int(counts.max(initial=0))
+def _move_multipliers(held: Contacts, multipliers: Array, places: Contacts) -> Array:
+    """Return the multipliers of contacts at the places to which they have moved: the nearest ones of the same obstacle, (q,)."""
+    known = np.zeros(len(places.time))
+    if not len(multipliers) or not len(known):
+        return known
+    apart = np.abs(held.time[:, None] - places.time)
+    apart[(held.problem[:, None] != places.problem) | (held.obstacle[:, None] != places.obstacle)] = np.inf
+    nearest = apart.argmin(axis=1)
+    is_there = np.isfinite(apart[np.arange(len(nearest)), nearest])
+    np.add.at(known, nearest[is_there], multipliers[is_there])
+    return known

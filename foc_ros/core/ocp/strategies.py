@@ -37,6 +37,8 @@ REACHED = 1e-5
 """Relative shortfall of k that counts as rounding."""
 TOUCHING = 1e-3
 """Distance that the mean lacks, relative to the scene, up to which a class has a path."""
+LEAP = 2.0
+"""Angle by which the direction of an obstacle turns between two points of the grid if the mean leaps over it [rad]."""
 STRIDE, LONGEST = 4.0, 60.0
 """First stride along the curve of `lv` and `hc`, and its end: with a growth of 2, lambda has grown by 1e18 there."""
 LARGEST_SHARE = 1e6
@@ -72,8 +74,10 @@ class StrategyResult:
         Clearance term [m^2] and weight of the variances lambda [1/s^6] that the control belongs to.
     qp_solves, iterations
         QPs solved; iterations of a loop that the strategy counts besides, None if there is none.
-    at_k
-        Safety factor of the constraint that the control meets, None where it meets tau and lam.
+    minimum
+        The least safety factor of the control, the row of its obstacle and its time [steps]; None where it is to be found.
+    weights
+        The (tau, lambda) of each contact for which it would be there, None where these are tau and lam.
     aims_at_eta
         Whether a control with less than the wanted eta is no solution.
     gain
@@ -88,7 +92,8 @@ class StrategyResult:
     lam: float = 0.0
     qp_solves: int = 0
     iterations: int | None = None
-    at_k: float | None = None
+    minimum: tuple[float, int, float] | None = None
+    weights: tuple[tuple[float, float], ...] | None = None
     aims_at_eta: bool = True
     gain: float = 0.0
 
@@ -122,13 +127,28 @@ class Point:
         """ln J up to a constant, (b,)."""
         return np.log(self.now.at.cost)
 
+    def find_minima(self) -> list[tuple[float, int, float]]:
+        """Return the least safety factors, their obstacles and times, from the contacts of the last iterate where these tell."""
+        margins, at = self.solver.margins, self.now.at
+        if margins.missing.any() or not np.isfinite(at.factor).all():
+            return list(zip(*(each.tolist() for each in margins.find_least_factors(self.now.control)), strict=True))
+        order = np.lexsort((at.factors, at.contacts.problem))
+        first = order[np.searchsorted(at.contacts.problem[order], np.arange(len(self.k)))]
+        contacts = at.contacts.take(first)
+        return list(zip(at.factors[first].tolist(), contacts.obstacle.tolist(), contacts.time.tolist(), strict=True))
+
     def is_touching(self) -> NDArray[np.bool_]:
-        """Return whether the mean enters an obstacle or its clearance, (b,)."""
+        """Return whether the mean enters an obstacle or its clearance, or leaps over one between two points of the grid, (b,)."""
         margins = self.solver.margins
         rows = np.arange(len(self.k))
-        grid = margins.measure_grid(rows, margins.move(rows, self.now.control), np.zeros(len(rows)))
-        short: NDArray[np.bool_] = grid.value.min(axis=(1, 2), initial=np.inf) < -TOUCHING * margins.extent
-        return short
+        motion, none = margins.move(rows, self.now.control), np.zeros(len(rows))
+        grid = margins.measure_grid(rows, motion, none)
+        places, _ = margins.find_minima(rows, motion, none, grid, np.isfinite(grid.factor))
+        least = np.full(len(rows), np.inf)
+        np.minimum.at(least, places.problem, margins.measure(places, places.problem, motion, none[places.problem]).value)
+        short = least < -TOUCHING * margins.extent
+        leaps: NDArray[np.bool_] = np.abs(margins.turn(rows, margins.find_path(motion))).max(axis=(1, 2), initial=0.0) > LEAP
+        return short | leaps
 
 
 def solve_at(
@@ -172,7 +192,7 @@ def solve_at(
     else:
         last = before.now
         control, contacts, multipliers, k, angles = last.control.copy(), last.contacts, last.multipliers, last.k.copy(), last.angles
-    now = solver.begin(solver.meet_goal(control), contacts, multipliers, np.where(k > 0.0, np.minimum(k, wanted), wanted), angles)
+    now = solver.begin(control, contacts, multipliers, np.where(k > 0.0, np.minimum(k, wanted), wanted), angles)
     if most is None:
         solver.run(now, deadline)
     else:
@@ -224,7 +244,26 @@ def solve_optimal(
     zeros = np.zeros(len(problems))
     point = solve_at(problems, starts, zeros, zeros, is_chance=True, deadline=deadline)
     touching = point.is_touching() if (point.k < 0.0).any() else zeros
-    return [_finish_optimal(point, row, bool(touching[row])) for row in range(len(problems))]
+    results = [_finish_optimal(point, row, bool(touching[row])) for row in range(len(problems))]
+    minima, weights = point.find_minima(), _find_weights(point, results)
+    return [replace(each, minimum=least, weights=pairs) for each, least, pairs in zip(results, minima, weights, strict=True)]
+
+
+def _find_weights(point: Point, results: Sequence[StrategyResult]) -> list[tuple[tuple[float, float], ...]]:
+    """Return the (tau [m^2], lambda [1/s^6]) with which each contact would be where it is.
+
+    tau = k sqrt(Var[C]) is by how much E[C] has to be below zero, and lambda = y k D / sqrt(Var[C]), for a multiplier y [m/s^6], is
+    the cost of a variance along its normal at its time.
+    """
+    counts = [len(each.forces.time) for each in results]
+    obstacle, time, push = (np.concatenate([each.forces[i] for each in results]) for i in range(3))
+    problem = np.repeat(np.arange(len(results)), counts)
+    spread, distance = point.solver.margins.measure_spread(Contacts(problem, obstacle, time), point.now.control)
+    k = point.k[problem]
+    effort = np.array([float(each.control @ each.control) for each in results])[problem]
+    pairs = list(zip((k * spread).tolist(), (push * effort * k * distance / spread).tolist(), strict=True))
+    ends = np.cumsum(counts).tolist()
+    return [tuple(pairs[end - count : end]) for count, end in zip(counts, ends, strict=True)]
 
 
 def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult:
@@ -232,19 +271,19 @@ def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult
     k = float(point.k[row])
     reached = problem.risk.find_probability(k)
     if k >= problem.wanted_k * (1.0 - REACHED) and now.is_done[row]:
-        return _collect(point, row, Status.SOLVED, 'solved', at_k=k)
+        return _collect(point, row, Status.SOLVED, 'solved')
     if not now.is_done[row]:
         cause = 'out of time' if now.iterations[row] < point.solver.most else 'not settled'
         message = f'{cause}: eta {reached:.4g} so far, and the likelihood is estimated'
-        return _collect(point, row, Status.DEADLINE, message, at_k=k, aims_at_eta=False)
+        return _collect(point, row, Status.DEADLINE, message, aims_at_eta=False)
     if is_touching:
         message = 'no path between the obstacles in this homotopy class meets the goal: the path shown violates them least'
-        return _collect(point, row, Status.INFEASIBLE, message, at_k=k)
+        return _collect(point, row, Status.INFEASIBLE, message)
     if problem.preference.is_hard:
         message = f'eta {problem.eta:g} is out of reach: the largest found is {reached:.4g}'
     else:
         message = f'eta {reached:.4g} only: more would cost more than likelihood.shortfall, or is out of reach'
-    return _collect(point, row, Status.ETA_UNREACHABLE, message, at_k=k)
+    return _collect(point, row, Status.ETA_UNREACHABLE, message)
 
 
 def solve_fixed(
@@ -407,6 +446,9 @@ def follow_curve(
             if row in results:
                 continue
             sample = _sample(point, row, float(s[row]), float(k[row]), bool(touching[row]), curve)
+            if is_late and not point.now.is_done[row]:
+                results[row] = _stop(problem, best.get(row, sample), int(solves[row]))
+                continue
             if sample.is_path and (row not in best or sample.loss < best[row].loss):
                 best[row] = sample
             try:
@@ -415,11 +457,15 @@ def follow_curve(
                 results[row] = _finish_choice(problem, end.value, sample, int(solves[row]))
                 continue
             if is_late:
-                found = best.get(row, sample)
-                reached = problem.risk.find_probability(found.k)
-                message = f'out of time: eta {reached:.4g} so far, and the likelihood is estimated'
-                results[row] = replace(found.result, status=Status.DEADLINE, message=message, qp_solves=int(solves[row]), aims_at_eta=False)
+                results[row] = _stop(problem, best.get(row, sample), int(solves[row]))
     return [results[row] for row in range(len(problems))]
+
+
+def _stop(problem: Problem, sample: Sample, solves: int) -> StrategyResult:
+    """Return the result of a search that the deadline has stopped."""
+    reached = problem.risk.find_probability(sample.k)
+    message = f'out of time: eta {reached:.4g} so far, and the likelihood is estimated'
+    return replace(sample.result, status=Status.DEADLINE, message=message, qp_solves=solves, aims_at_eta=False)
 
 
 def _sample(point: Point, row: int, s: float, k: float, is_touching: bool, curve: Curve) -> Sample:
@@ -428,7 +474,7 @@ def _sample(point: Point, row: int, s: float, k: float, is_touching: bool, curve
     result = _collect(point, row, Status.SOLVED, 'solved', tau=float(tau), lam=float(lam))
     problem = point.solver.margins.problems[row]
     loss = problem.preference.compute_loss(float(result.control @ result.control), min(k, problem.wanted_k), problem.wanted_k)
-    return Sample(s, k, loss, result, bool(point.now.is_done[row]) and not is_touching)
+    return Sample(s, k, loss, result, not is_touching)
 
 
 def _finish_choice(problem: Problem, chosen: Sample | None, last: Sample, solves: int) -> StrategyResult:
@@ -471,11 +517,12 @@ def solve_algorithm1(
 
 
 def _run_algorithm1(problem: Problem, start: Start, settings: FocConfig, deadline: Deadline) -> StrategyResult:
-    chance = Margins([problem], np.zeros(1), is_chance=True, between=False)
-    tau, lam, effort, point = 0.0, 1.0, math.inf, None
+    chance = Margins([problem], np.zeros(1), is_chance=True)
+    tau, lam, effort, point, iteration = 0.0, 1.0, math.inf, None, 0
     for iteration in range(1, MOST_STEPS + 1):
-        if not deadline.allows():
-            break
+        if point is not None and not deadline.allows():
+            message = f'out of time after {iteration - 1} QPs: the likelihood is estimated'
+            return _collect(point, 0, Status.DEADLINE, message, tau=tau, lam=lam, iterations=iteration - 1, aims_at_eta=False)
         one = np.array([tau]), np.array([lam])
         point = solve_at([problem], [start], *one, is_chance=False, between=False, before=point, most=1)
         last, effort = effort, float((point.now.control**2).sum()) / problem.horizon.gain**2
@@ -491,9 +538,6 @@ def _run_algorithm1(problem: Problem, start: Start, settings: FocConfig, deadlin
                 message = f'lambda = {lam:.3g} after {iteration} QPs, and the surrogate is still violated'
                 return _collect(point, 0, Status.ITERATION_LIMIT, message, **weights)
             tau, lam = tau + settings.algorithm1_delta, lam * settings.algorithm1_growth
-    if point is None:
-        point = solve_at([problem], [start], np.zeros(1), np.ones(1), is_chance=False, between=False, most=0)
-        return _collect(point, 0, Status.DEADLINE, 'out of time')
+    assert point is not None
     message = f'not settled after {MOST_STEPS} QPs at tau = {tau:.3g}, lambda = {lam:.3g}'
-    status = Status.ITERATION_LIMIT if deadline.allows() else Status.DEADLINE
-    return _collect(point, 0, status, message, tau=tau, lam=lam, iterations=MOST_STEPS)
+    return _collect(point, 0, Status.ITERATION_LIMIT, message, tau=tau, lam=lam, iterations=MOST_STEPS)
