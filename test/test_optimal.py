@@ -77,7 +77,7 @@ def test_the_multipliers_say_what_safety_costs(seed):
     places = Contacts(np.zeros(len(name), dtype=np.intp), np.array([problem.obstacles.ids.index(each) for each in name]), np.array(time))
     control = np.tile(solution.control.T.ravel() * problem.horizon.gain, (len(name), 1))
     margins = Margins([problem], np.zeros(1), is_chance=True)
-    rate = margins.linearise(places, control, np.full(len(name), solution.safety_factor)).stddev_rate
+    rate = margins.linearise(places, control, np.full(len(name), solution.safety_factor), np.full(len(name), True)).stddev_rate
     assert np.dot(push, rate) == pytest.approx((more - less) / (2 * h), rel=1e-3)
 
 
