@@ -32,7 +32,9 @@ def test_the_least_safety_factor_agrees_with_the_solver() -> None:
     assert measure_clutter.find_least_share(problem, solved(problem, guess, 'lv')) == pytest.approx(1.0, abs=2e-4)
     fixed = solved(problem, guess, 'fixed', tau=1e-3, lam=1e4)
     wanted = np.sqrt(problem.eta / (1.0 - problem.eta))
-    assert measure_clutter.find_least_share(problem, fixed) == pytest.approx(np.sqrt(fixed.eta / (1.0 - fixed.eta)) / wanted, rel=1e-4)
+    assert measure_clutter.find_least_share(problem, fixed) == pytest.approx(
+        np.sqrt(fixed.eta / (1.0 - fixed.eta)) / wanted, rel=1e-4
+    )
 
 
 def test_ticks_and_classes_in_clutter_are_counted() -> None:

@@ -74,7 +74,9 @@ def test_the_multipliers_say_what_safety_costs(seed):
     solution, h = solve_optimal(problem, guess), 1e-3
     more, less = (find_effort(problem, guess, solution.safety_factor + step) for step in (h, -h))
     name, time, push = zip(*solution.multipliers, strict=True)
-    places = Contacts(np.zeros(len(name), dtype=np.intp), np.array([problem.obstacles.ids.index(each) for each in name]), np.array(time))
+    places = Contacts(
+        np.zeros(len(name), dtype=np.intp), np.array([problem.obstacles.ids.index(each) for each in name]), np.array(time)
+    )
     control = np.tile(solution.control.T.ravel() * problem.horizon.gain, (len(name), 1))
     margins = Margins([problem], np.zeros(1), is_chance=True)
     rate = margins.linearise(places, control, np.full(len(name), solution.safety_factor), np.full(len(name), True)).stddev_rate
