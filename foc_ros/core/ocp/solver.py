@@ -25,7 +25,7 @@ from .margin import NO_CONTACTS, Contacts, Indices, Margins
 from .objective import Objective
 from .qp import ReducedQP, number_rows, solve_dual
 
-MOST_ITERATIONS = 60
+MOST_ITERATIONS = 150
 """Iterations after which a problem counts as not settled; ten are usual from a guess, three from an earlier solution."""
 NEAR, NEAR_FACTOR = 0.1, 1.5
 """Margin relative to the scene, and safety factor relative to the wanted one, below which an obstacle has a row in the QP."""
