@@ -3,7 +3,6 @@
 import doctest
 import subprocess
 import sys
-
 from dataclasses import replace
 
 import numpy as np

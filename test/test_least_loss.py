@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from foc_ros.core.ocp.strategies.least_loss import compute_loss
+from foc_ros.core.ocp.strategies.penalty_path import PathFollower, PenaltyPath
 from reach_helpers import bowed, case_guess, case_problem, random_scene, reach, reference_cases
 
 from foc_ros.core.config import Config, FocConfig, replace_values
@@ -12,8 +14,6 @@ from foc_ros.core.deadline import NEVER
 from foc_ros.core.memory.memory import Memory
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import solve_problem
-from foc_ros.core.ocp.strategies.least_loss import compute_loss
-from foc_ros.core.ocp.strategies.penalty_path import PathFollower, PenaltyPath
 from foc_ros.core.ocp.start import cold_start, warm_start
 from foc_ros.core.predictor import predict
 from foc_ros.core.safety_preference import SafetyPreference

@@ -39,11 +39,15 @@ DIFFERENCE = 5e-3
 """Time on both sides of a contact by whose gradients its sliding is found [steps]."""
 LEAST_BEND = 3e-2
 """Least second derivative of a margin in time, relative to scene and whole time: along a flat side the contact is anywhere."""
+GRID, FINE_GRID = 2, 4
+"""Points for each step on which closest approaches are looked for: among circles, and where there are corners."""
+POINTS, MANY_POINTS = 9, 17
+"""Points beside a minimum on the grid at which minima are told apart: in the solver, and for what is reported."""
 BRACKET = np.linspace(-1.0, 1.0, 9)
 """Times, relative to a bracket, at which the least safety factor is sought; the next bracket is a quarter of it."""
-NARROWINGS = 4
+NARROWINGS = 3
 """Brackets: the last points are 2e-3 steps apart, and a parabola or two lines pass through them."""
-FEW_NARROWINGS = 2
+FEW_NARROWINGS = 1
 """The same for circles, beside which a safety factor changes smoothly with time."""
 FACTORS = 5
 """Vectors of which the second derivatives of a margin consist, besides a diagonal."""
@@ -154,8 +158,9 @@ class Margins:
         self.problems, self.is_chance, self.between = problems, is_chance, between
         self.response = problems[0].horizon.position_response
         self.steps = self.response.steps
-        points = 2 if between else 1
-        self.times = np.arange(points, points * self.steps + 1) / points
+        has_polygons = any((each.obstacles.corners > 1).any() for each in problems)
+        points = (FINE_GRID if has_polygons else GRID) if between else 1
+        self.times, self._half = np.arange(points, points * self.steps + 1) / points, 1.0 / points
         self._step, share = self.response.locate(self.times)
         self._weight, self._quintic = hermite(share), hermite_quintic(share)
         self.extent = np.array([each.extent for each in problems])
@@ -344,28 +349,43 @@ class Margins:
             Minima with refined times, and the safety factors there, (q,).
         """
         factor = grid.factor
-        before, after = np.full_like(factor, np.inf), np.full_like(factor, np.inf)
-        before[..., 1:], after[..., :-1] = factor[..., :-1], factor[..., 1:]
-        at, obstacle, place = np.nonzero((factor <= before) & (factor < after) & is_wanted)
-        problem, time, apart = rows[at], self.times[place], 0.5
-        least = factor[at, obstacle, place]
-        if not len(at) or not self.between:
-            return Contacts(problem, obstacle, time), least
-        several = [np.tile(each, len(BRACKET)) for each in (problem, obstacle, at)]
-        best = np.arange(len(at))
+        at, obstacle, place = np.nonzero(_is_lowest(factor) & is_wanted)
+        if not self.between:
+            return Contacts(rows[at], obstacle, self.times[place]), factor[at, obstacle, place]
+        return self._refine(motion, k, at, Contacts(rows[at], obstacle, self.times[place]), POINTS)
+
+    def _refine(self, motion: Motion, k: Array, at: Indices, places: Contacts, points: int) -> tuple[Contacts, Array]:
+        """Return the minima beside some places of the grid, of movements in rows `at`, and the safety factors there.
+
+        There may be several beside one place, next to the corners of a small obstacle: they are told apart at a number of points.
+        """
+        least, last, apart = np.zeros(0), float(self.steps), self._half
+        if not len(at):
+            return places, least
+        times = np.clip(places.time + apart * np.linspace(-1.0, 1.0, points)[:, None], 1.0, last)
+        found = self._measure_times(motion, k, at, places, times).factor.reshape(points, -1).T
+        which, column = np.nonzero(_is_lowest(found))
+        at, places = at[which], Contacts(places.problem[which], places.obstacle[which], times[column, which])
+        apart, best = 2.0 * apart / (points - 1), np.arange(len(at))
         for _ in range(NARROWINGS if self.is_polygon.any() else FEW_NARROWINGS):
-            tried = np.clip(time + apart * BRACKET[:, None], 1.0, float(self.steps))
-            found = self.measure(Contacts(several[0], several[1], tried.ravel()), several[2], motion, k[several[2]])
-            factors, is_on_edge = (each.reshape(len(BRACKET), -1) for each in (found.factor, found.is_on_edge))
-            row = np.clip(factors.argmin(axis=0), 2, len(BRACKET) - 3)
-            time, spacing, apart = tried[row, best], apart * (BRACKET[1] - BRACKET[0]), apart / 4.0
-        least = np.minimum(least, factors.min(axis=0))
+            times = np.clip(places.time + apart * BRACKET[:, None], 1.0, last)
+            margin = self._measure_times(motion, k, at, places, times)
+            factors, is_on_edge = (each.reshape(len(BRACKET), -1) for each in (margin.factor, margin.is_on_edge))
+            lowest = factors.argmin(axis=0)
+            row = np.clip(lowest, 2, len(BRACKET) - 3)
+            places, spacing, apart = places._replace(time=times[row, best]), apart * (BRACKET[1] - BRACKET[0]), apart / 4.0
         near = np.stack([factors[row + step, best] for step in range(-2, 3)])
         is_kink = is_on_edge[row - 2, best] != is_on_edge[row + 2, best]
-        shift, lowest = _find_lowest(near, is_kink)
-        is_inside = (time - 2.0 * spacing > 1.0) & (time + 2.0 * spacing < self.steps)
-        time = np.where(is_inside, time + spacing * shift, tried[factors.argmin(axis=0), best])
-        return Contacts(problem, obstacle, time), np.where(is_inside, np.minimum(least, lowest), least)
+        shift, bottom = _find_lowest(near, is_kink)
+        least = factors[lowest, best]
+        is_inside = (places.time - 2.0 * spacing > 1.0) & (places.time + 2.0 * spacing < last)
+        time = np.where(is_inside, places.time + spacing * shift, times[lowest, best])
+        return places._replace(time=time), np.where(is_inside, np.minimum(least, bottom), least)
+
+    def _measure_times(self, motion: Motion, k: Array, at: Indices, places: Contacts, times: Array) -> Margin:
+        """Return margins of places (q,) at several times of each, (n, q), as n q in a row."""
+        several = [np.tile(each, len(times)) for each in (places.problem, places.obstacle, at)]
+        return self.measure(Contacts(several[0], several[1], times.ravel()), several[2], motion, k[several[2]])
 
     def find_least_factors(self, control: Array) -> tuple[Array, Indices, Array]:
         """Return the least safety factors of controls (b, 2N) over all obstacles and times, and where they are.
@@ -393,7 +413,10 @@ class Margins:
         lowest = np.maximum(grid.distance - nearer, reach)
         bold = (lowest - reach) * (lowest + reach) / (2.0 * lowest * grid.stddev)
         may_be_least = counts & (bold <= np.maximum(factor.min(axis=(1, 2)), 0.0)[:, None, None])
-        places, _ = self.find_minima(rows, motion, none, grid._replace(factor=factor), may_be_least)
+        at, obstacle, place = np.nonzero(may_be_least)
+        times = np.maximum(self.times[place], self.recovery_steps[at, obstacle])
+        places, _ = self._refine(motion, none, at, Contacts(at, obstacle, times), MANY_POINTS)
+        places = places._replace(time=np.maximum(places.time, self.recovery_steps[places.problem, places.obstacle]))
         found = self._measure_exactly(places, control)
         for which in np.argsort(-found, kind='stable').tolist():
             problem = places.problem[which]
@@ -491,6 +514,13 @@ class Margins:
         floor = LEAST_BEND * self.extent[places.problem] / self.steps**2
         weights[:, 4, 4] = np.where(is_inside, 1.0 / np.maximum(bend, floor), 0.0)
         return weights
+
+
+def _is_lowest(values: Array) -> NDArray[np.bool_]:
+    """Return which values (..., T) are not above their neighbours; of equal ones the last."""
+    before, after = np.full_like(values, np.inf), np.full_like(values, np.inf)
+    before[..., 1:], after[..., :-1] = values[..., :-1], values[..., 1:]
+    return (values <= before) & (values < after)
 
 
 def _find_lowest(values: Array, is_kink: NDArray[np.bool_]) -> tuple[Array, Array]:

@@ -25,7 +25,7 @@ from .margin import NO_CONTACTS, Contacts, Indices, Margins
 from .objective import Objective
 from .qp import ReducedQP, number_rows, solve_dual
 
-MOST_ITERATIONS = 60
+MOST_ITERATIONS = 150
 """Iterations after which a problem counts as not settled; ten are usual from a guess, three from an earlier solution."""
 NEAR, NEAR_FACTOR = 0.1, 1.5
 """Margin relative to the scene, and safety factor relative to the wanted one, below which an obstacle has a row in the QP."""
@@ -57,7 +57,7 @@ ROUNDS = 3
 """Most times that rows are added to a QP for places at which its solution breaks margins."""
 VIOLATED, VIOLATED_APART = 1e-3, 0.25
 """Broken margin, relative to the scene, for which a row is added, and its least time from other rows [steps]."""
-MOST_TRIALS, BUNDLES, SHORTER = 5, 1, 0.25
+MOST_TRIALS, BUNDLES, SHORTER = 8, 3, 0.25
 """Steps that are tried; those of them after which rows are added where a whole step failed; and the part that is tried next."""
 SUFFICIENT = 1e-4
 """Share of the promised gain that a step has to bring."""

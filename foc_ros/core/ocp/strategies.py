@@ -112,16 +112,6 @@ class Point:
         """ln J up to a constant, (b,)."""
         return np.log(self.now.at.cost)
 
-    def find_minima(self) -> list[tuple[float, int, float]]:
-        """Return the least safety factors, their obstacles and times, from the contacts of the last iterate where these tell."""
-        margins, at = self.solver.margins, self.now.at
-        if margins.missing.any() or not np.isfinite(at.factor).all():
-            return list(zip(*(each.tolist() for each in margins.find_least_factors(self.now.control)), strict=True))
-        order = np.lexsort((at.factors, at.contacts.problem))
-        first = order[np.searchsorted(at.contacts.problem[order], np.arange(len(self.k)))]
-        contacts = at.contacts.take(first)
-        return list(zip(at.factors[first].tolist(), contacts.obstacle.tolist(), contacts.time.tolist(), strict=True))
-
     def is_touching(self) -> NDArray[np.bool_]:
         """Return whether the mean enters an obstacle or its clearance, or leaps over one between two points of the grid, (b,)."""
         margins = self.solver.margins
@@ -231,7 +221,8 @@ def solve_optimal(
     point = solve_at(problems, starts, zeros, zeros, is_chance=True, deadline=deadline)
     touching = point.is_touching() if (point.k < 0.0).any() else zeros
     results = [_finish_optimal(point, row, bool(touching[row])) for row in range(len(problems))]
-    minima, weights = point.find_minima(), _find_weights(point, results)
+    found = point.solver.margins.find_least_factors(point.now.control)
+    minima, weights = zip(*(each.tolist() for each in found), strict=True), _find_weights(point, results)
     return [replace(each, minimum=least, weights=pairs) for each, least, pairs in zip(results, minima, weights, strict=True)]
 
 
@@ -258,8 +249,8 @@ def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult
     reached = problem.risk.find_probability(k)
     if k >= problem.wanted_k * (1.0 - REACHED) and now.is_done[row]:
         return collect(point, row, Status.SOLVED, 'solved')
-    if not now.is_done[row]:
-        cause = 'out of time' if now.iterations[row] < point.solver.most else 'not settled'
+    if not now.is_settled[row]:
+        cause = 'not settled' if now.is_done[row] or now.iterations[row] >= point.solver.most else 'out of time'
         message = f'{cause}: eta {reached:.4g} so far, and the likelihood is estimated'
         return collect(point, row, Status.DEADLINE, message, aims_at_eta=False)
     if is_touching:

@@ -1,0 +1,90 @@
+"""The parts of the cost and the goal against a step-by-step simulation of the model."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from foc_ros.core.config import FocConfig
+from foc_ros.core.dynamics.plants import condense, discretise_damped_mass, discretise_triple_integrator
+from foc_ros.core.ocp.problem import Problem, rest_to_goal
+from foc_ros.core.ocp.solve import solve_problem
+from foc_ros.core.ocp.start import cold_start
+from foc_ros.core.types import make_obstacles
+
+STEPS, LAMBDA = 12, 3e4
+PLANTS = {'jerk': discretise_triple_integrator(0.05), 'force': discretise_damped_mass(0.05, 1.5, 4.0)}
+EVERY_PLANT = pytest.mark.parametrize('plant', PLANTS)
+
+
+def weighted_problem(plant: str, seed: int = 0) -> Problem:
+    """Return a problem with every term of the cost: positions reach the goal exactly, others by weights at every step."""
+    generator = np.random.default_rng(seed)
+    n = len(PLANTS[plant].A)
+    root = 1e-2 * generator.standard_normal((n, n))
+    made = rest_to_goal(
+        condense(PLANTS[plant], STEPS),
+        0.1 * generator.standard_normal(n),
+        np.array([0.3, 0.1]),
+        make_obstacles(),
+        np.array([0.1, 0.2]),
+        0.9,
+        initial_covariance=root @ root.T,
+    )
+    terminal, stage = 10 ** generator.uniform(3, 6, n), 10 ** generator.uniform(1, 3, n)
+    return replace(made, at_goal=np.arange(n) < 2, terminal_weights=terminal, stage_weights=stage)
+
+
+def simulated(problem: Problem, plant: str, control: np.ndarray) -> tuple[np.ndarray, float]:
+    """Step mean and covariance on, and return the last mean and J_aug."""
+    A, B = PLANTS[plant].A, PLANTS[plant].B
+    mean, covariance, cost = problem.initial_mean, problem.initial_covariance, float(control @ control)
+    for t, u in enumerate(control.reshape(2, -1).T, start=1):
+        mean = A @ mean + B @ u
+        covariance = A @ covariance @ A.T + B @ np.diag((problem.noise * u) ** 2) @ B.T
+        variances = covariance.diagonal()
+        weights = problem.terminal_weights if t == STEPS else problem.stage_weights
+        cost += weights @ ((mean - problem.goal) ** 2 + variances) + LAMBDA * variances[:2].sum()
+    return mean, float(cost)
+
+
+@EVERY_PLANT
+def test_the_parts_of_the_cost_are_those_of_a_simulation(plant):
+    """Effort, variances and soft goal rows, but for a constant: the part of the variance that no control causes."""
+    problem = weighted_problem(plant)
+    problem = replace(problem, at_goal=np.zeros(len(problem.goal), dtype=bool))
+    rows, targets, softness = problem.goal_rows
+    weights = 1.0 + problem.weighted_variance + LAMBDA * problem.summed_variance
+    control, other = 10 * np.random.default_rng(1).standard_normal((2, 2 * STEPS))
+
+    def value(u: np.ndarray) -> float:
+        return float((weights * u**2).sum() + (0.5 / softness * (rows @ u - targets) ** 2).sum())
+
+    simulations = [simulated(problem, plant, u)[1] for u in (control, other)]
+    assert value(control) - value(other) == pytest.approx(simulations[0] - simulations[1], rel=1e-9)
+
+
+@EVERY_PLANT
+def test_hard_goal_rows_are_the_end_of_a_simulation(plant):
+    problem = weighted_problem(plant)
+    rows, targets, softness = problem.goal_rows
+    hard = softness == 0
+    assert hard.sum() == 2
+    control = np.random.default_rng(2).standard_normal(2 * STEPS)
+    end = simulated(problem, plant, control)[0]
+    np.testing.assert_allclose((rows @ control - targets)[hard], (end - problem.goal)[:2], atol=1e-12)
+
+
+@EVERY_PLANT
+def test_terms_reported_for_a_solution_sum_to_the_simulated_cost(plant):
+    problem = weighted_problem(plant)
+    solution = solve_problem(problem, cold_start(np.zeros((STEPS + 1, 2))), FocConfig(strategy='fixed', tau=0.0, lam=LAMBDA))
+    end, cost = simulated(problem, plant, solution.control.T.ravel())
+    assert sum(solution.costs.values()) == pytest.approx(cost, rel=1e-9)
+    np.testing.assert_allclose(end[:2], problem.goal[:2], atol=1e-9)
+    assert solution.costs['effort'] == pytest.approx(solution.effort)
+    nudge = np.random.default_rng(3).standard_normal(2 * STEPS)
+    rows = problem.goal_rows[0][problem.goal_rows[2] == 0]
+    nudge -= rows.T @ np.linalg.solve(rows @ rows.T, rows @ nudge)
+    for size in (-1e-2, 1e-2):
+        assert simulated(problem, plant, solution.control.T.ravel() + size * nudge)[1] > cost, 'it is the least'
