@@ -40,7 +40,10 @@ def solve_together(problem: Problem, candidates: list[Candidate], strategy: str)
 
 @pytest.mark.parametrize(
     ('name', 'strategy'),
-    [*((name, strategy) for name in SCENES for strategy in ('optimal', 'fixed')), *(('boxes', each) for each in ('lv', 'hc', 'algorithm1'))],
+    [
+        *((name, strategy) for name in SCENES for strategy in ('optimal', 'fixed')),
+        *(('boxes', each) for each in ('lv', 'hc', 'algorithm1')),
+    ],
 )
 def test_each_class_is_as_if_it_were_alone_and_the_same_each_time(name, strategy):
     problem = reach(collect_obstacles(SCENES[name]), steps=30, noise=(0.1, 0.1), preference=PREFERENCE)
@@ -86,7 +89,10 @@ def test_classes_are_as_good_as_those_of_an_independent_solver():
         assert len(candidates) == len(references)
         for candidate, solution in zip(candidates, solve_together(problem, candidates, 'optimal'), strict=True):
             compared += 1
-            sides, reference = find_path_sides(solution.path, problem.obstacles, problem.centre_trajectories), references[candidate.label]
+            sides, reference = (
+                find_path_sides(solution.path, problem.obstacles, problem.centre_trajectories),
+                references[candidate.label],
+            )
             assert all(sides.get(name, side) == side for name, side in candidate.sides)
             losses = [
                 PREFERENCE.compute_loss(effort, min(k + 1e-5, problem.wanted_k), problem.wanted_k)

@@ -170,7 +170,7 @@ def measure_factors(problem: Problem, control: np.ndarray, points: int = 100) ->
 
 
 def narrow_scene(seed: int) -> tuple[Problem, np.ndarray]:
-    """Return a problem with two random shapes that leave a gap of 1 to 20 mm, at times with a third one, and a guess through it."""
+    """Return a problem with two random shapes with a gap of 1 to 20 mm, at times a third one, and a guess through the gap."""
     generator = np.random.default_rng(seed)
     gap, x, y = 10 ** generator.uniform(-3, -1.7), generator.uniform(0.12, 0.18), generator.uniform(-0.02, 0.02)
     shapes: list[Shape] = []
@@ -178,13 +178,13 @@ def narrow_scene(seed: int) -> tuple[Problem, np.ndarray]:
         radius, stddev = generator.uniform(0.004, 0.02), generator.choice([0.0, 0.001])
         width, height = generator.uniform(0.01, 0.06, 2)
         at = np.array([x, y + side * (gap / 2 + radius)])
-        far = at + (0.0, side * height)
+        far = np.add(at, (0.0, side * height))
         velocity = (0.02, 0.0) if seed % 4 == 3 else (0.0, 0.0)
         shapes.append(
             (
                 Circle(at, radius, stddev, velocity=velocity),
-                Capsule(at, far + (width / 2, 0.0), radius, stddev, velocity=velocity),
-                Box(at + (0.0, side * height / 2), (width, height), 0.0, radius, stddev, velocity=velocity),
+                Capsule(at, np.add(far, (width / 2, 0.0)), radius, stddev, velocity=velocity),
+                Box(np.add(at, (0.0, side * height / 2)), (width, height), 0.0, radius, stddev, velocity=velocity),
             )[generator.integers(3)]
         )
     if seed % 3 == 0:
