@@ -57,7 +57,7 @@ ROUNDS = 3
 """Most times that rows are added to a QP for places at which its solution breaks margins."""
 VIOLATED, VIOLATED_APART = 1e-3, 0.25
 """Broken margin, relative to the scene, for which a row is added, and its least time from other rows [steps]."""
-MOST_TRIALS, BUNDLES, SHORTER = 5, 1, 0.25
+MOST_TRIALS, BUNDLES, SHORTER = 8, 3, 0.25
 """Steps that are tried; those of them after which rows are added where a whole step failed; and the part that is tried next."""
 SUFFICIENT = 1e-4
 """Share of the promised gain that a step has to bring."""

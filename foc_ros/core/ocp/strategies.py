@@ -249,8 +249,8 @@ def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult
     reached = problem.risk.find_probability(k)
     if k >= problem.wanted_k * (1.0 - REACHED) and now.is_done[row]:
         return collect(point, row, Status.SOLVED, 'solved')
-    if not now.is_done[row]:
-        cause = 'out of time' if now.iterations[row] < point.solver.most else 'not settled'
+    if not now.is_settled[row]:
+        cause = 'not settled' if now.is_done[row] or now.iterations[row] >= point.solver.most else 'out of time'
         message = f'{cause}: eta {reached:.4g} so far, and the likelihood is estimated'
         return collect(point, row, Status.DEADLINE, message, aims_at_eta=False)
     if is_touching:
