@@ -184,7 +184,7 @@ import builtins, sys
 from foc_ros.cli.main import main
 show = print
 def say(text, **options):
-    show(text, sorted({'numpy', 'numba', 'rclpy', 'matplotlib'} & set(sys.modules)), **options)
+    show(text, sorted({'numpy', 'rclpy', 'matplotlib'} & set(sys.modules)), **options)
     raise KeyboardInterrupt
 builtins.print = say
 sys.exit(main(['demo']))

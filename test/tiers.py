@@ -27,7 +27,7 @@ LONG = (
     'test_flicker.py::test_*symmetric_obstacle*',
     'test_guarantee.py::*',
     'test_homotopy_shapes.py::test_brute_force_finds_none_in_many_more_scenes',
-    'test_slow_path.py::*',
+    'test_least_loss.py::test_likelihoods_are_continuous*',
     'test_guidance_safety.py::test_ten_thousand_hostile_hands',
     # all steps of a fit, of the paper's studies and of long reports
     'test_fit.py::test_strategy_fixed_has_its_tau_and_lambda_fitted',

@@ -8,6 +8,7 @@ import numpy as np
 
 from .config import Config
 from .errors import SceneError
+from .obstacles.geometry import measure_offsets
 from .types import Array, HandState, Obstacles, Record
 
 
@@ -40,8 +41,6 @@ class ReachingScene(Record):
 
 def check_outside(field: str, point: Array, obstacles: Obstacles) -> None:
     """Raise SceneError, which names the field, if a point (2,) [m] lies inside the mean boundary of an obstacle."""
-    from .obstacles.geometry import measure_offsets  # imports numba, which a wrong scene file need not wait for
-
     distances = measure_offsets(point, obstacles)[1][0]
     for row in np.flatnonzero(distances < obstacles.radius)[:1]:
         found = f'{point.tolist()}, {distances[row]:.4g} m from its polygon'
