@@ -9,7 +9,7 @@ from reach_helpers import bowed, case_guess, case_problem, random_scene, reach, 
 
 from foc_ros.core.config import Config, FocConfig, replace_values
 from foc_ros.core.memory.memory import Memory
-from foc_ros.core.ocp.curve import Curve
+from foc_ros.core.ocp.lv_hc import Curve
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import find_least_safety_factor, solve_problem
 from foc_ros.core.ocp.start import cold_start, warm_start

@@ -20,7 +20,7 @@ UNCLEAR_NAMES = {
     'lineage', 'fixed',
 }
 # fmt: on
-ALLOWED = {('core/ocp/strategies/fixed.py', 'fixed')}
+ALLOWED: set[tuple[str, str]] = set()
 """The file of a strategy has the name that users give to the parameter `foc.strategy`."""
 
 

@@ -74,8 +74,8 @@ def _find_qpsolvers() -> list[str]:
 STRATEGIES = Registry(
     'strategy',
     {
-        'lv': 'foc_ros.core.ocp.curve:solve_lv',
-        'hc': 'foc_ros.core.ocp.curve:solve_hc',
+        'lv': 'foc_ros.core.ocp.lv_hc:solve_lv',
+        'hc': 'foc_ros.core.ocp.lv_hc:solve_hc',
         'optimal': 'foc_ros.core.ocp.strategies:solve_optimal',
         'algorithm1': 'foc_ros.core.ocp.strategies:solve_algorithm1',
         'fixed': 'foc_ros.core.ocp.strategies:solve_fixed',

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.dynamics.curve import compute_curve
+from foc_ros.core.dynamics.smooth_path import compute_curve
 from foc_ros.core.errors import MessageError
 from foc_ros.core.types import (
     LEFT,

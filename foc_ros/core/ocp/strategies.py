@@ -2,7 +2,7 @@
 
 `optimal` minimises the effort at a safety factor k itself, and gives way where k is not worth its effort. `fixed` is one point of
 tau and lambda, `algorithm1` walks along them in whole steps as printed in the paper, and `lv` and `hc` look for the best point
-(`curve`). All solve the same problem with the same `Solver`.
+(`lv_hc`). All solve the same problem with the same `Solver`.
 
 A strategy from outside the package is registered by name and then used like these:
 ``foc_ros.core.registry.STRATEGIES.register('mine', solve_mine)``, with `FocConfig(strategy='mine')`.
@@ -32,8 +32,8 @@ CLOSE = 5e-6
 """Relative excess over the wanted k that is aimed at."""
 REACHED = 1e-5
 """Relative shortfall of k that counts as rounding."""
-TOUCHING = 1e-3
-"""Distance that the mean lacks, relative to the scene, up to which a class has a path."""
+TOUCHING, TOUCHING_NEAR = 1e-3, 0.05
+"""Distance that the mean lacks, relative to the scene, up to which a class has a path, and within which it is looked for."""
 LEAP = 2.0
 """Angle by which the direction of an obstacle turns between two points of the grid if the mean leaps over it [rad]."""
 STALLED = 1e-6
@@ -118,7 +118,8 @@ class Point:
         rows = np.arange(len(self.k))
         motion, none = margins.move(rows, self.now.control), np.zeros(len(rows))
         grid = margins.measure_grid(rows, motion, none)
-        places, _ = margins.find_minima(rows, motion, none, grid, np.isfinite(grid.factor))
+        is_near = grid.value < TOUCHING_NEAR * margins.extent[:, None, None]
+        places, _ = margins.find_minima(rows, motion, none, grid, is_near)
         least = np.full(len(rows), np.inf)
         np.minimum.at(least, places.problem, margins.measure(places, places.problem, motion, none[places.problem]).value)
         short = least < -TOUCHING * margins.extent
@@ -129,8 +130,7 @@ class Point:
 def solve_at(
     problems: Sequence[Problem],
     starts: Sequence[Start],
-    tau: Array,
-    lam: Array,
+    weights: tuple[Array, Array],
     *,
     is_chance: bool,
     between: bool = True,
@@ -144,8 +144,8 @@ def solve_at(
     ----------
     problems, starts
         b problems with the same response, and where each begins.
-    tau, lam
-        Clearance terms [m^2] and weights of the variances [1/s^6], (b,).
+    weights
+        Clearance terms tau [m^2] and weights lambda of the variances [1/s^6], (b,) each.
     is_chance
         Whether the wanted k is asked for, as far as it is worth its effort; otherwise the mean keeps tau.
     between
@@ -157,6 +157,7 @@ def solve_at(
     most
         Most iterations, None for the usual number.
     """
+    tau, lam = weights
     margins = Margins(problems, tau, is_chance=is_chance, between=between)
     wanted = np.array([each.wanted_k for each in problems]) * (1.0 + CLOSE) * is_chance
     preferences = [each.preference for each in problems]
@@ -221,7 +222,7 @@ def solve_optimal(
 ) -> list[StrategyResult]:
     """Find the least effort at the wanted safety factor, or at the one that is worth its effort."""
     zeros = np.zeros(len(problems))
-    point = solve_at(problems, starts, zeros, zeros, is_chance=True, deadline=deadline)
+    point = solve_at(problems, starts, (zeros, zeros), is_chance=True, deadline=deadline)
     touching = point.is_touching() if (point.k < 0.0).any() else zeros
     results = [_finish_optimal(point, row, bool(touching[row])) for row in range(len(problems))]
     found = point.solver.margins.find_least_factors(point.now.control)
@@ -270,8 +271,8 @@ def solve_fixed(
     problems: Sequence[Problem], starts: Sequence[Start], settings: FocConfig, deadline: Deadline = NEVER
 ) -> list[StrategyResult]:
     """Solve at the tau [m^2] and lambda [1/s^6] of the settings, at the steps; the eta is what this gives."""
-    tau, lam = np.full(len(problems), settings.tau), np.full(len(problems), settings.lam)
-    point = solve_at(problems, starts, tau, lam, is_chance=False, between=False, deadline=deadline)
+    tau_lam = np.full(len(problems), settings.tau), np.full(len(problems), settings.lam)
+    point = solve_at(problems, starts, tau_lam, is_chance=False, between=False, deadline=deadline)
     touching, results = point.is_touching(), []
     for row in range(len(problems)):
         weights = {'tau': settings.tau, 'lam': settings.lam, 'aims_at_eta': False}
@@ -310,7 +311,7 @@ def _run_algorithm1(problem: Problem, start: Start, settings: FocConfig, deadlin
             weights = {'tau': tau, 'lam': lam, 'iterations': iteration - 1, 'qp_solves': iteration - 1}
             return collect(point, 0, Status.DEADLINE, message, **weights, aims_at_eta=False)
         one = np.array([tau]), np.array([lam])
-        point = solve_at([problem], [start], *one, is_chance=False, between=False, before=point, most=1)
+        point = solve_at([problem], [start], one, is_chance=False, between=False, before=point, most=1)
         last, effort = effort, float((point.now.control**2).sum()) / problem.horizon.gain**2
         k = float(chance.find_least_factors(point.now.control)[0][0])
         weights = {'tau': tau, 'lam': lam, 'iterations': iteration, 'qp_solves': iteration}

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from foc_ros.core.dynamics.curve import compute_curve
+from foc_ros.core.dynamics.smooth_path import compute_curve
 from foc_ros.core.errors import FocError
 from foc_ros.core.types import Array, PredictedCandidate, Prediction, describe_class
 

@@ -33,6 +33,8 @@ NARROW = 1e-5
 """Interval in s at which the search ends, and relative difference of k from the wanted one."""
 FLAT = 2e-3
 """Interval in s at which the search for the least loss ends: the loss differs by its square."""
+PROBE = 1e-2
+"""Distance in s from the root at which the loss tells whether it is less before it."""
 GOLDEN = 0.381966
 FURTHER_LOSS = 1e-3
 """How much a loss may rise before the curve is not followed any further."""
@@ -109,6 +111,11 @@ def choose_sample(wanted_k: float, is_hard: bool, first_s: float, end: float) ->
     samples = [each for each in samples if high is None or each.s < high.s] + ([high] if high is not None else [])
     if is_hard:
         return high or max(samples, key=lambda each: each.k)
+    if high is not None and high.s > PROBE:
+        beside = yield high.s - PROBE
+        if min(each.loss for each in [*samples, beside]) >= high.loss:
+            return high
+        samples = [*(each for each in samples[:-1] if each.s < beside.s), beside, high]
     return (yield from _find_least(samples))
 
 
@@ -166,7 +173,7 @@ def follow_curve(
     point: Point | None = None
     solves = np.zeros(len(problems), dtype=np.intp)
     while len(results) < len(problems):
-        point = solve_at(problems, starts, *curve.at(s), is_chance=False, deadline=deadline, before=point)
+        point = solve_at(problems, starts, curve.at(s), is_chance=False, deadline=deadline, before=point)
         solves += point.now.iterations
         k, *_ = chance.find_least_factors(point.now.control)
         touching = point.is_touching()
