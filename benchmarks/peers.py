@@ -49,9 +49,9 @@ def build_margins(problem: Problem, x: Any, y: Any, variance_x: Any, variance_y:
 
 def _find_offset(vertices: Array, x: Any, y: Any) -> tuple[Any, Any, Any]:
     """Return the signed distance from a box around the origin, and the offset from its nearest point [m]."""
-    sides: list[Array] = [(vertices[0] - vertices[1]) / 2, (vertices[1] - vertices[2]) / 2]
+    sides = (vertices[:2] - vertices[1:3]) / 2
     halves = [float(np.hypot(*side)) for side in sides]
-    axes: list[Array] = [side / half for side, half in zip(sides, halves, strict=True)]
+    axes = [side / half for side, half in zip(sides, halves, strict=True)]
     along = [x * axis[0] + y * axis[1] for axis in axes]
     beyond = [value - casadi.fmax(-half, casadi.fmin(half, value)) for value, half in zip(along, halves, strict=True)]
     inside = casadi.fmin(casadi.fmax(*(casadi.fabs(value) - half for value, half in zip(along, halves, strict=True))), 0)
@@ -62,9 +62,9 @@ def _find_offset(vertices: Array, x: Any, y: Any) -> tuple[Any, Any, Any]:
 def fit_guess(problem: Problem, guess: Array) -> Array:
     """Return the least control (N, 2) [m/s^3] through the middle of a path (N + 1, 2) to the goal."""
     middle = problem.horizon.steps // 2
-    rows, targets, _ = problem.goal_rows
-    rows = np.concatenate((rows, problem.horizon.response[middle - 1, :2]))
-    targets = np.concatenate((targets, guess[middle] - problem.free[middle, :2]))
+    goal_rows, goal_targets, _ = problem.goal_rows
+    rows = np.concatenate((goal_rows, problem.horizon.response[middle - 1, :2]))
+    targets = np.concatenate((goal_targets, guess[middle] - problem.free[middle, :2]))
     control: Array = np.linalg.lstsq(rows, targets, rcond=None)[0].reshape(2, -1).T
     return control
 
@@ -75,8 +75,8 @@ class Peer:
     def __init__(self, problem: Problem) -> None:
         self.steps = problem.horizon.steps
         rows, targets, _ = problem.goal_rows
-        least: Array = np.linalg.lstsq(rows, targets, rcond=None)[0]
-        self.control_unit = float(np.abs(self.scale_control(problem, least)).max())
+        least = np.linalg.lstsq(rows, targets, rcond=None)[0]
+        self.control_unit = float(np.abs(least).max()) * problem.horizon.dt**3 / LENGTH
         """Largest control of the plan without obstacles."""
         self.lower, self.upper = np.zeros(0), np.zeros(0)
         self.lower_variables = np.zeros(0)

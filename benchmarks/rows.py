@@ -31,8 +31,8 @@ from foc_ros.core.types import NANOSECONDS, Candidate, Obstacles, PredictedCandi
 Array = scenes.Array
 SETTINGS = FocConfig(strategy='optimal')
 TICK_S = 1.0 / scenes.RATE_HZ
-EFFORT_TOLERANCE = 0.02
-"""Largest relative difference of efforts: a peer keeps clear at the steps only, which takes a little less effort."""
+TOLERANCE, SHARP_TOLERANCE = 0.02, 0.05
+"""Largest relative difference of efforts: a peer keeps clear at the steps only, and may cut a sharp corner between them."""
 
 
 def measure_cold(build: Callable[[], Obstacles], name: str, is_quick: bool) -> Result:
@@ -103,7 +103,7 @@ def _follow_plan(solution: Solution, generator: np.random.Generator) -> Array:
     return state
 
 
-def _compare(ours: Sequence[Solution], theirs: Sequence[Array | None]) -> Agreement:
+def _compare(ours: Sequence[Solution], theirs: Sequence[Array | None], tolerance: float = TOLERANCE) -> Agreement:
     """Compare efforts with those of controls, None where a peer did not converge."""
     pairs = zip(ours, theirs, strict=True)
     excess = [mine.effort / float((control**2).sum()) - 1 for mine, control in pairs if control is not None]
@@ -111,8 +111,9 @@ def _compare(ours: Sequence[Solution], theirs: Sequence[Array | None]) -> Agreem
     converged = sum(each is not None for each in theirs)
     worst = max(excess, key=abs, default=np.inf)
     return Agreement(
-        solved == converged == len(ours) and abs(worst) < EFFORT_TOLERANCE,
-        f'solved {solved} of {len(ours)}, the peer {converged}; efforts differ by up to {100 * worst:+.3f} % (2 % allowed)',
+        solved == converged == len(ours) and abs(worst) < tolerance,
+        f'solved {solved} of {len(ours)}, the peer {converged}; '
+        f'efforts differ by up to {100 * worst:+.3f} % ({100 * tolerance:g} % allowed)',
     )
 
 
@@ -160,7 +161,7 @@ class TickSequence:
         return '{} of {}'.format(*counts[len(counts) // 2])
 
 
-def measure_tick(build: Callable[[], scenes.Reach], scene: str, is_quick: bool) -> Result:
+def measure_tick(build: Callable[[], scenes.Reach], scene: str, tolerance: float, is_quick: bool) -> Result:
     """Compare whole warm ticks with IPOPT, which solves only the problem of the most likely class."""
     from peers import build_fastest
 
@@ -177,7 +178,7 @@ def measure_tick(build: Callable[[], scenes.Reach], scene: str, is_quick: bool) 
     return Result(
         Timing(f'a warm tick, {scene}', compute_median_ms(ticks)),
         Timing('IPOPT, its most likely class alone, from our solution of 10 ms ago', compute_median_ms(times['peer'])),
-        _compare([best.solution], [control if peer.converged else None]),
+        _compare([best.solution], [control if peer.converged else None], tolerance),
         repetitions,
         {'solved': sequence.describe(), 'slowest_ms': 1e3 * max(ticks), 'first_tick_ms': 1e3 * cold},
     )
@@ -224,8 +225,8 @@ ROWS: dict[str, Callable[[bool], Result]] = {
     for measure in (measure_cold, measure_warm)
     for name in ('Fatrop', 'IPOPT')
 } | {
-    'tick_circles': partial(measure_tick, scenes.build_4x8, '4 classes, 8 circles'),
-    'tick_boxes': partial(measure_tick, scenes.build_4_boxes, '6 candidates, 2 goals, 4 sharp boxes'),
+    'tick_circles': partial(measure_tick, scenes.build_4x8, '4 classes, 8 circles', TOLERANCE),
+    'tick_boxes': partial(measure_tick, scenes.build_4_boxes, '6 candidates, 2 goals, 4 sharp boxes', SHARP_TOLERANCE),
     'far_obstacles': partial(measure_change, {}, 248, 'with 248 circles more, 1 to 3 m away'),
     'steps_200': partial(measure_change, {'foc.steps': 200}, 0, 'with N = 200'),
     'replay': measure_replay,

@@ -32,7 +32,7 @@ CENTRE, RADIUS, RADIUS_STDDEV = (0.12, 0.0), 0.03, 0.003
 NOISE, ETA = 0.15, 0.89
 ETAS = np.linspace(0.8, 0.95, 61)
 STRIDE = 0.05
-"""Distance in s between two points of the penalty path with rows at the steps."""
+"""Distance in s between two points of the curve with rows at the steps."""
 LAST_S = 27.0
 
 
@@ -49,7 +49,7 @@ def solve_sliding(eta: float) -> Solution:
 
 
 def follow_with_rows_at_steps() -> tuple[Array, Array]:
-    """Return eta and effort along the penalty path of `lv` where the constraint holds at the steps only, as in `fixed`."""
+    """Return eta and effort along the curve of `lv` where the constraint holds at the steps only, as in `fixed`."""
     problem, settings = one_obstacle(ETA), FocConfig(strategy='fixed')
     start, etas, efforts = cold_start(guess_path(np.zeros(2), GOAL, STEPS, 0.05)), [], []
     for s in np.arange(0.0, LAST_S, STRIDE):

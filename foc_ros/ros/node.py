@@ -1,7 +1,7 @@
 """The ROS 2 node: a prediction for every hand pose that is due, and diagnostics once a second.
 
 The pipeline holds the model and the memory and is driven by message stamps, so the node gives the same answers as a replay of
-the same messages, apart from candidates for which `budget_s` left no time. The node adds the clocks: it makes no prediction from
+the same messages, apart from candidates that `budget_s` leaves to an estimate. The node adds the clocks: it makes no prediction from
 an input that has fallen silent, and publishes none that has become too old.
 
 A prediction is computed in another thread, guidance in a third one (`guidance_loop`), and all else in that of the executor. What

@@ -14,7 +14,7 @@ from .page import format_table
 from .scenes import build_random, solve
 
 ETA = 0.977
-SCENES, SAMPLES, STEPS = 40, 2000, 50
+SCENES, SAMPLES, STEPS = 20, 2000, 50
 NOISES = (0.05, 0.15)
 STRATEGIES = ('lv', 'hc', 'optimal')
 CHOICES = (('gaussian', 'step'), ('gaussian', 'path'), ('cantelli', 'step'), ('cantelli', 'path'))

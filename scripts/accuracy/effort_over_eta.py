@@ -16,7 +16,7 @@ from .scenes import Scene, build_one_obstacle, build_random
 
 STRATEGIES = ('lv', 'hc', 'optimal')
 ETAS = np.linspace(0.5, 0.9, 21)
-SCENES = 60
+SCENES = 20
 SETTINGS = ((50, 0.05), (50, 0.1), (50, 0.15))
 """Steps N and noise c per step."""
 SMALLEST_JUMP = 0.01

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from foc_ros.core.types import Array, Obstacles
 
-SMALLEST_DISTANCE = 1e-9
-"""Distance [m] below which a point counts as on the polygon, where its normal is not defined: 1 nm."""
+SMALLEST_DISTANCE = 1e-13
+"""Distance [m] below which a point counts as on the polygon, where its normal is not defined: rounding."""
 
 
 class Edges(NamedTuple):

@@ -255,7 +255,8 @@ class Solver:
             fallen = now.at.loss[rows] - at.loss
             is_near = np.abs(fallen) < STALLED * plan.gain[place]  # what is left is rounding
             is_near |= (fallen >= 0.0) & (at.factor > plan.k[place] - LAST_FACTOR * (1.0 + plan.k[place]))
-            is_last = is_good & is_near & (plan.gain[place] < LAST_GAIN * self._tolerate(now, rows))
+            # rows at the steps alone creep from one to the next
+            is_last = is_good & is_near & (plan.gain[place] < LAST_GAIN * self._tolerate(now, rows)) & self.margins.between
             now.is_done[rows[is_last]] = now.is_settled[rows[is_last]] = True
         good = rows[is_good]
         now.control[good] = control[is_good]

@@ -160,7 +160,9 @@ def solve_at(
     margins = Margins(problems, tau, is_chance=is_chance, between=between)
     wanted = np.array([each.wanted_k for each in problems]) * (1.0 + CLOSE) * is_chance
     preferences = [each.preference for each in problems]
-    rate = np.array([min(each.shortfall / each.beta, LARGEST_RATE) if each.beta > 0.0 else LARGEST_RATE for each in preferences])
+    rates = [min(each.shortfall / each.beta, LARGEST_RATE) if each.beta > 0.0 else LARGEST_RATE for each in preferences]
+    # without a chance constraint no safety is wanted, and the rate has no effect
+    rate = np.array(rates) if is_chance else np.ones(len(problems))
     solver = Solver(margins, wanted, rate, lam)
     if before is None:
         control, contacts, multipliers, k, angles = _stack_starts(solver, problems, starts)
@@ -210,7 +212,8 @@ def collect(point: Point, row: int, status: Status, message: str, **rest: object
     forces = Forces(now.contacts.obstacle[mine], now.contacts.time[mine], now.multipliers[mine])
     gain = 0.0 if now.is_settled[row] else float(min(now.gain[row], np.finfo(float).max))
     control = now.control[row] / solver.gain[row]
-    return StrategyResult(status, message, control, forces, qp_solves=int(now.iterations[row]), gain=gain, **rest)  # type: ignore[arg-type]
+    rest.setdefault('qp_solves', int(now.iterations[row]))
+    return StrategyResult(status, message, control, forces, gain=gain, **rest)  # type: ignore[arg-type]
 
 
 def solve_optimal(
@@ -249,8 +252,9 @@ def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult
     reached = problem.risk.find_probability(k)
     if k >= problem.wanted_k * (1.0 - REACHED) and now.is_done[row]:
         return collect(point, row, Status.SOLVED, 'solved')
-    if not now.is_settled[row]:
-        cause = 'not settled' if now.is_done[row] or now.iterations[row] >= point.solver.most else 'out of time'
+    is_late = not now.is_done[row] and now.iterations[row] < point.solver.most
+    if is_late or not (now.is_settled[row] or problem.preference.is_hard):
+        cause = 'out of time' if is_late else 'not settled'
         message = f'{cause}: eta {reached:.4g} so far, and the likelihood is estimated'
         return collect(point, row, Status.DEADLINE, message, aims_at_eta=False)
     if is_touching:
@@ -303,12 +307,13 @@ def _run_algorithm1(problem: Problem, start: Start, settings: FocConfig, deadlin
     for iteration in range(1, MOST_STEPS + 1):
         if point is not None and not deadline.allows():
             message = f'out of time after {iteration - 1} QPs: the likelihood is estimated'
-            return collect(point, 0, Status.DEADLINE, message, tau=tau, lam=lam, iterations=iteration - 1, aims_at_eta=False)
+            weights = {'tau': tau, 'lam': lam, 'iterations': iteration - 1, 'qp_solves': iteration - 1}
+            return collect(point, 0, Status.DEADLINE, message, **weights, aims_at_eta=False)
         one = np.array([tau]), np.array([lam])
         point = solve_at([problem], [start], *one, is_chance=False, between=False, before=point, most=1)
         last, effort = effort, float((point.now.control**2).sum()) / problem.horizon.gain**2
         k = float(chance.find_least_factors(point.now.control)[0][0])
-        weights = {'tau': tau, 'lam': lam, 'iterations': iteration}
+        weights = {'tau': tau, 'lam': lam, 'iterations': iteration, 'qp_solves': iteration}
         if k >= problem.wanted_k and abs(effort - last) < settings.algorithm1_xi:
             return collect(point, 0, Status.SOLVED, 'solved', **weights)
         if point.is_touching()[0] and point.now.gain[0] < STALLED:
@@ -321,4 +326,5 @@ def _run_algorithm1(problem: Problem, start: Start, settings: FocConfig, deadlin
             tau, lam = tau + settings.algorithm1_delta, lam * settings.algorithm1_growth
     assert point is not None
     message = f'not settled after {MOST_STEPS} QPs at tau = {tau:.3g}, lambda = {lam:.3g}'
-    return collect(point, 0, Status.ITERATION_LIMIT, message, tau=tau, lam=lam, iterations=MOST_STEPS)
+    weights = {'tau': tau, 'lam': lam, 'iterations': MOST_STEPS, 'qp_solves': MOST_STEPS}
+    return collect(point, 0, Status.ITERATION_LIMIT, message, **weights)
