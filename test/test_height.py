@@ -8,7 +8,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import foc_ros
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.deadline import Deadline
 from foc_ros.core.dynamics.predictive_covariance import SharedCovariances
 from foc_ros.core.estimation.kalman_filter import update
 from foc_ros.core.height import HeightPredictor, predict_height, reach_along_axis
@@ -189,13 +188,13 @@ def test_without_the_heights_of_goals_the_height_is_not_predicted():
 
 
 def test_a_kept_answer_begins_where_the_hand_is():
-    """The second prediction has no time to solve anything new."""
+    """The second prediction follows one class only."""
     config = replace_values(CONFIG, {'likelihood.hold_s': 1.0})
     obstacles, memory = make_obstacles([[0.2, 0.01]], 0.03, 0.003), Memory()
     _, memory = predict(config, hand_at(0.1), obstacles, GOAL, memory, goal_heights=np.array([0.3]))
     later = replace(hand_at(0.12), stamp_ns=100_000_000)
-    deadline = Deadline(1e-9)
-    prediction, _ = predict(config, later, obstacles, GOAL, memory, deadline=deadline, goal_heights=np.array([0.3]))
+    narrow = replace_values(config, {'homotopy.max_candidates': 1})
+    prediction, _ = predict(narrow, later, obstacles, GOAL, memory, goal_heights=np.array([0.3]))
     kept = [each for each in prediction.candidates if each.age_s > 0.0]
     assert kept
     for each in kept:

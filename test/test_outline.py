@@ -31,7 +31,7 @@ def test_every_point_is_at_the_radius_and_the_area_is_that_of_steiner(shape: Sha
     obstacles = collect_obstacles([shape])
     outline, radius = trace_obstacle(obstacles, 0, growth, points=400), shape.radius + growth
     np.testing.assert_array_equal(outline[0], outline[-1])
-    np.testing.assert_allclose(measure_offsets(outline, obstacles)[1], radius, atol=1e-12)
+    np.testing.assert_allclose(measure_offsets(outline, obstacles)[1], radius, atol=2e-9)
     edges = np.roll(shape.polygon, -1, axis=0) - shape.polygon
     expected = measure_area(shape.polygon) + np.hypot(*edges.T).sum() * radius + np.pi * radius**2
     assert measure_area(outline) == pytest.approx(expected, rel=1e-3)
