@@ -75,7 +75,7 @@ def test_a_deadline_that_has_passed_leaves_an_estimate_for_every_class(name):
         assert each.status is Status.SOLVED or 'estimated' in each.solution.message
         assert np.isfinite(each.cost)
     for label, share in shares.items():
-        assert share == pytest.approx(expected[label], abs=0.3)
+        assert share == pytest.approx(expected[label], abs=0.35)
     assert late.notes['unfinished'] == sum(each.status is Status.DEADLINE for each in late.candidates)
 
 

@@ -15,6 +15,7 @@ All functions take several problems at once, because NumPy takes as long for one
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -158,17 +159,28 @@ class Margins:
         self.problems, self.is_chance, self.between = problems, is_chance, between
         self.response = problems[0].horizon.position_response
         self.steps = self.response.steps
-        has_polygons = any((each.obstacles.corners > 1).any() for each in problems)
-        points = (FINE_GRID if has_polygons else GRID) if between else 1
-        self.times, self._half = np.arange(points, points * self.steps + 1) / points, 1.0 / points
-        self._step, share = self.response.locate(self.times)
-        self._weight, self._quintic = hermite(share), hermite_quintic(share)
+        self._set_times(between)
         self.extent = np.array([each.extent for each in problems])
         self.step_s = np.array([each.horizon.dt for each in problems])
         self.noise_variance = np.stack([each.noise_variance for each in problems])
         self.count = max(len(each.obstacles) for each in problems)
         self._set_free_motion()
         self._set_obstacles(tau)
+
+    def _set_times(self, between: bool) -> None:
+        """Set the grid of times."""
+        has_polygons = any((each.obstacles.corners > 1).any() for each in self.problems)
+        points = (FINE_GRID if has_polygons else GRID) if between else 1
+        self.times, self._half = np.arange(points, points * self.steps + 1) / points, 1.0 / points
+        self._step, share = self.response.locate(self.times)
+        self._weight, self._quintic = hermite(share), hermite_quintic(share)
+
+    def look_between(self) -> Margins:
+        """Return the same margins, with a grid between the steps too."""
+        other = copy(self)
+        other.between = True
+        other._set_times(True)  # noqa: SLF001  of the same class
+        return other
 
     def _set_free_motion(self) -> None:
         """Set the movements without control: their means, and the covariances that uncertain starts cause."""
@@ -480,7 +492,8 @@ class Margins:
         gradient = along - worth[:, None] * spread
         rate = stddev * (1.0 + k * stddev / margin.root)
         earlier, later = slice(count, count + len(held)), slice(count + len(held), None)
-        apart = np.maximum(whole.time[later] - whole.time[earlier], np.finfo(float).tiny)
+        apart = whole.time[later] - whole.time[earlier]
+        apart = np.where(apart > 0.0, apart, 1.0)  # there is but one time in a single step
         rise, fall = margin.value[later] - margin.value[held], margin.value[earlier] - margin.value[held]
         bend = 4.0 * (rise + fall) / apart**2
         slide = (gradient[later] - gradient[earlier]) / apart[:, None]

@@ -22,7 +22,7 @@ from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.types import Array, Status
 
-from .margin import Contacts, Margins
+from .margin import Contacts, Indices, Margins
 from .problem import Problem
 from .solver import LARGEST_RATE, Iterates, Solver
 from .start import NO_FORCES, Forces, Start, follow
@@ -34,9 +34,13 @@ REACHED = 1e-5
 """Relative shortfall of k that counts as rounding."""
 TOUCHING, TOUCHING_NEAR = 1e-3, 0.05
 """Distance that the mean lacks, relative to the scene, up to which a class has a path, and within which it is looked for."""
+BETWEEN = 0.3
+"""Part of the least radius by which a mean that is held off at the steps alone may enter an obstacle between them."""
 LEAP = 2.0
 """Angle by which the direction of an obstacle turns between two points of the grid if the mean leaps over it [rad]."""
 STALLED = 1e-6
+CORRECTIONS = 3
+"""Most times that more than the wanted safety factor is asked for."""
 MOST_STEPS = 500
 """Most QPs of `algorithm1`."""
 LARGEST_LAMBDA = 1e150
@@ -113,8 +117,11 @@ class Point:
         return np.log(self.now.at.cost)
 
     def is_touching(self) -> NDArray[np.bool_]:
-        """Return whether the mean enters an obstacle or its clearance, or leaps over one between two points of the grid, (b,)."""
-        margins = self.solver.margins
+        """Return whether the mean enters an obstacle or its clearance, or leaps over one between two points of the grid, (b,).
+
+        Where it is held off at the steps alone, it may enter between them by a part of the radius.
+        """
+        margins = self.solver.margins.look_between()
         rows = np.arange(len(self.k))
         motion, none = margins.move(rows, self.now.control), np.zeros(len(rows))
         grid = margins.measure_grid(rows, motion, none)
@@ -122,7 +129,10 @@ class Point:
         places, _ = margins.find_minima(rows, motion, none, grid, is_near)
         least = np.full(len(rows), np.inf)
         np.minimum.at(least, places.problem, margins.measure(places, places.problem, motion, none[places.problem]).value)
-        short = least < -TOUCHING * margins.extent
+        allowed = TOUCHING * margins.extent
+        if not self.solver.margins.between and margins.count:
+            allowed = np.maximum(allowed, BETWEEN * np.sqrt(margins.reach_square.min(axis=1)))
+        short = least < -allowed
         leaps: NDArray[np.bool_] = np.abs(margins.turn(rows, margins.find_path(motion))).max(axis=(1, 2), initial=0.0) > LEAP
         return short | leaps
 
@@ -223,11 +233,29 @@ def solve_optimal(
     """Find the least effort at the wanted safety factor, or at the one that is worth its effort."""
     zeros = np.zeros(len(problems))
     point = solve_at(problems, starts, (zeros, zeros), is_chance=True, deadline=deadline)
+    found = _meet_everywhere(point, deadline)
     touching = point.is_touching() if (point.k < 0.0).any() else zeros
     results = [_finish_optimal(point, row, bool(touching[row])) for row in range(len(problems))]
-    found = point.solver.margins.find_least_factors(point.now.control)
     minima, weights = zip(*(each.tolist() for each in found), strict=True), _find_weights(point, results)
     return [replace(each, minimum=least, weights=pairs) for each, least, pairs in zip(results, minima, weights, strict=True)]
+
+
+def _meet_everywhere(point: Point, deadline: Deadline) -> tuple[Array, Indices, Array]:
+    """Return the least safety factors of a point, after asking for more where an obstacle comes nearer than its contacts tell."""
+    solver, now = point.solver, point.now
+    found = solver.margins.find_least_factors(now.control)
+    for _ in range(CORRECTIONS):
+        aimed = np.array([each.wanted_k for each in solver.margins.problems])
+        short = (found[0] < aimed * (1.0 - REACHED)) & (now.at.factor >= aimed * (1.0 - REACHED)) & now.is_done
+        if not short.any() or not deadline.allows():
+            break
+        solver.wanted_k[short] *= 1.0 + 1.2 * (1.0 - found[0][short] / aimed[short])
+        now.is_done[short] = now.is_settled[short] = False
+        now.bound[short] = np.inf
+        solver.run(now, deadline)
+        found = solver.margins.find_least_factors(now.control)
+    point.k = np.minimum(now.at.factor, np.where(now.at.factor > 0.0, found[0], np.inf))
+    return found
 
 
 def _find_weights(point: Point, results: Sequence[StrategyResult]) -> list[tuple[tuple[float, float], ...]]:
@@ -254,12 +282,12 @@ def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult
     if k >= problem.wanted_k * (1.0 - REACHED) and now.is_done[row]:
         return collect(point, row, Status.SOLVED, 'solved')
     is_late = not now.is_done[row] and now.iterations[row] < point.solver.most
+    if is_touching and not is_late:
+        return collect(point, row, Status.INFEASIBLE, INFEASIBLE)
     if is_late or not (now.is_settled[row] or problem.preference.is_hard):
         cause = 'out of time' if is_late else 'not settled'
         message = f'{cause}: eta {reached:.4g} so far, and the likelihood is estimated'
         return collect(point, row, Status.DEADLINE, message, aims_at_eta=False)
-    if is_touching:
-        return collect(point, row, Status.INFEASIBLE, INFEASIBLE)
     if problem.preference.is_hard:
         message = f'eta {problem.eta:g} is out of reach: the largest found is {reached:.4g}'
     else:
