@@ -140,7 +140,8 @@ def _meet_goal(stack: Array, diagonal: Array, goal: Array) -> tuple[Array, Array
     largest = np.einsum('bii->bi', square).max(axis=1)[:, None, None]
     is_missing = (goal == 0.0).all(axis=2).astype(float)
     square += (1e-12 + is_missing)[..., None] * largest * np.eye(goal.shape[1])
-    stack = stack - np.linalg.solve(square, scaled @ stack.swapaxes(1, 2)).swapaxes(1, 2) @ goal
+    for _ in range(2):  # what the first leaves would move the goal for a contact at it
+        stack = stack - np.linalg.solve(square, scaled @ stack.swapaxes(1, 2)).swapaxes(1, 2) @ goal
     left = stack / diagonal[:, None]
     return left, left @ stack.swapaxes(1, 2)
 

@@ -350,6 +350,8 @@ def _run_algorithm1(problem: Problem, start: Start, settings: FocConfig, deadlin
             return collect(point, 0, Status.INFEASIBLE, message, **weights)
         if k < problem.wanted_k:
             if lam * settings.algorithm1_growth > LARGEST_LAMBDA:
+                if point.is_touching()[0]:
+                    return collect(point, 0, Status.INFEASIBLE, INFEASIBLE, **weights)
                 message = f'lambda = {lam:.3g} after {iteration} QPs, and the surrogate is still violated'
                 return collect(point, 0, Status.ITERATION_LIMIT, message, **weights)
             tau, lam = tau + settings.algorithm1_delta, lam * settings.algorithm1_growth
