@@ -172,31 +172,6 @@ def test_wrong_inputs_are_answered_before_the_solver_is_imported(
     assert result.stderr.splitlines() == [f'foc_ros {arguments[0]}: {line}' for line in lines]
 
 
-def test_on_a_terminal_a_command_says_that_it_loads_before_it_does(tmp_path: Path) -> None:
-    (tmp_path / 'scene.yaml').write_text('start: [0, 0]\ngoal: [0.3, 0]\n')
-    program = """
-import sys
-from foc_ros.cli.main import main
-write = sys.stderr.write
-def note(text):
-    loaded.append('foc_ros.cli.solve' in sys.modules)
-    return write(text)
-loaded, sys.stderr.write = [], note
-code = main(sys.argv[1:])
-print(loaded[0], code)
-"""
-    controlling, terminal = os.openpty()
-    command = [sys.executable, '-c', program, 'solve', str(tmp_path / 'scene.yaml')]
-    try:
-        result = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=terminal, text=True, timeout=100, check=False)
-        shown = os.read(controlling, 1000).decode()
-    finally:
-        os.close(controlling)
-        os.close(terminal)
-    assert result.stdout.endswith('\nFalse 0\n')
-    assert shown.startswith('loading ...\r') and '           \r' in shown
-
-
 class Fake:
     """A command with a given outcome."""
 

@@ -140,16 +140,6 @@ def test_a_node_says_what_it_waits_for_and_when_it_predicts(ros: Graph) -> None:
     ]
 
 
-def test_a_first_start_says_at_once_that_it_compiles(ros: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path))
-    with running(ros, 'module') as process:
-        assert process.stderr is not None
-        line = process.stderr.readline()
-        compiled = list(tmp_path.glob('**/*.nbc'))
-    assert 'compiling the solver for this machine' in line
-    assert not compiled, 'the message comes before the first kernel is compiled'
-
-
 def test_dds_connects_the_process_while_it_loads_and_a_stop_then_leaves_no_trace(
     ros: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

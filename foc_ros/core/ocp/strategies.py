@@ -24,7 +24,7 @@ from foc_ros.core.types import Array, Status
 
 from .margin import Contacts, Indices, Margins
 from .problem import Problem
-from .solver import LARGEST_RATE, Iterates, Solver
+from .solver import LARGEST_RATE, LARGEST_TOLERANCE, Iterates, Solver
 from .start import NO_FORCES, Forces, Start, follow
 
 INFEASIBLE = 'no path between the obstacles in this homotopy class meets the goal: the path shown violates them least'
@@ -284,7 +284,8 @@ def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult
     is_late = not now.is_done[row] and now.iterations[row] < point.solver.most
     if is_touching and not is_late:
         return collect(point, row, Status.INFEASIBLE, INFEASIBLE)
-    if is_late or not (now.is_settled[row] or problem.preference.is_hard):
+    is_settled = now.is_settled[row] or now.gain[row] < LARGEST_TOLERANCE
+    if is_late or not (is_settled or problem.preference.is_hard):
         cause = 'out of time' if is_late else 'not settled'
         message = f'{cause}: eta {reached:.4g} so far, and the likelihood is estimated'
         return collect(point, row, Status.DEADLINE, message, aims_at_eta=False)
