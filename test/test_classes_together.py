@@ -13,8 +13,8 @@ from foc_ros.core.config import FocConfig, HomotopyConfig
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, collect_obstacles
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import solve_problem, solve_problems
-from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.ocp.solver import LARGEST_TOLERANCE
+from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.safety_preference import SafetyPreference
 from foc_ros.core.types import Candidate, Obstacles, Solution, Status, make_obstacles
 
@@ -54,7 +54,7 @@ def test_each_class_is_as_if_it_were_alone_and_the_same_each_time(name, strategy
     for candidate, one, other in zip(candidates, together, again, strict=True):
         np.testing.assert_array_equal(one.mean, other.mean)
         alone = solve_problem(problem, cold_start(candidate.guess), FocConfig(strategy=strategy))
-        # beside a better class a class is solved as far as its likelihood can tell, and `lv` and `hc` look at samples of such solutions
+        # beside a better class a class is solved as far as its likelihood tells; `lv` and `hc` look at samples of such solutions
         inexact = {'fixed': 1e-6, 'lv': 0.03, 'hc': 0.03}.get(strategy, LARGEST_TOLERANCE)
         assert find_loss(one) == pytest.approx(find_loss(alone), abs=inexact)
         assert one.effort == pytest.approx(alone.effort, rel=1e-2)

@@ -12,6 +12,7 @@ from foc_ros.core.memory.memory import Memory
 from foc_ros.core.ocp.lv_hc import Curve
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import find_least_safety_factor, solve_problem
+from foc_ros.core.ocp.solver import LARGEST_TOLERANCE
 from foc_ros.core.ocp.start import cold_start, warm_start
 from foc_ros.core.ocp.strategies import solve_at
 from foc_ros.core.predictor import predict
@@ -78,7 +79,7 @@ def test_no_point_of_the_curve_has_a_smaller_loss(strategy):
         last = curve.find_s(found.lam) if strategy == 'lv' else found.tau / curve.delta
         for s in np.arange(max(last - 3.0, 0.0), last + 2.0, 0.25):
             at = curve.at(np.array([s]))
-            point = solve_at([problem], [cold_start(guess)], *at, is_chance=False, before=point)
+            point = solve_at([problem], [cold_start(guess)], at, is_chance=False, before=point)
             control = point.now.control[0] / problem.horizon.gain
             k, *_ = find_least_safety_factor(problem, control)
             if not point.is_touching()[0]:
@@ -110,7 +111,7 @@ def test_a_warm_start_finds_the_compromise_of_a_cold_one(strategy):
         assert warm.status is cold.status
         if cold.status is Status.COMPROMISED:
             compromised += 1
-            assert loss(warm, problem) == pytest.approx(loss(cold, problem), abs=1e-3)
+            assert loss(warm, problem) == pytest.approx(loss(cold, problem), abs=LARGEST_TOLERANCE)
     assert compromised >= 3
 
 

@@ -29,11 +29,13 @@ def test_the_largest_reachable_eta_is_reported(strategy):
 def test_an_infeasible_geometry_says_how_much_it_lacks_and_where(strategy):
     solution = solved(reach(WALL), bowed((0, 0), (0.3, 0), 50, 0.0), strategy)
     assert solution.status is Status.INFEASIBLE
-    distance = np.hypot(*(solution.path[1:, None] - WALL.centre).T)
-    assert solution.violation == pytest.approx((0.03 - distance).max(), abs=1e-9)
+    path = CubicHermiteSpline(np.arange(51), solution.path, solution.mean[:, 2:4] * solution.dt)
+    distance = np.hypot(*(path(np.arange(0, 50, 1e-3))[:, None] - WALL.centre).T)
+    asked = math.sqrt(0.03**2 + solution.tau)
+    assert solution.violation == pytest.approx((asked - distance).max(), abs=2e-3)
     assert solution.violation > 0.005, 'between centres 4 cm apart there are 2 cm to each at best, of 3'
     identity, step = solution.violation_at
-    assert 0.03 - distance[WALL.ids.index(identity), step - 1] == pytest.approx(solution.violation, abs=1e-9)
+    assert asked - np.hypot(*(path(step) - WALL.centre[WALL.ids.index(identity)])) == pytest.approx(solution.violation, abs=1e-9)
     said = float(re.search(r'by up to (\S+) m', solution.message)[1])
     assert said == pytest.approx(solution.violation, rel=1e-2)
     assert solution.qp_solves >= 1
@@ -56,18 +58,21 @@ def test_multipliers_are_what_a_metre_of_distance_costs():
     less, middle, more = (solved(one_obstacle(), BOWED, 'fixed', tau=tau + by, lam=1e3) for by in (-step, 0.0, step))
     measured = (augmented(more) - augmented(less)) / (2 * step)
     reach_m = math.sqrt(0.03**2 + 0.003**2 + tau)
-    assert sum(value for _, _, value in middle.multipliers) / (2 * reach_m) == pytest.approx(measured, rel=1e-3)
+    assert sum(value for _, _, value in middle.multipliers) / (2 * reach_m) == pytest.approx(measured, rel=1e-2)
     assert middle.equivalent_weights == ((tau, 1e3),) * len(middle.multipliers)
 
 
 def test_multipliers_of_optimal_are_what_a_metre_of_distance_costs():
-    """J by k: a row asks for k sqrt(Var) / (2 |d|) more, and tau is k sqrt(Var)."""
+    """J by k: with s = sqrt(Var) / (2 |d|), a unit of k takes s |d| / (|d| - k s) from a margin, and tau is k sqrt(Var)."""
     k, step = 2.0, 1e-3
     less, middle, more = (solved(one_obstacle(x**2 / (1 + x**2)), BOWED, 'optimal') for x in (k - step, k, k + step))
     assert middle.status is Status.SOLVED
-    distance = np.hypot(*(middle.path - [0.12, 0.0]).T)
     rows = zip(middle.multipliers, middle.equivalent_weights, strict=True)
-    predicted = sum(value * tau / k / (2 * distance[int(at)]) for (_, at, value), (tau, _) in rows)
+    path = CubicHermiteSpline(np.arange(len(middle.mean)), middle.path, middle.mean[:, 2:4] * middle.dt)
+    predicted = 0.0
+    for (_, at, value), (tau, _) in rows:
+        distance = np.hypot(*(path(at) - [0.12, 0.0]))
+        predicted += value * tau / k / (2 * (distance - tau / (2 * distance)))
     assert predicted == pytest.approx((more.effort - less.effort) / (2 * step), rel=2e-3)
 
 

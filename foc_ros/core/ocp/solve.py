@@ -12,6 +12,7 @@ import numpy as np
 from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.dynamics.noise import propagate_covariance
+from foc_ros.core.dynamics.response import hermite, pair_steps
 from foc_ros.core.errors import InputError
 from foc_ros.core.obstacles.geometry import find_offset
 from foc_ros.core.registry import STRATEGIES
@@ -28,6 +29,8 @@ REMAINING = 0.5
 """Part of what a QP promised by which the loss still falls after its step: the median in the random scenes of the tests."""
 LARGEST_GAIN = 1.0
 """Most by which a loss is expected to fall still: far from a solution a QP promises anything."""
+PARTS = 16
+"""Points of a step at which the violation of a path that is none is looked at: it may leap over an obstacle between two steps."""
 NO_VIOLATION = 1e-7
 """Shortfall of a distance that counts as rounding [m]."""
 
@@ -114,7 +117,7 @@ def _evaluate_one(problem: Problem, result: StrategyResult, minimum: tuple[float
     covariance = propagate_covariance(problem.horizon, problem.free_covariance, problem.noise_variance, control)
     violation, violated = 0.0, None
     if status is Status.INFEASIBLE or result.tau:
-        violation, violated = compute_violation(problem, mean, result.tau)
+        violation, violated = compute_violation(problem, mean, result.tau, PARTS if status is Status.INFEASIBLE else 1)
     effort, names = float(control @ control), problem.obstacles.ids
     shortfall, expected = 0.0 if status is Status.SOLVED else max(problem.wanted_k - k, 0.0), None
     if status is Status.DEADLINE:
@@ -188,15 +191,18 @@ def compute_cost_terms(problem: Problem, control: Array, mean: Array, covariance
     }
 
 
-def compute_violation(problem: Problem, mean: Array, tau: float) -> tuple[float, tuple[int, int] | None]:
-    """Return by how much a mean (N + 1, n) comes nearer than sqrt(E[R^2] + tau) at the steps [m], and where: obstacle and step.
+def compute_violation(problem: Problem, mean: Array, tau: float, parts: int) -> tuple[float, tuple[int, float] | None]:
+    """Return by how much a mean (N + 1, n) comes nearer than sqrt(E[R^2] + tau) [m], and where: obstacle and step.
 
-    0 and None where it never does.
+    It is looked at a number of points of each step: at one for margins that hold at the steps. 0 and None where it never does.
     """
     if not len(problem.obstacles):
         return 0.0, None
-    relative = mean[1:, None, :2] - problem.centre_trajectories[1:]
+    times = np.arange(1, parts * problem.horizon.steps + 1) / parts
+    ends = pair_steps(np.stack((mean[:, :2], problem.horizon.dt * mean[:, 2:4]), axis=1))
+    path = (hermite(np.arange(1, parts + 1) / parts) @ ends).reshape(-1, 2)
+    relative = path[:, None] - problem.obstacles.centre - times[:, None, None] * problem.drift
     missing = np.sqrt(problem.size[0] + tau) - find_offset(relative[..., 0], relative[..., 1], problem.edges).distance
-    step, row = np.unravel_index(int(missing.argmax()), missing.shape)
-    deepest = float(missing[step, row])
-    return (deepest, (int(row), int(step) + 1)) if deepest > NO_VIOLATION else (0.0, None)
+    moment, row = np.unravel_index(int(missing.argmax()), missing.shape)
+    deepest = float(missing[moment, row])
+    return (deepest, (int(row), float(times[moment]))) if deepest > NO_VIOLATION else (0.0, None)

@@ -261,8 +261,9 @@ def _meet_everywhere(point: Point, deadline: Deadline) -> tuple[Array, Indices, 
 def _find_weights(point: Point, results: Sequence[StrategyResult]) -> list[tuple[tuple[float, float], ...]]:
     """Return the (tau [m^2], lambda [1/s^6]) with which each contact would be where it is.
 
-    tau = k sqrt(Var[C]) is by how much E[C] has to be below zero, and lambda = y k D / sqrt(Var[C]), for a multiplier y [m/s^6],
-    is the cost of a variance along its normal at its time.
+    tau = k sqrt(Var[C]) is by how much E[C] has to be below zero. With the standard deviation s = sqrt(Var[C]) / (2 D) along the
+    normal, lambda = y k / (2 s) D / (D - k s), for a multiplier y [m/s^6] of the margin g, is the cost of the variance s^2 at its
+    time: -y dg/d(s^2).
     """
     counts = [len(each.forces.time) for each in results]
     obstacle, time, push = (np.concatenate([each.forces[i] for each in results]) for i in range(3))
@@ -270,7 +271,8 @@ def _find_weights(point: Point, results: Sequence[StrategyResult]) -> list[tuple
     spread, distance = point.solver.margins.measure_spread(Contacts(problem, obstacle, time), point.now.control)
     k = point.k[problem]
     effort = np.array([float(each.control @ each.control) for each in results])[problem]
-    pairs = list(zip((k * spread).tolist(), (push * effort * k * distance / spread).tolist(), strict=True))
+    clear = distance / (distance - k * spread / (2.0 * distance))
+    pairs = list(zip((k * spread).tolist(), (push * effort * k * distance / spread * clear).tolist(), strict=True))
     ends = np.cumsum(counts).tolist()
     return [tuple(pairs[end - count : end]) for count, end in zip(counts, ends, strict=True)]
 
@@ -311,8 +313,8 @@ def solve_fixed(
 
 def _finish_curve(point: Point, row: int, is_touching: bool, status: Status, message: str, **rest: object) -> StrategyResult:
     """Return the result of a strategy of tau and lambda, unless the point is none."""
-    if not point.now.is_done[row]:
-        is_late = point.now.iterations[row] < point.solver.most
+    is_late = not point.now.is_done[row] and point.now.iterations[row] < point.solver.most
+    if is_late or not (point.now.is_done[row] or point.now.gain[row] < LARGEST_TOLERANCE):
         status, message = Status.DEADLINE, f'{"out of time" if is_late else "not settled"}: the likelihood is estimated'
     elif is_touching:
         status, message = Status.INFEASIBLE, INFEASIBLE
