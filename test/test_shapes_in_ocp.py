@@ -143,7 +143,7 @@ def test_a_circle_and_a_box_without_size(strategy):
     ]
     first = solved(make_reach(circle), GUESS, **SETTINGS[strategy])
     for shape in shapes:
-        same(first, solved(make_reach(shape), GUESS, **SETTINGS[strategy]))
+        same(first, solved(make_reach(shape), GUESS, **SETTINGS[strategy]), tolerance=1e-4 if strategy in ('lv', 'hc') else 1e-6)
 
 
 @EVERY
@@ -196,10 +196,10 @@ def well_posed(obstacles: Obstacles, guess, strategy: str) -> Solution:
 
 
 def alike(first: Solution, second: Solution, moved) -> None:
-    """Within what the root in s and the relinearisation leave open, as for circles."""
+    """Within what the samples of the curves of `lv` and `hc` leave open."""
     assert second.status is Status.SOLVED
-    assert second.effort == pytest.approx(first.effort, rel=1e-3)
-    assert np.abs(second.path - moved(first.path)).max() < 5e-4
+    assert second.effort == pytest.approx(first.effort, rel=1e-2)
+    assert np.abs(second.path - moved(first.path)).max() < 2e-3
 
 
 def transform(obstacles: Obstacles, map_: np.ndarray, shift: float = 0.0) -> Obstacles:
