@@ -25,8 +25,6 @@ ROOM = 0.002
 """Distance from the grown obstacles that a guess keeps where there is room [m]."""
 ROOMS = ROOM, ROOM, 0.0
 """To this distance from the grown obstacles a guess is moved after each smoothing [m]: the last smoothing uses up the room."""
-SMOOTHINGS = 2
-"""How often the positions of a guess are averaged with their neighbours before they are moved away from the obstacles."""
 CLEAR = 1e-12
 """Depth in a grown obstacle that does not count [m]."""
 

@@ -29,11 +29,6 @@ def position_variances(noise: PositionNoise, control: Array) -> Array:
     return variance
 
 
-def largest_shift(position: Array, control: Array, other: Array) -> float:
-    """Return the largest difference in x or y between the means of two controls (2N,) [m]; position (2, 2, N + 1)."""
-    return float(np.abs(apply_impulse_response(position, control - other)).max())
-
-
 def variance_weights(states: Array, terminal: Array, stage: Array) -> Array:
     """Return d (2N,), where d.u^2 is what a control's noise u adds to sum_i terminal_i X_i(N)^2 + stage_i sum_{t < N} X_i(t)^2.
 

@@ -22,6 +22,11 @@ def compute_curve(path: Array, velocity: Array, dt: float) -> Array:
     parts = -(-LEAST_POINTS // max(steps, 1))
     if steps < 1 or parts == 1:
         return path
+    return sample_curve(path, velocity, dt, parts)
+
+
+def sample_curve(path: Array, velocity: Array, dt: float, parts: int) -> Array:
+    """Return the mean path at equal parts of its steps, (parts N + 1, 2) [m], for positions and velocities as above."""
     ends = pair_steps(np.stack((path, dt * velocity), axis=1))
     points: Array = (hermite(np.arange(parts) / parts) @ ends).reshape(-1, 2)
     return np.concatenate((points, path[-1:]))

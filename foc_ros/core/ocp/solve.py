@@ -12,7 +12,7 @@ import numpy as np
 from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.dynamics.noise import propagate_covariance
-from foc_ros.core.dynamics.response import hermite, pair_steps
+from foc_ros.core.dynamics.smooth_path import sample_curve
 from foc_ros.core.errors import InputError
 from foc_ros.core.obstacles.geometry import find_offset
 from foc_ros.core.registry import STRATEGIES
@@ -30,7 +30,7 @@ REMAINING = 0.5
 LARGEST_GAIN = 1.0
 """Most by which a loss is expected to fall still: far from a solution a QP promises anything."""
 PARTS = 16
-"""Points of a step at which the violation of a path that is none is looked at: it may leap over an obstacle between two steps."""
+"""Points of each step at which an infeasible path is measured: it may leap over an obstacle between two steps."""
 NO_VIOLATION = 1e-7
 """Shortfall of a distance that counts as rounding [m]."""
 
@@ -194,13 +194,12 @@ def compute_cost_terms(problem: Problem, control: Array, mean: Array, covariance
 def compute_violation(problem: Problem, mean: Array, tau: float, parts: int) -> tuple[float, tuple[int, float] | None]:
     """Return by how much a mean (N + 1, n) comes nearer than sqrt(E[R^2] + tau) [m], and where: obstacle and step.
 
-    It is looked at a number of points of each step: at one for margins that hold at the steps. 0 and None where it never does.
+    Each step is measured at equal parts; one part means its end only. 0 and None where the mean keeps its distance.
     """
     if not len(problem.obstacles):
         return 0.0, None
     times = np.arange(1, parts * problem.horizon.steps + 1) / parts
-    ends = pair_steps(np.stack((mean[:, :2], problem.horizon.dt * mean[:, 2:4]), axis=1))
-    path = (hermite(np.arange(1, parts + 1) / parts) @ ends).reshape(-1, 2)
+    path = sample_curve(mean[:, :2], mean[:, 2:4], problem.horizon.dt, parts)[1:]
     relative = path[:, None] - problem.obstacles.centre - times[:, None, None] * problem.drift
     missing = np.sqrt(problem.size[0] + tau) - find_offset(relative[..., 0], relative[..., 1], problem.edges).distance
     moment, row = np.unravel_index(int(missing.argmax()), missing.shape)

@@ -24,7 +24,7 @@ from foc_ros.core.types import Array, Status
 
 from .margin import Contacts, Indices, Margins
 from .problem import Problem
-from .solver import LARGEST_RATE, LARGEST_TOLERANCE, Iterates, Solver
+from .solver import LARGEST_RATE, LARGEST_TOLERANCE, MOST_ITERATIONS, Iterates, Solver
 from .start import NO_FORCES, Forces, Start, follow
 
 INFEASIBLE = 'no path between the obstacles in this homotopy class meets the goal: the path shown violates them least'
@@ -111,10 +111,9 @@ class Point:
     now: Iterates
     k: Array
 
-    @property
-    def log_cost(self) -> Array:
-        """ln J up to a constant, (b,)."""
-        return np.log(self.now.at.cost)
+    def is_late(self, row: int) -> bool:
+        """Return whether the time was up before a problem was solved or had its iterations."""
+        return not self.now.is_done[row] and bool(self.now.iterations[row] < self.solver.most)
 
     def is_touching(self) -> NDArray[np.bool_]:
         """Return whether the mean enters an obstacle or its clearance, or leaps over one between two points of the grid, (b,).
@@ -146,7 +145,7 @@ def solve_at(
     between: bool = True,
     deadline: Deadline = NEVER,
     before: Point | None = None,
-    most: int | None = None,
+    most: int = MOST_ITERATIONS,
 ) -> Point:
     """Solve problems at one point of a curve.
 
@@ -165,7 +164,7 @@ def solve_at(
     before
         A solution of the same problems at another point, from which the search begins instead.
     most
-        Most iterations, None for the usual number.
+        Most iterations.
     """
     tau, lam = weights
     margins = Margins(problems, tau, is_chance=is_chance, between=between)
@@ -182,10 +181,7 @@ def solve_at(
         control, k, angles = last.control.copy(), last.k.copy(), last.angles
         contacts, multipliers = last.contacts, last.multipliers
     now = solver.begin(control, contacts, multipliers, np.where(k > 0.0, np.minimum(k, wanted), wanted), angles)
-    if most is None:
-        solver.run(now, deadline)
-    else:
-        solver.run(now, deadline, most)
+    solver.run(now, deadline, most)
     return Point(solver, now, now.at.factor)
 
 
@@ -244,8 +240,8 @@ def _meet_everywhere(point: Point, deadline: Deadline) -> tuple[Array, Indices, 
     """Return the least safety factors of a point, after asking for more where an obstacle comes nearer than its contacts tell."""
     solver, now = point.solver, point.now
     found = solver.margins.find_least_factors(now.control)
+    aimed = np.array([each.wanted_k for each in solver.margins.problems])
     for _ in range(CORRECTIONS):
-        aimed = np.array([each.wanted_k for each in solver.margins.problems])
         short = (found[0] < aimed * (1.0 - REACHED)) & (now.at.factor >= aimed * (1.0 - REACHED)) & now.is_done
         if not short.any() or not deadline.allows():
             break
@@ -283,7 +279,7 @@ def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult
     reached = problem.risk.find_probability(k)
     if k >= problem.wanted_k * (1.0 - REACHED) and now.is_done[row]:
         return collect(point, row, Status.SOLVED, 'solved')
-    is_late = not now.is_done[row] and now.iterations[row] < point.solver.most
+    is_late = point.is_late(row)
     if is_touching and not is_late:
         return collect(point, row, Status.INFEASIBLE, INFEASIBLE)
     is_settled = now.is_settled[row] or now.gain[row] < LARGEST_TOLERANCE
@@ -313,7 +309,7 @@ def solve_fixed(
 
 def _finish_curve(point: Point, row: int, is_touching: bool, status: Status, message: str, **rest: object) -> StrategyResult:
     """Return the result of a strategy of tau and lambda, unless the point is none."""
-    is_late = not point.now.is_done[row] and point.now.iterations[row] < point.solver.most
+    is_late = point.is_late(row)
     if is_late or not (point.now.is_done[row] or point.now.gain[row] < LARGEST_TOLERANCE):
         status, message = Status.DEADLINE, f'{"out of time" if is_late else "not settled"}: the likelihood is estimated'
     elif is_touching:
@@ -348,7 +344,7 @@ def _run_algorithm1(problem: Problem, start: Start, settings: FocConfig, deadlin
         weights = {'tau': tau, 'lam': lam, 'iterations': iteration, 'qp_solves': iteration}
         if k >= problem.wanted_k and abs(effort - last) < settings.algorithm1_xi:
             return collect(point, 0, Status.SOLVED, 'solved', **weights)
-        if point.is_touching()[0] and point.now.gain[0] < STALLED:
+        if point.now.gain[0] < STALLED and point.is_touching()[0]:
             message = f'QP {iteration} is infeasible at tau = {tau:.3g}, lambda = {lam:.3g}'
             return collect(point, 0, Status.INFEASIBLE, message, **weights)
         if k < problem.wanted_k:
