@@ -290,7 +290,9 @@ def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult
     if problem.preference.is_hard:
         message = f'eta {problem.eta:g} is out of reach: the largest found is {reached:.4g}'
     else:
-        message = f'eta {reached:.4g} only: more would cost more than likelihood.shortfall, or is out of reach'
+        message = (
+            f'eta {reached:.6g} of the wanted {problem.eta:g}: more would cost more than likelihood.shortfall, or is out of reach'
+        )
     return collect(point, row, Status.ETA_UNREACHABLE, message)
 
 
