@@ -40,7 +40,7 @@ DIFFERENCE = 5e-3
 """Time on both sides of a contact by whose gradients its sliding is found [steps]."""
 LEAST_BEND = 3e-2
 """Least second derivative of a margin in time, relative to scene and whole time: along a flat side the contact is anywhere."""
-GRID, FINE_GRID = 2, 4
+GRID, FINE_GRID = 4, 4
 """Points for each step on which closest approaches are looked for: among circles, and where there are corners."""
 POINTS, MANY_POINTS = 9, 17
 """Points beside a minimum on the grid at which minima are told apart: in the solver, and for what is reported."""
@@ -50,8 +50,8 @@ NARROWINGS = 3
 """Brackets: the last points are 2e-3 steps apart, and a parabola or two lines pass through them."""
 FEW_NARROWINGS = 1
 """The same for circles, beside which a safety factor changes smoothly with time."""
-FACTORS = 5
-"""Vectors of which the second derivatives of a margin consist, besides a diagonal."""
+FACTORS = 6
+"""Vectors of which the second derivatives of a margin consist, besides a diagonal; the last one is its gradient."""
 
 
 class Contacts(NamedTuple):
@@ -111,11 +111,13 @@ class Margin(NamedTuple):
 class Turning(NamedTuple):
     """What the second derivatives of q margins follow from.
 
-    k; worth: -dg/dw of the variance w = s^2; turn: 1 / D where the normal turns, else 0 [1/m]; across: dw by the angle of the
-    normal; size: Var[R^2] / 4 where it counts [m^4]; bend: second derivative in time. All are (q,).
+    k; is_free: whether k changes with the control; worth: -dg/dw of the variance w = s^2; turn: 1 / D where the normal turns, else
+    0 [1/m]; across: dw by the angle of the normal; size: Var[R^2] / 4 where it counts [m^4]; bend: second derivative in time.
+    All are (q,).
     """
 
     k: Array
+    is_free: NDArray[np.bool_]
     worth: Array
     turn: Array
     across: Array
@@ -128,7 +130,7 @@ class Gradients(NamedTuple):
 
     value (q,) [m]; gradient (q, 2N), with respect to the control; stddev_rate (q,): -dg/dk [m]. For the h places that hold the
     mean off, diagonal (h, 2N): what a unit of the multiplier adds to the diagonal of the Hessian of the Lagrangian; factors
-    (h, 5, 2N) and weights (h, 5, 5): the remaining part of it, sum_ab weights_ab factors_a factors_b'.
+    (h, 6, 2N) and weights (h, 6, 6): the remaining part of it, sum_ab weights_ab factors_a factors_b'.
     """
 
     value: Array
@@ -459,7 +461,9 @@ class Margins:
         margin, _ = self._respond(places, control[places.problem], np.zeros(len(places.time)))
         return 2.0 * np.abs(margin.distance) * margin.stddev, margin.distance
 
-    def linearise(self, places: Contacts, control: Array, k: Array, is_held: NDArray[np.bool_]) -> Gradients:
+    def linearise(
+        self, places: Contacts, control: Array, k: Array, is_held: NDArray[np.bool_], is_free: NDArray[np.bool_]
+    ) -> Gradients:
         """Return margins at q places with their first and second derivatives.
 
         Parameters
@@ -470,6 +474,8 @@ class Margins:
             Control (2N,) and safety factor for each place, (q, 2N) and (q,).
         is_held : NDArray[np.bool_]
             Which places hold the mean off, (q,): those that slide with it, and have second derivatives.
+        is_free : NDArray[np.bool_]
+            Where the safety factor changes with the control, (q,).
         """
         count, held = len(places.time), np.flatnonzero(is_held)
         moments = places.time[held]
@@ -496,7 +502,10 @@ class Margins:
         apart = np.where(apart > 0.0, apart, 1.0)  # there is but one time in a single step
         rise, fall = margin.value[later] - margin.value[held], margin.value[earlier] - margin.value[held]
         bend = 4.0 * (rise + fall) / apart**2
-        slide = (gradient[later] - gradient[earlier]) / apart[:, None]
+        before, after = (
+            np.where(is_free[held], rate[held] / rate[beside], 1.0)[:, None] * gradient[beside] for beside in (earlier, later)
+        )
+        slide = (after - before) / apart[:, None]
         # where the nearest point passes from an edge to a corner, the margin has a kink in time: the least margin moves with both
         # sides, by so much of each that it does not change with time
         is_kink = (margin.is_on_edge[later] != margin.is_on_edge[earlier]) & (rise > 0.0) & (fall > 0.0)
@@ -505,15 +514,16 @@ class Margins:
         gradient = gradient[:count]
         gradient[held] = np.where(is_kink[:, None], mixed, gradient[held])
         bend = np.where(is_kink, np.inf, bend)
-        factors = np.stack((aside[held], along[held], 4.0 * noise[held] * along[held] * aside[held], spread[held], slide), axis=1)
-        terms = Turning(k[held], worth[held], turn[held], across[held], size[held], bend)
+        moved = 4.0 * noise[held] * along[held] * aside[held]
+        factors = np.stack((aside[held], along[held], moved, spread[held], slide, gradient[held]), axis=1)
+        terms = Turning(k[held], is_free[held], worth[held], turn[held], across[held], size[held], bend)
         weights = self._weigh_factors(places.take(held), margin.take(held), terms)
         diagonal = (2.0 * worth[held])[:, None] * self.noise_variance[whole.problem[held]] * along[held] ** 2
         return Gradients(margin.value[:count], gradient, rate[:count], diagonal, factors, weights)
 
     def _weigh_factors(self, places: Contacts, margin: Margin, terms: Turning) -> Array:
-        """Return the weights (q, 5, 5) of the factors: displacement across and along the normal, and the effect on P, w and t."""
-        k, worth, turn, across, size, bend = terms
+        """Return the weights (q, 6, 6) of the factors: displacement across and along the normal, and the effect on P, w, t and g."""
+        k, is_free, worth, turn, across, size, bend = terms
         weights = np.zeros((len(k), FACTORS, FACTORS))
         difference = 2.0 * margin.trace - 4.0 * (margin.normal_x * margin.variance_x + margin.normal_y * margin.variance_y)
         weights[:, 0, 0] = turn * (-1.0 + worth * (turn * difference - 2.0 * size / margin.distance**3))
@@ -523,6 +533,15 @@ class Margins:
         reach = self.reach_square[places.problem, places.obstacle]
         variance = margin.stddev**2
         weights[:, 3, 3] = self.is_chance * k * k * reach / (4.0 * variance * margin.root**3) - worth / (2.0 * variance)
+        # where k is free, the margin is zero at k(u), of which the second derivatives are r k_uu = g_uu + g_uk k_u' + k_u g_uk' +
+        # g_kk k_u k_u', with k_u = g_u / r, g_u = along - worth spread, and g_uk in the direction of the spread
+        ratio = k * margin.stddev / margin.root
+        rate = margin.stddev * (1.0 + ratio)
+        mixed = is_free * (1.0 + 2.0 * ratio - ratio**3) / (2.0 * margin.stddev * rate)
+        square = is_free * variance * reach / (margin.root**3 * rate**2)
+        weights[:, 1, 1] += square
+        weights[:, 1, 3] = weights[:, 3, 1] = mixed - worth * square
+        weights[:, 3, 3] += worth * (worth * square - 2.0 * mixed)
         is_inside = (places.time > 1.0) & (places.time < self.steps) & self.between
         floor = LEAST_BEND * self.extent[places.problem] / self.steps**2
         weights[:, 4, 4] = np.where(is_inside, 1.0 / np.maximum(bend, floor), 0.0)

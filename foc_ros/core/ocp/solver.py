@@ -42,6 +42,8 @@ LARGEST_RATE, GENTLE_RATE = 1e3, 5.0
 begins where it is larger: at a guess, margins tell little of what they cost."""
 ROUGH_GAIN = 1e-3
 """Gain, as a logarithm of cost, at which the search with the gentle worth ends."""
+FREE = 1e-3
+"""Part of the wanted safety factor that is missing where it is chosen with the control."""
 SMALL_GAIN, SMALL_FACTOR = 2e-8, 1e-9
 """Gain that a QP promises below which a problem is solved, and relative difference of a safety factor that is rounding."""
 LAST_GAIN, LAST_FACTOR = 3e-4, 1e-6
@@ -252,11 +254,11 @@ class Solver:
         bound = now.bound[rows] - SUFFICIENT * share * plan.gain[place] + ROUNDING
         is_good = (at.loss <= bound) & (np.abs(at.angles - now.angles[rows]) < np.pi).all(axis=1)
         if share == 1.0:
-            fallen = now.at.loss[rows] - at.loss
-            is_near = np.abs(fallen) < STALLED * plan.gain[place]  # what is left is rounding
-            is_near |= (fallen >= 0.0) & (at.factor > plan.k[place] - LAST_FACTOR * (1.0 + plan.k[place]))
-            # rows at the steps alone creep from one to the next
-            is_last = is_good & is_near & (plan.gain[place] < LAST_GAIN * self._tolerate(now, rows)) & self.margins.between
+            # Newton steps converge quadratically; rows at the steps alone creep from one to the next
+            is_small = plan.gain[place] < LAST_GAIN * self._tolerate(now, rows)
+            is_met = at.factor > np.minimum(plan.k[place], self.wanted_k[rows]) - LAST_FACTOR * (1.0 + plan.k[place])
+            is_met |= plan.k[place] < self.wanted_k[rows] * (1.0 - FREE)
+            is_last = is_good & is_small & is_met & self.margins.between
             now.is_done[rows[is_last]] = now.is_settled[rows[is_last]] = True
         good = rows[is_good]
         now.control[good] = control[is_good]
@@ -315,14 +317,15 @@ class Solver:
         margins, objective = self.margins, self.objective
         places, known = self._choose_places(now, rows, further)
         at, control, k_now = np.searchsorted(rows, places.problem), now.control[rows], now.k[rows]
-        gradients = margins.linearise(places, control[at], k_now[at], known > 0.0)
+        is_free = (k_now > 0.0) & (k_now < self.wanted_k[rows] * (1.0 - FREE))
+        gradients = margins.linearise(places, control[at], k_now[at], known > 0.0, is_free[at])
         quadratic = objective.expand(rows, control, now.at.cost[rows])
-        numbered = number_rows(at, len(rows))
-        qp = ReducedQP(quadratic, numbered, gradients, known)
+        numbered, wanted = number_rows(at, len(rows)), self.wanted_k[rows]
+        short = gradients.value - gradients.stddev_rate * (wanted - k_now)[at]
+        qp = ReducedQP(quadratic, numbered, gradients, known, short, is_free)
         value, rate = numbered.spread(gradients.value), numbered.spread(gradients.stddev_rate)
         counts, multipliers = np.bincount(at, minlength=len(rows)).tolist(), np.zeros((len(rows), numbered.width))
-        wanted = self.wanted_k[rows]
-        linear = value - rate * (wanted - k_now)[:, None] - qp.gram[:, :-1, -1]
+        linear = numbered.spread(short) - qp.gram[:, :-1, -1]
         for row, (problem, n) in enumerate(zip(rows.tolist(), counts, strict=True)):
             if n:
                 square = qp.gram[row, :n, :n] + np.diag(qp.soften[row, :n])
