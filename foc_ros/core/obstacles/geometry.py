@@ -78,8 +78,9 @@ def find_offset(x: Array, y: Array, edges: Edges) -> Offset:
     is_inside = (edges.along_x * from_y >= edges.along_y * from_x).all(axis=-1) & edges.is_solid[..., 0]
     held = np.minimum(np.maximum(share, 0.0), 1.0)
     off_x, off_y = from_x - held * edges.along_x, from_y - held * edges.along_y
-    nearest = (off_x * off_x + off_y * off_y).argmin(axis=-1)[..., None]
-    x, y, share = (np.take_along_axis(each, nearest, axis=-1)[..., 0] for each in (off_x, off_y, share))
+    nearest = (off_x * off_x + off_y * off_y).argmin(axis=-1)
+    shape, flat = nearest.shape, np.arange(nearest.size) * share.shape[-1] + nearest.ravel()
+    x, y, share = (each.ravel()[flat].reshape(shape) for each in (off_x, off_y, share))
     return _point(x, y, is_inside, (share > 0.0) & (share < 1.0))
 
 

@@ -40,18 +40,17 @@ DIFFERENCE = 5e-3
 """Time on both sides of a contact by whose gradients its sliding is found [steps]."""
 LEAST_BEND = 3e-2
 """Least second derivative of a margin in time, relative to scene and whole time: along a flat side the contact is anywhere."""
-GRID, FINE_GRID = 4, 4
-"""Points for each step on which closest approaches are looked for: among circles, and where there are corners."""
-POINTS, MANY_POINTS = 9, 17
-"""Points beside a minimum on the grid at which minima are told apart: in the solver, and for what is reported."""
+GRID = 4
+"""Points for each step on which closest approaches are looked for."""
+POINTS = 9
+"""Points beside a minimum on the grid at which minima are told apart."""
 BRACKET = np.linspace(-1.0, 1.0, 9)
 """Times, relative to a bracket, at which the least safety factor is sought; the next bracket is a quarter of it."""
-NARROWINGS = 3
-"""Brackets: the last points are 2e-3 steps apart, and a parabola or two lines pass through them."""
-FEW_NARROWINGS = 1
-"""The same for circles, beside which a safety factor changes smoothly with time."""
-FACTORS = 6
-"""Vectors of which the second derivatives of a margin consist, besides a diagonal; the last one is its gradient."""
+NARROWINGS, MANY_NARROWINGS = 2, 3
+"""Brackets in the solver, and for what is reported: there the last points are 2e-3 steps apart, and a parabola or two lines pass
+through them."""
+FACTORS, GRADIENT = 5, 1
+"""Vectors of which the second derivatives of a margin consist, besides a diagonal, and which of them is its gradient."""
 
 
 class Contacts(NamedTuple):
@@ -130,7 +129,7 @@ class Gradients(NamedTuple):
 
     value (q,) [m]; gradient (q, 2N), with respect to the control; stddev_rate (q,): -dg/dk [m]. For the h places that hold the
     mean off, diagonal (h, 2N): what a unit of the multiplier adds to the diagonal of the Hessian of the Lagrangian; factors
-    (h, 6, 2N) and weights (h, 6, 6): the remaining part of it, sum_ab weights_ab factors_a factors_b'.
+    (h, 5, 2N) and weights (h, 5, 5): the remaining part of it, sum_ab weights_ab factors_a factors_b'.
     """
 
     value: Array
@@ -171,8 +170,7 @@ class Margins:
 
     def _set_times(self, between: bool) -> None:
         """Set the grid of times."""
-        has_polygons = any((each.obstacles.corners > 1).any() for each in self.problems)
-        points = (FINE_GRID if has_polygons else GRID) if between else 1
+        points = GRID if between else 1
         self.times, self._half = np.arange(points, points * self.steps + 1) / points, 1.0 / points
         self._step, share = self.response.locate(self.times)
         self._weight, self._quintic = hermite(share), hermite_quintic(share)
@@ -366,9 +364,9 @@ class Margins:
         at, obstacle, place = np.nonzero(_is_lowest(factor) & is_wanted)
         if not self.between:
             return Contacts(rows[at], obstacle, self.times[place]), factor[at, obstacle, place]
-        return self._refine(motion, k, at, Contacts(rows[at], obstacle, self.times[place]), POINTS)
+        return self._refine(motion, k, at, Contacts(rows[at], obstacle, self.times[place]), NARROWINGS)
 
-    def _refine(self, motion: Motion, k: Array, at: Indices, places: Contacts, points: int) -> tuple[Contacts, Array]:
+    def _refine(self, motion: Motion, k: Array, at: Indices, places: Contacts, narrowings: int) -> tuple[Contacts, Array]:
         """Return the minima beside some places of the grid, of movements in rows `at`, and the safety factors there.
 
         There may be several beside one place, next to the corners of a small obstacle: they are told apart at a number of points.
@@ -376,12 +374,12 @@ class Margins:
         least, last, apart = np.zeros(0), float(self.steps), self._half
         if not len(at):
             return places, least
-        times = np.clip(places.time + apart * np.linspace(-1.0, 1.0, points)[:, None], 1.0, last)
-        found = self._measure_times(motion, k, at, places, times).factor.reshape(points, -1).T
+        times = np.clip(places.time + apart * np.linspace(-1.0, 1.0, POINTS)[:, None], 1.0, last)
+        found = self._measure_times(motion, k, at, places, times).factor.reshape(POINTS, -1).T
         which, column = np.nonzero(_is_lowest(found))
         at, places = at[which], Contacts(places.problem[which], places.obstacle[which], times[column, which])
-        apart, best = 2.0 * apart / (points - 1), np.arange(len(at))
-        for _ in range(NARROWINGS if self.is_polygon.any() else FEW_NARROWINGS):
+        apart, best = 2.0 * apart / (POINTS - 1), np.arange(len(at))
+        for _ in range(narrowings):
             times = np.clip(places.time + apart * BRACKET[:, None], 1.0, last)
             margin = self._measure_times(motion, k, at, places, times)
             factors, is_on_edge = (each.reshape(len(BRACKET), -1) for each in (margin.factor, margin.is_on_edge))
@@ -429,7 +427,7 @@ class Margins:
         may_be_least = counts & (bold <= np.maximum(factor.min(axis=(1, 2)), 0.0)[:, None, None])
         at, obstacle, place = np.nonzero(may_be_least)
         times = np.maximum(self.times[place], self.recovery_steps[at, obstacle])
-        places, _ = self._refine(motion, none, at, Contacts(at, obstacle, times), MANY_POINTS)
+        places, _ = self._refine(motion, none, at, Contacts(at, obstacle, times), MANY_NARROWINGS)
         places = places._replace(time=np.maximum(places.time, self.recovery_steps[places.problem, places.obstacle]))
         found = self._measure_exactly(places, control)
         for which in np.argsort(-found, kind='stable').tolist():
@@ -515,33 +513,34 @@ class Margins:
         gradient[held] = np.where(is_kink[:, None], mixed, gradient[held])
         bend = np.where(is_kink, np.inf, bend)
         moved = 4.0 * noise[held] * along[held] * aside[held]
-        factors = np.stack((aside[held], along[held], moved, spread[held], slide, gradient[held]), axis=1)
+        factors = np.stack((aside[held], gradient[held], moved, spread[held], slide), axis=1)
         terms = Turning(k[held], is_free[held], worth[held], turn[held], across[held], size[held], bend)
         weights = self._weigh_factors(places.take(held), margin.take(held), terms)
         diagonal = (2.0 * worth[held])[:, None] * self.noise_variance[whole.problem[held]] * along[held] ** 2
         return Gradients(margin.value[:count], gradient, rate[:count], diagonal, factors, weights)
 
     def _weigh_factors(self, places: Contacts, margin: Margin, terms: Turning) -> Array:
-        """Return the weights (q, 6, 6) of the factors: displacement across and along the normal, and the effect on P, w, t and g."""
+        """Return the weights (q, 5, 5) of the factors: displacement across the normal, the gradient, and the effect on P, w, t.
+
+        The displacement along the normal is the gradient and worth times the effect on w. Where k is free, the margin is zero at
+        a k(u) whose second derivatives are r k_uu = g_uu + g_uk k_u' + k_u g_uk' + g_kk k_u k_u', with k_u = g_u / r.
+        """
         k, is_free, worth, turn, across, size, bend = terms
-        weights = np.zeros((len(k), FACTORS, FACTORS))
+        reach, variance = self.reach_square[places.problem, places.obstacle], margin.stddev**2
         difference = 2.0 * margin.trace - 4.0 * (margin.normal_x * margin.variance_x + margin.normal_y * margin.variance_y)
-        weights[:, 0, 0] = turn * (-1.0 + worth * (turn * difference - 2.0 * size / margin.distance**3))
-        weights[:, 0, 1] = weights[:, 1, 0] = -worth * across * turn**2
-        weights[:, 1, 1] = 6.0 * worth * size / margin.distance**4
-        weights[:, 0, 2] = weights[:, 2, 0] = worth * turn
-        reach = self.reach_square[places.problem, places.obstacle]
-        variance = margin.stddev**2
-        weights[:, 3, 3] = self.is_chance * k * k * reach / (4.0 * variance * margin.root**3) - worth / (2.0 * variance)
-        # where k is free, the margin is zero at k(u), of which the second derivatives are r k_uu = g_uu + g_uk k_u' + k_u g_uk' +
-        # g_kk k_u k_u', with k_u = g_u / r, g_u = along - worth spread, and g_uk in the direction of the spread
+        turned, along = -worth * across * turn**2, 6.0 * worth * size / margin.distance**4
         ratio = k * margin.stddev / margin.root
         rate = margin.stddev * (1.0 + ratio)
+        weights = np.zeros((len(k), FACTORS, FACTORS))
+        weights[:, 0, 0] = turn * (-1.0 + worth * (turn * difference - 2.0 * size / margin.distance**3))
+        weights[:, 0, 1] = weights[:, 1, 0] = turned
+        weights[:, 0, 2] = weights[:, 2, 0] = worth * turn
+        weights[:, 0, 3] = weights[:, 3, 0] = worth * turned
+        weights[:, 1, 1] = along + is_free * variance * reach / (margin.root**3 * rate**2)
         mixed = is_free * (1.0 + 2.0 * ratio - ratio**3) / (2.0 * margin.stddev * rate)
-        square = is_free * variance * reach / (margin.root**3 * rate**2)
-        weights[:, 1, 1] += square
-        weights[:, 1, 3] = weights[:, 3, 1] = mixed - worth * square
-        weights[:, 3, 3] += worth * (worth * square - 2.0 * mixed)
+        weights[:, 1, 3] = weights[:, 3, 1] = worth * along + mixed
+        bent = self.is_chance * k * k * reach / (4.0 * variance * margin.root**3) - worth / (2.0 * variance)
+        weights[:, 3, 3] = bent + worth**2 * along
         is_inside = (places.time > 1.0) & (places.time < self.steps) & self.between
         floor = LEAST_BEND * self.extent[places.problem] / self.steps**2
         weights[:, 4, 4] = np.where(is_inside, 1.0 / np.maximum(bend, floor), 0.0)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from foc_ros.core.types import Array
 
 from .backend import Answer, DenseQP
-from .margin import FACTORS, Gradients, Indices
+from .margin import FACTORS, GRADIENT, Gradients, Indices
 
 LEAST_CURVATURE = 0.1
 """Least eigenvalue of the Hessian relative to its diagonal part: with less, a step leaves the place where margins are known."""
@@ -114,7 +114,7 @@ class ReducedQP:
         values, self._vectors = np.linalg.eigh(self._lower.swapaxes(1, 2) @ curvature @ self._lower)
         lift = LIFT * np.maximum(-1.0 - values.min(axis=1, initial=0.0) + LEAST_CURVATURE, 0.0)
         if lift.any():
-            at = np.arange(numbered.width) * FACTORS + FACTORS - 1
+            at = np.arange(numbered.width) * FACTORS + GRADIENT
             unit = length[:, at]
             y, rate, short = (numbered.spread(each[held]) for each in (multipliers, gradients.stddev_rate, short))
             square, pull = _hold(lift, unit, y, rate, short, is_free)

@@ -46,7 +46,7 @@ FREE = 1e-3
 """Part of the wanted safety factor that is missing where it is chosen with the control."""
 SMALL_GAIN, SMALL_FACTOR = 2e-8, 1e-9
 """Gain that a QP promises below which a problem is solved, and relative difference of a safety factor that is rounding."""
-LAST_GAIN, LAST_FACTOR = 3e-4, 1e-6
+LAST_GAIN, LAST_FACTOR = 1e-3, 1e-6
 """Gain of a whole step after which a problem is solved, and part of its safety factor that the step may miss: Newton steps
 converge quadratically."""
 LARGEST_TOLERANCE = 5e-3
