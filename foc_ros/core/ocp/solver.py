@@ -36,7 +36,8 @@ APART = 0.05
 SAME = 1e-3
 """Time between contacts that count as one [steps]."""
 HELD = 1e-5
-"""Multiplier relative to the largest one from which a contact holds the mean off."""
+"""Multiplier, relative to the largest one and to one that changes ln J by 1 over the scene, from which a contact holds the mean
+off: the QP gives a small one to every row."""
 LARGEST_RATE, GENTLE_RATE = 1e3, 5.0
 """Worth of a unit of safety in logarithms of cost where the wanted safety is a condition, and the one with which the search
 begins where it is larger: at a guess, margins tell little of what they cost."""
@@ -46,9 +47,12 @@ FREE = 1e-3
 """Part of the wanted safety factor that is missing where it is chosen with the control."""
 SMALL_GAIN, SMALL_FACTOR = 2e-8, 1e-9
 """Gain that a QP promises below which a problem is solved, and relative difference of a safety factor that is rounding."""
-LAST_GAIN, LAST_FACTOR = 1e-3, 1e-6
+LAST_GAIN = 1e-3
 """Gain of a whole step after which a problem is solved, and part of its safety factor that the step may miss: Newton steps
 converge quadratically."""
+FORETOLD = 0.1
+CLOSE = 3e-5
+"""Relative excess over the wanted safety factor that is aimed at, so that a step that misses it by rounding still meets it."""
 LARGEST_TOLERANCE = 5e-3
 """Largest gain of such a step for classes that are unlikely."""
 STALLED = 1e-2
@@ -101,14 +105,15 @@ class Evaluation:
 class Plan:
     """The solutions of the QPs of r problems.
 
-    rows (r,): the problems; step (r, 2N); k (r,): planned safety factors; gain (r,): how much the loss falls to first order;
-    contacts and multipliers (q,): the rows of the QPs; further: those of them that were added.
+    rows (r,): the problems; step (r, 2N); k (r,): planned safety factors; gain, fall (r,): how much the loss falls to first
+    order, and to second order; contacts and multipliers (q,): the rows of the QPs; further: those of them that were added.
     """
 
     rows: Indices
     step: Array
     k: Array
     gain: Array
+    fall: Array
     contacts: Contacts
     multipliers: Array
     further: Contacts
@@ -116,12 +121,12 @@ class Plan:
     def replace(self, other: Plan) -> Plan:
         """Return the plans with those of some of the problems replaced."""
         place = np.searchsorted(self.rows, other.rows)
-        for mine, new in ((self.step, other.step), (self.k, other.k), (self.gain, other.gain)):
+        for mine, new in ((self.step, other.step), (self.k, other.k), (self.gain, other.gain), (self.fall, other.fall)):
             mine[place] = new
         kept = ~np.isin(self.contacts.problem, other.rows)
         contacts = self.contacts.take(kept).join(other.contacts)
         multipliers = np.concatenate((self.multipliers[kept], other.multipliers))
-        return Plan(self.rows, self.step, self.k, self.gain, contacts, multipliers, other.further)
+        return Plan(self.rows, self.step, self.k, self.gain, self.fall, contacts, multipliers, other.further)
 
 
 @dataclass
@@ -254,10 +259,13 @@ class Solver:
         bound = now.bound[rows] - SUFFICIENT * share * plan.gain[place] + ROUNDING
         is_good = (at.loss <= bound) & (np.abs(at.angles - now.angles[rows]) < np.pi).all(axis=1)
         if share == 1.0:
-            # Newton steps converge quadratically; rows at the steps alone creep from one to the next
-            is_small = plan.gain[place] < LAST_GAIN * self._tolerate(now, rows)
-            is_met = at.factor > np.minimum(plan.k[place], self.wanted_k[rows]) - LAST_FACTOR * (1.0 + plan.k[place])
-            is_met |= plan.k[place] < self.wanted_k[rows] * (1.0 - FREE)
+            # Newton steps converge quadratically: what is left is less than that by which this one missed what its QP foretold.
+            # Rows at the steps alone creep from one to the next.
+            missed = np.abs(now.at.loss[rows] - at.loss - plan.fall[place])
+            is_free = plan.k[place] < self.wanted_k[rows] * (1.0 - FREE)
+            left = np.where(is_free, plan.gain[place], np.maximum(plan.gain[place] * FORETOLD, missed))
+            is_small = left < LAST_GAIN * self._tolerate(now, rows)
+            is_met = is_free | (at.factor > self.wanted_k[rows] / (1.0 + CLOSE))
             is_last = is_good & is_small & is_met & self.margins.between
             now.is_done[rows[is_last]] = now.is_settled[rows[is_last]] = True
         good = rows[is_good]
@@ -332,13 +340,18 @@ class Solver:
                 worth = float(wanted[row]), float(objective.rate[problem]), float(objective.floor[problem])
                 multipliers[row, :n] = solve_dual(self._backend, square, linear[row, :n], rate[row, :n], *worth)
         step = qp.find_step(multipliers)
-        left = value + (qp.contact_rows @ step[..., None])[..., 0] + ACCURACY * margins.extent[rows, None]
+        moved = (qp.contact_rows @ step[..., None])[..., 0]
+        left = value + moved + ACCURACY * margins.extent[rows, None]
         is_there = np.arange(numbered.width) < np.array(counts)[:, None]
         reached = np.divide(left, rate, out=np.full_like(left, np.inf), where=is_there & (rate > 0.0))
         k = np.minimum(k_now + reached.min(axis=1, initial=np.inf), wanted)
         gain = objective.compute_penalty(rows, now.at.factor[rows]) - objective.compute_penalty(rows, k)
-        gain -= (quadratic.gradient * step).sum(axis=1)
-        return Plan(rows, step, k, np.maximum(gain, 0.0), places, multipliers[numbered.problem, numbered.slot], further)
+        slope = (quadratic.gradient * step).sum(axis=1)
+        gain -= slope
+        fall = gain - 0.5 * ((multipliers * moved).sum(axis=1) - slope)
+        largest = np.maximum(multipliers.max(axis=1, initial=0.0), 1.0 / margins.extent[rows])
+        multipliers[multipliers < HELD * largest[:, None]] = 0.0
+        return Plan(rows, step, k, np.maximum(gain, 0.0), fall, places, multipliers[numbered.problem, numbered.slot], further)
 
     def _choose_places(self, now: Iterates, rows: Indices, further: Contacts) -> tuple[Contacts, Array]:
         """Return the places at which the QPs have rows, and what is known of their multipliers."""
@@ -346,10 +359,7 @@ class Solver:
         minima = now.at.contacts.take(np.isin(now.at.contacts.problem, rows))
         kept = np.isin(now.contacts.problem, rows) & (now.multipliers > 0.0)
         held, multipliers = now.contacts.take(kept), now.multipliers[kept]
-        largest = np.zeros(len(margins.problems))
-        np.maximum.at(largest, held.problem, multipliers)
-        strong = held.take(multipliers > HELD * largest[held.problem])
-        more = [(further.take(np.isin(further.problem, rows)), SAME), (strong, APART)]
+        more = [(further.take(np.isin(further.problem, rows)), SAME), (held, APART)]
         is_polygon = margins.is_polygon[minima.problem, minima.obstacle]
         if margins.between and is_polygon.any():
             kinks = minima.take(is_polygon)
@@ -359,9 +369,7 @@ class Solver:
         for others, apart in more:
             if len(others.time):
                 places = places.join(others.take(~_is_known(others, places, apart)))
-        known = _move_multipliers(held, multipliers, places)
-        known[known < HELD * largest[places.problem]] = 0.0
-        return places, known
+        return places, _move_multipliers(held, multipliers, places)
 
 
 def _is_known(places: Contacts, known: Contacts, apart: float) -> NDArray[np.bool_]:

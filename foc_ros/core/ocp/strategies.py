@@ -24,12 +24,10 @@ from foc_ros.core.types import Array, Status
 
 from .margin import Contacts, Indices, Margins
 from .problem import Problem
-from .solver import LARGEST_RATE, LARGEST_TOLERANCE, MOST_ITERATIONS, Iterates, Solver
+from .solver import CLOSE, LARGEST_RATE, LARGEST_TOLERANCE, MOST_ITERATIONS, Iterates, Solver
 from .start import NO_FORCES, Forces, Start, follow
 
 INFEASIBLE = 'no path between the obstacles in this homotopy class meets the goal: the path shown violates them least'
-CLOSE = 5e-6
-"""Relative excess over the wanted k that is aimed at."""
 REACHED = 1e-5
 """Relative shortfall of k that counts as rounding."""
 TOUCHING, TOUCHING_NEAR = 1e-3, 0.05
