@@ -42,13 +42,13 @@ LEAST_BEND = 3e-2
 """Least second derivative of a margin in time, relative to scene and whole time: along a flat side the contact is anywhere."""
 GRID = 4
 """Points for each step on which closest approaches are looked for."""
-POINTS = 9
-"""Points beside a minimum on the grid at which minima are told apart."""
 BRACKET = np.linspace(-1.0, 1.0, 9)
-"""Times, relative to a bracket, at which the least safety factor is sought; the next bracket is a quarter of it."""
-NARROWINGS, MANY_NARROWINGS = 2, 3
-"""Brackets in the solver, and for what is reported: there the last points are 2e-3 steps apart, and a parabola or two lines pass
+"""Times, relative to a bracket, at which safety factors are sampled; the next bracket is a quarter of it."""
+NARROWINGS = 2
+"""Brackets after the one in which minima are told apart: the last points are 4e-3 steps apart, and a parabola or two lines pass
 through them."""
+BOLD = 1.5
+"""How much farther than to its neighbours a safety factor may change between two points."""
 FACTORS, GRADIENT = 5, 1
 """Vectors of which the second derivatives of a margin consist, besides a diagonal, and which of them is its gradient."""
 
@@ -362,48 +362,70 @@ class Margins:
         """
         factor = grid.factor
         at, obstacle, place = np.nonzero(_is_lowest(factor) & is_wanted)
-        if not self.between:
-            return Contacts(rows[at], obstacle, self.times[place]), factor[at, obstacle, place]
-        return self._refine(motion, k, at, Contacts(rows[at], obstacle, self.times[place]), NARROWINGS)
+        places = Contacts(rows[at], obstacle, self.times[place])
+        if not self.between or not len(at):
+            return places, factor[at, obstacle, place]
+        return self._refine(motion, k, at, places)
 
-    def _refine(self, motion: Motion, k: Array, at: Indices, places: Contacts, narrowings: int) -> tuple[Contacts, Array]:
+    def _refine(
+        self, motion: Motion, k: Array, at: Indices, places: Contacts, bound: Array | None = None
+    ) -> tuple[Contacts, Array]:
         """Return the minima beside some places of the grid, of movements in rows `at`, and the safety factors there.
 
-        There may be several beside one place, next to the corners of a small obstacle: they are told apart at a number of points.
+        There may be several beside one place, next to the corners of a small obstacle. Those are left out that cannot be below the
+        least factor found for their movement and a bound (r,), if there is one.
         """
-        least, last, apart = np.zeros(0), float(self.steps), self._half
-        if not len(at):
-            return places, least
-        times = np.clip(places.time + apart * np.linspace(-1.0, 1.0, POINTS)[:, None], 1.0, last)
-        found = self._measure_times(motion, k, at, places, times).factor.reshape(POINTS, -1).T
-        which, column = np.nonzero(_is_lowest(found))
+        spacing = self._half * (BRACKET[1] - BRACKET[0])
+        times, factors, is_on_edge = self._sample(motion, k, at, places, self._half)
+        is_lowest = _is_lowest(factors.T)
+        if bound is not None:
+            bound = bound.copy()
+            np.minimum.at(bound, at, factors.min(axis=0))
+            is_lowest &= factors.T - BOLD * _vary(factors.T) <= bound[at, None]
+        which, column = np.nonzero(is_lowest)
         at, places = at[which], Contacts(places.problem[which], places.obstacle[which], times[column, which])
-        apart, best = 2.0 * apart / (POINTS - 1), np.arange(len(at))
-        for _ in range(narrowings):
-            times = np.clip(places.time + apart * BRACKET[:, None], 1.0, last)
-            margin = self._measure_times(motion, k, at, places, times)
-            factors, is_on_edge = (each.reshape(len(BRACKET), -1) for each in (margin.factor, margin.is_on_edge))
-            lowest = factors.argmin(axis=0)
-            row = np.clip(lowest, 2, len(BRACKET) - 3)
-            places, spacing, apart = places._replace(time=times[row, best]), apart * (BRACKET[1] - BRACKET[0]), apart / 4.0
-        near = np.stack([factors[row + step, best] for step in range(-2, 3)])
-        is_kink = is_on_edge[row - 2, best] != is_on_edge[row + 2, best]
-        shift, bottom = _find_lowest(near, is_kink)
-        least = factors[lowest, best]
-        is_inside = (places.time - 2.0 * spacing > 1.0) & (places.time + 2.0 * spacing < last)
-        time = np.where(is_inside, places.time + spacing * shift, times[lowest, best])
-        return places._replace(time=time), np.where(is_inside, np.minimum(least, bottom), least)
+        times, factors, is_on_edge = times[:, which], factors[:, which], is_on_edge[:, which]
+        for _ in range(NARROWINGS):
+            time, _least = self._estimate(times, factors, is_on_edge, column, spacing)
+            places, half, spacing = places._replace(time=time), spacing, spacing * (BRACKET[1] - BRACKET[0])
+            times, factors, is_on_edge = self._sample(motion, k, at, places, half)
+            column = factors.argmin(axis=0)
+        time, least = self._estimate(times, factors, is_on_edge, column, spacing)
+        return places._replace(time=time), least
 
-    def _measure_times(self, motion: Motion, k: Array, at: Indices, places: Contacts, times: Array) -> Margin:
-        """Return margins of places (q,) at several times of each, (n, q), as n q in a row."""
+    def _sample(
+        self, motion: Motion, k: Array, at: Indices, places: Contacts, half: float
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return times (n, q) in brackets around places (q,), the safety factors, and whether an edge is nearest there."""
+        times = np.clip(places.time + half * BRACKET[:, None], 1.0, float(self.steps))
         several = [np.tile(each, len(times)) for each in (places.problem, places.obstacle, at)]
-        return self.measure(Contacts(several[0], several[1], times.ravel()), several[2], motion, k[several[2]])
+        margin = self.measure(Contacts(several[0], several[1], times.ravel()), several[2], motion, k[several[2]])
+        return times, margin.factor.reshape(times.shape), margin.is_on_edge.reshape(times.shape)
 
-    def find_least_factors(self, control: Array) -> tuple[Array, Indices, Array]:
+    def _estimate(
+        self, times: Array, factors: Array, is_on_edge: NDArray[np.bool_], column: Indices, spacing: float
+    ) -> tuple[Array, Array]:
+        """Return the times (q,) of minima near the given one of n even samples (n, q) of each, and the safety factors there."""
+        row, best = np.clip(column, 2, len(times) - 3), np.arange(len(column))
+        near = np.stack([factors[row + step, best] for step in range(-2, 3)])
+        shift, bottom = _find_lowest(near, is_on_edge[row - 2, best] != is_on_edge[row + 2, best])
+        lowest = factors[column, best]
+        is_inside = (times[0] > 1.0) & (times[-1] < self.steps)
+        time = np.where(is_inside, times[row, best] + spacing * shift, times[column, best])
+        return time, np.where(is_inside, np.minimum(lowest, bottom), lowest)
+
+    def find_least_factors(self, control: Array, factors: Array | None = None) -> tuple[Array, Indices, Array]:
         """Return the least safety factors of controls (b, 2N) over all obstacles and times, and where they are.
 
-        Between two points of the grid an obstacle comes nearer by no more than the hand moves relative to it. Wherever that may
-        lead below the least factor on the grid, the time is refined.
+        Wherever a factor that changes from one point of the grid to the next as it does there may fall below the least one, it is
+        sampled between them, and the minima are refined.
+
+        Parameters
+        ----------
+        control : Array
+            The controls.
+        factors : Array, optional
+            Their safety factors on the grid, (b, m, T), where they are known.
 
         Returns
         -------
@@ -415,19 +437,14 @@ class Margins:
         if not self.count:
             return k, row, moment
         motion, none = self.move(rows, control), np.zeros(len(rows))
-        grid = self.measure_grid(rows, motion, none)
+        if factors is None:
+            factors = self.measure_grid(rows, motion, none).factor
         counts = self.counts[..., None] & (self.times >= self.recovery_steps[..., None])
-        factor = np.where(counts, grid.factor, np.inf)
-        centre = self.centre[..., None] + self.times * self.drift[..., None]
-        moved = np.hypot(*np.diff(self.find_path(motion)[:, None] - centre, axis=3).swapaxes(0, 2)).swapaxes(0, 1)
-        nearer = np.maximum(np.pad(moved, ((0, 0), (0, 0), (1, 0))), np.pad(moved, ((0, 0), (0, 0), (0, 1))))
-        reach = np.sqrt(self.reach_square)[..., None]
-        lowest = np.maximum(grid.distance - nearer, reach)
-        bold = (lowest - reach) * (lowest + reach) / (2.0 * lowest * grid.stddev)
-        may_be_least = counts & (bold <= np.maximum(factor.min(axis=(1, 2)), 0.0)[:, None, None])
-        at, obstacle, place = np.nonzero(may_be_least)
+        factors = np.where(counts, factors, np.inf)
+        least = factors.min(axis=(1, 2))
+        at, obstacle, place = np.nonzero(factors - BOLD * _vary(factors) <= least[:, None, None])
         times = np.maximum(self.times[place], self.recovery_steps[at, obstacle])
-        places, _ = self._refine(motion, none, at, Contacts(at, obstacle, times), MANY_NARROWINGS)
+        places, _ = self._refine(motion, none, at, Contacts(at, obstacle, times), least)
         places = places._replace(time=np.maximum(places.time, self.recovery_steps[places.problem, places.obstacle]))
         found = self._measure_exactly(places, control)
         for which in np.argsort(-found, kind='stable').tolist():
@@ -552,6 +569,15 @@ def _is_lowest(values: Array) -> NDArray[np.bool_]:
     before, after = np.full_like(values, np.inf), np.full_like(values, np.inf)
     before[..., 1:], after[..., :-1] = values[..., :-1], values[..., 1:]
     return (values <= before) & (values < after)
+
+
+def _vary(values: Array) -> Array:
+    """Return the larger change of values (..., T) to a neighbour; 0 between infinite ones."""
+    changes = np.zeros((*values.shape[:-1], values.shape[-1] + 1))
+    is_finite = np.isfinite(values)
+    np.subtract(values[..., 1:], values[..., :-1], out=changes[..., 1:-1], where=is_finite[..., 1:] & is_finite[..., :-1])
+    np.abs(changes, out=changes)
+    return np.maximum(changes[..., 1:], changes[..., :-1])
 
 
 def _find_lowest(values: Array, is_kink: NDArray[np.bool_]) -> tuple[Array, Array]:

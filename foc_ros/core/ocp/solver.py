@@ -27,7 +27,7 @@ from .qp import ReducedQP, number_rows, solve_dual
 
 MOST_ITERATIONS = 150
 """Iterations after which a problem counts as not settled; ten are usual from a guess, three from an earlier solution."""
-NEAR, NEAR_FACTOR = 0.1, 1.5
+NEAR, NEAR_FACTOR = 0.01, 1.5
 """Margin relative to the scene, and safety factor relative to the wanted one, below which an obstacle has a row in the QP."""
 BESIDE = 0.3
 """Time on both sides of a contact with a polygon at which there are rows too: its margin may have a kink [steps]."""
@@ -79,7 +79,7 @@ class Evaluation:
     """What the sequence knows of the controls of r problems.
 
     cost (r,): J, in units of `gain`^2; loss (r,): what is minimised; factor (r,): the safety factor k; angles (r, m): swept
-    angles [rad]; margin (r, m, T), normal (r, 2, m, T): on the grid; contacts, factors (q,): minima of the safety factors near
+    angles [rad]; margin, factors (r, m, T), normal (r, 2, m, T): on the grid; contacts (q,): minima of the safety factors near
     the path.
     """
 
@@ -89,16 +89,16 @@ class Evaluation:
     angles: Array
     margin: Array
     normal: Array
-    contacts: Contacts
     factors: Array
+    contacts: Contacts
 
     def put(self, rows: Indices, other: Evaluation, taken: NDArray[np.bool_], problems: Indices) -> None:
         """Take rows over from the evaluation of some problems: those that are marked."""
         self.cost[rows], self.loss[rows], self.factor[rows] = other.cost[taken], other.loss[taken], other.factor[taken]
         self.angles[rows], self.margin[rows], self.normal[rows] = other.angles[taken], other.margin[taken], other.normal[taken]
+        self.factors[rows] = other.factors[taken]
         old, new = ~np.isin(self.contacts.problem, problems[taken]), np.isin(other.contacts.problem, problems[taken])
         self.contacts = self.contacts.take(old).join(other.contacts.take(new))
-        self.factors = np.concatenate((self.factors[old], other.factors[new]))
 
 
 @dataclass
@@ -194,7 +194,8 @@ class Solver:
         np.minimum.at(least, np.searchsorted(rows, contacts.problem), factors)
         cost, angles = objective.compute_cost(rows, control), margins.sweep(rows, margins.find_path(motion))
         normal = np.stack((grid.normal_x, grid.normal_y), axis=1)
-        return Evaluation(cost, objective.compute_loss(rows, cost, least), least, angles, grid.value, normal, contacts, factors)
+        loss = objective.compute_loss(rows, cost, least)
+        return Evaluation(cost, loss, least, angles, grid.value, normal, grid.factor, contacts)
 
     def run(self, now: Iterates, deadline: Deadline = NEVER, most: int = MOST_ITERATIONS) -> None:
         """Advance all problems together, an iteration at a time, until they are solved or the time is up."""

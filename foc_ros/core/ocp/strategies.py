@@ -237,7 +237,7 @@ def solve_optimal(
 def _meet_everywhere(point: Point, deadline: Deadline) -> tuple[Array, Indices, Array]:
     """Return the least safety factors of a point, after asking for more where an obstacle comes nearer than its contacts tell."""
     solver, now = point.solver, point.now
-    found = solver.margins.find_least_factors(now.control)
+    found = solver.margins.find_least_factors(now.control, now.at.factors)
     aimed = np.array([each.wanted_k for each in solver.margins.problems])
     for _ in range(CORRECTIONS):
         short = (found[0] < aimed * (1.0 - REACHED)) & (now.at.factor >= aimed * (1.0 - REACHED)) & now.is_done
@@ -247,7 +247,7 @@ def _meet_everywhere(point: Point, deadline: Deadline) -> tuple[Array, Indices, 
         now.is_done[short] = now.is_settled[short] = False
         now.bound[short] = np.inf
         solver.run(now, deadline)
-        found = solver.margins.find_least_factors(now.control)
+        found = solver.margins.find_least_factors(now.control, now.at.factors)
     point.k = np.minimum(now.at.factor, np.where(now.at.factor > 0.0, found[0], np.inf))
     return found
 
