@@ -50,11 +50,23 @@ MADE = {
 EVERY = pytest.mark.parametrize('case', MADE)
 
 
-def linearise(margins: Margins, control: np.ndarray, times: np.ndarray, k: float = K, slides: bool = True) -> Gradients:
+def linearise(
+    margins: Margins, control: np.ndarray, times: np.ndarray, k: float = K, slides: bool = True, is_free: bool = False
+) -> Gradients:
     count = len(times)
     none = np.zeros(count, dtype=np.intp)
     controls, is_held = np.tile(control, (count, 1)), np.full(count, slides)
-    return margins.linearise(Contacts(none, none, times), controls, np.full(count, k), is_held)
+    return margins.linearise(Contacts(none, none, times), controls, np.full(count, k), is_held, np.full(count, is_free))
+
+
+def find_least_factor(margins: Margins, control: np.ndarray, time: float) -> tuple[float, float]:
+    """Return the time near another at which the safety factor is least, and this factor."""
+    none, within, motion = np.zeros(21, dtype=np.intp), 0.3, margins.move(np.zeros(1, dtype=np.intp), control[None])
+    for _ in range(8):
+        times = time + within * np.linspace(-1, 1, 21)
+        factors = margins.measure(Contacts(none, none, times), none, motion, np.zeros(21)).factor
+        time, within = float(times[factors.argmin()]), within / 5
+    return time, float(factors.min())
 
 
 def find_least(margins: Margins, control: np.ndarray, time: float, within: float = 0.3) -> tuple[float, float]:
@@ -114,6 +126,29 @@ def test_the_hessian_is_that_of_the_least_margin_which_slides(case):
             assert made.gradient[0] @ direction == pytest.approx((more - less) / 2, rel=1e-3, abs=1e-9)
             assert added == pytest.approx(-(more - 2 * least + less), rel=2e-2, abs=1e-9)
     assert seen or 'box' in case or 'hull' in case, 'a circle has a least margin where it is smooth'
+
+
+@EVERY
+def test_where_the_safety_factor_is_free_the_hessian_is_that_of_the_least_one(case):
+    """Second differences of min_t k(u, t), times the rate r by which a margin falls with k."""
+    make, *given = MADE[case]
+    problem, control = make(*given)
+    margins, seen = Margins([problem], np.zeros(1), is_chance=True), 0
+    values = linearise(margins, control, np.arange(1.5, STEPS - 0.4, 0.1)).value
+    for place in np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:])) + 1:
+        time, k = find_least_factor(margins, control, 1.5 + 0.1 * place)
+        if abs(time - 1.5 - 0.1 * place) > 0.29 or k <= 0.0 or not is_smooth(margins, control, time):
+            continue
+        seen += 1
+        made = linearise(margins, control, np.array([time]), k, is_free=True)
+        assert made.value[0] == pytest.approx(0.0, abs=1e-9)
+        for direction in 1e-3 * random_directions(control):
+            more, less = (find_least_factor(margins, control + sign * direction, time)[1] for sign in (1, -1))
+            along = made.factors[0] @ direction
+            added = made.diagonal[0] @ direction**2 + along @ made.weights[0] @ along
+            assert made.gradient[0] @ direction == pytest.approx(made.stddev_rate[0] * (more - less) / 2, rel=1e-3, abs=1e-9)
+            assert added == pytest.approx(-made.stddev_rate[0] * (more - 2 * k + less), rel=2e-2, abs=2e-9)
+    assert seen or 'box' in case or 'hull' in case, 'a circle has a least safety factor where it is smooth'
 
 
 @pytest.mark.parametrize('name', ['box', 'sharp box', 'hull', 'moving capsule'])

@@ -32,11 +32,11 @@ def solve_optimal(problem: Problem, guess: np.ndarray) -> Solution:
     return solve_problem(problem, cold_start(guess), OPTIMAL)
 
 
-def find_effort(problem: Problem, guess: np.ndarray, k: float) -> float:
-    """Return the least effort at k."""
+def find_effort(problem: Problem, guess: np.ndarray, k: float) -> Solution:
+    """Return the solution with the least effort at k."""
     found = solve_optimal(replace(problem, preference=HARD, eta=eta_of_k(k)), guess)
     assert found.status is Status.SOLVED
-    return found.effort
+    return found
 
 
 def least_k_on_grid(problem: Problem, solution: Solution) -> float:
@@ -71,7 +71,7 @@ def test_k_is_kept_between_the_steps_too(seed):
 def test_the_multipliers_say_what_safety_costs(seed):
     """dJ / dk is the sum over the contacts of their multipliers, times -dg/dk."""
     problem, guess = make_reach(seed)
-    solution, h = solve_optimal(problem, guess), 1e-3
+    solution, h = solve_optimal(problem, guess), 1e-2
     more, less = (find_effort(problem, guess, solution.safety_factor + step) for step in (h, -h))
     name, time, push = zip(*solution.multipliers, strict=True)
     places = Contacts(
@@ -79,8 +79,10 @@ def test_the_multipliers_say_what_safety_costs(seed):
     )
     control = np.tile(solution.control.T.ravel() * problem.horizon.gain, (len(name), 1))
     margins = Margins([problem], np.zeros(1), is_chance=True)
-    rate = margins.linearise(places, control, np.full(len(name), solution.safety_factor), np.full(len(name), True)).stddev_rate
-    assert np.dot(push, rate) == pytest.approx((more - less) / (2 * h), rel=1e-3)
+    held, k = np.full(len(name), True), np.full(len(name), solution.safety_factor)
+    rate = margins.linearise(places, control, k, held, ~held).stddev_rate
+    cost = (more.effort - less.effort) / (more.safety_factor - less.safety_factor)
+    assert np.dot(push, rate) == pytest.approx(cost, rel=5e-3)
 
 
 @pytest.mark.parametrize('seed', SEEDS)
@@ -90,7 +92,7 @@ def test_a_soft_margin_gives_the_least_loss_of_all_k(seed):
     assert solution.status in (Status.SOLVED, Status.COMPROMISED)
     loss = SOFT.compute_loss(solution.effort, min(solution.safety_factor, problem.wanted_k), problem.wanted_k)
     for k in np.linspace(0.3, solution.safety_factor, 6):
-        assert loss <= SOFT.compute_loss(find_effort(problem, guess, float(k)), float(k), problem.wanted_k) + 1e-4
+        assert loss <= SOFT.compute_loss(find_effort(problem, guess, float(k)).effort, float(k), problem.wanted_k) + 1e-4
 
 
 @pytest.mark.parametrize('seed', SEEDS)

@@ -134,7 +134,7 @@ def test_the_same_circle_twice_is_as_once(strategy):
     one, two = solved(one_obstacle(), BOWED, strategy), solved(twice, BOWED, strategy)
     assert two.status is Status.SOLVED
     np.testing.assert_allclose(two.path, one.path, atol=1e-5)
-    assert two.effort == pytest.approx(one.effort, rel=1e-5)
+    assert two.effort == pytest.approx(one.effort, rel=1e-4)
 
 
 @EVERY

@@ -47,24 +47,22 @@ FREE = 1e-3
 """Part of the wanted safety factor that is missing where it is chosen with the control."""
 SMALL_GAIN, SMALL_FACTOR = 2e-8, 1e-9
 """Gain that a QP promises below which a problem is solved, and relative difference of a safety factor that is rounding."""
-LAST_GAIN = 1e-3
-"""Gain of a whole step after which a problem is solved, and part of its safety factor that the step may miss: Newton steps
-converge quadratically."""
+LAST_GAIN = 3e-4
+"""Gain of a whole step after which a problem is solved: Newton steps converge quadratically."""
 FORETOLD = 0.1
+"""Part of the promised gain that may be left, if the step brought what was foretold."""
 CLOSE = 3e-5
 """Relative excess over the wanted safety factor that is aimed at, so that a step that misses it by rounding still meets it."""
 LARGEST_TOLERANCE = 5e-3
 """Largest gain of such a step for classes that are unlikely."""
-STALLED = 1e-2
-"""Part of a promised gain that a step brings at least where rounding does not hide it."""
 STALLED_GAIN = 2e-5
 """Gain below which a problem is solved that no step improves: rounding hides it."""
 ROUNDS = 3
 """Most times that rows are added to a QP for places at which its solution breaks margins."""
 VIOLATED, VIOLATED_APART = 1e-3, 0.25
 """Broken margin, relative to the scene, for which a row is added, and its least time from other rows [steps]."""
-MOST_TRIALS, BUNDLES, SHORTER = 8, 3, 0.25
-"""Steps that are tried; those of them after which rows are added where a whole step failed; and the part that is tried next."""
+MOST_TRIALS, SHORTER = 6, 0.25
+"""Steps that are tried: the whole one, the same with rows added where it failed, and a part of the last one each."""
 SUFFICIENT = 1e-4
 """Share of the promised gain that a step has to bring."""
 GRACE = 0.02
@@ -136,7 +134,8 @@ class Iterates:
     control (b, 2N), in units of `Horizon.gain`; k (b,): safety factor at which margins are linearised; at: what is known of the
     controls; contacts and multipliers (q,) of the last QPs; angles (b, m): swept angles of the class [rad]; is_done (b,): whether
     the sequence has ended, is_settled (b,): at a minimum; gain (b,): what the last QP promised; iterations (b,);
-    bound (b,): what the loss must not exceed; trial: contacts of the last step that was tried.
+    bound (b,): what the loss must not exceed; is_exact (b,): whether to end only where the next step would change nothing;
+    trial: contacts of the last step that was tried.
     """
 
     control: Array
@@ -150,6 +149,7 @@ class Iterates:
     gain: Array
     iterations: Indices
     bound: Array
+    is_exact: NDArray[np.bool_]
     trial: Contacts = NO_CONTACTS
 
 
@@ -168,19 +168,25 @@ class Solver:
 
     def __init__(self, margins: Margins, wanted_k: Array, rate: Array, lam: Array) -> None:
         problems = margins.problems
-        self.margins, self.wanted_k = margins, wanted_k
+        self.margins, self.wanted_k = margins, wanted_k * (1.0 + CLOSE)
         self.objective = Objective(problems, wanted_k, rate, lam)
         self.gain = np.array([each.horizon.gain for each in problems])
         self.most, self._small_gain = MOST_ITERATIONS, SMALL_GAIN
         self._backend = QP_BACKENDS.get(problems[0].qp_backend)
 
-    def begin(self, control: Array, contacts: Contacts, multipliers: Array, k: Array, angles: Array) -> Iterates:
-        """Return the iterates at controls (b, 2N) moved to their goals, in the classes of some swept angles (b, m)."""
+    def begin(
+        self, control: Array, contacts: Contacts, multipliers: Array, k: Array, angles: Array, is_exact: NDArray[np.bool_]
+    ) -> Iterates:
+        """Return the iterates at controls (b, 2N) moved to their goals, in the classes of some swept angles (b, m).
+
+        is_exact (b,): whether more than a likelihood asks for is wanted, as where there is no earlier solution to go on from.
+        """
         control, rows = self.objective.meet_goal(control), np.arange(len(control))
         at = self.evaluate(rows, control, k)
         no, k = np.zeros(len(rows), dtype=np.bool_), np.clip(at.factor, 0.0, self.wanted_k)
         gain = np.full(len(rows), np.inf)
-        return Iterates(control, k, at, contacts, multipliers, angles, no, no.copy(), gain, np.zeros_like(rows), at.loss + GRACE)
+        bound, is_exact = at.loss + GRACE, is_exact | (not self.margins.is_chance)
+        return Iterates(control, k, at, contacts, multipliers, angles, no, no.copy(), gain, np.zeros_like(rows), bound, is_exact)
 
     def evaluate(self, rows: Indices, control: Array, k: Array) -> Evaluation:
         """Return what the sequence has to know of controls (r, 2N) of some problems, linearised at safety factors (r,)."""
@@ -239,7 +245,7 @@ class Solver:
             stalled = is_open & (plan.gain < STALLED_GAIN * self._tolerate(now, rows))
             now.is_done[rows[stalled]] = now.is_settled[rows[stalled]] = True
             is_open &= ~stalled
-            if trial >= BUNDLES:
+            if trial:
                 share *= SHORTER
             elif is_open.any():
                 plan = self._bundle(now, plan, rows[is_open])
@@ -264,9 +270,10 @@ class Solver:
             # Rows at the steps alone creep from one to the next.
             missed = np.abs(now.at.loss[rows] - at.loss - plan.fall[place])
             is_free = plan.k[place] < self.wanted_k[rows] * (1.0 - FREE)
-            left = np.where(is_free, plan.gain[place], np.maximum(plan.gain[place] * FORETOLD, missed))
+            is_exact = is_free | now.is_exact[rows]
+            left = np.where(is_exact, plan.gain[place], np.maximum(plan.gain[place] * FORETOLD, missed))
             is_small = left < LAST_GAIN * self._tolerate(now, rows)
-            is_met = is_free | (at.factor > self.wanted_k[rows] / (1.0 + CLOSE))
+            is_met = is_free | (at.factor >= self.objective.wanted_k[rows])
             is_last = is_good & is_small & is_met & self.margins.between
             now.is_done[rows[is_last]] = now.is_settled[rows[is_last]] = True
         good = rows[is_good]

@@ -24,7 +24,7 @@ from foc_ros.core.types import Array, Status
 
 from .margin import Contacts, Indices, Margins
 from .problem import Problem
-from .solver import CLOSE, LARGEST_RATE, LARGEST_TOLERANCE, MOST_ITERATIONS, Iterates, Solver
+from .solver import LARGEST_RATE, LARGEST_TOLERANCE, MOST_ITERATIONS, Iterates, Solver
 from .start import NO_FORCES, Forces, Start, follow
 
 INFEASIBLE = 'no path between the obstacles in this homotopy class meets the goal: the path shown violates them least'
@@ -166,7 +166,7 @@ def solve_at(
     """
     tau, lam = weights
     margins = Margins(problems, tau, is_chance=is_chance, between=between)
-    wanted = np.array([each.wanted_k for each in problems]) * (1.0 + CLOSE) * is_chance
+    wanted = np.array([each.wanted_k for each in problems]) * is_chance
     preferences = [each.preference for each in problems]
     rates = [min(each.shortfall / each.beta, LARGEST_RATE) if each.beta > 0.0 else LARGEST_RATE for each in preferences]
     # without a chance constraint no safety is wanted, and the rate has no effect
@@ -178,7 +178,8 @@ def solve_at(
         last = before.now
         control, k, angles = last.control.copy(), last.k.copy(), last.angles
         contacts, multipliers = last.contacts, last.multipliers
-    now = solver.begin(control, contacts, multipliers, np.where(k > 0.0, np.minimum(k, wanted), wanted), angles)
+    is_cold = np.array([each.control is None for each in starts])
+    now = solver.begin(control, contacts, multipliers, np.where(k > 0.0, np.minimum(k, wanted), wanted), angles, is_cold)
     solver.run(now, deadline, most)
     return Point(solver, now, now.at.factor)
 
@@ -281,7 +282,8 @@ def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult
     if is_touching and not is_late:
         return collect(point, row, Status.INFEASIBLE, INFEASIBLE)
     is_settled = now.is_settled[row] or now.gain[row] < LARGEST_TOLERANCE
-    if is_late or not (is_settled or problem.preference.is_hard):
+    is_short = problem.preference.is_hard and k < problem.wanted_k * (1.0 - REACHED)
+    if is_late or not (is_settled or is_short):
         cause = 'out of time' if is_late else 'not settled'
         message = f'{cause}: eta {reached:.4g} so far, and the likelihood is estimated'
         return collect(point, row, Status.DEADLINE, message, aims_at_eta=False)
@@ -349,7 +351,9 @@ def _run_algorithm1(problem: Problem, start: Start, settings: FocConfig, deadlin
             return collect(point, 0, Status.INFEASIBLE, message, **weights)
         if k < problem.wanted_k:
             if lam * settings.algorithm1_growth > LARGEST_LAMBDA:
-                if point.is_touching()[0]:
+                # so far along, the variances alone push the mean about: whether there is a path is known at the beginning
+                first = solve_at([problem], [start], (np.zeros(1), np.ones(1)), is_chance=False, between=False, deadline=deadline)
+                if first.is_touching()[0]:
                     return collect(point, 0, Status.INFEASIBLE, INFEASIBLE, **weights)
                 message = f'lambda = {lam:.3g} after {iteration} QPs, and the surrogate is still violated'
                 return collect(point, 0, Status.ITERATION_LIMIT, message, **weights)
