@@ -272,7 +272,7 @@ class Solver:
             is_free = plan.k[place] < self.wanted_k[rows] * (1.0 - FREE)
             is_exact = is_free | now.is_exact[rows]
             left = np.where(is_exact, plan.gain[place], np.maximum(plan.gain[place] * FORETOLD, missed))
-            is_small = left < LAST_GAIN * self._tolerate(now, rows)
+            is_small = left < LAST_GAIN * np.where(is_free, 1.0, self._tolerate(now, rows))
             is_met = is_free | (at.factor >= self.objective.wanted_k[rows])
             is_last = is_good & is_small & is_met & self.margins.between
             now.is_done[rows[is_last]] = now.is_settled[rows[is_last]] = True

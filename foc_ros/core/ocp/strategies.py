@@ -37,6 +37,8 @@ BETWEEN = 0.3
 LEAP = 2.0
 """Angle by which the direction of an obstacle turns between two points of the grid if the mean leaps over it [rad]."""
 STALLED = 1e-6
+NEARLY = 1e-2
+"""Relative shortfall of k that is made good by asking for more: an obstacle comes nearer than its contacts tell."""
 CORRECTIONS = 3
 """Most times that more than the wanted safety factor is asked for."""
 MOST_STEPS = 500
@@ -241,7 +243,7 @@ def _meet_everywhere(point: Point, deadline: Deadline) -> tuple[Array, Indices, 
     found = solver.margins.find_least_factors(now.control, now.at.factors)
     aimed = np.array([each.wanted_k for each in solver.margins.problems])
     for _ in range(CORRECTIONS):
-        short = (found[0] < aimed * (1.0 - REACHED)) & (now.at.factor >= aimed * (1.0 - REACHED)) & now.is_done
+        short = (found[0] < aimed * (1.0 - REACHED)) & (found[0] > aimed * (1.0 - NEARLY)) & now.is_done
         if not short.any() or not deadline.allows():
             break
         solver.wanted_k[short] *= 1.0 + 1.2 * (1.0 - found[0][short] / aimed[short])
