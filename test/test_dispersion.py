@@ -28,7 +28,7 @@ from foc_ros.ros.parameters import load_parameter_file, write_parameter_file
 
 STDDEV = 0.02
 STEP_NS = NANOSECONDS // 10
-FIXED = {'duration.adaptation': 'none', 'likelihood.adaptation': 'none'}
+FIXED = {'duration.adaptation': 'none'}
 CONFIG = replace_values(Config(), {'rate_hz': 10.0, 'foc.steps': 15, 'estimator.position_stddev': 1e-4} | FIXED)
 
 

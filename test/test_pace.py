@@ -35,7 +35,7 @@ def follow(pipeline: Pipeline, *movements: np.ndarray, goal: np.ndarray = GOAL) 
     return pipeline
 
 
-@pytest.mark.parametrize('model', ['fixed', 'fitts', 'cost_of_time'])
+@pytest.mark.parametrize('model', ['fixed', 'fitts'])
 def test_scaled_durations_are_longer_by_the_factor(model: str) -> None:
     pipeline, config = follow(Pipeline(CONFIG), np.zeros((5, 2))), DurationConfig(model=model)
     assert pipeline.hand_state is not None

@@ -21,9 +21,7 @@ STEPS, MASS, DAMPING = 50, 1.5, 4.0
 MASS_CONFIG = Config().with_values(
     {'foc.plant': 'damped_mass', 'foc.plant_mass': MASS, 'foc.plant_damping': DAMPING, 'estimator.acceleration_time_s': 0.0}
 )
-MOVING = HandState(
-    0, np.array([0.0, 0.0, 0.1, -0.05, 1.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2), effort_spent=5.0
-)
+MOVING = HandState(0, np.array([0.0, 0.0, 0.1, -0.05, 1.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2))
 GOAL = np.array([[0.3, 0.0]])
 CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003)
 
@@ -98,29 +96,16 @@ def test_the_duration_shifts_the_end_of_a_damped_mass_as_a_longer_plan_does():
     assert_allclose(found[middle], ((early - late) / 0.02)[middle], atol=0.03 * np.abs(found).max())
 
 
-def test_only_effort_of_jerk_is_added_to_effort_of_jerk():
-    """The effort since onset and the price of time have the units of jerk: a force-driven class costs its own effort alone."""
-    values = {'duration.model': 'cost_of_time', 'duration.time_cost': 50.0, 'likelihood.spent_share': 1.0}
-    scene = make_obstacles([[0.15, 0.01]], 0.03), GOAL
-    for config, shared, price in ((Config(), 5.0, 50.0), (MASS_CONFIG, 0.0, 0.0)):
-        for each in predict(config.with_values(values), MOVING, *scene, Memory())[0].solved_candidates:
-            assert each.cost == pytest.approx(shared + each.effort * each.solution.dt + price * each.times[-1])
-
-
 def test_the_durations_do_not_depend_on_the_plant():
     durations = []
     for config in (Config().with_values({'estimator.acceleration_time_s': 0.0}), MASS_CONFIG):
-        values = config.with_values({'duration.model': 'cost_of_time'})
-        solved = predict(values, MOVING, make_obstacles([[0.15, 0.01]], 0.03), GOAL, Memory())[0].solved_candidates
+        solved = predict(config, MOVING, make_obstacles([[0.15, 0.01]], 0.03), GOAL, Memory())[0].solved_candidates
         durations.append({each.label: each.times[-1] for each in solved})
     assert durations[0] == durations[1]
 
 
 def test_a_triple_integrator_from_outside_predicts_what_the_built_in_one_does(register):
-    class Outside(PlantModel):
-        is_jerk_driven = True
-
-    config = register('outside', lambda settings: Outside(discretise_triple_integrator))
+    config = register('outside', lambda settings: PlantModel(discretise_triple_integrator))
     values = {'foc.endpoint_stddev': 0.005, 'duration.spread': 0.2, 'duration.wait_s': 0.1}
     scene = make_obstacles([[0.15, 0.01]], 0.03), GOAL
     ours, theirs = (predict(each.with_values(values), MOVING, *scene, Memory())[0] for each in (Config(), config))

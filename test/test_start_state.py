@@ -35,6 +35,6 @@ def test_a_hand_that_has_not_begun_to_move_is_at_rest(time_s: float) -> None:
 
 
 @pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal', 'algorithm1', 'fixed'])
-@pytest.mark.parametrize('model', ['fixed', 'fitts', 'cost_of_time'])
+@pytest.mark.parametrize('model', ['fixed', 'fitts'])
 def test_every_configuration_can_be_rehearsed(strategy, model):
     warm_up(replace_values(Config(), {'foc.strategy': strategy, 'duration.model': model, 'foc.steps': 10}))

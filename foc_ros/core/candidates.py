@@ -12,17 +12,13 @@ import numpy as np
 from .classes import find_path_sides
 from .classes.rows import find_decisions, tabulate_sides
 from .classes.sides import compute_branch_times
-from .config import ONLINE, Config, FocConfig
+from .config import FocConfig, LikelihoodConfig
 from .deadline import NEVER, Deadline
-from .heading_bias import make_reaches
-from .learning.choices import Choice
-from .likelihood import CostModel, compute_likelihoods, compute_lookahead_share
+from .likelihood import BETWEEN_OPERATORS, compute_likelihoods, compute_lookahead_share
 from .ocp.problem import Problem
 from .ocp.solve import solve_problems
 from .ocp.start import Start, cold_start, warm_start
 from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Solution, Status
-
-EFFORT_ONLY = CostModel()
 
 
 class ProblemTable(Protocol):
@@ -36,7 +32,6 @@ def solve_candidates(
     candidates: Sequence[Candidate],
     problems: ProblemTable,
     settings: FocConfig,
-    costs: CostModel = EFFORT_ONLY,
     earlier: Mapping[str, Solution] = MappingProxyType({}),
     deadline: Deadline = NEVER,
 ) -> list[PredictedCandidate]:
@@ -50,8 +45,6 @@ def solve_candidates(
         One for each.
     settings
         The strategy and its parameters.
-    costs
-        Parts of the cost besides the effort to go.
     earlier
         Solutions of the prediction before, by label, from which their classes are followed.
     deadline
@@ -60,7 +53,7 @@ def solve_candidates(
     needed = [problems[row] for row in range(len(candidates))]
     starts = [_begin(each, problem, earlier.get(each.label)) for each, problem in zip(candidates, needed, strict=True)]
     solutions = solve_problems(needed, starts, settings, deadline)
-    return [_classify(*each, costs) for each in zip(candidates, solutions, needed, strict=True)]
+    return [_classify(*each) for each in zip(candidates, solutions, needed, strict=True)]
 
 
 def _begin(candidate: Candidate, problem: Problem, previous: Solution | None) -> Start:
@@ -79,12 +72,12 @@ def _is_in_class(candidate: Candidate, sides: Mapping[str, int]) -> bool:
     return all(sides.get(identity, side) == side for identity, side in candidate.sides)
 
 
-def _classify(candidate: Candidate, solution: Solution, problem: Problem, costs: CostModel) -> PredictedCandidate:
+def _classify(candidate: Candidate, solution: Solution, problem: Problem) -> PredictedCandidate:
     """Find the class in which a solution is, and its cost. The status says if it left the candidate's."""
     sides = _find_sides(solution.path, problem)
     if solution.status.has_likelihood and not _is_in_class(candidate, sides):
         solution = replace(solution, status=Status.LEFT_CLASS, message='the solution moved into another homotopy class')
-    return PredictedCandidate(candidate, solution, sides, costs.compute_cost(solution), 0.0)
+    return PredictedCandidate(candidate, solution, sides, solution.expected_effort * solution.dt, 0.0)
 
 
 def drop_duplicates(candidates: Sequence[PredictedCandidate]) -> list[PredictedCandidate]:
@@ -100,30 +93,28 @@ def _identify_class(candidate: PredictedCandidate) -> tuple[int, frozenset[tuple
 
 
 def rank_candidates(
-    candidates: Sequence[PredictedCandidate], config: Config, obstacles: Obstacles, hand: HandState, goals: Array
-) -> tuple[list[PredictedCandidate], Choice | None]:
+    candidates: Sequence[PredictedCandidate],
+    config: LikelihoodConfig,
+    obstacles: Obstacles,
+    hand: HandState,
+    goals: Array,
+    planning_spread: float = BETWEEN_OPERATORS,
+) -> list[PredictedCandidate]:
     """Return the distinct candidates: solved and compromised ones, most likely first, then the others, with likelihood 0.
 
-    obstacles: grown by the radius of the hand; goals (g, 2) [m]. The choice is that between the candidates with a likelihood,
-    None where there are fewer than two or nothing is learnt from choices.
+    obstacles: grown by the radius of the hand; goals (g, 2) [m]; planning_spread: as in `compute_likelihoods`.
     """
-    candidates, likelihood = drop_duplicates(candidates), config.likelihood
+    candidates = drop_duplicates(candidates)
     taken = [each for each in candidates if each.has_likelihood]
-    is_learnt = likelihood.adaptation == ONLINE
     time_s = min((float(each.solution.times[-1]) for each in taken), default=0.0)
-    may_look_ahead = is_learnt or compute_lookahead_share(time_s, likelihood) > 0.0
-    branch_times = compute_branch_times(taken, obstacles) if may_look_ahead and likelihood.lookahead_s > 0.0 else None
+    looks_ahead = compute_lookahead_share(time_s, config, planning_spread) > 0.0
+    branch_times = compute_branch_times(taken, obstacles) if looks_ahead and config.lookahead_s > 0.0 else None
     costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))
-    reaches = make_reaches(taken, goals, hand, config)
-    decisions = choice = None
-    if len(taken) > 1 and (may_look_ahead or likelihood.weaving > 0.0):
-        goal, sides = np.array([each.candidate.goal for each in taken], dtype=np.intp), tuple(each.sides for each in taken)
+    decisions = None
+    if len(taken) > 1 and (looks_ahead or config.weaving > 0.0):
+        goal = np.array([each.candidate.goal for each in taken], dtype=np.intp)
         decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
-        if is_learnt:
-            made = hand.stamp_ns, hand.onset_ns, obstacles, goals
-            choice = Choice(*made, goal, sides, costs, shortfalls, branch_times, decisions, time_s, reaches)
-    shares = compute_likelihoods(costs, likelihood, branch_times, shortfalls, decisions, time_s, reaches)
-    pairs = zip(taken, shares.tolist(), strict=True)
-    ranked = [replace(each, likelihood=share) for each, share in pairs]
+    shares = compute_likelihoods(costs, config, branch_times, shortfalls, decisions, time_s, planning_spread)
+    ranked = [replace(each, likelihood=share) for each, share in zip(taken, shares.tolist(), strict=True)]
     ranked.sort(key=lambda each: (-each.likelihood, each.label))
-    return ranked + [each for each in candidates if not each.has_likelihood], choice
+    return ranked + [each for each in candidates if not each.has_likelihood]

@@ -15,7 +15,7 @@ from .errors import ParameterError, join_errors, suggest
 from .registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
 
 PLANES = ('xy', 'xz', 'yz')
-DURATION_MODELS = ('fixed', 'fitts', 'cost_of_time')
+DURATION_MODELS = ('fixed', 'fitts')
 ARRIVALS = ('rest', 'passing')
 ONLINE = 'online'
 ADAPTATIONS = ('none', ONLINE)
@@ -25,7 +25,6 @@ GUIDANCE_MODES = ('path', 'trajectory')
 MOST_CANDIDATES = 64
 """Largest number of homotopy classes that are solved in one prediction."""
 WIDENS = 'widens the predicted covariance, not the chance constraint'
-JERK_ONLY = 'plant triple_integrator'
 REFERENCE_STEP_S = 0.02
 """Step for which the noise parameters are quoted (doc/model.md): c is scaled by sqrt(0.02 / dt)."""
 WHOLE_WAY_S = 1000.0
@@ -71,14 +70,12 @@ class FocConfig:
         0.0, f'root of the spectral density of unplanned control, which {WIDENS}; N s^0.5 for damped_mass', 'm/s^2.5', 0.0, 1e3
     )
     endpoint_stddev: float = _p(0.03, f'standard deviation of end points about their goal, per axis; it {WIDENS}', 'm', 0.0, 1.0)
-    lv_delta: float = _p(5e-5, 'tau per unit of s for strategy lv', 'm^2', 0.0, 1.0)
+    lv_delta: float = _p(5e-5, 'tau per unit of s for strategy lv, and per step of algorithm1 (delta)', 'm^2', 0.0, 1.0)
     hc_delta: float = _p(1e-4, 'tau per unit of s for strategy hc', 'm^2', 0.0, 1.0)
     growth: float = _p(2.0, 'factor on lambda per unit of s (Delta)', '', 1.0001, 1e6)
     tau: float = _p(0.0, 'clearance term tau of strategy fixed', 'm^2', 0.0, 100.0)
     lam: float = _p(1.0, 'variance weight lambda of strategy fixed, and the first lambda of lv and hc', '', 0.0, 1e15)
-    algorithm1_delta: float = _p(5e-5, 'step of tau in strategy algorithm1 (delta)', 'm^2', 0.0, 1.0)
     algorithm1_growth: float = _p(10.0, 'factor on lambda per step of strategy algorithm1 (Delta)', '', 1.0, 1e6)
-    algorithm1_xi: float = _p(1.0, 'change of effort at which strategy algorithm1 ends (xi)', 'm^2/s^6', 0.0, 1e12)
     goal_weight: float = _p(0.0, 'weight of the position variance at the goal, in effort per m^2', '1/s^6', 0.0, 1e15)
     recovery_s: float = _p(0.2, 'time within which a hand inside the margin of an obstacle has to leave it', 's', 0.0, 10.0)
     qp_backend: str = _p('piqp', 'QP solver: piqp, a solver of qpsolvers by its name, or a registered one', choices=QP_BACKENDS)
@@ -88,16 +85,11 @@ class FocConfig:
 class DurationConfig:
     """Duration of the movement, and how it ends."""
 
-    model: str = _p(
-        'fitts', 'duration of a movement: fixed, by Fitts law, or optimal if time has a cost', choices=DURATION_MODELS
-    )
+    model: str = _p('fitts', 'duration of a movement: fixed, or by Fitts law', choices=DURATION_MODELS)
     fixed_s: float = _p(1.0, 'duration of model fixed', 's', 0.05, 60.0)
     fitts_a_s: float = _p(0.2, 'intercept of Fitts law', 's', 0.0, 60.0)
     fitts_b_s: float = _p(0.25, 'slope of Fitts law, per bit', 's', 0.0, 60.0)
     target_width: float = _p(0.02, 'target width of Fitts law', 'm', 1e-4, 10.0)
-    time_cost: float = _p(
-        100.0, f'cost of time of model cost_of_time, for {JERK_ONLY} also in the cost of a class', 'm^2/s^6', 1e-9, 1e9
-    )
     adaptation: str = _p(
         'online', "whether expected durations and `arrival` follow the operator's movements", choices=ADAPTATIONS
     )
@@ -172,33 +164,18 @@ class LikelihoodConfig:
         0.0,
         math.inf,
     )
-    spent_share: float = _p(0.0, f'fraction of the effort since onset that every cost contains, for {JERK_ONLY}', '', 0.0, 1.0)
     planning_horizon_s: float = _p(
         3.0,
-        'time to the goal beyond which an operator looks ahead (lookahead_s, beta_beyond); 0: always; 1000: never',
+        'time to the goal beyond which an operator looks ahead (lookahead_s); 0: always; 1000: never',
         's',
         0.0,
         WHOLE_WAY_S,
     )
-    planning_spread: float = _p(
-        1.0, 'standard deviation of the logarithm of the planning horizon, in one operator and between operators', '', 0.05, 1.5
-    )
     lookahead_s: float = _p(
         0.5, 'mean look-ahead of an operator who looks ahead: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
     )
-    beta_beyond: float = _p(
-        0.05, 'exponent of an operator who looks ahead for the way beyond the next row of obstacles', '', 0.0, 100.0
-    )
     weaving: float = _p(
         4.0, 'log-likelihood that a class loses for each row through several gaps of which it leads', '', 0.0, 100.0
-    )
-    heading_bias: float = _p(
-        0.0, 'angle, positive to the left, by which reaches begin beside the straight way to their goal', 'rad', -0.8, 0.8
-    )
-    adaptation: str = _p(
-        'online',
-        "whether horizon, heading bias and, by a factor, `beta`, `shortfall` and `beta_beyond` follow the operator's choices",
-        choices=ADAPTATIONS,
     )
     hold_s: float = _p(
         0.2, 'longest time for which a class keeps its last answer if there is no time for a new one or it fails', 's', 0.0, 10.0
@@ -214,15 +191,6 @@ class ExperienceConfig:
     learning: str = _p(
         'none', 'whether movements that end at a goal are added to the recordings of the running program', choices=ADAPTATIONS
     )
-    prior_count: float = _p(
-        1.0, 'number of recordings as which the model counts, for the gap in the next row and for the goal', '', 1e-3, 1e6
-    )
-    prior_count_beyond: float = _p(30.0, 'the same, for the way beyond the next row of obstacles', '', 1e-3, 1e6)
-    prior_count_path: float = _p(0.3, 'the same, for the path to the next row and as far as recordings reach', '', 1e-3, 1e6)
-    position_stddev: float = _p(0.02, 'distance from the hand at which a recording counts less', 'm', 1e-4, 10.0)
-    velocity_stddev: float = _p(
-        0.03, 'difference from the velocity of the hand at which a recording counts less', 'm/s', 1e-4, 10.0
-    )
 
 
 @dataclass(frozen=True)
@@ -237,16 +205,9 @@ class SceneConfig:
         0.0, 'standard deviation of the radius of obstacles from markers, collision objects and detections', 'm', 0.0, 1.0
     )
     hand_radius: float = _p(0.0, 'added to the radius of every obstacle: hands and tools are not points', 'm', 0.0, 1.0)
-    height_stddevs: float = _p(
-        2.0,
-        'standard deviations of the predicted height by which it has to clear an obstacle that is to be ignored',
-        '',
-        0.0,
-        10.0,
-    )
 
 
-Group = TypeVar('Group', DurationConfig, CovarianceConfig, LikelihoodConfig)
+Group = TypeVar('Group', DurationConfig, CovarianceConfig)
 
 
 @dataclass(frozen=True)
@@ -278,12 +239,6 @@ class GuidanceConfig:
     )
     clearance: float = _p(
         0.012, 'distance that guidance keeps the hand from obstacles: no force farther away; 0: force everywhere', 'm', 0.0, 1.0
-    )
-    sharpness: float = _p(
-        3.0, 'exponent of the likelihoods as weights: the larger, the more the likeliest candidate leads', '', 0.1, 10.0
-    )
-    yield_acceleration: float = _p(
-        0.6, 'acceleration of the hand against the force from which on there is no force; 0: it does not yield', 'm/s^2', 0.0, 1e3
     )
     precision_low: float = _p(
         100.0, 'precision, an inverse variance of position, up to which there is no stiffness', '1/m^2', 0.0, 1e9
@@ -368,6 +323,29 @@ class Parameter:
     bound: Bound
 
 
+CHOICES_LEARNT = 'nothing is learnt from choices any more'
+EXPERIENCE_FIXED = 'how much recordings count is fixed'
+REMOVED = {
+    'duration.time_cost': 'durations follow Fitts law or are fixed, and their pace is learnt',
+    'likelihood.spent_share': 'only the effort to go is compared',
+    'likelihood.planning_spread': 'it is 1 until the pace of the operator is known from one movement, and then 0.3',
+    'likelihood.beta_beyond': 'ways beyond the next row are equally likely to an operator who looks ahead',
+    'likelihood.heading_bias': 'reaches that bend are learnt as recordings: experience.learning',
+    'likelihood.adaptation': CHOICES_LEARNT,
+    'experience.prior_count': EXPERIENCE_FIXED,
+    'experience.prior_count_beyond': EXPERIENCE_FIXED,
+    'experience.prior_count_path': EXPERIENCE_FIXED,
+    'experience.position_stddev': EXPERIENCE_FIXED,
+    'experience.velocity_stddev': EXPERIENCE_FIXED,
+    'scene.height_stddevs': 'it is 2',
+    'foc.algorithm1_delta': 'it is foc.lv_delta',
+    'foc.algorithm1_xi': 'it is 1 m^2/s^6, as in the paper',
+    'guidance.sharpness': 'it is 3',
+    'guidance.yield_acceleration': 'it is 0.6 m/s^2',
+}
+"""Parameters of earlier versions: what took their place, for the message that refuses them."""
+
+
 def list_parameters(group: type = Config, prefix: str = '') -> Iterator[Parameter]:
     """Yield every parameter of a config class, depth first, by dotted name."""
     for item in fields(group):
@@ -415,6 +393,8 @@ def _find_parameter(name: str, value: object, known: Mapping[str, Parameter]) ->
     """Return the parameter of a name; raise ParameterError for a name that is unknown or that of a group."""
     if name in known:
         return known[name]
+    if name in REMOVED:
+        raise ParameterError(name, f'no value, because it was removed: {REMOVED[name]}', repr(value))
     groups = {each.partition('.')[0] for each in known if '.' in each}
     expected = 'a group of parameters' if name in groups else f'a known parameter{suggest(name, (*known, *groups))}'
     raise ParameterError(name, expected, repr(value))

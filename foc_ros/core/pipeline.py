@@ -36,11 +36,12 @@ class PredictionTask:
     library: Library
     deadline: Deadline
     goal_heights: Array | None
+    planning_spread: float
 
     def run(self) -> tuple[Prediction, Memory]:
         """Compute the prediction and the memory for the next one; this may happen in another thread."""
         scene = self.hand, self.obstacles, self.goals
-        return predict(self.config, *scene, self.memory, self.library, self.deadline, self.goal_heights)
+        return predict(self.config, *scene, self.memory, self.library, self.deadline, self.goal_heights, self.planning_spread)
 
 
 class Pipeline:
@@ -189,8 +190,8 @@ class Pipeline:
         self._is_new, self._predicted_ns = False, stamp_ns
         obstacles = self.scene.obstacles(self.hand_state.stamp_ns)
         scene = self.hand_state, obstacles, self.scene.goals
-        heights = self.scene.goal_heights
-        self._task = PredictionTask(self.adapted_config, *scene, self._memory, self._library, deadline, heights)
+        known, last = (self._memory, self._library, deadline), (self.scene.goal_heights, self.learnt.planning_spread)
+        self._task = PredictionTask(self.adapted_config, *scene, *known, *last)
         return self._task
 
     def finish(self, task: PredictionTask, compute: Callable[[], tuple[Prediction, Memory]]) -> Prediction | None:
@@ -207,7 +208,7 @@ class Pipeline:
         except FocError as error:
             self._rejections.reject('predict_failed', str(error))
             return None
-        self.learnt = self.learnt.add(prediction, self._memory.choice, task.config.covariance)
+        self.learnt = self.learnt.add(prediction, task.config.covariance)
         for candidate in prediction.candidates:
             if not candidate.has_likelihood:
                 self._rejections.count(f'candidate_{candidate.status.value}')

@@ -17,16 +17,17 @@ from .deadline import NEVER, Deadline
 from .dynamics.noise import scale_noise
 from .dynamics.plant_models import make_plant_model
 from .dynamics.predictive_covariance import SharedCovariances, widen_covariance
-from .estimation.duration import choose_candidate_durations, estimate_times_to_go, is_passing, limit_change
+from .estimation.duration import estimate_times_to_go, is_passing, limit_change
 from .height import HeightPredictor
 from .learning.dispersion import scale_covariance
 from .learning.experience import NO_LIBRARY, Library, pool_recordings
-from .likelihood import CostModel, make_cost_model, make_preference, select_most_likely
+from .likelihood import BETWEEN_OPERATORS, select_most_likely
 from .memory.continuity import Past, keep_answers, make_continuous, smooth_paths
 from .memory.memory import Memory
 from .obstacles.chance_constraint import RiskBound, count_events
 from .obstacles.culling import cull_obstacles
 from .ocp.problem import Problem, rest_to_goal
+from .safety_preference import SafetyPreference
 from .types import (
     Array,
     Candidate,
@@ -55,6 +56,7 @@ def predict(
     library: Library = NO_LIBRARY,
     deadline: Deadline = NEVER,
     goal_heights: Array | None = None,
+    planning_spread: float = BETWEEN_OPERATORS,
 ) -> tuple[Prediction, Memory]:
     """Predict where a hand goes.
 
@@ -76,6 +78,8 @@ def predict(
         When the prediction has to be ready. All classes are solved together; what is not settled then is compared by an estimate.
     goal_heights
         Heights of the goals (g,) [m]; None where they are not known, and the height of the hand is not predicted.
+    planning_spread
+        Standard deviation of the logarithm of the operator's planning horizon (`likelihood`).
 
     Returns
     -------
@@ -85,11 +89,10 @@ def predict(
     began, past = time.perf_counter(), memory.past.keep_goals(goals)
     scene = _prepare_scene(config, hand, obstacles, goals, goal_heights, past)
     found, candidates = _find_candidates(scene, config, memory, library, deadline)
-    costs, earlier = make_cost_model(scene.hand.effort_spent, config), memory.find_earlier(candidates, past.durations_s)
-    solved = _solve(scene, config, candidates, costs, earlier, deadline)
-    kept = keep_answers(candidates, solved, past, hand.stamp_ns, config.likelihood.hold_s, costs)
-    ranked, choice = rank_candidates(kept, config, scene.near, scene.hand, goals)
-    pooled = pool_recordings(ranked, library, hand, scene.blocking, goals, config.experience)
+    solved = _solve(scene, config, candidates, memory.find_earlier(candidates, past.durations_s), deadline)
+    kept = keep_answers(candidates, solved, past, hand.stamp_ns, config.likelihood.hold_s)
+    ranked = rank_candidates(kept, config.likelihood, scene.near, scene.hand, goals, planning_spread)
+    pooled = pool_recordings(ranked, library, hand, scene.blocking, goals)
     smooth = smooth_paths(pooled, past, hand.stamp_ns, config.likelihood.smoothing_s)
     continuous = make_continuous(smooth, past, hand.stamp_ns, config.likelihood)
     numbered, numbers = memory.numbers.keep_goals(past.durations_s).number(continuous, hand.stamp_ns, config.likelihood.hold_s)
@@ -112,7 +115,7 @@ def predict(
     present = past.follow(prediction, scene.durations_s, config.likelihood.hold_s)
     solutions = {each.label: each.solution for each in solved if each.has_likelihood}
     scaled = tuple(scale_covariance(each, config.covariance, at_rest=hand.onset_ns is None) for each in predicted)
-    remembered = Memory(best, candidates, solutions, present, found.next_goal, numbers, choice)
+    remembered = Memory(best, candidates, solutions, present, found.next_goal, numbers)
     return replace(prediction, candidates=scaled), remembered
 
 
@@ -165,14 +168,15 @@ def _solve(
     scene: _PredictionScene,
     config: Config,
     candidates: Sequence[Candidate],
-    costs: CostModel,
     earlier: Mapping[str, Solution],
     deadline: Deadline,
 ) -> list[PredictedCandidate]:
     """Solve the candidates for which there is time; return them with their predictive covariance."""
-    problems = Problems(config, scene.hand, scene.near, scene.goals, candidates, scene.durations_s)
+    place = config, scene.hand, scene.near
+    by_goal = {row: build_problem(*place, scene.goals[row], scene.durations_s[row]) for row in {each.goal for each in candidates}}
+    problems = [by_goal[each.goal] for each in candidates]
     until = deadline.take_share(SOLVE_SHARE, RESERVE_S * len(candidates))
-    solved = solve_candidates(candidates, problems, config.foc, costs, earlier, until)
+    solved = solve_candidates(candidates, problems, config.foc, earlier, until)
     return [_widen_covariance(each, scene.covariances, scene.hand, config) for each in solved]
 
 
@@ -190,32 +194,6 @@ def _find_durations(hand: HandState, goals: Array, past: Past, config: Config) -
     return [limit_change(each, past.durations_s.get(goal, each), elapsed_s) for goal, each in enumerate(durations)]
 
 
-class Problems:
-    """The problem of each candidate, built when it is first asked for; candidates with the same goal and duration share one."""
-
-    def __init__(
-        self,
-        config: Config,
-        hand: HandState,
-        obstacles: Obstacles,
-        goals: Array,
-        candidates: Sequence[Candidate],
-        goal_times: Sequence[float],
-    ) -> None:
-        self._scene = config, hand, obstacles
-        times = choose_candidate_durations(hand, candidates, goal_times, config.duration)
-        self._kinds = [(each.goal, duration_s) for each, duration_s in zip(candidates, times, strict=True)]
-        self._goals = goals
-        self._built: dict[tuple[int, float], Problem] = {}
-
-    def __getitem__(self, row: int) -> Problem:
-        """Return the problem of the candidate in a row."""
-        goal, duration_s = kind = self._kinds[row]
-        if kind not in self._built:
-            self._built[kind] = build_problem(*self._scene, self._goals[goal], duration_s)
-        return self._built[kind]
-
-
 def build_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: Array, duration_s: float) -> Problem:
     """Return the problem of reaching a goal (2,) [m] in duration_s [s] with the plant of the config, from a known hand state."""
     foc = config.foc
@@ -231,7 +209,7 @@ def build_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: A
         recovery_s=foc.recovery_s,
         passing=is_passing(config.duration),
         risk=RiskBound(foc.bound, count_events(foc.risk, len(obstacles), foc.steps)),
-        preference=make_preference(hand.effort_spent, duration_s, config),
+        preference=SafetyPreference(config.likelihood.beta, config.likelihood.shortfall, dt=dt),
     )
 
 

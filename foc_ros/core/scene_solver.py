@@ -41,7 +41,7 @@ def solve_scene(scene: ReachingScene, problems: Sequence[Problem]) -> list[Predi
         durations = [scene.duration_s] * len(scene.goals)
         candidates = search(scene.hand.mean, scene.goals, avoided, config.homotopy, durations, config.foc.steps).candidates
     solved = solve_candidates(candidates, [problems[each.goal] for each in candidates], config.foc)
-    return rank_candidates(solved, config, avoided, scene.hand, scene.goals)[0]
+    return rank_candidates(solved, config.likelihood, avoided, scene.hand, scene.goals)
 
 
 def _make_guessed_candidate(guess: Array, obstacles: Obstacles) -> Candidate:

@@ -103,8 +103,8 @@ class HandState(Record):
 
     mean (6,): x, y, vx, vy, ax, ay [m, m/s, m/s^2]; covariance (6, 6) in the same order;
     height: as measured, along the plane's normal [m]; onset_ns: stamp at which the present movement began, None at rest;
-    onset_position (2,): where it began [m]; effort_spent: integral of squared jerk since onset [m^2/s^5]; height_mean (3,):
-    height, its velocity and its acceleration, with the covariance that x, vx and ax have.
+    onset_position (2,): where it began [m]; height_mean (3,): height, its velocity and its acceleration, with the covariance that
+    x, vx and ax have.
     """
 
     stamp_ns: int
@@ -114,7 +114,6 @@ class HandState(Record):
     frame_id: str = ''
     onset_ns: int | None = None
     onset_position: Array | None = None
-    effort_spent: float = 0.0
     height_mean: Array = field(default_factory=lambda: np.zeros(3))
 
 
@@ -379,11 +378,10 @@ class PredictedCandidate:
     """One candidate with its solution and likelihood.
 
     candidate: the homotopy class; solution: its forward optimal control; sides: side on which the mean path passes each obstacle,
-    by id. cost: effort to go, time cost, and the share of the effort since onset that all classes have in common [m^2/s^5];
-    likelihood in [0, 1]: 0 unless solved, compromised or estimated. age_s: 0, or how long ago the solution was found, of which
-    this is the rest, if it failed [s]. way: a number that stays the same for as long as the class
-    is followed, whatever its label and its rank are. height: the movement along the normal of the plane, None where it is not
-    predicted: the hand then stays at its height.
+    by id. cost: effort to go times the length of a step [m^2/s^5]; likelihood in [0, 1]: 0 unless solved, compromised or
+    estimated. age_s: 0, or how long ago the solution was found, of which this is the rest, if it failed [s]. way: a number that
+    stays the same for as long as the class is followed, whatever its label and its rank are. height: the movement along the
+    normal of the plane, None where it is not predicted: the hand then stays at its height.
     """
 
     candidate: Candidate

@@ -29,7 +29,7 @@ from .recorded_hand import RecordedHand
 
 CONSTANTS = {model: {f'duration.{name}': power for name, power in powers.items()} for model, powers in MODEL_CONSTANTS.items()}
 """By model, the constants that determine durations by dotted name, each with its power in a factor on all durations."""
-DISTANCE_MODELS = ('fitts', 'cost_of_time')
+DISTANCE_MODELS = ('fitts',)
 """Models whose durations depend on the distance."""
 NARROW_BITS = 0.5
 """Standard deviation of the index of difficulty below which intercept and slope are not told apart [bit]."""

@@ -5,10 +5,8 @@ estimate that is its own state, and says how errors of the state evolve when the
 
 What else depends on the plant:
 
-- The effort is the sum of squared controls: jerk [m^2/s^6] for the triple integrator, force [N^2] for the damped mass. Efforts
-  of different plants cannot be added. The effort since movement onset, and the price of time of the duration model
-  `cost_of_time`, are those of jerk, so they are part of the cost of a class only if `is_jerk_driven`. The durations themselves
-  describe the hand and are the same for every plant.
+- The effort is the sum of squared controls: jerk [m^2/s^6] for the triple integrator, force [N^2] for the damped mass. The
+  durations describe the hand and are the same for every plant.
 - `foc.process_noise` is white noise of the control. For the triple integrator the covariance that it adds in a step is exact; for
   other plants the noise is held constant over a step.
 """
@@ -61,16 +59,12 @@ class PlantModel:
     ----------
     states
         Number n of the states.
-    is_jerk_driven
-        Whether the control is jerk [m/s^3], so that its effort compares with the effort that the estimator measures.
 
     Raises
     ------
     InputError
         For a plant with other states.
     """
-
-    is_jerk_driven = False
 
     def __init__(self, discretise: Callable[[float], Plant]) -> None:
         self.discretise = discretise
@@ -123,8 +117,6 @@ def _condense(model: PlantModel, dt: float, steps: int) -> Horizon:
 
 class TripleIntegratorModel(PlantModel):
     """The paper's hand, driven by jerk: everything is scaled from the horizon of unit step, which is computed once."""
-
-    is_jerk_driven = True
 
     def __init__(self, _: FocConfig | None = None) -> None:
         super().__init__(discretise_triple_integrator)

@@ -10,10 +10,6 @@ duration, the speed is therefore taken into account: the time to go is at least 
 speed. This never delays a minimum-jerk movement that keeps its expected duration: from 0.3 of the duration on, the remaining
 distance at the present speed takes less than the remaining time.
 
-Model `cost_of_time` gives each path the duration that minimises effort plus `time_cost` times duration (`time_cost`), so that
-longer paths take longer. It needs no clock, and the present speed accounts for slow operators. Since paths are then compared by
-this sum, the price of the duration is part of the cost of a class (`time_price`).
-
 The hand goes to at most one of several goals. The speed gives the factor by which the operator is slow for the goal that fits
 best, and all expected durations are multiplied by this factor. (If each goal had its own factor, a hand that slows down at one
 goal would get seconds to reach another, and a path with hardly any effort.)
@@ -22,19 +18,13 @@ goal would get seconds to reach another, and a path with hardly any effort.)
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-
-import numpy as np
 
 from foc_ros.core.config import DurationConfig, clip_values
-from foc_ros.core.types import NANOSECONDS, Array, Candidate, HandState
-
-from .time_cost import find_least_cost_time
+from foc_ros.core.types import NANOSECONDS, Array, HandState
 
 CONSTANTS = {
     'fixed': {'fixed_s': 1.0},
     'fitts': {'fitts_a_s': 1.0, 'fitts_b_s': 1.0},
-    'cost_of_time': {'time_cost': -6.0},
 }
 """By model, the constants that determine durations, each with its power in a factor on all durations."""
 PACE_AFTER = 0.3
@@ -43,7 +33,6 @@ SLOWEST = 1e-6
 """Lower limit of the speed in divisions [m/s]."""
 CHANGE_S = 0.25
 """Time in which the time to go grows, or falls faster than time goes by, by a factor of e at most [s]."""
-SHORTEST_M = 1e-9
 SHORTEST_S = 1e-6
 """Lower limit of the expected duration in divisions [s]."""
 
@@ -78,29 +67,6 @@ def is_passing(config: DurationConfig) -> bool:
     return config.arrival == 'passing'
 
 
-def choose_candidate_durations(
-    hand: HandState, candidates: Sequence[Candidate], goal_times: Sequence[float], config: DurationConfig
-) -> list[float]:
-    """Return the time to go [s] of each candidate: that of its goal (g,) [s], or with model `cost_of_time` its own."""
-    if config.model != 'cost_of_time':
-        return [goal_times[candidate.goal] for candidate in candidates]
-    return [_find_duration(hand, each.length, each.guess, config) for each in candidates]
-
-
-def get_time_price(config: DurationConfig) -> float:
-    """Return the cost of a second besides the effort [m^2/s^6]: zero, except with model `cost_of_time`."""
-    return config.time_cost if config.model == 'cost_of_time' else 0.0
-
-
-def _find_duration(hand: HandState, length: float, path: Array, config: DurationConfig) -> float:
-    """Return the duration [s] of least cost for a path of points (m, 2) and a length [m]."""
-    first = path[len(path) // 5] - path[0]
-    heading = first / max(math.hypot(*first), SHORTEST_M)
-    state = float(hand.mean[2:4] @ heading), float(hand.mean[4:6] @ heading)
-    bounds = config.min_time_to_go_s, config.max_time_to_go_s
-    return find_least_cost_time(length, state, config.time_cost, bounds, is_passing(config))
-
-
 def estimate_times_to_go(hand: HandState, goals: Array, config: DurationConfig) -> list[float]:
     """Return the time to go [s] to each goal (g, 2) [m], between `min_time_to_go_s` and `max_time_to_go_s`.
 
@@ -110,9 +76,6 @@ def estimate_times_to_go(hand: HandState, goals: Array, config: DurationConfig) 
     """
     here, places = hand.mean[:2].tolist(), goals.tolist()
     distances = [math.dist(here, goal) for goal in places]
-    if config.model == 'cost_of_time':
-        lines = [np.linspace(hand.mean[:2], goal, 6) for goal in goals]
-        return [_find_duration(hand, distance, line, config) for distance, line in zip(distances, lines, strict=True)]
     if hand.onset_ns is None or hand.onset_position is None:
         expected = [compute_movement_time(distance, config) for distance in distances]
     else:

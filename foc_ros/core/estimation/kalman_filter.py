@@ -40,8 +40,6 @@ from foc_ros.core.config import EstimatorConfig
 from foc_ros.core.errors import InputError
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, SampleStatus, as_readonly
 
-from .effort import Effort, add_sample
-
 ONSET_STDDEVS = 3.0
 JUMP_STDDEVS = 10.0
 JUMP_SPEED = 5.0
@@ -52,12 +50,10 @@ JUMP_SPEED = 5.0
 class FilterState(HandState):
     """A hand state with the internal state of the filter.
 
-    root (3, 3): lower triangular root of the covariance of one axis; effort: sums over the samples since onset; jumped: the last
-    sample, if its position jumped.
+    root (3, 3): lower triangular root of the covariance of one axis; jumped: the last sample, if its position jumped.
     """
 
     root: Array = field(default_factory=lambda: np.zeros((3, 3)))
-    effort: Effort = field(default_factory=Effort)
     jumped: HandSample | None = None
 
 
@@ -192,20 +188,20 @@ def _update_state(state: FilterState, sample: HandSample, dt: float, config: Est
     measured, settings = (dt, sample.position, sample.height), (config.jerk_density, config.position_stddev)
     found = filter_step(state.mean, state.height_mean, state.root, *measured, *settings)
     mean, height_mean, covariance, root = map(as_readonly, found)
-    onset_ns, onset_position, effort = _update_movement(state, sample, mean, covariance, config)
+    onset_ns, onset_position = _update_movement(state, sample.stamp_ns, mean, covariance, config)
     hand = sample.stamp_ns, mean, covariance, sample.height, sample.frame_id
-    return FilterState(*hand, onset_ns, onset_position, effort.spent, height_mean, root, effort)
+    return FilterState(*hand, onset_ns, onset_position, height_mean, root)
 
 
 def _update_movement(
-    state: FilterState, sample: HandSample, mean: Array, covariance: Array, config: EstimatorConfig
-) -> tuple[int | None, Array | None, Effort]:
-    """Begin, continue or end a movement; return stamp and position (2,) of its onset, None at rest, and its effort."""
+    state: FilterState, stamp_ns: int, mean: Array, covariance: Array, config: EstimatorConfig
+) -> tuple[int | None, Array | None]:
+    """Begin, continue or end a movement; return stamp and position (2,) of its onset, None at rest."""
     onset_ns, onset_position, speed = state.onset_ns, state.onset_position, math.hypot(mean[2], mean[3])
     if onset_ns is None:
         if speed <= max(config.onset_speed, ONSET_STDDEVS * math.sqrt(covariance[2, 2])):
-            return None, None, state.effort
-        onset_ns, onset_position = sample.stamp_ns, mean[:2]
+            return None, None
+        onset_ns, onset_position = stamp_ns, mean[:2]
     elif speed < config.onset_speed / 2.0:
-        return None, None, Effort()
-    return onset_ns, onset_position, add_sample(state.effort, sample.stamp_ns, sample.position, config.position_stddev)
+        return None, None
+    return onset_ns, onset_position

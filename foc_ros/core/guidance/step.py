@@ -22,6 +22,10 @@ HEADING_M = 0.02
 """Shortest distance ahead on a path at which the heading points [m]."""
 SLOW = 0.02
 """Speed [m/s] from which on the direction of the hand counts more than that of a path as the one along the path."""
+SHARPNESS = 3.0
+"""Exponent of the likelihoods as weights: the larger, the more the likeliest candidate leads."""
+YIELD_ACCELERATION = 0.6
+"""Acceleration of the hand against the force from which on there is no force [m/s^2]."""
 LATE_PERIODS = 2.0
 """Longest time between two updates for which the tank is guaranteed, in periods of `guidance.rate_hz`."""
 
@@ -228,9 +232,9 @@ def _compute_wish(settings: GuidanceConfig, followed: Followed, seen: SeenMargin
         stiffness = project_out(stiffness, normalize(given.velocity + SLOW * paths.find_tangents(progress)))
     points = keep_clear(settings, followed.obstacles, paths.interpolate(paths.points, places))
     errors = saturate(settings, points - given.position - times[:, None] * given.velocity, need.share)
-    weights = weigh_candidates(paths.labels, paths.likelihoods, followed.known, settings.sharpness)
+    weights = weigh_candidates(paths.labels, paths.likelihoods, followed.known, SHARPNESS)
     force, agreement = combine(weights, (stiffness @ errors[..., None])[..., 0], find_crossing(need, errors))
-    force = yield_to_hand(force, given.acceleration, settings.yield_acceleration)
+    force = yield_to_hand(force, given.acceleration, YIELD_ACCELERATION)
     heading, line = _find_heading(paths, np.maximum(ahead, progress + HEADING_M), weights, given.position)
     return _Wish(
         turn_along(seen, weights @ errors, force),

@@ -2,13 +2,13 @@
 
 A recording r counts by how near its states come to the position p [m] and the velocity v [m/s] of the hand,
 
-    w_r = max_m exp(-|p - p_rm|^2 / 2 a^2 - |v - v_rm|^2 / 2 b^2),  a = `position_stddev`,  b = `velocity_stddev`.
+    w_r = max_m exp(-|p - p_rm|^2 / 2 a^2 - |v - v_rm|^2 / 2 b^2),  a = `POSITION_STDDEV`,  b = `VELOCITY_STDDEV`.
 
 From the state m of this maximum on, it passes obstacles on the sides of a class i towards the goal at its end. With G the classes
 that take the same gap in the next row, or lead to the same goal where no row is ahead, W those of the same way through all rows,
 n_i = sum of the w_r of class i, and n_G and n_W = sums of the n_i, the likelihoods p_i of the model are means of three Dirichlet
-distributions: of the gap, of the way beyond it, and of the goal. They count as n_0 = `prior_count` recordings for the gap and for
-the goal, and as n_1 = `prior_count_beyond` for the way; the recordings are observations:
+distributions: of the gap, of the way beyond it, and of the goal. They count as n_0 = `PRIOR_COUNT` recordings for the gap and for
+the goal, and as n_1 = `PRIOR_COUNT_BEYOND` for the way; the recordings are observations:
 
     p_G <- (n_0 p_G + n_G) / (n_0 + sum n),    p_W <- p_G (n_1 p_W / p_G + n_W) / (n_1 + n_G),
     p_i <- p_W (n_0 p_i / p_W + n_i) / (n_0 + n_W),
@@ -31,13 +31,17 @@ from numpy.typing import NDArray
 
 from foc_ros.core.classes.library import NEAR, STEP_S, Demonstration, is_same_demonstration
 from foc_ros.core.classes.rows import Decisions, find_decisions, tabulate_sides
-from foc_ros.core.config import ExperienceConfig
 from foc_ros.core.types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Record, Solution
 
 from .recorded_paths import RecordedPaths, fade_weights, pool_path, stays_in_class
 
 MOST_NEAR = 64
 """Number of recordings, the nearest ones, that count in one prediction: its time is bounded whatever the size of the library."""
+POSITION_STDDEV, VELOCITY_STDDEV = 0.02, 0.03
+"""Distance [m] and difference of velocities [m/s] at which a recording counts less."""
+PRIOR_COUNT, PRIOR_COUNT_BEYOND, PRIOR_COUNT_PATH = 1.0, 30.0, 0.3
+"""Numbers of recordings as which the model counts: for the gap in the next row and for the goal; for the way beyond it; for the
+path to it. Operators vary more in far choices than their recordings say, and less in their paths than plans do."""
 LEAST_WEIGHT = 1e-3
 """Weight below which a recording does not count."""
 
@@ -103,9 +107,12 @@ def make_library(found: Sequence[Demonstration]) -> Library:
 NO_LIBRARY = make_library(())
 
 
-def find_evidence(library: Library, hand: HandState, obstacles: Obstacles, goals: Array, config: ExperienceConfig) -> Evidence:
-    """Find the recordings that count: nearest first, at most MOST_NEAR, only those whose obstacles are where they were."""
-    scale = np.repeat([config.position_stddev, config.velocity_stddev], 2)
+def find_evidence(library: Library, hand: HandState, obstacles: Obstacles, goals: Array, widening: float = 1.0) -> Evidence:
+    """Find the recordings that count: nearest first, at most MOST_NEAR, only those whose obstacles are where they were.
+
+    widening: factor on the distances at which a recording counts less.
+    """
+    scale = widening * np.repeat([POSITION_STDDEV, VELOCITY_STDDEV], 2)
     apart = (((library.states - hand.mean[:4]) / scale) ** 2).sum(axis=2)
     state = apart.argmin(axis=1)
     weight = np.exp(-0.5 * apart[np.arange(len(apart)), state])
@@ -136,7 +143,6 @@ def pool_recordings(
     hand: HandState,
     obstacles: Obstacles,
     goals: Array,
-    config: ExperienceConfig,
 ) -> list[PredictedCandidate]:
     """Return candidates with likelihoods and paths that the recordings of a library change, the most likely first.
 
@@ -145,18 +151,18 @@ def pool_recordings(
     taken = [each for each in candidates if each.has_likelihood]
     if not taken or not library.recordings:
         return list(candidates)
-    evidence = find_evidence(library, hand, obstacles, goals, config)
+    evidence = find_evidence(library, hand, obstacles, goals)
     if not len(evidence.row):
         return list(candidates)
     goal = np.array([each.candidate.goal for each in taken], dtype=np.intp)
     decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
     agreements = [compare_with_class(each.candidate, evidence, obstacles, decisions.next_row) for each in taken]
     counts = np.array([evidence.weight[each.is_same].sum() for each in agreements])
-    likelihoods = update_likelihoods(np.array([each.likelihood for each in taken]), counts, decisions, config)
+    likelihoods = update_likelihoods(np.array([each.likelihood for each in taken]), counts, decisions)
     pooled = []
     for each, share, agreement in zip(taken, likelihoods.tolist(), agreements, strict=True):
         recorded = follow_recordings(library, evidence, agreement.until_s, hand, each.times)
-        pooled.append(replace(each, likelihood=share, solution=_pool_path(each, recorded, agreement, hand, obstacles, config)))
+        pooled.append(replace(each, likelihood=share, solution=_pool_path(each, recorded, agreement, hand, obstacles)))
     pooled.sort(key=lambda each: (-each.likelihood, each.label))
     return pooled + [each for each in candidates if not each.has_likelihood]
 
@@ -201,26 +207,25 @@ def _pool_path(
     agreement: Agreement,
     hand: HandState,
     obstacles: Obstacles,
-    config: ExperienceConfig,
 ) -> Solution:
     """Return the solution with the path that recordings change; an answer that is kept was changed when it was found."""
     for is_used in (agreement.until_s > 0.0, agreement.is_same):
         if candidate.age_s or not is_used.any():
             break
-        uncertainty = hand.covariance[:2, :2], 0.5 * config.velocity_stddev
-        pooled = pool_path(candidate.solution, recorded.take(is_used), *uncertainty, config.prior_count_path)
+        uncertainty = hand.covariance[:2, :2], 0.5 * VELOCITY_STDDEV
+        pooled = pool_path(candidate.solution, recorded.take(is_used), *uncertainty, PRIOR_COUNT_PATH)
         if stays_in_class(candidate, pooled, obstacles):
             return pooled
     return candidate.solution
 
 
-def update_likelihoods(likelihoods: Array, counts: Array, decisions: Decisions, config: ExperienceConfig) -> Array:
+def update_likelihoods(likelihoods: Array, counts: Array, decisions: Decisions) -> Array:
     """Return likelihoods (k,) that counts (k,) change: of the gaps, of the ways in each gap, and of the goals in each way."""
     whole, each = np.zeros(len(counts), dtype=np.intp), np.arange(len(counts))
     levels = (
-        (whole, decisions.next_gap, config.prior_count),
-        (decisions.next_gap, decisions.way, config.prior_count_beyond),
-        (decisions.way, each, config.prior_count),
+        (whole, decisions.next_gap, PRIOR_COUNT),
+        (decisions.next_gap, decisions.way, PRIOR_COUNT_BEYOND),
+        (decisions.way, each, PRIOR_COUNT),
     )
     pooled = np.ones(len(counts))
     for group, part, prior_count in levels:

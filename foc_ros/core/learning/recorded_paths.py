@@ -2,12 +2,12 @@
 
 The recordings e that pass the next row as a candidate does, displaced so that they begin at the hand, are at a time t from now at
 x_e with weights w_e, which fade out over the FADE_S before a recording ends or parts from the class. With P the covariance of the
-position of the hand and b = `velocity_stddev`, by which their velocities differ from that of the hand,
+position of the hand and b = `experience.VELOCITY_STDDEV`, by which their velocities differ from that of the hand,
 
     n = sum w_e,   r = sum w_e x_e / n,   R = sum w_e (x_e - r) (x_e - r)' / n + P + (b t / 2)^2 I.
 
 The position of a plan with mean m and covariance S becomes the logarithmic opinion pool (Genest and Zidek 1986,
-doi:10.1214/ss/1177013825) of both normal distributions, in which the plan counts as n_0 = `prior_count_path` recordings:
+doi:10.1214/ss/1177013825) of both normal distributions, in which the plan counts as n_0 recordings:
 
     S' = ((1 - a) S^-1 + a R^-1)^-1,   m' = S' ((1 - a) S^-1 m + a R^-1 r),   a = n / (n + n_0).
 

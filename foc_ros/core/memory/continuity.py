@@ -26,7 +26,6 @@ from functools import cache
 import numpy as np
 
 from foc_ros.core.config import LikelihoodConfig
-from foc_ros.core.likelihood import CostModel
 from foc_ros.core.types import NANOSECONDS, Array, Candidate, PredictedCandidate, Prediction, Record, Solution, as_readonly
 
 from .class_numbers import is_renamed
@@ -121,7 +120,6 @@ def keep_answers(
     past: Past,
     stamp_ns: int,
     hold_s: float,
-    costs: CostModel,
 ) -> list[PredictedCandidate]:
     """Return the solved candidates, with kept answers for those without a likelihood and for classes that are not followed.
 
@@ -139,19 +137,19 @@ def keep_answers(
             if answer not in usable:
                 answer = next((each for each in usable if is_renamed(each.predicted.candidate, candidate)), None)
             reason = 'out of time' if result is None else result.solution.message
-            held = None if answer is None else hold_answer(answer, candidate, stamp_ns, costs, reason)
+            held = None if answer is None else hold_answer(answer, candidate, stamp_ns, reason)
             result = held or result
         if result is not None:
             kept.append(result)
     for answer in usable:
         candidate = answer.predicted.candidate
         if not any(each.label == candidate.label or is_renamed(candidate, each) for each in candidates):
-            held = hold_answer(answer, candidate, stamp_ns, costs, 'the class is not followed any more')
+            held = hold_answer(answer, candidate, stamp_ns, 'the class is not followed any more')
             kept += [held] if held is not None else []
     return kept
 
 
-def hold_answer(answer: Answer, candidate: Candidate, stamp_ns: int, costs: CostModel, reason: str) -> PredictedCandidate | None:
+def hold_answer(answer: Answer, candidate: Candidate, stamp_ns: int, reason: str) -> PredictedCandidate | None:
     """Return what remains of an answer, under the name of a candidate; None if nothing remains."""
     age_s, solution = (stamp_ns - answer.stamp_ns) / NANOSECONDS, answer.predicted.solution
     left_s = float(solution.times[-1]) - age_s
@@ -159,7 +157,7 @@ def hold_answer(answer: Answer, candidate: Candidate, stamp_ns: int, costs: Cost
         return None
     rest = _shift(solution, age_s, left_s, f'{reason}; the answer is from {age_s:.3g} s ago')
     sides = answer.predicted.sides
-    return PredictedCandidate(candidate, rest, sides, costs.compute_cost(rest), answer.predicted.likelihood, age_s)
+    return PredictedCandidate(candidate, rest, sides, rest.expected_effort * rest.dt, answer.predicted.likelihood, age_s)
 
 
 def interpolate_rest(states: Array, begin: float) -> Array:

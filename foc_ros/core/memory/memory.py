@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from foc_ros.core.learning.choices import Choice
 from foc_ros.core.types import Candidate, Solution
 
 from .class_numbers import NO_NUMBERS, ClassNumbers, is_renamed
@@ -17,8 +16,7 @@ class Memory:
     """What one prediction passes to the next, by label.
 
     most_likely: label; candidates: the homotopy classes followed; solutions: of those with a likelihood; past: what continuity
-    needs; next_goal: row of the goal at which the search begins; numbers: of the classes; choice: the last one, from which
-    preferences are learnt.
+    needs; next_goal: row of the goal at which the search begins; numbers: of the classes.
     """
 
     most_likely: str | None = None
@@ -27,7 +25,6 @@ class Memory:
     past: Past = NO_PAST
     next_goal: int = 0
     numbers: ClassNumbers = NO_NUMBERS
-    choice: Choice | None = None
 
     def forget(self) -> Memory:
         """Return the memory with which a new movement begins: empty, but no number of a class is given again."""
