@@ -15,17 +15,15 @@ from foc_ros.core.checks import check_array, check_number, check_vector
 from foc_ros.core.classes.library import Demonstration
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.errors import InputError, SceneError
-from foc_ros.core.estimation.kalman_filter import FilterState, describe_jump, update
+from foc_ros.core.errors import FocError, InputError, SceneError
+from foc_ros.core.estimation.kalman_filter import describe_jump
 from foc_ros.core.guidance.step import GuidanceInput, GuidanceOutput, GuidanceState, guide
-from foc_ros.core.learning.experience import make_library
-from foc_ros.core.memory.memory import Memory
-from foc_ros.core.obstacles.scene import ObstacleSource
 from foc_ros.core.obstacles.shapes import Shape, collect_obstacles
 from foc_ros.core.ocp import monte_carlo as sampling
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import find_least_safety_factor
-from foc_ros.core.predictor import predict, warm_up
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.predictor import warm_up
 from foc_ros.core.reaching_scene import ReachingScene, check_outside
 from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
 from foc_ros.core.scene_solver import build_scene_problems, solve_scene
@@ -43,6 +41,8 @@ from foc_ros.core.types import (
 LATEST_S = 9e9
 """Bound on a time [s]: stamps are 64-bit numbers of nanoseconds."""
 MOST_SAMPLES = 10_000_000
+SHAPES = 'shapes'
+"""Name of the source of the obstacles of a `Predictor`."""
 PLANE, SPACE = 2, 3
 """Number of coordinates of a position in the task plane, and of one with its height over the plane."""
 
@@ -58,7 +58,9 @@ class Prediction(types.Prediction):
         Solved ones first, the most likely first; then those that could not be solved, with their status. The `height` of a
         candidate has `mean` and `covariance` of the height over the plane and its derivatives, None where it is not predicted.
     most_likely : str or None
-        Label of the most likely class, which changes only when another one leads by `likelihood.margin`; None if none was solved.
+        Label of the most likely class, which changes only when another one leads by 0.05; None if none was solved.
+    unknown : float
+        Share of the likelihood of classes that the search has seen and that are no candidates; with it, likelihoods sum to one.
     obstacles, goals : Obstacles, ndarray of shape (g, 2)
         The scene at time `t`.
     cleared : tuple of bool
@@ -171,8 +173,8 @@ class Guidance:
 class Predictor:
     """Predict where a moving hand is going.
 
-    A predictor follows one hand: it filters its positions, detects where movements begin, and starts every prediction from the
-    previous one.
+    A predictor follows one hand: it filters its positions, detects where movements begin, starts every prediction from the
+    previous one, and learns from the operator's movements, as the node and replays do.
 
     Parameters
     ----------
@@ -202,19 +204,23 @@ class Predictor:
             from foc_ros.io.class_library import load_library
 
             source = load_library(str(source))
-        self._library = make_library(tuple(source))
         if self.config.budget_s:
             warm_up(self.config)  # imports are no part of the time of the first update
-        self._goals: types.Array | None = None
-        self._goal_heights: types.Array | None = None
-        self._obstacles = ObstacleSource(make_obstacles(), None, '')
-        self._hand: FilterState | None = None
-        self._memory = Memory()
+        self._pipeline = Pipeline(self.config, tuple(source), is_timed=False)
+        self._obstacles: Obstacles | None = make_obstacles()
 
     def __repr__(self) -> str:
         """Count goals and obstacles."""
-        goals = 0 if self._goals is None else len(self._goals)
-        return f'<Predictor with {goals} goals, {len(self._obstacles.obstacles)} obstacles>'
+        scene = self._pipeline.scene
+        goals = 0 if scene.goals is None else len(scene.goals)
+        waiting = self._obstacles
+        obstacles = sum(len(each.obstacles) for each in scene.sources.values()) if waiting is None else len(waiting)
+        return f'<Predictor with {goals} goals, {obstacles} obstacles>'
+
+    @property
+    def adapted_config(self) -> Config:
+        """The parameters with which the next prediction is made: those given, adapted to the operator."""
+        return self._pipeline.adapted_config
 
     def set_goals(self, goals: ArrayLike) -> None:
         """Replace the goals.
@@ -229,7 +235,8 @@ class Predictor:
         points = check_array('goals', goals, (None, SPACE if has_heights else PLANE))
         if not len(points):
             raise SceneError('goals', 'at least one position', 'none')
-        self._goals, self._goal_heights = points[:, :PLANE], points[:, PLANE] if has_heights else None
+        heights = points[:, PLANE] if has_heights else None
+        self._pipeline.set_goals(points[:, :PLANE], self._pipeline.frame_id or '', heights)
 
     def set_obstacles(self, obstacles: Iterable[Shape] | Obstacles) -> None:
         """Replace the obstacles. Their positions hold at the next update; from then on each moves on at its velocity.
@@ -239,7 +246,7 @@ class Predictor:
         obstacles : iterable of Circle, Box, Capsule and Hull, or Obstacles
             The obstacles, none for a free scene. `SceneError` is raised if a name occurs twice.
         """
-        self._obstacles = ObstacleSource(collect_obstacles(obstacles), None, '')
+        self._obstacles = collect_obstacles(obstacles)
 
     def update(self, t: float, position: ArrayLike) -> Prediction:
         """Take the next hand position and predict from it.
@@ -267,33 +274,29 @@ class Predictor:
             Also for a position that jumps: the next one decides whether it was an outlier, or the movement restarts there.
         """
         stamp_ns = round(check_number('t', t, -LATEST_S, LATEST_S) * NANOSECONDS)
-        point = check_vector('position', position, PLANE if self._goal_heights is None else SPACE)
-        height = 0.0 if self._goal_heights is None else float(point[PLANE])
-        sample = HandSample(stamp_ns, point[:PLANE], height, self.config.frame_id)
-        if self._goals is None:
+        pipeline, before = self._pipeline, self._pipeline.hand_state
+        goals, heights = pipeline.scene.goals, pipeline.scene.goal_heights
+        point = check_vector('position', position, PLANE if heights is None else SPACE)
+        if goals is None:
             raise SceneError('goals', 'at least one, by set_goals', 'none')
-        updated = update(self._hand, sample, self.config.estimator)
-        if updated.status is SampleStatus.JUMPED:
-            assert self._hand is not None
-            error, self._hand = describe_jump('position', self._hand, sample, self.config.estimator), updated.state
-            raise error
-        if updated.status is SampleStatus.RESTARTED_BACKWARD or not updated.status.is_taken:
-            last = '' if self._hand is None else f', {self._hand.stamp_ns / NANOSECONDS:.9g} s'
-            raise InputError('t', f'a time after the last one{last}', t)
-        if updated.status.is_restart:
-            self._memory = self._memory.forget()
-        self._hand = updated.state
-        if self._obstacles.stamp_ns is None:
-            self._obstacles = replace(self._obstacles, stamp_ns=stamp_ns)
-        obstacles = self._obstacles.at(stamp_ns)
-        deadline = Deadline(self.config.budget_s or None)
-        known = self._memory, self._library, deadline, self._goal_heights
-        prediction, self._memory = predict(self.config, self._hand, obstacles, self._goals, *known)
+        if before is not None and stamp_ns <= before.stamp_ns:
+            raise InputError('t', f'a time after the last one, {before.stamp_ns / NANOSECONDS:.9g} s', t)
+        frame_id = pipeline.frame_id or ''
+        sample = HandSample(stamp_ns, point[:PLANE], 0.0 if heights is None else float(point[PLANE]), frame_id)
+        if self._obstacles is not None:
+            pipeline.set_obstacles(SHAPES, self._obstacles, stamp_ns, frame_id)
+        if pipeline.add_hand_sample(sample) is SampleStatus.JUMPED:
+            assert before is not None
+            raise describe_jump('position', before, sample, self.config.estimator)
+        self._obstacles = None
+        prediction = pipeline.predict(Deadline(self.config.budget_s or None))
+        if prediction is None:
+            raise FocError(str(pipeline.last_refusal))
         return Prediction(**vars(prediction))
 
     def reset(self) -> None:
-        """Forget the movement; keep goals and obstacles. The next update may have any time."""
-        self._hand, self._memory = None, self._memory.forget()
+        """Forget the movement and the operator; keep goals and obstacles. The next update may have any time."""
+        self._pipeline.reset()
 
 
 @dataclass(frozen=True, eq=False, repr=False)

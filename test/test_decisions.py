@@ -10,8 +10,8 @@ import pytest
 from foc_ros.core.classes.rows import Decisions, find_decisions
 from foc_ros.core.config import Config, LikelihoodConfig
 from foc_ros.core.likelihood import compute_likelihoods
-from foc_ros.core.memory.memory import Memory
 from foc_ros.core.predictor import predict
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import LEFT, RIGHT, HandState, make_obstacles
 
 OBSTACLES = make_obstacles([[0.1, 0.05], [0.1, -0.05], [0.3, 0.0]], 0.01)
@@ -89,5 +89,5 @@ def test_who_plans_the_whole_way_weighs_all_choices_alike() -> None:
 
 def test_where_no_class_can_be_solved_there_is_no_likelihood() -> None:
     config = Config().with_values({'foc.eta': 0.999, 'foc.noise_x': 2.0, 'foc.noise_y': 2.0, 'likelihood.shortfall': np.inf})
-    found, _ = predict(config, make_hand(0.0), OBSTACLES, GOALS, Memory())
+    found, _ = predict(config, make_hand(0.0), OBSTACLES, GOALS, NO_TRACKS)
     assert found.candidates and not found.candidates_with_likelihood

@@ -22,6 +22,7 @@ from foc_ros.analysis.evaluation.observations import (
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
 from foc_ros.analysis.recordings import BagRecording, find_recordings
 from foc_ros.analysis.replay import Replay
+from foc_ros.core import tracks
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.types import LEFT, Solution, Status
 from foc_ros.io.bags import TYPESTORE, BagReader, Item
@@ -29,10 +30,15 @@ from foc_ros.ros.messages.encode_inputs import encode_goals
 from foc_ros.ros.messages.types import RosbagsTypes
 
 FAST = {'rate_hz': 4.0, 'foc.steps': 20, 'foc.strategy': 'fixed', 'foc.tau': 1e-4, 'foc.lam': 0.0, 'homotopy.max_candidates': 6}
-PLAIN = replace_values(Config(), FAST | {'likelihood.smoothing_s': 0.0, 'likelihood.planning_horizon_s': 1000.0})
+PLAIN = replace_values(Config(), FAST | {'likelihood.planning_horizon_s': 1000.0})
 AHEAD = replace_values(PLAIN, {'likelihood.beta': 3.0, 'likelihood.planning_horizon_s': 0.0, 'likelihood.lookahead_s': 0.4})
 OBSTACLES = [(0.12, 0.0, 0.02), (0.22, 0.03, 0.02)]
 GOALS = [(0.32, 0.05), (0.32, -0.05)]
+
+
+@pytest.fixture(autouse=True)
+def without_a_filter(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tracks, 'SMOOTHING_S', 1e-9)
 
 
 @pytest.fixture(scope='module')

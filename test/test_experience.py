@@ -25,9 +25,9 @@ from foc_ros.core.learning.experience import (
     make_library,
     update_likelihoods,
 )
-from foc_ros.core.memory.memory import Memory
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.predictor import predict
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import LEFT, RIGHT, Candidate, HandState, make_obstacles
 from foc_ros.io.class_library import load_library, save_library
 
@@ -51,7 +51,7 @@ HAND = HandState(1, np.zeros(6), 1e-6 * np.eye(6), frame_id='world')
 
 
 def ask(library, hand=HAND, obstacles=OBSTACLES):
-    return predict(CONFIG, hand, obstacles, GOAL, Memory(), library)[0]
+    return predict(CONFIG, hand, obstacles, GOAL, NO_TRACKS, library)[0]
 
 
 def by_label(prediction):
@@ -140,7 +140,7 @@ def test_an_obstacle_below_the_hand_does_not_keep_recordings_away():
         [*OBSTACLES.radius, 0.02],
         heights=[(-9.0, 9.0)] * len(OBSTACLES) + [(0.0, 0.05)],
     )
-    ask_above = lambda obstacles: predict(CONFIG, high, obstacles, GOAL, Memory(), library, goal_heights=np.array([0.3]))[0]  # noqa: E731
+    ask_above = lambda obstacles: predict(CONFIG, high, obstacles, GOAL, NO_TRACKS, library, goal_heights=np.array([0.3]))[0]  # noqa: E731
     without, over = find_taken(ask_above(low.take([0, 1, 2]))), find_taken(ask_above(low))
     np.testing.assert_array_equal(over.mean, without.mean)
     assert over.likelihood == without.likelihood

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.memory.memory import Memory
 from foc_ros.core.predictor import predict
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, Obstacles, Prediction, Status, make_obstacles
 
 GOAL = np.array([[0.3, 0.0]])
@@ -18,7 +18,7 @@ CONFIG = replace_values(Config(), {'foc.steps': 30})
 
 def predicted(obstacles: Obstacles, goals: np.ndarray = GOAL, config: Config = CONFIG) -> Prediction:
     hand = HandState(1, np.zeros(6), np.diag([1e-6, 1e-6, 1e-4, 1e-4, 1e-2, 1e-2]))
-    prediction, memory = predict(config, hand, obstacles, goals, Memory())
+    prediction, memory = predict(config, hand, obstacles, goals, NO_TRACKS)
     for outcome in prediction.candidates:
         solution = outcome.solution
         for array in (solution.mean, solution.covariance, solution.control):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.errors import InputError
-from foc_ros.core.likelihood import COST_FLOOR, compute_likelihoods, select_most_likely
+from foc_ros.core.likelihood import COST_FLOOR, compute_likelihoods
 
 COSTS = st.lists(st.floats(0.0, 1.7e308), min_size=1, max_size=12)
 BETA = st.floats(0.0, 100.0)
@@ -24,7 +24,6 @@ def test_ratio_of_likelihoods_is_the_power_of_the_ratio_of_costs() -> None:
 
 def test_no_class_gives_no_likelihood() -> None:
     assert compute_likelihoods(np.zeros(0), with_beta(0.5)).shape == (0,)
-    assert select_most_likely({}, 'a', 0.1) is None
 
 
 def test_beta_zero_is_uniform_and_large_beta_picks_the_cheapest() -> None:
@@ -60,20 +59,3 @@ def test_the_unit_of_effort_does_not_matter(costs: list[float], beta: float, uni
 def test_a_negative_or_infinite_cost_is_refused_by_name(wrong: float) -> None:
     with pytest.raises(InputError, match=r'costs\[1\]: expected a finite number >= 0'):
         compute_likelihoods(np.array([1.0, wrong]), with_beta(0.5))
-
-
-def test_most_likely_stays_until_another_leads_by_more_than_the_margin() -> None:
-    p = {'a': 0.44, 'b': 0.56}
-    assert select_most_likely(p, 'a', 0.13) == 'a'
-    assert select_most_likely(p, 'a', 0.11) == 'b'
-    assert select_most_likely(p, None, 0.13) == 'b'
-    assert select_most_likely(p, 'gone', 0.13) == 'b'
-    assert select_most_likely({'a': 0.0, 'b': 1.0}, 'a', 1.0) == 'a'
-
-
-@given(st.permutations(list('abcd')), st.sampled_from([None, *'abcdx']), st.floats(0.0, 1.0))
-def test_the_order_of_the_classes_does_not_matter(order: list[str], previous: str | None, margin: float) -> None:
-    p = {'a': 0.2, 'b': 0.3, 'c': 0.3, 'd': 0.2}
-    answer = select_most_likely({label: p[label] for label in order}, previous, margin)
-    assert answer == select_most_likely(p, previous, margin)
-    assert answer == (previous if previous in ('b', 'c') or (previous in p and margin >= 0.3 - 0.2) else 'b')

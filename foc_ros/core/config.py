@@ -177,11 +177,6 @@ class LikelihoodConfig:
     weaving: float = _p(
         4.0, 'log-likelihood that a class loses for each row through several gaps of which it leads', '', 0.0, 100.0
     )
-    hold_s: float = _p(
-        0.2, 'longest time for which a class keeps its last answer if there is no time for a new one or it fails', 's', 0.0, 10.0
-    )
-    smoothing_s: float = _p(0.1, 'time constant of the filter of the likelihoods; 0: none', 's', 0.0, 10.0)
-    margin: float = _p(0.05, 'lead in likelihood that another class needs to become the most likely one', '', 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -332,6 +327,9 @@ REMOVED = {
     'likelihood.beta_beyond': 'ways beyond the next row are equally likely to an operator who looks ahead',
     'likelihood.heading_bias': 'reaches that bend are learnt as recordings: experience.learning',
     'likelihood.adaptation': CHOICES_LEARNT,
+    'likelihood.hold_s': 'it is 0.2 s',
+    'likelihood.smoothing_s': 'it is 0.1 s',
+    'likelihood.margin': 'it is 0.05',
     'experience.prior_count': EXPERIENCE_FIXED,
     'experience.prior_count_beyond': EXPERIENCE_FIXED,
     'experience.prior_count_path': EXPERIENCE_FIXED,

@@ -38,7 +38,6 @@ The weight of a class that weaves through w_i rows (`classes.rows`) is smaller b
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,16 +159,3 @@ def _weigh_by_lookahead(logs: Array, branch_times: BranchTimes, lookahead_s: flo
     probability = -np.diff(later, axis=1, prepend=1.0)
     weighted: Array = ((probability * mean).sum(axis=1) - weight)[path_class] + logs
     return weighted
-
-
-def select_most_likely(likelihoods: Mapping[str, float], previous: str | None, margin: float) -> str | None:
-    """Return the label of the most likely class; the previous one stays until another leads by more than `margin`.
-
-    likelihoods: by label. Among equally likely classes the first label in the alphabet is taken, whatever the order of the input.
-    None for no class.
-    """
-    if not likelihoods:
-        return None
-    negative, best = min((-share, label) for label, share in likelihoods.items())
-    kept = likelihoods.get(previous) if previous is not None else None
-    return previous if kept is not None and -negative - kept <= margin else best

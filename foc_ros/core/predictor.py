@@ -1,15 +1,15 @@
-"""The prediction: one hand state and one scene enter, one prediction and the memory for the next one leave."""
+"""The prediction: one hand state and one scene enter, one prediction and the classes that it follows leave."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .candidates import rank_candidates, solve_candidates
+from .candidates import estimate_unsolved, find_unknown_share, rank_candidates, solve_candidates
 from .classes import Search, Turn, search
 from .classes.library import GuessTiming, recall_demonstrations
 from .config import REFERENCE_STEP_S, Config, EstimatorConfig
@@ -21,14 +21,14 @@ from .estimation.duration import estimate_times_to_go, is_passing, limit_change
 from .height import HeightPredictor
 from .learning.dispersion import scale_covariance
 from .learning.experience import NO_LIBRARY, Library, pool_recordings
-from .likelihood import BETWEEN_OPERATORS, select_most_likely
-from .memory.continuity import Past, keep_answers, make_continuous, smooth_paths
-from .memory.memory import Memory
+from .likelihood import BETWEEN_OPERATORS
 from .obstacles.chance_constraint import RiskBound, count_events
 from .obstacles.culling import cull_obstacles
 from .ocp.problem import Problem, rest_to_goal
 from .safety_preference import SafetyPreference
+from .tracks import HOLD_S, NO_TRACKS, Track, Tracks, take_rest
 from .types import (
+    NANOSECONDS,
     Array,
     Candidate,
     HandState,
@@ -36,7 +36,6 @@ from .types import (
     PredictedCandidate,
     Prediction,
     Record,
-    Solution,
     Status,
     make_obstacles,
 )
@@ -52,12 +51,12 @@ def predict(
     hand: HandState,
     obstacles: Obstacles,
     goals: Array,
-    memory: Memory,
+    tracks: Tracks,
     library: Library = NO_LIBRARY,
     deadline: Deadline = NEVER,
     goal_heights: Array | None = None,
     planning_spread: float = BETWEEN_OPERATORS,
-) -> tuple[Prediction, Memory]:
+) -> tuple[Prediction, Tracks]:
     """Predict where a hand goes.
 
     Parameters
@@ -70,8 +69,8 @@ def predict(
         Obstacles at the stamp of the hand. The hand keeps `scene.hand_radius` away from them; the prediction holds them as given.
     goals
         Goals (g, 2) [m], g >= 1.
-    memory
-        What the previous prediction returned, or an empty `Memory`.
+    tracks
+        What the previous prediction returned, or `NO_TRACKS`.
     library
         Demonstrated paths, which become candidates where they fit the scene, and recordings, which are evidence (`experience`).
     deadline
@@ -83,40 +82,58 @@ def predict(
 
     Returns
     -------
-    Prediction, Memory
-        The prediction, and the memory for the next one. Without a deadline, equal arguments give equal results, wall times apart.
+    Prediction, Tracks
+        The prediction, and the classes that it follows, for the next one. Without a deadline, equal arguments give equal results,
+        wall times apart.
     """
-    began, past = time.perf_counter(), memory.past.keep_goals(goals)
-    scene = _prepare_scene(config, hand, obstacles, goals, goal_heights, past)
-    found, candidates = _find_candidates(scene, config, memory, library, deadline)
-    solved = _solve(scene, config, candidates, memory.find_earlier(candidates, past.durations_s), deadline)
-    kept = keep_answers(candidates, solved, past, hand.stamp_ns, config.likelihood.hold_s)
-    ranked = rank_candidates(kept, config.likelihood, scene.near, scene.hand, goals, planning_spread)
+    began, stamp_ns, known = time.perf_counter(), hand.stamp_ns, tracks.keep_goals(goals)
+    scene = _prepare_scene(config, hand, obstacles, goals, goal_heights, known)
+    found, candidates = _find_candidates(scene, config, known, library, deadline)
+    matched = known.match(candidates, stamp_ns)
+    solved = _solve(scene, config, candidates, matched, deadline)
+    held = [_hold_answer(*each, scene.hand) for each in zip(solved, matched, strict=True)]
+    answered = estimate_unsolved(held, scene.near)
+    ranked = rank_candidates(answered, config.likelihood, scene.near, scene.hand, goals, planning_spread)
     pooled = pool_recordings(ranked, library, hand, scene.blocking, goals)
-    smooth = smooth_paths(pooled, past, hand.stamp_ns, config.likelihood.smoothing_s)
-    continuous = make_continuous(smooth, past, hand.stamp_ns, config.likelihood)
-    numbered, numbers = memory.numbers.keep_goals(past.durations_s).number(continuous, hand.stamp_ns, config.likelihood.hold_s)
-    predicted = scene.heights.add_to(numbered)
-    taking_part = [each for each in predicted if each.has_likelihood]
-    shares = {each.candidate: each.likelihood for each in taking_part}
-    likelihoods = {each.label: each.likelihood for each in taking_part}
-    best = select_most_likely(likelihoods, past.find_renamed(memory.most_likely, shares), config.likelihood.margin)
+    distances = np.hypot(*(goals - hand.mean[:2]).T)
+    unknown = find_unknown_share(pooled, found.unfollowed, distances, config.likelihood, planning_spread)
+    smooth, unknown = known.smooth(
+        [replace(each, likelihood=(1.0 - unknown) * each.likelihood) for each in pooled], unknown, stamp_ns
+    )
+    predicted, best = scene.heights.add_to(smooth), known.choose_most_likely(smooth)
     counts = {
-        'merged': len(kept) - len(ranked),
+        'merged': len(answered) - len(ranked),
         'culled': len(scene.blocking) - len(scene.near),
         'cleared_by_height': int(scene.cleared.sum()),
         'recalled': len(candidates) - len(found.candidates),
         'kept': sum(each.age_s > 0.0 for each in predicted),
         'unfinished': sum(each.status is Status.DEADLINE for each in predicted),
+        'estimated': sum(each.status is Status.ESTIMATED for each in predicted),
     }
-    notes = dict(found.notes) | {name: count for name, count in counts.items() if count}
-    hand_at, cleared = (hand.stamp_ns, hand.frame_id, hand.height), tuple(scene.cleared.tolist())
-    prediction = Prediction(*hand_at, predicted, best, notes, time.perf_counter() - began, obstacles, goals, cleared)
-    present = past.follow(prediction, scene.durations_s, config.likelihood.hold_s)
-    solutions = {each.label: each.solution for each in solved if each.has_likelihood}
-    scaled = tuple(scale_covariance(each, config.covariance, at_rest=hand.onset_ns is None) for each in predicted)
-    remembered = Memory(best, candidates, solutions, present, found.next_goal, numbers)
-    return replace(prediction, candidates=scaled), remembered
+    prediction = Prediction(
+        stamp_ns,
+        hand.frame_id,
+        hand.height,
+        tuple(scale_covariance(each, config.covariance, at_rest=hand.onset_ns is None) for each in predicted),
+        None if best is None else best.label,
+        notes=dict(found.notes) | {name: count for name, count in counts.items() if count},
+        solve_s=time.perf_counter() - began,
+        obstacles=obstacles,
+        goals=goals,
+        cleared=tuple(scene.cleared.tolist()),
+        unknown=unknown,
+    )
+    following = Tracks(
+        known.follow(predicted, matched, solved, stamp_ns),
+        stamp_ns,
+        goals,
+        dict(enumerate(scene.durations_s)),
+        unknown,
+        None if best is None else best.way,
+        max([known.next_number, *(each.number + 1 for each in matched)]),
+        found.next_goal,
+    )
+    return prediction, following
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,11 +156,11 @@ class _PredictionScene(Record):
 
 
 def _prepare_scene(
-    config: Config, estimated: HandState, obstacles: Obstacles, goals: Array, goal_heights: Array | None, past: Past
+    config: Config, estimated: HandState, obstacles: Obstacles, goals: Array, goal_heights: Array | None, known: Tracks
 ) -> _PredictionScene:
     """Return the scene of a prediction: a start without noise, times to go, and the obstacles that are in the way."""
     hand = _simplify_start(estimated, config.estimator)
-    durations_s = _find_durations(hand, goals, past, config)
+    durations_s = _find_durations(hand, goals, known, config)
     grown = obstacles.grow(config.scene.hand_radius)
     covariances = SharedCovariances(hand, config)
     heights = HeightPredictor(config, hand, goal_heights, covariances)
@@ -154,44 +171,53 @@ def _prepare_scene(
 
 
 def _find_candidates(
-    scene: _PredictionScene, config: Config, memory: Memory, library: Library, deadline: Deadline
+    scene: _PredictionScene, config: Config, known: Tracks, library: Library, deadline: Deadline
 ) -> tuple[Search, tuple[Candidate, ...]]:
     """Search for homotopy classes; return what was found, and the candidates with those that a library recalls."""
     timing = GuessTiming(scene.durations_s, config.foc.steps)
-    turn = Turn(deadline.take_share(SEARCH_SHARE), memory.next_goal)
-    found = search(scene.hand.mean, scene.goals, scene.near, config.homotopy, *timing, memory.candidates, turn)
+    turn = Turn(deadline.take_share(SEARCH_SHARE), known.next_goal)
+    found = search(scene.hand.mean, scene.goals, scene.near, config.homotopy, *timing, known.candidates, turn)
     where = scene.hand, scene.goals, scene.near, config.homotopy, timing
-    return found, recall_demonstrations(library.demonstrations, *where, found.candidates, memory.candidates)
+    return found, recall_demonstrations(library.demonstrations, *where, found.candidates, known.candidates)
 
 
 def _solve(
-    scene: _PredictionScene,
-    config: Config,
-    candidates: Sequence[Candidate],
-    earlier: Mapping[str, Solution],
-    deadline: Deadline,
+    scene: _PredictionScene, config: Config, candidates: Sequence[Candidate], matched: Sequence[Track], deadline: Deadline
 ) -> list[PredictedCandidate]:
-    """Solve the candidates for which there is time; return them with their predictive covariance."""
+    """Solve the candidates, each from the solution of its track; return them with their numbers and predictive covariance."""
     place = config, scene.hand, scene.near
     by_goal = {row: build_problem(*place, scene.goals[row], scene.durations_s[row]) for row in {each.goal for each in candidates}}
-    problems = [by_goal[each.goal] for each in candidates]
     until = deadline.take_share(SOLVE_SHARE, RESERVE_S * len(candidates))
-    solved = solve_candidates(candidates, problems, config.foc, earlier, until)
-    return [_widen_covariance(each, scene.covariances, scene.hand, config) for each in solved]
+    earlier = [each.solution if each.seen_ns == each.solved_ns else None for each in matched]
+    solved = solve_candidates(candidates, [by_goal[each.goal] for each in candidates], config.foc, earlier, until)
+    numbered = [replace(each, way=track.number) for each, track in zip(solved, matched, strict=True)]
+    return [_widen_covariance(each, scene.covariances, scene.hand, config) for each in numbered]
+
+
+def _hold_answer(solved: PredictedCandidate, track: Track, hand: HandState) -> PredictedCandidate:
+    """Return the rest of the last answer of a class that could not be solved, if it is young enough."""
+    if solved.has_likelihood or track.solution is None or not track.is_solved_within(hand.stamp_ns, HOLD_S):
+        return solved
+    age_s = (hand.stamp_ns - track.solved_ns) / NANOSECONDS
+    rest = take_rest(track.solution, age_s, hand.mean[:2], solved.solution.message)
+    if rest is None:
+        return solved
+    sides = dict(solved.candidate.sides)
+    return replace(solved, solution=rest, sides=sides, cost=rest.expected_effort * rest.dt, age_s=age_s)
 
 
 def warm_up(config: Config) -> None:
     """Predict twice in a made-up scene, so that the first real predictions find the cached matrices and the loaded kernels."""
     obstacles, goals = make_obstacles([[0.15, 0.0]], 0.02, 0.001), np.array([[0.3, 0.0]])
-    hand, memory = HandState(0, np.zeros(6), np.zeros((6, 6))), Memory()
+    hand, tracks = HandState(0, np.zeros(6), np.zeros((6, 6))), NO_TRACKS
     for _ in range(2):  # the second one begins at a solution
-        _, memory = predict(config, hand, obstacles, goals, memory)
+        _, tracks = predict(config, hand, obstacles, goals, tracks)
 
 
-def _find_durations(hand: HandState, goals: Array, past: Past, config: Config) -> list[float]:
+def _find_durations(hand: HandState, goals: Array, known: Tracks, config: Config) -> list[float]:
     """Return the time to go [s] to each goal, which for a goal that was there before changes only gradually."""
-    durations, elapsed_s = estimate_times_to_go(hand, goals, config.duration), past.measure_time(hand.stamp_ns)
-    return [limit_change(each, past.durations_s.get(goal, each), elapsed_s) for goal, each in enumerate(durations)]
+    durations, elapsed_s = estimate_times_to_go(hand, goals, config.duration), known.measure_time(hand.stamp_ns)
+    return [limit_change(each, known.durations_s.get(goal, each), elapsed_s) for goal, each in enumerate(durations)]
 
 
 def build_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: Array, duration_s: float) -> Problem:

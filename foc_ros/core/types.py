@@ -237,13 +237,13 @@ class Candidate(Record):
 
 
 class Status(Enum):
-    """Result of the forward optimal control of a candidate. Those that are solved, compromised or out of time have a likelihood.
+    """Result of the forward optimal control of a candidate. All that are solved or estimated have a likelihood.
 
     SOLVED: the solution meets the wanted eta. COMPROMISED: it meets a smaller eta only, which makes it less likely.
     ETA_UNREACHABLE: the same, where less than the wanted eta is not allowed. INFEASIBLE: no path of the class meets the goal and
     the constraints. ITERATION_LIMIT: the result does not meet what it promises. DEADLINE: time or iterations ran out before it
-    was settled: effort and safety are estimated from its last iterate.
-    LEFT_CLASS: the solution lies in another homotopy class.
+    was settled: effort and safety are estimated from its last iterate. ESTIMATED: the solver failed where the search has found a
+    path: path, effort and safety are estimated from its length. LEFT_CLASS: the solution lies in another homotopy class.
     """
 
     SOLVED = 'solved'
@@ -252,12 +252,13 @@ class Status(Enum):
     INFEASIBLE = 'infeasible'
     ITERATION_LIMIT = 'iteration_limit'
     DEADLINE = 'deadline'
+    ESTIMATED = 'estimated'
     LEFT_CLASS = 'left_class'
 
     @property
     def has_likelihood(self) -> bool:
         """Whether a candidate that ended so takes part in the likelihood."""
-        return self in (Status.SOLVED, Status.COMPROMISED, Status.DEADLINE)
+        return self in (Status.SOLVED, Status.COMPROMISED, Status.DEADLINE, Status.ESTIMATED)
 
     @property
     def remedy(self) -> str:
@@ -272,6 +273,7 @@ _REMEDIES = {
     'infeasible': 'none for this class, whose gap is closed; check the radii of its obstacles if people pass here',
     'iteration_limit': 'choose another foc.strategy',
     'deadline': 'allow a longer budget_s or fewer homotopy.max_candidates',
+    'estimated': 'choose another foc.strategy',
     'left_class': 'choose another foc.strategy',
 }
 
@@ -468,7 +470,7 @@ class Prediction(Record):
     most_likely: label after hysteresis, None where no candidate has a likelihood. notes: facts for diagnostics (relaxed margins,
     merged classes, culled obstacles), as counts by name. solve_s: wall time of the whole prediction [s]. obstacles: all that were
     given, at the stamp of the hand; goals (g, 2) [m]. cleared (n,): whether the predicted height clears each obstacle, which
-    therefore does not block.
+    therefore does not block. unknown: share of the likelihood that belongs to classes that are not among the candidates.
     """
 
     stamp_ns: int
@@ -481,6 +483,7 @@ class Prediction(Record):
     obstacles: Obstacles = field(default_factory=make_obstacles)
     goals: Array = field(default_factory=lambda: np.zeros((0, 2)))
     cleared: tuple[bool, ...] = ()
+    unknown: float = 0.0
 
     def __repr__(self) -> str:
         """Say time, number of candidates and the most likely one."""

@@ -17,6 +17,7 @@ def encode_prediction(prediction: Prediction) -> dict[str, Any]:
     return {
         'stamp_ns': prediction.stamp_ns,
         'most_likely': prediction.most_likely,
+        'unknown': prediction.unknown,
         'candidates': [encode_candidate(each) for each in candidates],
     }
 

@@ -276,7 +276,8 @@ def _describe_prediction(prediction: Prediction | None) -> dict[str, str]:
         return {}
     candidates = {f'candidate {outcome.candidate.label}': _describe_candidate(outcome) for outcome in prediction.candidates}
     notes = {f'note {name}': str(count) for name, count in sorted(prediction.notes.items())}
-    return {'most likely': prediction.most_likely or 'none', **candidates, **notes}
+    known = {'most likely': prediction.most_likely or 'none', 'unknown': f'{prediction.unknown:.3f}'}
+    return {**known, **candidates, **notes}
 
 
 def _describe_candidate(outcome: PredictedCandidate) -> str:

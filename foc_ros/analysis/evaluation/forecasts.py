@@ -1,7 +1,8 @@
 """Forecasts: the probabilities that a predictor gives to the answers of a question, and likelihood rules tried on observations.
 
-What a predictor leaves over is spread evenly over the possible answers. Every predictor leaves at least `UNCERTAINTY`, so that an
-answer that no candidate gives is unlikely, not impossible. A candidate without a likelihood counts as the node publishes it: 0.
+What a predictor leaves over, such as the unknown share, is spread evenly over the possible answers. Every predictor leaves at
+least `UNCERTAINTY`, so that an answer that no candidate gives is unlikely, not impossible. A candidate without a likelihood
+counts as the node publishes it: 0.
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ class Forecast(Record):
     def from_shares(cls, shares: Array, question: Question) -> Forecast:
         """Sum shares (k,) of all candidates by the answers that they give."""
         by_answer = np.bincount(question.given, shares, len(question.answers)).astype(float)
-        return cls.from_answer_shares(by_answer, question, UNCERTAINTY)
+        total = float(by_answer.sum())
+        even = by_answer / total if total > 0.0 else by_answer
+        return cls.from_answer_shares(even, question, 1.0 - (1.0 - UNCERTAINTY) * min(total, 1.0))
 
     @classmethod
     def from_answer(cls, answer: Answer, confidence: float, question: Question) -> Forecast:

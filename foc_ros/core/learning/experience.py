@@ -208,9 +208,9 @@ def _pool_path(
     hand: HandState,
     obstacles: Obstacles,
 ) -> Solution:
-    """Return the solution with the path that recordings change; an answer that is kept was changed when it was found."""
+    """Return the solution with the path that recordings change."""
     for is_used in (agreement.until_s > 0.0, agreement.is_same):
-        if candidate.age_s or not is_used.any():
+        if not is_used.any():
             break
         uncertainty = hand.covariance[:2, :2], 0.5 * VELOCITY_STDDEV
         pooled = pool_path(candidate.solution, recorded.take(is_used), *uncertainty, PRIOR_COUNT_PATH)

@@ -24,13 +24,11 @@ from numpy.typing import NDArray
 
 from foc_ros.core.classes import find_path_sides
 from foc_ros.core.obstacles.chance_constraint import centre_trajectories
-from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.obstacles.clearance import measure_clearance
 from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Record, Solution, as_readonly
 
 FADE_S = 0.25
 """Time over which the weight of a recording falls to zero before its end [s]."""
-FINER = 4
-"""Number of parts of a step at which the distances of a pooled path from obstacles are measured."""
 EXACT = 1e-12
 """Variance of a position that is known [m^2]: that of a micrometre."""
 
@@ -113,15 +111,5 @@ def stays_in_class(planned: PredictedCandidate, pooled: Solution, obstacles: Obs
     sides = find_path_sides(pooled.path, obstacles, centres)
     if any(sides.get(identity) != side for identity, side in planned.sides.items()):
         return False
-    clearance = _measure_clearance(pooled.path, obstacles, pooled.dt)
-    return clearance >= 0.0 or clearance >= _measure_clearance(planned.solution.path, obstacles, pooled.dt)
-
-
-def _measure_clearance(path: Array, obstacles: Obstacles, dt: float) -> float:
-    """Return the smallest distance [m] of a path (N + 1, 2) [m] from obstacles, negative inside; dt: the time step [s]."""
-    steps = len(path) - 1
-    at = np.linspace(0.0, steps, FINER * steps + 1)
-    points = np.column_stack([np.interp(at, np.arange(steps + 1), axis) for axis in path.T])
-    centres = centre_trajectories(obstacles.centre, dt / FINER * obstacles.velocity, FINER * steps)
-    distance = measure_offsets(points, obstacles, centres)[1] - obstacles.radius
-    return float(distance.min(initial=np.inf))
+    clearance = measure_clearance(pooled.path, obstacles, pooled.dt)
+    return clearance >= 0.0 or clearance >= measure_clearance(planned.solution.path, obstacles, pooled.dt)
