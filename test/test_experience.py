@@ -25,13 +25,14 @@ from foc_ros.core.learning.experience import (
     make_library,
     update_likelihoods,
 )
+from foc_ros.core.learning.learnt import Knowledge
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.predictor import predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import LEFT, RIGHT, Candidate, HandState, make_obstacles
 from foc_ros.io.class_library import load_library, save_library
 
-CONFIG = Config().with_values({'foc.steps': 20})
+CONFIG = Config().with_values({'foc.steps': 20, 'homotopy.max_candidates': 24})
 
 
 def move(path, rest_s=0.5, moving_s=2.0):
@@ -51,7 +52,7 @@ HAND = HandState(1, np.zeros(6), 1e-6 * np.eye(6), frame_id='world')
 
 
 def ask(library, hand=HAND, obstacles=OBSTACLES):
-    return predict(CONFIG, hand, obstacles, GOAL, NO_TRACKS, library)[0]
+    return predict(CONFIG, hand, obstacles, GOAL, NO_TRACKS, Knowledge(library))[0]
 
 
 def by_label(prediction):
@@ -77,7 +78,7 @@ def test_recordings_count_for_gaps_and_goals_as_much_as_the_model_and_less_for_w
     """Eight classes: two gaps with two ways each, and two goals on each way; ten recordings of the first class."""
     gap, way = np.repeat([0, 1], 4), np.repeat([0, 1, 2, 3], 2)
     counts, n, m = np.array([10.0, *[0.0] * 7]), PRIOR_COUNT, PRIOR_COUNT_BEYOND
-    after = update_likelihoods(np.full(8, 0.125), counts, Decisions(gap, way, np.zeros(8, dtype=np.intp)))
+    after = update_likelihoods(np.full(8, 0.125), counts, counts, Decisions(gap, way, np.zeros(8, dtype=np.intp)))
     of_gap, of_way = np.bincount(gap, after), np.bincount(way, after)
     assert after.sum() == pytest.approx(1.0)
     assert of_gap[0] == pytest.approx((0.5 * n + 10.0) / (n + 10.0))
@@ -85,7 +86,7 @@ def test_recordings_count_for_gaps_and_goals_as_much_as_the_model_and_less_for_w
     assert after[0] / of_way[0] == pytest.approx((0.5 * n + 10.0) / (n + 10.0))
     np.testing.assert_allclose(after[4:], of_gap[1] / 4.0)
     sure, seen = np.array([1.0, *[0.0] * 7]), np.array([*[0.0] * 7, 6.0])
-    of_gap = np.bincount(gap, update_likelihoods(sure, seen, Decisions(gap, way, np.zeros(8, dtype=np.intp))))
+    of_gap = np.bincount(gap, update_likelihoods(sure, seen, seen, Decisions(gap, way, np.zeros(8, dtype=np.intp))))
     np.testing.assert_allclose(of_gap, [n / (n + 6.0), 6.0 / (n + 6.0)])
 
 
@@ -140,7 +141,11 @@ def test_an_obstacle_below_the_hand_does_not_keep_recordings_away():
         [*OBSTACLES.radius, 0.02],
         heights=[(-9.0, 9.0)] * len(OBSTACLES) + [(0.0, 0.05)],
     )
-    ask_above = lambda obstacles: predict(CONFIG, high, obstacles, GOAL, NO_TRACKS, library, goal_heights=np.array([0.3]))[0]  # noqa: E731
+
+    def ask_above(obstacles):
+        heights = {'goal_heights': np.array([0.3])}
+        return predict(CONFIG, high, obstacles, GOAL, NO_TRACKS, Knowledge(library), **heights)[0]
+
     without, over = find_taken(ask_above(low.take([0, 1, 2]))), find_taken(ask_above(low))
     np.testing.assert_array_equal(over.mean, without.mean)
     assert over.likelihood == without.likelihood

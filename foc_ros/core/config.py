@@ -19,6 +19,7 @@ DURATION_MODELS = ('fixed', 'fitts')
 ARRIVALS = ('rest', 'passing')
 ONLINE = 'online'
 ADAPTATIONS = ('none', ONLINE)
+LEARNINGS = ('none', 'goals', ONLINE)
 BOUNDS = ('cantelli', 'gaussian')
 RISKS = ('step', 'path')
 GUIDANCE_MODES = ('path', 'trajectory')
@@ -184,7 +185,9 @@ class ExperienceConfig:
     """Use of recordings as evidence: those in the class library (`homotopy.library`), and those that are learnt."""
 
     learning: str = _p(
-        'none', 'whether movements that end at a goal are added to the recordings of the running program', choices=ADAPTATIONS
+        'goals',
+        'what movements that end at a goal say of later ones in the running program: nothing; paths and goals; also ways',
+        choices=LEARNINGS,
     )
 
 

@@ -9,12 +9,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from .classes.library import Demonstration
-from .config import Config
+from .config import ONLINE, Config
 from .deadline import NEVER, Deadline
 from .errors import FocError
 from .estimation.kalman_filter import FilterState, describe_jump, update
 from .learning.experience import Library, make_library
-from .learning.learnt import Learnt
+from .learning.learnt import Knowledge, Learnt
 from .obstacles.scene import ObstacleSource, Scene
 from .predictor import predict
 from .rejections import Rejections
@@ -33,15 +33,14 @@ class PredictionTask:
     obstacles: Obstacles
     goals: Array
     tracks: Tracks
-    library: Library
+    knowledge: Knowledge
     deadline: Deadline
     goal_heights: Array | None
-    planning_spread: float
 
     def run(self) -> tuple[Prediction, Tracks]:
         """Compute the prediction and the classes that it follows; this may happen in another thread."""
         scene = self.hand, self.obstacles, self.goals
-        return predict(self.config, *scene, self.tracks, self.library, self.deadline, self.goal_heights, self.planning_spread)
+        return predict(self.config, *scene, self.tracks, self.knowledge, self.deadline, self.goal_heights)
 
 
 class Pipeline:
@@ -194,8 +193,9 @@ class Pipeline:
         self._is_new, self._predicted_ns = False, stamp_ns
         obstacles = self.scene.obstacles(self.hand_state.stamp_ns)
         scene = self.hand_state, obstacles, self.scene.goals
-        known, last = (self._tracks, self._library, deadline), (self.scene.goal_heights, self.learnt.planning_spread)
-        self._task = PredictionTask(self.adapted_config, *scene, *known, *last)
+        knowledge = Knowledge(self._library, self.learnt.planning_spread)
+        tracks, heights = self._tracks, self.scene.goal_heights
+        self._task = PredictionTask(self.adapted_config, *scene, tracks, knowledge, deadline, heights)
         return self._task
 
     def finish(self, task: PredictionTask, compute: Callable[[], tuple[Prediction, Tracks]]) -> Prediction | None:
@@ -270,8 +270,13 @@ class Pipeline:
         """Replace what was learnt, and the library if it has other recordings now."""
         recordings = learnt.movements.learnt
         if recordings is not self.learnt.movements.learnt:
-            self._library = make_library((*self.given, *recordings))
+            self._library = self._make_library(recordings)
         self.learnt = learnt
+
+    def _make_library(self, recordings: Sequence[Demonstration]) -> Library:
+        if self.config.experience.learning == ONLINE:
+            return make_library((*self.given, *recordings))
+        return make_library(self.given, recordings)
 
     def _find_not_ready_reason(self) -> tuple[str, str] | None:
         """Return why the pipeline cannot predict, as (kind, message), judged by stamps; the node also judges by its clocks."""

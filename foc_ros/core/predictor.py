@@ -20,8 +20,8 @@ from .dynamics.predictive_covariance import SharedCovariances, widen_covariance
 from .estimation.duration import estimate_times_to_go, is_passing, limit_change
 from .height import HeightPredictor
 from .learning.dispersion import scale_covariance
-from .learning.experience import NO_LIBRARY, Library, pool_recordings
-from .likelihood import BETWEEN_OPERATORS
+from .learning.experience import Library, pool_recordings
+from .learning.learnt import NOTHING, Knowledge
 from .obstacles.chance_constraint import RiskBound, count_events
 from .obstacles.culling import cull_obstacles
 from .ocp.problem import Problem, rest_to_goal
@@ -52,10 +52,9 @@ def predict(
     obstacles: Obstacles,
     goals: Array,
     tracks: Tracks,
-    library: Library = NO_LIBRARY,
+    knowledge: Knowledge = NOTHING,
     deadline: Deadline = NEVER,
     goal_heights: Array | None = None,
-    planning_spread: float = BETWEEN_OPERATORS,
 ) -> tuple[Prediction, Tracks]:
     """Predict where a hand goes.
 
@@ -71,14 +70,13 @@ def predict(
         Goals (g, 2) [m], g >= 1.
     tracks
         What the previous prediction returned, or `NO_TRACKS`.
-    library
-        Demonstrated paths, which become candidates where they fit the scene, and recordings, which are evidence (`experience`).
+    knowledge
+        Demonstrated paths, which become candidates where they fit the scene, recordings, which are evidence (`experience`), and
+        the planning of the operator (`likelihood`).
     deadline
         When the prediction has to be ready. All classes are solved together; what is not settled then is compared by an estimate.
     goal_heights
         Heights of the goals (g,) [m]; None where they are not known, and the height of the hand is not predicted.
-    planning_spread
-        Standard deviation of the logarithm of the operator's planning horizon (`likelihood`).
 
     Returns
     -------
@@ -87,6 +85,7 @@ def predict(
         wall times apart.
     """
     began, stamp_ns, known = time.perf_counter(), hand.stamp_ns, tracks.keep_goals(goals)
+    library, planning_spread = knowledge
     scene = _prepare_scene(config, hand, obstacles, goals, goal_heights, known)
     found, candidates = _find_candidates(scene, config, known, library, deadline)
     matched = known.match(candidates, stamp_ns)

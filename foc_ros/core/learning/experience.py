@@ -18,7 +18,8 @@ with the p_G and p_W of the model in the fractions p_W / p_G and p_i / p_W.
 The path of a class is pooled with the recordings that take its gap in the next row, each up to where it passes an obstacle on
 another side than the class (`recorded_paths`). If this path leaves the class or enters an obstacle, only the recordings of the
 class count, and if that one does so too, the path stays that of the plan. Effort and eta are always those of the plan. Without
-recordings near the hand, all is the model.
+recordings near the hand, all is the model. Recordings of the running program change the likelihoods of goals and the paths only,
+unless `experience.learning` is `online`: people vary their ways between obstacles more than where they go.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ class Library(Record):
 
     demonstrations: one of each class, to recall; recordings: those with states, r of them; states (r, m, 4): x, y, vx, vy [m,
     m/s], infinite beyond the end of each; ends (r,): the last state of each; scene (r,): equal numbers for recordings in the same
-    scene.
+    scene; shows_ways (r,): whether a recording is evidence of ways between obstacles, or only of goals and paths.
     """
 
     demonstrations: tuple[Demonstration, ...]
@@ -60,6 +61,7 @@ class Library(Record):
     states: Array
     ends: NDArray[np.intp]
     scene: tuple[int, ...]
+    shows_ways: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +89,9 @@ class Agreement(Record):
     until_s: Array
 
 
-def make_library(found: Sequence[Demonstration]) -> Library:
-    """Return the library of demonstrations, of which those with states are recordings."""
+def make_library(given: Sequence[Demonstration], learnt: Sequence[Demonstration] = ()) -> Library:
+    """Return the library of demonstrations, of which those with states are recordings; learnt: those that show no ways."""
+    found = (*given, *learnt)
     distinct: list[Demonstration] = []
     for each in found:
         if not any(is_same_demonstration(each, known) for known in distinct):
@@ -101,7 +104,8 @@ def make_library(found: Sequence[Demonstration]) -> Library:
     ends = np.array([len(table) - 1 for table in tables], dtype=np.intp)
     numbers = dict[tuple[object, ...], int]()
     scene = tuple(numbers.setdefault((each.frame_id, each.ids, each.centre.tobytes()), len(numbers)) for each in recordings)
-    return Library(tuple(distinct), recordings, states, ends, scene)
+    shows_ways = np.arange(len(recordings)) < sum(each.states is not None for each in given)
+    return Library(tuple(distinct), recordings, states, ends, scene, shows_ways)
 
 
 NO_LIBRARY = make_library(())
@@ -157,8 +161,9 @@ def pool_recordings(
     goal = np.array([each.candidate.goal for each in taken], dtype=np.intp)
     decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
     agreements = [compare_with_class(each.candidate, evidence, obstacles, decisions.next_row) for each in taken]
-    counts = np.array([evidence.weight[each.is_same].sum() for each in agreements])
-    likelihoods = update_likelihoods(np.array([each.likelihood for each in taken]), counts, decisions)
+    of_ways = evidence.weight * library.shows_ways[evidence.row]
+    counts, on_ways = (np.array([each[one.is_same].sum() for one in agreements]) for each in (evidence.weight, of_ways))
+    likelihoods = update_likelihoods(np.array([each.likelihood for each in taken]), counts, on_ways, decisions)
     pooled = []
     for each, share, agreement in zip(taken, likelihoods.tolist(), agreements, strict=True):
         recorded = follow_recordings(library, evidence, agreement.until_s, hand, each.times)
@@ -219,18 +224,21 @@ def _pool_path(
     return candidate.solution
 
 
-def update_likelihoods(likelihoods: Array, counts: Array, decisions: Decisions) -> Array:
-    """Return likelihoods (k,) that counts (k,) change: of the gaps, of the ways in each gap, and of the goals in each way."""
+def update_likelihoods(likelihoods: Array, counts: Array, on_ways: Array, decisions: Decisions) -> Array:
+    """Return likelihoods (k,) that counts (k,) change: of the gaps, of the ways in each gap, and of the goals in each way.
+
+    on_ways (k,): counts of the recordings that show ways; where no row is ahead, gaps are goals, for which all count.
+    """
     whole, each = np.zeros(len(counts), dtype=np.intp), np.arange(len(counts))
     levels = (
-        (whole, decisions.next_gap, PRIOR_COUNT),
-        (decisions.next_gap, decisions.way, PRIOR_COUNT_BEYOND),
-        (decisions.way, each, PRIOR_COUNT),
+        (whole, decisions.next_gap, PRIOR_COUNT, on_ways if len(decisions.next_row) else counts),
+        (decisions.next_gap, decisions.way, PRIOR_COUNT_BEYOND, on_ways),
+        (decisions.way, each, PRIOR_COUNT, counts),
     )
     pooled = np.ones(len(counts))
-    for group, part, prior_count in levels:
+    for group, part, prior_count, seen in levels:
         of_group, of_part = (np.bincount(number, likelihoods)[number] for number in (group, part))
-        in_group, in_part = (np.bincount(number, counts)[number] for number in (group, part))
+        in_group, in_part = (np.bincount(number, seen)[number] for number in (group, part))
         even = 1.0 / np.bincount(group[np.unique(part, return_index=True)[1]])[group]
         share = np.divide(of_part, of_group, out=even, where=of_group > 0.0)
         pooled *= (prior_count * share + in_part) / (prior_count + in_group)

@@ -8,6 +8,7 @@ gives equal results.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from foc_ros.core.config import ONLINE, Config, CovarianceConfig
 from foc_ros.core.likelihood import BETWEEN_OPERATORS, OWN_SPREAD
@@ -15,11 +16,25 @@ from foc_ros.core.obstacles.scene import Scene
 from foc_ros.core.types import HandState, Prediction
 
 from .dispersion import Dispersion
+from .experience import NO_LIBRARY, Library
 from .movements import Movements
 from .pace import Pace
 
 DISPERSED_BY = ('foc', 'duration', 'covariance', 'estimator')
 """Groups of parameters on which errors and covariances depend."""
+
+
+class Knowledge(NamedTuple):
+    """What a prediction is made with besides parameters and scene.
+
+    library: recorded paths; planning_spread: standard deviation of the logarithm of the operator's planning horizon.
+    """
+
+    library: Library = NO_LIBRARY
+    planning_spread: float = BETWEEN_OPERATORS
+
+
+NOTHING = Knowledge()
 
 
 @dataclass(frozen=True)
@@ -51,7 +66,7 @@ class Learnt:
             pace = pace.follow(hand, scene.goals, config.duration)
         if config.covariance.adaptation == ONLINE:
             dispersion = dispersion.follow(hand)
-        if config.experience.learning == ONLINE:
+        if config.experience.learning != 'none':
             movements = movements.follow(hand, scene, is_restart=is_restart)
         return Learnt(pace, dispersion, movements)
 
