@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from foc_ros.core.errors import ParameterError as ParameterError
     from foc_ros.core.errors import RecordingError as RecordingError
     from foc_ros.core.errors import SceneError as SceneError
-    from foc_ros.core.guidance.step import GuidanceOutput as GuidanceOutput
-    from foc_ros.core.guidance.step import GuidanceStatus as GuidanceStatus
+    from foc_ros.core.guidance.guide import GuidanceOutput as GuidanceOutput
+    from foc_ros.core.guidance.guide import GuidanceStatus as GuidanceStatus
     from foc_ros.core.obstacles.shapes import Box as Box
     from foc_ros.core.obstacles.shapes import Capsule as Capsule
     from foc_ros.core.obstacles.shapes import Circle as Circle
@@ -46,7 +46,7 @@ _MODULES = {
     'core.dynamics.plant_models': 'PlantModel',
     'core.dynamics.plants': 'Plant',
     'core.errors': 'FocError FocWarning InputError MessageError ParameterError RecordingError SceneError',
-    'core.guidance.step': 'GuidanceOutput GuidanceStatus',
+    'core.guidance.guide': 'GuidanceOutput GuidanceStatus',
     'core.obstacles.shapes': 'Box Capsule Circle Hull',
     'core.ocp.monte_carlo': 'MonteCarlo',
     'core.ocp.strategies': 'StrategyResult',

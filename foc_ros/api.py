@@ -17,7 +17,7 @@ from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import FocError, InputError, SceneError
 from foc_ros.core.estimation.kalman_filter import describe_jump
-from foc_ros.core.guidance.step import GuidanceInput, GuidanceOutput, GuidanceState, guide
+from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, guide
 from foc_ros.core.obstacles.shapes import Shape, collect_obstacles
 from foc_ros.core.ocp import monte_carlo as sampling
 from foc_ros.core.ocp.problem import Problem

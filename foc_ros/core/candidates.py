@@ -83,9 +83,9 @@ def _classify(candidate: Candidate, solution: Solution, problem: Problem) -> Pre
 def estimate_unsolved(candidates: Sequence[PredictedCandidate], obstacles: Obstacles) -> list[PredictedCandidate]:
     """Return the candidates with an estimate for those that the solver could not solve although the search has a path for them.
 
-    The path is the guess of the search, and effort and safety follow from the class to the same goal, or else to any, that is
-    solved and of most similar length (`compute_detour_effort`). A class without a path, such as one that an obstacle closes on
-    the way, stays as it is. obstacles: grown by the radius of the hand.
+    The path is what the solver found, if it is in the class, or the guess of the search. Effort and safety follow from the class
+    to the same goal, or else to any, that is solved and of most similar length (`compute_detour_effort`). A class without a path,
+    such as one that an obstacle closes on the way, stays as it is. obstacles: grown by the radius of the hand.
     """
     solved = [each for each in candidates if each.has_likelihood]
     return [
@@ -136,20 +136,23 @@ def _has_path(candidate: PredictedCandidate, obstacles: Obstacles) -> bool:
 
 
 def _estimate(candidate: PredictedCandidate, similar: tuple[PredictedCandidate, float]) -> PredictedCandidate:
-    """Return a candidate with the guess as its path, and the effort and safety that a similar one leads to expect."""
+    """Return a candidate with a path in its class, and the effort and safety that a similar one leads to expect."""
     (known, ratio), failed = similar, candidate.solution
     effort = ratio * known.cost / failed.dt
-    states = [candidate.candidate.guess]
-    for _ in range(failed.mean.shape[1] // 2 - 1):
-        states.append(np.gradient(states[-1], failed.dt, axis=0))
-    mean = np.concatenate(states, axis=1)
-    mean[0] = failed.mean[0]
+    mean = failed.mean
+    if not _is_in_class(candidate.candidate, candidate.sides):
+        states = [candidate.candidate.guess]
+        for _ in range(mean.shape[1] // 2 - 1):
+            states.append(np.gradient(states[-1], failed.dt, axis=0))
+        mean = np.concatenate(states, axis=1)
+        mean[0] = failed.mean[0]
+        mean = as_readonly(mean)
     safety = known.solution.eta, known.solution.safety_factor, known.solution.safety_shortfall
     estimated = replace(
         failed,
         status=Status.ESTIMATED,
         message=f'{failed.message}; estimated from the path that the search has found',
-        mean=as_readonly(mean),
+        mean=mean,
         effort=effort,
         expected=effort,
         eta=safety[0],

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.guidance.step import GuidanceOutput
+from foc_ros.core.guidance.guide import GuidanceOutput
 from foc_ros.core.types import LEFT, Array, HeightTrajectory, PredictedCandidate, Prediction, Solution
 
 

@@ -1,4 +1,8 @@
-"""One update of guidance: references, stiffness, agreement, margins, limits and tank, in this order."""
+"""One update of guidance: references, stiffness, agreement, margins, limits and tank, in this order.
+
+The force is the sum of the candidates' forces, weakened by their disagreement, by that of the hand, and by
+what is unknown.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +10,39 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from foc_ros.core.config import Config, GuidanceConfig
 from foc_ros.core.types import Array, Obstacles, Prediction, Record, make_obstacles
 
-from .agreement import combine, remember_likelihoods, weigh_candidates, yield_to_hand
-from .clearance import find_crossing, find_need, keep_clear, saturate
-from .energy_tank import limit_by_energy, update_energy
-from .limits import find_largest_force, shorten, step_force
-from .obstacle_margin import NEAR_M, Margins, SeenMargins, build_margins, measure_opposing_distance, see_margins, turn_along
-from .reference import GuidePaths, advance_progress, build_paths, normalize, transfer_progress
-from .stiffness import compute_stiffness, find_deflection, project_out
+from .limits import (
+    NEAR_M,
+    Margins,
+    SeenMargins,
+    build_margins,
+    find_largest_force,
+    limit_by_energy,
+    measure_opposing_distance,
+    see_margins,
+    shorten,
+    step_force,
+    turn_along,
+    update_energy,
+)
+from .paths import (
+    GuidePaths,
+    advance_progress,
+    build_paths,
+    compute_stiffness,
+    find_crossing,
+    find_deflection,
+    find_need,
+    keep_clear,
+    normalize,
+    project_out,
+    saturate,
+    transfer_progress,
+)
 
 HEADING_M = 0.02
 """Shortest distance ahead on a path at which the heading points [m]."""
@@ -103,7 +129,7 @@ class Followed(Record):
     """The newest prediction as guidance uses it.
 
     paths: of its candidates, None if none has a likelihood; progress (c,): on them [m]; obstacles: as far as the hand has to keep
-    away; margins: of these; known: last likelihoods by label.
+    away; margins: of these.
     """
 
     prediction: Prediction | None = None
@@ -111,7 +137,6 @@ class Followed(Record):
     progress: Array = field(default_factory=lambda: np.zeros(0))
     obstacles: Obstacles = field(default_factory=make_obstacles)
     margins: Margins = field(default_factory=lambda: build_margins(make_obstacles(), 0.0))
-    known: dict[str, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +155,7 @@ class GuidanceState(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class _Wish(Record):
+class _Demand(Record):
     """What the candidates ask for, before the limits: force, stiffness, agreement, authority, heading."""
 
     force: Array = field(default_factory=lambda: np.zeros(2))
@@ -152,13 +177,13 @@ def guide(config: Config, state: GuidanceState, given: GuidanceInput) -> tuple[G
     if state.energy is not None:
         energy = update_energy(state.energy, state.force, given.position - state.position, settings.tank)
     status = find_status(settings, given)
-    followed, wish = _follow_prediction(config, state.followed, given), _Wish()
+    followed, demand = _follow_prediction(config, state.followed, given), _Demand()
     seen = see_margins(followed.margins, given.position)
     if status is GuidanceStatus.GUIDING and followed.paths is not None:
         progress = advance_progress(followed.paths, followed.progress, given.position, given.velocity, dt)
         followed = replace(followed, progress=progress)
-        wish = _compute_wish(settings, followed, seen, given)
-    target = wish.force if status is GuidanceStatus.GUIDING else _release(settings, state.force, dt)
+        demand = _compute_demand(settings, followed, seen, given)
+    target = demand.force if status is GuidanceStatus.GUIDING else _release(settings, state.force, dt)
     longest = LATE_PERIODS / settings.rate_hz if status is GuidanceStatus.GUIDING else dt  # no sudden force after a gap
 
     def find_bound(force: Array) -> float:
@@ -166,10 +191,10 @@ def guide(config: Config, state: GuidanceState, given: GuidanceInput) -> tuple[G
 
     force = step_force(state.force, target, settings.slew * min(dt, longest), find_bound)
     change = dt / settings.ramp_s
-    authority = state.authority + min(max(wish.authority - state.authority, -change), change)
-    reference = given.position + find_deflection(wish.stiffness, force)
+    authority = state.authority + min(max(demand.authority - state.authority, -change), change)
+    reference = given.position + find_deflection(demand.stiffness, force)
     output = GuidanceOutput(
-        given.t, status, given.position, force, reference, wish.stiffness, wish.agreement, authority, wish.heading, energy
+        given.t, status, given.position, force, reference, demand.stiffness, demand.agreement, authority, demand.heading, energy
     )
     return output, GuidanceState(energy, given.t, given.position, force, authority, followed)
 
@@ -190,30 +215,30 @@ def _follow_prediction(config: Config, before: Followed, given: GuidanceInput) -
     prediction = given.prediction
     if prediction is None or prediction is before.prediction:
         return before
-    known, obstacles, margins = remember_likelihoods(prediction, before.known), before.obstacles, before.margins
+    obstacles, margins = before.obstacles, before.margins
     if before.prediction is None or not _is_blocked_alike(prediction, before.prediction):
         obstacles = prediction.blocking_obstacles.grow(config.scene.hand_radius)
         margins = build_margins(obstacles, config.guidance.margin)
     if not prediction.candidates_with_likelihood:
-        return Followed(prediction, obstacles=obstacles, margins=margins, known=known)
+        return Followed(prediction, obstacles=obstacles, margins=margins)
     paths, references = build_paths(prediction), {}
     if before.paths is not None:
         points = before.paths.interpolate(before.paths.points, before.paths.locate(before.progress))
         references = dict(zip(before.paths.labels, points, strict=True))
     travelled = float(np.hypot(*given.velocity)) * max(given.prediction_age_s, 0.0)
     progress = transfer_progress(paths, references, given.position, travelled)
-    return Followed(prediction, paths, progress, obstacles, margins, known)
+    return Followed(prediction, paths, progress, obstacles, margins)
 
 
 def _is_blocked_alike(prediction: Prediction, other: Prediction) -> bool:
     return prediction.obstacles is other.obstacles and prediction.cleared == other.cleared
 
 
-def _compute_wish(settings: GuidanceConfig, followed: Followed, seen: SeenMargins, given: GuidanceInput) -> _Wish:
+def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMargins, given: GuidanceInput) -> _Demand:
     """Return what the candidates ask for.
 
     A prediction begins at the hand, so what distinguishes a path from the movement of the hand is ahead of both. With the
-    look-ahead h of `clearance.find_need`, x_i is the point of path i that is |v| h farther than the progress, and it is compared
+    look-ahead h of `paths.find_need`, x_i is the point of path i that is |v| h farther than the progress, and it is compared
     with where the hand is by then, if it keeps its velocity v:
 
         f_i = K_i (x_i - (x + h v)).
@@ -232,11 +257,12 @@ def _compute_wish(settings: GuidanceConfig, followed: Followed, seen: SeenMargin
         stiffness = project_out(stiffness, normalize(given.velocity + SLOW * paths.find_tangents(progress)))
     points = keep_clear(settings, followed.obstacles, paths.interpolate(paths.points, places))
     errors = saturate(settings, points - given.position - times[:, None] * given.velocity, need.share)
-    weights = weigh_candidates(paths.labels, paths.likelihoods, followed.known, SHARPNESS)
+    unknown = 0.0 if followed.prediction is None else followed.prediction.unknown
+    weights = weigh_candidates(paths.likelihoods, unknown)
     force, agreement = combine(weights, (stiffness @ errors[..., None])[..., 0], find_crossing(need, errors))
     force = yield_to_hand(force, given.acceleration, YIELD_ACCELERATION)
     heading, line = _find_heading(paths, np.maximum(ahead, progress + HEADING_M), weights, given.position)
-    return _Wish(
+    return _Demand(
         turn_along(seen, weights @ errors, force),
         need.share * agreement * np.einsum('c,cab->ab', weights, stiffness),
         agreement,
@@ -267,3 +293,47 @@ def _find_bound(settings: GuidanceConfig, seen: SeenMargins, energy: float, forc
     distance = measure_opposing_distance(seen, force)
     by_tank = limit_by_energy(energy, slew, speed, LATE_PERIODS / settings.rate_hz)
     return max(min(find_largest_force(settings), by_tank, slew * (distance - NEAR_M) / speed), 0.0)
+
+
+def weigh_candidates(likelihoods: Array, unknown: float) -> Array:
+    """Return the weights w_i (c,) of candidates with likelihoods p_i, where a share u is unknown.
+
+    What is unknown takes part without a force of its own, so that the force of the others does not grow by it. With the exponent
+    g of `SHARPNESS`,
+
+        w_i = p_i^g / (sum_i p_i^g + u^g).
+    """
+    powers = likelihoods**SHARPNESS
+    total = float(powers.sum()) + unknown**SHARPNESS
+    weights: Array = powers / total if total > 0.0 else np.zeros(len(powers))
+    return weights
+
+
+def combine(weights: Array, forces: Array, is_idle: NDArray[np.bool_]) -> tuple[Array, float]:
+    """Return f = a sum_i w_i b_i f_i (2,) [N] and the agreement a in [0, 1] of forces (c, 2) [N] with weights w_i (c,).
+
+        a = |sum_i w_i b_i f_i| / sum_i w_i |f_i|
+
+    Candidates that are idle (c,) give no force, b_i = 0, and count in the agreement as others do; b_i = 1 otherwise. The
+    agreement is 1 where all likely candidates pull the same way or none pulls, and 0 where they cancel.
+    """
+    total = weights @ np.where(is_idle[:, None], 0.0, forces)
+    separate = float(weights @ np.hypot(forces[:, 0], forces[:, 1]))
+    agreement = min(float(np.hypot(*total)) / separate, 1.0) if separate > 0.0 else 1.0
+    return agreement * total, agreement
+
+
+def yield_to_hand(force: Array, acceleration: Array, strongest: float) -> Array:
+    """Return a force (2,) [N] that falls as the hand accelerates against it, and is zero from an acceleration A on.
+
+        f <- f clip(1 + f . a / (|f| A), 0, 1)
+
+    A hand that accelerates against a force of guidance is pushed by its operator, and more strongly than by guidance, whatever
+    its mass is. The operator wants another way, which the likelihoods will say later.
+
+    acceleration: a (2,), of the hand [m/s^2]; strongest: A [m/s^2], 0 for a force that does not fall.
+    """
+    size = float(np.hypot(*force))
+    if not strongest or not size:
+        return force
+    return force * min(max(1.0 + float(force @ acceleration) / (size * strongest), 0.0), 1.0)
