@@ -25,9 +25,10 @@ def predicted(obstacles: Obstacles, goals: np.ndarray = GOAL, config: Config = C
             assert np.isfinite(array).all()
         assert outcome.has_likelihood or outcome.likelihood == 0.0
     shares = [outcome.likelihood for outcome in prediction.candidates_with_likelihood]
-    assert not shares or sum(shares) == pytest.approx(1.0)
+    assert sum(shares) + prediction.unknown == pytest.approx(1.0)
     assert (prediction.most_likely is None) == (not shares)
-    assert memory.most_likely == prediction.most_likely
+    numbers = {each.way: each.label for each in prediction.candidates}
+    assert numbers.get(memory.most_likely) == prediction.most_likely
     return prediction
 
 

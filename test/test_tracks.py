@@ -32,8 +32,10 @@ def number(*predictions: tuple[Candidate, ...]) -> list[list[int]]:
         matched = tracks.match(candidates, tick * STEP_NS)
         numbers.append([each.number for each in matched])
         seen = [replace(each, candidate=made, seen_ns=tick * STEP_NS) for each, made in zip(matched, candidates, strict=True)]
-        absent = [each for each in tracks.followed if each.number not in numbers[-1]]
-        tracks = Tracks((*seen, *absent), tick * STEP_NS, next_number=max([tracks.next_number, *(n + 1 for n in numbers[-1])]))
+        absent = [each for each in (*tracks.followed, *tracks.absent) if each.number not in numbers[-1]]
+        tracks = Tracks(
+            tuple(seen), tuple(absent), tick * STEP_NS, next_number=max([tracks.next_number, *(n + 1 for n in numbers[-1])])
+        )
     return numbers
 
 
@@ -71,7 +73,7 @@ def test_a_class_that_is_missing_for_a_short_time_keeps_its_number() -> None:
 )
 def test_a_candidate_continues_the_track_of_its_class_under_any_name(now: Candidate, before: int) -> None:
     known = make_class({'a': LEFT, 'b': LEFT}), make_class({'a': LEFT, 'b': RIGHT})
-    tracks = Tracks((Track(0, known[0], 0, 0.2), Track(1, known[1], 0, 0.8)), 0, next_number=2)
+    tracks = Tracks((Track(0, known[0], 0, 0.2), Track(1, known[1], 0, 0.8)), (), 0, next_number=2)
     assert [each.number for each in tracks.match([now], STEP_NS)] == [before]
 
 

@@ -123,7 +123,7 @@ def predict(
         unknown=unknown,
     )
     following = Tracks(
-        known.follow(predicted, matched, solved, stamp_ns),
+        *known.follow(predicted, matched, solved, stamp_ns),
         stamp_ns,
         goals,
         dict(enumerate(scene.durations_s)),
@@ -187,7 +187,7 @@ def _solve(
     place = config, scene.hand, scene.near
     by_goal = {row: build_problem(*place, scene.goals[row], scene.durations_s[row]) for row in {each.goal for each in candidates}}
     until = deadline.take_share(SOLVE_SHARE, RESERVE_S * len(candidates))
-    earlier = [each.solution if each.seen_ns == each.solved_ns else None for each in matched]
+    earlier = [each.solution if each.solved_ns == each.seen_ns else None for each in matched]
     solved = solve_candidates(candidates, [by_goal[each.goal] for each in candidates], config.foc, earlier, until)
     numbered = [replace(each, way=track.number) for each, track in zip(solved, matched, strict=True)]
     return [_widen_covariance(each, scene.covariances, scene.hand, config) for each in numbered]

@@ -61,12 +61,14 @@ class Track(Record):
 class Tracks(Record):
     """What one prediction passes to the next.
 
-    followed: the tracks; stamp_ns: of the prediction, None if there was none; goals (g, 2) [m]; durations_s: time to go to each
-    [s]; unknown: share of the likelihood that no candidate had; most_likely: number of the most likely class; next_number: of the
-    next new class; next_goal: row of the goal at which the search begins.
+    followed: the tracks of its candidates; absent: those that were not seen for a short time; stamp_ns: of the prediction, None
+    if there was none; goals (g, 2) [m]; durations_s: time to go to each [s]; unknown: share of the likelihood that no candidate
+    had; most_likely: number of the most likely class; next_number: of the next new class; next_goal: row of the goal at which the
+    search begins.
     """
 
     followed: tuple[Track, ...] = ()
+    absent: tuple[Track, ...] = ()
     stamp_ns: int | None = None
     goals: Array = field(default_factory=lambda: np.zeros((0, 2)))
     durations_s: dict[int, float] = field(default_factory=dict)
@@ -78,7 +80,7 @@ class Tracks(Record):
     @property
     def candidates(self) -> tuple[Candidate, ...]:
         """The candidates of the last prediction."""
-        return tuple(each.candidate for each in self.followed if each.seen_ns == self.stamp_ns)
+        return tuple(each.candidate for each in self.followed)
 
     def forget(self) -> Tracks:
         """Return what a new movement begins with: nothing, but no number is given twice."""
@@ -89,13 +91,13 @@ class Tracks(Record):
         count = min(len(goals), len(self.goals))
         kept = set(np.flatnonzero(np.hypot(*(goals[:count] - self.goals[:count]).T) <= MOVED_M).tolist())
         durations_s = {goal: each for goal, each in self.durations_s.items() if goal in kept}
-        return replace(
-            self, followed=tuple(each for each in self.followed if each.candidate.goal in kept), durations_s=durations_s
-        )
+        followed, absent = (tuple(each for each in part if each.candidate.goal in kept) for part in (self.followed, self.absent))
+        return replace(self, followed=followed, absent=absent, durations_s=durations_s)
 
     def without_solutions(self) -> Tracks:
         """Return the same classes without their solutions, which other parameters would not give."""
-        return replace(self, followed=tuple(replace(each, solution=None) for each in self.followed))
+        followed, absent = (tuple(replace(each, solution=None) for each in part) for part in (self.followed, self.absent))
+        return replace(self, followed=followed, absent=absent)
 
     def measure_time(self, stamp_ns: int) -> float:
         """Return the time since the last prediction [s], infinite if there was none or it is later."""
@@ -105,7 +107,7 @@ class Tracks(Record):
 
     def match(self, candidates: Sequence[Candidate], stamp_ns: int) -> list[Track]:
         """Return the track of each candidate, a new one where it continues none; those not seen for `HOLD_S` are forgotten."""
-        alive = [each for each in self.followed if 0 <= stamp_ns - each.seen_ns <= HOLD_S * NANOSECONDS]
+        alive = [each for each in (*self.followed, *self.absent) if 0 <= stamp_ns - each.seen_ns <= HOLD_S * NANOSECONDS]
         pairs = [
             (each.candidate.label == candidate.label, shared, each.seen_ns, each.likelihood, -place, each)
             for place, candidate in enumerate(candidates)
@@ -124,7 +126,7 @@ class Tracks(Record):
         self, predicted: Sequence[PredictedCandidate], unknown: float, stamp_ns: int
     ) -> tuple[list[PredictedCandidate], float]:
         """Return candidates with numbers and likelihoods p_i with the likelihoods l_i, ranked, and the unknown share likewise."""
-        before = {each.number: each.likelihood for each in self.followed if each.seen_ns == self.stamp_ns}
+        before = {each.number: each.likelihood for each in self.followed}
         taking_part = [each for each in predicted if each.has_likelihood]
         gain = -math.expm1(-self.measure_time(stamp_ns) / SMOOTHING_S)
         if not any(each.way in before for each in taking_part):
@@ -152,8 +154,8 @@ class Tracks(Record):
         matched: Sequence[Track],
         solved: Sequence[PredictedCandidate],
         stamp_ns: int,
-    ) -> tuple[Track, ...]:
-        """Return the tracks after a prediction: of its candidates, with new solutions where there are, and of those not seen.
+    ) -> tuple[tuple[Track, ...], tuple[Track, ...]]:
+        """Return the tracks after a prediction: of its candidates, with new solutions where there are, and those not seen.
 
         predicted: as published; matched: the track of each candidate; solved: all candidates with what the solver has found.
         """
@@ -164,8 +166,9 @@ class Tracks(Record):
             newest = (found.solution, stamp_ns) if found.has_likelihood else (track.solution, track.solved_ns)
             present.append(replace(seen, solution=newest[0], solved_ns=newest[1]))
         numbers = {each.number for each in matched}
-        others = [each for each in self.followed if each.number not in numbers]
-        return (*present, *(each for each in others if stamp_ns - each.seen_ns <= HOLD_S * NANOSECONDS))
+        others = [each for each in (*self.followed, *self.absent) if each.number not in numbers]
+        absent = [each for each in others if 0 <= stamp_ns - each.seen_ns <= HOLD_S * NANOSECONDS]
+        return tuple(present), tuple(absent)
 
 
 NO_TRACKS = Tracks()
