@@ -19,7 +19,7 @@ import scenes
 from measurement import Agreement, Result, Timing, compute_median_ms, time_call, time_in_turn
 
 from foc_ros.analysis.replay import replay
-from foc_ros.core import predictor
+from foc_ros.core import predict as predictor
 from foc_ros.core.candidates import solve_candidates
 from foc_ros.core.config import Config, FocConfig
 from foc_ros.core.ocp.problem import Problem

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from foc_ros.analysis.evaluation import register_baseline as register_baseline
     from foc_ros.api import *  # noqa: F403
     from foc_ros.core.config import Config as Config
-    from foc_ros.core.dynamics.plant_models import PlantModel as PlantModel
-    from foc_ros.core.dynamics.plants import Plant as Plant
     from foc_ros.core.errors import FocError as FocError
     from foc_ros.core.errors import FocWarning as FocWarning
     from foc_ros.core.errors import InputError as InputError
@@ -30,6 +28,8 @@ if TYPE_CHECKING:
     from foc_ros.core.obstacles.shapes import Hull as Hull
     from foc_ros.core.ocp.monte_carlo import MonteCarlo as MonteCarlo
     from foc_ros.core.ocp.strategies import StrategyResult as StrategyResult
+    from foc_ros.core.plant.models import PlantModel as PlantModel
+    from foc_ros.core.plant.plants import Plant as Plant
     from foc_ros.core.types import Candidate as Candidate
     from foc_ros.core.types import HandState as HandState
     from foc_ros.core.types import Obstacles as Obstacles
@@ -43,8 +43,8 @@ _MODULES = {
     ),
     'analysis.evaluation': 'register_baseline',
     'core.config': 'Config',
-    'core.dynamics.plant_models': 'PlantModel',
-    'core.dynamics.plants': 'Plant',
+    'core.plant.models': 'PlantModel',
+    'core.plant.plants': 'Plant',
     'core.errors': 'FocError FocWarning InputError MessageError ParameterError RecordingError SceneError',
     'core.guidance.guide': 'GuidanceOutput GuidanceStatus',
     'core.obstacles.shapes': 'Box Capsule Circle Hull',

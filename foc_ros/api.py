@@ -11,22 +11,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from foc_ros.core import types
-from foc_ros.core.checks import check_array, check_number, check_vector
 from foc_ros.core.classes.library import Demonstration
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import FocError, InputError, SceneError
-from foc_ros.core.estimation.kalman_filter import describe_jump
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, guide
+from foc_ros.core.hand.kalman import describe_jump
 from foc_ros.core.obstacles.shapes import Shape, collect_obstacles
 from foc_ros.core.ocp import monte_carlo as sampling
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import find_least_safety_factor
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.predictor import warm_up
-from foc_ros.core.reaching_scene import ReachingScene, check_outside
+from foc_ros.core.predict import build_scene_problems, solve_scene, warm_up
 from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
-from foc_ros.core.scene_solver import build_scene_problems, solve_scene
+from foc_ros.core.scene import ReachingScene, check_outside
+from foc_ros.core.support import check_array, check_number, check_vector
 from foc_ros.core.types import (
     NANOSECONDS,
     Candidate,

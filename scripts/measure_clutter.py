@@ -18,9 +18,9 @@ from accuracy.scenes import build_varied, solve
 
 from foc_ros import solve_classes
 from foc_ros.core.config import Config
-from foc_ros.core.estimation.kalman_filter import FilterState, update
+from foc_ros.core.hand.kalman import FilterState, update
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import Array, HandSample, Obstacles, Solution, Status, make_obstacles
 

@@ -27,7 +27,7 @@ from foc_ros.analysis.parallel import collect, collect_all, open_executor
 from foc_ros.analysis.recordings import Recording, find_recordings
 from foc_ros.cli.arguments import add_worker_arguments
 from foc_ros.core.classes.library import Demonstration
-from foc_ros.core.learning.experience import Library, find_evidence, follow_recordings, make_library
+from foc_ros.core.learning.recordings import Library, find_evidence, follow_recordings, make_library
 from foc_ros.core.types import Array, HandState, make_obstacles
 from foc_ros.io.class_library import save_library
 from foc_ros.ros.parameters import load_parameter_file

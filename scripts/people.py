@@ -31,7 +31,7 @@ from foc_ros.analysis.recordings import Recording, find_recordings, group_by_ope
 from foc_ros.cli.arguments import add_worker_arguments
 from foc_ros.core.config import Config
 from foc_ros.core.errors import RecordingError
-from foc_ros.core.estimation.duration import estimate_times_to_go
+from foc_ros.core.hand.duration import estimate_times_to_go
 from foc_ros.core.learning.pace import Pace
 from foc_ros.ros.parameters import load_parameter_file
 

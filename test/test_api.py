@@ -12,7 +12,7 @@ import foc_ros
 import foc_ros.api
 import foc_ros.core.config
 import foc_ros.core.obstacles.shapes
-from foc_ros.core.dynamics.plant_models import make_plant_model
+from foc_ros.core.plant.models import make_plant_model
 from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
 
 CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003, name='cup')

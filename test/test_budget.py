@@ -8,10 +8,10 @@ from reach_helpers import bowed, one_obstacle
 
 from foc_ros.core.config import Config, FocConfig, replace_values
 from foc_ros.core.deadline import NEVER, Deadline, OutOfTimeError
-from foc_ros.core.estimation.kalman_filter import update
+from foc_ros.core.hand.kalman import update
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS, Tracks
 from foc_ros.core.types import HandSample, Obstacles, Prediction, Status, make_obstacles
 

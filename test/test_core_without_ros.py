@@ -28,14 +28,14 @@ import foc_ros.core
 names = [module.name for module in pkgutil.walk_packages(foc_ros.core.__path__, 'foc_ros.core.')]
 for name in names:
     importlib.import_module(name)
-assert 'foc_ros.core.predictor' in names, names
+assert 'foc_ros.core.predict' in names, names
 """
 
 PREDICT = """
 import numpy as np
 from foc_ros.core.config import Config
 from foc_ros.core.tracks import NO_TRACKS
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
 from foc_ros.core.types import HandState, make_obstacles
 hand = HandState(0, np.zeros(6), np.zeros((6, 6)))
 scene = make_obstacles([[0.15, 0.0]], [0.03], 0.002)

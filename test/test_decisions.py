@@ -10,7 +10,7 @@ import pytest
 from foc_ros.core.classes.rows import Decisions, find_decisions
 from foc_ros.core.config import Config, LikelihoodConfig
 from foc_ros.core.likelihood import compute_likelihoods
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import LEFT, RIGHT, HandState, make_obstacles
 

@@ -18,9 +18,9 @@ from foc_ros.core.classes.library import (
 )
 from foc_ros.core.config import Config, HomotopyConfig, replace_values
 from foc_ros.core.errors import FocError
-from foc_ros.core.learning.experience import make_library
 from foc_ros.core.learning.learnt import Knowledge
-from foc_ros.core.predictor import predict
+from foc_ros.core.learning.recordings import make_library
+from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, make_obstacles
 from foc_ros.io.class_library import load_library, save_library

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foc_ros.core.config import DurationConfig
-from foc_ros.core.estimation.duration import compute_movement_time, estimate_times_to_go
+from foc_ros.core.hand.duration import compute_movement_time, estimate_times_to_go
 from foc_ros.core.types import NANOSECONDS, HandState
 
 FITTS = DurationConfig(

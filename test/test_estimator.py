@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foc_ros.core.config import EstimatorConfig
-from foc_ros.core.estimation.kalman_filter import (
+from foc_ros.core.hand.kalman import (
     JUMP_SPEED,
     JUMP_STDDEVS,
     FilterState,

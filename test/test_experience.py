@@ -15,7 +15,8 @@ from foc_ros.core.classes.library import STEP_S, record_demonstration
 from foc_ros.core.classes.rows import Decisions
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
-from foc_ros.core.learning.experience import (
+from foc_ros.core.learning.learnt import Knowledge
+from foc_ros.core.learning.recordings import (
     NO_LIBRARY,
     POSITION_STDDEV,
     PRIOR_COUNT,
@@ -25,9 +26,8 @@ from foc_ros.core.learning.experience import (
     make_library,
     update_likelihoods,
 )
-from foc_ros.core.learning.learnt import Knowledge
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import LEFT, RIGHT, Candidate, HandState, make_obstacles
 from foc_ros.io.class_library import load_library, save_library

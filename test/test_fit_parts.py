@@ -8,7 +8,7 @@ from foc_ros.analysis.fitting.duration_fit import fit_duration
 from foc_ros.analysis.fitting.estimator_fit import Innovations, fit_estimator
 from foc_ros.analysis.fitting.resampling import expand_quadratic
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition, update
+from foc_ros.core.hand.kalman import compute_gramian, compute_transition, update
 from foc_ros.core.types import HandSample, SampleStatus, make_obstacles
 
 

@@ -22,7 +22,7 @@ from foc_ros.analysis.recordings import find_recordings
 from foc_ros.cli import fit as fit_command
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.estimation.kalman_filter import compute_transition
+from foc_ros.core.hand.kalman import compute_transition
 from foc_ros.core.types import Array, make_obstacles
 
 CONFIG = replace_values(

@@ -9,7 +9,7 @@ import pytest
 
 import foc_ros
 from foc_ros.core.obstacles.shapes import collect_obstacles
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
 

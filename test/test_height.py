@@ -10,13 +10,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 import foc_ros
 from foc_ros.core import candidates
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.dynamics.predictive_covariance import SharedCovariances
-from foc_ros.core.estimation.kalman_filter import update
+from foc_ros.core.hand.kalman import update
 from foc_ros.core.height import HeightPredictor, predict_height, reach_along_axis
-from foc_ros.core.obstacles.height_clearance import SLACK
+from foc_ros.core.obstacles.clearance import SLACK
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
-from foc_ros.core.predictor import build_problem, predict
+from foc_ros.core.plant.covariance import SharedCovariances
+from foc_ros.core.predict import build_problem, predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandSample, HandState, Obstacles, Prediction, Status, make_obstacles
 

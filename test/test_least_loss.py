@@ -14,7 +14,7 @@ from foc_ros.core.ocp.solve import find_least_safety_factor, solve_problem
 from foc_ros.core.ocp.solver import LARGEST_TOLERANCE
 from foc_ros.core.ocp.start import cold_start, warm_start
 from foc_ros.core.ocp.strategies import solve_at
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
 from foc_ros.core.safety_preference import SafetyPreference
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, Solution, Status, make_obstacles

@@ -16,7 +16,7 @@ from foc_ros.analysis.replay import Replay
 from foc_ros.core.classes.library import MOST_STATES, is_same_recording
 from foc_ros.core.config import Config
 from foc_ros.core.learning import movements as learning
-from foc_ros.core.learning.experience import PRIOR_COUNT
+from foc_ros.core.learning.recordings import PRIOR_COUNT
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io.bags import BagReader

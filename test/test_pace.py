@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config, DurationConfig, replace_values
-from foc_ros.core.estimation.duration import compute_movement_time, estimate_times_to_go, scale_durations
+from foc_ros.core.hand.duration import compute_movement_time, estimate_times_to_go, scale_durations
 from foc_ros.core.height import reach_along_axis
 from foc_ros.core.learning.pace import MOST_GOALS, Pace, find_free_positions
 from foc_ros.core.pipeline import Pipeline

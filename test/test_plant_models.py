@@ -8,11 +8,11 @@ from numpy.testing import assert_allclose
 
 import foc_ros
 from foc_ros.core.config import Config
-from foc_ros.core.dynamics.plant_models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
-from foc_ros.core.dynamics.plants import Plant, condense, discretise_damped_mass, discretise_triple_integrator
-from foc_ros.core.dynamics.predictive_covariance import compute_duration_sensitivity
-from foc_ros.core.obstacles.chance_constraint import k_of_eta
-from foc_ros.core.predictor import build_problem, predict
+from foc_ros.core.obstacles.risk import k_of_eta
+from foc_ros.core.plant.covariance import compute_duration_sensitivity
+from foc_ros.core.plant.models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
+from foc_ros.core.plant.plants import Plant, condense, discretise_damped_mass, discretise_triple_integrator
+from foc_ros.core.predict import build_problem, predict
 from foc_ros.core.registry import PLANTS
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, make_obstacles

@@ -5,13 +5,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.dynamics.plants import build_triple_integrator_horizon, condense, discretise_triple_integrator
-from foc_ros.core.dynamics.predictive_covariance import compute_duration_sensitivity, compute_onset_delay_covariance
-from foc_ros.core.dynamics.replanning import compute_goal_map, triple_integrator_goal_map
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
-from foc_ros.core.predictor import predict
+from foc_ros.core.plant.covariance import compute_duration_sensitivity, compute_onset_delay_covariance
+from foc_ros.core.plant.plants import build_triple_integrator_horizon, condense, discretise_triple_integrator
+from foc_ros.core.plant.replanning import compute_goal_map, triple_integrator_goal_map
+from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, Solution, make_obstacles
 

@@ -4,10 +4,10 @@ import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.dynamics.plants import condense, discretise_triple_integrator
-from foc_ros.core.dynamics.replanning import compute_error_map, triple_integrator_process_covariance
-from foc_ros.core.estimation.kalman_filter import compute_gramian
-from foc_ros.core.predictor import predict
+from foc_ros.core.hand.kalman import compute_gramian
+from foc_ros.core.plant.plants import condense, discretise_triple_integrator
+from foc_ros.core.plant.replanning import compute_error_map, triple_integrator_process_covariance
+from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, make_obstacles
 

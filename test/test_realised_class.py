@@ -12,7 +12,7 @@ import pytest
 from homotopy_scenes import GOAL, random_scene
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, Obstacles, Prediction, make_obstacles
 

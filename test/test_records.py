@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import Array, HandState, Prediction, Record, Solution, as_readonly, make_obstacles
 

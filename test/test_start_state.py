@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.predictor import predict, warm_up
+from foc_ros.core.predict import predict, warm_up
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, make_obstacles
 

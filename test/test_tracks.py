@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.estimation.duration import CHANGE_S, limit_change
-from foc_ros.core.estimation.kalman_filter import update
-from foc_ros.core.predictor import predict
+from foc_ros.core.hand.duration import CHANGE_S, limit_change
+from foc_ros.core.hand.kalman import update
+from foc_ros.core.predict import predict
 from foc_ros.core.tracks import LEAD, NO_TRACKS, SMOOTHING_S, Track, Tracks, interpolate_rest, take_rest
 from foc_ros.core.types import LEFT, RIGHT, Candidate, HandSample, HandState, Status, make_obstacles
 

@@ -11,7 +11,7 @@ from bag_helpers import TYPES
 
 from foc_ros.core import candidates
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, Prediction, Solution, Status, make_obstacles
 from foc_ros.io.json_output import encode_prediction

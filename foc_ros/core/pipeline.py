@@ -12,12 +12,12 @@ from .classes.library import Demonstration
 from .config import ONLINE, Config
 from .deadline import NEVER, Deadline
 from .errors import FocError
-from .estimation.kalman_filter import FilterState, describe_jump, update
-from .learning.experience import Library, make_library
+from .hand.kalman import FilterState, describe_jump, update
 from .learning.learnt import Knowledge, Learnt
-from .obstacles.scene import ObstacleSource, Scene
-from .predictor import predict
-from .rejections import Rejections
+from .learning.recordings import Library, make_library
+from .predict import predict
+from .scene import ObstacleSource, Scene
+from .support import Rejections
 from .tracks import NO_TRACKS, Tracks
 from .types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction, SampleStatus
 

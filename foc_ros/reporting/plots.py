@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from foc_ros.core.errors import InputError
-from foc_ros.core.obstacles.outline import find_limits
+from foc_ros.core.obstacles.geometry import find_limits
 from foc_ros.core.types import NANOSECONDS, Array, Obstacles, PredictedCandidate, Prediction
 from foc_ros.io.outputs import MARK, PICTURE_SUFFIXES
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.dynamics.smooth_path import compute_curve
 from foc_ros.core.errors import MessageError
+from foc_ros.core.plant.response import compute_curve
 from foc_ros.core.types import (
     LEFT,
     NANOSECONDS,

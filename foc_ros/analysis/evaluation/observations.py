@@ -17,10 +17,10 @@ from foc_ros.analysis.replay import Replay, Step
 from foc_ros.core.classes.rows import Decisions, Rows, find_decisions, find_direction, find_rows
 from foc_ros.core.classes.sides import BranchTimes, compute_branch_times
 from foc_ros.core.config import Config
-from foc_ros.core.dynamics.predictive_covariance import compute_duration_sensitivity
 from foc_ros.core.errors import FocError, RecordingError, warn
-from foc_ros.core.estimation.duration import is_passing
-from foc_ros.core.obstacles.chance_constraint import centre_trajectories
+from foc_ros.core.hand.duration import is_passing
+from foc_ros.core.obstacles.risk import centre_trajectories
+from foc_ros.core.plant.covariance import compute_duration_sensitivity
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Obstacles, PredictedCandidate, Prediction, Record, Solution
 
 from .ground_truth import (

@@ -19,9 +19,9 @@ from scipy.optimize import minimize
 from foc_ros.analysis.evaluation.bootstrap import CENTRAL, RESAMPLES, SEED, draw_resamples
 from foc_ros.analysis.evaluation.ground_truth import RecordedPath
 from foc_ros.core.config import Config, DurationConfig, replace_values
-from foc_ros.core.estimation.duration import CONSTANTS as MODEL_CONSTANTS
-from foc_ros.core.estimation.duration import estimate_times_to_go
-from foc_ros.core.learning.goal_reached import has_covered_distance
+from foc_ros.core.hand.duration import CONSTANTS as MODEL_CONSTANTS
+from foc_ros.core.hand.duration import estimate_times_to_go
+from foc_ros.core.learning.movements import has_covered_distance
 from foc_ros.core.types import NANOSECONDS, Array, HandState
 
 from .estimates import Estimate, Estimates, apply_estimates, clip_to_bounds

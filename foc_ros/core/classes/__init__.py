@@ -2,7 +2,7 @@
 
 Enters: the hand, the goals and the obstacles. Leaves: candidates, the side on which a given path passes an obstacle, and the
 decisions that tell candidates apart.
-May import `foc_ros.core.dynamics`, `obstacles`, `estimation` and the ground modules.
+May import `foc_ros.core.plant`, `obstacles`, `hand` and the ground modules.
 """
 
 from .guess import timed

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.errors import SceneError
-from foc_ros.core.obstacles.chance_constraint import centre_trajectories
 from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.obstacles.risk import centre_trajectories
 from foc_ros.core.types import LEFT, RIGHT, Array, Obstacles, PredictedCandidate, Record
 
 TURN = 2.0 * np.pi

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.config import GuidanceConfig
-from foc_ros.core.obstacles.outline import trace_obstacle
+from foc_ros.core.obstacles.geometry import trace_obstacle
 from foc_ros.core.types import Array, Obstacles, Record
 
 ROUNDING = 1e-9

@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 from foc_ros.core.config import ONLINE, Config, CovarianceConfig
 from foc_ros.core.likelihood import BETWEEN_OPERATORS, OWN_SPREAD
-from foc_ros.core.obstacles.scene import Scene
+from foc_ros.core.scene import Scene
 from foc_ros.core.types import HandState, Prediction
 
 from .dispersion import Dispersion
-from .experience import NO_LIBRARY, Library
 from .movements import Movements
 from .pace import Pace
+from .recordings import NO_LIBRARY, Library
 
 DISPERSED_BY = ('foc', 'duration', 'covariance', 'estimator')
 """Groups of parameters on which errors and covariances depend."""

@@ -37,10 +37,10 @@ from functools import lru_cache
 import numpy as np
 
 from foc_ros.core.config import ARRIVALS, DurationConfig
-from foc_ros.core.estimation.duration import estimate_times_to_go, is_passing, scale_durations
+from foc_ros.core.hand.duration import estimate_times_to_go, is_passing, scale_durations
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Record, as_readonly
 
-from .goal_reached import find_goal_at_end, has_covered_distance
+from .movements import find_goal_at_end, has_covered_distance
 from .posterior import GridPosterior
 
 LOG_FACTORS = as_readonly(np.linspace(-1.6, 1.6, 17))

@@ -20,8 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.obstacles.outline import trace_obstacle
+from foc_ros.core.obstacles.geometry import measure_offsets, trace_obstacle
 from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Prediction
 
 from .plane import lift

@@ -20,6 +20,11 @@ margins for motor noise only. A prediction, however, is as uncertain as
       cov(X(t)) = E[(X(t - d) - X(t)) (X(t - d) - X(t))'],
 
   with moments of X(t - d) that are low-pass filters of X and X X' with the time constant `wait_s`.
+
+Signal-dependent noise makes every variance a diagonal quadratic function of the control. The plant receives U + eps with eps_i =
+c_i phi U_i, phi standard normal at every step and channel (paper, equations 2-3). Hence P(t + 1) = A P(t) A' + B diag(c^2 u_t^2)
+B'; over the horizon, P(t) = A^t P(0) A'^t + sum_k R_k diag(c^2 u_k^2) R_k', with R_k the response of the state at step t to the
+control at step k.
 """
 
 from __future__ import annotations
@@ -30,10 +35,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from foc_ros.core.config import Config, DurationConfig
-from foc_ros.core.estimation.duration import is_passing
+from foc_ros.core.hand.duration import is_passing
 from foc_ros.core.types import Array, HandState, Solution
 
-from .plant_models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
+from .models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
+from .plants import Horizon, apply_impulse_response
 
 
 def compute_predictive_covariance(hand: HandState, dt: float, steps: int, config: Config) -> Array:
@@ -100,3 +106,24 @@ def compute_duration_sensitivity(solution: Solution, passing: bool, plant: Plant
     goal_map = plant.compute_goal_map(solution.dt, len(solution.control), passing)
     displacement: Array = goal_map @ (float(solution.times[-1]) * plant.compute_end_rate(solution))
     return displacement
+
+
+def stack_noise(noise: Array, steps: int) -> Array:
+    """Return c for every entry of the stacked control, (2N,), from noise c per channel (2,)."""
+    return np.repeat(np.asarray(noise, dtype=float), steps)
+
+
+def scale_noise(noise_at_reference: Array, reference_step: float, dt: float) -> Array:
+    """Convert noise c from a reference step [s] to dt [s]: c sqrt(reference / dt) keeps the noise power per second."""
+    scaled: Array = np.asarray(noise_at_reference, dtype=float) * np.sqrt(reference_step / dt)
+    return scaled
+
+
+def propagate_covariance(horizon: Horizon, free: Array, noise_variance: Array, control: Array) -> Array:
+    """Return P at steps 0..N, (N + 1, n, n).
+
+    free (N + 1, n, n): the part that the control does not cause; noise_variance (2N,): c^2; control (2N,): stacked.
+    """
+    caused = apply_impulse_response(horizon.products, noise_variance * control**2)
+    covariance: Array = free + caused.T.reshape(free.shape)
+    return covariance

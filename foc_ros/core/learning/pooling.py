@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.classes import find_path_sides
-from foc_ros.core.obstacles.chance_constraint import centre_trajectories
 from foc_ros.core.obstacles.clearance import measure_clearance
+from foc_ros.core.obstacles.risk import centre_trajectories
 from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Record, Solution, as_readonly
 
 FADE_S = 0.25

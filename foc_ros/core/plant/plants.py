@@ -1,15 +1,21 @@
 """Discrete linear plants of the hand, and their maps over a horizon.
 
 State X, control U of two channels: X(t+1) = A X(t) + B (U(t) + noise). The first two states are the position, the next two the
-velocity. The optimal control works for any such (A, B); `plant_models` says what the predictor needs besides.
+velocity. The optimal control works for any such (A, B); `models` says what the predictor needs besides.
+
+A unit control at step k of one channel changes a quantity at step s by h(s - k), with h(0) = 0 and no effect on earlier steps.
+One response of N + 1 numbers therefore stands for a whole matrix. Responses (q, 2, N + 1) are those of q quantities to both
+channels; a control is stacked, (2N,): the first channel at steps 0..N-1, then the second.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from foc_ros.core.errors import InputError
@@ -175,3 +181,46 @@ def build_triple_integrator_horizon(dt: float, steps: int) -> Horizon:
 def find_states_at_goal(n: int, passing: bool = False) -> NDArray[np.bool_]:
     """Return which of n states the goal fixes, (n,): all if the hand comes to rest, all but the velocity if it passes."""
     return np.array([not (passing and 2 <= state < 4) for state in range(n)])
+
+
+class PositionNoise(NamedTuple):
+    """How a control spreads the position over the horizon.
+
+    responses (5, 2, N + 1): impulse responses of x and y and their products xx, yy, xy (`Horizon.maps`); noise_variance (2N,):
+    c^2 for each entry of the stacked control; free (3, N): variances xx, yy, xy that the control does not cause [m^2].
+    """
+
+    responses: Array
+    noise_variance: Array
+    free: Array
+
+
+def position_variances(noise: PositionNoise, control: Array) -> Array:
+    """Return the position covariance at steps 1..N as rows xx, yy, xy, (3, N) [m^2], for a stacked control (2N,)."""
+    variance: Array = noise.free + apply_impulse_response(noise.responses[2:], noise.noise_variance * control**2)[:, 1:]
+    return variance
+
+
+def variance_weights(states: Array, terminal: Array, stage: Array) -> Array:
+    """Return d (2N,), where d.u^2 is what a control's noise u adds to sum_i terminal_i X_i(N)^2 + stage_i sum_{t < N} X_i(t)^2.
+
+    states (n, 2, N + 1): impulse responses of the states; terminal, stage (n,): weights.
+    """
+    squares = states**2
+    since = np.tensordot(terminal, squares[..., 1:], 1) + np.tensordot(stage, squares[..., :-1].cumsum(axis=-1), 1)
+    return since[:, ::-1].ravel()
+
+
+def apply_impulse_response(responses: Array, control: Array) -> Array:
+    """Return the q quantities at steps 0..N, (q, N + 1), from responses (q, 2, N + 1) and a stacked control (2N,)."""
+    quantities, channels, times = responses.shape
+    moved: Array = responses.reshape(quantities, -1) @ _shift_control(control, channels, times)
+    return moved
+
+
+def _shift_control(control: Array, channels: int, times: int) -> Array:
+    """Return the control at step s - m for each channel and each m, s = 0..N, (2 (N + 1), N + 1); zero before step 0."""
+    padded = np.zeros((channels, 2 * times - 1))
+    padded[:, times - 1 : -1] = control.reshape(channels, -1)
+    row, item = padded.strides
+    return as_strided(padded[:, times - 1 :], (channels, times, times), (row, -item, item)).reshape(channels * times, times)

@@ -16,7 +16,7 @@ the goal, and as n_1 = `PRIOR_COUNT_BEYOND` for the way; the recordings are obse
 with the p_G and p_W of the model in the fractions p_W / p_G and p_i / p_W.
 
 The path of a class is pooled with the recordings that take its gap in the next row, each up to where it passes an obstacle on
-another side than the class (`recorded_paths`). If this path leaves the class or enters an obstacle, only the recordings of the
+another side than the class (`pooling`). If this path leaves the class or enters an obstacle, only the recordings of the
 class count, and if that one does so too, the path stays that of the plan. Effort and eta are always those of the plan. Without
 recordings near the hand, all is the model. Recordings of the running program change the likelihoods of goals and the paths only,
 unless `experience.learning` is `online`: people vary their ways between obstacles more than where they go.
@@ -34,7 +34,7 @@ from foc_ros.core.classes.library import NEAR, STEP_S, Demonstration, is_same_de
 from foc_ros.core.classes.rows import Decisions, find_decisions, tabulate_sides
 from foc_ros.core.types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Record, Solution
 
-from .recorded_paths import RecordedPaths, fade_weights, pool_path, stays_in_class
+from .pooling import RecordedPaths, fade_weights, pool_path, stays_in_class
 
 MOST_NEAR = 64
 """Number of recordings, the nearest ones, that count in one prediction: its time is bounded whatever the size of the library."""

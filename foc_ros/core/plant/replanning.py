@@ -22,7 +22,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from foc_ros.core.estimation.kalman_filter import compute_gramian
+from foc_ros.core.hand.kalman import compute_gramian
 from foc_ros.core.types import Array
 
 from .plants import (

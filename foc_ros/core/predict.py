@@ -10,24 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .candidates import estimate_unsolved, find_unknown_share, rank_candidates, solve_candidates
-from .classes import Search, Turn, search
+from .classes import Search, Turn, find_path_sides, search
 from .classes.library import GuessTiming, recall_demonstrations
 from .config import REFERENCE_STEP_S, Config, EstimatorConfig
 from .deadline import NEVER, Deadline
-from .dynamics.noise import scale_noise
-from .dynamics.plant_models import make_plant_model
-from .dynamics.predictive_covariance import SharedCovariances, widen_covariance
-from .estimation.duration import estimate_times_to_go, is_passing, limit_change
+from .hand.duration import estimate_times_to_go, is_passing, limit_change
 from .height import HeightPredictor
 from .learning.dispersion import scale_covariance
-from .learning.experience import Library, pool_recordings
 from .learning.learnt import NOTHING, Knowledge
-from .obstacles.chance_constraint import RiskBound, count_events
-from .obstacles.culling import cull_obstacles
+from .learning.recordings import Library, pool_recordings
+from .obstacles.clearance import cull_obstacles
+from .obstacles.risk import RiskBound, count_events
 from .ocp.problem import Problem, rest_to_goal
+from .plant.covariance import SharedCovariances, scale_noise, widen_covariance
+from .plant.models import make_plant_model
 from .safety_preference import SafetyPreference
+from .scene import ReachingScene
 from .tracks import HOLD_S, NO_TRACKS, Track, Tracks, take_rest
 from .types import (
+    LEFT,
     NANOSECONDS,
     Array,
     Candidate,
@@ -71,7 +72,7 @@ def predict(
     tracks
         What the previous prediction returned, or `NO_TRACKS`.
     knowledge
-        Demonstrated paths, which become candidates where they fit the scene, recordings, which are evidence (`experience`), and
+        Demonstrated paths, which become candidates where they fit the scene, recordings, which are evidence (`recordings`), and
         the planning of the operator (`likelihood`).
     deadline
         When the prediction has to be ready. All classes are solved together; what is not settled then is compared by an estimate.
@@ -274,3 +275,38 @@ def _widen_covariance(
     solution = candidate.solution
     covariance = widen_covariance(solution, shared[solution.dt], hand.onset_ns is None, config)
     return replace(candidate, solution=solution.with_covariance(covariance))
+
+
+def build_scene_problems(scene: ReachingScene) -> list[Problem]:
+    """Return the problem of every goal. An uncertain start is as uncertain to the operator, so it counts in the constraint."""
+    config = scene.config
+    problems = [build_problem(config, scene.hand, scene.avoided, goal, scene.duration_s) for goal in scene.goals]
+    if scene.noise is not None:
+        problems = [replace(problem, noise=scene.noise) for problem in problems]
+    if not scene.hand.covariance.any():
+        return problems
+    plant, steps = make_plant_model(config.foc), config.foc.steps
+    error_map = plant.compute_error_map(scene.duration_s / steps, steps, is_passing(config.duration))
+    covariance = plant.project_covariance(scene.hand.covariance)
+    return [replace(problem, initial_covariance=covariance, error_map=error_map) for problem in problems]
+
+
+def solve_scene(scene: ReachingScene, problems: Sequence[Problem]) -> list[PredictedCandidate]:
+    """Solve the class of the guess, or the classes that are found; solved ones come first, the most likely first.
+
+    problems: of every goal, from `build_scene_problems`.
+    """
+    config, avoided = scene.config, scene.avoided
+    if scene.guess is not None:
+        candidates: tuple[Candidate, ...] = (_make_guessed_candidate(scene.guess, avoided),)
+    else:
+        durations = [scene.duration_s] * len(scene.goals)
+        candidates = search(scene.hand.mean, scene.goals, avoided, config.homotopy, durations, config.foc.steps).candidates
+    solved = solve_candidates(candidates, [problems[each.goal] for each in candidates], config.foc)
+    return rank_candidates(solved, config.likelihood, avoided, scene.hand, scene.goals)
+
+
+def _make_guessed_candidate(guess: Array, obstacles: Obstacles) -> Candidate:
+    sides = tuple(sorted(find_path_sides(guess, obstacles).items()))
+    label = 'goal0:' + ''.join(('+' if side == LEFT else '-') + identity for identity, side in sides)
+    return Candidate(label, 0, sides, guess, 0.0)
