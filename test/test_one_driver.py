@@ -102,6 +102,10 @@ def test_the_intake_of_the_node_predicts_what_a_replay_does(bag: Path, replayed:
             intake.take(item.role, item.message)
             if intake.pipeline.is_due:
                 made.append(intake.pipeline.predict())
+                state = intake.pipeline.hand_state
+                assert state is not None
+                apart = [np.hypot(*(each.mean[0, :2] - state.mean[:2])) for each in made[-1].candidates]
+                assert max(apart) < 1e-3, 'every path begins at the hand'
     assert [strip(each) for each in made] == [strip(each) for each in replayed[0]]
 
 

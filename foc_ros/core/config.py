@@ -94,11 +94,9 @@ class DurationConfig:
     adaptation: str = _p(
         'online', "whether expected durations and `arrival` follow the operator's movements", choices=ADAPTATIONS
     )
-    min_time_to_go_s: float = _p(0.3, 'lower limit of the time to go', 's', 0.01, 60.0)
     spread: float = _p(0.4, f'standard deviation of the time to go, as a fraction of it; it {WIDENS}', '', 0.0, 2.0)
     wait_s: float = _p(0.0, f'mean time until a hand at rest starts to move; it {WIDENS}', 's', 0.0, 60.0)
     arrival: str = _p('rest', 'how the hand arrives at its goal: it comes to rest, or passes at any speed', choices=ARRIVALS)
-    max_time_to_go_s: float = _p(10.0, 'upper limit of the time to go', 's', 0.05, 120.0)
 
 
 @dataclass(frozen=True)
@@ -146,7 +144,7 @@ class HomotopyConfig:
     """Homotopy classes that are considered."""
 
     max_candidates: int = _p(
-        4, 'number of homotopy classes to solve, over all goals; each goal gets at least one', '', 1, MOST_CANDIDATES
+        8, 'number of homotopy classes to solve, over all goals; each goal gets at least one', '', 1, MOST_CANDIDATES
     )
     clearance: float = _p(0.005, 'distance that the hand needs from every obstacle: narrower gaps are closed', 'm', 0.0, 1.0)
     library: str = _p('', 'file of paths that learn or replay --learn wrote; empty: none', read_only=True)
@@ -238,11 +236,6 @@ class GuidanceConfig:
     clearance: float = _p(
         0.012, 'distance that guidance keeps the hand from obstacles: no force farther away; 0: force everywhere', 'm', 0.0, 1.0
     )
-    precision_low: float = _p(
-        100.0, 'precision, an inverse variance of position, up to which there is no stiffness', '1/m^2', 0.0, 1e9
-    )
-    precision_high: float = _p(2500.0, 'precision from which on the stiffness is `k_max`', '1/m^2', 1.0, 1e9)
-    position_stddev: float = _p(0.002, 'standard deviation that is added to that of every predicted position', 'm', 1e-6, 1.0)
     margin: float = _p(0.002, 'distance from every obstacle within which no force leads towards it', 'm', 0.0, 1.0)
     tank: float = _p(0.5, 'capacity and first content of the energy tank: most energy that guidance gives', 'J', 0.0, 1e3)
     max_speed: float = _p(1.0, 'speed of the fastest hand, for which tank and margins are guaranteed', 'm/s', 0.01, 100.0)
@@ -325,6 +318,8 @@ CHOICES_LEARNT = 'nothing is learnt from choices any more'
 EXPERIENCE_FIXED = 'how much recordings count is fixed'
 REMOVED = {
     'duration.time_cost': 'durations follow Fitts law or are fixed, and their pace is learnt',
+    'duration.min_time_to_go_s': 'it is 0.3 s',
+    'duration.max_time_to_go_s': 'it is 10 s',
     'likelihood.spent_share': 'only the effort to go is compared',
     'likelihood.planning_spread': 'it is 1 until the pace of the operator is known from one movement, and then 0.3',
     'likelihood.beta_beyond': 'ways beyond the next row are equally likely to an operator who looks ahead',
@@ -341,6 +336,9 @@ REMOVED = {
     'scene.height_stddevs': 'it is 2',
     'foc.algorithm1_delta': 'it is foc.lv_delta',
     'foc.algorithm1_xi': 'it is 1 m^2/s^6, as in the paper',
+    'guidance.precision_low': 'it is 100 1/m^2',
+    'guidance.precision_high': 'it is 2500 1/m^2',
+    'guidance.position_stddev': 'it is 2 mm',
     'guidance.sharpness': 'it is 3',
     'guidance.yield_acceleration': 'it is 0.6 m/s^2',
 }

@@ -73,11 +73,6 @@ def sweep(offset: Array) -> Array:
     return angles
 
 
-def is_same_class(angles: Array, others: Array) -> bool:
-    """Tell whether two paths with the same ends, which sweep the angles (n,) [rad], pass all n centres on the same sides."""
-    return bool((np.abs(angles - others) < np.pi).all())
-
-
 def find_path_sides(path: Array, obstacles: Obstacles, centres: Array | None = None) -> dict[str, int]:
     """Find the side on which a path passes each obstacle.
 

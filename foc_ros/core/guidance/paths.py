@@ -136,6 +136,10 @@ def normalize(vectors: Array) -> Array:
     return unit
 
 
+PRECISION_LOW, PRECISION_HIGH = 100.0, 2500.0
+"""Precisions between which the stiffness grows from 0 to `k_max` [1/m^2]: standard deviations of 100 mm and of 20 mm."""
+POSITION_STDDEV = 0.002
+"""Standard deviation that is added to that of every predicted position [m]: that of a good tracker and of its registration."""
 SINGULAR = 1e-6
 """Stiffness below which a direction counts as one without any, as a share of the largest one."""
 
@@ -148,12 +152,11 @@ def compute_stiffness(covariances: Array, config: GuidanceConfig) -> Array:
         K = sum_j k_max clip((l_j - l_lo) / (l_hi - l_lo), 0, 1) w_j w_j',
 
     which is symmetric, positive semidefinite and bounded by k_max (Muehlbauer et al. 2025, arXiv 2506.10239). Here l_lo is
-    `precision_low`, l_hi `precision_high` and s0 `position_stddev`.
+    `PRECISION_LOW`, l_hi `PRECISION_HIGH` and s0 `POSITION_STDDEV`.
     """
     variances, axes = np.linalg.eigh(covariances)
-    precisions = 1.0 / (np.maximum(variances, 0.0) + config.position_stddev**2)
-    width = max(config.precision_high - config.precision_low, 1e-9)
-    shares = np.minimum(np.maximum((precisions - config.precision_low) / width, 0.0), 1.0)
+    precisions = 1.0 / (np.maximum(variances, 0.0) + POSITION_STDDEV**2)
+    shares = np.minimum(np.maximum((precisions - PRECISION_LOW) / (PRECISION_HIGH - PRECISION_LOW), 0.0), 1.0)
     stiffness: Array = config.k_max * np.einsum('cj,caj,cbj->cab', shares, axes, axes)
     return stiffness
 

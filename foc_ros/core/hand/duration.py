@@ -27,6 +27,8 @@ CONSTANTS = {
     'fitts': {'fitts_a_s': 1.0, 'fitts_b_s': 1.0},
 }
 """By model, the constants that determine durations, each with its power in a factor on all durations."""
+LEAST_S, MOST_S = 0.3, 10.0
+"""Limits of the time to go [s]: near its goal a hand corrects for about that long; plans beyond the other limit say nothing."""
 PACE_AFTER = 0.3
 """Share of the expected duration after which the present speed counts."""
 SLOWEST = 1e-6
@@ -68,7 +70,7 @@ def is_passing(config: DurationConfig) -> bool:
 
 
 def estimate_times_to_go(hand: HandState, goals: Array, config: DurationConfig) -> list[float]:
-    """Return the time to go [s] to each goal (g, 2) [m], between `min_time_to_go_s` and `max_time_to_go_s`.
+    """Return the time to go [s] to each goal (g, 2) [m], between `LEAST_S` and `MOST_S`.
 
     During a movement this is the expected duration from its onset, less the time since then. After `PACE_AFTER` of it, all
     expected durations are multiplied by the smallest factor with which, for one of the goals, the present speed suffices for the
@@ -90,4 +92,4 @@ def estimate_times_to_go(hand: HandState, goals: Array, config: DurationConfig) 
         ]
         factor = max(1.0, min(factors, default=1.0))
         expected = [factor * duration - since_s for duration in whole]
-    return [min(max(each, config.min_time_to_go_s), config.max_time_to_go_s) for each in expected]
+    return [min(max(each, LEAST_S), MOST_S) for each in expected]
