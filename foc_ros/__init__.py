@@ -35,12 +35,13 @@ if TYPE_CHECKING:
     from foc_ros.core.types import Obstacles as Obstacles
     from foc_ros.core.types import PredictedCandidate as PredictedCandidate
     from foc_ros.core.types import Status as Status
+    from foc_ros.extending import *  # noqa: F403
+    from foc_ros.solving import *  # noqa: F403
 
 _MODULES = {
-    'api': (
-        'Guidance Prediction Predictor Solution compute_eta get_strategy load_config monte_carlo plot_candidates'
-        ' register_likelihood_rule register_plant register_qp_backend register_strategy replay solve solve_classes'
-    ),
+    'api': 'Guidance Prediction Predictor load_config replay',
+    'extending': ('compute_eta get_strategy register_likelihood_rule register_plant register_qp_backend register_strategy'),
+    'solving': 'Solution monte_carlo plot_candidates solve solve_classes',
     'analysis.evaluation': 'register_baseline',
     'core.config': 'Config',
     'core.plant.models': 'PlantModel',

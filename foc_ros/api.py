@@ -1,9 +1,8 @@
-"""The public Python API as far as it is more than a re-export; `foc_ros` exports all of it. No other module imports this one."""
+"""The public Python API for a moving hand: `Predictor`, `Guidance`, `replay`; `foc_ros` exports all of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,21 +17,13 @@ from foc_ros.core.errors import FocError, InputError, SceneError
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, guide
 from foc_ros.core.hand.kalman import describe_jump
 from foc_ros.core.obstacles.shapes import Shape, collect_obstacles
-from foc_ros.core.ocp import monte_carlo as sampling
-from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.ocp.solve import find_least_safety_factor
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.predict import build_scene_problems, solve_scene, warm_up
-from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
-from foc_ros.core.scene import ReachingScene, check_outside
-from foc_ros.core.support import check_array, check_number, check_vector
+from foc_ros.core.predict import warm_up
+from foc_ros.core.support import check_array, check_config, check_number, check_vector, find_shape
 from foc_ros.core.types import (
     NANOSECONDS,
-    Candidate,
     HandSample,
-    HandState,
     Obstacles,
-    PredictedCandidate,
     SampleStatus,
     make_obstacles,
 )
@@ -110,7 +101,7 @@ class Guidance:
     """
 
     def __init__(self, config: Config | None = None) -> None:
-        self.config = _check_config(config)
+        self.config = check_config(config)
         self._state = GuidanceState()
 
     def __repr__(self) -> str:
@@ -197,7 +188,7 @@ class Predictor:
     """
 
     def __init__(self, config: Config | None = None, library: str | Path | Sequence[Demonstration] | None = None) -> None:
-        self.config = _check_config(config)
+        self.config = check_config(config)
         source = self.config.homotopy.library if library is None else library
         if isinstance(source, (str, Path)):
             from foc_ros.io.class_library import load_library
@@ -230,7 +221,7 @@ class Predictor:
             Positions [m], at least one, in the plane or also with the height over it. Labels number them in this order. If they
             have heights, the height of the hand is predicted. `SceneError` is raised for anything else.
         """
-        has_heights = _find_shape(goals)[1:] == (SPACE,)
+        has_heights = find_shape(goals)[1:] == (SPACE,)
         points = check_array('goals', goals, (None, SPACE if has_heights else PLANE))
         if not len(points):
             raise SceneError('goals', 'at least one position', 'none')
@@ -298,237 +289,6 @@ class Predictor:
         self._pipeline.reset()
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Solution(types.Solution):
-    """The forward optimal control of one homotopy class, with the problem that it solves.
-
-    Attributes
-    ----------
-    status, message : Status, str
-        Result in words and numbers. `Status.SOLVED` meets the wanted eta, `Status.COMPROMISED` a smaller one.
-    label : str
-        Name of the homotopy class, such as ``goal0:+0-1``: + passes an obstacle on the left.
-    times, path, mean, covariance : ndarray of shape (N + 1,), (N + 1, 2), (N + 1, n), (N + 1, n, n)
-        Times [s], mean positions [m], and mean and covariance of the state: position, velocity and what else the plant has.
-    control, effort : ndarray of shape (N, 2), float
-        Jerk [m/s^3] for the triple integrator, force [N] for the damped mass; the sum of its squares.
-    eta, problem : float, Problem
-        Probability of avoidance that the solution achieves for each obstacle and step, and the problem that was solved.
-    obstacles : Obstacles
-        The obstacles as they were given; those of the problem are larger by `scene.hand_radius`.
-    """
-
-    label: str = ''
-    problem: Problem | None = None
-    obstacles: Obstacles = field(default_factory=make_obstacles)
-
-    def plot(self, axes: Any = None) -> Any:
-        """Draw the solution in its scene; see `Prediction.plot`."""
-        from foc_ros.reporting.snapshots import parse_label
-
-        _, sides = parse_label(self.label, self.obstacles.ids)
-        candidate = Candidate(self.label, 0, tuple(sides.items()), self.path, 0.0)
-        return plot_candidates([PredictedCandidate(candidate, self, {}, 0.0, 1.0)], axes)
-
-
-def solve(
-    start: ArrayLike,
-    goal: ArrayLike,
-    obstacles: Iterable[Shape] | Obstacles = (),
-    eta: float | None = None,
-    strategy: str | None = None,
-    duration_s: float = 1.0,
-    config: Config | None = None,
-    guess: ArrayLike | None = None,
-) -> Solution:
-    """Solve one reaching scene and return its most likely homotopy class.
-
-    Parameters
-    ----------
-    start : array_like of shape (2,) or (6,)
-        Position of a hand at rest [m], or its state x, y, vx, vy, ax, ay [m, m/s, m/s^2].
-    goal : array_like of shape (2,)
-        Position at which the hand comes to rest [m].
-    obstacles : iterable of Circle, Box, Capsule and Hull, or Obstacles
-        The obstacles.
-    eta : float, optional
-        Wanted probability of avoiding each obstacle at each step; by default `foc.eta` of the config.
-    strategy : str, optional
-        Strategy of the solver; by default `foc.strategy` of the config.
-    duration_s : float
-        Duration of the movement [s].
-    config : Config, optional
-        All other parameters; the defaults if not given.
-    guess : array_like of shape (m, 2), optional
-        Via points of a path [m], or its positions at all N + 1 steps. Only its homotopy class is solved then.
-
-    Returns
-    -------
-    Solution
-        The solution of the most likely class. Its status says if the problem could not be solved.
-
-    Raises
-    ------
-    InputError
-        For input that cannot be used: `SceneError` for the scene, or if no path leads to the goal, `ParameterError` for eta,
-        strategy and duration.
-
-    Examples
-    --------
-    >>> import foc_ros
-    >>> solution = foc_ros.solve((0, 0), (0.3, 0), [foc_ros.Circle((0.15, 0.01), radius=0.03)], eta=0.95)
-    >>> solution.status, solution.label
-    (<Status.SOLVED: 'solved'>, 'goal0:-0')
-    >>> solution.path.shape
-    (51, 2)
-    """
-    target, config = check_vector('goal', goal, 2), _fix_parameters(config, eta, strategy, duration_s)
-    scene = _build_scene(start, target[None], obstacles, config)
-    if guess is not None:
-        from foc_ros.io.scene_file import guess_path
-
-        points = check_array('guess', guess, (None, 2))
-        scene = replace(scene, guess=guess_path(scene.hand.mean[:2], target, config.foc.steps, via=points))
-    candidates = _solve(scene)
-    if not candidates:
-        raise SceneError('scene', 'a path between the obstacles from the start to the goal', 'none')
-    solution = candidates[0].solution
-    assert isinstance(solution, Solution)
-    return solution
-
-
-def solve_classes(
-    start: ArrayLike,
-    goal: ArrayLike,
-    obstacles: Iterable[Shape] | Obstacles = (),
-    eta: float | None = None,
-    strategy: str | None = None,
-    duration_s: float = 1.0,
-    config: Config | None = None,
-) -> tuple[PredictedCandidate, ...]:
-    """Solve one reaching scene in every homotopy class that is found, at most `homotopy.max_candidates`.
-
-    Parameters
-    ----------
-    start, obstacles, eta, strategy, duration_s, config
-        As for `solve`, which also lists the errors.
-    goal : array_like of shape (2,) or (g, 2)
-        One goal or several [m].
-
-    Returns
-    -------
-    tuple of PredictedCandidate
-        Solved ones first, the most likely first; then those that could not be solved. The solution of each is a `Solution`.
-        Empty if no path leads to a goal.
-
-    Examples
-    --------
-    >>> import foc_ros
-    >>> for candidate in foc_ros.solve_classes((0, 0), (0.3, 0), [foc_ros.Circle((0.15, 0.01), radius=0.03)]):
-    ...     print(candidate)
-    <PredictedCandidate goal0:-0, solved, likelihood 0.66>
-    <PredictedCandidate goal0:+0, solved, likelihood 0.34>
-    """
-    goals = check_array('goal', np.atleast_2d(np.asarray(goal, dtype=object)).tolist(), (None, 2))
-    return _solve(_build_scene(start, goals, obstacles, _fix_parameters(config, eta, strategy, duration_s)))
-
-
-def _build_scene(start: ArrayLike, goals: types.Array, obstacles: Iterable[Shape] | Obstacles, config: Config) -> ReachingScene:
-    expected = 'a position (2,) or a state (6,) x, y, vx, vy, ax, ay'
-    size = _find_shape(start)
-    if size not in ((2,), (6,)):
-        raise SceneError('start', expected, f'{start!r} of shape {size}')
-    state, table = np.zeros(6), collect_obstacles(obstacles)
-    state[: size[0]] = check_vector('start', start, size[0])
-    for name, point in (('start', state[:2]), *(('goal', goal) for goal in goals)):
-        check_outside(name, point, table.grow(config.scene.hand_radius))
-    return ReachingScene(HandState(0, state, np.zeros((6, 6))), goals, table, None, None, config)
-
-
-def _fix_parameters(config: Config | None, eta: float | None, strategy: str | None, duration_s: float) -> Config:
-    given = {'foc.eta': eta, 'foc.strategy': strategy, 'duration.fixed_s': duration_s, 'duration.model': 'fixed'}
-    return _check_config(config).with_values({name: value for name, value in given.items() if value is not None})
-
-
-def _find_shape(given: object) -> tuple[int, ...]:
-    """Return the shape of anything that may be an array, without a check of its numbers."""
-    return np.shape(np.asarray(given, dtype=object))
-
-
-def _check_config(config: Config | None) -> Config:
-    if not isinstance(config, (Config, type(None))):
-        raise InputError('config', 'a Config', repr(config))
-    return Config() if config is None else config
-
-
-def _solve(scene: ReachingScene) -> tuple[PredictedCandidate, ...]:
-    problems = build_scene_problems(scene)
-    return tuple(
-        replace(each, solution=Solution(**vars(each.solution), label=each.label, problem=problem, obstacles=scene.obstacles))
-        for each in solve_scene(scene, problems)
-        for problem in (problems[each.candidate.goal],)
-    )
-
-
-def monte_carlo(solution: Solution, samples: int = 10_000, seed: int = 0) -> sampling.MonteCarlo:
-    """Estimate from noisy movements how often a solution avoids the obstacles.
-
-    Parameters
-    ----------
-    solution : Solution
-        Result of `solve`, or the solution of a candidate of `solve_classes`.
-    samples : int
-        Number of movements, up to 10,000,000.
-    seed : int
-        Seed of the random generator: equal seeds give equal results.
-
-    Returns
-    -------
-    MonteCarlo
-        Fractions of movements that avoid the obstacles, each with its 95 % interval: `step` for the worst obstacle and step, and
-        `path` for all obstacles and steps together.
-
-    Raises
-    ------
-    InputError
-        For a solution without its problem, or a number of samples out of bounds.
-
-    Examples
-    --------
-    >>> import foc_ros
-    >>> solution = foc_ros.solve((0, 0), (0.3, 0), [foc_ros.Circle((0.15, 0.01), radius=0.03)])
-    >>> fraction, low, high = foc_ros.monte_carlo(solution, samples=1000).step
-    >>> fraction >= 0.9
-    True
-    """
-    problem = getattr(solution, 'problem', None)
-    if problem is None:
-        raise InputError('solution', 'a result of foc_ros.solve or solve_classes', repr(solution))
-    if not check_number('samples', samples, 1, MOST_SAMPLES).is_integer():
-        raise InputError('samples', 'a whole number', samples)
-    return sampling.monte_carlo(problem, solution.control.T.ravel(), int(samples), seed)
-
-
-def plot_candidates(candidates: Sequence[PredictedCandidate], axes: Any = None) -> Any:
-    """Draw the candidates of `solve_classes` in their scene, the thicker the more likely; those without a likelihood are grey.
-
-    Parameters
-    ----------
-    candidates : sequence of PredictedCandidate
-        Result of `solve_classes`, not empty.
-    axes : matplotlib.axes.Axes, optional
-        Axes to draw on; new ones by default. They are returned.
-    """
-    solutions = [each.solution for each in candidates if isinstance(each.solution, Solution)]
-    problems = [each.problem for each in solutions if each.problem]
-    if not problems:
-        raise InputError('candidates', 'results of foc_ros.solve_classes', repr(candidates))
-    by_number = {each.candidate.goal: problem.goal[:2] for each, problem in zip(candidates, problems, strict=True)}
-    goals = np.array([by_number[number] for number in sorted(by_number)])
-    shown = Prediction(0, '', 0.0, tuple(candidates), candidates[0].label, obstacles=solutions[0].obstacles, goals=goals)
-    return shown.plot(axes)
-
-
 def replay(recording: str | Path, config: Config | None = None, topics: Mapping[str, str] | None = None) -> Iterator[Prediction]:
     """Predict through a recording, in its own time.
 
@@ -549,7 +309,7 @@ def replay(recording: str | Path, config: Config | None = None, topics: Mapping[
     """
     from foc_ros.analysis.replay import replay as replay_bag
 
-    for prediction in replay_bag(recording, _check_config(config), topics):
+    for prediction in replay_bag(recording, check_config(config), topics):
         yield Prediction(**vars(prediction))
 
 
@@ -566,94 +326,3 @@ def load_config(file: str | Path) -> Config:
     from foc_ros.ros.parameters import load_parameter_file
 
     return load_parameter_file(file)
-
-
-def register_strategy(name: str, function: Callable[..., Any]) -> None:
-    """Add a strategy, a new value of `foc.strategy`.
-
-    Parameters
-    ----------
-    name : str
-        A new name; `InputError` is raised if it is taken.
-    function : callable
-        ``function(problems, starts, settings, deadline)``, which returns a list of `StrategyResult`: see
-        `foc_ros.core.ocp.strategies`.
-    """
-    _register(STRATEGIES, name, function)
-
-
-def get_strategy(name: str) -> Callable[..., Any]:
-    """Return a strategy by its name, for a strategy that builds on another one; `InputError` is raised for an unknown name."""
-    strategy: Callable[..., Any] = STRATEGIES.get(name)
-    return strategy
-
-
-def compute_eta(problem: Problem, control: types.Array) -> float:
-    """Return the eta that a stacked control (2N,) achieves: the smallest over all obstacles and times."""
-    return problem.risk.find_probability(find_least_safety_factor(problem, control)[0])
-
-
-def register_plant(name: str, factory: Callable[..., Any]) -> None:
-    """Add a plant, a new value of `foc.plant`.
-
-    Parameters
-    ----------
-    name : str
-        A new name; `InputError` is raised if it is taken.
-    factory : callable
-        ``factory(settings)``, which returns a `PlantModel`; `settings` are the parameters of the group `foc`.
-
-    Examples
-    --------
-    A hand whose control is its acceleration [m/s^2]:
-
-    >>> import numpy as np
-    >>> import foc_ros
-    >>> def discretise(dt):
-    ...     position, velocity = np.eye(2) * dt**2 / 2, np.eye(2) * dt
-    ...     A = np.block([[np.eye(2), np.eye(2) * dt], [np.zeros((2, 2)), np.eye(2)]])
-    ...     return foc_ros.Plant(A, np.vstack([position, velocity]), dt)
-    >>> foc_ros.register_plant('double_integrator', lambda settings: foc_ros.PlantModel(discretise))
-    >>> config = foc_ros.Config().with_values({'foc.plant': 'double_integrator'})
-    >>> foc_ros.solve((0, 0), (0.3, 0), config=config).mean.shape
-    (51, 4)
-    """
-    _register(PLANTS, name, factory)
-
-
-def register_qp_backend(name: str, solver: Callable[..., Any]) -> None:
-    """Add a QP solver, a new value of `foc.qp_backend`; the solvers of qpsolvers need no registration.
-
-    Parameters
-    ----------
-    name : str
-        A new name; `InputError` is raised if it is taken.
-    solver : callable
-        ``solver(qp)``, from a `foc_ros.core.ocp.backend.DenseQP` to an `Answer`.
-    """
-    _register(QP_BACKENDS, name, solver)
-
-
-def register_likelihood_rule(name: str, function: Callable[..., Any]) -> None:
-    """Add a likelihood rule, a new value of `likelihood.rule`.
-
-    Parameters
-    ----------
-    name : str
-        A new name; `InputError` is raised if it is taken.
-    function : callable
-        ``function(costs, config)``: from the costs (k,) of k classes and the parameters of the group `likelihood` to the
-        logarithms (k,) of their weights, which need no normalisation.
-
-    Examples
-    --------
-    >>> import foc_ros
-    >>> foc_ros.register_likelihood_rule('exponential', lambda costs, config: -config.beta * costs)
-    """
-    _register(LIKELIHOOD_RULES, name, function)
-
-
-def _register(registry: Registry, name: str, part: Callable[..., Any]) -> None:
-    if not callable(part):
-        raise InputError(f'{registry.kind} {name}', 'a function', repr(part))
-    registry.register(name, part)

@@ -13,6 +13,7 @@ from typing import Any, TypeVar, cast
 
 from .errors import ParameterError, join_errors, suggest
 from .registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
+from .removed import REMOVED
 
 PLANES = ('xy', 'xz', 'yz')
 DURATION_MODELS = ('fixed', 'fitts')
@@ -312,37 +313,6 @@ class Parameter:
     name: str
     default: Any
     bound: Bound
-
-
-CHOICES_LEARNT = 'nothing is learnt from choices any more'
-EXPERIENCE_FIXED = 'how much recordings count is fixed'
-REMOVED = {
-    'duration.time_cost': 'durations follow Fitts law or are fixed, and their pace is learnt',
-    'duration.min_time_to_go_s': 'it is 0.3 s',
-    'duration.max_time_to_go_s': 'it is 10 s',
-    'likelihood.spent_share': 'only the effort to go is compared',
-    'likelihood.planning_spread': 'it is 1 until the pace of the operator is known from one movement, and then 0.3',
-    'likelihood.beta_beyond': 'ways beyond the next row are equally likely to an operator who looks ahead',
-    'likelihood.heading_bias': 'reaches that bend are learnt as recordings: experience.learning',
-    'likelihood.adaptation': CHOICES_LEARNT,
-    'likelihood.hold_s': 'it is 0.2 s',
-    'likelihood.smoothing_s': 'it is 0.1 s',
-    'likelihood.margin': 'it is 0.05',
-    'experience.prior_count': EXPERIENCE_FIXED,
-    'experience.prior_count_beyond': EXPERIENCE_FIXED,
-    'experience.prior_count_path': EXPERIENCE_FIXED,
-    'experience.position_stddev': EXPERIENCE_FIXED,
-    'experience.velocity_stddev': EXPERIENCE_FIXED,
-    'scene.height_stddevs': 'it is 2',
-    'foc.algorithm1_delta': 'it is foc.lv_delta',
-    'foc.algorithm1_xi': 'it is 1 m^2/s^6, as in the paper',
-    'guidance.precision_low': 'it is 100 1/m^2',
-    'guidance.precision_high': 'it is 2500 1/m^2',
-    'guidance.position_stddev': 'it is 2 mm',
-    'guidance.sharpness': 'it is 3',
-    'guidance.yield_acceleration': 'it is 0.6 m/s^2',
-}
-"""Parameters of earlier versions: what took their place, for the message that refuses them."""
 
 
 def list_parameters(group: type = Config, prefix: str = '') -> Iterator[Parameter]:

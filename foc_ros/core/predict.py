@@ -43,8 +43,8 @@ from .types import (
 
 SEARCH_SHARE, SOLVE_SHARE = 0.3, 0.8
 """Shares of the time left after which the search and the solver begin no step. The last step may end later."""
-RESERVE_S = 5e-5
-"""Time besides that for each candidate, to keep, rank and smooth it [s]."""
+RESERVE_S, POOLING_S = 5e-5, 2e-4
+"""Time besides that for each candidate [s]: to rank it, and to pool its path with recordings where there are some."""
 
 
 def predict(
@@ -90,7 +90,8 @@ def predict(
     scene = _prepare_scene(config, hand, obstacles, goals, goal_heights, known)
     found, candidates = _find_candidates(scene, config, known, library, deadline)
     matched = known.match(candidates, stamp_ns)
-    solved = _solve(scene, config, candidates, matched, deadline)
+    reserve_s = (RESERVE_S + POOLING_S * bool(library.recordings)) * len(candidates)
+    solved = _solve(scene, config, candidates, matched, deadline.take_share(SOLVE_SHARE, reserve_s))
     held = [_hold_answer(*each, scene.hand) for each in zip(solved, matched, strict=True)]
     answered = estimate_unsolved(held, scene.near)
     ranked = rank_candidates(answered, config.likelihood, scene.near, scene.hand, goals, planning_spread)
@@ -187,9 +188,8 @@ def _solve(
     """Solve the candidates, each from the solution of its track; return them with their numbers and predictive covariance."""
     place = config, scene.hand, scene.near
     by_goal = {row: build_problem(*place, scene.goals[row], scene.durations_s[row]) for row in {each.goal for each in candidates}}
-    until = deadline.take_share(SOLVE_SHARE, RESERVE_S * len(candidates))
     earlier = [each.solution if each.solved_ns == each.seen_ns else None for each in matched]
-    solved = solve_candidates(candidates, [by_goal[each.goal] for each in candidates], config.foc, earlier, until)
+    solved = solve_candidates(candidates, [by_goal[each.goal] for each in candidates], config.foc, earlier, deadline)
     numbered = [replace(each, way=track.number) for each, track in zip(solved, matched, strict=True)]
     return [_widen_covariance(each, scene.covariances, scene.hand, config) for each in numbered]
 

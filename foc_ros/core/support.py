@@ -7,6 +7,7 @@ from collections import Counter
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .config import Config
 from .errors import InputError, SceneError
 from .types import NANOSECONDS, Array
 
@@ -43,6 +44,18 @@ def check_number(field: str, value: object, low: float = -FARTHEST, high: float 
     if not low <= value <= high:
         raise SceneError(field, f'a number in [{low:g}, {high:g}]', value)
     return float(value)
+
+
+def find_shape(given: object) -> tuple[int, ...]:
+    """Return the shape of anything that may be an array, without a check of its numbers."""
+    return np.shape(np.asarray(given, dtype=object))
+
+
+def check_config(config: Config | None) -> Config:
+    """Return a config, the defaults for None; raise InputError for anything else."""
+    if not isinstance(config, (Config, type(None))):
+        raise InputError('config', 'a Config', repr(config))
+    return Config() if config is None else config
 
 
 class Rejections:
