@@ -128,4 +128,4 @@ def test_who_needs_longer_than_the_planning_horizon_looks_ahead(horizon_s: float
 
 def test_extreme_costs_do_not_overflow() -> None:
     p = compute_likelihoods(np.array([1e-300, 1e300, 1e300]), replace(make_config(1.0), beta=100.0), make_branch_times(0.1))
-    np.testing.assert_allclose(p, [1.0, 0.0, 0.0])
+    np.testing.assert_allclose(p, [1.0, 0.0, 0.0], atol=1e-250)

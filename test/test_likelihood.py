@@ -1,13 +1,17 @@
-"""Likelihoods from cost ratios, and the most likely class with hysteresis."""
+"""Likelihoods from cost ratios."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from foc_ros.core.classes.sides import BranchTimes
 from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.errors import InputError
 from foc_ros.core.likelihood import COST_FLOOR, compute_likelihoods
+from foc_ros.core.registry import LIKELIHOOD_RULES
 
 COSTS = st.lists(st.floats(0.0, 1.7e308), min_size=1, max_size=12)
 BETA = st.floats(0.0, 100.0)
@@ -59,3 +63,15 @@ def test_the_unit_of_effort_does_not_matter(costs: list[float], beta: float, uni
 def test_a_negative_or_infinite_cost_is_refused_by_name(wrong: float) -> None:
     with pytest.raises(InputError, match=r'costs\[1\]: expected a finite number >= 0'):
         compute_likelihoods(np.array([1.0, wrong]), with_beta(0.5))
+
+
+def test_a_rule_may_give_classes_no_weight(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        LIKELIHOOD_RULES, '_parts', {'first': lambda costs, _: np.where(np.arange(len(costs)) == 0, 0.0, -np.inf)}
+    )
+    config, ahead = replace(LikelihoodConfig(), rule='first'), BranchTimes(np.full((3, 3), 0.5), np.arange(3))
+    for horizon_s in (0.0, 1000.0):
+        found = compute_likelihoods(np.ones(3), replace(config, planning_horizon_s=horizon_s, lookahead_s=0.0), ahead)
+        np.testing.assert_allclose(found, [1.0, 0.0, 0.0], atol=1e-250)
+    monkeypatch.setattr(LIKELIHOOD_RULES, '_parts', {'first': lambda costs, _: np.full(len(costs), -np.inf)})
+    np.testing.assert_allclose(compute_likelihoods(np.ones(3), config, ahead, time_s=1.0), np.ones(3) / 3.0)

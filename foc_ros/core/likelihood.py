@@ -50,6 +50,8 @@ from .registry import LIKELIHOOD_RULES
 from .safety_preference import COST_FLOOR
 from .types import Array
 
+LEAST_LOG = -700.0
+"""Least logarithm of a weight relative to the largest one: a rule may give a class no weight at all, and numbers stay finite."""
 BETWEEN_OPERATORS, OWN_SPREAD = 1.0, 0.3
 """Standard deviation of the logarithm of the planning horizon: between operators, and of one operator from choice to choice."""
 
@@ -95,6 +97,8 @@ def compute_likelihoods(
     if shortfalls is not None:
         np.multiply(config.shortfall, shortfalls, out=losses, where=shortfalls > 0.0)
     logs = LIKELIHOOD_RULES.get(config.rule)(values, config) - losses
+    best = logs.max(initial=-np.inf)
+    logs = np.maximum(logs - best, LEAST_LOG) if np.isfinite(best) else np.zeros(len(values))
     woven = np.zeros(len(values)) if decisions is None else config.weaving * decisions.woven
     planned = normalise_logs(logs - woven)
     share = compute_lookahead_share(time_s, config, planning_spread)
@@ -102,7 +106,7 @@ def compute_likelihoods(
         return planned
     near = logs
     if config.lookahead_s > 0.0 and branch_times is not None:
-        near = _weigh_by_lookahead(logs - logs.max(), branch_times, config.lookahead_s)
+        near = _weigh_by_lookahead(logs, branch_times, config.lookahead_s)
     if decisions is not None:
         beyond = _share_weights(np.zeros(len(logs)), logs, decisions.way)
         near = _share_weights(near - woven, beyond - woven, decisions.next_gap)
