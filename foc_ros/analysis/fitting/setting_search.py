@@ -150,7 +150,7 @@ def compare_settings(settings: Sequence[Sequence[ReplayScores]], names: Sequence
             for key, value in each.items():
                 worst[key] = min(value, worst.get(key, value))
         for column, name in enumerate(names):
-            keys = [key for key in worst if key[0] == name]
+            keys = sorted(key for key in worst if key[0] == name)
             if keys:
                 score[:, column] = [np.mean([each.get(key, worst[key]) for key in keys]) for each in best]
     return scores
