@@ -19,13 +19,13 @@ import scenes
 from measurement import Agreement, Result, Timing, compute_median_ms, time_call, time_in_turn
 
 from foc_ros.analysis.replay import replay
-from foc_ros.core import predictor
+from foc_ros.core import predict as predictor
 from foc_ros.core.candidates import solve_candidates
 from foc_ros.core.config import Config, FocConfig
-from foc_ros.core.memory.memory import Memory
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start, resample, warm_start
+from foc_ros.core.tracks import NO_TRACKS, Tracks
 from foc_ros.core.types import NANOSECONDS, Candidate, Obstacles, PredictedCandidate, Prediction, Solution, Status
 
 Array = scenes.Array
@@ -121,7 +121,7 @@ class TickSequence:
     """The ticks of a reach, repeated without end, as the node makes them."""
 
     def __init__(self, reach: scenes.Reach) -> None:
-        self.reach, self.index, self.memory = reach, 0, Memory()
+        self.reach, self.index, self.memory = reach, 0, NO_TRACKS
         self.predictions: list[Prediction] = []
         self.problems: list[Problem] = []
 
@@ -129,7 +129,7 @@ class TickSequence:
         """Make the next prediction that does not begin a movement, and return its time [s]."""
         self.index %= len(self.reach.hands)
         if self.index == 0:
-            self.memory = self.predict(Memory())[1]
+            self.memory = self.predict(NO_TRACKS)[1]
             self.index = 1
         began = time.perf_counter()
         prediction, self.memory = self.predict(self.memory)
@@ -138,7 +138,7 @@ class TickSequence:
         self.predictions.append(prediction)
         return seconds
 
-    def predict(self, memory: Memory) -> tuple[Prediction, Memory]:
+    def predict(self, memory: Tracks) -> tuple[Prediction, Tracks]:
         """Make the prediction of the present tick."""
         reach = self.reach
         return predictor.predict(reach.config, reach.hands[self.index], reach.obstacles, reach.goals, memory)
@@ -166,7 +166,7 @@ def measure_tick(build: Callable[[], scenes.Reach], scene: str, tolerance: float
     from peers import build_fastest
 
     sequence, repetitions = TickSequence(build()), 3 if is_quick else 25
-    cold = time_call(lambda: sequence.predict(Memory()))
+    cold = time_call(lambda: sequence.predict(NO_TRACKS))
     sequence.tick()
     best = sequence.predictions[-1].solved_candidates[0]
     problem = dict(sequence.list_problems())[best.label]

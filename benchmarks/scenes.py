@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.dynamics.noise import scale_noise
-from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
-from foc_ros.core.estimation.kalman_filter import FilterState, update
+from foc_ros.core.hand.kalman import FilterState, update
 from foc_ros.core.obstacles.shapes import make_box_polygon
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
+from foc_ros.core.plant.covariance import scale_noise
+from foc_ros.core.plant.plants import build_triple_integrator_horizon
 from foc_ros.core.types import HandSample, Obstacles, make_obstacles
 
 Array = NDArray[np.float64]

@@ -14,7 +14,7 @@ import foc_ros
 GOALS = [(0.24, 0.13), (0.30, 0.0), (0.24, -0.13)]
 RATE_HZ, DURATION_S = 50, 1.0
 
-values = {'homotopy.max_candidates': 6, 'duration.model': 'fixed', 'likelihood.beta': 1.0, 'likelihood.spent_share': 0.0}
+values = {'homotopy.max_candidates': 6, 'duration.model': 'fixed', 'likelihood.beta': 1.0}
 # without a time limit the answers do not depend on the machine
 predictor = foc_ros.Predictor(foc_ros.Config(budget_s=0.0).with_values(values))
 predictor.set_goals(GOALS)

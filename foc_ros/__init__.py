@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from foc_ros.analysis.evaluation import register_baseline as register_baseline
     from foc_ros.api import *  # noqa: F403
     from foc_ros.core.config import Config as Config
-    from foc_ros.core.dynamics.plant_models import PlantModel as PlantModel
-    from foc_ros.core.dynamics.plants import Plant as Plant
     from foc_ros.core.errors import FocError as FocError
     from foc_ros.core.errors import FocWarning as FocWarning
     from foc_ros.core.errors import InputError as InputError
@@ -22,31 +20,34 @@ if TYPE_CHECKING:
     from foc_ros.core.errors import ParameterError as ParameterError
     from foc_ros.core.errors import RecordingError as RecordingError
     from foc_ros.core.errors import SceneError as SceneError
-    from foc_ros.core.guidance.step import GuidanceOutput as GuidanceOutput
-    from foc_ros.core.guidance.step import GuidanceStatus as GuidanceStatus
+    from foc_ros.core.guidance.guide import GuidanceOutput as GuidanceOutput
+    from foc_ros.core.guidance.guide import GuidanceStatus as GuidanceStatus
     from foc_ros.core.obstacles.shapes import Box as Box
     from foc_ros.core.obstacles.shapes import Capsule as Capsule
     from foc_ros.core.obstacles.shapes import Circle as Circle
     from foc_ros.core.obstacles.shapes import Hull as Hull
     from foc_ros.core.ocp.monte_carlo import MonteCarlo as MonteCarlo
     from foc_ros.core.ocp.strategies import StrategyResult as StrategyResult
+    from foc_ros.core.plant.models import PlantModel as PlantModel
+    from foc_ros.core.plant.plants import Plant as Plant
     from foc_ros.core.types import Candidate as Candidate
     from foc_ros.core.types import HandState as HandState
     from foc_ros.core.types import Obstacles as Obstacles
     from foc_ros.core.types import PredictedCandidate as PredictedCandidate
     from foc_ros.core.types import Status as Status
+    from foc_ros.extending import *  # noqa: F403
+    from foc_ros.solving import *  # noqa: F403
 
 _MODULES = {
-    'api': (
-        'Guidance Prediction Predictor Solution compute_eta get_strategy load_config monte_carlo plot_candidates'
-        ' register_likelihood_rule register_plant register_qp_backend register_strategy replay solve solve_classes'
-    ),
+    'api': 'Guidance Prediction Predictor load_config replay',
+    'extending': ('compute_eta get_strategy register_likelihood_rule register_plant register_qp_backend register_strategy'),
+    'solving': 'Solution monte_carlo plot_candidates solve solve_classes',
     'analysis.evaluation': 'register_baseline',
     'core.config': 'Config',
-    'core.dynamics.plant_models': 'PlantModel',
-    'core.dynamics.plants': 'Plant',
+    'core.plant.models': 'PlantModel',
+    'core.plant.plants': 'Plant',
     'core.errors': 'FocError FocWarning InputError MessageError ParameterError RecordingError SceneError',
-    'core.guidance.step': 'GuidanceOutput GuidanceStatus',
+    'core.guidance.guide': 'GuidanceOutput GuidanceStatus',
     'core.obstacles.shapes': 'Box Capsule Circle Hull',
     'core.ocp.monte_carlo': 'MonteCarlo',
     'core.ocp.strategies': 'StrategyResult',

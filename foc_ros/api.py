@@ -1,9 +1,8 @@
-"""The public Python API as far as it is more than a re-export; `foc_ros` exports all of it. No other module imports this one."""
+"""The public Python API for a moving hand: `Predictor`, `Guidance`, `replay`; `foc_ros` exports all of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,31 +10,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from foc_ros.core import types
-from foc_ros.core.checks import check_array, check_number, check_vector
 from foc_ros.core.classes.library import Demonstration
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.errors import InputError, SceneError
-from foc_ros.core.estimation.kalman_filter import FilterState, describe_jump, update
-from foc_ros.core.guidance.step import GuidanceInput, GuidanceOutput, GuidanceState, guide
-from foc_ros.core.learning.experience import make_library
-from foc_ros.core.memory.memory import Memory
-from foc_ros.core.obstacles.scene import ObstacleSource
+from foc_ros.core.errors import FocError, InputError, SceneError
+from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, guide
+from foc_ros.core.hand.kalman import describe_jump
 from foc_ros.core.obstacles.shapes import Shape, collect_obstacles
-from foc_ros.core.ocp import monte_carlo as sampling
-from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.ocp.solve import find_least_safety_factor
-from foc_ros.core.predictor import predict, warm_up
-from foc_ros.core.reaching_scene import ReachingScene, check_outside
-from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
-from foc_ros.core.scene_solver import build_scene_problems, solve_scene
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.predict import warm_up
+from foc_ros.core.support import check_array, check_config, check_number, check_vector, find_shape
 from foc_ros.core.types import (
     NANOSECONDS,
-    Candidate,
     HandSample,
-    HandState,
     Obstacles,
-    PredictedCandidate,
     SampleStatus,
     make_obstacles,
 )
@@ -43,6 +31,8 @@ from foc_ros.core.types import (
 LATEST_S = 9e9
 """Bound on a time [s]: stamps are 64-bit numbers of nanoseconds."""
 MOST_SAMPLES = 10_000_000
+SHAPES = 'shapes'
+"""Name of the source of the obstacles of a `Predictor`."""
 PLANE, SPACE = 2, 3
 """Number of coordinates of a position in the task plane, and of one with its height over the plane."""
 
@@ -58,7 +48,9 @@ class Prediction(types.Prediction):
         Solved ones first, the most likely first; then those that could not be solved, with their status. The `height` of a
         candidate has `mean` and `covariance` of the height over the plane and its derivatives, None where it is not predicted.
     most_likely : str or None
-        Label of the most likely class, which changes only when another one leads by `likelihood.margin`; None if none was solved.
+        Label of the most likely class, which changes only when another one leads by 0.05; None if none was solved.
+    unknown : float
+        Share of the likelihood of classes that the search has seen and that are no candidates; with it, likelihoods sum to one.
     obstacles, goals : Obstacles, ndarray of shape (g, 2)
         The scene at time `t`.
     cleared : tuple of bool
@@ -109,7 +101,7 @@ class Guidance:
     """
 
     def __init__(self, config: Config | None = None) -> None:
-        self.config = _check_config(config)
+        self.config = check_config(config)
         self._state = GuidanceState()
 
     def __repr__(self) -> str:
@@ -171,8 +163,8 @@ class Guidance:
 class Predictor:
     """Predict where a moving hand is going.
 
-    A predictor follows one hand: it filters its positions, detects where movements begin, and starts every prediction from the
-    previous one.
+    A predictor follows one hand: it filters its positions, detects where movements begin, starts every prediction from the
+    previous one, and learns from the operator's movements, as the node and replays do.
 
     Parameters
     ----------
@@ -196,25 +188,29 @@ class Predictor:
     """
 
     def __init__(self, config: Config | None = None, library: str | Path | Sequence[Demonstration] | None = None) -> None:
-        self.config = _check_config(config)
+        self.config = check_config(config)
         source = self.config.homotopy.library if library is None else library
         if isinstance(source, (str, Path)):
             from foc_ros.io.class_library import load_library
 
             source = load_library(str(source))
-        self._library = make_library(tuple(source))
         if self.config.budget_s:
             warm_up(self.config)  # imports are no part of the time of the first update
-        self._goals: types.Array | None = None
-        self._goal_heights: types.Array | None = None
-        self._obstacles = ObstacleSource(make_obstacles(), None, '')
-        self._hand: FilterState | None = None
-        self._memory = Memory()
+        self._pipeline = Pipeline(self.config, tuple(source), is_timed=False)
+        self._obstacles: Obstacles | None = make_obstacles()
 
     def __repr__(self) -> str:
         """Count goals and obstacles."""
-        goals = 0 if self._goals is None else len(self._goals)
-        return f'<Predictor with {goals} goals, {len(self._obstacles.obstacles)} obstacles>'
+        scene = self._pipeline.scene
+        goals = 0 if scene.goals is None else len(scene.goals)
+        waiting = self._obstacles
+        obstacles = sum(len(each.obstacles) for each in scene.sources.values()) if waiting is None else len(waiting)
+        return f'<Predictor with {goals} goals, {obstacles} obstacles>'
+
+    @property
+    def adapted_config(self) -> Config:
+        """The parameters with which the next prediction is made: those given, adapted to the operator."""
+        return self._pipeline.adapted_config
 
     def set_goals(self, goals: ArrayLike) -> None:
         """Replace the goals.
@@ -225,11 +221,12 @@ class Predictor:
             Positions [m], at least one, in the plane or also with the height over it. Labels number them in this order. If they
             have heights, the height of the hand is predicted. `SceneError` is raised for anything else.
         """
-        has_heights = _find_shape(goals)[1:] == (SPACE,)
+        has_heights = find_shape(goals)[1:] == (SPACE,)
         points = check_array('goals', goals, (None, SPACE if has_heights else PLANE))
         if not len(points):
             raise SceneError('goals', 'at least one position', 'none')
-        self._goals, self._goal_heights = points[:, :PLANE], points[:, PLANE] if has_heights else None
+        heights = points[:, PLANE] if has_heights else None
+        self._pipeline.set_goals(points[:, :PLANE], self._pipeline.frame_id or '', heights)
 
     def set_obstacles(self, obstacles: Iterable[Shape] | Obstacles) -> None:
         """Replace the obstacles. Their positions hold at the next update; from then on each moves on at its velocity.
@@ -239,7 +236,7 @@ class Predictor:
         obstacles : iterable of Circle, Box, Capsule and Hull, or Obstacles
             The obstacles, none for a free scene. `SceneError` is raised if a name occurs twice.
         """
-        self._obstacles = ObstacleSource(collect_obstacles(obstacles), None, '')
+        self._obstacles = collect_obstacles(obstacles)
 
     def update(self, t: float, position: ArrayLike) -> Prediction:
         """Take the next hand position and predict from it.
@@ -267,264 +264,29 @@ class Predictor:
             Also for a position that jumps: the next one decides whether it was an outlier, or the movement restarts there.
         """
         stamp_ns = round(check_number('t', t, -LATEST_S, LATEST_S) * NANOSECONDS)
-        point = check_vector('position', position, PLANE if self._goal_heights is None else SPACE)
-        height = 0.0 if self._goal_heights is None else float(point[PLANE])
-        sample = HandSample(stamp_ns, point[:PLANE], height, self.config.frame_id)
-        if self._goals is None:
+        pipeline, before = self._pipeline, self._pipeline.hand_state
+        goals, heights = pipeline.scene.goals, pipeline.scene.goal_heights
+        point = check_vector('position', position, PLANE if heights is None else SPACE)
+        if goals is None:
             raise SceneError('goals', 'at least one, by set_goals', 'none')
-        updated = update(self._hand, sample, self.config.estimator)
-        if updated.status is SampleStatus.JUMPED:
-            assert self._hand is not None
-            error, self._hand = describe_jump('position', self._hand, sample, self.config.estimator), updated.state
-            raise error
-        if updated.status is SampleStatus.RESTARTED_BACKWARD or not updated.status.is_taken:
-            last = '' if self._hand is None else f', {self._hand.stamp_ns / NANOSECONDS:.9g} s'
-            raise InputError('t', f'a time after the last one{last}', t)
-        if updated.status.is_restart:
-            self._memory = self._memory.forget()
-        self._hand = updated.state
-        if self._obstacles.stamp_ns is None:
-            self._obstacles = replace(self._obstacles, stamp_ns=stamp_ns)
-        obstacles = self._obstacles.at(stamp_ns)
-        deadline = Deadline(self.config.budget_s or None)
-        known = self._memory, self._library, deadline, self._goal_heights
-        prediction, self._memory = predict(self.config, self._hand, obstacles, self._goals, *known)
+        if before is not None and stamp_ns <= before.stamp_ns:
+            raise InputError('t', f'a time after the last one, {before.stamp_ns / NANOSECONDS:.9g} s', t)
+        frame_id = pipeline.frame_id or ''
+        sample = HandSample(stamp_ns, point[:PLANE], 0.0 if heights is None else float(point[PLANE]), frame_id)
+        if self._obstacles is not None:
+            pipeline.set_obstacles(SHAPES, self._obstacles, stamp_ns, frame_id)
+        if pipeline.add_hand_sample(sample) is SampleStatus.JUMPED:
+            assert before is not None
+            raise describe_jump('position', before, sample, self.config.estimator)
+        self._obstacles = None
+        prediction = pipeline.predict(Deadline(self.config.budget_s or None))
+        if prediction is None:
+            raise FocError(str(pipeline.last_refusal))
         return Prediction(**vars(prediction))
 
     def reset(self) -> None:
-        """Forget the movement; keep goals and obstacles. The next update may have any time."""
-        self._hand, self._memory = None, self._memory.forget()
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Solution(types.Solution):
-    """The forward optimal control of one homotopy class, with the problem that it solves.
-
-    Attributes
-    ----------
-    status, message : Status, str
-        Result in words and numbers. `Status.SOLVED` meets the wanted eta, `Status.COMPROMISED` a smaller one.
-    label : str
-        Name of the homotopy class, such as ``goal0:+0-1``: + passes an obstacle on the left.
-    times, path, mean, covariance : ndarray of shape (N + 1,), (N + 1, 2), (N + 1, n), (N + 1, n, n)
-        Times [s], mean positions [m], and mean and covariance of the state: position, velocity and what else the plant has.
-    control, effort : ndarray of shape (N, 2), float
-        Jerk [m/s^3] for the triple integrator, force [N] for the damped mass; the sum of its squares.
-    eta, problem : float, Problem
-        Probability of avoidance that the solution achieves for each obstacle and step, and the problem that was solved.
-    obstacles : Obstacles
-        The obstacles as they were given; those of the problem are larger by `scene.hand_radius`.
-    """
-
-    label: str = ''
-    problem: Problem | None = None
-    obstacles: Obstacles = field(default_factory=make_obstacles)
-
-    def plot(self, axes: Any = None) -> Any:
-        """Draw the solution in its scene; see `Prediction.plot`."""
-        from foc_ros.reporting.snapshots import parse_label
-
-        _, sides = parse_label(self.label, self.obstacles.ids)
-        candidate = Candidate(self.label, 0, tuple(sides.items()), self.path, 0.0)
-        return plot_candidates([PredictedCandidate(candidate, self, {}, 0.0, 1.0)], axes)
-
-
-def solve(
-    start: ArrayLike,
-    goal: ArrayLike,
-    obstacles: Iterable[Shape] | Obstacles = (),
-    eta: float | None = None,
-    strategy: str | None = None,
-    duration_s: float = 1.0,
-    config: Config | None = None,
-    guess: ArrayLike | None = None,
-) -> Solution:
-    """Solve one reaching scene and return its most likely homotopy class.
-
-    Parameters
-    ----------
-    start : array_like of shape (2,) or (6,)
-        Position of a hand at rest [m], or its state x, y, vx, vy, ax, ay [m, m/s, m/s^2].
-    goal : array_like of shape (2,)
-        Position at which the hand comes to rest [m].
-    obstacles : iterable of Circle, Box, Capsule and Hull, or Obstacles
-        The obstacles.
-    eta : float, optional
-        Wanted probability of avoiding each obstacle at each step; by default `foc.eta` of the config.
-    strategy : str, optional
-        Strategy of the solver; by default `foc.strategy` of the config.
-    duration_s : float
-        Duration of the movement [s].
-    config : Config, optional
-        All other parameters; the defaults if not given.
-    guess : array_like of shape (m, 2), optional
-        Via points of a path [m], or its positions at all N + 1 steps. Only its homotopy class is solved then.
-
-    Returns
-    -------
-    Solution
-        The solution of the most likely class. Its status says if the problem could not be solved.
-
-    Raises
-    ------
-    InputError
-        For input that cannot be used: `SceneError` for the scene, or if no path leads to the goal, `ParameterError` for eta,
-        strategy and duration.
-
-    Examples
-    --------
-    >>> import foc_ros
-    >>> solution = foc_ros.solve((0, 0), (0.3, 0), [foc_ros.Circle((0.15, 0.01), radius=0.03)], eta=0.95)
-    >>> solution.status, solution.label
-    (<Status.SOLVED: 'solved'>, 'goal0:-0')
-    >>> solution.path.shape
-    (51, 2)
-    """
-    target, config = check_vector('goal', goal, 2), _fix_parameters(config, eta, strategy, duration_s)
-    scene = _build_scene(start, target[None], obstacles, config)
-    if guess is not None:
-        from foc_ros.io.scene_file import guess_path
-
-        points = check_array('guess', guess, (None, 2))
-        scene = replace(scene, guess=guess_path(scene.hand.mean[:2], target, config.foc.steps, via=points))
-    candidates = _solve(scene)
-    if not candidates:
-        raise SceneError('scene', 'a path between the obstacles from the start to the goal', 'none')
-    solution = candidates[0].solution
-    assert isinstance(solution, Solution)
-    return solution
-
-
-def solve_classes(
-    start: ArrayLike,
-    goal: ArrayLike,
-    obstacles: Iterable[Shape] | Obstacles = (),
-    eta: float | None = None,
-    strategy: str | None = None,
-    duration_s: float = 1.0,
-    config: Config | None = None,
-) -> tuple[PredictedCandidate, ...]:
-    """Solve one reaching scene in every homotopy class that is found, at most `homotopy.max_candidates`.
-
-    Parameters
-    ----------
-    start, obstacles, eta, strategy, duration_s, config
-        As for `solve`, which also lists the errors.
-    goal : array_like of shape (2,) or (g, 2)
-        One goal or several [m].
-
-    Returns
-    -------
-    tuple of PredictedCandidate
-        Solved ones first, the most likely first; then those that could not be solved. The solution of each is a `Solution`.
-        Empty if no path leads to a goal.
-
-    Examples
-    --------
-    >>> import foc_ros
-    >>> for candidate in foc_ros.solve_classes((0, 0), (0.3, 0), [foc_ros.Circle((0.15, 0.01), radius=0.03)]):
-    ...     print(candidate)
-    <PredictedCandidate goal0:-0, solved, likelihood 0.66>
-    <PredictedCandidate goal0:+0, solved, likelihood 0.34>
-    """
-    goals = check_array('goal', np.atleast_2d(np.asarray(goal, dtype=object)).tolist(), (None, 2))
-    return _solve(_build_scene(start, goals, obstacles, _fix_parameters(config, eta, strategy, duration_s)))
-
-
-def _build_scene(start: ArrayLike, goals: types.Array, obstacles: Iterable[Shape] | Obstacles, config: Config) -> ReachingScene:
-    expected = 'a position (2,) or a state (6,) x, y, vx, vy, ax, ay'
-    size = _find_shape(start)
-    if size not in ((2,), (6,)):
-        raise SceneError('start', expected, f'{start!r} of shape {size}')
-    state, table = np.zeros(6), collect_obstacles(obstacles)
-    state[: size[0]] = check_vector('start', start, size[0])
-    for name, point in (('start', state[:2]), *(('goal', goal) for goal in goals)):
-        check_outside(name, point, table.grow(config.scene.hand_radius))
-    return ReachingScene(HandState(0, state, np.zeros((6, 6))), goals, table, None, None, config)
-
-
-def _fix_parameters(config: Config | None, eta: float | None, strategy: str | None, duration_s: float) -> Config:
-    given = {'foc.eta': eta, 'foc.strategy': strategy, 'duration.fixed_s': duration_s, 'duration.model': 'fixed'}
-    return _check_config(config).with_values({name: value for name, value in given.items() if value is not None})
-
-
-def _find_shape(given: object) -> tuple[int, ...]:
-    """Return the shape of anything that may be an array, without a check of its numbers."""
-    return np.shape(np.asarray(given, dtype=object))
-
-
-def _check_config(config: Config | None) -> Config:
-    if not isinstance(config, (Config, type(None))):
-        raise InputError('config', 'a Config', repr(config))
-    return Config() if config is None else config
-
-
-def _solve(scene: ReachingScene) -> tuple[PredictedCandidate, ...]:
-    problems = build_scene_problems(scene)
-    return tuple(
-        replace(each, solution=Solution(**vars(each.solution), label=each.label, problem=problem, obstacles=scene.obstacles))
-        for each in solve_scene(scene, problems)
-        for problem in (problems[each.candidate.goal],)
-    )
-
-
-def monte_carlo(solution: Solution, samples: int = 10_000, seed: int = 0) -> sampling.MonteCarlo:
-    """Estimate from noisy movements how often a solution avoids the obstacles.
-
-    Parameters
-    ----------
-    solution : Solution
-        Result of `solve`, or the solution of a candidate of `solve_classes`.
-    samples : int
-        Number of movements, up to 10,000,000.
-    seed : int
-        Seed of the random generator: equal seeds give equal results.
-
-    Returns
-    -------
-    MonteCarlo
-        Fractions of movements that avoid the obstacles, each with its 95 % interval: `step` for the worst obstacle and step, and
-        `path` for all obstacles and steps together.
-
-    Raises
-    ------
-    InputError
-        For a solution without its problem, or a number of samples out of bounds.
-
-    Examples
-    --------
-    >>> import foc_ros
-    >>> solution = foc_ros.solve((0, 0), (0.3, 0), [foc_ros.Circle((0.15, 0.01), radius=0.03)])
-    >>> fraction, low, high = foc_ros.monte_carlo(solution, samples=1000).step
-    >>> fraction >= 0.9
-    True
-    """
-    problem = getattr(solution, 'problem', None)
-    if problem is None:
-        raise InputError('solution', 'a result of foc_ros.solve or solve_classes', repr(solution))
-    if not check_number('samples', samples, 1, MOST_SAMPLES).is_integer():
-        raise InputError('samples', 'a whole number', samples)
-    return sampling.monte_carlo(problem, solution.control.T.ravel(), int(samples), seed)
-
-
-def plot_candidates(candidates: Sequence[PredictedCandidate], axes: Any = None) -> Any:
-    """Draw the candidates of `solve_classes` in their scene, the thicker the more likely; those without a likelihood are grey.
-
-    Parameters
-    ----------
-    candidates : sequence of PredictedCandidate
-        Result of `solve_classes`, not empty.
-    axes : matplotlib.axes.Axes, optional
-        Axes to draw on; new ones by default. They are returned.
-    """
-    solutions = [each.solution for each in candidates if isinstance(each.solution, Solution)]
-    problems = [each.problem for each in solutions if each.problem]
-    if not problems:
-        raise InputError('candidates', 'results of foc_ros.solve_classes', repr(candidates))
-    by_number = {each.candidate.goal: problem.goal[:2] for each, problem in zip(candidates, problems, strict=True)}
-    goals = np.array([by_number[number] for number in sorted(by_number)])
-    shown = Prediction(0, '', 0.0, tuple(candidates), candidates[0].label, obstacles=solutions[0].obstacles, goals=goals)
-    return shown.plot(axes)
+        """Forget the movement and the operator; keep goals and obstacles. The next update may have any time."""
+        self._pipeline.reset()
 
 
 def replay(recording: str | Path, config: Config | None = None, topics: Mapping[str, str] | None = None) -> Iterator[Prediction]:
@@ -547,7 +309,7 @@ def replay(recording: str | Path, config: Config | None = None, topics: Mapping[
     """
     from foc_ros.analysis.replay import replay as replay_bag
 
-    for prediction in replay_bag(recording, _check_config(config), topics):
+    for prediction in replay_bag(recording, check_config(config), topics):
         yield Prediction(**vars(prediction))
 
 
@@ -564,94 +326,3 @@ def load_config(file: str | Path) -> Config:
     from foc_ros.ros.parameters import load_parameter_file
 
     return load_parameter_file(file)
-
-
-def register_strategy(name: str, function: Callable[..., Any]) -> None:
-    """Add a strategy, a new value of `foc.strategy`.
-
-    Parameters
-    ----------
-    name : str
-        A new name; `InputError` is raised if it is taken.
-    function : callable
-        ``function(problems, starts, settings, deadline)``, which returns a list of `StrategyResult`: see
-        `foc_ros.core.ocp.strategies`.
-    """
-    _register(STRATEGIES, name, function)
-
-
-def get_strategy(name: str) -> Callable[..., Any]:
-    """Return a strategy by its name, for a strategy that builds on another one; `InputError` is raised for an unknown name."""
-    strategy: Callable[..., Any] = STRATEGIES.get(name)
-    return strategy
-
-
-def compute_eta(problem: Problem, control: types.Array) -> float:
-    """Return the eta that a stacked control (2N,) achieves: the smallest over all obstacles and times."""
-    return problem.risk.find_probability(find_least_safety_factor(problem, control)[0])
-
-
-def register_plant(name: str, factory: Callable[..., Any]) -> None:
-    """Add a plant, a new value of `foc.plant`.
-
-    Parameters
-    ----------
-    name : str
-        A new name; `InputError` is raised if it is taken.
-    factory : callable
-        ``factory(settings)``, which returns a `PlantModel`; `settings` are the parameters of the group `foc`.
-
-    Examples
-    --------
-    A hand whose control is its acceleration [m/s^2]:
-
-    >>> import numpy as np
-    >>> import foc_ros
-    >>> def discretise(dt):
-    ...     position, velocity = np.eye(2) * dt**2 / 2, np.eye(2) * dt
-    ...     A = np.block([[np.eye(2), np.eye(2) * dt], [np.zeros((2, 2)), np.eye(2)]])
-    ...     return foc_ros.Plant(A, np.vstack([position, velocity]), dt)
-    >>> foc_ros.register_plant('double_integrator', lambda settings: foc_ros.PlantModel(discretise))
-    >>> config = foc_ros.Config().with_values({'foc.plant': 'double_integrator'})
-    >>> foc_ros.solve((0, 0), (0.3, 0), config=config).mean.shape
-    (51, 4)
-    """
-    _register(PLANTS, name, factory)
-
-
-def register_qp_backend(name: str, solver: Callable[..., Any]) -> None:
-    """Add a QP solver, a new value of `foc.qp_backend`; the solvers of qpsolvers need no registration.
-
-    Parameters
-    ----------
-    name : str
-        A new name; `InputError` is raised if it is taken.
-    solver : callable
-        ``solver(qp)``, from a `foc_ros.core.ocp.backend.DenseQP` to an `Answer`.
-    """
-    _register(QP_BACKENDS, name, solver)
-
-
-def register_likelihood_rule(name: str, function: Callable[..., Any]) -> None:
-    """Add a likelihood rule, a new value of `likelihood.rule`.
-
-    Parameters
-    ----------
-    name : str
-        A new name; `InputError` is raised if it is taken.
-    function : callable
-        ``function(costs, config)``: from the costs (k,) of k classes and the parameters of the group `likelihood` to the
-        logarithms (k,) of their weights, which need no normalisation.
-
-    Examples
-    --------
-    >>> import foc_ros
-    >>> foc_ros.register_likelihood_rule('exponential', lambda costs, config: -config.beta * costs)
-    """
-    _register(LIKELIHOOD_RULES, name, function)
-
-
-def _register(registry: Registry, name: str, part: Callable[..., Any]) -> None:
-    if not callable(part):
-        raise InputError(f'{registry.kind} {name}', 'a function', repr(part))
-    registry.register(name, part)

@@ -18,14 +18,14 @@ from foc_ros.analysis.paper.reaching import Method, solve_class
 from foc_ros.analysis.paper.scenes import NOISE as PAPER_NOISE
 from foc_ros.analysis.paper.scenes import STRATEGY_SCENE
 from foc_ros.core.config import FocConfig, LikelihoodConfig
-from foc_ros.core.dynamics.noise import scale_noise, stack_noise
-from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
 from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
-from foc_ros.core.scene_solver import build_scene_problems, solve_scene
+from foc_ros.core.plant.covariance import scale_noise, stack_noise
+from foc_ros.core.plant.plants import build_triple_integrator_horizon
+from foc_ros.core.predict import build_scene_problems, solve_scene
 from foc_ros.core.types import Array, Obstacles, Solution, make_obstacles
 from foc_ros.io.scene_file import guess_path, load_scene
 from foc_ros.reporting.drawing import draw_candidates, draw_scene, draw_tag, get_class_style, make_stddev_ellipse, open_figure

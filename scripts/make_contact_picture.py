@@ -16,10 +16,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from foc_ros.core.config import FocConfig
-from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start, warm_start
+from foc_ros.core.plant.plants import build_triple_integrator_horizon
 from foc_ros.core.types import Array, Solution, Status, make_obstacles
 from foc_ros.io.scene_file import guess_path
 from foc_ros.reporting.drawing import get_class_style, open_figure

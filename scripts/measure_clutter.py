@@ -18,10 +18,10 @@ from accuracy.scenes import build_varied, solve
 
 from foc_ros import solve_classes
 from foc_ros.core.config import Config
-from foc_ros.core.estimation.kalman_filter import FilterState, update
-from foc_ros.core.memory.memory import Memory
+from foc_ros.core.hand.kalman import FilterState, update
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import Array, HandSample, Obstacles, Solution, Status, make_obstacles
 
 STRATEGIES = ('lv', 'hc', 'optimal')
@@ -109,7 +109,7 @@ def drift_hand(config: Config, ticks: int = TICKS) -> list[FilterState]:
 def time_ticks(obstacles: Obstacles, config: Config, goals: Array = GOAL[None]) -> tuple[Array, int, int]:
     """Return the CPU times [s] of warm ticks, and how many candidates the last one has and how many of them take part."""
     config = config.with_values({'duration.model': 'fixed', 'duration.fixed_s': DURATION_S})
-    memory, seconds = Memory(), []
+    memory, seconds = NO_TRACKS, []
     for hand in drift_hand(config):
         began = time.process_time()
         prediction, memory = predict(config, hand, obstacles, goals, memory)

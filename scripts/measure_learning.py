@@ -11,7 +11,6 @@ import argparse
 import tempfile
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -28,8 +27,7 @@ from foc_ros.analysis.parallel import collect, collect_all, open_executor
 from foc_ros.analysis.recordings import Recording, find_recordings
 from foc_ros.cli.arguments import add_worker_arguments
 from foc_ros.core.classes.library import Demonstration
-from foc_ros.core.config import ExperienceConfig
-from foc_ros.core.learning.experience import Library, find_evidence, follow_recordings, make_library
+from foc_ros.core.learning.recordings import Library, find_evidence, follow_recordings, make_library
 from foc_ros.core.types import Array, HandState, make_obstacles
 from foc_ros.io.class_library import save_library
 from foc_ros.ros.parameters import load_parameter_file
@@ -48,12 +46,8 @@ def predict_by_nearest(observation: Observation, library: Library, frame_id: str
     """
     hand = HandState(observation.stamp_ns, observation.hand, np.zeros((6, 6)), frame_id=frame_id)
     obstacles = make_obstacles(observation.centre, 0.0, ids=observation.ids)
-    for widening in 2.0 ** np.arange(16):
-        default = ExperienceConfig()
-        wide = replace(
-            default, position_stddev=widening * default.position_stddev, velocity_stddev=widening * default.velocity_stddev
-        )
-        evidence = find_evidence(library, hand, obstacles, observation.goals, wide)
+    for widening in (2.0 ** np.arange(16)).tolist():
+        evidence = find_evidence(library, hand, obstacles, observation.goals, widening)
         if len(evidence.row):
             break
     recorded = follow_recordings(library, evidence, np.full(len(evidence.row), np.inf), hand, np.array(HORIZONS_S))

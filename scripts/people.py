@@ -31,7 +31,7 @@ from foc_ros.analysis.recordings import Recording, find_recordings, group_by_ope
 from foc_ros.cli.arguments import add_worker_arguments
 from foc_ros.core.config import Config
 from foc_ros.core.errors import RecordingError
-from foc_ros.core.estimation.duration import estimate_times_to_go
+from foc_ros.core.hand.duration import estimate_times_to_go
 from foc_ros.core.learning.pace import Pace
 from foc_ros.ros.parameters import load_parameter_file
 
@@ -39,10 +39,10 @@ PAGE, EXAMPLES = ROOT / 'doc' / 'people.md', ROOT / 'doc' / 'examples'
 D3IL, HLP = 'd3il_avoiding', 'hlp_reaching'
 ROOM = Config().with_values({'homotopy.max_candidates': 24, 'rate_hz': 4.0})
 HAND = Config().with_values({'scene.hand_radius': 0.0125, 'rate_hz': 4.0})
-UNLEARNT = {f'{each}.adaptation': 'none' for each in ('duration', 'likelihood', 'covariance')}
+UNLEARNT = {f'{each}.adaptation': 'none' for each in ('duration', 'covariance')}
 SETTINGS = {
     (D3IL, 'defaults, nothing learnt'): ROOM.with_values(UNLEARNT),
-    (D3IL, 'defaults, pace learnt'): ROOM.with_values({'likelihood.adaptation': 'none'}),
+    (D3IL, 'defaults, pace learnt'): ROOM.with_values({'covariance.adaptation': 'none'}),
     (D3IL, 'defaults'): ROOM,
     (D3IL, 'thumb_stick.yaml'): load_parameter_file(EXAMPLES / 'thumb_stick.yaml').with_values({'rate_hz': 4.0}),
     (HLP, 'defaults, nothing learnt'): HAND.with_values(UNLEARNT),

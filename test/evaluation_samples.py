@@ -15,7 +15,7 @@ from foc_ros.core.types import LEFT, RIGHT, make_obstacles
 H = len(TIMES_S)
 
 
-def make_candidates(sides, goal=None, likelihood=None, cost_to_go=None, solved=None, time_price=0.0) -> CandidateTable:
+def make_candidates(sides, goal=None, likelihood=None, cost_to_go=None, solved=None) -> CandidateTable:
     """Return candidates that pass obstacles on sides (k, n); each in its own class, all branching now."""
     k, n = np.shape(sides)
     solved = np.ones(k, dtype=bool) if solved is None else np.array(solved)
@@ -25,11 +25,9 @@ def make_candidates(sides, goal=None, likelihood=None, cost_to_go=None, solved=N
         goal=np.zeros(k, dtype=int) if goal is None else np.array(goal),
         has_likelihood=solved,
         safety_shortfall=np.zeros(len(solved)),
-        effort_spent=0.0,
         cost_to_go=np.ones(k) if cost_to_go is None else np.array(cost_to_go, dtype=float),
         likelihood=even if likelihood is None else np.array(likelihood, dtype=float),
         length=np.arange(1.0, k + 1.0),
-        time_price=time_price,
         time_s=np.ones(k),
         is_named=np.ones((k, n), dtype=bool),
         sides=np.array(sides, dtype=np.int8).reshape(k, n),

@@ -8,7 +8,7 @@ import numpy as np
 from prediction_samples import outcome, prediction
 
 from foc_ros.core.config import Config, GuidanceConfig
-from foc_ros.core.guidance.step import GuidanceInput, GuidanceOutput, GuidanceState, guide
+from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, guide
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Prediction, Status, make_obstacles
 

@@ -89,7 +89,9 @@ def prediction(stamp_ns: int, start: Array, share: float = 0.6) -> Prediction:
     ]
     outcomes.sort(key=lambda each: -each.likelihood)
     lost = outcome('goal1:+1+post', 1, 0.1, 0.0, start, Status.ETA_UNREACHABLE)
-    return Prediction(stamp_ns, 'world', 0.1, (*outcomes, lost), outcomes[0].candidate.label, {}, 0.004, OBSTACLES, GOALS)
+    return Prediction(
+        stamp_ns, 'world', 0.1, (*outcomes, lost), outcomes[0].candidate.label, {}, 0.004, OBSTACLES, GOALS, (), 0.25
+    )
 
 
 def predictions(of: list[HandSample], every: int = 4) -> list[Prediction]:

@@ -12,7 +12,9 @@ import foc_ros
 import foc_ros.api
 import foc_ros.core.config
 import foc_ros.core.obstacles.shapes
-from foc_ros.core.dynamics.plant_models import make_plant_model
+import foc_ros.extending
+import foc_ros.solving
+from foc_ros.core.plant.models import make_plant_model
 from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
 
 CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003, name='cup')
@@ -29,7 +31,9 @@ def registries(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    'module', [foc_ros.api, foc_ros.core.config, foc_ros.core.obstacles.shapes], ids=lambda module: module.__name__
+    'module',
+    [foc_ros.api, foc_ros.solving, foc_ros.extending, foc_ros.core.config, foc_ros.core.obstacles.shapes],
+    ids=lambda module: module.__name__,
 )
 def test_the_examples_of_the_docstrings_hold(module):
     results = doctest.testmod(module)

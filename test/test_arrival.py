@@ -5,16 +5,15 @@ import pytest
 from numpy.testing import assert_allclose
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.dynamics.plants import condense, discretise_triple_integrator
-from foc_ros.core.dynamics.replanning import (
+from foc_ros.core.hand.kalman import compute_gramian, compute_transition
+from foc_ros.core.plant.plants import condense, discretise_triple_integrator
+from foc_ros.core.plant.replanning import (
     compute_error_map,
     triple_integrator_error_map,
     triple_integrator_process_covariance,
 )
-from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition
-from foc_ros.core.estimation.time_cost import compute_least_effort, find_least_cost_time
-from foc_ros.core.memory.memory import Memory
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, make_obstacles
 
 PASSING = replace_values(
@@ -34,8 +33,15 @@ def hand(*mean: float) -> HandState:
     return HandState(0, np.array(mean), 1e-8 * np.eye(6), onset_ns=0, onset_position=np.array(mean[:2]))
 
 
+def compute_least_effort(length: float, speed: float, acceleration: float) -> float:
+    """Return the least integral of squared jerk [m^2/s^5] of an axis that passes its goal after 1 s with no acceleration."""
+    held = [0, 2]
+    missing = (np.array([length, 0.0, 0.0]) - compute_transition(1.0) @ [0.0, speed, acceleration])[held]
+    return float(missing @ np.linalg.solve(compute_gramian(1.0)[np.ix_(held, held)], missing))
+
+
 def test_a_hand_that_keeps_its_speed_passes_without_effort() -> None:
-    (found,) = predict(PASSING, hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0), FREE, np.array([[0.3, 0.1]]), Memory())[0].solved_candidates
+    (found,) = predict(PASSING, hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0), FREE, np.array([[0.3, 0.1]]), NO_TRACKS)[0].solved_candidates
     assert found.solution.effort == pytest.approx(0.0, abs=1e-12)
     assert_allclose(found.solution.mean[-1], [0.3, 0.1, 0.3, 0.1, 0.0, 0.0], atol=1e-9)
 
@@ -43,21 +49,10 @@ def test_a_hand_that_keeps_its_speed_passes_without_effort() -> None:
 def test_the_effort_is_the_least_that_leads_to_the_goal_without_acceleration() -> None:
     start = np.array([0.0, 0.0, 0.2, -0.1, 0.5, 1.0])
     config = replace_values(PASSING, {'foc.steps': 400})
-    (found,) = predict(config, hand(*start), FREE, np.array([[0.3, 0.1]]), Memory())[0].solved_candidates
-    along = [compute_least_effort(way, *start[2 + axis :: 2], np.array([1.0]), True)[0] for axis, way in enumerate((0.3, 0.1))]
+    (found,) = predict(config, hand(*start), FREE, np.array([[0.3, 0.1]]), NO_TRACKS)[0].solved_candidates
+    along = [compute_least_effort(way, *start[2 + axis :: 2]) for axis, way in enumerate((0.3, 0.1))]
     assert found.solution.effort * found.solution.dt == pytest.approx(sum(along), rel=1e-3)
     assert_allclose(found.solution.mean[-1, [0, 1, 4, 5]], [0.3, 0.1, 0.0, 0.0], atol=1e-9)
-
-
-@pytest.mark.parametrize(('length', 'speed', 'acceleration'), [(0.3, 0.0, 0.0), (0.2, 0.5, -1.0), (0.05, -0.2, 3.0)])
-def test_effort_along_a_line_is_that_of_least_energy(length: float, speed: float, acceleration: float) -> None:
-    held, times = [0, 2], np.array([0.4, 1.0, 2.5])
-    expected = []
-    for T in times:
-        missing = (np.array([length, 0.0, 0.0]) - compute_transition(T) @ [0.0, speed, acceleration])[held]
-        expected.append(missing @ np.linalg.solve(compute_gramian(T)[np.ix_(held, held)], missing))
-    assert_allclose(compute_least_effort(length, speed, acceleration, times, True), expected, rtol=1e-9)
-    assert find_least_cost_time(0.4, (0.5, 0.0), 0.1, (0.05, 20.0), True) == pytest.approx(0.8, rel=0.05)
 
 
 def test_all_errors_but_those_of_the_velocity_are_corrected() -> None:
@@ -72,7 +67,7 @@ def test_all_errors_but_those_of_the_velocity_are_corrected() -> None:
 
 
 def test_the_velocity_at_a_passed_goal_is_more_uncertain_than_at_rest() -> None:
-    scene = FREE, np.array([[0.3, 0.1]]), Memory()
+    scene = FREE, np.array([[0.3, 0.1]]), NO_TRACKS
     now = hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0)
     passing = predict(PASSING, now, *scene)[0].solved_candidates[0].solution
     resting = predict(replace_values(PASSING, {'duration.arrival': 'rest'}), now, *scene)[0].solved_candidates[0].solution
@@ -83,7 +78,7 @@ def test_the_velocity_at_a_passed_goal_is_more_uncertain_than_at_rest() -> None:
 
 def test_a_goal_behind_an_obstacle_is_passed_with_velocity() -> None:
     scene = make_obstacles([[0.15, 0.04]], 0.05), np.array([[0.3, 0.1]])
-    solved = predict(PASSING, hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0), *scene, Memory())[0].solved_candidates
+    solved = predict(PASSING, hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0), *scene, NO_TRACKS)[0].solved_candidates
     assert len(solved) == 2
     for each in solved:
         assert_allclose(each.solution.mean[-1, [0, 1, 4, 5]], [0.3, 0.1, 0.0, 0.0], atol=1e-6)

@@ -11,7 +11,7 @@ from scipy.stats import norm
 
 from foc_ros.core.classes.sides import BranchTimes, compute_branch_times
 from foc_ros.core.config import LikelihoodConfig
-from foc_ros.core.likelihood import compute_likelihoods, compute_shared_cost
+from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.types import Array, Candidate, PredictedCandidate, Solution, Status, make_obstacles
 
 STEPS = 40
@@ -119,8 +119,8 @@ def test_who_needs_longer_than_the_planning_horizon_looks_ahead(horizon_s: float
         compute_likelihoods(COSTS, make_config(0.7)),
         compute_likelihoods(COSTS, make_config(0.7), make_branch_times(1.0)),
     )
-    config = replace(make_config(0.7), planning_horizon_s=horizon_s, planning_spread=0.5)
-    found = compute_likelihoods(COSTS, config, make_branch_times(1.0), time_s=2.0)
+    config = replace(make_config(0.7), planning_horizon_s=horizon_s)
+    found = compute_likelihoods(COSTS, config, make_branch_times(1.0), time_s=2.0, planning_spread=0.5)
     np.testing.assert_allclose(found, (1.0 - share) * planned + share * ahead, rtol=1e-12)
     at_goal = compute_likelihoods(COSTS, config, make_branch_times(1.0), time_s=0.0)
     np.testing.assert_array_equal(at_goal, ahead if horizon_s == 0.0 else planned)
@@ -128,10 +128,4 @@ def test_who_needs_longer_than_the_planning_horizon_looks_ahead(horizon_s: float
 
 def test_extreme_costs_do_not_overflow() -> None:
     p = compute_likelihoods(np.array([1e-300, 1e300, 1e300]), replace(make_config(1.0), beta=100.0), make_branch_times(0.1))
-    np.testing.assert_allclose(p, [1.0, 0.0, 0.0])
-
-
-def test_shared_cost_is_a_share_of_the_effort_spent() -> None:
-    assert compute_shared_cost(3.0, LikelihoodConfig(spent_share=1.0)) == 3.0
-    assert compute_shared_cost(3.0, LikelihoodConfig()) == 0.0
-    assert compute_shared_cost(3.0, LikelihoodConfig(spent_share=0.5)) == 1.5
+    np.testing.assert_allclose(p, [1.0, 0.0, 0.0], atol=1e-250)

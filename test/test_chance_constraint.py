@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foc_ros.core.obstacles.chance_constraint import (
+from foc_ros.core.obstacles.risk import (
     CERTAIN_K,
     RiskBound,
     centre_trajectories,

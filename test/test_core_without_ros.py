@@ -28,18 +28,18 @@ import foc_ros.core
 names = [module.name for module in pkgutil.walk_packages(foc_ros.core.__path__, 'foc_ros.core.')]
 for name in names:
     importlib.import_module(name)
-assert 'foc_ros.core.predictor' in names, names
+assert 'foc_ros.core.predict' in names, names
 """
 
 PREDICT = """
 import numpy as np
 from foc_ros.core.config import Config
-from foc_ros.core.memory.memory import Memory
-from foc_ros.core.predictor import predict
+from foc_ros.core.tracks import NO_TRACKS
+from foc_ros.core.predict import predict
 from foc_ros.core.types import HandState, make_obstacles
 hand = HandState(0, np.zeros(6), np.zeros((6, 6)))
 scene = make_obstacles([[0.15, 0.0]], [0.03], 0.002)
-prediction, _ = predict(Config(), hand, scene, np.array([[0.3, 0.0]]), Memory())
+prediction, _ = predict(Config(), hand, scene, np.array([[0.3, 0.0]]), NO_TRACKS)
 sides = sorted(outcome.sides['0'] for outcome in prediction.solved_candidates)
 assert sides == [-1, 1], sides
 """

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import FocConfig
-from foc_ros.core.dynamics.plants import condense, discretise_damped_mass, discretise_triple_integrator
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
+from foc_ros.core.plant.plants import condense, discretise_damped_mass, discretise_triple_integrator
 from foc_ros.core.types import make_obstacles
 
 STEPS, LAMBDA = 12, 3e4

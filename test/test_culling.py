@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foc_ros.core.obstacles.culling import cull_obstacles
+from foc_ros.core.obstacles.clearance import cull_obstacles
 from foc_ros.core.types import make_obstacles
 
 HAND, GOALS = np.zeros(2), np.array([[0.3, 0.0], [0.0, 0.3]])

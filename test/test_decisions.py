@@ -1,4 +1,4 @@
-"""The next row and weaving are found from the sides; choices beyond the next row have an exponent of their own."""
+"""The next row and weaving are found from the sides; ways beyond the next row are equally likely."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 from foc_ros.core.classes.rows import Decisions, find_decisions
 from foc_ros.core.config import Config, LikelihoodConfig
 from foc_ros.core.likelihood import compute_likelihoods
-from foc_ros.core.memory.memory import Memory
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import LEFT, RIGHT, HandState, make_obstacles
 
 OBSTACLES = make_obstacles([[0.1, 0.05], [0.1, -0.05], [0.3, 0.0]], 0.01)
@@ -21,7 +21,7 @@ SIDES = np.array(
 )
 GOAL = np.array([0, 1, 0, 1, 0])
 COSTS = np.array([1.0, 2.0, 3.0, 2.5, 4.0])
-CONFIG = replace(LikelihoodConfig(), beta=2.0, planning_horizon_s=0.0, beta_beyond=0.3, weaving=1.5)
+CONFIG = replace(LikelihoodConfig(), beta=2.0, planning_horizon_s=0.0, weaving=1.5)
 
 
 def make_hand(x: float) -> HandState:
@@ -54,19 +54,18 @@ def test_where_no_row_is_ahead_the_choice_of_a_goal_is_a_near_one() -> None:
     assert p[0] / p[1] == pytest.approx(3.0**CONFIG.beta)
 
 
-def test_gaps_keep_their_weight_and_share_it_by_the_other_exponent() -> None:
+def test_gaps_keep_their_weight_and_share_it_evenly() -> None:
     decisions = Decisions(np.array([0, 1, 1, 2, 3]), np.arange(5), np.zeros(5, dtype=np.intp))
     near, p = compute_likelihoods(COSTS, CONFIG), compute_likelihoods(COSTS, CONFIG, decisions=decisions)
     np.testing.assert_allclose(np.bincount(decisions.next_gap, p), np.bincount(decisions.next_gap, near))
-    assert p[1] / p[2] == pytest.approx((3.0 / 2.0) ** 0.3)
+    assert p[1] == pytest.approx(p[2])
 
 
-def test_goals_of_one_way_are_compared_in_full_and_its_weight_is_that_of_a_far_choice() -> None:
+def test_goals_of_one_way_are_compared_in_full_and_its_weight_is_their_number() -> None:
     decisions = Decisions(np.zeros(5, dtype=np.intp), np.array([0, 0, 1, 1, 2]), np.zeros(5, dtype=np.intp))
     p = compute_likelihoods(COSTS, CONFIG, decisions=decisions)
     assert p[0] / p[1] == pytest.approx((COSTS[1] / COSTS[0]) ** CONFIG.beta)
-    ways, far = np.bincount(decisions.way, p), np.bincount(decisions.way, COSTS**-CONFIG.beta_beyond)
-    np.testing.assert_allclose(ways, far / far.sum())
+    np.testing.assert_allclose(np.bincount(decisions.way, p), [0.4, 0.4, 0.2])
 
 
 def test_classes_that_pass_all_open_obstacles_alike_take_one_way() -> None:
@@ -81,13 +80,6 @@ def test_weaving_costs_a_factor() -> None:
     assert woven[3] / woven[0] == pytest.approx(p[3] / p[0] * np.exp(-1.5))
 
 
-def test_with_one_exponent_and_no_weaving_the_rule_is_the_plain_one() -> None:
-    decisions = Decisions(np.array([0, 0, 1, 1, 1]), np.arange(5), np.zeros(5, dtype=np.intp))
-    config, shortfalls = replace(CONFIG, beta_beyond=CONFIG.beta), np.array([0.0, 0.4, 0.0, 0.2, 0.0])
-    plain, two = (compute_likelihoods(COSTS, config, shortfalls=shortfalls, decisions=each) for each in (None, decisions))
-    np.testing.assert_allclose(two, plain)
-
-
 def test_who_plans_the_whole_way_weighs_all_choices_alike() -> None:
     decisions = Decisions(np.array([0, 0, 1, 1, 1]), np.arange(5), np.array([0, 0, 0, 1, 0]))
     p = compute_likelihoods(COSTS, replace(CONFIG, planning_horizon_s=1000.0), decisions=decisions)
@@ -97,5 +89,5 @@ def test_who_plans_the_whole_way_weighs_all_choices_alike() -> None:
 
 def test_where_no_class_can_be_solved_there_is_no_likelihood() -> None:
     config = Config().with_values({'foc.eta': 0.999, 'foc.noise_x': 2.0, 'foc.noise_y': 2.0, 'likelihood.shortfall': np.inf})
-    found, _ = predict(config, make_hand(0.0), OBSTACLES, GOALS, Memory())
+    found, _ = predict(config, make_hand(0.0), OBSTACLES, GOALS, NO_TRACKS)
     assert found.candidates and not found.candidates_with_likelihood

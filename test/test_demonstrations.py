@@ -18,9 +18,10 @@ from foc_ros.core.classes.library import (
 )
 from foc_ros.core.config import Config, HomotopyConfig, replace_values
 from foc_ros.core.errors import FocError
-from foc_ros.core.learning.experience import make_library
-from foc_ros.core.memory.memory import Memory
-from foc_ros.core.predictor import predict
+from foc_ros.core.learning.learnt import Knowledge
+from foc_ros.core.learning.recordings import make_library
+from foc_ros.core.predict import predict
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, make_obstacles
 from foc_ros.io.class_library import load_library, save_library
 
@@ -56,8 +57,8 @@ def test_a_demonstration_contains_the_obstacles_that_it_passed():
 
 def test_a_demonstrated_class_longer_than_the_candidates_is_solved_too():
     config = replace_values(Config(), {'homotopy.max_candidates': 2})
-    without, _ = predict(config, hand(), OBSTACLES, GOAL, Memory())
-    prediction, memory = predict(config, hand(), OBSTACLES, GOAL, Memory(), make_library([DEMONSTRATION]))
+    without, _ = predict(config, hand(), OBSTACLES, GOAL, NO_TRACKS)
+    prediction, memory = predict(config, hand(), OBSTACLES, GOAL, NO_TRACKS, Knowledge(make_library([DEMONSTRATION])))
     labels = {one.candidate.label for one in prediction.solved_candidates}
     assert 'goal0:+0+1+2' in labels - {one.candidate.label for one in without.candidates}
     assert prediction.notes['recalled'] == 1
@@ -189,10 +190,10 @@ def test_hysteresis_gives_found_and_recalled_candidates_the_same_names():
     """An obstacle at the edge of the names is in the names of both found and recalled candidates, or in neither."""
     config = replace_values(Config(), {'homotopy.max_candidates': 8, 'foc.strategy': 'fixed', 'foc.steps': 20})
     demonstrations = [record_demonstration('world', bow(height), OBSTACLES) for height in (-0.1, 0.03, -0.03, 0.1)]
-    rng, memory = np.random.default_rng(4), Memory()
+    rng, memory = np.random.default_rng(4), NO_TRACKS
     for x in np.linspace(0.14, 0.16, 80):
         state = hand(rng.normal((x, 0.1), 0.001))
-        _, memory = predict(config, state, OBSTACLES, GOAL, memory, make_library(demonstrations))
+        _, memory = predict(config, state, OBSTACLES, GOAL, memory, Knowledge(make_library(demonstrations)))
         names = {frozenset(identity for identity, _ in one.sides) for one in memory.candidates}
         assert len(names) == 1
         assert len({one.label for one in memory.candidates}) == len(memory.candidates)

@@ -28,7 +28,7 @@ from foc_ros.ros.parameters import load_parameter_file, write_parameter_file
 
 STDDEV = 0.02
 STEP_NS = NANOSECONDS // 10
-FIXED = {'duration.adaptation': 'none', 'likelihood.adaptation': 'none'}
+FIXED = {'duration.adaptation': 'none'}
 CONFIG = replace_values(Config(), {'rate_hz': 10.0, 'foc.steps': 15, 'estimator.position_stddev': 1e-4} | FIXED)
 
 
@@ -140,7 +140,7 @@ def test_equal_messages_give_equal_factors_and_later_ones_change_no_earlier_pred
         np.testing.assert_array_equal(before.candidates[0].covariance, after.candidates[0].covariance)
     again = Pipeline(CONFIG)
     reach(again, 1.0), reach(again, 11.0)
-    np.testing.assert_array_equal(one.learnt.dispersion.scores, again.learnt.dispersion.scores)
+    np.testing.assert_array_equal(one.learnt.dispersion.posterior.logs, again.learnt.dispersion.posterior.logs)
 
 
 def test_factors_are_forgotten_by_a_reset_and_by_other_parameters_and_can_be_switched_off() -> None:

@@ -9,12 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foc_ros.core.config import DurationConfig
-from foc_ros.core.estimation.duration import compute_movement_time, estimate_times_to_go
+from foc_ros.core.hand.duration import compute_movement_time, estimate_times_to_go
 from foc_ros.core.types import NANOSECONDS, HandState
 
-FITTS = DurationConfig(
-    model='fitts', fitts_a_s=0.2, fitts_b_s=0.25, target_width=0.02, min_time_to_go_s=0.3, max_time_to_go_s=10.0
-)
+FITTS = DurationConfig(model='fitts', fitts_a_s=0.2, fitts_b_s=0.25, target_width=0.02)
 FIXED = replace(FITTS, model='fixed', fixed_s=1.5)
 GOAL = np.array([0.3, 0.0])
 
@@ -63,11 +61,10 @@ def test_a_slow_hand_needs_the_time_of_the_distance_at_its_speed() -> None:
 
 @pytest.mark.parametrize('share', np.linspace(0.0, 0.99, 34))
 def test_a_minimum_jerk_movement_of_the_expected_duration_is_not_delayed(share: float) -> None:
-    config = replace(FIXED, min_time_to_go_s=0.01)
     x = 0.3 * (10.0 * share**3 - 15.0 * share**4 + 6.0 * share**5)
     speed = 0.3 / 1.5 * (30.0 * share**2 - 60.0 * share**3 + 30.0 * share**4)
     state = hand(x, onset=0.0, since_s=1.5 * share, speed=speed)
-    assert time_to_go(state, GOAL, config) == pytest.approx(max(1.5 * (1.0 - share), 0.01), abs=1e-8)
+    assert time_to_go(state, GOAL, FIXED) == pytest.approx(max(1.5 * (1.0 - share), 0.3), abs=1e-8)
 
 
 @given(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4), st.floats(0.0, 1e4), st.floats(0.0, 1e3), st.sampled_from([FITTS, FIXED]))

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from foc_ros.core.dynamics.plants import (
+from foc_ros.core.errors import InputError
+from foc_ros.core.plant.plants import (
     Plant,
     build_triple_integrator_horizon,
     condense,
     discretise_damped_mass,
     discretise_triple_integrator,
 )
-from foc_ros.core.dynamics.replanning import compute_error_map, triple_integrator_error_map
-from foc_ros.core.errors import InputError
+from foc_ros.core.plant.replanning import compute_error_map, triple_integrator_error_map
 
 
 def zero_order_hold(a: np.ndarray, b: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foc_ros.core.config import EstimatorConfig
-from foc_ros.core.estimation.kalman_filter import (
+from foc_ros.core.hand.kalman import (
     JUMP_SPEED,
     JUMP_STDDEVS,
     FilterState,
@@ -81,7 +81,7 @@ def test_the_first_sample_gives_the_position_and_broad_velocity() -> None:
     np.testing.assert_array_equal(state.mean, [0.2, -0.1, 0.0, 0.0, 0.0, 0.0])
     deviations = np.sqrt(np.diag(state.covariance))
     np.testing.assert_allclose(deviations[::2], [0.001, 5.0 * np.sqrt(0.5**3 / 3.0), 5.0 * np.sqrt(0.5)])
-    assert (state.height, state.frame_id, state.onset_ns, state.effort_spent) == (0.4, 'world', None, 0.0)
+    assert (state.height, state.frame_id, state.onset_ns) == (0.4, 'world', None)
 
 
 def test_a_uniform_motion_is_estimated_exactly() -> None:
@@ -136,8 +136,6 @@ def test_the_estimate_stays_finite_and_positive_for_any_configuration(
         scale = np.sqrt(np.diag(state.covariance))
         assert np.all(scale > 0.0)
         assert np.linalg.eigvalsh(state.covariance / np.outer(scale, scale)).min() > -1e-9
-        assert np.isfinite(state.effort_spent)
-        assert state.effort_spent >= 0.0
 
 
 def test_duplicates_and_late_samples_change_nothing() -> None:

@@ -92,11 +92,6 @@ def test_straight_minimum_jerk_from_any_state_has_the_effort_of_its_own_jerk() -
         np.testing.assert_allclose((path[1] - path[0]) / t[1], [0.5, 0.3], atol=1e-2)
 
 
-def test_where_time_has_a_price_it_is_part_of_the_cost_of_a_straight_movement() -> None:
-    priced = replace(reaching(), candidates=replace(reaching().candidates, time_price=7.0))
-    np.testing.assert_allclose(compute_straight_costs(priced), compute_straight_costs(reaching()) + 7.0 * 2.0)
-
-
 def test_the_speed_of_a_hand_at_rest_is_noise_to_minimum_jerk_too() -> None:
     np.testing.assert_allclose(
         compute_straight_costs(reaching((0.0, 0.0, 1.0, 1.0, 9.0, 9.0), movement_age_s=0.0)), compute_straight_costs(reaching())

@@ -11,7 +11,7 @@ from foc_ros.analysis.evaluation.ground_truth import (
     find_rows_ahead,
 )
 from foc_ros.core.classes.rows import find_direction, find_rows, locate_rows
-from foc_ros.core.learning.goal_reached import find_reached_goal
+from foc_ros.core.learning.movements import find_reached_goal
 from foc_ros.core.obstacles.shapes import Box, Circle, Shape, collect_obstacles
 from foc_ros.core.types import LEFT, RIGHT, make_obstacles
 

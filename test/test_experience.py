@@ -13,16 +13,26 @@ from foc_ros.cli.main import main
 from foc_ros.core.classes import find_path_sides
 from foc_ros.core.classes.library import STEP_S, record_demonstration
 from foc_ros.core.classes.rows import Decisions
-from foc_ros.core.config import Config, ExperienceConfig
+from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
-from foc_ros.core.learning.experience import NO_LIBRARY, compare_with_class, find_evidence, make_library, update_likelihoods
-from foc_ros.core.memory.memory import Memory
+from foc_ros.core.learning.learnt import Knowledge
+from foc_ros.core.learning.recordings import (
+    NO_LIBRARY,
+    POSITION_STDDEV,
+    PRIOR_COUNT,
+    PRIOR_COUNT_BEYOND,
+    compare_with_class,
+    find_evidence,
+    make_library,
+    update_likelihoods,
+)
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import LEFT, RIGHT, Candidate, HandState, make_obstacles
 from foc_ros.io.class_library import load_library, save_library
 
-CONFIG = Config().with_values({'foc.steps': 20})
+CONFIG = Config().with_values({'foc.steps': 20, 'homotopy.max_candidates': 24})
 
 
 def move(path, rest_s=0.5, moving_s=2.0):
@@ -42,7 +52,7 @@ HAND = HandState(1, np.zeros(6), 1e-6 * np.eye(6), frame_id='world')
 
 
 def ask(library, hand=HAND, obstacles=OBSTACLES):
-    return predict(CONFIG, hand, obstacles, GOAL, Memory(), library)[0]
+    return predict(CONFIG, hand, obstacles, GOAL, NO_TRACKS, Knowledge(library))[0]
 
 
 def by_label(prediction):
@@ -57,7 +67,7 @@ def test_likelihoods_are_those_of_a_dirichlet_distribution():
     before, after = by_label(ask(NO_LIBRARY)), by_label(ask(make_library([ABOVE, ABOVE])))
     taken = [label for label, each in before.items() if dict(each.candidate.sides).items() <= sides_of(ABOVE).items()]
     assert len(taken) == 1
-    prior, count = CONFIG.experience.prior_count, 2.0
+    prior, count = PRIOR_COUNT, 2.0
     for label, each in before.items():
         if each.has_likelihood:
             expected = (prior * each.likelihood + count * (label in taken)) / (prior + count)
@@ -67,17 +77,17 @@ def test_likelihoods_are_those_of_a_dirichlet_distribution():
 def test_recordings_count_for_gaps_and_goals_as_much_as_the_model_and_less_for_ways():
     """Eight classes: two gaps with two ways each, and two goals on each way; ten recordings of the first class."""
     gap, way = np.repeat([0, 1], 4), np.repeat([0, 1, 2, 3], 2)
-    counts, config = np.array([10.0, *[0.0] * 7]), ExperienceConfig(prior_count=2.0, prior_count_beyond=30.0)
-    after = update_likelihoods(np.full(8, 0.125), counts, Decisions(gap, way, np.zeros(8, dtype=np.intp)), config)
+    counts, n, m = np.array([10.0, *[0.0] * 7]), PRIOR_COUNT, PRIOR_COUNT_BEYOND
+    after = update_likelihoods(np.full(8, 0.125), counts, counts, Decisions(gap, way, np.zeros(8, dtype=np.intp)))
     of_gap, of_way = np.bincount(gap, after), np.bincount(way, after)
     assert after.sum() == pytest.approx(1.0)
-    assert of_gap[0] == pytest.approx((2.0 * 0.5 + 10.0) / 12.0)
-    assert of_way[0] / of_gap[0] == pytest.approx((30.0 * 0.5 + 10.0) / 40.0)
-    assert after[0] / of_way[0] == pytest.approx((2.0 * 0.5 + 10.0) / 12.0)
+    assert of_gap[0] == pytest.approx((0.5 * n + 10.0) / (n + 10.0))
+    assert of_way[0] / of_gap[0] == pytest.approx((0.5 * m + 10.0) / (m + 10.0))
+    assert after[0] / of_way[0] == pytest.approx((0.5 * n + 10.0) / (n + 10.0))
     np.testing.assert_allclose(after[4:], of_gap[1] / 4.0)
     sure, seen = np.array([1.0, *[0.0] * 7]), np.array([*[0.0] * 7, 6.0])
-    of_gap = np.bincount(gap, update_likelihoods(sure, seen, Decisions(gap, way, np.zeros(8, dtype=np.intp)), config))
-    np.testing.assert_allclose(of_gap, [2.0 / 8.0, 6.0 / 8.0])
+    of_gap = np.bincount(gap, update_likelihoods(sure, seen, seen, Decisions(gap, way, np.zeros(8, dtype=np.intp))))
+    np.testing.assert_allclose(of_gap, [n / (n + 6.0), 6.0 / (n + 6.0)])
 
 
 MOVING = replace(HAND, mean=np.array([*ABOVE.states[20], 0.0, 0.0]), onset_ns=0)
@@ -131,7 +141,11 @@ def test_an_obstacle_below_the_hand_does_not_keep_recordings_away():
         [*OBSTACLES.radius, 0.02],
         heights=[(-9.0, 9.0)] * len(OBSTACLES) + [(0.0, 0.05)],
     )
-    ask_above = lambda obstacles: predict(CONFIG, high, obstacles, GOAL, Memory(), library, goal_heights=np.array([0.3]))[0]  # noqa: E731
+
+    def ask_above(obstacles):
+        heights = {'goal_heights': np.array([0.3])}
+        return predict(CONFIG, high, obstacles, GOAL, NO_TRACKS, Knowledge(library), **heights)[0]
+
     without, over = find_taken(ask_above(low.take([0, 1, 2]))), find_taken(ask_above(low))
     np.testing.assert_array_equal(over.mean, without.mean)
     assert over.likelihood == without.likelihood
@@ -179,19 +193,19 @@ def test_equal_input_gives_equal_answers():
 
 
 def test_recordings_count_by_position_and_velocity():
-    library, experience = make_library([ABOVE]), ExperienceConfig()
+    library = make_library([ABOVE])
     away = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
-    assert not len(find_evidence(library, replace(HAND, mean=away), OBSTACLES, GOAL, experience).row)
-    assert find_evidence(library, HAND, OBSTACLES, GOAL, experience).weight == pytest.approx([1.0])
-    beside = replace(HAND, mean=HAND.mean - [experience.position_stddev, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert find_evidence(library, beside, OBSTACLES, GOAL, experience).weight == pytest.approx([np.exp(-0.5)])
+    assert not len(find_evidence(library, replace(HAND, mean=away), OBSTACLES, GOAL).row)
+    assert find_evidence(library, HAND, OBSTACLES, GOAL).weight == pytest.approx([1.0])
+    beside = replace(HAND, mean=HAND.mean - [POSITION_STDDEV, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert find_evidence(library, beside, OBSTACLES, GOAL).weight == pytest.approx([np.exp(-0.5)])
 
 
 def test_a_recording_of_another_class_leads_until_it_passes_there():
     obstacles = make_obstacles([[0.1, 0.0], [0.2, 0.0]], 0.015)
     path = np.column_stack([np.linspace(0.0, 0.3, 61), 0.04 * np.sin(np.linspace(0.0, 2.0 * np.pi, 61))])
     recording = record_demonstration('world', path, obstacles, move(path))
-    evidence = find_evidence(make_library([recording]), HAND, obstacles, GOAL, ExperienceConfig())
+    evidence = find_evidence(make_library([recording]), HAND, obstacles, GOAL)
     compared = {}
     for sides in ((LEFT, RIGHT), (LEFT, LEFT), (RIGHT, RIGHT)):
         candidate = Candidate('goal0', 0, tuple(zip(obstacles.ids, sides, strict=True)), path, 0.3)

@@ -10,14 +10,14 @@ from reach_helpers import bowed, one_obstacle, reach, solved
 import foc_ros
 from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.dynamics.plant_models import PlantModel
-from foc_ros.core.dynamics.plants import Plant
 from foc_ros.core.errors import InputError
-from foc_ros.core.obstacles.chance_constraint import k_of_eta
+from foc_ros.core.obstacles.risk import k_of_eta
 from foc_ros.core.ocp.backend import Answer, DenseQP
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.start import Start
 from foc_ros.core.ocp.strategies import Strategy, StrategyResult, solve_fixed
+from foc_ros.core.plant.models import PlantModel
+from foc_ros.core.plant.plants import Plant
 from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
 from foc_ros.core.types import Status, make_obstacles
 

@@ -8,7 +8,7 @@ from foc_ros.analysis.fitting.duration_fit import fit_duration
 from foc_ros.analysis.fitting.estimator_fit import Innovations, fit_estimator
 from foc_ros.analysis.fitting.resampling import expand_quadratic
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition, update
+from foc_ros.core.hand.kalman import compute_gramian, compute_transition, update
 from foc_ros.core.types import HandSample, SampleStatus, make_obstacles
 
 
@@ -86,15 +86,6 @@ def test_one_factor_is_fitted_where_distances_are_alike() -> None:
     assert a.value / config.duration.fitts_a_s == pytest.approx(2.0, rel=0.2)
     assert a.low <= a.value <= a.high
     assert any('too alike to tell intercept and slope apart' in words for words in warnings)
-
-
-def test_the_cost_of_time_is_found() -> None:
-    given = {'estimator.position_stddev': 2e-4, 'duration.model': 'cost_of_time', 'duration.time_cost': 100.0}
-    estimates, _ = fit_duration(_reaches([2.0] * 4, np.tile([0.3, 0.0], (4, 1))), replace_values(Config(), given))
-    found = estimates['duration.time_cost']
-    assert found.low <= found.value <= found.high
-    # the filter lags because it models a fading acceleration as a lasting one
-    assert (3600 * 0.3**2 / found.value) ** (1 / 6) == pytest.approx(2.0, rel=0.2)
 
 
 def test_distances_that_differ_determine_intercept_and_slope() -> None:

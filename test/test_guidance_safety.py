@@ -10,8 +10,8 @@ from guidance_samples import PERIOD, random_candidate, random_prediction, random
 from prediction_samples import prediction
 
 from foc_ros.core.config import Config, GuidanceConfig
+from foc_ros.core.guidance.guide import GuidanceInput, GuidanceState, GuidanceStatus, guide
 from foc_ros.core.guidance.limits import find_largest_force
-from foc_ros.core.guidance.step import GuidanceInput, GuidanceState, GuidanceStatus, guide
 
 FEW, MANY = 300, 10_000
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import foc_ros
-from foc_ros.core.memory.memory import Memory
 from foc_ros.core.obstacles.shapes import collect_obstacles
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
 
 WIDE = foc_ros.Config().with_values({'scene.hand_radius': 0.01})
@@ -20,9 +20,9 @@ GOALS = np.array([[0.3, 0.0]])
 
 def test_a_prediction_is_that_for_larger_obstacles_and_holds_the_given_ones() -> None:
     hand, given = HandState(0, np.zeros(6), np.zeros((6, 6))), collect_obstacles(CUPS)
-    wide, _ = predict(WIDE, hand, given, GOALS, Memory())
-    grown, _ = predict(foc_ros.Config(), hand, replace(given, radius=given.radius + 0.01), GOALS, Memory())
-    narrow, _ = predict(foc_ros.Config(), hand, given, GOALS, Memory())
+    wide, _ = predict(WIDE, hand, given, GOALS, NO_TRACKS)
+    grown, _ = predict(foc_ros.Config(), hand, replace(given, radius=given.radius + 0.01), GOALS, NO_TRACKS)
+    narrow, _ = predict(foc_ros.Config(), hand, given, GOALS, NO_TRACKS)
     assert wide.obstacles is given
     assert [each.label for each in wide.candidates] == [each.label for each in grown.candidates]
     for each, other in zip(wide.candidates, grown.candidates, strict=True):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.memory.memory import Memory
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, Obstacles, Prediction, Status, make_obstacles
 
 GOAL = np.array([[0.3, 0.0]])
@@ -18,16 +18,17 @@ CONFIG = replace_values(Config(), {'foc.steps': 30})
 
 def predicted(obstacles: Obstacles, goals: np.ndarray = GOAL, config: Config = CONFIG) -> Prediction:
     hand = HandState(1, np.zeros(6), np.diag([1e-6, 1e-6, 1e-4, 1e-4, 1e-2, 1e-2]))
-    prediction, memory = predict(config, hand, obstacles, goals, Memory())
+    prediction, memory = predict(config, hand, obstacles, goals, NO_TRACKS)
     for outcome in prediction.candidates:
         solution = outcome.solution
         for array in (solution.mean, solution.covariance, solution.control):
             assert np.isfinite(array).all()
         assert outcome.has_likelihood or outcome.likelihood == 0.0
     shares = [outcome.likelihood for outcome in prediction.candidates_with_likelihood]
-    assert not shares or sum(shares) == pytest.approx(1.0)
+    assert sum(shares) + prediction.unknown == pytest.approx(1.0)
     assert (prediction.most_likely is None) == (not shares)
-    assert memory.most_likely == prediction.most_likely
+    numbers = {each.way: each.label for each in prediction.candidates}
+    assert numbers.get(memory.most_likely) == prediction.most_likely
     return prediction
 
 

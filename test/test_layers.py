@@ -12,10 +12,10 @@ pytest.importorskip('importlinter', reason='import-linter is not installed')
 
 ROOT = Path(__file__).parents[1]
 VIOLATIONS = {
-    'core/types.py': ['rclpy', 'foc_ros.core.estimation.duration'],
-    'core/predictor.py': ['sensor_msgs'],
+    'core/types.py': ['rclpy', 'foc_ros.core.hand.duration'],
+    'core/predict.py': ['sensor_msgs'],
     'core/likelihood.py': ['rosbags'],
-    'core/obstacles/chance_constraint.py': ['foc_ros.core.pipeline'],
+    'core/obstacles/risk.py': ['foc_ros.core.pipeline'],
     'core/classes/search.py': ['foc_ros.core.ocp.problem'],
     'io/bags.py': ['foc_ros.ros.intake'],
     'analysis/replay.py': ['foc_ros.reporting.plots'],

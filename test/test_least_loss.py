@@ -8,15 +8,15 @@ import pytest
 from reach_helpers import bowed, case_guess, case_problem, random_scene, reach, reference_cases
 
 from foc_ros.core.config import Config, FocConfig, replace_values
-from foc_ros.core.memory.memory import Memory
 from foc_ros.core.ocp.lv_hc import Curve
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import find_least_safety_factor, solve_problem
 from foc_ros.core.ocp.solver import LARGEST_TOLERANCE
 from foc_ros.core.ocp.start import cold_start, warm_start
 from foc_ros.core.ocp.strategies import solve_at
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
 from foc_ros.core.safety_preference import SafetyPreference
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, Solution, Status, make_obstacles
 
 SOFT = SafetyPreference(beta=0.5, shortfall=1.0, dt=0.02)
@@ -128,7 +128,7 @@ def predict_shares(strategy: str, values: dict[str, float]) -> tuple[float, set[
     mean = np.array([0.0, 0.0, given['vx'], given['vy'], 0.0, 0.0])
     hand = HandState(0, mean, np.zeros((6, 6)), onset_ns=0, onset_position=np.zeros(2))
     obstacle = make_obstacles([[0.15, given['y']]], 0.03, 0.003)
-    prediction, _ = predict(config, hand, obstacle, np.array([[0.3, 0.0]]), Memory())
+    prediction, _ = predict(config, hand, obstacle, np.array([[0.3, 0.0]]), NO_TRACKS)
     shares = {each.label: each.likelihood for each in prediction.candidates_with_likelihood}
     assert shares.keys() == {'goal0:+0', 'goal0:-0'}
     return shares['goal0:+0'], {each.status for each in prediction.candidates}
@@ -161,6 +161,6 @@ def test_a_rule_that_leaves_classes_out_is_found_out():
         parameters = {'foc.noise_x': 0.3, 'foc.noise_y': 0.3, 'foc.eta': eta, 'duration.model': 'fixed'}
         config = replace_values(Config(), parameters | {'likelihood.shortfall': math.inf})
         scene = make_obstacles([[0.15, 0.02]], 0.03, 0.003), np.array([[0.3, 0.0]])
-        prediction, _ = predict(config, HandState(0, np.zeros(6), np.zeros((6, 6))), *scene, Memory())
+        prediction, _ = predict(config, HandState(0, np.zeros(6), np.zeros((6, 6))), *scene, NO_TRACKS)
         shares.append({each.label: each.likelihood for each in prediction.candidates}['goal0:+0'])
     assert np.abs(np.diff(shares)).max() > 0.6 * np.abs(np.diff(shares[::4])).max() > 0.05

@@ -1,13 +1,17 @@
-"""Likelihoods from cost ratios, and the most likely class with hysteresis."""
+"""Likelihoods from cost ratios."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from foc_ros.core.classes.sides import BranchTimes
 from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.errors import InputError
-from foc_ros.core.likelihood import COST_FLOOR, compute_likelihoods, select_most_likely
+from foc_ros.core.likelihood import COST_FLOOR, compute_likelihoods
+from foc_ros.core.registry import LIKELIHOOD_RULES
 
 COSTS = st.lists(st.floats(0.0, 1.7e308), min_size=1, max_size=12)
 BETA = st.floats(0.0, 100.0)
@@ -24,7 +28,6 @@ def test_ratio_of_likelihoods_is_the_power_of_the_ratio_of_costs() -> None:
 
 def test_no_class_gives_no_likelihood() -> None:
     assert compute_likelihoods(np.zeros(0), with_beta(0.5)).shape == (0,)
-    assert select_most_likely({}, 'a', 0.1) is None
 
 
 def test_beta_zero_is_uniform_and_large_beta_picks_the_cheapest() -> None:
@@ -62,18 +65,13 @@ def test_a_negative_or_infinite_cost_is_refused_by_name(wrong: float) -> None:
         compute_likelihoods(np.array([1.0, wrong]), with_beta(0.5))
 
 
-def test_most_likely_stays_until_another_leads_by_more_than_the_margin() -> None:
-    p = {'a': 0.44, 'b': 0.56}
-    assert select_most_likely(p, 'a', 0.13) == 'a'
-    assert select_most_likely(p, 'a', 0.11) == 'b'
-    assert select_most_likely(p, None, 0.13) == 'b'
-    assert select_most_likely(p, 'gone', 0.13) == 'b'
-    assert select_most_likely({'a': 0.0, 'b': 1.0}, 'a', 1.0) == 'a'
-
-
-@given(st.permutations(list('abcd')), st.sampled_from([None, *'abcdx']), st.floats(0.0, 1.0))
-def test_the_order_of_the_classes_does_not_matter(order: list[str], previous: str | None, margin: float) -> None:
-    p = {'a': 0.2, 'b': 0.3, 'c': 0.3, 'd': 0.2}
-    answer = select_most_likely({label: p[label] for label in order}, previous, margin)
-    assert answer == select_most_likely(p, previous, margin)
-    assert answer == (previous if previous in ('b', 'c') or (previous in p and margin >= 0.3 - 0.2) else 'b')
+def test_a_rule_may_give_classes_no_weight(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        LIKELIHOOD_RULES, '_parts', {'first': lambda costs, _: np.where(np.arange(len(costs)) == 0, 0.0, -np.inf)}
+    )
+    config, ahead = replace(LikelihoodConfig(), rule='first'), BranchTimes(np.full((3, 3), 0.5), np.arange(3))
+    for horizon_s in (0.0, 1000.0):
+        found = compute_likelihoods(np.ones(3), replace(config, planning_horizon_s=horizon_s, lookahead_s=0.0), ahead)
+        np.testing.assert_allclose(found, [1.0, 0.0, 0.0], atol=1e-250)
+    monkeypatch.setattr(LIKELIHOOD_RULES, '_parts', {'first': lambda costs, _: np.full(len(costs), -np.inf)})
+    np.testing.assert_allclose(compute_likelihoods(np.ones(3), config, ahead, time_s=1.0), np.ones(3) / 3.0)

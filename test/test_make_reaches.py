@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from foc_ros.analysis.recordings import find_recordings
-from foc_ros.core.learning.goal_reached import find_reached_goal
+from foc_ros.core.learning.movements import find_reached_goal
 
 SCRIPT = Path(__file__).parents[1] / 'scripts' / 'make_reaches.py'
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from reach_helpers import bowed, reach, solved
 
-from foc_ros.core.dynamics.plants import build_triple_integrator_horizon, condense, discretise_damped_mass
-from foc_ros.core.obstacles.chance_constraint import compute_safety_factor
 from foc_ros.core.obstacles.geometry import Edges, find_offset
+from foc_ros.core.obstacles.risk import compute_safety_factor
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles
 from foc_ros.core.ocp.margin import Contacts, Gradients, Margins
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
+from foc_ros.core.plant.plants import build_triple_integrator_horizon, condense, discretise_damped_mass
 from foc_ros.core.safety_preference import SafetyPreference
 
 STEPS, GOAL, K = 24, (0.3, 0.02), 2.0

@@ -16,6 +16,7 @@ from foc_ros.analysis.replay import Replay
 from foc_ros.core.classes.library import MOST_STATES, is_same_recording
 from foc_ros.core.config import Config
 from foc_ros.core.learning import movements as learning
+from foc_ros.core.learning.recordings import PRIOR_COUNT
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io.bags import BagReader
@@ -60,20 +61,27 @@ def test_a_repeated_way_becomes_more_likely() -> None:
     ways = [reach(ABOVE)] * 4
     first, last = [], []
     for learning_ in ('none', 'online'):
-        pipeline = Pipeline(CONFIG.with_values({'experience.learning': learning_, 'likelihood.adaptation': 'none'}))
+        pipeline = Pipeline(CONFIG.with_values({'experience.learning': learning_}))
         predicted = follow(pipeline, *ways, is_predicting=True)
         of_each = len(predicted) // len(ways)
         first.append(likelihood_above(predicted[0]))
         last.append(likelihood_above(predicted[3 * of_each]))
     assert first[0] == first[1], 'nothing is known before the first movement'
-    prior = CONFIG.experience.prior_count
+    prior = PRIOR_COUNT
     assert last[1] == pytest.approx((prior * last[0] + 3.0) / (prior + 3.0), abs=0.02)
 
 
-def test_it_is_off_by_default() -> None:
-    pipeline = Pipeline(CONFIG.with_values({'experience.learning': Config().experience.learning}))
-    follow(pipeline, reach(ABOVE), reach(ABOVE))
-    assert not pipeline.learnt.movements.learnt and not pipeline.learnt.movements.states
+def test_by_default_movements_say_nothing_of_ways() -> None:
+    default = CONFIG.with_values({'experience.learning': Config().experience.learning})
+    with_paths, without = Pipeline(default), Pipeline(CONFIG.with_values({'experience.learning': 'none'}))
+    learnt, unlearnt = (follow(each, *[reach(ABOVE)] * 3, is_predicting=True) for each in (with_paths, without))
+    assert len(with_paths.learnt.movements.learnt) == 2 and not without.learnt.movements.states
+    assert [likelihood_above(each) for each in learnt] == pytest.approx([likelihood_above(each) for each in unlearnt])
+    apart = [
+        np.hypot(*(one.candidates[0].mean[:, :2] - other.candidates[0].mean[:, :2]).T).max()
+        for one, other in zip(learnt, unlearnt, strict=True)
+    ]
+    assert max(apart) > 0.005, 'paths are learnt'
 
 
 def test_a_movement_is_learnt_when_it_has_ended() -> None:
@@ -137,7 +145,7 @@ def test_a_reset_and_new_parameters_forget_what_was_learnt_and_keep_the_library(
         pipeline = Pipeline(CONFIG, [given])
         follow(pipeline, reach(BELOW), np.zeros((2, 2)))
         assert len(pipeline.learnt.movements.learnt) == 1 and len(pipeline._library.recordings) == 2
-        pipeline.reconfigure(CONFIG.with_values({'rate_hz': 5.0, 'experience.prior_count': 2.0}))
+        pipeline.reconfigure(CONFIG.with_values({'rate_hz': 5.0, 'likelihood.beta': 3.0}))
         assert len(pipeline.learnt.movements.learnt) == 1
         forget(pipeline)
         assert not pipeline.learnt.movements.learnt and pipeline._library.recordings == (given,)

@@ -3,9 +3,15 @@
 import numpy as np
 import pytest
 
-from foc_ros.core.dynamics.condensed import PositionNoise, position_variances, variance_weights
-from foc_ros.core.dynamics.noise import propagate_covariance, scale_noise, stack_noise
-from foc_ros.core.dynamics.plants import condense, discretise_damped_mass, discretise_triple_integrator
+from foc_ros.core.plant.covariance import propagate_covariance, scale_noise, stack_noise
+from foc_ros.core.plant.plants import (
+    PositionNoise,
+    condense,
+    discretise_damped_mass,
+    discretise_triple_integrator,
+    position_variances,
+    variance_weights,
+)
 
 PLANTS = pytest.mark.parametrize(
     'plant', [discretise_triple_integrator(0.03), discretise_damped_mass(0.04, 1.5, 4.0)], ids=['jerk', 'force']

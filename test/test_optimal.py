@@ -7,7 +7,7 @@ import pytest
 from reach_helpers import bowed, random_scene, reach
 
 from foc_ros.core.config import FocConfig
-from foc_ros.core.obstacles.chance_constraint import eta_of_k
+from foc_ros.core.obstacles.risk import eta_of_k
 from foc_ros.core.ocp.margin import Contacts, Margins
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import find_least_safety_factor, solve_problem

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.obstacles.outline import find_limits, trace_obstacle, trace_outline
+from foc_ros.core.obstacles.geometry import find_limits, measure_offsets, trace_obstacle, trace_outline
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles
 
 SHAPES = (

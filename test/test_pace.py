@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config, DurationConfig, replace_values
-from foc_ros.core.estimation.duration import compute_movement_time, estimate_times_to_go, scale_durations
+from foc_ros.core.hand.duration import compute_movement_time, estimate_times_to_go, scale_durations
 from foc_ros.core.height import reach_along_axis
 from foc_ros.core.learning.pace import MOST_GOALS, Pace, find_free_positions
 from foc_ros.core.pipeline import Pipeline
@@ -35,7 +35,7 @@ def follow(pipeline: Pipeline, *movements: np.ndarray, goal: np.ndarray = GOAL) 
     return pipeline
 
 
-@pytest.mark.parametrize('model', ['fixed', 'fitts', 'cost_of_time'])
+@pytest.mark.parametrize('model', ['fixed', 'fitts'])
 def test_scaled_durations_are_longer_by_the_factor(model: str) -> None:
     pipeline, config = follow(Pipeline(CONFIG), np.zeros((5, 2))), DurationConfig(model=model)
     assert pipeline.hand_state is not None

@@ -103,6 +103,15 @@ foc: {ros__parameters: {rate_hz: 25}}
     [
         ('/**: {ros__parameters: {rate: 5}}', 'rate: expected a known parameter (did you mean rate_hz?), got 5'),
         ('/**: {ros__parameters: {foc: {eta: {low: 1}}}}', 'foc.eta: expected a finite number'),
+        (
+            '/**: {ros__parameters: {likelihood: {beta_beyond: 0.1}}}',
+            'likelihood.beta_beyond: expected no value, because it was removed',
+        ),
+        ('/**: {ros__parameters: {experience.prior_count: 2.0}}', 'how much recordings count is fixed, got 2.0'),
+        (
+            '/**: {ros__parameters: {duration: {model: cost_of_time}}}',
+            "duration.model: expected one of fixed, fitts, got 'cost_of_time'",
+        ),
         ('/**: {ros__parameters: {foc: {etta: 0.5}}}', 'foc.etta: expected a known parameter (did you mean foc.eta?), got 0.5'),
         ('/**: {ros__parameters: {foc: 5}}', 'foc: expected a group of parameters, got 5'),
         ('/**: {ros__parameters: {foc: {eta: 1.5}}}', 'foc.eta: expected a number in [0, 0.999], got 1.5'),

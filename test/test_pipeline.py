@@ -12,9 +12,9 @@ from foc_ros.core import pipeline as module
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.errors import SceneError
-from foc_ros.core.learning.experience import NO_LIBRARY, Library
-from foc_ros.core.memory.memory import Memory
+from foc_ros.core.learning.learnt import NOTHING, Knowledge
 from foc_ros.core.pipeline import Pipeline, SampleStatus
+from foc_ros.core.tracks import Tracks
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction, make_obstacles
 
 START = 1000 * NANOSECONDS
@@ -26,7 +26,7 @@ class Recorder:
     """Replaces the predictor and records its arguments."""
 
     def __init__(self) -> None:
-        self.calls: list[tuple[Config, HandState, Obstacles, Array, Memory]] = []
+        self.calls: list[tuple[Config, HandState, Obstacles, Array, Tracks]] = []
 
     def __call__(
         self,
@@ -34,16 +34,16 @@ class Recorder:
         hand: HandState,
         obstacles: Obstacles,
         goals: Array,
-        memory: Memory,
-        library: Library,
+        memory: Tracks,
+        knowledge: Knowledge,
         deadline: Deadline,
         goal_heights: Array | None,
-    ) -> tuple[Prediction, Memory]:
-        assert not library.demonstrations and goal_heights is None
+    ) -> tuple[Prediction, Tracks]:
+        assert not knowledge.library.demonstrations and goal_heights is None
         assert deadline is NEVER
         self.calls.append((config, hand, obstacles, goals, memory))
         label = f'call{len(self.calls)}'
-        return Prediction(hand.stamp_ns, hand.frame_id, hand.height, (), label), Memory(label)
+        return Prediction(hand.stamp_ns, hand.frame_id, hand.height, (), label), Tracks(stamp_ns=len(self.calls))
 
 
 @pytest.fixture
@@ -121,8 +121,8 @@ def test_the_predictor_gets_the_scene_at_the_stamp_and_its_memory(recorder: Reco
     assert first is not None
     assert second is not None
     config, state, obstacles, goals, memory = recorder.calls[1]
-    assert (config, memory.most_likely) == (pipeline.config, 'call1')
-    assert recorder.calls[0][4] == Memory()
+    assert (config, memory.stamp_ns) == (pipeline.config, 1)
+    assert recorder.calls[0][4].stamp_ns is None
     assert state is pipeline.hand_state
     assert (second.stamp_ns, second.frame_id, second.height) == (START + 100 * MS, 'world', 0.3)
     assert obstacles.ids == ('0', 'm')
@@ -260,7 +260,7 @@ def test_a_jump_of_the_hand_stamp_restarts_the_movement(recorder: Recorder, jump
     assert status.is_restart
     assert pipeline.is_due
     assert pipeline.predict() is not None
-    assert recorder.calls[1][4] == Memory()
+    assert recorder.calls[1][4].stamp_ns is None
     assert pipeline.counts[f'hand_{status}'] == 1
 
 
@@ -274,7 +274,7 @@ def test_an_outlier_is_refused_and_the_movement_goes_on(recorder: Recorder) -> N
     assert pipeline.add_hand_sample(hand(40.0)) is plain.add_hand_sample(hand(40.0)) is SampleStatus.ACCEPTED
     assert pipeline.hand_state is not None and plain.hand_state is not None
     np.testing.assert_array_equal(pipeline.hand_state.mean, plain.hand_state.mean)
-    assert pipeline.predict() is not None and recorder.calls[-1][4] != Memory()
+    assert pipeline.predict() is not None and recorder.calls[-1][4].stamp_ns is not None
     assert pipeline.counts['hand_jumped'] == 1 and 'hand_restarted_jump' not in pipeline.counts
 
 
@@ -288,7 +288,7 @@ def test_a_position_that_jumps_is_counted_and_the_movement_restarts(recorder: Re
     assert re.match(expected, pipeline.last_refusal or '')
     assert pipeline.add_hand_sample(replace(hand(40.0), position=jumped)) is SampleStatus.RESTARTED_JUMP
     assert pipeline.hand_state is not None and not pipeline.hand_state.mean[2:].any()
-    assert pipeline.predict() is not None and recorder.calls[1][4] == Memory()
+    assert pipeline.predict() is not None and recorder.calls[1][4].stamp_ns is None
     assert pipeline.counts['hand_jumped'] == pipeline.counts['hand_restarted_jump'] == 1
 
 
@@ -321,7 +321,7 @@ def test_while_disengaged_the_hand_is_followed_without_predictions(recorder: Rec
     assert pipeline.add_hand_sample(hand(51.0, 0.02)) is SampleStatus.ACCEPTED
     assert pipeline.is_due
     assert pipeline.predict() is not None
-    assert recorder.calls[1][4] == Memory()
+    assert recorder.calls[1][4].stamp_ns is None
     pipeline.add_hand_sample(hand(55.0))
     pipeline.set_engaged(True)
     assert not pipeline.is_due
@@ -337,7 +337,7 @@ def test_reset_forgets_the_movement_and_keeps_the_scene(recorder: Recorder) -> N
     assert pipeline.not_ready_reason() == 'no hand pose yet'
     assert pipeline.add_hand_sample(hand(0.0)) is SampleStatus.ACCEPTED
     assert pipeline.predict() is not None
-    assert recorder.calls[1][4] == Memory()
+    assert recorder.calls[1][4].stamp_ns is None
 
 
 def test_other_parameters_keep_movement_and_scene(recorder: Recorder) -> None:
@@ -353,7 +353,7 @@ def test_other_parameters_keep_movement_and_scene(recorder: Recorder) -> None:
     pipeline.add_hand_sample(hand(100.0))
     pipeline.predict()
     assert recorder.calls[1][0].foc.steps == 30
-    assert recorder.calls[1][4] == Memory('call1')
+    assert recorder.calls[1][4].stamp_ns == 1
 
 
 @pytest.mark.parametrize(('name', 'value'), [('plane', 'xz'), ('frame_id', 'base')])
@@ -367,7 +367,7 @@ def test_another_plane_or_frame_discards_movement_and_scene(recorder: Recorder, 
 
 
 def test_a_scene_that_the_predictor_refuses_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*arguments: object) -> tuple[Prediction, Memory]:
+    def refuse(*arguments: object) -> tuple[Prediction, Tracks]:
         raise SceneError('goals[0]', 'a goal outside of every obstacle', '(0.15, 0)')
 
     monkeypatch.setattr(module, 'predict', refuse)
@@ -519,7 +519,7 @@ def test_a_prediction_that_was_begun_before_an_event_is_neither_returned_nor_rem
     pipeline.set_engaged(True)
     pipeline.add_hand_sample(hand(100.0))
     assert pipeline.is_due and pipeline.predict() is not None
-    assert recorder.calls[0][4] == Memory()
+    assert recorder.calls[0][4].stamp_ns is None
 
 
 def test_after_a_change_of_parameters_the_newest_sample_is_due_again(recorder: Recorder) -> None:
@@ -541,10 +541,10 @@ def test_samples_and_scenes_of_the_meantime_do_not_change_a_prediction_that_was_
     assert task is not None
     pipeline.add_hand_sample(hand(40.0, 0.01))
     pipeline.set_obstacles('cloud', make_obstacles(), START, 'world')
-    recorder(task.config, task.hand, task.obstacles, task.goals, task.memory, NO_LIBRARY, NEVER, None)
-    prediction = pipeline.finish(task, lambda: (Prediction(task.hand.stamp_ns, 'world', 0.3, (), 'made'), Memory('made')))
+    recorder(task.config, task.hand, task.obstacles, task.goals, task.tracks, NOTHING, NEVER, None)
+    prediction = pipeline.finish(task, lambda: (Prediction(task.hand.stamp_ns, 'world', 0.3, (), 'made'), Tracks(stamp_ns=7)))
     assert prediction is not None and prediction.stamp_ns == START
     assert recorder.calls[0][2].ids == ('0',)
     assert pipeline.is_due and pipeline.predict() is not None
-    assert recorder.calls[1][4].most_likely == 'made'
+    assert recorder.calls[1][4].stamp_ns == 7
     assert recorder.calls[1][2].ids == ()

@@ -8,22 +8,20 @@ from numpy.testing import assert_allclose
 
 import foc_ros
 from foc_ros.core.config import Config
-from foc_ros.core.dynamics.plant_models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
-from foc_ros.core.dynamics.plants import Plant, condense, discretise_damped_mass, discretise_triple_integrator
-from foc_ros.core.dynamics.predictive_covariance import compute_duration_sensitivity
-from foc_ros.core.memory.memory import Memory
-from foc_ros.core.obstacles.chance_constraint import k_of_eta
-from foc_ros.core.predictor import build_problem, predict
+from foc_ros.core.obstacles.risk import k_of_eta
+from foc_ros.core.plant.covariance import compute_duration_sensitivity
+from foc_ros.core.plant.models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
+from foc_ros.core.plant.plants import Plant, condense, discretise_damped_mass, discretise_triple_integrator
+from foc_ros.core.predict import build_problem, predict
 from foc_ros.core.registry import PLANTS
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, make_obstacles
 
 STEPS, MASS, DAMPING = 50, 1.5, 4.0
 MASS_CONFIG = Config().with_values(
     {'foc.plant': 'damped_mass', 'foc.plant_mass': MASS, 'foc.plant_damping': DAMPING, 'estimator.acceleration_time_s': 0.0}
 )
-MOVING = HandState(
-    0, np.array([0.0, 0.0, 0.1, -0.05, 1.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2), effort_spent=5.0
-)
+MOVING = HandState(0, np.array([0.0, 0.0, 0.1, -0.05, 1.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2))
 GOAL = np.array([[0.3, 0.0]])
 CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003)
 
@@ -42,7 +40,7 @@ def register(monkeypatch):
 
 
 def test_without_obstacles_the_effort_of_a_damped_mass_is_that_of_the_kkt_system():
-    (found,) = predict(MASS_CONFIG, MOVING, make_obstacles(), GOAL, Memory())[0].solved_candidates
+    (found,) = predict(MASS_CONFIG, MOVING, make_obstacles(), GOAL, NO_TRACKS)[0].solved_candidates
     solution = found.solution
     horizon = condense(discretise_damped_mass(solution.dt, MASS, DAMPING), STEPS)
     target = np.array([0.3, 0.0, 0.0, 0.0]) - horizon.powers[-1] @ MOVING.mean[:4]
@@ -76,7 +74,7 @@ def test_predictions_of_a_damped_mass_have_all_parts_of_the_covariance():
     config = MASS_CONFIG.with_values({'foc.process_noise': 0.5, 'foc.endpoint_stddev': 0.005, 'duration.spread': 0.2})
     scene = make_obstacles([[0.15, 0.01]], 0.03), GOAL
     exact = MASS_CONFIG.with_values({'foc.endpoint_stddev': 0.0, 'duration.spread': 0.0})
-    narrow, wide = (predict(each, MOVING, *scene, Memory())[0] for each in (exact, config))
+    narrow, wide = (predict(each, MOVING, *scene, NO_TRACKS)[0] for each in (exact, config))
     assert len(narrow.solved_candidates) == 2
     for before, after in zip(narrow.candidates, wide.candidates, strict=True):
         np.testing.assert_array_equal(before.mean, after.mean)
@@ -90,7 +88,7 @@ def test_the_duration_shifts_the_end_of_a_damped_mass_as_a_longer_plan_does():
     plans = []
     for factor in (0.99, 1.0, 1.01):
         config = MASS_CONFIG.with_values({'duration.model': 'fixed', 'duration.fixed_s': factor})
-        plans.append(predict(config, MOVING, make_obstacles(), GOAL, Memory())[0].candidates[0].solution)
+        plans.append(predict(config, MOVING, make_obstacles(), GOAL, NO_TRACKS)[0].candidates[0].solution)
     plan = plans[1]
     early, late = (np.interp(plan.times, each.times, each.path[:, 0]) for each in plans[::2])
     found = compute_duration_sensitivity(plan, False, make_plant_model(MASS_CONFIG.foc))[:, 0]
@@ -98,32 +96,19 @@ def test_the_duration_shifts_the_end_of_a_damped_mass_as_a_longer_plan_does():
     assert_allclose(found[middle], ((early - late) / 0.02)[middle], atol=0.03 * np.abs(found).max())
 
 
-def test_only_effort_of_jerk_is_added_to_effort_of_jerk():
-    """The effort since onset and the price of time have the units of jerk: a force-driven class costs its own effort alone."""
-    values = {'duration.model': 'cost_of_time', 'duration.time_cost': 50.0, 'likelihood.spent_share': 1.0}
-    scene = make_obstacles([[0.15, 0.01]], 0.03), GOAL
-    for config, shared, price in ((Config(), 5.0, 50.0), (MASS_CONFIG, 0.0, 0.0)):
-        for each in predict(config.with_values(values), MOVING, *scene, Memory())[0].solved_candidates:
-            assert each.cost == pytest.approx(shared + each.effort * each.solution.dt + price * each.times[-1])
-
-
 def test_the_durations_do_not_depend_on_the_plant():
     durations = []
     for config in (Config().with_values({'estimator.acceleration_time_s': 0.0}), MASS_CONFIG):
-        values = config.with_values({'duration.model': 'cost_of_time'})
-        solved = predict(values, MOVING, make_obstacles([[0.15, 0.01]], 0.03), GOAL, Memory())[0].solved_candidates
+        solved = predict(config, MOVING, make_obstacles([[0.15, 0.01]], 0.03), GOAL, NO_TRACKS)[0].solved_candidates
         durations.append({each.label: each.times[-1] for each in solved})
     assert durations[0] == durations[1]
 
 
 def test_a_triple_integrator_from_outside_predicts_what_the_built_in_one_does(register):
-    class Outside(PlantModel):
-        is_jerk_driven = True
-
-    config = register('outside', lambda settings: Outside(discretise_triple_integrator))
+    config = register('outside', lambda settings: PlantModel(discretise_triple_integrator))
     values = {'foc.endpoint_stddev': 0.005, 'duration.spread': 0.2, 'duration.wait_s': 0.1}
     scene = make_obstacles([[0.15, 0.01]], 0.03), GOAL
-    ours, theirs = (predict(each.with_values(values), MOVING, *scene, Memory())[0] for each in (Config(), config))
+    ours, theirs = (predict(each.with_values(values), MOVING, *scene, NO_TRACKS)[0] for each in (Config(), config))
     assert [each.label for each in ours.candidates] == [each.label for each in theirs.candidates]
     for one, other in zip(ours.candidates, theirs.candidates, strict=True):
         assert_allclose(other.mean, one.mean, atol=1e-6 * np.abs(one.mean).max())

@@ -21,8 +21,7 @@ from report_samples import START_NS, prediction, predictions, samples, scene
 
 from foc_ros.core.errors import InputError
 from foc_ros.core.obstacles import shapes
-from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.obstacles.outline import trace_obstacle
+from foc_ros.core.obstacles.geometry import measure_offsets, trace_obstacle
 from foc_ros.core.types import Status, make_obstacles
 from foc_ros.reporting.drawing import (
     CLASS_COLOURS,
@@ -155,9 +154,9 @@ def test_both_ellipses_are_drawn_and_named_and_a_compromised_candidate_is_dotted
     assert [line.get_linestyle() for line in axes.lines if line.get_label().strip().startswith('A')] == [':']
 
 
-def test_the_share_without_a_likelihood_is_hatched() -> None:
+def test_the_unknown_share_is_hatched() -> None:
     made = predictions(samples())
-    lost = [replace(each, candidates=each.candidates[-1:], most_likely=None) for each in made[20:]]
+    lost = [replace(each, candidates=each.candidates[-1:], most_likely=None, unknown=1.0) for each in made[20:]]
     axes = Figure().subplots()
     draw_likelihoods(axes, build_candidate_tracks([build_snapshot(each) for each in (*made[:20], *lost)]), START_NS)
     (hatched,) = axes.collections

@@ -5,14 +5,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.dynamics.plants import build_triple_integrator_horizon, condense, discretise_triple_integrator
-from foc_ros.core.dynamics.predictive_covariance import compute_duration_sensitivity, compute_onset_delay_covariance
-from foc_ros.core.dynamics.replanning import compute_goal_map, triple_integrator_goal_map
-from foc_ros.core.memory.memory import Memory
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
-from foc_ros.core.predictor import predict
+from foc_ros.core.plant.covariance import compute_duration_sensitivity, compute_onset_delay_covariance
+from foc_ros.core.plant.plants import build_triple_integrator_horizon, condense, discretise_triple_integrator
+from foc_ros.core.plant.replanning import compute_goal_map, triple_integrator_goal_map
+from foc_ros.core.predict import predict
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, Solution, make_obstacles
 
 STEPS = 50
@@ -64,8 +64,8 @@ def test_the_duration_sensitivity_is_the_difference_between_plans_of_other_durat
 def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoods() -> None:
     scene = make_obstacles([[0.2, 0.0]], 0.02), np.array([GOAL, [0.4, -0.1]])
     exact = replace_values(Config(), {'foc.endpoint_stddev': 0.0, 'duration.spread': 0.0})
-    sure = predict(exact, HAND, *scene, Memory())[0]
-    unsure = predict(replace_values(Config(), {'foc.endpoint_stddev': 0.006, 'duration.spread': 0.3}), HAND, *scene, Memory())[0]
+    sure = predict(exact, HAND, *scene, NO_TRACKS)[0]
+    unsure = predict(replace_values(Config(), {'foc.endpoint_stddev': 0.006, 'duration.spread': 0.3}), HAND, *scene, NO_TRACKS)[0]
     assert len(sure.solved_candidates) == len(unsure.solved_candidates) >= 3
     for before, after in zip(sure.candidates, unsure.candidates, strict=True):
         assert_array_equal(before.solution.mean, after.solution.mean)
@@ -100,7 +100,7 @@ def test_the_onset_delay_widens_predictions_at_rest_only() -> None:
     scene = make_obstacles([], []), GOAL[None]
     delayed = replace_values(Config(), {'duration.wait_s': 0.2})
     for hand, widens in ((HandState(0, np.zeros(6), 1e-6 * np.eye(6)), True), (HAND, False)):
-        plain, unsure = (predict(config, hand, *scene, Memory())[0].candidates[0] for config in (Config(), delayed))
+        plain, unsure = (predict(config, hand, *scene, NO_TRACKS)[0].candidates[0] for config in (Config(), delayed))
         assert_array_equal(plain.solution.mean, unsure.solution.mean)
         added = (unsure.solution.covariance - plain.solution.covariance)[STEPS // 2, :2, :2]
         assert (np.trace(added) > 0.05**2) == widens and (widens or not added.any())

@@ -4,11 +4,11 @@ import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.dynamics.plants import condense, discretise_triple_integrator
-from foc_ros.core.dynamics.replanning import compute_error_map, triple_integrator_process_covariance
-from foc_ros.core.estimation.kalman_filter import compute_gramian
-from foc_ros.core.memory.memory import Memory
-from foc_ros.core.predictor import predict
+from foc_ros.core.hand.kalman import compute_gramian
+from foc_ros.core.plant.plants import condense, discretise_triple_integrator
+from foc_ros.core.plant.replanning import compute_error_map, triple_integrator_process_covariance
+from foc_ros.core.predict import predict
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, make_obstacles
 
 
@@ -40,8 +40,8 @@ def test_the_covariance_agrees_with_a_hand_that_replans_at_each_step() -> None:
 def test_predictions_widen_and_keep_means_and_likelihoods() -> None:
     hand = HandState(0, np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2))
     scene = make_obstacles([[0.15, 0.01]], 0.03), np.array([[0.3, 0.0]])
-    narrow = predict(Config(), hand, *scene, Memory())[0]
-    wide = predict(replace_values(Config(), {'foc.process_noise': 2.0}), hand, *scene, Memory())[0]
+    narrow = predict(Config(), hand, *scene, NO_TRACKS)[0]
+    wide = predict(replace_values(Config(), {'foc.process_noise': 2.0}), hand, *scene, NO_TRACKS)[0]
     assert len(narrow.solved_candidates) == len(wide.solved_candidates) == 2
     for before, after in zip(narrow.candidates, wide.candidates, strict=True):
         assert_array_equal(before.solution.mean, after.solution.mean)

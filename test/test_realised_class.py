@@ -12,8 +12,8 @@ import pytest
 from homotopy_scenes import GOAL, random_scene
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.memory.memory import Memory
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState, Obstacles, Prediction, make_obstacles
 
 SCENES = int(os.environ.get('FOC_ROS_SCENES', '40'))
@@ -44,7 +44,7 @@ def solve_scene(seed: int, strategy: str) -> tuple[Prediction, Obstacles]:
     circles = random_scene(rng, int(rng.integers(1, 9)))
     obstacles = make_obstacles(circles.centre, circles.radius, 0.001)
     config = replace_values(Config(), {'homotopy.max_candidates': K, 'foc.strategy': strategy})
-    return predict(config, HandState(1, np.zeros(6), np.zeros((6, 6))), obstacles, GOAL[None], Memory())[0], obstacles
+    return predict(config, HandState(1, np.zeros(6), np.zeros((6, 6))), obstacles, GOAL[None], NO_TRACKS)[0], obstacles
 
 
 @pytest.mark.parametrize('strategy', ['lv', 'optimal'])

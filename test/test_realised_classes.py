@@ -6,8 +6,8 @@ from homotopy_scenes import GOAL
 from homotopy_shapes import HAND, random_shapes
 
 from foc_ros.core.config import Config
-from foc_ros.core.reaching_scene import ReachingScene
-from foc_ros.core.scene_solver import build_scene_problems, solve_scene
+from foc_ros.core.predict import build_scene_problems, solve_scene
+from foc_ros.core.scene import ReachingScene
 from foc_ros.core.types import HandState, Status
 
 SCENES = {'optimal': 40, 'lv': 3}

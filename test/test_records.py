@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config
-from foc_ros.core.memory.memory import Memory
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import Array, HandState, Prediction, Record, Solution, as_readonly, make_obstacles
 
 
@@ -23,7 +23,7 @@ class Kept(Record):
 def prediction() -> Prediction:
     """Predict a reach past one obstacle."""
     hand = HandState(0, np.zeros(6), 1e-6 * np.eye(6))
-    return predict(Config(), hand, make_obstacles([[0.15, 0.0]], 0.02, 0.001), np.array([[0.3, 0.0]]), Memory())[0]
+    return predict(Config(), hand, make_obstacles([[0.15, 0.0]], 0.02, 0.001), np.array([[0.3, 0.0]]), NO_TRACKS)[0]
 
 
 def test_a_record_copies_an_array_that_can_be_written_to() -> None:

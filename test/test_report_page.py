@@ -17,8 +17,7 @@ pytest.importorskip('plotly', reason='plotly is not installed')
 from browser_helpers import check_report, chromium, screenshot, show
 from report_samples import predictions, samples
 
-from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.obstacles.outline import find_limits
+from foc_ros.core.obstacles.geometry import find_limits, measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, collect_obstacles
 from foc_ros.reporting.report import write_report
 from foc_ros.reporting.report_data import MOST_FRAMES

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import foc_ros
-from foc_ros.core.config import LikelihoodConfig, replace_values
-from foc_ros.core.likelihood import compute_likelihoods, make_preference
+from foc_ros.core.config import LikelihoodConfig
+from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.safety_preference import COST_FLOOR, HARD, SafetyPreference
 from foc_ros.core.types import Status
 
@@ -33,12 +33,6 @@ def test_the_loss_has_its_limits():
     assert HARD.compute_loss(1.0, 2.999, 3.0) == math.inf
     assert HARD.compute_loss(math.e, 3.0, 3.0) == pytest.approx(1.0)
     assert SafetyPreference(1.0, 1.0).compute_loss(0.0, 4.0, 3.0) == pytest.approx(math.log(COST_FLOOR))
-
-
-def test_a_preference_contains_what_the_cost_contains():
-    values = {'duration.model': 'cost_of_time', 'duration.time_cost': 50.0, 'likelihood.spent_share': 0.5, 'likelihood.beta': 0.8}
-    preference = make_preference(8.0, 1.5, replace_values(foc_ros.Config(), values))
-    assert preference == SafetyPreference(0.8, foc_ros.Config().likelihood.shortfall, 0.5 * 8.0 + 50.0 * 1.5, 1.5 / 50)
 
 
 def test_a_class_that_misses_eta_takes_part_with_less_weight():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from foc_ros.core.obstacles.scene import ObstacleSource, Scene
+from foc_ros.core.scene import ObstacleSource, Scene
 from foc_ros.core.types import NANOSECONDS, make_obstacles
 
 NOW = 50 * NANOSECONDS

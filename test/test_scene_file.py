@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from foc_ros.core.checks import check_number, check_vector
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, ParameterError, RecordingError, SceneError, list_messages
 from foc_ros.core.obstacles.shapes import Box, Circle, Hull, collect_obstacles
+from foc_ros.core.support import check_number, check_vector
 from foc_ros.io.documents import _check_keys as check_keys
 from foc_ros.io.scene_file import guess_path, load_scene, parse_scene
 

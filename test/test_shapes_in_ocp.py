@@ -9,11 +9,11 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from reach_helpers import bowed, reach, solved
 
-from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
-from foc_ros.core.obstacles.chance_constraint import k_of_eta
+from foc_ros.core.obstacles.risk import k_of_eta
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles, make_box_polygon
 from foc_ros.core.ocp.monte_carlo import wilson
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
+from foc_ros.core.plant.plants import build_triple_integrator_horizon
 from foc_ros.core.types import Obstacles, Solution, Status, make_obstacles
 
 GOAL = np.array([0.3, 0.0])

@@ -8,13 +8,13 @@ import pytest
 from reach_helpers import bowed, one_obstacle, random_scene, reach, solved
 
 from foc_ros.core.config import FocConfig
-from foc_ros.core.dynamics.plants import build_triple_integrator_horizon, condense, discretise_damped_mass
 from foc_ros.core.errors import SceneError
-from foc_ros.core.obstacles.chance_constraint import eta_of_k
+from foc_ros.core.obstacles.risk import eta_of_k
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import find_least_safety_factor, solve_problem
 from foc_ros.core.ocp.start import cold_start, warm_start
+from foc_ros.core.plant.plants import build_triple_integrator_horizon, condense, discretise_damped_mass
 from foc_ros.core.types import Status, make_obstacles
 
 BOWED = bowed((0, 0), (0.3, 0), 50, 0.05)

@@ -7,9 +7,9 @@ import pytest
 
 import foc_ros
 from foc_ros.core.config import Config
-from foc_ros.core.memory.memory import Memory
 from foc_ros.core.obstacles.shapes import collect_obstacles
-from foc_ros.core.predictor import predict
+from foc_ros.core.predict import predict
+from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
 
 FAST = Config().with_values({'foc.steps': 25, 'duration.model': 'fixed', 'foc.noise_x': 0.1, 'foc.noise_y': 0.1})
@@ -22,7 +22,7 @@ Answers = dict[str, tuple[float, float]]
 def answer(shapes, values, state=(0.0, 0.0, 0.1, 0.0, 0.0, 0.0)) -> Answers:
     """Return ln J and likelihood by class, for a prediction without a past."""
     hand = HandState(0, np.array(state), np.zeros((6, 6)), onset_ns=0, onset_position=np.zeros(2))
-    prediction, _ = predict(FAST.with_values(values), hand, collect_obstacles(shapes), GOALS, Memory())
+    prediction, _ = predict(FAST.with_values(values), hand, collect_obstacles(shapes), GOALS, NO_TRACKS)
     assert {each.status.value for each in prediction.candidates} <= {'solved', 'compromised'}, (values, state)
     return {each.label: (float(np.log(each.solution.effort)), each.likelihood) for each in prediction.candidates}
 

@@ -62,7 +62,7 @@ def test_the_tables_of_a_fit_fit(capsys: pytest.CaptureFixture[str]) -> None:
     answer = {
         'recordings': 6,
         'parameters': {'guidance.progress_speed_of_the_reference': estimate},
-        'chosen': {'duration.model': {'given': 'fitts', 'value': 'cost_of_time'}},
+        'chosen': {'duration.model': {'given': 'fitts', 'value': 'fixed'}},
         'scores': {'inside_all_90': {'without the recording': 0.9}},
         'comparison': measures,
         'warnings': ['a long warning ' * 10],

@@ -11,8 +11,8 @@ from pathlib import Path
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import MessageError
-from foc_ros.core.obstacles.scene import Scene
 from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.scene import Scene
 from foc_ros.core.types import NANOSECONDS, HandSample, Prediction, SampleStatus
 from foc_ros.io.bags import BagReader, Item
 from foc_ros.io.class_library import load_library

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from foc_ros.core.guidance.step import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
+from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, HandState, Prediction
 from foc_ros.ros.messages.encode_guidance import Place

@@ -10,7 +10,7 @@ from typing import Any
 
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.scene_solver import build_scene_problems, solve_scene
+from foc_ros.core.predict import build_scene_problems, solve_scene
 from foc_ros.core.types import PredictedCandidate
 from foc_ros.io.json_output import encode_candidate, encode_solution
 from foc_ros.io.terminal import show_table, show_text

@@ -2,42 +2,37 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from types import MappingProxyType
-from typing import Protocol
 
 import numpy as np
 
 from .classes import find_path_sides
 from .classes.rows import find_decisions, tabulate_sides
 from .classes.sides import compute_branch_times
-from .config import ONLINE, Config, FocConfig
+from .config import FocConfig, LikelihoodConfig
 from .deadline import NEVER, Deadline
-from .heading_bias import make_reaches
-from .learning.choices import Choice
-from .likelihood import CostModel, compute_likelihoods, compute_lookahead_share
+from .likelihood import BETWEEN_OPERATORS, compute_likelihoods, compute_lookahead_share
+from .obstacles.clearance import measure_clearance
 from .ocp.problem import Problem
 from .ocp.solve import solve_problems
 from .ocp.start import Start, cold_start, warm_start
-from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Solution, Status
+from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Solution, Status, as_readonly
 
-EFFORT_ONLY = CostModel()
-
-
-class ProblemTable(Protocol):
-    """The problems of candidates by row: a list, or what builds each when it is asked for."""
-
-    def __getitem__(self, row: int, /) -> Problem:
-        """Return the problem of the candidate in a row."""
+FAILED = (Status.LEFT_CLASS, Status.ITERATION_LIMIT, Status.INFEASIBLE)
+"""What a solver says of classes that it could not solve."""
+SHORTEST_M = 1e-6
+"""Lower limit of a distance in ratios [m]: a micrometre."""
+DETOUR = 64.0 / 9.0
+"""Effort of going aside over that of going straight, see `compute_detour_effort`."""
 
 
 def solve_candidates(
     candidates: Sequence[Candidate],
-    problems: ProblemTable,
+    problems: Sequence[Problem],
     settings: FocConfig,
-    costs: CostModel = EFFORT_ONLY,
-    earlier: Mapping[str, Solution] = MappingProxyType({}),
+    earlier: Sequence[Solution | None] | None = None,
     deadline: Deadline = NEVER,
 ) -> list[PredictedCandidate]:
     """Solve all candidates together, each from its earlier solution or its guess; return them with likelihoods 0.
@@ -50,17 +45,15 @@ def solve_candidates(
         One for each.
     settings
         The strategy and its parameters.
-    costs
-        Parts of the cost besides the effort to go.
     earlier
-        Solutions of the prediction before, by label, from which their classes are followed.
+        The solution of the prediction before of each, from which its class is followed, None where there is none.
     deadline
         When the solutions have to be ready. A class that is not ready then has an estimate, and says so.
     """
-    needed = [problems[row] for row in range(len(candidates))]
-    starts = [_begin(each, problem, earlier.get(each.label)) for each, problem in zip(candidates, needed, strict=True)]
-    solutions = solve_problems(needed, starts, settings, deadline)
-    return [_classify(*each, costs) for each in zip(candidates, solutions, needed, strict=True)]
+    before = [None] * len(candidates) if earlier is None else earlier
+    starts = [_begin(*each) for each in zip(candidates, problems, before, strict=True)]
+    solutions = solve_problems(problems, starts, settings, deadline)
+    return [_classify(*each) for each in zip(candidates, solutions, problems, strict=True)]
 
 
 def _begin(candidate: Candidate, problem: Problem, previous: Solution | None) -> Start:
@@ -79,12 +72,94 @@ def _is_in_class(candidate: Candidate, sides: Mapping[str, int]) -> bool:
     return all(sides.get(identity, side) == side for identity, side in candidate.sides)
 
 
-def _classify(candidate: Candidate, solution: Solution, problem: Problem, costs: CostModel) -> PredictedCandidate:
+def _classify(candidate: Candidate, solution: Solution, problem: Problem) -> PredictedCandidate:
     """Find the class in which a solution is, and its cost. The status says if it left the candidate's."""
     sides = _find_sides(solution.path, problem)
     if solution.status.has_likelihood and not _is_in_class(candidate, sides):
         solution = replace(solution, status=Status.LEFT_CLASS, message='the solution moved into another homotopy class')
-    return PredictedCandidate(candidate, solution, sides, costs.compute_cost(solution), 0.0)
+    return PredictedCandidate(candidate, solution, sides, solution.expected_effort * solution.dt, 0.0)
+
+
+def estimate_unsolved(candidates: Sequence[PredictedCandidate], obstacles: Obstacles) -> list[PredictedCandidate]:
+    """Return the candidates with an estimate for those that the solver could not solve although the search has a path for them.
+
+    The path is what the solver found, if it is in the class, or the guess of the search. Effort and safety follow from the class
+    to the same goal, or else to any, that is solved and of most similar length (`compute_detour_effort`). A class without a path,
+    such as one that an obstacle closes on the way, stays as it is. obstacles: grown by the radius of the hand.
+    """
+    solved = [each for each in candidates if each.has_likelihood]
+    return [
+        _estimate(each, find_similar(each.candidate.goal, _measure(each.candidate), solved))
+        if solved and each.status in FAILED and _has_path(each, obstacles)
+        else each
+        for each in candidates
+    ]
+
+
+def compute_detour_effort(length: float, distance: float) -> float:
+    """Return the effort of a detour of a length [m] from rest to rest over a distance [m], up to a factor [m^2].
+
+    Aside of the straight way by A half way, and not at rest there, it needs 720 (D^2 + 256 A^2 / 9) / T^5, and its shortest path
+    is L = sqrt(D^2 + 4 A^2) long, so that this is proportional to D^2 + 64 (L^2 - D^2) / 9.
+    """
+    straight = max(distance, SHORTEST_M) ** 2
+    return straight + DETOUR * max(length**2 - straight, 0.0)
+
+
+def find_similar(goal: int, way: tuple[float, float], solved: Sequence[PredictedCandidate]) -> tuple[PredictedCandidate, float]:
+    """Return the solved candidate of most similar effort, to the same goal if there is one, and the ratio of both efforts.
+
+    way: length and straight distance [m] of the class that is not solved.
+    """
+
+    def measure(other: PredictedCandidate) -> tuple[bool, float]:
+        return other.candidate.goal != goal, abs(math.log(find_ratio(other)))
+
+    def find_ratio(other: PredictedCandidate) -> float:
+        return compute_detour_effort(*way) / compute_detour_effort(*_measure(other.candidate))
+
+    similar = min(solved, key=measure)
+    return similar, find_ratio(similar)
+
+
+def _measure(candidate: Candidate) -> tuple[float, float]:
+    """Return the length of the shortest path of a class, and the straight distance to its goal [m]."""
+    return candidate.length, math.dist(candidate.guess[0], candidate.guess[-1])
+
+
+def _has_path(candidate: PredictedCandidate, obstacles: Obstacles) -> bool:
+    """Tell whether the guess of the search is a path between the obstacles, whatever the solver says."""
+    solution = candidate.solution
+    if candidate.status is not Status.INFEASIBLE:
+        return True
+    return measure_clearance(candidate.candidate.guess, obstacles, solution.dt) >= 0.0
+
+
+def _estimate(candidate: PredictedCandidate, similar: tuple[PredictedCandidate, float]) -> PredictedCandidate:
+    """Return a candidate with a path in its class, and the effort and safety that a similar one leads to expect."""
+    (known, ratio), failed = similar, candidate.solution
+    effort = ratio * known.cost / failed.dt
+    mean = failed.mean
+    if not _is_in_class(candidate.candidate, candidate.sides):
+        states = [candidate.candidate.guess]
+        for _ in range(mean.shape[1] // 2 - 1):
+            states.append(np.gradient(states[-1], failed.dt, axis=0))
+        mean = np.concatenate(states, axis=1)
+        mean[0] = failed.mean[0]
+        mean = as_readonly(mean)
+    safety = known.solution.eta, known.solution.safety_factor, known.solution.safety_shortfall
+    estimated = replace(
+        failed,
+        status=Status.ESTIMATED,
+        message=f'{failed.message}; estimated from the path that the search has found',
+        mean=mean,
+        effort=effort,
+        expected=effort,
+        eta=safety[0],
+        safety_factor=safety[1],
+        safety_shortfall=safety[2],
+    )
+    return replace(candidate, solution=estimated, sides=dict(candidate.candidate.sides), cost=effort * failed.dt)
 
 
 def drop_duplicates(candidates: Sequence[PredictedCandidate]) -> list[PredictedCandidate]:
@@ -100,30 +175,55 @@ def _identify_class(candidate: PredictedCandidate) -> tuple[int, frozenset[tuple
 
 
 def rank_candidates(
-    candidates: Sequence[PredictedCandidate], config: Config, obstacles: Obstacles, hand: HandState, goals: Array
-) -> tuple[list[PredictedCandidate], Choice | None]:
+    candidates: Sequence[PredictedCandidate],
+    config: LikelihoodConfig,
+    obstacles: Obstacles,
+    hand: HandState,
+    goals: Array,
+    planning_spread: float = BETWEEN_OPERATORS,
+) -> list[PredictedCandidate]:
     """Return the distinct candidates: solved and compromised ones, most likely first, then the others, with likelihood 0.
 
-    obstacles: grown by the radius of the hand; goals (g, 2) [m]. The choice is that between the candidates with a likelihood,
-    None where there are fewer than two or nothing is learnt from choices.
+    obstacles: grown by the radius of the hand; goals (g, 2) [m]; planning_spread: as in `compute_likelihoods`.
     """
-    candidates, likelihood = drop_duplicates(candidates), config.likelihood
+    candidates = drop_duplicates(candidates)
     taken = [each for each in candidates if each.has_likelihood]
-    is_learnt = likelihood.adaptation == ONLINE
     time_s = min((float(each.solution.times[-1]) for each in taken), default=0.0)
-    may_look_ahead = is_learnt or compute_lookahead_share(time_s, likelihood) > 0.0
-    branch_times = compute_branch_times(taken, obstacles) if may_look_ahead and likelihood.lookahead_s > 0.0 else None
+    looks_ahead = compute_lookahead_share(time_s, config, planning_spread) > 0.0
+    branch_times = compute_branch_times(taken, obstacles) if looks_ahead and config.lookahead_s > 0.0 else None
     costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))
-    reaches = make_reaches(taken, goals, hand, config)
-    decisions = choice = None
-    if len(taken) > 1 and (may_look_ahead or likelihood.weaving > 0.0):
-        goal, sides = np.array([each.candidate.goal for each in taken], dtype=np.intp), tuple(each.sides for each in taken)
+    decisions = None
+    if len(taken) > 1 and (looks_ahead or config.weaving > 0.0):
+        goal = np.array([each.candidate.goal for each in taken], dtype=np.intp)
         decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
-        if is_learnt:
-            made = hand.stamp_ns, hand.onset_ns, obstacles, goals
-            choice = Choice(*made, goal, sides, costs, shortfalls, branch_times, decisions, time_s, reaches)
-    shares = compute_likelihoods(costs, likelihood, branch_times, shortfalls, decisions, time_s, reaches)
-    pairs = zip(taken, shares.tolist(), strict=True)
-    ranked = [replace(each, likelihood=share) for each, share in pairs]
+    shares = compute_likelihoods(costs, config, branch_times, shortfalls, decisions, time_s, planning_spread)
+    ranked = [replace(each, likelihood=share) for each, share in zip(taken, shares.tolist(), strict=True)]
     ranked.sort(key=lambda each: (-each.likelihood, each.label))
-    return ranked + [each for each in candidates if not each.has_likelihood], choice
+    return ranked + [each for each in candidates if not each.has_likelihood]
+
+
+def find_unknown_share(
+    ranked: Sequence[PredictedCandidate],
+    unfollowed: Sequence[tuple[int, float]],
+    distances: Array,
+    config: LikelihoodConfig,
+    planning_spread: float,
+) -> float:
+    """Return the share of classes that the search has seen and that are no candidates: they cannot be told apart.
+
+    By their efforts as far as the operator plans the whole way, and evenly as far as they look ahead. 1 where no candidate has a
+    likelihood. unfollowed: goal and length [m] of each; distances (g,): from the hand to the goals [m].
+    """
+    taken = [each for each in ranked if each.has_likelihood]
+    if not taken:
+        return 1.0
+    if not unfollowed:
+        return 0.0
+    similar = [find_similar(goal, (length, float(distances[goal])), taken) for goal, length in unfollowed]
+    costs = [each.cost for each in taken] + [ratio * each.cost for each, ratio in similar]
+    shortfalls = [each.solution.safety_shortfall for each in (*taken, *(each for each, _ in similar))]
+    shares = compute_likelihoods(np.array(costs), config, shortfalls=np.array(shortfalls))
+    time_s = min(float(each.solution.times[-1]) for each in taken)
+    ahead = compute_lookahead_share(time_s, config, planning_spread)
+    planned, even = float(shares[len(taken) :].sum()), len(unfollowed) / len(costs)
+    return (1.0 - ahead) * planned + ahead * even

@@ -13,19 +13,20 @@ from typing import Any, TypeVar, cast
 
 from .errors import ParameterError, join_errors, suggest
 from .registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
+from .removed import REMOVED
 
 PLANES = ('xy', 'xz', 'yz')
-DURATION_MODELS = ('fixed', 'fitts', 'cost_of_time')
+DURATION_MODELS = ('fixed', 'fitts')
 ARRIVALS = ('rest', 'passing')
 ONLINE = 'online'
 ADAPTATIONS = ('none', ONLINE)
+LEARNINGS = ('none', 'goals', ONLINE)
 BOUNDS = ('cantelli', 'gaussian')
 RISKS = ('step', 'path')
 GUIDANCE_MODES = ('path', 'trajectory')
 MOST_CANDIDATES = 64
 """Largest number of homotopy classes that are solved in one prediction."""
 WIDENS = 'widens the predicted covariance, not the chance constraint'
-JERK_ONLY = 'plant triple_integrator'
 REFERENCE_STEP_S = 0.02
 """Step for which the noise parameters are quoted (doc/model.md): c is scaled by sqrt(0.02 / dt)."""
 WHOLE_WAY_S = 1000.0
@@ -71,14 +72,12 @@ class FocConfig:
         0.0, f'root of the spectral density of unplanned control, which {WIDENS}; N s^0.5 for damped_mass', 'm/s^2.5', 0.0, 1e3
     )
     endpoint_stddev: float = _p(0.03, f'standard deviation of end points about their goal, per axis; it {WIDENS}', 'm', 0.0, 1.0)
-    lv_delta: float = _p(5e-5, 'tau per unit of s for strategy lv', 'm^2', 0.0, 1.0)
+    lv_delta: float = _p(5e-5, 'tau per unit of s for strategy lv, and per step of algorithm1 (delta)', 'm^2', 0.0, 1.0)
     hc_delta: float = _p(1e-4, 'tau per unit of s for strategy hc', 'm^2', 0.0, 1.0)
     growth: float = _p(2.0, 'factor on lambda per unit of s (Delta)', '', 1.0001, 1e6)
     tau: float = _p(0.0, 'clearance term tau of strategy fixed', 'm^2', 0.0, 100.0)
     lam: float = _p(1.0, 'variance weight lambda of strategy fixed, and the first lambda of lv and hc', '', 0.0, 1e15)
-    algorithm1_delta: float = _p(5e-5, 'step of tau in strategy algorithm1 (delta)', 'm^2', 0.0, 1.0)
     algorithm1_growth: float = _p(10.0, 'factor on lambda per step of strategy algorithm1 (Delta)', '', 1.0, 1e6)
-    algorithm1_xi: float = _p(1.0, 'change of effort at which strategy algorithm1 ends (xi)', 'm^2/s^6', 0.0, 1e12)
     goal_weight: float = _p(0.0, 'weight of the position variance at the goal, in effort per m^2', '1/s^6', 0.0, 1e15)
     recovery_s: float = _p(0.2, 'time within which a hand inside the margin of an obstacle has to leave it', 's', 0.0, 10.0)
     qp_backend: str = _p('piqp', 'QP solver: piqp, a solver of qpsolvers by its name, or a registered one', choices=QP_BACKENDS)
@@ -88,24 +87,17 @@ class FocConfig:
 class DurationConfig:
     """Duration of the movement, and how it ends."""
 
-    model: str = _p(
-        'fitts', 'duration of a movement: fixed, by Fitts law, or optimal if time has a cost', choices=DURATION_MODELS
-    )
+    model: str = _p('fitts', 'duration of a movement: fixed, or by Fitts law', choices=DURATION_MODELS)
     fixed_s: float = _p(1.0, 'duration of model fixed', 's', 0.05, 60.0)
     fitts_a_s: float = _p(0.2, 'intercept of Fitts law', 's', 0.0, 60.0)
     fitts_b_s: float = _p(0.25, 'slope of Fitts law, per bit', 's', 0.0, 60.0)
     target_width: float = _p(0.02, 'target width of Fitts law', 'm', 1e-4, 10.0)
-    time_cost: float = _p(
-        100.0, f'cost of time of model cost_of_time, for {JERK_ONLY} also in the cost of a class', 'm^2/s^6', 1e-9, 1e9
-    )
     adaptation: str = _p(
         'online', "whether expected durations and `arrival` follow the operator's movements", choices=ADAPTATIONS
     )
-    min_time_to_go_s: float = _p(0.3, 'lower limit of the time to go', 's', 0.01, 60.0)
     spread: float = _p(0.4, f'standard deviation of the time to go, as a fraction of it; it {WIDENS}', '', 0.0, 2.0)
     wait_s: float = _p(0.0, f'mean time until a hand at rest starts to move; it {WIDENS}', 's', 0.0, 60.0)
     arrival: str = _p('rest', 'how the hand arrives at its goal: it comes to rest, or passes at any speed', choices=ARRIVALS)
-    max_time_to_go_s: float = _p(10.0, 'upper limit of the time to go', 's', 0.05, 120.0)
 
 
 @dataclass(frozen=True)
@@ -153,7 +145,7 @@ class HomotopyConfig:
     """Homotopy classes that are considered."""
 
     max_candidates: int = _p(
-        4, 'number of homotopy classes to solve, over all goals; each goal gets at least one', '', 1, MOST_CANDIDATES
+        8, 'number of homotopy classes to solve, over all goals; each goal gets at least one', '', 1, MOST_CANDIDATES
     )
     clearance: float = _p(0.005, 'distance that the hand needs from every obstacle: narrower gaps are closed', 'm', 0.0, 1.0)
     library: str = _p('', 'file of paths that learn or replay --learn wrote; empty: none', read_only=True)
@@ -172,39 +164,19 @@ class LikelihoodConfig:
         0.0,
         math.inf,
     )
-    spent_share: float = _p(0.0, f'fraction of the effort since onset that every cost contains, for {JERK_ONLY}', '', 0.0, 1.0)
     planning_horizon_s: float = _p(
         3.0,
-        'time to the goal beyond which an operator looks ahead (lookahead_s, beta_beyond); 0: always; 1000: never',
+        'time to the goal beyond which an operator looks ahead (lookahead_s); 0: always; 1000: never',
         's',
         0.0,
         WHOLE_WAY_S,
     )
-    planning_spread: float = _p(
-        1.0, 'standard deviation of the logarithm of the planning horizon, in one operator and between operators', '', 0.05, 1.5
-    )
     lookahead_s: float = _p(
         0.5, 'mean look-ahead of an operator who looks ahead: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
-    )
-    beta_beyond: float = _p(
-        0.05, 'exponent of an operator who looks ahead for the way beyond the next row of obstacles', '', 0.0, 100.0
     )
     weaving: float = _p(
         4.0, 'log-likelihood that a class loses for each row through several gaps of which it leads', '', 0.0, 100.0
     )
-    heading_bias: float = _p(
-        0.0, 'angle, positive to the left, by which reaches begin beside the straight way to their goal', 'rad', -0.8, 0.8
-    )
-    adaptation: str = _p(
-        'online',
-        "whether horizon, heading bias and, by a factor, `beta`, `shortfall` and `beta_beyond` follow the operator's choices",
-        choices=ADAPTATIONS,
-    )
-    hold_s: float = _p(
-        0.2, 'longest time for which a class keeps its last answer if there is no time for a new one or it fails', 's', 0.0, 10.0
-    )
-    smoothing_s: float = _p(0.1, 'time constant of the filter of the likelihoods; 0: none', 's', 0.0, 10.0)
-    margin: float = _p(0.05, 'lead in likelihood that another class needs to become the most likely one', '', 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -212,16 +184,9 @@ class ExperienceConfig:
     """Use of recordings as evidence: those in the class library (`homotopy.library`), and those that are learnt."""
 
     learning: str = _p(
-        'none', 'whether movements that end at a goal are added to the recordings of the running program', choices=ADAPTATIONS
-    )
-    prior_count: float = _p(
-        1.0, 'number of recordings as which the model counts, for the gap in the next row and for the goal', '', 1e-3, 1e6
-    )
-    prior_count_beyond: float = _p(30.0, 'the same, for the way beyond the next row of obstacles', '', 1e-3, 1e6)
-    prior_count_path: float = _p(0.3, 'the same, for the path to the next row and as far as recordings reach', '', 1e-3, 1e6)
-    position_stddev: float = _p(0.02, 'distance from the hand at which a recording counts less', 'm', 1e-4, 10.0)
-    velocity_stddev: float = _p(
-        0.03, 'difference from the velocity of the hand at which a recording counts less', 'm/s', 1e-4, 10.0
+        'goals',
+        'what movements that end at a goal say of later ones in the running program: nothing; paths and goals; also ways',
+        choices=LEARNINGS,
     )
 
 
@@ -237,16 +202,9 @@ class SceneConfig:
         0.0, 'standard deviation of the radius of obstacles from markers, collision objects and detections', 'm', 0.0, 1.0
     )
     hand_radius: float = _p(0.0, 'added to the radius of every obstacle: hands and tools are not points', 'm', 0.0, 1.0)
-    height_stddevs: float = _p(
-        2.0,
-        'standard deviations of the predicted height by which it has to clear an obstacle that is to be ignored',
-        '',
-        0.0,
-        10.0,
-    )
 
 
-Group = TypeVar('Group', DurationConfig, CovarianceConfig, LikelihoodConfig)
+Group = TypeVar('Group', DurationConfig, CovarianceConfig)
 
 
 @dataclass(frozen=True)
@@ -279,17 +237,6 @@ class GuidanceConfig:
     clearance: float = _p(
         0.012, 'distance that guidance keeps the hand from obstacles: no force farther away; 0: force everywhere', 'm', 0.0, 1.0
     )
-    sharpness: float = _p(
-        3.0, 'exponent of the likelihoods as weights: the larger, the more the likeliest candidate leads', '', 0.1, 10.0
-    )
-    yield_acceleration: float = _p(
-        0.6, 'acceleration of the hand against the force from which on there is no force; 0: it does not yield', 'm/s^2', 0.0, 1e3
-    )
-    precision_low: float = _p(
-        100.0, 'precision, an inverse variance of position, up to which there is no stiffness', '1/m^2', 0.0, 1e9
-    )
-    precision_high: float = _p(2500.0, 'precision from which on the stiffness is `k_max`', '1/m^2', 1.0, 1e9)
-    position_stddev: float = _p(0.002, 'standard deviation that is added to that of every predicted position', 'm', 1e-6, 1.0)
     margin: float = _p(0.002, 'distance from every obstacle within which no force leads towards it', 'm', 0.0, 1.0)
     tank: float = _p(0.5, 'capacity and first content of the energy tank: most energy that guidance gives', 'J', 0.0, 1e3)
     max_speed: float = _p(1.0, 'speed of the fastest hand, for which tank and margins are guaranteed', 'm/s', 0.01, 100.0)
@@ -415,6 +362,8 @@ def _find_parameter(name: str, value: object, known: Mapping[str, Parameter]) ->
     """Return the parameter of a name; raise ParameterError for a name that is unknown or that of a group."""
     if name in known:
         return known[name]
+    if name in REMOVED:
+        raise ParameterError(name, f'no value, because it was removed: {REMOVED[name]}', repr(value))
     groups = {each.partition('.')[0] for each in known if '.' in each}
     expected = 'a group of parameters' if name in groups else f'a known parameter{suggest(name, (*known, *groups))}'
     raise ParameterError(name, expected, repr(value))

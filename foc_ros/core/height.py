@@ -11,7 +11,7 @@ is linear-quadratic, and its answer is closed: with W = diag(1 + w c^2 S^2),
 
     u = W^-1 R' (R W^-1 R')^-1 (z_goal - A^N z(0)).
 
-The covariance has the parts that it has in the plane (`dynamics.predictive_covariance`). c is the root mean square of
+The covariance has the parts that it has in the plane (`plant.covariance`). c is the root mean square of
 `foc.noise_x` and `foc.noise_y`. Time to go, onset and likelihoods are those of the plane.
 """
 
@@ -25,14 +25,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .config import REFERENCE_STEP_S, Config
-from .dynamics.impulse_response import apply_impulse_response
-from .dynamics.noise import propagate_covariance, scale_noise, stack_noise
-from .dynamics.plant_models import HAND_STATES, make_plant_model
-from .dynamics.plants import find_states_at_goal
-from .dynamics.predictive_covariance import SharedCovariances, widen_covariance
-from .estimation.duration import is_passing
-from .obstacles.height_clearance import find_cleared
+from .hand.duration import is_passing
+from .obstacles.clearance import find_cleared
+from .plant.covariance import SharedCovariances, propagate_covariance, scale_noise, stack_noise, widen_covariance
+from .plant.models import HAND_STATES, make_plant_model
+from .plant.plants import apply_impulse_response, find_states_at_goal
 from .types import Array, HandState, HeightTrajectory, Obstacles, PredictedCandidate, Solution, Status
+
+CLEAR_STDDEVS = 2.0
+"""Standard deviations of the predicted height by which it has to clear an obstacle that is to be ignored."""
 
 
 class HeightPredictor:
@@ -78,7 +79,7 @@ class HeightPredictor:
             dt = duration_s / self._config.foc.steps
             height = self._predict(row, dt)
             assert height is not None
-            margin = scene.hand_radius + scene.height_stddevs * height.stddev
+            margin = scene.hand_radius + CLEAR_STDDEVS * height.stddev
             band = height.mean[:, 0] + np.stack((-margin, margin))
             is_cleared &= find_cleared(obstacles, place, goal, self.compute_progress(goal, dt), band, dt)
         return is_cleared

@@ -6,13 +6,12 @@ which, unlike the usual exponential of cost differences, does not change with th
 is the rule `cost_ratio`; `likelihood.rule` can name another one, which maps costs to logarithms of weights. A class whose safety
 factor k is below the wanted one has a smaller weight, by the factor exp(-likelihood.shortfall (k_wanted - k)).
 
-J_i is the cost that `CostModel` assembles: the effort to go through class i, the price of its duration, and a part of the effort
-since movement onset, which all classes share. For an operator with a heading bias it is the cost without it (`heading_bias`).
+J_i is the integral of the squared control of class i: its effort to go times the length of a step.
 
 This is for operators who plan the whole way. They do so where they need less time than their planning horizon. Otherwise they
 look ahead: they weigh what is near and leave distant choices open, with p' from the rules below. The horizon has a log-normal
-distribution with the median H = `likelihood.planning_horizon_s` and the spread sigma = `likelihood.planning_spread`, so that with
-the shortest time to go T of the classes
+distribution with the median H = `likelihood.planning_horizon_s` and the spread sigma, between operators or of one from choice to
+choice, so that with the shortest time to go T of the classes
 
     p_i <- (1 - s) p_i + s p'_i,   s = Phi(log(T / H) / sigma).
 
@@ -25,73 +24,36 @@ h, S_W(h) = {W': tau_WW' > h}, are not yet distinguished from W, so that each ge
 A choice that lies tau ahead is therefore made with the exponent beta exp(-tau / lookahead_s): by the ratio of costs when it is
 near, evenly when it is far. With a `lookahead_s` of 0, h is infinite.
 
-These p'_i give the probabilities of the gaps of the next row. Which way to take beyond this row is decided with an exponent of
-its own, beta' = `likelihood.beta_beyond`. With G the classes that take the same gap in the next row as class i, and W those of
-the same way through all rows, which differ in their goals,
+These p'_i give the probabilities of the gaps of the next row. All classes beyond this row are equally likely, but for the goals
+of one way. With |G| classes that take the same gap in the next row as class i, and |W| of the same way through all rows, which
+differ in their goals,
 
-    p'_i <- sum_{j in G} p'_j  (sum_{j in W} r_j / sum_{j in G} r_j)  p_i / sum_{j in W} p_j,
-    log r_i = -beta' log J_i - (beta' / beta) shortfall (k_wanted - k),
+    p'_i <- (sum_{j in G} p'_j) |W| / |G|  p_i / sum_{j in W} p_j.
 
-so that far choices follow the same losses as near ones, less precisely if beta' < beta. With a beta of 0 the shortfall counts in
-full.
 Where no row is ahead, W and G are the classes that lead to the same goal, and all is decided as near.
 
-The weight of a class that weaves through w_i rows (`decisions`) is smaller by exp(-`likelihood.weaving` w_i), in both p and p'.
+The weight of a class that weaves through w_i rows (`classes.rows`) is smaller by exp(-`likelihood.weaving` w_i), in both p, p'.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .classes.rows import Decisions
 from .classes.sides import BranchTimes
-from .config import WHOLE_WAY_S, Config, LikelihoodConfig
-from .dynamics.plant_models import make_plant_model
+from .config import WHOLE_WAY_S, LikelihoodConfig
 from .errors import InputError
-from .estimation.duration import get_time_price
-from .heading_bias import Reaches
 from .registry import LIKELIHOOD_RULES
-from .safety_preference import COST_FLOOR, SafetyPreference
-from .types import Array, Solution
+from .safety_preference import COST_FLOOR
+from .types import Array
 
-
-class CostModel(NamedTuple):
-    """Parts of the cost of a class besides its effort: a part that all classes share [m^2/s^5], the price of time [m^2/s^6]."""
-
-    shared: float = 0.0
-    time_price: float = 0.0
-
-    def compute_cost(self, solution: Solution) -> float:
-        """Return the cost J_i [m^2/s^5] of a class: an integral of squared jerk, so that classes of other durations compare."""
-        return solution.expected_effort * solution.dt + self.compute_fixed_cost(solution.dt * len(solution.control))
-
-    def compute_fixed_cost(self, duration_s: float) -> float:
-        """Return the part of the cost [m^2/s^5] that is not effort to go, for a class with a duration [s]."""
-        return self.shared + self.time_price * duration_s
-
-
-def make_cost_model(effort_spent: float, config: Config) -> CostModel:
-    """Return the costs of a movement with an effort since onset [m^2/s^5]; both parts are 0 for a plant not driven by jerk."""
-    if not make_plant_model(config.foc).is_jerk_driven:
-        return CostModel()
-    return CostModel(compute_shared_cost(effort_spent, config.likelihood), get_time_price(config.duration))
-
-
-def make_preference(effort_spent: float, duration_s: float, config: Config) -> SafetyPreference:
-    """Return how a class with a duration [s] weighs effort and safety, for an effort since onset [m^2/s^5]."""
-    fixed_cost, likelihood = make_cost_model(effort_spent, config).compute_fixed_cost(duration_s), config.likelihood
-    return SafetyPreference(likelihood.beta, likelihood.shortfall, fixed_cost, duration_s / config.foc.steps)
-
-
-def compute_shared_cost(effort_spent: float, config: LikelihoodConfig) -> float:
-    """Return the part of the cost [m^2/s^5] that all classes share, for an effort since onset [m^2/s^5]."""
-    return config.spent_share * effort_spent
+LEAST_LOG = -700.0
+"""Least logarithm of a weight relative to the largest one: a rule may give a class no weight at all, and numbers stay finite."""
+BETWEEN_OPERATORS, OWN_SPREAD = 1.0, 0.3
+"""Standard deviation of the logarithm of the planning horizon: between operators, and of one operator from choice to choice."""
 
 
 def compute_likelihoods(
@@ -101,50 +63,65 @@ def compute_likelihoods(
     shortfalls: Array | None = None,
     decisions: Decisions | None = None,
     time_s: float = 0.0,
-    reaches: Reaches | None = None,
+    planning_spread: float = BETWEEN_OPERATORS,
 ) -> Array:
     """Return the likelihoods (k,) of classes by the rule that `likelihood.rule` names; they sum to one.
 
-    costs (k,) >= 0 [m^2/s^5], of which those below `COST_FLOOR` count as `COST_FLOOR`; branch_times: of these classes, for a
-    look-ahead only; shortfalls (k,) >= 0: of their safety factors, zero if not given; decisions: of these classes, without which
-    all choices are near; time_s: the shortest time to go of these classes [s]; reaches: of these classes, without which there is
-    no heading bias. Logarithms keep numbers in range. Raises InputError for a cost that is negative or not finite.
+    Parameters
+    ----------
+    costs
+        Costs J_i (k,) >= 0 [m^2/s^5]; those below `COST_FLOOR` count as `COST_FLOOR`, to keep numbers in range.
+    config
+        The rule and its parameters.
+    branch_times
+        When the classes branch off, for a look-ahead only.
+    shortfalls
+        By how much safety factors are below the wanted one, (k,) >= 0; zero if not given.
+    decisions
+        Gaps and ways of the classes, without which all choices are near.
+    time_s
+        Shortest time to go of the classes [s].
+    planning_spread
+        Standard deviation of the logarithm of the planning horizon.
+
+    Raises
+    ------
+    InputError
+        For a cost that is negative or not finite.
     """
     values = np.asarray(costs, dtype=float)
     for row, value in enumerate(values.tolist()):
         if not 0.0 <= value < math.inf:
             raise InputError(f'costs[{row}]', 'a finite number >= 0', value)
-    if reaches is not None and config.heading_bias:
-        values = reaches.compute_unbiased_costs(values, config.heading_bias)
-    rule, losses = LIKELIHOOD_RULES.get(config.rule), np.zeros(len(values))
+    losses = np.zeros(len(values))
     if shortfalls is not None:
         np.multiply(config.shortfall, shortfalls, out=losses, where=shortfalls > 0.0)
-    logs, woven = rule(values, config) - losses, np.zeros(len(values)) if decisions is None else config.weaving * decisions.woven
+    logs = LIKELIHOOD_RULES.get(config.rule)(values, config) - losses
+    best = logs.max(initial=-np.inf)
+    logs = np.maximum(logs - best, LEAST_LOG) if np.isfinite(best) else np.zeros(len(values))
+    woven = np.zeros(len(values)) if decisions is None else config.weaving * decisions.woven
     planned = normalise_logs(logs - woven)
-    share = compute_lookahead_share(time_s, config)
+    share = compute_lookahead_share(time_s, config, planning_spread)
     if share == 0.0 or not len(logs) or (branch_times is None and decisions is None):
         return planned
     near = logs
     if config.lookahead_s > 0.0 and branch_times is not None:
-        near = _weigh_by_lookahead(logs - logs.max(), branch_times, config.lookahead_s)
+        near = _weigh_by_lookahead(logs, branch_times, config.lookahead_s)
     if decisions is not None:
-        precision = config.beta_beyond / config.beta if config.beta > 0.0 else 1.0
-        beyond = rule(values, replace(config, beta=config.beta_beyond)) - precision * losses
-        beyond = _share_weights(beyond, logs, decisions.way)
+        beyond = _share_weights(np.zeros(len(logs)), logs, decisions.way)
         near = _share_weights(near - woven, beyond - woven, decisions.next_gap)
-    ahead = normalise_logs(near)
-    mixed: Array = (1.0 - share) * planned + share * ahead
+    mixed: Array = (1.0 - share) * planned + share * normalise_logs(near)
     return mixed
 
 
-def compute_lookahead_share(time_s: float, config: LikelihoodConfig) -> float:
+def compute_lookahead_share(time_s: float, config: LikelihoodConfig, planning_spread: float) -> float:
     """Return the probability Phi(log(T / H) / sigma) that an operator looks ahead whose time to go is time_s [s]."""
     if config.planning_horizon_s == 0.0:
         return 1.0
     if time_s <= 0.0 or config.planning_horizon_s >= WHOLE_WAY_S:
         return 0.0
     log_ratio = math.log(config.planning_horizon_s) - math.log(time_s)
-    return 0.5 * math.erfc(log_ratio / (math.sqrt(2.0) * config.planning_spread))
+    return 0.5 * math.erfc(log_ratio / (math.sqrt(2.0) * planning_spread))
 
 
 def cost_ratio_logs(costs: Array, config: LikelihoodConfig) -> Array:
@@ -186,16 +163,3 @@ def _weigh_by_lookahead(logs: Array, branch_times: BranchTimes, lookahead_s: flo
     probability = -np.diff(later, axis=1, prepend=1.0)
     weighted: Array = ((probability * mean).sum(axis=1) - weight)[path_class] + logs
     return weighted
-
-
-def select_most_likely(likelihoods: Mapping[str, float], previous: str | None, margin: float) -> str | None:
-    """Return the label of the most likely class; the previous one stays until another leads by more than `margin`.
-
-    likelihoods: by label. Among equally likely classes the first label in the alphabet is taken, whatever the order of the input.
-    None for no class.
-    """
-    if not likelihoods:
-        return None
-    negative, best = min((-share, label) for label, share in likelihoods.items())
-    kept = likelihoods.get(previous) if previous is not None else None
-    return previous if kept is not None and -negative - kept <= margin else best

@@ -9,16 +9,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from .classes.library import Demonstration
-from .config import Config
+from .config import ONLINE, Config
 from .deadline import NEVER, Deadline
 from .errors import FocError
-from .estimation.kalman_filter import FilterState, describe_jump, update
-from .learning.experience import Library, make_library
-from .learning.learnt import Learnt
-from .memory.memory import Memory
-from .obstacles.scene import ObstacleSource, Scene
-from .predictor import predict
-from .rejections import Rejections
+from .hand.kalman import FilterState, describe_jump, update
+from .learning.learnt import Knowledge, Learnt
+from .learning.recordings import Library, make_library
+from .predict import predict
+from .scene import ObstacleSource, Scene
+from .support import Rejections
+from .tracks import NO_TRACKS, Tracks
 from .types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction, SampleStatus
 
 __all__ = ['Pipeline', 'PredictionTask', 'SampleStatus']
@@ -32,27 +32,29 @@ class PredictionTask:
     hand: HandState
     obstacles: Obstacles
     goals: Array
-    memory: Memory
-    library: Library
+    tracks: Tracks
+    knowledge: Knowledge
     deadline: Deadline
     goal_heights: Array | None
 
-    def run(self) -> tuple[Prediction, Memory]:
-        """Compute the prediction and the memory for the next one; this may happen in another thread."""
+    def run(self) -> tuple[Prediction, Tracks]:
+        """Compute the prediction and the classes that it follows; this may happen in another thread."""
         scene = self.hand, self.obstacles, self.goals
-        return predict(self.config, *scene, self.memory, self.library, self.deadline, self.goal_heights)
+        return predict(self.config, *scene, self.tracks, self.knowledge, self.deadline, self.goal_heights)
 
 
 class Pipeline:
     """Follow the hand, keep the scene, and predict when a new hand sample is due.
 
-    library: demonstrated paths. Attributes: config; given, this library; hand_state, None before the first hand sample; scene,
-    obstacles and goals; is_engaged, whether predictions are made; frame_id, the working frame, None until the parameter or the
-    first hand sample fixes it; learnt, what was learnt so far of the operator and the scene.
+    library: demonstrated paths; is_timed: whether `rate_hz` and `scene.timeout_s` apply; without them every hand sample is due,
+    and obstacles are never too old. Attributes: config; given, this library; hand_state, None before the first hand sample;
+    scene, obstacles and goals; is_engaged, whether predictions are made; frame_id, the working frame, None until the parameter or
+    the first hand sample fixes it; learnt, what was learnt so far of the operator and the scene.
     """
 
-    def __init__(self, config: Config, library: Sequence[Demonstration] = ()) -> None:
+    def __init__(self, config: Config, library: Sequence[Demonstration] = (), *, is_timed: bool = True) -> None:
         self.config = config
+        self._is_timed = is_timed
         self.given = tuple(library)
         self.hand_state: FilterState | None = None
         self.scene = Scene()
@@ -60,7 +62,7 @@ class Pipeline:
         self.learnt, self._library = Learnt(), make_library(self.given)
         self.frame_id = config.frame_id.lstrip('/') or None
         self._rejections = Rejections()
-        self._memory = Memory()
+        self._tracks = NO_TRACKS
         self._is_new = False
         self._was_tried = False
         self._predicted_ns: int | None = None
@@ -108,8 +110,10 @@ class Pipeline:
     @property
     def _due_ns(self) -> int | None:
         """Stamp from which on the next prediction is due; None if any stamp is."""
+        if self._predicted_ns is None or not self._is_timed:
+            return None
         period_ns = int(NANOSECONDS / self.config.rate_hz)
-        return None if self._predicted_ns is None else self._predicted_ns + period_ns - min(self._late_ns, period_ns // 2)
+        return self._predicted_ns + period_ns - min(self._late_ns, period_ns // 2)
 
     def add_hand_sample(self, sample: HandSample) -> SampleStatus:
         """Take a hand sample. The first one fixes the working frame if the parameter does not."""
@@ -189,11 +193,12 @@ class Pipeline:
         self._is_new, self._predicted_ns = False, stamp_ns
         obstacles = self.scene.obstacles(self.hand_state.stamp_ns)
         scene = self.hand_state, obstacles, self.scene.goals
-        heights = self.scene.goal_heights
-        self._task = PredictionTask(self.adapted_config, *scene, self._memory, self._library, deadline, heights)
+        knowledge = Knowledge(self._library, self.learnt.planning_spread)
+        tracks, heights = self._tracks, self.scene.goal_heights
+        self._task = PredictionTask(self.adapted_config, *scene, tracks, knowledge, deadline, heights)
         return self._task
 
-    def finish(self, task: PredictionTask, compute: Callable[[], tuple[Prediction, Memory]]) -> Prediction | None:
+    def finish(self, task: PredictionTask, compute: Callable[[], tuple[Prediction, Tracks]]) -> Prediction | None:
         """Return the prediction of a task, and remember it; None, with a count, if it failed or was abandoned meanwhile.
 
         compute: `task.run`, or a function that returns or raises what it returned or raised in another thread.
@@ -203,11 +208,11 @@ class Pipeline:
             return None
         self._task = None
         try:
-            prediction, self._memory = compute()
+            prediction, self._tracks = compute()
         except FocError as error:
             self._rejections.reject('predict_failed', str(error))
             return None
-        self.learnt = self.learnt.add(prediction, self._memory.choice, task.config.covariance)
+        self.learnt = self.learnt.add(prediction, task.config.covariance)
         for candidate in prediction.candidates:
             if not candidate.has_likelihood:
                 self._rejections.count(f'candidate_{candidate.status.value}')
@@ -259,14 +264,19 @@ class Pipeline:
         if self._task is not None:
             self._abandon_task()
             self._is_new, self._predicted_ns = True, None
-        self._memory = Memory(self._memory.most_likely, numbers=self._memory.numbers)
+        self._tracks = self._tracks.without_solutions()
 
     def _learn(self, learnt: Learnt) -> None:
         """Replace what was learnt, and the library if it has other recordings now."""
         recordings = learnt.movements.learnt
         if recordings is not self.learnt.movements.learnt:
-            self._library = make_library((*self.given, *recordings))
+            self._library = self._make_library(recordings)
         self.learnt = learnt
+
+    def _make_library(self, recordings: Sequence[Demonstration]) -> Library:
+        if self.config.experience.learning == ONLINE:
+            return make_library((*self.given, *recordings))
+        return make_library(self.given, recordings)
 
     def _find_not_ready_reason(self) -> tuple[str, str] | None:
         """Return why the pipeline cannot predict, as (kind, message), judged by stamps; the node also judges by its clocks."""
@@ -274,11 +284,11 @@ class Pipeline:
             return 'disengaged', 'disengaged'
         if self.hand_state is None:
             return 'no_hand', 'no hand pose yet'
-        return self.scene.not_ready_reason(self.hand_state.stamp_ns, self.config.scene.timeout_s)
+        return self.scene.not_ready_reason(self.hand_state.stamp_ns, self.config.scene.timeout_s if self._is_timed else 0.0)
 
     def _forget_predictions(self) -> None:
         self._abandon_task()
-        self._memory, self._predicted_ns = self._memory.forget(), None
+        self._tracks, self._predicted_ns = self._tracks.forget(), None
 
     def _abandon_task(self) -> None:
         """Make sure that a prediction that is being computed is neither returned nor remembered, and end it soon."""

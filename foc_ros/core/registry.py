@@ -84,8 +84,8 @@ STRATEGIES = Registry(
 PLANTS = Registry(
     'plant',
     {
-        'triple_integrator': 'foc_ros.core.dynamics.plant_models:TripleIntegratorModel',
-        'damped_mass': 'foc_ros.core.dynamics.plant_models:make_damped_mass',
+        'triple_integrator': 'foc_ros.core.plant.models:TripleIntegratorModel',
+        'damped_mass': 'foc_ros.core.plant.models:make_damped_mass',
     },
 )
 QP_BACKENDS = QPBackendRegistry('QP backend', {'piqp': 'foc_ros.core.ocp.backend:solve_piqp'})

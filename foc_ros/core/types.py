@@ -103,8 +103,8 @@ class HandState(Record):
 
     mean (6,): x, y, vx, vy, ax, ay [m, m/s, m/s^2]; covariance (6, 6) in the same order;
     height: as measured, along the plane's normal [m]; onset_ns: stamp at which the present movement began, None at rest;
-    onset_position (2,): where it began [m]; effort_spent: integral of squared jerk since onset [m^2/s^5]; height_mean (3,):
-    height, its velocity and its acceleration, with the covariance that x, vx and ax have.
+    onset_position (2,): where it began [m]; height_mean (3,): height, its velocity and its acceleration, with the covariance that
+    x, vx and ax have.
     """
 
     stamp_ns: int
@@ -114,7 +114,6 @@ class HandState(Record):
     frame_id: str = ''
     onset_ns: int | None = None
     onset_position: Array | None = None
-    effort_spent: float = 0.0
     height_mean: Array = field(default_factory=lambda: np.zeros(3))
 
 
@@ -238,13 +237,13 @@ class Candidate(Record):
 
 
 class Status(Enum):
-    """Result of the forward optimal control of a candidate. Those that are solved, compromised or out of time have a likelihood.
+    """Result of the forward optimal control of a candidate. All that are solved or estimated have a likelihood.
 
     SOLVED: the solution meets the wanted eta. COMPROMISED: it meets a smaller eta only, which makes it less likely.
     ETA_UNREACHABLE: the same, where less than the wanted eta is not allowed. INFEASIBLE: no path of the class meets the goal and
     the constraints. ITERATION_LIMIT: the result does not meet what it promises. DEADLINE: time or iterations ran out before it
-    was settled: effort and safety are estimated from its last iterate.
-    LEFT_CLASS: the solution lies in another homotopy class.
+    was settled: effort and safety are estimated from its last iterate. ESTIMATED: the solver failed where the search has found a
+    path: path, effort and safety are estimated from its length. LEFT_CLASS: the solution lies in another homotopy class.
     """
 
     SOLVED = 'solved'
@@ -253,12 +252,13 @@ class Status(Enum):
     INFEASIBLE = 'infeasible'
     ITERATION_LIMIT = 'iteration_limit'
     DEADLINE = 'deadline'
+    ESTIMATED = 'estimated'
     LEFT_CLASS = 'left_class'
 
     @property
     def has_likelihood(self) -> bool:
         """Whether a candidate that ended so takes part in the likelihood."""
-        return self in (Status.SOLVED, Status.COMPROMISED, Status.DEADLINE)
+        return self in (Status.SOLVED, Status.COMPROMISED, Status.DEADLINE, Status.ESTIMATED)
 
     @property
     def remedy(self) -> str:
@@ -273,6 +273,7 @@ _REMEDIES = {
     'infeasible': 'none for this class, whose gap is closed; check the radii of its obstacles if people pass here',
     'iteration_limit': 'choose another foc.strategy',
     'deadline': 'allow a longer budget_s or fewer homotopy.max_candidates',
+    'estimated': 'choose another foc.strategy',
     'left_class': 'choose another foc.strategy',
 }
 
@@ -379,11 +380,10 @@ class PredictedCandidate:
     """One candidate with its solution and likelihood.
 
     candidate: the homotopy class; solution: its forward optimal control; sides: side on which the mean path passes each obstacle,
-    by id. cost: effort to go, time cost, and the share of the effort since onset that all classes have in common [m^2/s^5];
-    likelihood in [0, 1]: 0 unless solved, compromised or estimated. age_s: 0, or how long ago the solution was found, of which
-    this is the rest, if it failed [s]. way: a number that stays the same for as long as the class
-    is followed, whatever its label and its rank are. height: the movement along the normal of the plane, None where it is not
-    predicted: the hand then stays at its height.
+    by id. cost: effort to go times the length of a step [m^2/s^5]; likelihood in [0, 1]: 0 unless solved, compromised or
+    estimated. age_s: 0, or how long ago the solution was found, of which this is the rest, if it failed [s]. way: a number that
+    stays the same for as long as the class is followed, whatever its label and its rank are. height: the movement along the
+    normal of the plane, None where it is not predicted: the hand then stays at its height.
     """
 
     candidate: Candidate
@@ -470,7 +470,7 @@ class Prediction(Record):
     most_likely: label after hysteresis, None where no candidate has a likelihood. notes: facts for diagnostics (relaxed margins,
     merged classes, culled obstacles), as counts by name. solve_s: wall time of the whole prediction [s]. obstacles: all that were
     given, at the stamp of the hand; goals (g, 2) [m]. cleared (n,): whether the predicted height clears each obstacle, which
-    therefore does not block.
+    therefore does not block. unknown: share of the likelihood that belongs to classes that are not among the candidates.
     """
 
     stamp_ns: int
@@ -483,6 +483,7 @@ class Prediction(Record):
     obstacles: Obstacles = field(default_factory=make_obstacles)
     goals: Array = field(default_factory=lambda: np.zeros((0, 2)))
     cleared: tuple[bool, ...] = ()
+    unknown: float = 0.0
 
     def __repr__(self) -> str:
         """Say time, number of candidates and the most likely one."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.guidance.step import GuidanceOutput
+from foc_ros.core.guidance.guide import GuidanceOutput
 from foc_ros.core.types import LEFT, Array, HeightTrajectory, PredictedCandidate, Prediction, Solution
 
 
@@ -17,6 +17,7 @@ def encode_prediction(prediction: Prediction) -> dict[str, Any]:
     return {
         'stamp_ns': prediction.stamp_ns,
         'most_likely': prediction.most_likely,
+        'unknown': prediction.unknown,
         'candidates': [encode_candidate(each) for each in candidates],
     }
 

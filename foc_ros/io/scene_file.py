@@ -21,7 +21,7 @@ import numpy as np
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import FocError, ParameterError, SceneError, collect, collect_all, join_errors, suggest
 from foc_ros.core.obstacles.shapes import Box, Hull
-from foc_ros.core.reaching_scene import ReachingScene, check_outside
+from foc_ros.core.scene import ReachingScene, check_outside
 from foc_ros.core.types import Array, HandState, Obstacles, make_obstacles
 
 from .documents import read_document

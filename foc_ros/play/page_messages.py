@@ -8,8 +8,8 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from foc_ros.core.checks import check_number
 from foc_ros.core.errors import InputError, SceneError
+from foc_ros.core.support import check_number
 
 from .scene import BOUNDS, MOST_GOALS, MOST_OBSTACLES, PlayScene, Point, make_box, make_circle
 

@@ -16,9 +16,9 @@ from time import monotonic
 
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.guidance.step import GuidanceOutput
+from foc_ros.core.guidance.guide import GuidanceOutput
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.predictor import warm_up
+from foc_ros.core.predict import warm_up
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import HAND, TYPES

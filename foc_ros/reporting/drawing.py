@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.errors import FocError
-from foc_ros.core.obstacles.outline import trace_obstacle
+from foc_ros.core.obstacles.geometry import trace_obstacle
 from foc_ros.core.types import NANOSECONDS, Array, Obstacles
 
 from .snapshots import CandidateView, HandTrajectory, Snapshot, UnsolvedView

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from foc_ros.core.errors import InputError
-from foc_ros.core.obstacles.outline import find_limits
+from foc_ros.core.obstacles.geometry import find_limits
 from foc_ros.core.types import NANOSECONDS, Array, Obstacles, PredictedCandidate, Prediction
 from foc_ros.io.outputs import MARK, PICTURE_SUFFIXES
 
@@ -68,7 +68,7 @@ def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None
     unknown = np.array([each.unknown_share for each in tracks.snapshots])
     if unknown.any():
         look = {'facecolor': 'none', 'edgecolor': '0.6', 'hatch': HATCH, 'linewidth': 0.0, 'step': 'mid'}
-        axes.fill_between(times, 1.0 - unknown, 1.0, label='share of candidates without a likelihood', **look)
+        axes.fill_between(times, 1.0 - unknown, 1.0, label='share of what is unknown', **look)
         axes.legend(loc='lower left', fontsize=7)
     axes.set(ylim=(-0.03, 1.03), ylabel='likelihood')
     axes.tick_params(labelbottom=False)

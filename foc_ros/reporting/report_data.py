@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.obstacles.outline import find_limits
+from foc_ros.core.obstacles.geometry import find_limits
 from foc_ros.core.types import NANOSECONDS, Array, Obstacles, make_obstacles
 
 from .drawing import CLASS_COLOURS, ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, STDDEVS, Bounds, compute_ellipse_axes

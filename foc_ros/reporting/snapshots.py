@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.dynamics.smooth_path import compute_curve
 from foc_ros.core.errors import MessageError
+from foc_ros.core.plant.response import compute_curve
 from foc_ros.core.types import (
     LEFT,
     NANOSECONDS,
@@ -21,11 +21,10 @@ from foc_ros.core.types import (
     PredictedCandidate,
     Prediction,
     Record,
-    Status,
     describe_class,
 )
 from foc_ros.ros.messages.decode_poses import decode_stamp
-from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS, STAMP
+from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS, STAMP, UNKNOWN
 from foc_ros.ros.messages.plane import project
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate, find_drawn_curve, order_candidates
 
@@ -93,7 +92,7 @@ class Snapshot(Record):
     """One prediction and its scene.
 
     candidates: those with a likelihood, most likely first; most_likely: label, None if no candidate has one; unsolved: the other
-    candidates; solve_s: wall time [s], None if it is unknown.
+    candidates; solve_s: wall time [s], None if it is unknown; unknown_share: of the likelihood, which no candidate has.
     """
 
     stamp_ns: int
@@ -103,12 +102,7 @@ class Snapshot(Record):
     most_likely: str | None
     unsolved: tuple[UnsolvedView, ...] = ()
     solve_s: float | None = None
-
-    @property
-    def unknown_share(self) -> float:
-        """Share of the candidates of which no likelihood is known, 1 if none is; a class without any path is known to be out."""
-        unknown = sum(each.status != Status.INFEASIBLE.value for each in self.unsolved)
-        return unknown / (unknown + len(self.candidates)) if self.candidates else 1.0
+    unknown_share: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +215,8 @@ def build_snapshot(prediction: Prediction) -> Snapshot:
     unsolved = build_unsolved_views(prediction.candidates, len(prediction.goals))
     candidates = build_candidate_views(order_candidates(prediction), len(prediction.goals))
     scene = prediction.obstacles, prediction.goals
-    return Snapshot(prediction.stamp_ns, *scene, candidates, prediction.most_likely, unsolved, prediction.solve_s)
+    best, solve_s = prediction.most_likely, prediction.solve_s
+    return Snapshot(prediction.stamp_ns, *scene, candidates, best, unsolved, solve_s, prediction.unknown)
 
 
 def is_same_prediction(cloud: Any, likelihoods: Any) -> bool:
@@ -239,11 +234,15 @@ def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles
         raise MessageError('likelihoods', 'those of the prediction', 'those of another prediction')
     rows, columns = _read_cloud(cloud), _read_likelihoods(likelihoods)
     labels = likelihoods.layout.dim[0].label.split(';') if len(columns) else []
+    unknown = 0.0 if labels else 1.0
+    if labels and labels[-1] == UNKNOWN:
+        unknown, labels, columns = float(columns[-1, 0]), labels[:-1], columns[:-1]
     candidates = []
     for number, (label, values) in enumerate(zip(labels, columns, strict=True)):
         name = label, _describe_label(label, obstacles.ids, len(goals))
         candidates.append(_read_candidate(name, values, rows[rows['candidate'] == number], plane))
-    return Snapshot(decode_stamp(cloud.header), obstacles, goals, tuple(candidates), candidates[0].label if candidates else None)
+    best = candidates[0].label if candidates else None
+    return Snapshot(decode_stamp(cloud.header), obstacles, goals, tuple(candidates), best, unknown_share=unknown)
 
 
 def _read_candidate(name: tuple[str, str], values: Array, rows: Any, plane: str) -> CandidateView:

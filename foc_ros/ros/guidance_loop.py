@@ -15,8 +15,8 @@ from time import monotonic
 import numpy as np
 
 from foc_ros.core.config import Config
-from foc_ros.core.estimation.kalman_filter import FilterState
-from foc_ros.core.guidance.step import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
+from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
+from foc_ros.core.hand.kalman import FilterState
 from foc_ros.core.types import Prediction
 
 from .messages.encode_guidance import Place

@@ -9,7 +9,7 @@ from typing import Any
 from rclpy.node import Node
 
 from foc_ros.core.config import Config
-from foc_ros.core.guidance.step import GuidanceOutput
+from foc_ros.core.guidance.guide import GuidanceOutput
 from foc_ros.io.topics import COMMAND
 
 from .endpoints import create_guidance_publishers

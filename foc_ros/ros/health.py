@@ -261,18 +261,14 @@ class Monitor:
 
 def _describe_learnt(pipeline: Pipeline) -> str:
     """Return what was learnt of the operator and of the scene, and from how many movements and errors."""
-    pace, preferences, dispersion = pipeline.learnt.pace, pipeline.learnt.preferences, pipeline.learnt.dispersion
+    pace, dispersion = pipeline.learnt.pace, pipeline.learnt.dispersion
     movements = pipeline.learnt.movements
-    precision, horizon_s, _ = preferences.find_mean(pipeline.config.likelihood)
     arrival, factor = pace.find_best(pipeline.config.duration)
     durations = f'{pace.movements} movements ended, durations x {factor:.2f}, arrival {arrival}'
-    bias = preferences.find_heading_bias(pipeline.config.likelihood)
-    planned = f'planning horizon {horizon_s:.3g} s, heading bias {bias:.2f} rad'
-    choices = f'{preferences.movements} movements with choices, precision x {precision:.2f}, {planned}'
     now, later = dispersion.factors
     errors = f'{dispersion.errors} errors, standard deviations x {now:.2f} now, x {later:.2f} at the end'
     recorded = f'{len(movements.learnt)} movements recorded, {movements.refused} refused'
-    return f'{durations}; {choices}; {errors}; {recorded}'
+    return f'{durations}; {errors}; {recorded}'
 
 
 def _describe_prediction(prediction: Prediction | None) -> dict[str, str]:
@@ -280,7 +276,8 @@ def _describe_prediction(prediction: Prediction | None) -> dict[str, str]:
         return {}
     candidates = {f'candidate {outcome.candidate.label}': _describe_candidate(outcome) for outcome in prediction.candidates}
     notes = {f'note {name}': str(count) for name, count in sorted(prediction.notes.items())}
-    return {'most likely': prediction.most_likely or 'none', **candidates, **notes}
+    known = {'most likely': prediction.most_likely or 'none', 'unknown': f'{prediction.unknown:.3f}'}
+    return {**known, **candidates, **notes}
 
 
 def _describe_candidate(outcome: PredictedCandidate) -> str:

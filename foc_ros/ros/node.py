@@ -31,7 +31,7 @@ from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import FocError, MessageError
 from foc_ros.core.pipeline import Pipeline, SampleStatus
-from foc_ros.core.predictor import warm_up
+from foc_ros.core.predict import warm_up
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import CLOUD, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, REQUIRED
 

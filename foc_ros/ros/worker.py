@@ -15,8 +15,8 @@ from typing import Any
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
-from foc_ros.core.memory.memory import Memory
 from foc_ros.core.pipeline import PredictionTask
+from foc_ros.core.tracks import Tracks
 from foc_ros.core.types import Prediction
 
 
@@ -31,7 +31,7 @@ class Computation:
     task: PredictionTask
     received_s: float
     start_s: float
-    result: Future[tuple[Prediction, Memory]]
+    result: Future[tuple[Prediction, Tracks]]
 
 
 class Worker:

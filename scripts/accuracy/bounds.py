@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from foc_ros.core.obstacles.chance_constraint import RiskBound, count_events
+from foc_ros.core.obstacles.risk import RiskBound, count_events
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.types import Status
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from foc_ros.core.obstacles.chance_constraint import k_of_eta
+from foc_ros.core.obstacles.risk import k_of_eta
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.types import Array, Status
 from foc_ros.reporting.drawing import get_class_style, open_figure

@@ -11,8 +11,8 @@ from scipy.interpolate import CubicSpline
 
 from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config
-from foc_ros.core.obstacles.scene import Scene
 from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.scene import Scene
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Prediction
 from foc_ros.io.topics import HAND
 from foc_ros.ros.intake import Intake

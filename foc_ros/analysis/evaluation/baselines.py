@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.config import WHOLE_WAY_S, LikelihoodConfig
-from foc_ros.core.learning.choices import OWN_SPREAD
 from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.registry import Registry
 from foc_ros.core.types import LEFT, RIGHT, Array
@@ -28,11 +27,10 @@ from .questions import GOAL, Answer, Question
 PUBLISHED, REFITTED, PLAIN, UNIFORM, BOLTZMANN = 'foc', 'foc, held out', 'foc, plain rule', 'uniform', 'Boltzmann'
 CONFIDENCES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 POWERS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
-HORIZONS_S, LOOKAHEADS_S, POWERS_AHEAD, POWERS_BEYOND, WEAVINGS = (
+HORIZONS_S, LOOKAHEADS_S, POWERS_AHEAD, WEAVINGS = (
     (0.0, 1.5, 2.5),
     (0.0, 0.5, 1.0),
     (1.0, 2.0, 3.0, 5.0),
-    (0.05, 0.2, 1.0),
     (1.0, 4.0),
 )
 """Values that are tried where near and far choices differ."""
@@ -98,18 +96,17 @@ def _make_baseline(
 
 
 def make_plain_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[LikelihoodConfig, ...]:
-    """Return the exponents that are tried for ratios of whole costs, effort spent and to go, by which all choices are made."""
-    return tuple(replace(make_plain(published, beta), spent_share=1.0) for beta in POWERS)
+    """Return the exponents that are tried by which all choices are made."""
+    return tuple(make_plain(published, beta) for beta in POWERS)
 
 
 def make_power_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[LikelihoodConfig, ...]:
     """Return all parameters of the likelihood that are tried: one exponent for all choices, or near and far ones that differ."""
-    plain = (replace(make_plain(published, beta), spent_share=share) for beta, share in product(POWERS, (1.0, 0.0)))
     ahead = (
-        replace(make_ahead(published, horizon, seconds, beta, beyond), weaving=weaving)
-        for horizon, seconds, beta, beyond, weaving in product(HORIZONS_S, LOOKAHEADS_S, POWERS_AHEAD, POWERS_BEYOND, WEAVINGS)
+        replace(make_ahead(published, horizon, seconds, beta), weaving=weaving)
+        for horizon, seconds, beta, weaving in product(HORIZONS_S, LOOKAHEADS_S, POWERS_AHEAD, WEAVINGS)
     )
-    return (*plain, *ahead)
+    return (*make_plain_rules((), published), *ahead)
 
 
 def make_plain(likelihood: LikelihoodConfig, beta: float) -> LikelihoodConfig:
@@ -117,12 +114,9 @@ def make_plain(likelihood: LikelihoodConfig, beta: float) -> LikelihoodConfig:
     return replace(likelihood, beta=beta, planning_horizon_s=WHOLE_WAY_S)
 
 
-def make_ahead(
-    likelihood: LikelihoodConfig, horizon_s: float, lookahead_s: float, beta: float, beta_beyond: float
-) -> LikelihoodConfig:
-    """Return a likelihood of an operator with a known planning horizon, for whom effort that was spent does not count."""
-    ahead = replace(likelihood, planning_horizon_s=horizon_s, planning_spread=OWN_SPREAD, lookahead_s=lookahead_s)
-    return replace(ahead, beta=beta, beta_beyond=beta_beyond, spent_share=0.0)
+def make_ahead(likelihood: LikelihoodConfig, horizon_s: float, lookahead_s: float, beta: float) -> LikelihoodConfig:
+    """Return a likelihood of an operator with a planning horizon."""
+    return replace(likelihood, planning_horizon_s=horizon_s, lookahead_s=lookahead_s, beta=beta)
 
 
 def is_plain(likelihood: LikelihoodConfig) -> bool:

@@ -1,7 +1,8 @@
 """Forecasts: the probabilities that a predictor gives to the answers of a question, and likelihood rules tried on observations.
 
-What a predictor leaves over is spread evenly over the possible answers. Every predictor leaves at least `UNCERTAINTY`, so that an
-answer that no candidate gives is unlikely, not impossible. A candidate without a likelihood counts as the node publishes it: 0.
+What a predictor leaves over, such as the unknown share, is spread evenly over the possible answers. Every predictor leaves at
+least `UNCERTAINTY`, so that an answer that no candidate gives is unlikely, not impossible. A candidate without a likelihood
+counts as the node publishes it: 0.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from foc_ros.core.config import LikelihoodConfig
-from foc_ros.core.likelihood import compute_likelihoods, compute_shared_cost
+from foc_ros.core.likelihood import OWN_SPREAD, compute_likelihoods
 from foc_ros.core.types import Array, Record
 
 from .observations import Observation
@@ -32,7 +33,9 @@ class Forecast(Record):
     def from_shares(cls, shares: Array, question: Question) -> Forecast:
         """Sum shares (k,) of all candidates by the answers that they give."""
         by_answer = np.bincount(question.given, shares, len(question.answers)).astype(float)
-        return cls.from_answer_shares(by_answer, question, UNCERTAINTY)
+        total = float(by_answer.sum())
+        even = by_answer / total if total > 0.0 else by_answer
+        return cls.from_answer_shares(even, question, 1.0 - (1.0 - UNCERTAINTY) * min(total, 1.0))
 
     @classmethod
     def from_answer(cls, answer: Answer, confidence: float, question: Question) -> Forecast:
@@ -72,18 +75,18 @@ def published_shares(observation: Observation, _: None = None) -> Array:
 
 
 def power_rule_shares(observation: Observation, config: LikelihoodConfig) -> Array:
-    """Return the shares (k,) that the node would publish with other parameters of the likelihood."""
+    """Return the shares (k,) that the node would publish to a known operator with other parameters of the likelihood."""
     candidates = observation.candidates
     solved = np.flatnonzero(candidates.has_likelihood)
-    costs = compute_shared_cost(candidates.effort_spent, config) + candidates.cost_to_go[solved]
     branch_times, shortfalls = candidates.branch_times.take(solved), candidates.safety_shortfall[solved]
     time_s = float(candidates.time_s[solved].min()) if len(solved) else 0.0
-    shares = compute_likelihoods(costs, config, branch_times, shortfalls, candidates.decisions, time_s)
+    decided = branch_times, shortfalls, candidates.decisions, time_s, OWN_SPREAD
+    shares = compute_likelihoods(candidates.cost_to_go[solved], config, *decided)
     return _share_among_solved(observation, shares)
 
 
 def boltzmann_shares(observation: Observation, inverse_temperature: float) -> Array:
-    """Return the maximum-entropy rule exp(-b J), (k,); b: inverse temperature [s^5/m^2]. Effort spent is the same for all."""
+    """Return the maximum-entropy rule exp(-b J), (k,); b: inverse temperature [s^5/m^2]."""
     cost = observation.candidates.cost_to_go[observation.candidates.has_likelihood]
     weights = np.exp(-inverse_temperature * (cost - cost.min()))
     return _share_among_solved(observation, weights / weights.sum())

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from foc_ros.core.classes import compute_swept_angles
 from foc_ros.core.classes.rows import WALL, Rows, locate_rows
-from foc_ros.core.learning.goal_reached import find_reached_goal
+from foc_ros.core.learning.movements import find_reached_goal
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import LEFT, NANOSECONDS, RIGHT, Array, Obstacles, Record
 

@@ -18,12 +18,12 @@ from .observations import Observation
 
 
 def compute_straight_costs(observation: Observation) -> Array:
-    """Return the cost [m^2/s^5] of the movement to each goal, (g,): the integral of squared jerk and the price of its time."""
+    """Return the cost [m^2/s^5] of the movement to each goal, (g,): the integral of squared jerk."""
     alpha, beta, gamma, T = _compute_jerk(observation)
     effort = (
         gamma**2 * T + beta * gamma * T**2 + (beta**2 + alpha * gamma) * T**3 / 3 + alpha * beta * T**4 / 4 + alpha**2 * T**5 / 20
     )
-    return np.asarray(effort.sum(axis=1) + observation.candidates.time_price * T[:, 0])
+    return np.asarray(effort.sum(axis=1))
 
 
 def compute_straight_positions(observation: Observation, goal: int, seconds: Array) -> Array:

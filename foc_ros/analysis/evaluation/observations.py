@@ -17,10 +17,10 @@ from foc_ros.analysis.replay import Replay, Step
 from foc_ros.core.classes.rows import Decisions, Rows, find_decisions, find_direction, find_rows
 from foc_ros.core.classes.sides import BranchTimes, compute_branch_times
 from foc_ros.core.config import Config
-from foc_ros.core.dynamics.predictive_covariance import compute_duration_sensitivity
 from foc_ros.core.errors import FocError, RecordingError, warn
-from foc_ros.core.estimation.duration import get_time_price, is_passing
-from foc_ros.core.obstacles.chance_constraint import centre_trajectories
+from foc_ros.core.hand.duration import is_passing
+from foc_ros.core.obstacles.risk import centre_trajectories
+from foc_ros.core.plant.covariance import compute_duration_sensitivity
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Obstacles, PredictedCandidate, Prediction, Record, Solution
 
 from .ground_truth import (
@@ -39,24 +39,22 @@ from .ground_truth import (
 class CandidateTable(Record):
     """The k candidates of one prediction, about n obstacles.
 
-    labels; goal (k,): row of the goals; has_likelihood (k,): whether each takes part; effort_spent [m^2/s^5]: since onset, the
-    same for all; cost_to_go (k,) [m^2/s^5]: effort to go and what its time costs; safety_shortfall (k,): by how much the safety
-    factor is below the wanted one; likelihood (k,): as published; length (k,) [m]: of the shortest path in its class; time_price
-    [m^2/s^6]; time_s (k,): time to the goal; is_named (k, n): whether the obstacle is in the label; sides (k, n): LEFT or RIGHT,
-    on which the candidate passes each obstacle; mean (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2]: of the position at
-    `TIMES_S`; duration_sensitivity (k, h, 2) [m]: by how much the position lags behind for each share of the time to go that the
-    movement takes longer; branch_times: when the candidates part; decisions: of those that take part.
+    labels; goal (k,): row of the goals; has_likelihood (k,): whether each takes part; cost_to_go (k,) [m^2/s^5]: integral of the
+    squared control; safety_shortfall (k,): by how much the safety factor is below the wanted one; likelihood (k,): as published;
+    length (k,) [m]: of the shortest path in its class; time_s (k,): time to the goal; is_named (k, n): whether the obstacle is in
+    the label; sides (k, n): LEFT or RIGHT, on which the candidate passes each obstacle; mean (k, h, 2) [m] and covariance (k, h,
+    2, 2) [m^2]: of the position at `TIMES_S`; duration_sensitivity (k, h, 2) [m]: by how much the position lags behind for each
+    share of the time to go that the movement takes longer; branch_times: when the candidates part; decisions: of those that take
+    part.
     """
 
     labels: tuple[str, ...]
     goal: NDArray[np.int64]
     has_likelihood: Bools
-    effort_spent: float
     cost_to_go: Array
     safety_shortfall: Array
     likelihood: Array
     length: Array
-    time_price: float
     time_s: Array
     is_named: Bools
     sides: Sides
@@ -184,7 +182,7 @@ def make_observation(step: Step, hand: HandState, path: RecordedPath, config: Co
 def _tabulate_candidates(
     prediction: Prediction, obstacles: Obstacles, hand: HandState, goals: Array, config: Config
 ) -> CandidateTable:
-    predicted, price, passing = prediction.candidates, get_time_price(config.duration), is_passing(config.duration)
+    predicted, passing = prediction.candidates, is_passing(config.duration)
     solutions = [each.solution for each in predicted]
     has_likelihood = np.array([each.has_likelihood for each in predicted])
     sides = np.array([_find_predicted_sides(each, obstacles) for each in predicted])
@@ -194,12 +192,10 @@ def _tabulate_candidates(
         labels=tuple(each.candidate.label for each in predicted),
         goal=goal,
         has_likelihood=has_likelihood,
-        effort_spent=hand.effort_spent,
-        cost_to_go=np.array([each.effort * each.dt + price * each.times[-1] for each in solutions]),
+        cost_to_go=np.array([each.effort * each.dt for each in solutions]),
         safety_shortfall=np.array([each.safety_shortfall for each in solutions]),
         likelihood=np.array([each.likelihood for each in predicted]),
         length=np.array([each.candidate.length for each in predicted]),
-        time_price=price,
         time_s=np.array([each.times[-1] for each in solutions]),
         is_named=np.array(named, dtype=bool).reshape(len(predicted), len(obstacles)),
         sides=sides,

@@ -23,8 +23,8 @@ from foc_ros.analysis.evaluation.position_metrics import (
     log_mixture_density,
 )
 from foc_ros.core.config import Config
-from foc_ros.core.dynamics.replanning import triple_integrator_goal_map, triple_integrator_process_covariance
-from foc_ros.core.estimation.duration import is_passing
+from foc_ros.core.hand.duration import is_passing
+from foc_ros.core.plant.replanning import triple_integrator_goal_map, triple_integrator_process_covariance
 from foc_ros.core.types import Array
 
 from .estimates import Estimate, Estimates

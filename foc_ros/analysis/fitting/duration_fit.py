@@ -19,9 +19,9 @@ from scipy.optimize import minimize
 from foc_ros.analysis.evaluation.bootstrap import CENTRAL, RESAMPLES, SEED, draw_resamples
 from foc_ros.analysis.evaluation.ground_truth import RecordedPath
 from foc_ros.core.config import Config, DurationConfig, replace_values
-from foc_ros.core.estimation.duration import CONSTANTS as MODEL_CONSTANTS
-from foc_ros.core.estimation.duration import estimate_times_to_go
-from foc_ros.core.learning.goal_reached import has_covered_distance
+from foc_ros.core.hand.duration import CONSTANTS as MODEL_CONSTANTS
+from foc_ros.core.hand.duration import estimate_times_to_go
+from foc_ros.core.learning.movements import has_covered_distance
 from foc_ros.core.types import NANOSECONDS, Array, HandState
 
 from .estimates import Estimate, Estimates, apply_estimates, clip_to_bounds
@@ -29,7 +29,7 @@ from .recorded_hand import RecordedHand
 
 CONSTANTS = {model: {f'duration.{name}': power for name, power in powers.items()} for model, powers in MODEL_CONSTANTS.items()}
 """By model, the constants that determine durations by dotted name, each with its power in a factor on all durations."""
-DISTANCE_MODELS = ('fitts', 'cost_of_time')
+DISTANCE_MODELS = ('fitts',)
 """Models whose durations depend on the distance."""
 NARROW_BITS = 0.5
 """Standard deviation of the index of difficulty below which intercept and slope are not told apart [bit]."""

@@ -26,7 +26,7 @@ from scipy.optimize import minimize
 from foc_ros.analysis.evaluation.bootstrap import CENTRAL, draw_resamples
 from foc_ros.analysis.evaluation.ground_truth import HORIZONS_S
 from foc_ros.core.config import Config, EstimatorConfig
-from foc_ros.core.estimation.kalman_filter import compute_gramian, compute_transition
+from foc_ros.core.hand.kalman import compute_gramian, compute_transition
 from foc_ros.core.types import Array, SampleStatus
 
 from .estimates import Estimate, Estimates, clip_to_bounds

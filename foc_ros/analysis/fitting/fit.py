@@ -29,8 +29,6 @@ MIN_FOLDS = 3
 """Recordings below which there is no cross-validation."""
 UNSCALED: dict[str, object] = {'covariance.near': 1.0, 'covariance.far': 1.0}
 """A fit sets both factors to 1, because it fits the covariances that they multiply."""
-LEARNT: dict[str, object] = {'likelihood.adaptation': 'none'}
-"""What a fit switches off: choices are known from many movements, and learning them anew from a few makes them worse."""
 
 
 def fit_parameters(recordings: Mapping[str, Recording], config: Config, executor: Executor, may_lower_eta: bool = False) -> Fit:
@@ -53,9 +51,9 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, executor
     thinned = {'rate_hz': rate_hz, 'covariance.adaptation': 'none'}
     _search(hands, fit, Replays(usable, thinned | UNSCALED, executor), may_lower_eta)
     _fit_to_one_replay(usable, fit, thinned | UNSCALED, executor)
-    given, decided = flatten(config), UNSCALED | LEARNT
-    fit.chosen |= {name: str(value) for name, value in decided.items() if given[name] != value}
-    fit.config = replace_values(fit.config, decided)
+    given = flatten(config)
+    fit.chosen |= {name: str(value) for name, value in UNSCALED.items() if given[name] != value}
+    fit.config = replace_values(fit.config, UNSCALED)
     compared = {name: usable[name] for name in sample_names(list(usable))}
     fit.comparison = compare_configs(compared, (config, fit.config), thinned, executor)
     fit.warnings[:0] = find_worse_positions(fit.comparison)

@@ -31,10 +31,7 @@ MARGIN_NAT = 0.02
 """By how much per prediction, held out, a likelihood in which near and far choices differ has to be better."""
 INDISTINCT_NAT = 2.0
 """Settings whose total log-likelihood is less than this below the best are not distinguished: 95 % of chi-square, halved."""
-NAMES = tuple(
-    f'likelihood.{each}'
-    for each in ('beta', 'spent_share', 'planning_horizon_s', 'planning_spread', 'lookahead_s', 'beta_beyond', 'weaving')
-)
+NAMES = tuple(f'likelihood.{each}' for each in ('beta', 'planning_horizon_s', 'lookahead_s', 'weaving'))
 MISSED = 0.1
 """Share of predictions without the true class among their candidates above which there is a warning."""
 

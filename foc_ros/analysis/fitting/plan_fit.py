@@ -17,14 +17,14 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from foc_ros.core.config import REFERENCE_STEP_S, Config
-from foc_ros.core.dynamics.noise import scale_noise
-from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
 from foc_ros.core.errors import RecordingError
-from foc_ros.core.estimation.duration import is_passing
-from foc_ros.core.learning.goal_reached import AT_GOAL_M, find_goal_at_end
+from foc_ros.core.hand.duration import is_passing
+from foc_ros.core.learning.movements import AT_GOAL_M, find_goal_at_end
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import Start, cold_start
+from foc_ros.core.plant.covariance import scale_noise
+from foc_ros.core.plant.plants import build_triple_integrator_horizon
 from foc_ros.core.types import Array, Record, Solution, Status
 
 from .estimates import Estimate, Estimates, clip_to_bounds

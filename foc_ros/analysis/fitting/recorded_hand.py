@@ -12,7 +12,7 @@ from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config, EstimatorConfig
 from foc_ros.core.errors import RecordingError
-from foc_ros.core.estimation.kalman_filter import Update, update
+from foc_ros.core.hand.kalman import Update, update
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Record
 
 MIN_SAMPLES = 10

@@ -9,10 +9,10 @@ import numpy as np
 
 from foc_ros.core.classes import find_path_sides
 from foc_ros.core.config import FocConfig
-from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
+from foc_ros.core.plant.plants import build_triple_integrator_horizon
 from foc_ros.core.types import Array, Obstacles, Solution, Status, make_obstacles
 from foc_ros.io.scene_file import guess_path
 

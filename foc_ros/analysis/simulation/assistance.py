@@ -12,8 +12,8 @@ import numpy as np
 
 from foc_ros.core.classes.sides import find_path_sides
 from foc_ros.core.config import Config
+from foc_ros.core.guidance.guide import GuidanceInput, GuidanceState, guide
 from foc_ros.core.guidance.limits import find_largest_force, shorten
-from foc_ros.core.guidance.step import GuidanceInput, GuidanceState, guide
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Prediction
 

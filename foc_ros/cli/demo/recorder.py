@@ -17,8 +17,8 @@ from rich.table import Table
 from rich.text import Text
 
 from foc_ros.core.config import Config
-from foc_ros.core.obstacles.scene import Scene
 from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.scene import Scene
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
 from foc_ros.io.bags import Item

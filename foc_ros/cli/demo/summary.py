@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from foc_ros.core.learning.goal_reached import AT_GOAL_M, find_goal_at_end
+from foc_ros.core.learning.movements import AT_GOAL_M, find_goal_at_end
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.reporting.snapshots import HandTrajectory, Snapshot, parse_label
 

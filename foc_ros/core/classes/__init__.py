@@ -2,20 +2,19 @@
 
 Enters: the hand, the goals and the obstacles. Leaves: candidates, the side on which a given path passes an obstacle, and the
 decisions that tell candidates apart.
-May import `foc_ros.core.dynamics`, `obstacles`, `estimation` and the ground modules.
+May import `foc_ros.core.plant`, `obstacles`, `hand` and the ground modules.
 """
 
 from .guess import timed
 from .names import named_obstacles
 from .search import Search, Turn, search
-from .sides import compute_swept_angles, find_path_sides, is_same_class
+from .sides import compute_swept_angles, find_path_sides
 
 __all__ = [
     'Search',
     'Turn',
     'compute_swept_angles',
     'find_path_sides',
-    'is_same_class',
     'named_obstacles',
     'search',
     'timed',

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from foc_ros.core.obstacles.culling import cull_obstacles
+from foc_ros.core.obstacles.clearance import cull_obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import LEFT, Array, Candidate, Obstacles
 

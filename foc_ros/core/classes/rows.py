@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.obstacles.chance_constraint import centre_trajectories
+from foc_ros.core.obstacles.risk import centre_trajectories
 from foc_ros.core.types import LEFT, RIGHT, Array, HandState, Obstacles, Solution
 
 from .sides import compute_swept_angles

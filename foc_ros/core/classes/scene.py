@@ -51,6 +51,10 @@ class PathClass(NamedTuple):
         """The label without the goal."""
         return self.label.partition(':')[2]
 
+    def measure_length(self) -> float:
+        """Return the length of the shortest path [m]."""
+        return float(compute_path_lengths(self.points)[-1]) if self.known is None else self.known.length
+
     @property
     def named(self) -> set[str]:
         """The ids of the obstacles in the name."""

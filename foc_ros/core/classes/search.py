@@ -19,6 +19,8 @@ from .scene import PathClass, SearchScene
 
 REPEAT = 1.5
 """A class that passes all obstacles as a class to another goal does ranks as if it were this times as long: it adds little."""
+MOST_UNFOLLOWED = 8
+"""Number of classes besides the candidates that are looked for, to know what is not followed."""
 STAY = 0.95
 """A class of the previous prediction ranks as if it were this times as long: noise does not swap classes of equal length."""
 
@@ -48,11 +50,14 @@ class Search:
         largest number of states. search_late: searches that the deadline ended or prevented.
     next_goal : int
         Row of the first goal that the deadline left out, at which the next search should begin; 0 if there was time for all.
+    unfollowed : tuple[tuple[int, float], ...]
+        Goal and length [m] of classes that were seen and are no candidates, at most `MOST_UNFOLLOWED` besides goals.
     """
 
     candidates: tuple[Candidate, ...]
     notes: dict[str, int] = field(default_factory=dict)
     next_goal: int = 0
+    unfollowed: tuple[tuple[int, float], ...] = ()
 
 
 def search(
@@ -111,15 +116,19 @@ def search(
     ranking = _Ranking(scene, {each.label for each in previous}, turn.deadline)
     next_goal = ranking.find_bests(sorted(range(len(goals)), key=lambda goal: (goal < turn.first_goal, goal)))
     count = max(config.max_candidates, min(len(goals), MOST_CANDIDATES))
-    candidates = scene.make_candidates(ranking.choose(count), duration_s, steps)
-    return Search(candidates, {name: number for name, number in scene.notes.items() if number}, next_goal)
+    chosen = ranking.choose(count)
+    candidates = scene.make_candidates(chosen, duration_s, steps)
+    labels = {each.label for each in chosen}
+    unfollowed = [(each.goal, each.measure_length()) for each in ranking.seen if each.label not in labels]
+    return Search(candidates, {name: number for name, number in scene.notes.items() if number}, next_goal, tuple(unfollowed))
 
 
 class _Ranking:
     """Finds and ranks classes to all goals.
 
     A class ranks by its key, which is multiplied by STAY if it was followed in the previous prediction (labels), and by REPEAT if
-    it passes all obstacles as the shortest class to another goal does, or one that ranks before it.
+    it passes all obstacles as the shortest class to another goal does, or one that ranks before it. seen: classes that were
+    found, among them all that are not chosen.
     """
 
     def __init__(self, scene: SearchScene, followed: Collection[str], deadline: Deadline) -> None:
@@ -127,6 +136,7 @@ class _Ranking:
         self._bests: list[PathClass] = []
         self._shortest: list[PathClass] = []
         self._others: list[Iterable[PathClass]] = []
+        self.seen: list[PathClass] = []
 
     def find_bests(self, goals: Sequence[int]) -> int:
         """Find the best class to each of some goals; return the first goal for which there was no time, or 0.
@@ -178,7 +188,9 @@ class _Ranking:
             labels.add(found.label)
 
         is_late = room > 0 and self._deadline.has_passed
-        for found in merge(*self._others) if room and not is_late else ():
+        others = merge(*self._others)
+        for found in others if room and not is_late else ():
+            self.seen.append(found)
             if len(chosen) >= room and found.key * (1.0 if labels.issuperset(self._followed) else STAY) > chosen[room - 1][0]:
                 break
             add(found)
@@ -186,6 +198,7 @@ class _Ranking:
             if is_late:
                 break
         self._scene.notes['search_late'] += is_late
+        self.seen += self._bests if is_late else [*self._bests, *self._find_more(others)]
         if self._scene.notes['search_late']:
             # beside others to its goal, a class has to have the same obstacles in its name, so that no class comes twice
             named = {each.goal: each.named for each in [*bests, *[found for *_, found in chosen]]}
@@ -193,6 +206,15 @@ class _Ranking:
                 if each.label not in labels and named.get(each.goal) == each.named:
                     add(each)
         return sorted([*bests, *[found for *_, found in chosen[:room]]])
+
+    def _find_more(self, others: Iterable[PathClass]) -> list[PathClass]:
+        """Find some classes more than are chosen, as long as there is time."""
+        found = list[PathClass]()
+        for each in others:
+            found.append(each)
+            if len(found) == MOST_UNFOLLOWED or self._deadline.has_passed:
+                break
+        return found
 
     def _rank(self, found: PathClass) -> tuple[float, str]:
         return found.key * (STAY if found.label in self._followed else 1.0), found.label

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.errors import SceneError
-from foc_ros.core.obstacles.chance_constraint import centre_trajectories
 from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.obstacles.risk import centre_trajectories
 from foc_ros.core.types import LEFT, RIGHT, Array, Obstacles, PredictedCandidate, Record
 
 TURN = 2.0 * np.pi
@@ -71,11 +71,6 @@ def sweep(offset: Array) -> Array:
     turns = count_crossings(offset[..., :-1, :, :], offset[..., 1:, :, :]).sum(axis=-2)
     angles: Array = compute_bearings(offset[..., -1, :, :]) - compute_bearings(offset[..., 0, :, :]) + TURN * turns
     return angles
-
-
-def is_same_class(angles: Array, others: Array) -> bool:
-    """Tell whether two paths with the same ends, which sweep the angles (n,) [rad], pass all n centres on the same sides."""
-    return bool((np.abs(angles - others) < np.pi).all())
 
 
 def find_path_sides(path: Array, obstacles: Obstacles, centres: Array | None = None) -> dict[str, int]:

@@ -1,13 +1,22 @@
-"""Limits of the force: its size, its rate of change, and bounds that have to be kept later, wherever the hand goes."""
+"""Limits of the force: its size and its rate of change, the energy that guidance gives, and the margins of the obstacles.
+
+An energy tank makes a force passive whose parameters change (Franken et al. 2011, doi 10.1109/TRO.2011.2142430). The tank pays
+for the work on the hand and takes up the work of the hand on guidance, such as that of damping, up to its capacity. The margins
+are convex polygons of short edges that no force leads into.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from foc_ros.core.config import GuidanceConfig
-from foc_ros.core.types import Array
+from foc_ros.core.obstacles.geometry import trace_obstacle
+from foc_ros.core.types import Array, Obstacles, Record
 
 ROUNDING = 1e-9
 """Relative size of differences that are rounding errors."""
@@ -38,3 +47,117 @@ def step_force(previous: Array, target: Array, most_change: float, find_bound: C
     if np.hypot(*(stepped - previous)) <= most_change * (1.0 + ROUNDING):
         return stepped
     return shorten(previous, max(float(np.hypot(*previous)) - most_change, 0.0))
+
+
+def update_energy(energy: float, force: Array, displacement: Array, capacity: float) -> float:
+    """Return the energy [J] after a force (2,) [N] was held while the hand moved by a displacement (2,) [m].
+
+    E <- min(E - f . dx, E_max)
+    """
+    return min(energy - float(force @ displacement), capacity)
+
+
+def limit_by_energy(energy: float, slew: float, speed: float, period: float) -> float:
+    """Return the largest force [N] for which the tank pays until it is slewed to zero.
+
+    From f, a hand that flees at the speed w extracts w (f T + f^2 / (2 r)) at most while f is held for another T, and then falls
+    at the rate r. So f is the positive root of w (f T + f^2 / (2 r)) = E.
+
+    energy: E [J]; slew: r [N/s]; speed: w, of the fastest hand [m/s]; period: T, longest time between two updates [s].
+    """
+    held = slew * period
+    return math.sqrt(held * held + 2.0 * slew * max(energy, 0.0) / speed) - held
+
+
+POINTS = 32
+"""Number of edges round a circle."""
+TOLERANCE = math.sin(math.pi / POINTS)
+"""Sine of the largest angle between the normal of an edge and the true one of an arc that it stands for."""
+NEAR_M = 0.001
+"""Distance [m] from a margin within which there is no force into it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Margins(Record):
+    """The margins of n obstacles as convex polygons of k edges each; edges that a polygon does not have repeat its first.
+
+    start, edge, normal (n, k, 2): first corner [m], vector to the next [m], and outward unit normal of each edge.
+    """
+
+    start: Array
+    edge: Array
+    normal: Array
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+
+def build_margins(obstacles: Obstacles, growth: float) -> Margins:
+    """Return the polygons about obstacles that are larger by a growth [m]; they contain the rounded shapes."""
+    extra = [(growth + radius) / math.cos(math.pi / POINTS) - radius for radius in obstacles.radius.tolist()]
+    outlines = [trace_obstacle(obstacles, row, extra[row], POINTS) for row in range(len(obstacles))]
+    most = max((len(each) - 1 for each in outlines), default=1)
+    start, edge = np.zeros((len(outlines), most, 2)), np.zeros((len(outlines), most, 2))
+    for row, outline in enumerate(outlines):
+        edges = np.diff(outline, axis=0)
+        is_long = np.hypot(edges[:, 0], edges[:, 1]) > 1e-12
+        corners, edges = outline[:-1][is_long], edges[is_long]
+        start[row], edge[row] = corners[0], edges[0]
+        start[row, : len(edges)], edge[row, : len(edges)] = corners, edges
+    lengths = np.hypot(edge[..., 0], edge[..., 1])[..., None]
+    return Margins(start, edge, np.stack([edge[..., 1], -edge[..., 0]], axis=-1) / lengths)
+
+
+@dataclass(frozen=True, eq=False)
+class SeenMargins(Record):
+    """The margins as seen from a hand.
+
+    normal (n, k, 2): outward unit normals of the edges. height (n, k): by how much the hand is outside the line of each edge [m].
+    distance (n, k): from each edge [m]; that of the nearest edge is 0 within a margin.
+    """
+
+    normal: Array
+    height: Array
+    distance: Array
+
+
+def see_margins(margins: Margins, position: Array) -> SeenMargins:
+    """Return the margins as seen from a hand at a position (2,) [m]."""
+    offset, edge = position - margins.start, margins.edge
+    height = (offset * margins.normal).sum(axis=-1)
+    share = np.minimum(np.maximum((offset * edge).sum(axis=-1) / (edge * edge).sum(axis=-1), 0.0), 1.0)
+    away = offset - share[..., None] * edge
+    distance = np.hypot(away[..., 0], away[..., 1])
+    is_inside = (height.max(axis=1) < 0.0)[:, None]
+    is_nearest = distance <= distance.min(axis=1)[:, None] + 1e-12
+    return SeenMargins(margins.normal, height, np.where(is_inside & is_nearest, 0.0, distance))
+
+
+def turn_along(seen: SeenMargins, line: Array, force: Array) -> Array:
+    """Return a force (2,) without its part into margins that a line (2,) [m] from the hand crosses.
+
+    With n the outward normal of the edge that is nearest to the hand, f <- f + max(-f . n, 0) n for one obstacle after the other.
+    """
+    for row in _find_crossed(seen, line):
+        normal = seen.normal[row, seen.distance[row].argmin()]
+        force = force + max(-float(force @ normal), 0.0) * normal
+    return force
+
+
+def measure_opposing_distance(seen: SeenMargins, force: Array) -> float:
+    """Return the distance [m] of the hand from the nearest edge into which a force (2,) leads; infinite if there is none.
+
+    Edges whose normal is within `TOLERANCE` of a right angle to the force count as well.
+    """
+    is_opposing = seen.normal @ force < TOLERANCE * float(np.hypot(*force))
+    return float(seen.distance[is_opposing].min(initial=np.inf))
+
+
+def _find_crossed(seen: SeenMargins, line: Array) -> NDArray[np.intp]:
+    """Return the rows of the margins that a line (2,) [m] from the hand crosses (clipping by Cyrus and Beck)."""
+    slopes = seen.normal @ line
+    at = -seen.height / np.where(slopes == 0.0, 1.0, slopes)
+    enters = np.where(slopes < 0.0, at, 0.0).max(axis=1)
+    leaves = np.where(slopes > 0.0, at, 1.0).min(axis=1)
+    is_beside = ((slopes == 0.0) & (seen.height > 0.0)).any(axis=1)
+    return np.flatnonzero((enters < leaves) & ~is_beside)

@@ -1,6 +1,6 @@
 """Learning: the hand's movements and their predictions enter; what they say about the operator and about the scene leaves.
 
-`learnt` holds all of it: `pace` is how the operator moves and arrives, `choices` how precisely they choose, `dispersion` how
-large the errors of predictions are, and `movements` which recordings of the scene there are. `experience` is how recordings
-change a prediction. It may import all of `foc_ros.core` but `candidates`, `memory`, the predictor and the pipeline.
+`learnt` holds all of it: `pace` is how the operator moves and arrives, `dispersion` how large the errors of predictions are, both
+by a posterior on a grid (`posterior`), and `movements` which recordings of the scene there are. `recordings` is how recordings
+change a prediction. It may import all of `foc_ros.core` but `candidates`, `tracks`, `predict` and the pipeline.
 """

@@ -14,7 +14,7 @@ Predictions of a moving hand, `SAMPLE_S` apart, are kept until the hand has reac
 x there and the mixture of normal distributions (p_i, m_i, S_i) that was predicted without the factors, each pair of factors has
 the log-posterior
 
-    log w(f, f') = -(log^2 f + log^2 f') / (2 v^2) + sum_h sum_predictions c log sum_i p_i N(x; m_i, f(h)^2 S_i).
+    log w(f, f') = -(log^2 f + log^2 f') / 2 + sum_h sum_predictions c log sum_i p_i N(x; m_i, f(h)^2 S_i).
 
 The errors within one second, which depend on each other, count as one: c is the time since the prediction before over 1 s, at
 most 1, or `SAMPLE_S` over 1 s for the first one of a movement. The factors in use are the posterior means, of the logarithms.
@@ -25,17 +25,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from foc_ros.core.config import CovarianceConfig, clip_values
 from foc_ros.core.types import NANOSECONDS, Array, HandState, PredictedCandidate, Record, Solution, as_readonly
 
+from .posterior import GridPosterior
+
 LOG_FACTORS = as_readonly(math.log(2.0) * np.linspace(-3.0, 2.0, 11))
 """Logarithms of the factors that are judged, for now and for the end."""
-PRIOR_STDDEV = 1.0
-"""Standard deviation of the logarithm of a factor before the first prediction."""
+PRIOR = GridPosterior.from_normal((LOG_FACTORS, LOG_FACTORS), (1.0, 1.0))
+"""The posterior before the first prediction: the logarithm of each factor has a standard deviation of 1."""
 HORIZONS_S = (0.25, 0.5, 1.0)
 """Times ahead at which predicted positions are judged [s]."""
 SAMPLE_S = 0.1
@@ -44,7 +46,6 @@ DEPENDENT_S = 1.0
 """Time within which errors count as one observation [s]."""
 VARIANCE_FLOOR = 1e-12
 """Variance that is added to that of a predicted position [m^2], so that its density is finite."""
-
 
 REST_SHARE = 2.0 / 3.0
 """Power of the factor for now for a hand at rest."""
@@ -83,13 +84,13 @@ class Forecast(Record):
 class Dispersion(Record):
     """The errors of the predictions so far.
 
-    errors: how many were judged; scores (f, f'): sums of their scores for each pair of factors; factors: for now and for
-    the end, exactly 1 before the first error; hand: its last state; taken_ns: stamp of the last prediction that was taken;
+    errors: how many were judged; posterior: of both factors; factors: for now and for the end, exactly 1 before the first
+    error; hand: its last state; taken_ns: stamp of the last prediction that was taken;
     forecasts: that the hand has not reached yet.
     """
 
     errors: int = 0
-    scores: Array = field(default_factory=lambda: np.zeros((len(LOG_FACTORS), len(LOG_FACTORS))))
+    posterior: GridPosterior = PRIOR
     factors: tuple[float, float] = (1.0, 1.0)
     hand: HandState | None = None
     taken_ns: int | None = None
@@ -110,13 +111,14 @@ class Dispersion(Record):
         reached = [each for each in self.forecasts if each.due_ns <= hand.stamp_ns]
         if not reached:
             return replace(self, hand=hand)
-        total = self.scores.copy()
+        posterior = self.posterior
         for each in reached:
             share = (each.due_ns - before.stamp_ns) / (hand.stamp_ns - before.stamp_ns)
-            total += each.count * each.score((1.0 - share) * before.mean[:2] + share * hand.mean[:2])
+            posterior = posterior.add(each.count * each.score((1.0 - share) * before.mean[:2] + share * hand.mean[:2]))
         left = tuple(each for each in self.forecasts if each.due_ns > hand.stamp_ns)
-        factors = _compute_mean_factors(total)
-        return replace(self, errors=self.errors + len(reached), scores=total, factors=factors, hand=hand, forecasts=left)
+        near, far = np.exp(posterior.mean()).tolist()
+        errors = self.errors + len(reached)
+        return replace(self, errors=errors, posterior=posterior, factors=(near, far), hand=hand, forecasts=left)
 
     def add(self, stamp_ns: int, candidates: Sequence[PredictedCandidate], config: CovarianceConfig) -> Dispersion:
         """Return what is known after a prediction with the factors of config, which counts if the hand is moving."""
@@ -174,12 +176,3 @@ def scale_covariance(candidate: PredictedCandidate, config: CovarianceConfig, *,
     solution = candidate.solution
     covariance = solution.covariance * compute_factors(solution, config)[:, None, None] ** 2
     return replace(candidate, solution=solution.with_covariance(covariance))
-
-
-def _compute_mean_factors(scores: Array) -> tuple[float, float]:
-    """Return the geometric posterior means of the factors for now and for the end, from sums of scores (f, f') of each pair."""
-    prior = -0.5 * (LOG_FACTORS / PRIOR_STDDEV) ** 2
-    total = scores + prior[:, None] + prior
-    weights = np.exp(total - total.max())
-    weights /= weights.sum()
-    return float(np.exp(weights.sum(axis=1) @ LOG_FACTORS)), float(np.exp(weights.sum(axis=0) @ LOG_FACTORS))

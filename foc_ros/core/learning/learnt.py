@@ -1,68 +1,82 @@
 """All that is learnt while the hand moves, as one record that follows the samples of the hand and the predictions.
 
-Each part learns only where its parameter says `online`: the pace (`duration.adaptation`), the choices (`likelihood.adaptation`),
-the errors (`covariance.adaptation`) and the recordings of the scene (`experience.learning`). All depend on samples, scene and
-predictions alone, so that equal input gives equal results.
+Each part learns only where its parameter says `online`: the pace (`duration.adaptation`), the errors (`covariance.adaptation`)
+and the recordings of the scene (`experience.learning`). All depend on samples, scene and predictions alone, so that equal input
+gives equal results.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from foc_ros.core.config import ONLINE, Config, CovarianceConfig
-from foc_ros.core.obstacles.scene import Scene
+from foc_ros.core.likelihood import BETWEEN_OPERATORS, OWN_SPREAD
+from foc_ros.core.scene import Scene
 from foc_ros.core.types import HandState, Prediction
 
-from .choices import Choice, Preferences
 from .dispersion import Dispersion
 from .movements import Movements
 from .pace import Pace
+from .recordings import NO_LIBRARY, Library
 
 DISPERSED_BY = ('foc', 'duration', 'covariance', 'estimator')
 """Groups of parameters on which errors and covariances depend."""
 
 
+class Knowledge(NamedTuple):
+    """What a prediction is made with besides parameters and scene.
+
+    library: recorded paths; planning_spread: standard deviation of the logarithm of the operator's planning horizon.
+    """
+
+    library: Library = NO_LIBRARY
+    planning_spread: float = BETWEEN_OPERATORS
+
+
+NOTHING = Knowledge()
+
+
 @dataclass(frozen=True)
 class Learnt:
-    """What was learnt of the operator (pace, preferences, dispersion) and of the scene (movements)."""
+    """What was learnt of the operator (pace, dispersion) and of the scene (movements)."""
 
     pace: Pace = field(default_factory=Pace)
-    preferences: Preferences = field(default_factory=Preferences)
     dispersion: Dispersion = field(default_factory=Dispersion)
     movements: Movements = field(default_factory=Movements)
 
     def adapt(self, config: Config) -> Config:
         """Return the parameters with which the next prediction is made: those given, adapted to the operator."""
-        duration, likelihood = self.pace.adapt(config.duration), self.preferences.adapt(config.likelihood)
-        covariance = self.dispersion.adapt(config.covariance)
-        is_same = duration is config.duration and likelihood is config.likelihood and covariance is config.covariance
-        return config if is_same else replace(config, duration=duration, likelihood=likelihood, covariance=covariance)
+        duration, covariance = self.pace.adapt(config.duration), self.dispersion.adapt(config.covariance)
+        is_same = duration is config.duration and covariance is config.covariance
+        return config if is_same else replace(config, duration=duration, covariance=covariance)
+
+    @property
+    def planning_spread(self) -> float:
+        """Standard deviation of the logarithm of the planning horizon: between operators, or of one whose pace is known."""
+        return OWN_SPREAD if self.pace.movements else BETWEEN_OPERATORS
 
     def follow(self, hand: HandState, scene: Scene, config: Config, *, is_restart: bool) -> Learnt:
         """Return what is known after the next state of the hand.
 
         config: before it is adapted; is_restart: whether the filter of the hand began anew.
         """
-        pace, preferences, dispersion, movements = self.pace, self.preferences, self.dispersion, self.movements
+        pace, dispersion, movements = self.pace, self.dispersion, self.movements
         if config.duration.adaptation == ONLINE:
             pace = pace.follow(hand, scene.goals, config.duration)
-        if config.likelihood.adaptation == ONLINE:
-            preferences = preferences.follow(hand, config.likelihood)
         if config.covariance.adaptation == ONLINE:
             dispersion = dispersion.follow(hand)
-        if config.experience.learning == ONLINE:
+        if config.experience.learning != 'none':
             movements = movements.follow(hand, scene, is_restart=is_restart)
-        return Learnt(pace, preferences, dispersion, movements)
+        return Learnt(pace, dispersion, movements)
 
-    def add(self, prediction: Prediction, choice: Choice | None, config: CovarianceConfig) -> Learnt:
-        """Return what is known after a prediction with its choice and with the factors of config."""
-        dispersion = self.dispersion.add(prediction.stamp_ns, prediction.candidates, config)
-        return replace(self, preferences=self.preferences.add(choice), dispersion=dispersion)
+    def add(self, prediction: Prediction, config: CovarianceConfig) -> Learnt:
+        """Return what is known after a prediction with the factors of config."""
+        return replace(self, dispersion=self.dispersion.add(prediction.stamp_ns, prediction.candidates, config))
 
     def interrupt(self) -> Learnt:
         """Return what is known where the samples of the hand stop: the present movement ends there."""
-        preferences, dispersion = self.preferences.interrupt(), self.dispersion.interrupt()
-        return Learnt(self.pace.interrupt(), preferences, dispersion, self.movements.interrupt())
+        return Learnt(self.pace.interrupt(), self.dispersion.interrupt(), self.movements.interrupt())
 
     def reconfigure(self, before: Config, now: Config) -> Learnt:
         """Return what still holds with other parameters: what depends on one that changed is forgotten."""
@@ -70,7 +84,6 @@ class Learnt:
         is_recorded = (before.experience.learning, before.estimator) == (now.experience.learning, now.estimator)
         return Learnt(
             self.pace if before.duration == now.duration else Pace(),
-            self.preferences if before.likelihood == now.likelihood else Preferences(),
             Dispersion() if is_dispersed else self.dispersion,
             self.movements if is_recorded else Movements(),
         )

@@ -6,6 +6,10 @@ depends on the past alone.
 
 The states are those of the estimator at the multiples of `STEP_S` of the stamps, linear between two samples. They depend on the
 samples and the scene alone, so that equal input gives equal demonstrations, live, replayed or learnt from a recording.
+
+When a movement has reached a goal is decided here, for all learning, `evaluate` and `fit`. Three questions need three answers:
+scores need the goal that the hand visited last, even if the recording goes on; a demonstration needs a path that ends at the
+goal; durations need a movement that covered most of its distance.
 """
 
 from __future__ import annotations
@@ -16,11 +20,10 @@ import numpy as np
 
 from foc_ros.core.classes.library import MOST_STATES, STEP_S, Demonstration, record_demonstration
 from foc_ros.core.errors import RecordingError
-from foc_ros.core.obstacles.scene import Scene
+from foc_ros.core.scene import Scene
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Record
 
-from .experience import MOST_NEAR
-from .goal_reached import AT_GOAL_M, find_goal_at_end, find_reached_goal
+from .recordings import MOST_NEAR
 
 StampedState = tuple[int, Array]
 """A stamp [ns] and the state then (4,): x, y, vx, vy [m, m/s]."""
@@ -118,3 +121,39 @@ def sample_states(states: tuple[StampedState, ...], before: HandState | None, ha
     share = (due - before.stamp_ns)[:, None] / (hand.stamp_ns - before.stamp_ns)
     between = (1.0 - share) * before.mean[:4] + share * hand.mean[:4]
     return (*states, *zip(due.tolist(), between, strict=True))[-MOST_STATES:]
+
+
+REMAINING_SHARE = 0.25
+"""A movement that leaves no more than this share of its first distance to a goal has covered the distance."""
+AT_GOAL_M = 0.05
+"""A path that ends no farther from a goal than this ends at it [m]."""
+
+
+def find_reached_goal(positions: Array, goals: Array) -> tuple[int | None, int]:
+    """Find the goal that a path (m, 2) [m] reached, and the sample at which the path was nearest to it.
+
+    Reached is the last of the goals (g, 2) [m] that the path came to within half of the distance to its nearest neighbour; a
+    single goal is reached in any case. Returns None and the last sample where no goal was reached.
+    """
+    distance = np.hypot(*(positions[:, None] - goals).transpose(2, 0, 1))
+    between = np.hypot(*(goals[:, None] - goals).transpose(2, 0, 1))
+    np.fill_diagonal(between, np.inf)
+    is_near = distance <= between.min(axis=1) / 2.0
+    if not is_near.any():
+        return None, len(positions) - 1
+    last = int(np.flatnonzero(is_near.any(axis=1))[-1])
+    goal = int(np.where(is_near[last], distance[last], np.inf).argmin())
+    return goal, int(distance[:, goal].argmin())
+
+
+def find_goal_at_end(positions: Array, goals: Array) -> tuple[int, float]:
+    """Return the goal (g, 2) [m] nearest to the end of a path (m, 2) [m], and its distance [m], at most AT_GOAL_M if reached."""
+    distance = np.hypot(*(goals - positions[-1]).T)
+    goal = int(distance.argmin())
+    return goal, float(distance[goal])
+
+
+def has_covered_distance(positions: Array, goal: Array) -> bool:
+    """Tell whether a path (m, 2) [m] came to within REMAINING_SHARE of its first distance from a goal (2,) [m]."""
+    distance = np.hypot(*(positions - goal).T)
+    return bool(distance.min() <= REMAINING_SHARE * distance[0])

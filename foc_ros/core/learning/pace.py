@@ -9,12 +9,14 @@ the goal in T_f(t) would be h = `AHEAD_S` later is compared with where the hand 
 A movement that has covered most of its distance to a goal counts with c = 1. In the present one, c is the distance of the hand
 from the onset relative to that of the goal, at most 1, and the goal is the one for which the least loss is smallest.
 
-The arrival and the factor in use minimise w (log(f) / sigma)^2 + w' + sum l_f over the movements so far, as a regularised leader
-(Shalev-Shwartz 2012, Foundations and Trends in Machine Learning 4(2)), with the weight w of `PRIOR_WEIGHT`, sigma of
-`duration.spread`, and w' of `ARRIVAL_WEIGHT` for the arrival that `duration.arrival` does not name: without movements the factor
-is 1, and both adapt in the course of a few, the sooner the less is known of the durations. A parabola through three factors gives
-the least, so that the factor does not jump from one of `FACTORS` to the next; the arrival changes between movements only. They
-depend on the samples and goals alone, so that equal input gives equal factors.
+With sigma of `duration.spread`, c of `PRECISION` and w of `OTHER_ARRIVAL` for the arrival that `duration.arrival` does not name,
+the posterior of arrival and factor is
+
+    log P = -(log f / sigma)^2 / 2 - w - c sum l_f.
+
+The factor in use is its mean, of the logarithm, with the likelier arrival: without movements it is 1, and both adapt in the
+course of a few, the sooner the less is known of the durations. The arrival changes between movements only. They depend on the
+samples and goals alone, so that equal input gives equal factors.
 
 The free movement has the least integral of squared jerk, and begins at the velocity v without acceleration, as predictions do.
 After the share s = h / T of its time it has come to
@@ -35,20 +37,21 @@ from functools import lru_cache
 import numpy as np
 
 from foc_ros.core.config import ARRIVALS, DurationConfig
-from foc_ros.core.estimation.duration import estimate_times_to_go, is_passing, scale_durations
+from foc_ros.core.hand.duration import estimate_times_to_go, is_passing, scale_durations
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Record, as_readonly
 
-from .goal_reached import find_goal_at_end, has_covered_distance
+from .movements import find_goal_at_end, has_covered_distance
+from .posterior import GridPosterior
 
-LOG_FACTORS = as_readonly(np.linspace(-0.8, 1.6, 13))
+LOG_FACTORS = as_readonly(np.linspace(-1.6, 1.6, 17))
 FACTORS = as_readonly(np.exp(LOG_FACTORS))
 """Factors that are judged."""
-PRIOR_WEIGHT = 0.016
-"""Weight of (log(f) / `duration.spread`)^2 against the errors of one movement."""
+PRECISION = 31.0
+"""By how much the logarithm of the probability falls per unit of the loss of a movement."""
 SMALLEST_SPREAD = 1e-3
 """Smallest spread with which the factor is weighed: a smaller one says that durations are known."""
-ARRIVAL_WEIGHT = 0.1
-"""Weight of another arrival than that of the parameters, likewise."""
+OTHER_ARRIVAL = 3.0
+"""By how much the logarithm of the probability of another arrival than that of the parameters is smaller [nat]."""
 AHEAD_S = 0.5
 """How far ahead positions are judged [s]."""
 SAMPLE_S = 0.1
@@ -156,13 +159,15 @@ class Pace(Record):
         """Return the arrival, and the factor on expected durations, which is exactly 1 as long as nothing was judged."""
         if not self.is_known:
             return config.arrival, 1.0
-        losses = self.losses + PRIOR_WEIGHT * (LOG_FACTORS / max(config.spread, SMALLEST_SPREAD)) ** 2
-        other = np.array([[each != config.arrival] for each in ARRIVALS])
-        row = ARRIVALS.index(config.arrival)
+        axes, row = (np.arange(len(ARRIVALS), dtype=float), LOG_FACTORS), ARRIVALS.index(config.arrival)
+        prior = GridPosterior.from_normal(axes, (np.inf, max(config.spread, SMALLEST_SPREAD)))
+        posterior = prior.add(-PRECISION * self.losses)
         if self.movements:
-            row = int((losses + ARRIVAL_WEIGHT * other).min(axis=1).argmin())
-        present = 0.0 if self.present is None else self.present.compute_losses()[row]
-        return ARRIVALS[row], _find_least(losses[row] + present)
+            is_other = np.array([[each != config.arrival] for each in ARRIVALS])
+            row = int(posterior.add(-OTHER_ARRIVAL * is_other).weights().sum(axis=1).argmax())
+        if self.present is not None:
+            posterior = posterior.add(-PRECISION * self.present.compute_losses())
+        return ARRIVALS[row], float(np.exp(posterior.given(row).mean()[0]))
 
     def adapt(self, config: DurationConfig) -> DurationConfig:
         """Return the durations of this operator."""
@@ -199,16 +204,6 @@ def _scale_all(config: DurationConfig) -> tuple[tuple[DurationConfig, ...], ...]
     """Return the durations multiplied by each of `FACTORS`, for each of `ARRIVALS`."""
     scaled = [scale_durations(config, each) for each in FACTORS.tolist()]
     return tuple(tuple(replace(each, arrival=arrival) for each in scaled) for arrival in ARRIVALS)
-
-
-def _find_least(losses: Array) -> float:
-    """Return the factor at which a parabola through the least loss (f,) and its neighbours is least."""
-    middle = int(np.clip(losses.argmin(), 1, len(losses) - 2))
-    before, here, after = losses[middle - 1 : middle + 2].tolist()
-    bend = before - 2.0 * here + after
-    offset = min(max(0.5 * (before - after) / bend, -1.0), 1.0) if bend > 0.0 else float(losses.argmin() - middle)
-    step = LOG_FACTORS[1] - LOG_FACTORS[0]
-    return float(np.exp(LOG_FACTORS[middle] + offset * step))
 
 
 def find_free_positions(start: Array, goal: Array, times: Array, seconds: float, passing: bool) -> Array:

@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foc_ros.core.checks import check_array, check_number, check_vector
 from foc_ros.core.errors import SceneError
+from foc_ros.core.support import check_array, check_number, check_vector
 from foc_ros.core.types import UNKNOWN_HEIGHTS, Array, Obstacles, make_obstacles
 
 MOST_VERTICES = 16

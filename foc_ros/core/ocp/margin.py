@@ -21,9 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.dynamics.response import hermite, hermite_quintic, pair_steps
-from foc_ros.core.obstacles.chance_constraint import CERTAIN_K, compute_safety_factor
 from foc_ros.core.obstacles.geometry import Edges, find_offset, tabulate_edges
+from foc_ros.core.obstacles.risk import CERTAIN_K, compute_safety_factor
+from foc_ros.core.plant.response import hermite, hermite_quintic, pair_steps
 from foc_ros.core.types import Array
 
 from .problem import Problem

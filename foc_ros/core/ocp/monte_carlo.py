@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from foc_ros.core.dynamics.noise import stack_noise
 from foc_ros.core.obstacles.geometry import Edges, find_offset
+from foc_ros.core.plant.covariance import stack_noise
 from foc_ros.core.types import Array
 
 from .problem import Problem

@@ -10,12 +10,11 @@ from typing import TypedDict, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.dynamics.condensed import variance_weights
-from foc_ros.core.dynamics.noise import stack_noise
-from foc_ros.core.dynamics.plants import Horizon, find_states_at_goal
 from foc_ros.core.errors import SceneError
-from foc_ros.core.obstacles.chance_constraint import CANTELLI, RiskBound, centre_trajectories, compute_safety_factor, size_moments
 from foc_ros.core.obstacles.geometry import Edges, find_offset, tabulate_edges
+from foc_ros.core.obstacles.risk import CANTELLI, RiskBound, centre_trajectories, compute_safety_factor, size_moments
+from foc_ros.core.plant.covariance import stack_noise
+from foc_ros.core.plant.plants import Horizon, find_states_at_goal, variance_weights
 from foc_ros.core.safety_preference import HARD, SafetyPreference
 from foc_ros.core.types import Array, Obstacles, Record, as_readonly
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline
-from foc_ros.core.dynamics.noise import propagate_covariance
-from foc_ros.core.dynamics.smooth_path import sample_curve
 from foc_ros.core.errors import InputError
 from foc_ros.core.obstacles.geometry import find_offset
+from foc_ros.core.plant.covariance import propagate_covariance
+from foc_ros.core.plant.response import sample_curve
 from foc_ros.core.registry import STRATEGIES
 from foc_ros.core.types import Array, Solution, Status, as_readonly
 

@@ -41,6 +41,8 @@ NEARLY = 1e-2
 """Relative shortfall of k that is made good by asking for more: an obstacle comes nearer than its contacts tell."""
 CORRECTIONS = 3
 """Most times that more than the wanted safety factor is asked for."""
+SETTLED_EFFORT = 1.0
+"""Change of effort at which `algorithm1` ends, xi of the paper [m^2/s^6]."""
 MOST_STEPS = 500
 """Most QPs of `algorithm1`."""
 LARGEST_LAMBDA = 1e150
@@ -346,7 +348,7 @@ def _run_algorithm1(problem: Problem, start: Start, settings: FocConfig, deadlin
         last, effort = effort, float((point.now.control**2).sum()) / problem.horizon.gain**2
         k = float(chance.find_least_factors(point.now.control)[0][0])
         weights = {'tau': tau, 'lam': lam, 'iterations': iteration, 'qp_solves': iteration}
-        if k >= problem.wanted_k and abs(effort - last) < settings.algorithm1_xi:
+        if k >= problem.wanted_k and abs(effort - last) < SETTLED_EFFORT:
             return collect(point, 0, Status.SOLVED, 'solved', **weights)
         if point.now.gain[0] < STALLED and point.is_touching()[0]:
             message = f'QP {iteration} is infeasible at tau = {tau:.3g}, lambda = {lam:.3g}'
@@ -359,7 +361,7 @@ def _run_algorithm1(problem: Problem, start: Start, settings: FocConfig, deadlin
                     return collect(point, 0, Status.INFEASIBLE, INFEASIBLE, **weights)
                 message = f'lambda = {lam:.3g} after {iteration} QPs, and the surrogate is still violated'
                 return collect(point, 0, Status.ITERATION_LIMIT, message, **weights)
-            tau, lam = tau + settings.algorithm1_delta, lam * settings.algorithm1_growth
+            tau, lam = tau + settings.lv_delta, lam * settings.algorithm1_growth
     assert point is not None
     message = f'not settled after {MOST_STEPS} QPs at tau = {tau:.3g}, lambda = {lam:.3g}'
     weights = {'tau': tau, 'lam': lam, 'iterations': MOST_STEPS, 'qp_solves': MOST_STEPS}

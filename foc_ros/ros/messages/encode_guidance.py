@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.guidance.step import GuidanceOutput
+from foc_ros.core.guidance.guide import GuidanceOutput
 
 from .encode_inputs import encode_hand_pose
 from .plane import lift, project

@@ -20,8 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.obstacles.outline import trace_obstacle
+from foc_ros.core.obstacles.geometry import measure_offsets, trace_obstacle
 from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Prediction
 
 from .plane import lift
@@ -114,10 +113,12 @@ class _MarkerEncoder:
             yield self.encode(name, 1000 * index + i, CYLINDER, faint, (*diameters[i], float(thick[i])), centre, angles[i])
 
     def encode_legend(self) -> Iterator[Any]:
-        """Yield the legend of the ellipses, below the hand, if any are drawn."""
+        """Yield the legend of the ellipses, below the hand, if any are drawn, and the share that is unknown, if there is one."""
         for outcome in self.prediction.candidates_with_likelihood[:1]:
             (place,) = self._lift(outcome.solution.path[:1] - [0.0, LEGEND_BELOW_M])
-            yield self.encode('legend', 0, TEXT, GREY, (0, 0, TEXT_HEIGHT), place, text=LEGEND)
+            share = self.prediction.unknown
+            text = f'{LEGEND}\n{100 * share:.0f} % unknown' if share > 0.0 else LEGEND
+            yield self.encode('legend', 0, TEXT, GREY, (0, 0, TEXT_HEIGHT), place, text=text)
 
     def encode_obstacles(self, obstacles: Obstacles) -> Iterator[Any]:
         near = self._find_nearest(obstacles)

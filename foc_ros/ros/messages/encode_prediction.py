@@ -6,6 +6,7 @@ its rank, so the most likely one has index 0. All messages carry the stamp and t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -38,6 +39,8 @@ CLOUD_ROW = np.dtype(
 of the class."""
 STAMP = 'stamp_ns:'
 """Beginning of the label with the stamp [ns] of a table of likelihoods, whose message has no header."""
+UNKNOWN = 'unknown'
+"""Label of the share that no candidate has."""
 LIKELIHOOD_COLUMNS = ('likelihood', 'effort', 'cost_ratio', 'eta')
 
 
@@ -85,12 +88,16 @@ def encode_likelihoods(prediction: Prediction, types: MessageTypes) -> Any:
     """Encode one row per candidate with a likelihood, with the columns LIKELIHOOD_COLUMNS, as a Float64MultiArray.
 
     The first dimension's label joins the labels of the candidates by ';', and that of the third one, of size 1, has the stamp.
-    effort: the remaining one [m^2/s^6].
+    effort: the remaining one [m^2/s^6]. Where a share is unknown, a last row `UNKNOWN` has it, without the other numbers.
     """
     outcomes = order_candidates(prediction)
     ratios = compute_cost_ratios(outcomes)
     rows = [(o.likelihood, o.solution.effort, ratio, o.solution.eta) for o, ratio in zip(outcomes, ratios, strict=True)]
-    labels, width = ';'.join(outcome.candidate.label for outcome in outcomes), len(LIKELIHOOD_COLUMNS)
+    names, width = [outcome.candidate.label for outcome in outcomes], len(LIKELIHOOD_COLUMNS)
+    if prediction.unknown > 0.0:
+        rows.append((prediction.unknown, math.nan, math.nan, math.nan))
+        names.append(UNKNOWN)
+    labels = ';'.join(names)
     dimensions = [
         types.make('std_msgs/msg/MultiArrayDimension', label=label, size=size, stride=stride)
         for label, size, stride in (

@@ -6,8 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from foc_ros.core.dynamics.smooth_path import compute_curve
 from foc_ros.core.errors import FocError
+from foc_ros.core.plant.response import compute_curve
 from foc_ros.core.types import Array, PredictedCandidate, Prediction, describe_class
 
 MAX_NUMBER = 1e30

@@ -1,4 +1,0 @@
-"""Dynamics: a plant and a number of steps enter; condensed horizons, covariances and predictive covariances leave.
-
-It may import the ground modules of `foc_ros.core` and `foc_ros.core.estimation`.
-"""

@@ -1,0 +1,339 @@
+"""One update of guidance: references, stiffness, agreement, margins, limits and tank, in this order.
+
+The force is the sum of the candidates' forces, weakened by their disagreement, by that of the hand, and by
+what is unknown.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foc_ros.core.config import Config, GuidanceConfig
+from foc_ros.core.types import Array, Obstacles, Prediction, Record, make_obstacles
+
+from .limits import (
+    NEAR_M,
+    Margins,
+    SeenMargins,
+    build_margins,
+    find_largest_force,
+    limit_by_energy,
+    measure_opposing_distance,
+    see_margins,
+    shorten,
+    step_force,
+    turn_along,
+    update_energy,
+)
+from .paths import (
+    GuidePaths,
+    advance_progress,
+    build_paths,
+    compute_stiffness,
+    find_crossing,
+    find_deflection,
+    find_need,
+    keep_clear,
+    normalize,
+    project_out,
+    saturate,
+    transfer_progress,
+)
+
+HEADING_M = 0.02
+"""Shortest distance ahead on a path at which the heading points [m]."""
+SLOW = 0.02
+"""Speed [m/s] from which on the direction of the hand counts more than that of a path as the one along the path."""
+SHARPNESS = 3.0
+"""Exponent of the likelihoods as weights: the larger, the more the likeliest candidate leads."""
+YIELD_ACCELERATION = 0.6
+"""Acceleration of the hand against the force from which on there is no force [m/s^2]."""
+LATE_PERIODS = 2.0
+"""Longest time between two updates for which the tank is guaranteed, in periods of `guidance.rate_hz`."""
+
+
+class GuidanceStatus(StrEnum):
+    """What guidance does. All but GUIDING are dead-man conditions, in which the force becomes zero within `guidance.ramp_s`.
+
+    GUIDING: a force is computed. RELEASED: the clutch is open, the node is not active, or guidance is disabled. NO_PREDICTION:
+    there is none, or none of its candidates has a likelihood. STALE: pose or prediction is older than `guidance.hold_s`.
+    """
+
+    GUIDING = 'guiding'
+    RELEASED = 'released'
+    NO_PREDICTION = 'no_prediction'
+    STALE = 'stale'
+
+
+@dataclass(frozen=True, eq=False)
+class GuidanceInput(Record):
+    """What one update is computed from.
+
+    t: time of the update, of any clock that does not run backward [s]; position (2,) [m] and velocity (2,) [m/s] of the hand;
+    prediction: the newest one, None if there is none. pose_age_s, prediction_age_s: time since the hand was measured, and since
+    the stamp of the prediction [s]. is_released: whether guidance is switched off. acceleration (2,): of the hand [m/s^2].
+    """
+
+    t: float
+    position: Array
+    velocity: Array
+    prediction: Prediction | None
+    pose_age_s: float = 0.0
+    prediction_age_s: float = 0.0
+    is_released: bool = False
+    acceleration: Array = field(default_factory=lambda: np.zeros(2))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class GuidanceOutput(Record):
+    """The answer of one update.
+
+    t: its time [s]; status; position (2,) [m]: of the hand; force (2,) [N]. reference (2,) [m] and stiffness (2, 2) [N/m]: an
+    impedance with the same force at the present position, for controllers with a stiffness of their own. agreement in [0, 1]: of
+    the candidates; authority in [0, 1]: share of guidance in a blended command; heading (2,): direction of that share, of at most
+    unit length. tank: its content [J].
+    """
+
+    t: float
+    status: GuidanceStatus
+    position: Array
+    force: Array
+    reference: Array
+    stiffness: Array
+    agreement: float
+    authority: float
+    heading: Array
+    tank: float
+
+    def __repr__(self) -> str:
+        """Say time, status, force and agreement."""
+        x, y = self.force.tolist()
+        return f'<GuidanceOutput t={self.t:g} s, {self.status}, force ({x:.3g}, {y:.3g}) N, agreement {self.agreement:.2f}>'
+
+    def blend_command(self, command: Array) -> Array:
+        """Return (1 - A) u + A |u| h (2,) for an operator's velocity command u (2,), the authority A and the heading h.
+
+        It is never faster than the command, and equal to it where the authority is 0.
+        """
+        speed = float(np.hypot(*command))
+        blended: Array = (1.0 - self.authority) * command + self.authority * speed * self.heading
+        return blended
+
+
+@dataclass(frozen=True, eq=False)
+class Followed(Record):
+    """The newest prediction as guidance uses it.
+
+    paths: of its candidates, None if none has a likelihood; progress (c,): on them [m]; obstacles: as far as the hand has to keep
+    away; margins: of these.
+    """
+
+    prediction: Prediction | None = None
+    paths: GuidePaths | None = None
+    progress: Array = field(default_factory=lambda: np.zeros(0))
+    obstacles: Obstacles = field(default_factory=make_obstacles)
+    margins: Margins = field(default_factory=lambda: build_margins(make_obstacles(), 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class GuidanceState(Record):
+    """What the next update needs of this one.
+
+    energy: content of the tank [J], None before the first update; t, position (2,), force (2,) and authority: of the last update.
+    """
+
+    energy: float | None = None
+    t: float = 0.0
+    position: Array = field(default_factory=lambda: np.zeros(2))
+    force: Array = field(default_factory=lambda: np.zeros(2))
+    authority: float = 0.0
+    followed: Followed = field(default_factory=Followed)
+
+
+@dataclass(frozen=True, eq=False)
+class _Demand(Record):
+    """What the candidates ask for, before the limits: force, stiffness, agreement, authority, heading."""
+
+    force: Array = field(default_factory=lambda: np.zeros(2))
+    stiffness: Array = field(default_factory=lambda: np.zeros((2, 2)))
+    agreement: float = 0.0
+    authority: float = 0.0
+    heading: Array = field(default_factory=lambda: np.zeros(2))
+
+
+def guide(config: Config, state: GuidanceState, given: GuidanceInput) -> tuple[GuidanceOutput, GuidanceState]:
+    """Return the guidance of one update, and the state for the next one. Equal arguments give equal results.
+
+    The time of an update is not before that of the last one. Force and slew keep their limits for every input; tank and margins
+    are guaranteed for hands up to `guidance.max_speed`, updates not more than two periods apart, and obstacles that stand still.
+    """
+    settings = config.guidance
+    dt = 0.0 if state.energy is None else given.t - state.t
+    energy = settings.tank
+    if state.energy is not None:
+        energy = update_energy(state.energy, state.force, given.position - state.position, settings.tank)
+    status = find_status(settings, given)
+    followed, demand = _follow_prediction(config, state.followed, given), _Demand()
+    seen = see_margins(followed.margins, given.position)
+    if status is GuidanceStatus.GUIDING and followed.paths is not None:
+        progress = advance_progress(followed.paths, followed.progress, given.position, given.velocity, dt)
+        followed = replace(followed, progress=progress)
+        demand = _compute_demand(settings, followed, seen, given)
+    target = demand.force if status is GuidanceStatus.GUIDING else _release(settings, state.force, dt)
+    longest = LATE_PERIODS / settings.rate_hz if status is GuidanceStatus.GUIDING else dt  # no sudden force after a gap
+
+    def find_bound(force: Array) -> float:
+        return _find_bound(settings, seen, energy, force)
+
+    force = step_force(state.force, target, settings.slew * min(dt, longest), find_bound)
+    change = dt / settings.ramp_s
+    authority = state.authority + min(max(demand.authority - state.authority, -change), change)
+    reference = given.position + find_deflection(demand.stiffness, force)
+    output = GuidanceOutput(
+        given.t, status, given.position, force, reference, demand.stiffness, demand.agreement, authority, demand.heading, energy
+    )
+    return output, GuidanceState(energy, given.t, given.position, force, authority, followed)
+
+
+def find_status(settings: GuidanceConfig, given: GuidanceInput) -> GuidanceStatus:
+    """Return whether there is a dead-man condition, and which."""
+    if given.is_released:
+        return GuidanceStatus.RELEASED
+    if given.prediction is None or not given.prediction.candidates_with_likelihood:
+        return GuidanceStatus.NO_PREDICTION
+    if max(given.pose_age_s, abs(given.prediction_age_s)) > settings.hold_s:
+        return GuidanceStatus.STALE
+    return GuidanceStatus.GUIDING
+
+
+def _follow_prediction(config: Config, before: Followed, given: GuidanceInput) -> Followed:
+    """Return paths, progress and margins of the given prediction; those before if it is none or the same."""
+    prediction = given.prediction
+    if prediction is None or prediction is before.prediction:
+        return before
+    obstacles, margins = before.obstacles, before.margins
+    if before.prediction is None or not _is_blocked_alike(prediction, before.prediction):
+        obstacles = prediction.blocking_obstacles.grow(config.scene.hand_radius)
+        margins = build_margins(obstacles, config.guidance.margin)
+    if not prediction.candidates_with_likelihood:
+        return Followed(prediction, obstacles=obstacles, margins=margins)
+    paths, references = build_paths(prediction), {}
+    if before.paths is not None:
+        points = before.paths.interpolate(before.paths.points, before.paths.locate(before.progress))
+        references = dict(zip(before.paths.labels, points, strict=True))
+    travelled = float(np.hypot(*given.velocity)) * max(given.prediction_age_s, 0.0)
+    progress = transfer_progress(paths, references, given.position, travelled)
+    return Followed(prediction, paths, progress, obstacles, margins)
+
+
+def _is_blocked_alike(prediction: Prediction, other: Prediction) -> bool:
+    return prediction.obstacles is other.obstacles and prediction.cleared == other.cleared
+
+
+def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMargins, given: GuidanceInput) -> _Demand:
+    """Return what the candidates ask for.
+
+    A prediction begins at the hand, so what distinguishes a path from the movement of the hand is ahead of both. With the
+    look-ahead h of `paths.find_need`, x_i is the point of path i that is |v| h farther than the progress, and it is compared
+    with where the hand is by then, if it keeps its velocity v:
+
+        f_i = K_i (x_i - (x + h v)).
+
+    In mode `path` there is no force along the direction of the hand, which is that of the path where the hand is at rest. Near
+    the end of a path, h is the time to its end. With h = 0 this is f_i = K_i (x_i - x).
+    """
+    paths, progress, speed = followed.paths, followed.progress, float(np.hypot(*given.velocity))
+    assert paths is not None
+    need = find_need(settings, followed.obstacles, given.position, given.velocity)
+    ahead = np.minimum(progress + need.time_s * speed, paths.lengths[:, -1])
+    times = np.minimum(need.time_s, (ahead - progress) / max(speed, 1e-9))
+    places = paths.locate(ahead)
+    stiffness = compute_stiffness(paths.interpolate(paths.covariances, places), settings)
+    if settings.mode == 'path':
+        stiffness = project_out(stiffness, normalize(given.velocity + SLOW * paths.find_tangents(progress)))
+    points = keep_clear(settings, followed.obstacles, paths.interpolate(paths.points, places))
+    errors = saturate(settings, points - given.position - times[:, None] * given.velocity, need.share)
+    unknown = 0.0 if followed.prediction is None else followed.prediction.unknown
+    weights = weigh_candidates(paths.likelihoods, unknown)
+    force, agreement = combine(weights, (stiffness @ errors[..., None])[..., 0], find_crossing(need, errors))
+    force = yield_to_hand(force, given.acceleration, YIELD_ACCELERATION)
+    heading, line = _find_heading(paths, np.maximum(ahead, progress + HEADING_M), weights, given.position)
+    return _Demand(
+        turn_along(seen, weights @ errors, force),
+        need.share * agreement * np.einsum('c,cab->ab', weights, stiffness),
+        agreement,
+        settings.authority * min(float(np.hypot(*heading)), 1.0),
+        turn_along(seen, line, normalize(heading)),
+    )
+
+
+def _find_heading(paths: GuidePaths, ahead: Array, weights: Array, position: Array) -> tuple[Array, Array]:
+    """Return the weighted sum of the unit vectors from the hand to a point of each path, and the line to their weighted mean."""
+    lines = paths.interpolate(paths.points, paths.locate(ahead)) - position
+    return weights @ normalize(lines), weights @ lines
+
+
+def _release(settings: GuidanceConfig, force: Array, dt: float) -> Array:
+    """Return a released force: the largest one becomes zero within `ramp_s`, in the same direction."""
+    norm = float(np.hypot(*force))
+    return shorten(force, max(norm - dt * find_largest_force(settings) / settings.ramp_s, 0.0))
+
+
+def _find_bound(settings: GuidanceConfig, seen: SeenMargins, energy: float, force: Array) -> float:
+    """Return the largest size [N] of a force in a direction (2,): by its limits, the tank and the margins.
+
+    At the distance D there is a margin into which the force leads. A hand at the speed w is there after D / w. The force has to
+    be so small that the slew limit r makes it zero by then: |f| <= r (D - d) / w, with the distance d of `NEAR_M`.
+    """
+    slew, speed = settings.slew, settings.max_speed
+    distance = measure_opposing_distance(seen, force)
+    by_tank = limit_by_energy(energy, slew, speed, LATE_PERIODS / settings.rate_hz)
+    return max(min(find_largest_force(settings), by_tank, slew * (distance - NEAR_M) / speed), 0.0)
+
+
+def weigh_candidates(likelihoods: Array, unknown: float) -> Array:
+    """Return the weights w_i (c,) of candidates with likelihoods p_i, where a share u is unknown.
+
+    What is unknown takes part without a force of its own, so that the force of the others does not grow by it. With the exponent
+    g of `SHARPNESS`,
+
+        w_i = p_i^g / (sum_i p_i^g + u^g).
+    """
+    powers = likelihoods**SHARPNESS
+    total = float(powers.sum()) + unknown**SHARPNESS
+    weights: Array = powers / total if total > 0.0 else np.zeros(len(powers))
+    return weights
+
+
+def combine(weights: Array, forces: Array, is_idle: NDArray[np.bool_]) -> tuple[Array, float]:
+    """Return f = a sum_i w_i b_i f_i (2,) [N] and the agreement a in [0, 1] of forces (c, 2) [N] with weights w_i (c,).
+
+        a = |sum_i w_i b_i f_i| / sum_i w_i |f_i|
+
+    Candidates that are idle (c,) give no force, b_i = 0, and count in the agreement as others do; b_i = 1 otherwise. The
+    agreement is 1 where all likely candidates pull the same way or none pulls, and 0 where they cancel.
+    """
+    total = weights @ np.where(is_idle[:, None], 0.0, forces)
+    separate = float(weights @ np.hypot(forces[:, 0], forces[:, 1]))
+    agreement = min(float(np.hypot(*total)) / separate, 1.0) if separate > 0.0 else 1.0
+    return agreement * total, agreement
+
+
+def yield_to_hand(force: Array, acceleration: Array, strongest: float) -> Array:
+    """Return a force (2,) [N] that falls as the hand accelerates against it, and is zero from an acceleration A on.
+
+        f <- f clip(1 + f . a / (|f| A), 0, 1)
+
+    A hand that accelerates against a force of guidance is pushed by its operator, and more strongly than by guidance, whatever
+    its mass is. The operator wants another way, which the likelihoods will say later.
+
+    acceleration: a (2,), of the hand [m/s^2]; strongest: A [m/s^2], 0 for a force that does not fall.
+    """
+    size = float(np.hypot(*force))
+    if not strongest or not size:
+        return force
+    return force * min(max(1.0 + float(force @ acceleration) / (size * strongest), 0.0), 1.0)

@@ -1,0 +1,246 @@
+"""Recordings of a scene as evidence: they change the likelihoods of the candidates, and their paths.
+
+A recording r counts by how near its states come to the position p [m] and the velocity v [m/s] of the hand,
+
+    w_r = max_m exp(-|p - p_rm|^2 / 2 a^2 - |v - v_rm|^2 / 2 b^2),  a = `POSITION_STDDEV`,  b = `VELOCITY_STDDEV`.
+
+From the state m of this maximum on, it passes obstacles on the sides of a class i towards the goal at its end. With G the classes
+that take the same gap in the next row, or lead to the same goal where no row is ahead, W those of the same way through all rows,
+n_i = sum of the w_r of class i, and n_G and n_W = sums of the n_i, the likelihoods p_i of the model are means of three Dirichlet
+distributions: of the gap, of the way beyond it, and of the goal. They count as n_0 = `PRIOR_COUNT` recordings for the gap and for
+the goal, and as n_1 = `PRIOR_COUNT_BEYOND` for the way; the recordings are observations:
+
+    p_G <- (n_0 p_G + n_G) / (n_0 + sum n),    p_W <- p_G (n_1 p_W / p_G + n_W) / (n_1 + n_G),
+    p_i <- p_W (n_0 p_i / p_W + n_i) / (n_0 + n_W),
+
+with the p_G and p_W of the model in the fractions p_W / p_G and p_i / p_W.
+
+The path of a class is pooled with the recordings that take its gap in the next row, each up to where it passes an obstacle on
+another side than the class (`pooling`). If this path leaves the class or enters an obstacle, only the recordings of the
+class count, and if that one does so too, the path stays that of the plan. Effort and eta are always those of the plan. Without
+recordings near the hand, all is the model. Recordings of the running program change the likelihoods of goals and the paths only,
+unless `experience.learning` is `online`: people vary their ways between obstacles more than where they go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foc_ros.core.classes.library import NEAR, STEP_S, Demonstration, is_same_demonstration
+from foc_ros.core.classes.rows import Decisions, find_decisions, tabulate_sides
+from foc_ros.core.types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Record, Solution
+
+from .pooling import RecordedPaths, fade_weights, pool_path, stays_in_class
+
+MOST_NEAR = 64
+"""Number of recordings, the nearest ones, that count in one prediction: its time is bounded whatever the size of the library."""
+POSITION_STDDEV, VELOCITY_STDDEV = 0.02, 0.03
+"""Distance [m] and difference of velocities [m/s] at which a recording counts less."""
+PRIOR_COUNT, PRIOR_COUNT_BEYOND, PRIOR_COUNT_PATH = 1.0, 30.0, 0.3
+"""Numbers of recordings as which the model counts: for the gap in the next row and for the goal; for the way beyond it; for the
+path to it. Operators vary more in far choices than their recordings say, and less in their paths than plans do."""
+LEAST_WEIGHT = 1e-3
+"""Weight below which a recording does not count."""
+
+
+@dataclass(frozen=True, eq=False)
+class Library(Record):
+    """The class library.
+
+    demonstrations: one of each class, to recall; recordings: those with states, r of them; states (r, m, 4): x, y, vx, vy [m,
+    m/s], infinite beyond the end of each; ends (r,): the last state of each; scene (r,): equal numbers for recordings in the same
+    scene; shows_ways (r,): whether a recording is evidence of ways between obstacles, or only of goals and paths.
+    """
+
+    demonstrations: tuple[Demonstration, ...]
+    recordings: tuple[Demonstration, ...]
+    states: Array
+    ends: NDArray[np.intp]
+    scene: tuple[int, ...]
+    shows_ways: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence(Record):
+    """The e recordings that count, beside the n obstacles and g goals of the prediction.
+
+    weight (e,); row (e,) in the library; state (e,), the nearest one; sides (e, n): LEFT or RIGHT, on which each passes the
+    obstacles from there on, 0 for an obstacle that it does not know; passing_s (e, n): the time until then [s]; is_at_goal (e,
+    g): whether it ends at a goal.
+    """
+
+    weight: Array
+    row: NDArray[np.intp]
+    state: NDArray[np.intp]
+    sides: NDArray[np.int8]
+    passing_s: Array
+    is_at_goal: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement(Record):
+    """Of a class and e recordings: is_same (e,): whether they are of it; until_s (e,) [s]: how long they may lead its path."""
+
+    is_same: NDArray[np.bool_]
+    until_s: Array
+
+
+def make_library(given: Sequence[Demonstration], learnt: Sequence[Demonstration] = ()) -> Library:
+    """Return the library of demonstrations, of which those with states are recordings; learnt: those that show no ways."""
+    found = (*given, *learnt)
+    distinct: list[Demonstration] = []
+    for each in found:
+        if not any(is_same_demonstration(each, known) for known in distinct):
+            distinct.append(each)
+    recordings = tuple(each for each in found if each.states is not None)
+    tables = [each.states for each in recordings if each.states is not None]
+    states = np.full((len(tables), max(map(len, tables), default=0), 4), np.inf)
+    for row, table in enumerate(tables):
+        states[row, : len(table)] = table
+    ends = np.array([len(table) - 1 for table in tables], dtype=np.intp)
+    numbers = dict[tuple[object, ...], int]()
+    scene = tuple(numbers.setdefault((each.frame_id, each.ids, each.centre.tobytes()), len(numbers)) for each in recordings)
+    shows_ways = np.arange(len(recordings)) < sum(each.states is not None for each in given)
+    return Library(tuple(distinct), recordings, states, ends, scene, shows_ways)
+
+
+NO_LIBRARY = make_library(())
+
+
+def find_evidence(library: Library, hand: HandState, obstacles: Obstacles, goals: Array, widening: float = 1.0) -> Evidence:
+    """Find the recordings that count: nearest first, at most MOST_NEAR, only those whose obstacles are where they were.
+
+    widening: factor on the distances at which a recording counts less.
+    """
+    scale = widening * np.repeat([POSITION_STDDEV, VELOCITY_STDDEV], 2)
+    apart = (((library.states - hand.mean[:4]) / scale) ** 2).sum(axis=2)
+    state = apart.argmin(axis=1)
+    weight = np.exp(-0.5 * apart[np.arange(len(apart)), state])
+    rows, is_same = list[int](), dict[int, bool]()
+    for row in np.argsort(-weight, kind='stable').tolist():
+        if weight[row] < LEAST_WEIGHT or len(rows) == MOST_NEAR:
+            break
+        scene = library.scene[row]
+        if scene not in is_same:
+            is_same[scene] = library.recordings[row].matches(hand.frame_id, obstacles)
+        if is_same[scene]:
+            rows.append(row)
+    sides, passing_s = np.zeros((len(rows), len(obstacles)), dtype=np.int8), np.zeros((len(rows), len(obstacles)))
+    column = {name: number for number, name in enumerate(obstacles.ids)}
+    for number, row in enumerate(rows):
+        recording = library.recordings[row]
+        columns = [column[name] for name in recording.ids]
+        sides[number, columns] = recording.rest_sides[state[row]]
+        passing_s[number, columns] = STEP_S * (recording.passing - state[row])
+    ends = np.array([library.recordings[row].path[-1] for row in rows]).reshape(-1, 1, 2)
+    is_at_goal = np.hypot(*(ends - goals).transpose(2, 0, 1)) <= NEAR
+    return Evidence(weight[rows], np.array(rows, dtype=np.intp), state[rows], sides, passing_s, is_at_goal)
+
+
+def pool_recordings(
+    candidates: Sequence[PredictedCandidate],
+    library: Library,
+    hand: HandState,
+    obstacles: Obstacles,
+    goals: Array,
+) -> list[PredictedCandidate]:
+    """Return candidates with likelihoods and paths that the recordings of a library change, the most likely first.
+
+    hand: as estimated; obstacles: grown by the radius of the hand; goals (g, 2) [m].
+    """
+    taken = [each for each in candidates if each.has_likelihood]
+    if not taken or not library.recordings:
+        return list(candidates)
+    evidence = find_evidence(library, hand, obstacles, goals)
+    if not len(evidence.row):
+        return list(candidates)
+    goal = np.array([each.candidate.goal for each in taken], dtype=np.intp)
+    decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
+    agreements = [compare_with_class(each.candidate, evidence, obstacles, decisions.next_row) for each in taken]
+    of_ways = evidence.weight * library.shows_ways[evidence.row]
+    counts, on_ways = (np.array([each[one.is_same].sum() for one in agreements]) for each in (evidence.weight, of_ways))
+    likelihoods = update_likelihoods(np.array([each.likelihood for each in taken]), counts, on_ways, decisions)
+    pooled = []
+    for each, share, agreement in zip(taken, likelihoods.tolist(), agreements, strict=True):
+        recorded = follow_recordings(library, evidence, agreement.until_s, hand, each.times)
+        pooled.append(replace(each, likelihood=share, solution=_pool_path(each, recorded, agreement, hand, obstacles)))
+    pooled.sort(key=lambda each: (-each.likelihood, each.label))
+    return pooled + [each for each in candidates if not each.has_likelihood]
+
+
+def compare_with_class(candidate: Candidate, evidence: Evidence, obstacles: Obstacles, next_row: NDArray[np.intp]) -> Agreement:
+    """Compare the recordings with the class of a candidate: its goal, and its sides of all obstacles in its label.
+
+    A recording may lead the path until it passes an obstacle on another side, or the last obstacle if its goal is another one;
+    not at all if that obstacle is in the next row, which is empty where only goals differ, or not known to the recording.
+    """
+    column = {name: number for number, name in enumerate(obstacles.ids)}
+    columns = [column[name] for name, _ in candidate.sides if name in column]
+    sides, passing_s = evidence.sides[:, columns], evidence.passing_s[:, columns]
+    is_other = sides != [side for name, side in candidate.sides if name in column]
+    is_at_goal = evidence.is_at_goal[:, candidate.goal]
+    until_s = np.where(is_other, passing_s, np.inf).min(axis=1, initial=np.inf)
+    until_s = np.where(is_at_goal, until_s, np.minimum(until_s, passing_s.max(axis=1, initial=0.0)))
+    until_s[(is_other & (np.isin(columns, next_row) | (sides == 0))).any(axis=1)] = 0.0
+    if not len(next_row):
+        until_s[~is_at_goal] = 0.0
+    return Agreement(is_at_goal & ~is_other.any(axis=1), until_s)
+
+
+def follow_recordings(library: Library, evidence: Evidence, until_s: Array, hand: HandState, times: Array) -> RecordedPaths:
+    """Return where recordings lead the hand at times (m,) [s] from now, each with its weight up to until_s (e,) [s].
+
+    Paths are linear between states, and stay at the last one.
+    """
+    row, ends = evidence.row[:, None], library.ends[evidence.row]
+    at = np.minimum(evidence.state[:, None] + times / STEP_S, ends[:, None])
+    before = np.minimum(at.astype(np.intp), ends[:, None] - 1)
+    share = (at - before)[..., None]
+    paths = (1.0 - share) * library.states[row, before, :2] + share * library.states[row, before + 1, :2]
+    paths += (hand.mean[:2] - library.states[evidence.row, evidence.state, :2])[:, None]
+    left_s = np.minimum(STEP_S * (ends - evidence.state), until_s)
+    return RecordedPaths(paths, fade_weights(evidence.weight, left_s, times))
+
+
+def _pool_path(
+    candidate: PredictedCandidate,
+    recorded: RecordedPaths,
+    agreement: Agreement,
+    hand: HandState,
+    obstacles: Obstacles,
+) -> Solution:
+    """Return the solution with the path that recordings change."""
+    for is_used in (agreement.until_s > 0.0, agreement.is_same):
+        if not is_used.any():
+            break
+        uncertainty = hand.covariance[:2, :2], 0.5 * VELOCITY_STDDEV
+        pooled = pool_path(candidate.solution, recorded.take(is_used), *uncertainty, PRIOR_COUNT_PATH)
+        if stays_in_class(candidate, pooled, obstacles):
+            return pooled
+    return candidate.solution
+
+
+def update_likelihoods(likelihoods: Array, counts: Array, on_ways: Array, decisions: Decisions) -> Array:
+    """Return likelihoods (k,) that counts (k,) change: of the gaps, of the ways in each gap, and of the goals in each way.
+
+    on_ways (k,): counts of the recordings that show ways; where no row is ahead, gaps are goals, for which all count.
+    """
+    whole, each = np.zeros(len(counts), dtype=np.intp), np.arange(len(counts))
+    levels = (
+        (whole, decisions.next_gap, PRIOR_COUNT, on_ways if len(decisions.next_row) else counts),
+        (decisions.next_gap, decisions.way, PRIOR_COUNT_BEYOND, on_ways),
+        (decisions.way, each, PRIOR_COUNT, counts),
+    )
+    pooled = np.ones(len(counts))
+    for group, part, prior_count, seen in levels:
+        of_group, of_part = (np.bincount(number, likelihoods)[number] for number in (group, part))
+        in_group, in_part = (np.bincount(number, seen)[number] for number in (group, part))
+        even = 1.0 / np.bincount(group[np.unique(part, return_index=True)[1]])[group]
+        share = np.divide(of_part, of_group, out=even, where=of_group > 0.0)
+        pooled *= (prior_count * share + in_part) / (prior_count + in_group)
+    pooled /= pooled.sum()
+    return pooled

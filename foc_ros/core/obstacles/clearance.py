@@ -1,0 +1,85 @@
+"""How far a path stays from obstacles, which obstacles no path comes near, and which the hand passes above or below.
+
+The footprint of an obstacle is a range of progress, the coordinate along the line from the hand to the goal: whatever way leads
+around the other obstacles, the hand has about the progress of the free movement. An obstacle is cleared if the band of predicted
+heights is above it, or below it, during the whole time in which the hand has the progress of the footprint. The footprint is
+longer than the obstacle by `SLACK` on both sides, because a way around obstacles has not quite the progress of the free movement.
+Obstacles beyond the goal are judged as if they were at the goal, and those behind the hand as if they were at the hand.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foc_ros.core.types import Array, Obstacles
+
+from .geometry import measure_offsets
+from .risk import centre_trajectories
+
+FINER = 4
+"""Number of parts of a step at which distances are measured."""
+
+
+def measure_clearance(path: Array, obstacles: Obstacles, dt: float) -> float:
+    """Return the smallest distance [m] of a path (N + 1, 2) [m] from obstacles, negative inside; dt: the time step [s]."""
+    steps = len(path) - 1
+    at = np.linspace(0.0, steps, FINER * steps + 1)
+    points = np.column_stack([np.interp(at, np.arange(steps + 1), axis) for axis in path.T])
+    centres = centre_trajectories(obstacles.centre, dt / FINER * obstacles.velocity, FINER * steps)
+    distance = measure_offsets(points, obstacles, centres)[1] - obstacles.radius
+    return float(distance.min(initial=np.inf))
+
+
+def cull_obstacles(obstacles: Obstacles, hand: Array, goals: Array, duration_s: float, most: int) -> Obstacles:
+    """Return the `most` obstacles at most, in their order, that a path to a goal can touch with the smallest detour.
+
+    hand (2,), goals (g, 2) [m], g >= 1. The detour over an obstacle is d(hand) + d(goal) - 2 r - |hand - goal|, with distances d
+    from its polygon, for the goal where it is smallest. A moving obstacle may come nearer by its speed times duration_s [s], at
+    both ends. Of equal ones the first rows are kept.
+    """
+    if len(obstacles) <= most:
+        return obstacles
+    _, distance = measure_offsets(np.concatenate((hand[None], goals)), obstacles)
+    detour = (distance[1:] - np.linalg.norm(goals - hand, axis=1)[:, None]).min(axis=0) + distance[0]
+    reach = obstacles.radius + duration_s * np.linalg.norm(obstacles.velocity, axis=1)
+    kept = np.argsort(detour - 2.0 * reach, kind='stable')[:most]
+    return obstacles.take(np.sort(kept))
+
+
+SLACK = 0.45
+"""Part of the distance to the goal by which a footprint is longer on both sides."""
+
+
+def find_cleared(obstacles: Obstacles, hand: Array, goal: Array, progress: Array, band: Array, dt: float) -> NDArray[np.bool_]:
+    """Return which obstacles the hand passes above or below on its way to a goal, (n,).
+
+    Parameters
+    ----------
+    obstacles
+        The obstacles now, grown by what the hand needs beside them. One whose heights are not known is not cleared.
+    hand, goal
+        Positions in the plane, (2,) [m].
+    progress
+        Of the free movement at steps 0..N, (N + 1,) [m].
+    band
+        Lowest and highest predicted point of the hand at these steps, (2, N + 1) [m].
+    dt
+        Duration of a step [s].
+    """
+    distance = float(np.hypot(*(goal - hand)))
+    direction = (goal - hand) / distance if distance > 0.0 else np.zeros(2)
+    corners = obstacles.vertices @ direction
+    times = dt * np.arange(len(progress))[:, None]
+    centre = (obstacles.centre - hand) @ direction + times * (obstacles.velocity @ direction)
+    reach = obstacles.radius + SLACK * distance
+    near = np.minimum(centre + corners.min(axis=1) - reach, progress.max())
+    far = np.maximum(centre + corners.max(axis=1) + reach, progress.min())
+    behind, ahead = progress[:, None] < near, progress[:, None] > far
+    # the hand is not at the footprint between two steps if it is on the same side of it at both
+    is_there = ~((behind[:-1] & behind[1:]) | (ahead[:-1] & ahead[1:]))
+    lowest, highest = obstacles.heights.T
+    is_cleared = np.zeros(len(obstacles), dtype=bool)
+    for is_clear in (band[0][:, None] > highest, band[1][:, None] < lowest):
+        is_cleared |= ((is_clear[:-1] & is_clear[1:]) | ~is_there).all(axis=0)
+    return is_cleared

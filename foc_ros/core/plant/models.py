@@ -1,0 +1,151 @@
+"""Plant models: what the predictor has to know of the plant that the parameter `foc.plant` names.
+
+The estimator follows position, velocity and acceleration of the hand, whatever the plant. A plant model takes the part of this
+estimate that is its own state, and says how errors of the state evolve when the operator corrects them (`replanning`).
+
+What else depends on the plant:
+
+- The effort is the sum of squared controls: jerk [m^2/s^6] for the triple integrator, force [N^2] for the damped mass. The
+  durations describe the hand and are the same for every plant.
+- `foc.process_noise` is white noise of the control. For the triple integrator the covariance that it adds in a step is exact; for
+  other plants the noise is held constant over a step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+
+from foc_ros.core.config import REFERENCE_STEP_S, FocConfig
+from foc_ros.core.errors import InputError
+from foc_ros.core.registry import PLANTS
+from foc_ros.core.types import Array, Solution
+
+from .plants import (
+    CACHED_HORIZONS,
+    Horizon,
+    Plant,
+    build_triple_integrator_horizon,
+    condense,
+    discretise_damped_mass,
+    discretise_triple_integrator,
+)
+from .replanning import (
+    compute_error_map,
+    compute_goal_map,
+    compute_process_covariance,
+    triple_integrator_error_covariance,
+    triple_integrator_error_map,
+    triple_integrator_goal_map,
+    triple_integrator_process_covariance,
+)
+
+HAND_STATES = 6
+"""x, y, vx, vy, ax, ay of the estimator."""
+
+
+class PlantModel:
+    """A linear plant of the hand at every step length.
+
+    Parameters
+    ----------
+    discretise
+        Function that returns the discrete `Plant` for a step dt [s]. Its states are x, y [m], vx, vy [m/s] and, where the plant
+        has them, ax, ay [m/s^2], so that n is 4 to 6; its control has one channel for each axis.
+
+    Attributes
+    ----------
+    states
+        Number n of the states.
+
+    Raises
+    ------
+    InputError
+        For a plant with other states.
+    """
+
+    def __init__(self, discretise: Callable[[float], Plant]) -> None:
+        self.discretise = discretise
+        self.states = len(discretise(REFERENCE_STEP_S).A)
+        if self.states > HAND_STATES:
+            raise InputError('plant', f'4 to {HAND_STATES} states x, y, vx, vy, ax, ay', self.states)
+
+    def build_horizon(self, dt: float, steps: int) -> Horizon:
+        """Return the condensed horizon of `steps` steps of dt [s]."""
+        return _condense(self, dt, steps)
+
+    def project_mean(self, hand_mean: Array) -> Array:
+        """Return the state (n,) of the plant for the estimated state (6,) of a hand."""
+        return hand_mean[: self.states]
+
+    def project_covariance(self, hand_covariance: Array) -> Array:
+        """Return the covariance (n, n) of the state for that (6, 6) of the estimate."""
+        return hand_covariance[: self.states, : self.states]
+
+    def compute_goal_map(self, dt: float, steps: int, passing: bool) -> Array:
+        """Return K_t, (N + 1, n, n): how a displaced state at the goal displaces the states before it (`replanning`)."""
+        return compute_goal_map(self.build_horizon(dt, steps), passing)
+
+    def compute_error_map(self, dt: float, steps: int, passing: bool) -> Array:
+        """Return E_t, (N + 1, n, n): what remains at steps 0..N of an error of the initial state that the operator corrects."""
+        return compute_error_map(self.build_horizon(dt, steps), passing)
+
+    def propagate_error(self, covariance: Array, dt: float, steps: int, passing: bool) -> Array:
+        """Return the covariance (N + 1, n, n) at steps 0..N that an estimate of covariance (6, 6) leads to."""
+        error_map = self.compute_error_map(dt, steps, passing)
+        propagated: Array = error_map @ self.project_covariance(covariance) @ error_map.swapaxes(1, 2)
+        return propagated
+
+    def compute_process_covariance(self, dt: float, steps: int, passing: bool) -> Array:
+        """Return the covariance (N + 1, n, n) that white control noise of unit spectral density causes at steps 0..N."""
+        plant = self.discretise(dt)
+        return compute_process_covariance(plant, steps, plant.B @ plant.B.T / dt, passing)
+
+    def compute_end_rate(self, solution: Solution) -> Array:
+        """Return the time derivative (n,) of the mean state at the end of a solution, by a backward difference."""
+        states = solution.mean
+        rate: Array = (1.5 * states[-1] - 2.0 * states[-2] + 0.5 * states[-3]) / solution.dt
+        return rate
+
+
+@lru_cache(maxsize=CACHED_HORIZONS)
+def _condense(model: PlantModel, dt: float, steps: int) -> Horizon:
+    return condense(model.discretise(dt), steps)
+
+
+class TripleIntegratorModel(PlantModel):
+    """The paper's hand, driven by jerk: everything is scaled from the horizon of unit step, which is computed once."""
+
+    def __init__(self, _: FocConfig | None = None) -> None:
+        super().__init__(discretise_triple_integrator)
+
+    build_horizon = staticmethod(build_triple_integrator_horizon)
+    compute_goal_map = staticmethod(triple_integrator_goal_map)
+    compute_error_map = staticmethod(triple_integrator_error_map)
+    propagate_error = staticmethod(triple_integrator_error_covariance)
+    compute_process_covariance = staticmethod(triple_integrator_process_covariance)
+
+    def compute_end_rate(self, solution: Solution) -> Array:  # noqa: D102
+        # the control belongs to the middle of its step: in 50 steps of a reach from rest, the last one is 7 % below the jerk at
+        # the end, so it is extrapolated by half a step
+        jerk = 1.5 * solution.control[-1] - 0.5 * solution.control[-2]
+        return np.concatenate([solution.mean[-1, 2:6], jerk])
+
+
+TRIPLE_INTEGRATOR = TripleIntegratorModel()
+
+
+def make_damped_mass(settings: FocConfig) -> PlantModel:
+    """Return the paper's second-order hand: a mass with viscous damping, driven by force."""
+    return PlantModel(lambda dt: discretise_damped_mass(dt, settings.plant_mass, settings.plant_damping))
+
+
+@lru_cache(maxsize=CACHED_HORIZONS)
+def make_plant_model(settings: FocConfig) -> PlantModel:
+    """Return the model of the plant that `foc.plant` names; raise InputError if its factory makes something else."""
+    model = PLANTS.get(settings.plant)(settings)
+    if not isinstance(model, PlantModel):
+        raise InputError(f'plant {settings.plant}', 'a factory that returns a PlantModel', repr(model))
+    return model

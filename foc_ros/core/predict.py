@@ -1,0 +1,312 @@
+"""The prediction: one hand state and one scene enter, one prediction and the classes that it follows leave."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .candidates import estimate_unsolved, find_unknown_share, rank_candidates, solve_candidates
+from .classes import Search, Turn, find_path_sides, search
+from .classes.library import GuessTiming, recall_demonstrations
+from .config import REFERENCE_STEP_S, Config, EstimatorConfig
+from .deadline import NEVER, Deadline
+from .hand.duration import estimate_times_to_go, is_passing, limit_change
+from .height import HeightPredictor
+from .learning.dispersion import scale_covariance
+from .learning.learnt import NOTHING, Knowledge
+from .learning.recordings import Library, pool_recordings
+from .obstacles.clearance import cull_obstacles
+from .obstacles.risk import RiskBound, count_events
+from .ocp.problem import Problem, rest_to_goal
+from .plant.covariance import SharedCovariances, scale_noise, widen_covariance
+from .plant.models import make_plant_model
+from .safety_preference import SafetyPreference
+from .scene import ReachingScene
+from .tracks import HOLD_S, NO_TRACKS, Track, Tracks, take_rest
+from .types import (
+    LEFT,
+    NANOSECONDS,
+    Array,
+    Candidate,
+    HandState,
+    Obstacles,
+    PredictedCandidate,
+    Prediction,
+    Record,
+    Status,
+    make_obstacles,
+)
+
+SEARCH_SHARE, SOLVE_SHARE = 0.3, 0.8
+"""Shares of the time left after which the search and the solver begin no step. The last step may end later."""
+RESERVE_S, POOLING_S = 5e-5, 2e-4
+"""Time besides that for each candidate [s]: to rank it, and to pool its path with recordings where there are some."""
+
+
+def predict(
+    config: Config,
+    hand: HandState,
+    obstacles: Obstacles,
+    goals: Array,
+    tracks: Tracks,
+    knowledge: Knowledge = NOTHING,
+    deadline: Deadline = NEVER,
+    goal_heights: Array | None = None,
+) -> tuple[Prediction, Tracks]:
+    """Predict where a hand goes.
+
+    Parameters
+    ----------
+    config
+        All parameters.
+    hand
+        Estimated state of the hand.
+    obstacles
+        Obstacles at the stamp of the hand. The hand keeps `scene.hand_radius` away from them; the prediction holds them as given.
+    goals
+        Goals (g, 2) [m], g >= 1.
+    tracks
+        What the previous prediction returned, or `NO_TRACKS`.
+    knowledge
+        Demonstrated paths, which become candidates where they fit the scene, recordings, which are evidence (`recordings`), and
+        the planning of the operator (`likelihood`).
+    deadline
+        When the prediction has to be ready. All classes are solved together; what is not settled then is compared by an estimate.
+    goal_heights
+        Heights of the goals (g,) [m]; None where they are not known, and the height of the hand is not predicted.
+
+    Returns
+    -------
+    Prediction, Tracks
+        The prediction, and the classes that it follows, for the next one. Without a deadline, equal arguments give equal results,
+        wall times apart.
+    """
+    began, stamp_ns, known = time.perf_counter(), hand.stamp_ns, tracks.keep_goals(goals)
+    library, planning_spread = knowledge
+    scene = _prepare_scene(config, hand, obstacles, goals, goal_heights, known)
+    found, candidates = _find_candidates(scene, config, known, library, deadline)
+    matched = known.match(candidates, stamp_ns)
+    reserve_s = (RESERVE_S + POOLING_S * bool(library.recordings)) * len(candidates)
+    solved = _solve(scene, config, candidates, matched, deadline.take_share(SOLVE_SHARE, reserve_s))
+    held = [_hold_answer(*each, scene.hand) for each in zip(solved, matched, strict=True)]
+    answered = estimate_unsolved(held, scene.near)
+    ranked = rank_candidates(answered, config.likelihood, scene.near, scene.hand, goals, planning_spread)
+    pooled = pool_recordings(ranked, library, hand, scene.blocking, goals)
+    distances = np.hypot(*(goals - hand.mean[:2]).T)
+    unknown = find_unknown_share(pooled, found.unfollowed, distances, config.likelihood, planning_spread)
+    smooth, unknown = known.smooth(
+        [replace(each, likelihood=(1.0 - unknown) * each.likelihood) for each in pooled], unknown, stamp_ns
+    )
+    predicted, best = scene.heights.add_to(smooth), known.choose_most_likely(smooth)
+    counts = {
+        'merged': len(answered) - len(ranked),
+        'culled': len(scene.blocking) - len(scene.near),
+        'cleared_by_height': int(scene.cleared.sum()),
+        'recalled': len(candidates) - len(found.candidates),
+        'kept': sum(each.age_s > 0.0 for each in predicted),
+        'unfinished': sum(each.status is Status.DEADLINE for each in predicted),
+        'estimated': sum(each.status is Status.ESTIMATED for each in predicted),
+    }
+    prediction = Prediction(
+        stamp_ns,
+        hand.frame_id,
+        hand.height,
+        tuple(scale_covariance(each, config.covariance, at_rest=hand.onset_ns is None) for each in predicted),
+        None if best is None else best.label,
+        notes=dict(found.notes) | {name: count for name, count in counts.items() if count},
+        solve_s=time.perf_counter() - began,
+        obstacles=obstacles,
+        goals=goals,
+        cleared=tuple(scene.cleared.tolist()),
+        unknown=unknown,
+    )
+    following = Tracks(
+        *known.follow(predicted, matched, solved, stamp_ns),
+        stamp_ns,
+        goals,
+        dict(enumerate(scene.durations_s)),
+        unknown,
+        None if best is None else best.way,
+        max([known.next_number, *(each.number + 1 for each in matched)]),
+        found.next_goal,
+    )
+    return prediction, following
+
+
+@dataclass(frozen=True, eq=False)
+class _PredictionScene(Record):
+    """What the candidates of one prediction are found and solved in.
+
+    hand: the state that they start from; goals (g, 2) [m]; durations_s: time to go to each; blocking: obstacles that the hand
+    does not clear by its height, grown by its radius; near: those that are not culled; cleared (n,): whether the hand clears each
+    of all obstacles; heights: the prediction of the height; covariances: what all candidates share of theirs.
+    """
+
+    hand: HandState
+    goals: Array
+    durations_s: list[float]
+    blocking: Obstacles
+    near: Obstacles
+    cleared: NDArray[np.bool_]
+    heights: HeightPredictor
+    covariances: SharedCovariances
+
+
+def _prepare_scene(
+    config: Config, estimated: HandState, obstacles: Obstacles, goals: Array, goal_heights: Array | None, known: Tracks
+) -> _PredictionScene:
+    """Return the scene of a prediction: a start without noise, times to go, and the obstacles that are in the way."""
+    hand = _simplify_start(estimated, config.estimator)
+    durations_s = _find_durations(hand, goals, known, config)
+    grown = obstacles.grow(config.scene.hand_radius)
+    covariances = SharedCovariances(hand, config)
+    heights = HeightPredictor(config, hand, goal_heights, covariances)
+    cleared = heights.find_cleared(grown, goals, durations_s)
+    blocking = grown.take(np.flatnonzero(~cleared)) if cleared.any() else grown
+    near = cull_obstacles(blocking, hand.mean[:2], goals, max(durations_s), config.scene.max_obstacles)
+    return _PredictionScene(hand, goals, durations_s, blocking, near, cleared, heights, covariances)
+
+
+def _find_candidates(
+    scene: _PredictionScene, config: Config, known: Tracks, library: Library, deadline: Deadline
+) -> tuple[Search, tuple[Candidate, ...]]:
+    """Search for homotopy classes; return what was found, and the candidates with those that a library recalls."""
+    timing = GuessTiming(scene.durations_s, config.foc.steps)
+    turn = Turn(deadline.take_share(SEARCH_SHARE), known.next_goal)
+    found = search(scene.hand.mean, scene.goals, scene.near, config.homotopy, *timing, known.candidates, turn)
+    where = scene.hand, scene.goals, scene.near, config.homotopy, timing
+    return found, recall_demonstrations(library.demonstrations, *where, found.candidates, known.candidates)
+
+
+def _solve(
+    scene: _PredictionScene, config: Config, candidates: Sequence[Candidate], matched: Sequence[Track], deadline: Deadline
+) -> list[PredictedCandidate]:
+    """Solve the candidates, each from the solution of its track; return them with their numbers and predictive covariance."""
+    place = config, scene.hand, scene.near
+    by_goal = {row: build_problem(*place, scene.goals[row], scene.durations_s[row]) for row in {each.goal for each in candidates}}
+    earlier = [each.solution if each.solved_ns == each.seen_ns else None for each in matched]
+    solved = solve_candidates(candidates, [by_goal[each.goal] for each in candidates], config.foc, earlier, deadline)
+    numbered = [replace(each, way=track.number) for each, track in zip(solved, matched, strict=True)]
+    return [_widen_covariance(each, scene.covariances, scene.hand, config) for each in numbered]
+
+
+def _hold_answer(solved: PredictedCandidate, track: Track, hand: HandState) -> PredictedCandidate:
+    """Return the rest of the last answer of a class that could not be solved, if it is young enough."""
+    if solved.has_likelihood or track.solution is None or not track.is_solved_within(hand.stamp_ns, HOLD_S):
+        return solved
+    age_s = (hand.stamp_ns - track.solved_ns) / NANOSECONDS
+    rest = take_rest(track.solution, age_s, hand.mean[:2], solved.solution.message)
+    if rest is None:
+        return solved
+    sides = dict(solved.candidate.sides)
+    return replace(solved, solution=rest, sides=sides, cost=rest.expected_effort * rest.dt, age_s=age_s)
+
+
+def warm_up(config: Config) -> None:
+    """Predict twice in a made-up scene, so that the first real predictions find the cached matrices and the loaded kernels."""
+    obstacles, goals = make_obstacles([[0.15, 0.0]], 0.02, 0.001), np.array([[0.3, 0.0]])
+    hand, tracks = HandState(0, np.zeros(6), np.zeros((6, 6))), NO_TRACKS
+    for _ in range(2):  # the second one begins at a solution
+        _, tracks = predict(config, hand, obstacles, goals, tracks)
+
+
+def _find_durations(hand: HandState, goals: Array, known: Tracks, config: Config) -> list[float]:
+    """Return the time to go [s] to each goal, which for a goal that was there before changes only gradually."""
+    durations, elapsed_s = estimate_times_to_go(hand, goals, config.duration), known.measure_time(hand.stamp_ns)
+    return [limit_change(each, known.durations_s.get(goal, each), elapsed_s) for goal, each in enumerate(durations)]
+
+
+def build_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: Array, duration_s: float) -> Problem:
+    """Return the problem of reaching a goal (2,) [m] in duration_s [s] with the plant of the config, from a known hand state."""
+    foc = config.foc
+    dt, plant = duration_s / foc.steps, make_plant_model(foc)
+    return rest_to_goal(
+        plant.build_horizon(dt, foc.steps),
+        plant.project_mean(hand.mean),
+        goal,
+        obstacles,
+        scale_noise(np.array([foc.noise_x, foc.noise_y]), REFERENCE_STEP_S, dt),
+        foc.eta,
+        goal_weight=foc.goal_weight,
+        recovery_s=foc.recovery_s,
+        passing=is_passing(config.duration),
+        risk=RiskBound(foc.bound, count_events(foc.risk, len(obstacles), foc.steps)),
+        preference=SafetyPreference(config.likelihood.beta, config.likelihood.shortfall, dt=dt),
+    )
+
+
+def _simplify_start(hand: HandState, config: EstimatorConfig) -> HandState:
+    """Return the state that a prediction starts from.
+
+    Speed and acceleration of a hand that has not begun to move, those of its height too, are set to zero, because they are noise:
+    with 1 mm of it at 100 Hz, the efforts of a hand at rest would differ by a factor of three from one sample to the next, and
+    the classes of a symmetric obstacle would swap their ranks 24 times a second. The covariance is that of a hand that moves with
+    about `estimator.onset_speed` at most.
+
+    An acceleration a that decays as exp(-t / tau) leads from the speed v to v + tau a. Where the operator commands speed, as with
+    a thumb stick, tau is short, and a plan that starts from v + tau a without acceleration is nearer to what follows.
+    """
+    if hand.onset_ns is None:
+        height_at_rest, mean = np.array([hand.height_mean[0], 0.0, 0.0]), np.concatenate([hand.mean[:2], np.zeros(4)])
+        return replace(hand, mean=mean, covariance=_slow_down(hand.covariance, config.onset_speed), height_mean=height_at_rest)
+    if not config.acceleration_time_s:
+        return hand
+    final_velocity = hand.mean[2:4] + config.acceleration_time_s * hand.mean[4:]
+    height, velocity, acceleration = hand.height_mean.tolist()
+    height_then = np.array([height, velocity + config.acceleration_time_s * acceleration, 0.0])
+    return replace(hand, mean=np.concatenate([hand.mean[:2], final_velocity, np.zeros(2)]), height_mean=height_then)
+
+
+def _slow_down(covariance: Array, onset_speed: float) -> Array:
+    """Return the covariance (6, 6) of a state given that its velocity is zero with a standard deviation of onset_speed [m/s]."""
+    gain = covariance[:, 2:4] @ np.linalg.inv(covariance[2:4, 2:4] + onset_speed**2 * np.eye(2))
+    slowed: Array = covariance - gain @ covariance[2:4]
+    return slowed
+
+
+def _widen_covariance(
+    candidate: PredictedCandidate, shared: SharedCovariances, hand: HandState, config: Config
+) -> PredictedCandidate:
+    """Add the predictive covariance, and that of the timing, to the covariance that motor noise causes."""
+    solution = candidate.solution
+    covariance = widen_covariance(solution, shared[solution.dt], hand.onset_ns is None, config)
+    return replace(candidate, solution=solution.with_covariance(covariance))
+
+
+def build_scene_problems(scene: ReachingScene) -> list[Problem]:
+    """Return the problem of every goal. An uncertain start is as uncertain to the operator, so it counts in the constraint."""
+    config = scene.config
+    problems = [build_problem(config, scene.hand, scene.avoided, goal, scene.duration_s) for goal in scene.goals]
+    if scene.noise is not None:
+        problems = [replace(problem, noise=scene.noise) for problem in problems]
+    if not scene.hand.covariance.any():
+        return problems
+    plant, steps = make_plant_model(config.foc), config.foc.steps
+    error_map = plant.compute_error_map(scene.duration_s / steps, steps, is_passing(config.duration))
+    covariance = plant.project_covariance(scene.hand.covariance)
+    return [replace(problem, initial_covariance=covariance, error_map=error_map) for problem in problems]
+
+
+def solve_scene(scene: ReachingScene, problems: Sequence[Problem]) -> list[PredictedCandidate]:
+    """Solve the class of the guess, or the classes that are found; solved ones come first, the most likely first.
+
+    problems: of every goal, from `build_scene_problems`.
+    """
+    config, avoided = scene.config, scene.avoided
+    if scene.guess is not None:
+        candidates: tuple[Candidate, ...] = (_make_guessed_candidate(scene.guess, avoided),)
+    else:
+        durations = [scene.duration_s] * len(scene.goals)
+        candidates = search(scene.hand.mean, scene.goals, avoided, config.homotopy, durations, config.foc.steps).candidates
+    solved = solve_candidates(candidates, [problems[each.goal] for each in candidates], config.foc)
+    return rank_candidates(solved, config.likelihood, avoided, scene.hand, scene.goals)
+
+
+def _make_guessed_candidate(guess: Array, obstacles: Obstacles) -> Candidate:
+    sides = tuple(sorted(find_path_sides(guess, obstacles).items()))
+    label = 'goal0:' + ''.join(('+' if side == LEFT else '-') + identity for identity, side in sides)
+    return Candidate(label, 0, sides, guess, 0.0)

@@ -1,0 +1,33 @@
+"""Parameters of earlier versions, and what took their place: for the message that refuses them."""
+
+from __future__ import annotations
+
+CHOICES = 'nothing is learnt from choices any more'
+RECORDINGS = 'how much recordings count is fixed'
+REMOVED = {
+    'duration.time_cost': 'durations follow Fitts law or are fixed, and their pace is learnt',
+    'duration.min_time_to_go_s': 'it is 0.3 s',
+    'duration.max_time_to_go_s': 'it is 10 s',
+    'likelihood.spent_share': 'only the effort to go is compared',
+    'likelihood.planning_spread': 'it is 1 until the pace of the operator is known from one movement, and then 0.3',
+    'likelihood.beta_beyond': 'ways beyond the next row are equally likely to an operator who looks ahead',
+    'likelihood.heading_bias': 'reaches that bend are learnt as recordings: experience.learning',
+    'likelihood.adaptation': CHOICES,
+    'likelihood.hold_s': 'it is 0.2 s',
+    'likelihood.smoothing_s': 'it is 0.1 s',
+    'likelihood.margin': 'it is 0.05',
+    'experience.prior_count': RECORDINGS,
+    'experience.prior_count_beyond': RECORDINGS,
+    'experience.prior_count_path': RECORDINGS,
+    'experience.position_stddev': RECORDINGS,
+    'experience.velocity_stddev': RECORDINGS,
+    'scene.height_stddevs': 'it is 2',
+    'foc.algorithm1_delta': 'it is foc.lv_delta',
+    'foc.algorithm1_xi': 'it is 1 m^2/s^6, as in the paper',
+    'guidance.precision_low': 'it is 100 1/m^2',
+    'guidance.precision_high': 'it is 2500 1/m^2',
+    'guidance.position_stddev': 'it is 2 mm',
+    'guidance.sharpness': 'it is 3',
+    'guidance.yield_acceleration': 'it is 0.6 m/s^2',
+}
+"""By dotted name, a sentence that goes on after `it was removed: `."""

@@ -1,0 +1,129 @@
+"""The scene: goals, and obstacles from several sources, moved on to a stamp; and one reaching scene as the paper poses it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .config import Config
+from .errors import SceneError
+from .obstacles.geometry import measure_offsets
+from .types import NANOSECONDS, Array, HandState, Obstacles, Record, make_obstacles
+
+
+@dataclass(frozen=True)
+class ObstacleSource:
+    """The last table of one source: its obstacles with unique ids, the stamp for which they hold (None: always), their frame."""
+
+    obstacles: Obstacles
+    stamp_ns: int | None
+    frame_id: str
+
+    def at(self, stamp_ns: int) -> Obstacles:
+        """Return the obstacles at a stamp [ns], moved on at their velocity; those without a stamp stay where they are."""
+        return self.obstacles if self.stamp_ns is None else self.obstacles.after((stamp_ns - self.stamp_ns) / NANOSECONDS)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene(Record):
+    """Obstacles by source, in order of arrival, and the goals (g, 2) [m], None until some were received.
+
+    goal_heights (g,): of the goals, along the plane's normal [m]; None where they are not known.
+    """
+
+    sources: dict[str, ObstacleSource] = field(default_factory=dict)
+    goals: Array | None = None
+    goals_frame: str = ''
+    goal_heights: Array | None = None
+
+    def with_source(self, name: str, source: ObstacleSource) -> Scene:
+        """Return the scene with the obstacles of one source replaced; this source is now the latest."""
+        return replace(self, sources=self.without_source(name).sources | {name: source})
+
+    def without_source(self, name: str) -> Scene:
+        """Return the scene without the obstacles of one source."""
+        return replace(self, sources={other: part for other, part in self.sources.items() if other != name})
+
+    def with_goals(self, goals: Array, frame_id: str, heights: Array | None = None) -> Scene:
+        """Return the scene with all goals replaced."""
+        return replace(self, goals=np.array(goals, dtype=float).reshape(-1, 2), goals_frame=frame_id, goal_heights=heights)
+
+    def obstacles(self, stamp_ns: int) -> Obstacles:
+        """Return all obstacles at a stamp [ns]: the union over the sources, in which the latest source of an id counts."""
+        tables = [part.at(stamp_ns) for part in self.sources.values()]
+        if len(tables) < 2:
+            return tables[0] if tables else make_obstacles()
+        ids = [name for table in tables for name in table.ids]
+        latest = {name: row for row, name in enumerate(ids)}
+        return _concatenate(tables, ids).take(sorted(latest.values()))
+
+    def not_ready_reason(self, stamp_ns: int, timeout_s: float) -> tuple[str, str] | None:
+        """Return why nothing can be predicted for a hand pose at a stamp [ns], as (kind, message); None if it can.
+
+        A source is stale if its stamp differs from that of the hand by more than timeout_s [s], in either direction; 0: never.
+        One stale source suffices, since a missing message does not mean that its obstacles are gone.
+        """
+        if not self.sources:
+            return 'no_obstacles', 'no obstacles received yet: publish an empty cloud for an empty scene'
+        if self.goals is None:
+            return 'no_goal', 'no goal received'
+        if not len(self.goals):
+            return 'no_goal', 'no goal: the last goals message was empty'
+        ages = [(stamp_ns - part.stamp_ns) / NANOSECONDS for part in self.sources.values() if part.stamp_ns is not None]
+        age = max(ages, key=abs, default=0.0)
+        if 0.0 < timeout_s < abs(age):
+            relation = 'older' if age > 0.0 else 'newer'
+            return 'stale', f'obstacles are {abs(age):.3g} s {relation} than the hand pose (scene.timeout_s is {timeout_s:g})'
+        return None
+
+
+def _concatenate(tables: list[Obstacles], ids: list[str]) -> Obstacles:
+    most = max(table.vertices.shape[1] for table in tables)
+    vertices = [np.pad(table.vertices, ((0, 0), (0, most - table.vertices.shape[1]), (0, 0))) for table in tables]
+    return Obstacles(
+        tuple(ids),
+        np.concatenate([table.centre for table in tables]),
+        np.concatenate([table.radius for table in tables]),
+        np.concatenate([table.radius_stddev for table in tables]),
+        np.concatenate([table.velocity for table in tables]),
+        np.concatenate([table.centre_covariance for table in tables]),
+        np.concatenate(vertices),
+        np.concatenate([table.corners for table in tables]),
+        np.concatenate([table.heights for table in tables]),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class ReachingScene(Record):
+    """One reaching problem.
+
+    hand: where it starts; goals (g, 2) [m]; obstacles; noise (2,): c per step, None for the parameters' noise scaled to the step;
+    guess (N + 1, 2) [m]: path in the only class to be solved, None to search the classes; config: parameters, of which
+    `duration.fixed_s` is the duration.
+    """
+
+    hand: HandState
+    goals: Array
+    obstacles: Obstacles
+    noise: Array | None
+    guess: Array | None
+    config: Config
+
+    @property
+    def avoided(self) -> Obstacles:
+        """The obstacles that the centre of the hand has to avoid: those of the scene, larger by the radius of the hand."""
+        return self.obstacles.grow(self.config.scene.hand_radius)
+
+    @property
+    def duration_s(self) -> float:
+        """Duration of the movement [s]."""
+        return self.config.duration.fixed_s
+
+
+def check_outside(field: str, point: Array, obstacles: Obstacles) -> None:
+    """Raise SceneError, which names the field, if a point (2,) [m] lies inside the mean boundary of an obstacle."""
+    distances = measure_offsets(point, obstacles)[1][0]
+    for row in np.flatnonzero(distances < obstacles.radius)[:1]:
+        found = f'{point.tolist()}, {max(round(distances[row], 9), 0.0):.4g} m from its polygon'
+        raise SceneError(field, f'a point outside obstacle {obstacles.ids[row]}, of radius {obstacles.radius[row]:g} m', found)

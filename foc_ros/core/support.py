@@ -1,0 +1,92 @@
+"""Checks of what a user passes to the public API, and the count of what was refused."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .config import Config
+from .errors import InputError, SceneError
+from .types import NANOSECONDS, Array
+
+FARTHEST = 1e4
+"""Bound on every length, velocity and acceleration, in SI units."""
+
+
+def check_array(field: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
+    """Return a new array of finite numbers of a shape, in which None stands for any length; raise SceneError otherwise."""
+    sizes = ', '.join('n' if size is None else str(size) for size in shape)
+    expected = f'finite numbers of shape ({sizes}{"," if len(shape) == 1 else ""})'
+    try:
+        array = np.array(value, dtype=float)
+    except OverflowError as error:
+        raise SceneError(field, expected, 'a whole number beyond all floats') from error
+    except (TypeError, ValueError) as error:
+        raise SceneError(field, expected, repr(value)) from error
+    if array.ndim != len(shape) or any(size not in (None, found) for size, found in zip(shape, array.shape, strict=True)):
+        raise SceneError(field, expected, f'{value!r} of shape {array.shape}')
+    if not (np.abs(array) <= FARTHEST).all():
+        raise SceneError(field, f'numbers in [{-FARTHEST:g}, {FARTHEST:g}]', repr(value))
+    return array
+
+
+def check_vector(field: str, value: ArrayLike, length: int) -> Array:
+    """Return a new array (length,) of finite numbers; raise SceneError otherwise."""
+    return check_array(field, value, (length,))
+
+
+def check_number(field: str, value: object, low: float = -FARTHEST, high: float = FARTHEST) -> float:
+    """Return a finite number within bounds; raise SceneError otherwise."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise SceneError(field, f'a number in [{low:g}, {high:g}]', repr(value))
+    if not low <= value <= high:
+        raise SceneError(field, f'a number in [{low:g}, {high:g}]', value)
+    return float(value)
+
+
+def find_shape(given: object) -> tuple[int, ...]:
+    """Return the shape of anything that may be an array, without a check of its numbers."""
+    return np.shape(np.asarray(given, dtype=object))
+
+
+def check_config(config: Config | None) -> Config:
+    """Return a config, the defaults for None; raise InputError for anything else."""
+    if not isinstance(config, (Config, type(None))):
+        raise InputError('config', 'a Config', repr(config))
+    return Config() if config is None else config
+
+
+class Rejections:
+    """Attributes: counts, by kind; refused, number of rejections; last, the text of the last one, None before the first."""
+
+    def __init__(self) -> None:
+        self.counts: Counter[str] = Counter()
+        self.refused = 0
+        self.last: str | None = None
+
+    def count(self, kind: str) -> None:
+        """Count an event that is no rejection."""
+        self.counts[kind] += 1
+
+    def reject(self, kind: str, message: str) -> None:
+        """Count a rejection and keep its text."""
+        self.counts[kind] += 1
+        self.refused += 1
+        self.last = message
+
+    def reject_stamp(self, kind: str, topic: str, stamp_ns: int, newest_ns: int) -> None:
+        """Reject a stamp [ns] that is not after the newest one."""
+        if stamp_ns == newest_ns:
+            self.reject(kind, f'{topic}: stamps repeat: {stamp_ns} ns is that of the message before')
+            return
+        seconds = (newest_ns - stamp_ns) / NANOSECONDS
+        self.reject(kind, f'{topic}: the stamp {stamp_ns} ns is {seconds:g} s behind the newest one, {newest_ns} ns')
+
+    def accept_frame(self, kind: str, topic: str, frame_id: str, working: str | None) -> bool:
+        """Return whether a frame is the working one, or none is fixed yet; otherwise reject it and name both."""
+        if working is None or frame_id == working:
+            return True
+        self.reject(kind, str(InputError(f'{topic}.header.frame_id', f"the working frame '{working}'", f"'{frame_id}'")))
+        return False

@@ -1,0 +1,223 @@
+"""The homotopy classes that are followed: one track for each, and one matching of tracks and candidates per prediction.
+
+A class goes on under another name if the name of one of the two is that of the other with obstacles left out: obstacles come into
+reach and are passed. Of several tracks, a candidate continues the one with its own name, or else the one with which it shares
+most sides, that was seen last, and is the most likely. No two candidates continue one track.
+
+From its track a class has its number, the solution from which the next one starts, and its likelihood before. A class that could
+not be solved keeps the rest of its last solution for at most `HOLD_S`: of an age a, a movement of duration T over [a, T],
+resampled at N steps of (T - a) / N, that begins where the hand is now and has the cost of that rest.
+
+Likelihoods change gradually: with p_i of this prediction, l_i before (0 for a new class), and the time h between both,
+
+    l_i <- ((1 - g) l_i + g p_i) / sum,   g = 1 - exp(-h / `SMOOTHING_S`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+
+import numpy as np
+
+from .types import NANOSECONDS, Array, Candidate, PredictedCandidate, Record, Solution, as_readonly
+
+HOLD_S = 0.2
+"""Longest time for which a class that is not solved keeps its last answer, and one that is not seen its number [s]: ten
+predictions, within which a solver or a search that missed a class finds it again."""
+SMOOTHING_S = 0.1
+"""Time constant of the filter of the likelihoods [s]: half the time in which people react to what they see."""
+LEAD = 0.05
+"""Lead in likelihood that another class needs to become the most likely one: equal ones do not swap by noise."""
+LEAST_UNKNOWN = 1e-6
+"""Unknown share that counts as none."""
+MOVED_M = 0.01
+"""A goal that moves by more than this between two predictions is another goal [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Track(Record):
+    """A homotopy class that is followed.
+
+    number: stays for as long as the class is followed; candidate: as it was last, at the stamp seen_ns; likelihood: its last one;
+    solution: the last one, found at solved_ns, None if there is none.
+    """
+
+    number: int
+    candidate: Candidate
+    seen_ns: int
+    likelihood: float = 0.0
+    solution: Solution | None = None
+    solved_ns: int = 0
+
+    def is_solved_within(self, stamp_ns: int, seconds: float) -> bool:
+        """Tell whether there is a solution that is not older at a stamp [ns] than some seconds [s]."""
+        return self.solution is not None and 0 <= stamp_ns - self.solved_ns <= seconds * NANOSECONDS
+
+
+@dataclass(frozen=True, eq=False)
+class Tracks(Record):
+    """What one prediction passes to the next.
+
+    followed: the tracks of its candidates; absent: those that were not seen for a short time; stamp_ns: of the prediction, None
+    if there was none; goals (g, 2) [m]; durations_s: time to go to each [s]; unknown: share of the likelihood that no candidate
+    had; most_likely: number of the most likely class; next_number: of the next new class; next_goal: row of the goal at which the
+    search begins.
+    """
+
+    followed: tuple[Track, ...] = ()
+    absent: tuple[Track, ...] = ()
+    stamp_ns: int | None = None
+    goals: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    durations_s: dict[int, float] = field(default_factory=dict)
+    unknown: float = 0.0
+    most_likely: int | None = None
+    next_number: int = 0
+    next_goal: int = 0
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The candidates of the last prediction."""
+        return tuple(each.candidate for each in self.followed)
+
+    def forget(self) -> Tracks:
+        """Return what a new movement begins with: nothing, but no number is given twice."""
+        return Tracks(next_number=self.next_number)
+
+    def keep_goals(self, goals: Array) -> Tracks:
+        """Return what belongs to those of the goals (g, 2) [m] that are where they were."""
+        count = min(len(goals), len(self.goals))
+        kept = set(np.flatnonzero(np.hypot(*(goals[:count] - self.goals[:count]).T) <= MOVED_M).tolist())
+        durations_s = {goal: each for goal, each in self.durations_s.items() if goal in kept}
+        followed, absent = (tuple(each for each in part if each.candidate.goal in kept) for part in (self.followed, self.absent))
+        return replace(self, followed=followed, absent=absent, durations_s=durations_s)
+
+    def without_solutions(self) -> Tracks:
+        """Return the same classes without their solutions, which other parameters would not give."""
+        followed, absent = (tuple(replace(each, solution=None) for each in part) for part in (self.followed, self.absent))
+        return replace(self, followed=followed, absent=absent)
+
+    def measure_time(self, stamp_ns: int) -> float:
+        """Return the time since the last prediction [s], infinite if there was none or it is later."""
+        if self.stamp_ns is None or stamp_ns < self.stamp_ns:
+            return math.inf
+        return (stamp_ns - self.stamp_ns) / NANOSECONDS
+
+    def match(self, candidates: Sequence[Candidate], stamp_ns: int) -> list[Track]:
+        """Return the track of each candidate, a new one where it continues none; those not seen for `HOLD_S` are forgotten."""
+        alive = [each for each in (*self.followed, *self.absent) if 0 <= stamp_ns - each.seen_ns <= HOLD_S * NANOSECONDS]
+        pairs = [
+            (each.candidate.label == candidate.label, shared, each.seen_ns, each.likelihood, -place, each)
+            for place, candidate in enumerate(candidates)
+            for each in alive
+            if (shared := count_shared(each.candidate, candidate)) is not None
+        ]
+        found, taken = dict[int, Track](), set[int]()
+        for *_, place, each in sorted(pairs, key=lambda pair: pair[:5], reverse=True):
+            if -place not in found and each.number not in taken:
+                found[-place] = each
+                taken.add(each.number)
+        numbers = iter(range(self.next_number, self.next_number + len(candidates)))
+        return [found.get(place) or Track(next(numbers), each, stamp_ns) for place, each in enumerate(candidates)]
+
+    def smooth(
+        self, predicted: Sequence[PredictedCandidate], unknown: float, stamp_ns: int
+    ) -> tuple[list[PredictedCandidate], float]:
+        """Return candidates with numbers and likelihoods p_i with the likelihoods l_i, ranked, and the unknown share likewise."""
+        before = {each.number: each.likelihood for each in self.followed}
+        taking_part = [each for each in predicted if each.has_likelihood]
+        gain = -math.expm1(-self.measure_time(stamp_ns) / SMOOTHING_S)
+        if not any(each.way in before for each in taking_part):
+            gain = 1.0
+        weights = [(1.0 - gain) * before.get(each.way, 0.0) + gain * each.likelihood for each in taking_part]
+        left = (1.0 - gain) * self.unknown + gain * unknown
+        left = left if left >= LEAST_UNKNOWN else 0.0
+        total = sum(weights) + left or 1.0
+        ranked = [replace(each, likelihood=weight / total) for each, weight in zip(taking_part, weights, strict=True)]
+        ranked.sort(key=lambda each: (-each.likelihood, each.label))
+        return ranked + [each for each in predicted if not each.has_likelihood], left / total
+
+    def choose_most_likely(self, predicted: Sequence[PredictedCandidate]) -> PredictedCandidate | None:
+        """Return the most likely of ranked candidates; the one of before stays until another leads by more than `LEAD`."""
+        taking_part = [each for each in predicted if each.has_likelihood]
+        if not taking_part:
+            return None
+        best = taking_part[0]
+        kept = next((each for each in taking_part if each.way == self.most_likely), best)
+        return kept if best.likelihood - kept.likelihood <= LEAD else best
+
+    def follow(
+        self,
+        predicted: Sequence[PredictedCandidate],
+        matched: Sequence[Track],
+        solved: Sequence[PredictedCandidate],
+        stamp_ns: int,
+    ) -> tuple[tuple[Track, ...], tuple[Track, ...]]:
+        """Return the tracks after a prediction: of its candidates, with new solutions where there are, and those not seen.
+
+        predicted: as published; matched: the track of each candidate; solved: all candidates with what the solver has found.
+        """
+        likelihoods = {each.way: each.likelihood for each in predicted}
+        present = []
+        for track, found in zip(matched, solved, strict=True):
+            seen = Track(track.number, found.candidate, stamp_ns, likelihoods.get(track.number, 0.0))
+            newest = (found.solution, stamp_ns) if found.has_likelihood else (track.solution, track.solved_ns)
+            present.append(replace(seen, solution=newest[0], solved_ns=newest[1]))
+        numbers = {each.number for each in matched}
+        others = [each for each in (*self.followed, *self.absent) if each.number not in numbers]
+        absent = [each for each in others if 0 <= stamp_ns - each.seen_ns <= HOLD_S * NANOSECONDS]
+        return tuple(present), tuple(absent)
+
+
+NO_TRACKS = Tracks()
+
+
+def count_shared(before: Candidate, now: Candidate) -> int | None:
+    """Return how many sides two candidates share, None if they are different classes: no name is the other with less in it."""
+    fewer, more = sorted((before.sides, now.sides), key=len)
+    if before.goal != now.goal or not set(fewer) <= set(more):
+        return None
+    return len(fewer)
+
+
+def take_rest(solution: Solution, age_s: float, position: Array, reason: str) -> Solution | None:
+    """Return the rest of a solution from an age [s] on, at as many steps, that begins at a position (2,) [m].
+
+    None if nothing remains. reason: why it is used, in words. The distance of the hand from the solution now falls to zero at its
+    end as a minimum-jerk movement does, with its derivatives.
+    """
+    steps, left_s = len(solution.control), float(solution.times[-1]) - age_s
+    if left_s <= solution.dt:
+        return None
+    begin, motor = age_s / solution.dt, solution.motor_covariance
+    mean, covariance = interpolate_rest(solution.mean, begin), as_readonly(interpolate_rest(solution.covariance, begin))
+    aside, fall = position - mean[0, :2], _fall_as_minimum_jerk(steps)
+    for order in range(mean.shape[1] // 2):
+        mean[:, 2 * order : 2 * order + 2] += fall[order] * (aside / left_s**order)
+    if motor is not None:
+        motor = as_readonly(interpolate_rest(motor, begin))
+    during = (begin + (steps - begin) * (np.arange(steps) + 0.5) / steps).astype(np.intp)
+    control = as_readonly(solution.control[np.minimum(during, steps - 1)])
+    message = f'{reason}; the answer is from {age_s:.3g} s ago'
+    rest = replace(solution, mean=as_readonly(mean), covariance=covariance, motor_covariance=motor, control=control)
+    return replace(rest, effort=float((control**2).sum()), dt=left_s / steps, message=message)
+
+
+def interpolate_rest(states: Array, begin: float) -> Array:
+    """Return states (N + 1, ...), such as means or covariances, from the step `begin` on, at N steps."""
+    steps = len(states) - 1
+    at = np.linspace(begin, steps, steps + 1)
+    row = np.minimum(at.astype(np.intp), steps - 1)
+    share = (at - row).reshape(-1, *(1,) * (states.ndim - 1))
+    rest: Array = (1.0 - share) * states[row] + share * states[row + 1]
+    return rest
+
+
+@cache
+def _fall_as_minimum_jerk(steps: int) -> Array:
+    """Return phi = 1 - s^3 (10 - 15 s + 6 s^2) and its first two derivatives at s = 0..1 in steps, (3, steps + 1, 1)."""
+    s = np.linspace(0.0, 1.0, steps + 1)[:, None]
+    slope, bend = -30.0 * s**2 * (1.0 - s) ** 2, -60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
+    return np.stack((1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2), slope, bend))

@@ -1,0 +1,103 @@
+"""No probability without knowledge: what fails keeps a share, and what is not followed is unknown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bag_helpers import TYPES
+
+from foc_ros.core import candidates
+from foc_ros.core.config import Config, replace_values
+from foc_ros.core.predict import predict
+from foc_ros.core.tracks import NO_TRACKS
+from foc_ros.core.types import HandState, Prediction, Solution, Status, make_obstacles
+from foc_ros.io.json_output import encode_prediction
+from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_markers
+
+CONFIG = replace_values(Config(), {'foc.steps': 20})
+HAND = HandState(0, np.zeros(6), np.zeros((6, 6)), frame_id='world')
+ROW = make_obstacles([[0.15, 0.04], [0.15, -0.045]], 0.025, 0.001)
+GOALS = np.array([[0.3, 0.0]])
+
+
+def ask(config: Config = CONFIG, goals: np.ndarray = GOALS, obstacles=ROW) -> Prediction:
+    return predict(config, HAND, obstacles, goals, NO_TRACKS)[0]
+
+
+def let_fail(monkeypatch: pytest.MonkeyPatch, number: int, status: Status) -> None:
+    """Let the solver fail in the candidate of a number."""
+    solve = candidates.solve_problems
+
+    def fail(*given) -> Sequence[Solution]:
+        return [replace(each, status=status) if row == number else each for row, each in enumerate(solve(*given))]
+
+    monkeypatch.setattr(candidates, 'solve_problems', fail)
+
+
+def total(prediction: Prediction) -> float:
+    return sum(each.likelihood for each in prediction.candidates) + prediction.unknown
+
+
+@pytest.mark.parametrize('status', [Status.LEFT_CLASS, Status.ITERATION_LIMIT, Status.INFEASIBLE])
+@pytest.mark.parametrize('number', [0, 1, 2])
+def test_a_class_that_the_search_sees_and_the_solver_fails_in_keeps_a_share(
+    monkeypatch: pytest.MonkeyPatch, status: Status, number: int
+) -> None:
+    known = {each.way: each for each in ask().candidates}
+    let_fail(monkeypatch, number, status)
+    found = ask()
+    (failed,) = [each for each in found.candidates if each.status is Status.ESTIMATED]
+    assert failed.way == number and found.notes['estimated'] == 1 and len(found.candidates) == 4
+    assert 0.25 < failed.likelihood / known[number].likelihood < 4.0
+    assert total(found) == pytest.approx(1.0)
+    np.testing.assert_allclose(failed.mean[0], HAND.mean, atol=1e-12)
+    np.testing.assert_allclose(failed.mean[-1, :2], GOALS[0], atol=1e-9)
+
+
+def test_a_class_that_the_wanted_eta_rules_out_has_no_share(monkeypatch: pytest.MonkeyPatch) -> None:
+    let_fail(monkeypatch, 1, Status.ETA_UNREACHABLE)
+    found = ask()
+    assert [each.likelihood > 0.0 for each in found.candidates] == [True, True, True, False]
+
+
+def test_what_is_seen_and_not_followed_is_unknown() -> None:
+    whole, one = ask(), ask(replace_values(CONFIG, {'homotopy.max_candidates': 1}))
+    assert whole.unknown == 0.0 and len(whole.candidates) == 4 and len(one.candidates) == 1
+    assert one.unknown == pytest.approx(1.0 - whole.candidates[0].likelihood, abs=0.15)
+    assert one.candidates[0].likelihood == pytest.approx(1.0 - one.unknown)
+
+
+def test_where_an_operator_looks_ahead_all_that_is_not_followed_counts_alike() -> None:
+    ahead = replace_values(CONFIG, {'likelihood.planning_horizon_s': 0.0, 'homotopy.max_candidates': 1})
+    assert ask(ahead).unknown == pytest.approx(3.0 / 4.0)
+
+
+def test_goals_that_are_not_followed_are_unknown() -> None:
+    """There are more goals than candidates that a prediction may have."""
+    angles = np.linspace(-0.7, 0.7, 80)
+    found = ask(
+        replace_values(CONFIG, {'foc.steps': 5}), 0.3 * np.column_stack([np.cos(angles), np.sin(angles)]), make_obstacles()
+    )
+    assert len(found.candidates) == 64
+    assert found.unknown == pytest.approx(16.0 / 80.0, abs=0.02) and total(found) == pytest.approx(1.0)
+
+
+def test_where_nothing_is_solved_all_is_unknown() -> None:
+    hard = replace_values(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 2.0, 'foc.noise_y': 2.0, 'likelihood.shortfall': np.inf})
+    found = ask(hard)
+    assert found.unknown == 1.0 and found.most_likely is None and total(found) == 1.0
+
+
+def test_the_unknown_share_is_published() -> None:
+    whole, one = ask(), ask(replace_values(CONFIG, {'homotopy.max_candidates': 1}))
+    table = encode_likelihoods(one, TYPES)
+    assert table.layout.dim[0].label == f'{one.candidates[0].label};unknown'
+    rows = np.asarray(table.data).reshape(-1, 4)
+    assert rows[:, 0].sum() == pytest.approx(1.0) and np.isnan(rows[1, 1:]).all() and rows[1, 0] == one.unknown
+    assert 'unknown' not in encode_likelihoods(whole, TYPES).layout.dim[0].label
+    texts = [each.text for each in encode_markers(one, one.obstacles, 'xy', TYPES).markers]
+    assert any(text.endswith(f'{100 * one.unknown:.0f} % unknown') for text in texts)
+    assert encode_prediction(one)['unknown'] == one.unknown
