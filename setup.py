@@ -7,7 +7,7 @@ from setuptools import find_packages, setup
 
 PACKAGE = 'foc_ros'
 PAGES = ('play/page', 'reporting/page')
-REPORT = ['Jinja2>=3.1', 'matplotlib>=3.6', 'plotly>=5.24']
+REPORT = ['Jinja2>=3.1', 'matplotlib>=3.6']
 
 setup(
     name=PACKAGE,

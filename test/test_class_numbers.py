@@ -10,7 +10,7 @@ from foc_ros.core.memory.class_numbers import NO_NUMBERS
 from foc_ros.core.memory.memory import Memory
 from foc_ros.core.predictor import predict
 from foc_ros.core.types import Candidate, HandState, PredictedCandidate, make_obstacles
-from foc_ros.reporting.snapshots import parse_label
+from foc_ros.reporting.views import parse_label
 
 IDS = ('1', '12', 'post-2')
 STEP_NS, HOLD_S = 20_000_000, 0.2

@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PUBLISHED, REFITTED
-from foc_ros.reporting.drawing import open_figure
+from foc_ros.reporting.draw import open_figure
 from foc_ros.reporting.evaluation_report import _draw_reliability
 
 BINS = [

@@ -14,7 +14,6 @@ import pytest
 
 pytest.importorskip('tornado', reason='tornado is not installed')
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
-pytest.importorskip('plotly', reason='plotly is not installed')
 
 from browser_helpers import check_report, chromium, screenshot
 from play_helpers import Play, find_point, play, press_keys, steer, tab_to, until, visit, wait_for, wait_for_answer

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
-pytest.importorskip('plotly', reason='plotly is not installed')
 
 from session_helpers import BOX, CIRCLE, SCENE, TASKS, parse
 

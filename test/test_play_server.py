@@ -18,7 +18,6 @@ import pytest
 
 pytest.importorskip('tornado', reason='tornado is not installed')
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
-pytest.importorskip('plotly', reason='plotly is not installed')
 
 from play_helpers import play
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest, HTTPResponse

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
-pytest.importorskip('plotly', reason='plotly is not installed')
 
 from report_samples import predictions, samples
 from session_helpers import SCENE, TASKS, Page, Silent, reach, wait_until

@@ -14,7 +14,7 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from report_samples import predictions, samples
 
-from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
+from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from foc_ros.core.config import Config
-from foc_ros.reporting.drawing import CLASS_COLOURS
+from foc_ros.reporting.draw import CLASS_COLOURS
 
 from . import scene
 from .tasks import Phase, Tasks

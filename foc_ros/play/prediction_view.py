@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.types import Array
-from foc_ros.reporting.drawing import CLASSES, ELLIPSES_PER_CANDIDATE, STDDEVS, compute_ellipse_axes
-from foc_ros.reporting.report_data import PATH_POINTS, select_evenly
+from foc_ros.reporting.draw import ELLIPSES_PER_CANDIDATE, STDDEVS, compute_ellipse_axes
+from foc_ros.reporting.encode import PATH_POINTS, select_evenly
+from foc_ros.reporting.views import SLOTS
 from foc_ros.ros.messages.encode_prediction import CLOUD_ROW
 
 DECIMALS = 5
@@ -20,7 +21,7 @@ class Slots:
 
     def __init__(self) -> None:
         self._slots: dict[int, int] = {}
-        self._free = list(range(CLASSES))
+        self._free = list(range(SLOTS))
 
     def assign(self, ways: list[int]) -> list[int | None]:
         """Return the slots of the present classes; a class that finds none has None."""

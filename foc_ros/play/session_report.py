@@ -9,7 +9,7 @@ import numpy as np
 from foc_ros.core.types import NANOSECONDS, HandSample, as_readonly
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.reporting.report import write_report
-from foc_ros.reporting.snapshots import build_hand_trajectory, is_same_prediction, read_snapshot
+from foc_ros.reporting.views import build_hand_trajectory, is_same_prediction, read_snapshot
 
 from .predictors import KINDS, NODE
 from .scene import FRAME, PlayScene, Point

@@ -15,9 +15,8 @@ from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS
 from foc_ros.analysis.evaluation.tables import GAP_TITLE, make_tables
 from foc_ros.io.outputs import EVALUATION_PAGE
 
-from .drawing import open_figure
+from .draw import open_figure, save_figure
 from .page import render_list, render_page, render_picture, render_pictures, render_table, write_page
-from .plots import save_figure
 
 WIDTH_IN, HEIGHT_IN = 6.4, 4.2
 COUNTS = f'with intervals of 95 % by bootstrap over recordings, and the numbers of predictions of {PUBLISHED}'

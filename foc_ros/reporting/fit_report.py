@@ -18,9 +18,8 @@ from foc_ros.analysis.fitting.tables import (
 )
 from foc_ros.io.outputs import FIT_PAGE
 
-from .drawing import get_class_style, open_figure
+from .draw import get_class_style, open_figure, save_figure
 from .page import render_list, render_page, render_picture, render_pictures, render_table, write_page
-from .plots import save_figure
 
 WIDTH_IN, LINE_IN = 6.4, 0.34
 CAPTION = (

@@ -16,9 +16,8 @@ from foc_ros.analysis.simulation.tables import COLUMNS, make_tables
 from foc_ros.analysis.simulation.trial import Trial
 from foc_ros.io.outputs import SIMULATION_PAGE
 
-from .drawing import draw_scene, get_class_style, open_figure
+from .draw import draw_scene, get_class_style, open_figure, save_figure
 from .page import render_page, render_picture, render_pictures, render_table, write_page
-from .plots import save_figure
 
 DRAWN = ('collision_rate', 'completion_s', 'opposing_impulse')
 """Measures with a figure."""

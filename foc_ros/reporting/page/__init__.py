@@ -28,15 +28,8 @@ def read_part(name: str) -> str:
     return (FOLDER / name).read_text(encoding='utf-8')
 
 
-def load_plotly() -> str:
-    """Return the source of plotly.js with its licence header."""
-    from plotly.offline import get_plotlyjs
-
-    return str(get_plotlyjs())
-
-
 _TEMPLATES = Environment(autoescape=True, undefined=StrictUndefined, loader=FileSystemLoader(FOLDER), trim_blocks=True)
-_TEMPLATES.globals.update(policy=POLICY, mark=MARK, source=read_part, plotly=load_plotly)
+_TEMPLATES.globals.update(policy=POLICY, mark=MARK, source=read_part)
 _TEMPLATES.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
 _PARTS: Any = _TEMPLATES.get_template('parts.html').module
 
