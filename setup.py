@@ -53,7 +53,7 @@ setup(
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
         'report': REPORT,
         # the page on which one tries it with one's own hand
-        'play': [*REPORT, 'tornado>=6.2'],
+        'play': [*REPORT, 'pydantic>=2', 'tornado>=6.2'],
         # recordings on the workers of a Dask cluster
         'cluster': ['distributed>=2024.1'],
         # the documentation as a web site

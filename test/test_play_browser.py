@@ -1,10 +1,8 @@
-"""The page of `foc_ros play` in a browser: steered by synthetic events, with a node and without ROS; broken pages."""
+"""The page of `foc_ros play` in a browser: steered by synthetic events, loaded again, on a phone; and broken pages."""
 
 from __future__ import annotations
 
 import math
-import os
-import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,7 +15,6 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from browser_helpers import check_report, chromium, screenshot
 from play_helpers import Play, find_point, play, press_keys, steer, tab_to, until, visit, wait_for, wait_for_answer
-from ros_helpers import require_ros
 
 from foc_ros.core.config import Config
 from foc_ros.io.bags import BagReader
@@ -47,7 +44,7 @@ def parameters(tmp_path_factory: pytest.TempPathFactory) -> str:
 @pytest.fixture(scope='module')
 def library(tmp_path_factory: pytest.TempPathFactory, parameters: str) -> Iterator[Play]:
     """Start a server without ROS."""
-    with play(tmp_path_factory.mktemp('library'), '--no-ros', '--params', parameters) as started:
+    with play(tmp_path_factory.mktemp('library'), '--params', parameters) as started:
         yield started
 
 
@@ -88,7 +85,7 @@ def check_steering(browser: Any) -> None:
     steer(browser, *ON)
     wait_for(browser, 'Math.abs(play.view.hand.position[0] - 0.3) < 0.003', 'the hand at the goal', 20)
     until(lambda: has_numbers(browser), 'numbers', 20)
-    assert 'frames a second' in text_of(browser, 'numbers')
+    assert 'frames a second' in browser.execute_script("return document.getElementById('numbers').textContent")
 
 
 def has_numbers(browser: Any) -> bool:
@@ -242,6 +239,46 @@ def move_by_keys(browser: Any, goal: tuple[float, float], near: float = 0.008) -
     until(is_there, f'the hand at {goal}')
 
 
+def test_a_page_that_is_loaded_again_is_as_it_was(page: Any) -> None:
+    """Score, report link and session are still there, and the status line is not green while something is refused."""
+    kept = ['score', 'session', 'job', 'result']
+    page.execute_script("document.getElementById('trials').value = 1; document.getElementById('begin').click();")
+    wait_for(page, "document.getElementById('begin').innerText === 'end tasks'", 'tasks')
+    click(page, 'begin')
+    wait_for(page, "document.getElementById('score').innerText === 'No trial was finished.'", 'the score')
+    click(page, 'report')
+    wait_for(page, "!document.getElementById('download').hidden", 'the report')
+    before = [text_of(page, name) for name in kept]
+    page.refresh()
+    wait_for(page, 'globalThis.play && play.view.candidates.length > 0', 'predictions')
+    assert [text_of(page, name) for name in kept] == before
+    assert not page.execute_script("return document.getElementById('download').hidden")
+    click(page, 'fit')  # which is impossible without trials
+    wait_for(page, "document.getElementById('status').className === 'status failing'", 'the status line')
+    assert text_of(page, 'status').startswith('refused: job: expected a session with trials without guidance')
+    wait_for(page, "document.getElementById('status').className === 'status well'", 'the status line is green again')
+
+
+def test_bars_have_the_colours_of_their_paths_and_paths_to_one_goal_differ_in_words(page: Any) -> None:
+    wait_for(page, "document.querySelectorAll('#ways tr').length > 2", 'bars')
+    rows = page.execute_script("""
+        const colourAt = (row) => getComputedStyle(row.querySelector('.bar i')).backgroundColor;
+        return [...document.querySelectorAll('#ways tr')].map(
+          (row) => [row.querySelector('.letter').innerText, colourAt(row), row.cells[3].innerText]);
+    """)
+    wanted = page.execute_script("""
+        const probe = document.createElement('i');
+        document.body.append(probe);
+        return play.view.candidates.filter(({ likelihood }) => likelihood !== null).map(({ slot }) => {
+          probe.style.color = colourOf(slot);
+          return [letterOf(slot), getComputedStyle(probe).color];
+        });
+    """)
+    assert {tuple(row[:2]) for row in rows} == {tuple(each) for each in wanted}
+    words = [row[2] for row in rows]
+    assert len(set(words)) == len(words) and all(text.startswith('goal') for text in words)
+
+
 def test_everything_can_be_done_by_keys(page: Any, library: Play, tmp_path: Path) -> None:
     """Move the hand, arrange the scene, switch guidance, record, do a task, write a report and download it, without a pointer."""
     page.execute_cdp_cmd('Browser.setDownloadBehavior', {'behavior': 'allow', 'downloadPath': str(tmp_path)})
@@ -271,7 +308,7 @@ def test_everything_can_be_done_by_keys(page: Any, library: Play, tmp_path: Path
     press_keys(page, ENTER)
     wait_for(page, "document.getElementById('task').innerText.startsWith('1 of 1: ')", 'the task')
     assert page.execute_script('return document.activeElement.id') == 'scene'
-    assert text_of(page, 'record') == 'record without tasks', 'the button does not offer to end what the tasks record'
+    assert text_of(page, 'record') == 'record', 'the button does not offer to end what the tasks record'
     move_by_keys(page, (0.0, 0.0))
     wait_for(page, "play.view.phase === 'reach'", 'the light')
     goal = page.execute_script('return [play.view.scene.goals[play.view.goal].x, play.view.scene.goals[play.view.goal].y]')
@@ -300,6 +337,11 @@ PHONE = 360, 640
 def test_the_page_fits_on_a_phone(browser: Any, library: Play, dark: bool) -> None:
     """It has the width of the phone, whatever it shows, and the colours of the system until the button changes them."""
     visit(browser, library, *PHONE, dark)
+    place = """return ['scene', 'buttons'].map((name) => document.getElementById(name).getBoundingClientRect())
+        .map(({ top, bottom }) => [top, bottom])"""
+    for top, bottom in browser.execute_script(place):
+        assert 0.0 <= top < bottom <= PHONE[1], 'scene and buttons are on one screen'
+    assert browser.execute_script("return document.querySelector('details').open") is False, 'help is folded'
     colour = 'return getComputedStyle(document.body).backgroundColor'
     before = browser.execute_script(colour)
     assert before == ('rgb(20, 24, 28)' if dark else 'rgb(255, 255, 255)')
@@ -350,57 +392,25 @@ def test_a_finger_moves_the_hand_and_drags_obstacles_and_goals_on_a_phone(browse
 
 
 def test_the_page_says_that_the_server_is_gone_and_recovers(browser: Any, tmp_path: Path) -> None:
-    with play(tmp_path, '--no-ros') as started:
+    with play(tmp_path) as started:
         visit(browser, started)
         port = started.url.rpartition(':')[2]
     wait_for(browser, "document.getElementById('status').innerText === 'The server is gone; trying again.'", 'the message')
     assert browser.execute_script('return play.view.candidates.length') == 0
-    with play(tmp_path, '--no-ros', '--port', port):
+    with play(tmp_path, '--port', port):
         wait_for(browser, 'play.view.candidates.length > 0', 'predictions after a new start of the server')
-        wait_for(browser, "!document.getElementById('status').classList.contains('gone')", 'the message is gone')
+        wait_for(browser, "document.getElementById('status').className === 'status well'", 'the message is gone')
         browser.get('about:blank')
-
-
-def test_over_dds_a_killed_node_is_reported_and_started_again(browser: Any, tmp_path: Path, parameters: str) -> None:
-    require_ros()
-    with play(tmp_path, '--params', parameters) as started:
-        visit(browser, started)
-        check_steering(browser)
-        click(browser, 'guidance')
-        (node,) = find_nodes(started.process.pid)
-        os.kill(node, signal.SIGKILL)
-        wait_for(browser, "document.getElementById('status').classList.contains('gone')", 'the page says that the node is gone')
-        assert 'the node' in text_of(browser, 'status')
-        wait_for(browser, "!document.getElementById('status').classList.contains('gone')", 'the node is back')
-        assert find_nodes(started.process.pid) != [node]
-        wait_for(browser, 'play.view.candidates.length > 0', 'predictions of the new node')
-        browser.get('about:blank')
-    assert started.process.returncode == 0
-
-
-def find_nodes(parent: int) -> list[int]:
-    """Return the process ids of the nodes that a process has started."""
-    nodes = []
-    for folder in Path('/proc').iterdir():
-        if folder.name.isdigit():
-            try:
-                state = (folder / 'stat').read_text().rpartition(')')[2].split()
-                words = (folder / 'cmdline').read_text().split('\0')
-            except OSError:
-                continue
-            if int(state[1]) == parent and state[0] != 'Z' and 'node' in words:
-                nodes.append(int(folder.name))
-    return nodes
 
 
 BROKEN = [
     ('hand.js', "'pointermove', ", ''),
     ('hand.js', 'this.followed = this.followed.map(', 'this.ignored = this.followed.map('),
-    ('play.js', 'view.candidates = candidates;', ''),
+    ('play.js', 'view.candidates = candidates.map(decode);', ''),
     ('play.js', "send({ type: 'hand'", "send({ type: 'hands'"),
     ('play.js', 'connect();\nrequest', 'request'),
-    ('drawing.js', 'class Drawing {', 'class Drawing {{'),
-    ('drawing.js', 'drawCandidate(candidate) {', 'drawCandidate(candidate) { null.x;'),
+    ('arranging.js', 'class Arranging {', 'class Arranging {{'),
+    ('scene.js', '  candidates(list, alphaOf', '  candidate() { null.x; }\n\n  candidates(list, alphaOf'),
 ]
 
 
@@ -409,7 +419,7 @@ BROKEN = [
 )
 def test_the_check_finds_a_broken_page(browser: Any, tmp_path: Path, file: str, old: str, new: str) -> None:
     """Serve the page with one text changed, in a process of its own; then the check of steering fails."""
-    source = (server.FOLDER / file).read_text(encoding='utf-8')
+    source = server.FILES[f'/{file}'].read_text(encoding='utf-8')
     assert old in source
     (tmp_path / file).write_text(source.replace(old, new), encoding='utf-8')
     program = f"""
@@ -420,7 +430,7 @@ from foc_ros.play import server
 server.FILES['/{file}'] = Path({str(tmp_path / file)!r})
 sys.exit(main(sys.argv[1:]))
 """
-    with play(tmp_path, '--no-ros', program=program) as started:
+    with play(tmp_path, program=program) as started:
         browser.get(started.url)
         with pytest.raises(AssertionError):
             check_steering(browser)

@@ -19,14 +19,13 @@ from foc_ros.analysis.recordings import find_recordings
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import InputError
-from foc_ros.io.bags import TYPESTORE, BagReader
+from foc_ros.io.bags import BagReader
 from foc_ros.io.topics import TYPES
-from foc_ros.play import jobs, recorder
-from foc_ros.play.predictors import LibraryPredictor, LivePredictor
+from foc_ros.play import jobs, recording
+from foc_ros.play.predictor import Predictor, State
 from foc_ros.play.scene import BOUNDS, FIRST_SCENE, START
 from foc_ros.play.session import Session
-from foc_ros.ros.messages.encode_prediction import encode_prediction_cloud
-from foc_ros.ros.messages.types import RosbagsTypes
+from foc_ros.reporting.encode import LENGTH
 from foc_ros.ros.parameters import dump_parameter_file
 
 
@@ -36,7 +35,8 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Page:
     session = Session(Silent, Config(), tmp_path / 'data')
     session.predictor.start()
     page = Page(session)
-    monkeypatch.setattr('foc_ros.play.session.time_ns', lambda: 10**15 + round(page.t_ms * 1e6))
+    for module in ('session', 'recording'):
+        monkeypatch.setattr(f'foc_ros.play.{module}.time_ns', lambda: 10**15 + round(page.t_ms * 1e6))
     return page
 
 
@@ -50,14 +50,14 @@ def test_tasks_leave_bags_that_fit_and_evaluate_read(page: Page) -> None:
     assert sorted(row[0] for row in page.last('score')['rows']) == ['with guidance', 'without guidance']
     assert [each.guidance.enabled for each in page.session.predictor.configs] in ([True, False], [True])
     folder = Path(page.last('settings')['session'])
-    (name,) = recordings = find_recordings(folder / recorder.UNGUIDED)
+    (name,) = recordings = find_recordings(folder / recording.UNGUIDED)
     replay = Replay(Config(rate_hz=5.0))
     steps = list(replay.steps(recordings[name].items()))
     stamps = [step.sample.stamp_ns for step in steps if step.sample is not None]
     assert {round(gap) for gap in np.diff(stamps)} == {20_000_000}
     assert any(step.prediction is not None and step.prediction.candidates_with_likelihood for step in steps)
     assert replay.describe_losses() == ''
-    with BagReader(folder / recorder.SESSION) as reader:
+    with BagReader(folder / recording.SESSION) as reader:
         assert sum(item.role == 'hand_pose' for item in reader) > len(stamps)
 
 
@@ -78,8 +78,7 @@ def test_a_blinded_page_learns_nothing_from_what_it_receives(page: Page) -> None
         page.send(TASKS | {'assistance': assistance, 'blinded': True})
         begin = len(page.received)
         page.move(START, 100)
-        prediction = encode_prediction_cloud(predictions(samples())[0], 'xy', RosbagsTypes(TYPESTORE))
-        page.session._receive('/foc/prediction', bytes(TYPESTORE.serialize_cdr(prediction, prediction.__msgtype__)))
+        page.session._receive(predictions(samples())[0])
         received[assistance] = page.received[begin:]
         page.send({'type': 'stop'})
     assert received['with'] == received['without']
@@ -132,7 +131,8 @@ def fit_with_errors(
 ) -> dict[str, Any]:
     """Press the button of the fit; in place of the command, write FITTED, with the errors of positions before and after it."""
 
-    async def fit(*arguments: str | Path) -> str:
+    async def fit(note: Any, *arguments: str | Path) -> str:
+        note('replays: 20 of 40')
         given = list(map(str, arguments))
         assert given[0] == 'fit' and given[given.index('--allow') + 1] == 'positions'
         Path(given[given.index('--output') + 1]).write_text(dump_parameter_file(replace_values(Config(), FITTED)))
@@ -161,7 +161,7 @@ def test_the_page_keeps_the_standard_parameters_if_positions_become_worse_and_sa
     fitted = fit_with_errors(page, monkeypatch, 0.063, 0.096)
     assert fitted['text'] == (
         'Predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm. '
-        'Predictions use the standard parameters, unless you choose yours above.'
+        'Predictions use the standard parameters, unless you choose yours.'
     )
     assert (page.last('settings')['parameters'], page.last('settings')['fitted']) == ('standard', True)
     assert page.session.predictor.configs[-1] == Config()
@@ -177,7 +177,7 @@ def test_a_fit_that_ends_during_tasks_changes_the_parameters_after_them(page: Pa
     record_trials(page, 1)
     page.send(TASKS | {'assistance': 'with'})
     page.session.predictor.configs.clear()
-    operator = page.session._after.operator = page.session._after.folder / jobs.OPERATOR
+    operator = page.session._jobs.operator = page.session._jobs.recording.folder / recording.OPERATOR
     operator.write_text(dump_parameter_file(replace_values(Config(), FITTED)))
     page.session._note_fitted(True)
     reach(page)
@@ -199,11 +199,12 @@ def test_a_command_that_could_not_use_all_trials_has_an_answer(
     program.write_text(f"#!/bin/sh\necho 'foc_ros fit: trial_002: reason' >&2\nprintf '%s' '{printed}'\nexit 2\n")
     program.chmod(0o755)
     monkeypatch.setattr(jobs.sys, 'executable', str(program))
+    noted: list[str] = []
     if printed:
-        assert asyncio.run(jobs.run_command('fit')) == printed
+        assert asyncio.run(jobs.run_command(noted.append, 'fit')) == printed
     else:
         with pytest.raises(jobs.CommandError, match='foc_ros fit: trial_002: reason'):
-            asyncio.run(jobs.run_command('fit'))
+            asyncio.run(jobs.run_command(noted.append, 'fit'))
 
 
 def test_the_page_says_which_trials_were_not_used(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -211,7 +212,7 @@ def test_the_page_says_which_trials_were_not_used(page: Page, monkeypatch: pytes
     fitted = fit_with_errors(page, monkeypatch, 0.063, 0.060, UNUSED)
     assert fitted['text'] == 'Predictions now use your parameters. Not used: trial_002 (nothing could be predicted).'
 
-    async def evaluate(*_: str | Path) -> str:
+    async def evaluate(*_: object) -> str:
         return json.dumps({'questions': {}, 'positions': NO_POSITIONS, 'failed': UNUSED})
 
     monkeypatch.setattr(jobs, 'run_command', evaluate)
@@ -237,6 +238,49 @@ def test_what_is_impossible_is_refused(page: Page) -> None:
     with pytest.raises(InputError, match='job: expected a session with trials without guidance, got fit'):
         page.send({'type': 'job', 'name': 'fit'})
     assert page.last('settings')['recording'] is False
+
+
+def test_a_page_that_is_loaded_again_finds_everything_as_it_was(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    record_trials(page, 1)
+    fitted = fit_with_errors(page, monkeypatch, 0.063, 0.060)
+    asyncio.run(work(page, 'report'))
+    score, before = page.last('score'), page.last('settings')
+    again = Page(page.session)
+    assert (again.last('score'), again.last('settings')) == (score, before)
+    assert before['report'] and before['session'] and before['parameters'] == 'mine'
+    assert again.last('job')['name'] == 'report'
+    assert again.last('result') == {'type': 'result', 'columns': fitted['columns'], 'rows': fitted['rows']}
+    report = page.session.report.read_text(encoding='utf-8')
+    assert '<h2>Score</h2>' in report and f'<td>{score["rows"][0][2]}</td>' in report, 'the score is in the report'
+
+
+def test_a_fit_shows_its_progress_and_can_be_cancelled(page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    record_trials(page, 1)
+    program, ended = tmp_path / 'program', tmp_path / 'ended'
+    program.write_text(
+        f"#!/bin/sh\ntrap 'touch {ended}; exit 1' TERM\necho 'replays: 20 of 60' >&2\nwhile :; do sleep 0.05; done\n"
+    )
+    program.chmod(0o755)
+    monkeypatch.setattr(jobs.sys, 'executable', str(program))
+
+    async def run() -> None:
+        page.send({'type': 'job', 'name': 'fit'})
+        await wait_until(lambda: page.last('job')['text'] == 'replays: 20 of 60')
+        assert page.last('job')['state'] == 'running'
+        page.send({'type': 'cancel'})
+        await wait_until(lambda: page.last('job')['state'] == 'cancelled')
+        await wait_until(ended.exists)
+
+    asyncio.run(run())
+    assert page.last('settings')['fitted'] is False
+
+
+def test_the_page_is_told_what_fails(page: Page) -> None:
+    page.session.tick()
+    assert (page.last('status')['level'], page.last('status')['text']) == ('well', 'silent')
+    page.session.predictor.state = State('failing', 'no path to any goal can be found')
+    page.session.tick()
+    assert page.last('status')['level'] == 'failing'
 
 
 def test_only_the_newest_page_steers(page: Page) -> None:
@@ -279,8 +323,8 @@ def test_the_library_predicts_and_reports_the_session(tmp_path: Path, monkeypatc
     async def run() -> tuple[Page, Session]:
         loop = asyncio.get_running_loop()
 
-        def make(config: Config, receive: Any) -> LivePredictor:
-            return LibraryPredictor(config, lambda topic, raw: loop.call_soon_threadsafe(receive, topic, raw))
+        def make(config: Config, receive: Any) -> Predictor:
+            return Predictor(config, lambda outcome: loop.call_soon_threadsafe(receive, outcome))
 
         session = Session(make, Config(budget_s=0.0, rate_hz=20.0), tmp_path)
         session.predictor.start()
@@ -308,13 +352,13 @@ def test_the_library_predicts_and_reports_the_session(tmp_path: Path, monkeypatc
     assert numbers['hand_samples'] == 60
     assert numbers['predictions'], 'how many depends on how busy the machine is'
     shown = page.last('prediction')
-    assert sum(each['likelihood'] for each in shown['candidates']) == pytest.approx(1.0, abs=1e-3)
+    assert sum(each['likelihood'] or 0.0 for each in shown['candidates']) == pytest.approx(1.0, abs=1e-3)
     low_x, high_x, low_y, high_y = BOUNDS
     for each in shown['candidates']:
-        path = np.array(each['path'])
+        path = np.cumsum([each['x'], each['y']], axis=1).T * LENGTH
         assert ((path >= [low_x, low_y]) & (path <= [high_x, high_y])).all()
-        np.testing.assert_allclose(path[-1], FIRST_SCENE.goals[each['goal']], atol=2e-3)
-    with BagReader(Path(page.last('settings')['session']) / recorder.SESSION) as reader:
+        np.testing.assert_allclose(path[-1], FIRST_SCENE.points[each['goal']], atol=2e-3)
+    with BagReader(Path(page.last('settings')['session']) / recording.SESSION) as reader:
         topics = {each.topic for each in reader._channels}
         assert {TYPES[item.role] for item in reader} == {TYPES[role] for role in ('hand_pose', 'obstacles', 'goals')}
     assert topics == {'/hand_pose', '/obstacles', '/goals', '/foc/prediction', '/foc/likelihoods'}

@@ -9,7 +9,7 @@ from enum import Enum
 
 import numpy as np
 
-from .page_messages import TasksMessage
+from .messages import TasksMessage
 from .scene import START, TARGET_RADIUS, PlayScene, Point, make_random_scene
 
 REST_S = 0.3
@@ -61,7 +61,7 @@ def make_trials(settings: TasksMessage, scene: PlayScene) -> list[Trial]:
     trials: list[Trial] = []
     while len(trials) < settings.trials:
         for row in random.permutation(len(kinds)).tolist():
-            shown_scene = make_random_scene(random, scene.goals) if settings.is_shuffled else scene
+            shown_scene = make_random_scene(random, scene.goals) if settings.shuffled else scene
             trials.append(Trial(shown_scene, *kinds[row]))
     return trials[: settings.trials]
 
@@ -125,7 +125,7 @@ class Tasks:
     def _follow_to_goal(self, t: float, position: Point) -> None:
         trial = self.trial
         self._reach.add(position, trial.scene)
-        if self._reach.has_arrived(t, position, trial.scene.goals[trial.goal]):
+        if self._reach.has_arrived(t, position, trial.scene.points[trial.goal]):
             self.scores.append(self._reach.score(trial.is_guided))
             self.number += 1
             self.phase = Phase.RETURN if self.number < len(self.trials) else Phase.OVER
