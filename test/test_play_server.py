@@ -141,32 +141,13 @@ def test_bad_messages_are_refused_and_harm_nothing(tmp_path: Path) -> None:
     serve(tmp_path, test)
 
 
-@pytest.mark.parametrize(
-    ('name', 'host', 'is_own'),
-    [
-        ('localhost', '127.0.0.1', True),
-        ('127.0.0.1', '127.0.0.1', True),
-        ('[::1]', '::1', True),
-        ('192.168.1.7', '0.0.0.0', True),
-        ('lab', 'lab', True),
-        ('lab', '0.0.0.0', False),
-        ('attacker.example', '127.0.0.1', False),
-        ('127.0.0.1.attacker.example', '127.0.0.1', False),
-        ('', '127.0.0.1', False),
-    ],
-)
-def test_hosts(name: str, host: str, is_own: bool) -> None:
-    assert is_own_host(name, host) is is_own
-
-
-def test_loopback() -> None:
-    assert [each for each in ('127.0.0.1', 'localhost', '::1', '0.0.0.0', '192.168.1.7', 'lab') if is_loopback(each)] == [
-        '127.0.0.1', 'localhost', '::1',
-    ]  # fmt: skip
-
-
-def test_the_address_of_the_page_can_be_opened() -> None:
-    assert describe_page('127.0.0.1', 8420) == 'http://127.0.0.1:8420 in a browser'
+def test_own_hosts_loopback_and_the_address_of_the_page() -> None:
+    own = (('localhost', '127.0.0.1'), ('127.0.0.1',) * 2, ('[::1]', '::1'), ('192.168.1.7', '0.0.0.0'), ('lab', 'lab'))
+    assert all(is_own_host(name, host) for name, host in own)
+    foreign = ('lab', '0.0.0.0'), *((name, '127.0.0.1') for name in ('attacker.example', '127.0.0.1.attacker.example', ''))
+    assert not any(is_own_host(name, host) for name, host in foreign)
+    assert all(map(is_loopback, ('127.0.0.1', 'localhost', '::1')))
+    assert not any(map(is_loopback, ('0.0.0.0', '192.168.1.7', 'lab')))
     assert describe_page('::1', 8420) == 'http://[::1]:8420 in a browser'
     words = 'http://0.0.0.0:8420 in a browser, on other computers with an address of this one in place of 0.0.0.0'
     assert describe_page('0.0.0.0', 8420) == words

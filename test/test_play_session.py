@@ -145,32 +145,36 @@ def fit_with_errors(
     return asyncio.run(work(page, 'fit'))
 
 
-def test_the_page_predicts_with_the_fit_if_positions_become_no_worse(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
-    record_trials(page, 1)
-    fitted = fit_with_errors(page, monkeypatch, 0.063, 0.060)
-    assert fitted['text'] == 'Predictions now use your parameters.'
-    assert fitted['rows'] == [['likelihood.beta', '4', '7.5']]
-    assert (page.last('settings')['parameters'], page.last('settings')['fitted']) == ('mine', True)
-    assert page.session.predictor.configs[-1] == replace_values(Config(), FITTED)
+BETTER = 'Predictions now use your parameters.'
+WORSE = (
+    'Predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm. '
+    'Predictions use the standard parameters, unless you choose yours.'
+)
+UNUSED = {'trial_002': 'nothing could be predicted'}
 
 
-def test_the_page_keeps_the_standard_parameters_if_positions_become_worse_and_says_so(
-    page: Page, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(('after_m', 'text', 'used'), [(0.060, BETTER, 'mine'), (0.096, WORSE, 'standard')])
+def test_the_page_predicts_with_the_fit_unless_positions_become_worse_and_says_so(
+    page: Page, monkeypatch: pytest.MonkeyPatch, after_m: float, text: str, used: str
 ) -> None:
     record_trials(page, 1)
-    fitted = fit_with_errors(page, monkeypatch, 0.063, 0.096)
-    assert fitted['text'] == (
-        'Predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm. '
-        'Predictions use the standard parameters, unless you choose yours.'
-    )
-    assert (page.last('settings')['parameters'], page.last('settings')['fitted']) == ('standard', True)
-    assert page.session.predictor.configs[-1] == Config()
+    configs = {'standard': Config(), 'mine': replace_values(Config(), FITTED)}
+    fitted = fit_with_errors(page, monkeypatch, 0.063, after_m, UNUSED)
+    assert fitted['text'] == f'{text} Not used: trial_002 (nothing could be predicted).'
+    assert fitted['rows'] == [['likelihood.beta', '4', '7.5']]
+    assert (page.last('settings')['parameters'], page.last('settings')['fitted']) == (used, True)
+    assert page.session.predictor.configs[-1] == configs[used]
     page.send({'type': 'parameters', 'name': 'mine'})
-    assert page.session.predictor.configs[-1] == replace_values(Config(), FITTED)
-    # the next fit is worse, too: its parameters are not used because those before it were
-    fit_with_errors(page, monkeypatch, 0.063, 0.096)
-    assert page.last('settings')['parameters'] == 'standard'
-    assert page.session.predictor.configs[-1] == Config()
+    assert page.session.predictor.configs[-1] == configs['mine']
+    # the next fit is as good: its parameters are not used because those before it were
+    fit_with_errors(page, monkeypatch, 0.063, after_m)
+    assert page.last('settings')['parameters'] == used and page.session.predictor.configs[-1] == configs[used]
+
+    async def evaluate(*_: object) -> str:
+        return json.dumps({'questions': {}, 'positions': NO_POSITIONS, 'failed': UNUSED})
+
+    monkeypatch.setattr(jobs, 'run_command', evaluate)
+    assert asyncio.run(work(page, 'compare'))['text'].endswith(' Not used: trial_002 (nothing could be predicted).')
 
 
 def test_a_fit_that_ends_during_tasks_changes_the_parameters_after_them(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -185,9 +189,6 @@ def test_a_fit_that_ends_during_tasks_changes_the_parameters_after_them(page: Pa
     page.send({'type': 'stop'})
     assert page.session.predictor.configs[-1] == replace_values(Config(), FITTED)
     assert page.last('settings')['parameters'] == 'mine'
-
-
-UNUSED = {'trial_002': 'nothing could be predicted'}
 
 
 @pytest.mark.parametrize('printed', ['{"failed": {}}', ''], ids=['answer', 'nothing'])
@@ -205,18 +206,6 @@ def test_a_command_that_could_not_use_all_trials_has_an_answer(
     else:
         with pytest.raises(jobs.CommandError, match='foc_ros fit: trial_002: reason'):
             asyncio.run(jobs.run_command(noted.append, 'fit'))
-
-
-def test_the_page_says_which_trials_were_not_used(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
-    record_trials(page, 1)
-    fitted = fit_with_errors(page, monkeypatch, 0.063, 0.060, UNUSED)
-    assert fitted['text'] == 'Predictions now use your parameters. Not used: trial_002 (nothing could be predicted).'
-
-    async def evaluate(*_: object) -> str:
-        return json.dumps({'questions': {}, 'positions': NO_POSITIONS, 'failed': UNUSED})
-
-    monkeypatch.setattr(jobs, 'run_command', evaluate)
-    assert asyncio.run(work(page, 'compare'))['text'].endswith(' Not used: trial_002 (nothing could be predicted).')
 
 
 NO_POSITIONS = {
@@ -293,28 +282,21 @@ def test_only_the_newest_page_steers(page: Page) -> None:
     assert [role for role, _ in page.session.predictor.sent[before:]] == ['hand_pose']
 
 
-def test_a_full_disk_ends_the_recording_and_nothing_else(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize('begin', [{'type': 'record', 'on': True}, TASKS | {'assistance': 'with'}], ids=['recording', 'tasks'])
+def test_a_full_disk_ends_recording_and_tasks_and_nothing_else(
+    page: Page, monkeypatch: pytest.MonkeyPatch, begin: dict[str, Any]
+) -> None:
     def fail(*_: object) -> None:
         raise OSError(28, 'No space left on device')
 
-    page.send({'type': 'record', 'on': True})
+    page.send(begin)
     monkeypatch.setattr('rosbags.rosbag2.Writer.write', fail)
     page.move(START)
     assert 'No space left' in page.last('error')['text']
-    assert page.last('settings')['recording'] is False
+    settings = page.last('settings')
+    assert (settings['recording'], settings['guided'], page.last('task')['phase']) == (False, False, 'none')
+    assert [each.guidance.enabled for each in page.session.predictor.configs] in ([], [True, False])
     page.move(START)
-
-
-def test_a_full_disk_ends_the_tasks_and_restores_guidance(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: object) -> None:
-        raise OSError(28, 'No space left on device')
-
-    page.send(TASKS | {'assistance': 'with'})
-    monkeypatch.setattr('rosbags.rosbag2.Writer.write', fail)
-    page.move(START)
-    assert page.last('task') == {'type': 'task', 'phase': 'none'}
-    assert [each.guidance.enabled for each in page.session.predictor.configs] == [True, False]
-    assert page.last('settings')['guided'] is False
 
 
 def test_the_library_predicts_and_reports_the_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

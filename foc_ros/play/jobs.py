@@ -55,12 +55,13 @@ async def run_command(note: Note, *arguments: str | Path) -> str:
             if text := line.decode(errors='replace').strip():
                 lines.append(text)
                 note(text)
-        answer = (await output).decode()
         await process.wait()
     finally:
         if process.returncode is None:
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGTERM)
+            await process.wait()
+        answer = (await output).decode()
     if process.returncode and not answer:
         raise CommandError(lines[-1] or f'foc_ros {arguments[0]} ended with exit code {process.returncode}')
     return answer
