@@ -25,9 +25,10 @@ from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
+from foc_ros.play.address import describe_page, is_loopback, open_sockets
 from foc_ros.play.messages import LONGEST_MESSAGE
 from foc_ros.play.predictor import Predictor
-from foc_ros.play.server import FILES, describe_page, is_loopback, is_own_host, listen, open_sockets
+from foc_ros.play.server import FILES, is_own_host, listen
 from foc_ros.play.session import Session
 
 SCENE = {'type': 'scene', 'obstacles': [], 'goals': [{'x': 0.1, 'y': 0.1, 'file': '/x'}]}

@@ -101,7 +101,7 @@ def _check_folder_of_output(arguments: argparse.Namespace) -> None:
 
 
 def _read_play(arguments: argparse.Namespace) -> None:
-    from foc_ros.play.server import open_sockets
+    from foc_ros.play.address import open_sockets
 
     check_folder('--data', arguments.data)
     arguments.sockets = open_sockets(arguments.host, arguments.port)

@@ -16,19 +16,16 @@ from pathlib import Path
 from socket import socket
 from typing import Any
 
+from tornado.httpserver import HTTPServer
+from tornado.ioloop import PeriodicCallback
+from tornado.web import Application, HTTPError, RequestHandler
+from tornado.websocket import WebSocketClosedError, WebSocketHandler
+
 from foc_ros.core.config import Config
-from foc_ros.core.errors import FocError, InputError
+from foc_ros.core.errors import FocError
 from foc_ros.reporting import page as report_page
 
-try:
-    from tornado.httpserver import HTTPServer
-    from tornado.ioloop import PeriodicCallback
-    from tornado.netutil import bind_sockets
-    from tornado.web import Application, HTTPError, RequestHandler
-    from tornado.websocket import WebSocketClosedError, WebSocketHandler
-except ImportError as error:
-    raise FocError("play needs tornado: install python3-tornado, or pip install 'foc_ros[play]'") from error
-
+from .address import describe_page, is_loopback
 from .messages import LONGEST_MESSAGE, parse_message
 from .predictor import Outcome, Predictor, Receive
 from .session import Session
@@ -116,31 +113,6 @@ def is_own_host(name: str, host: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def is_loopback(host: str) -> bool:
-    """Return whether a host is reached from this computer only."""
-    try:
-        return host == 'localhost' or ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
-
-
-def describe_page(host: str, port: int) -> str:
-    """Return the address of the page and where it can be opened."""
-    words = f'http://{f"[{host}]" if ":" in host else host}:{port} in a browser'
-    if host in ('0.0.0.0', '::'):  # noqa: S104  this is where it is warned of
-        words += f', on other computers with an address of this one in place of {host}'
-    return words
-
-
-def open_sockets(host: str, port: int) -> list[socket]:
-    """Open the sockets of a host at a port, 0 for a free one; raises InputError where that is impossible."""
-    try:
-        return bind_sockets(port, host)
-    except (OSError, UnicodeError) as error:
-        wanted = 'a free port of this computer, and a host that it has'
-        raise InputError('--host and --port', wanted, f'{host}:{port}: {error}') from error
 
 
 def listen(session: Session, host: str, sockets: Sequence[socket]) -> HTTPServer:
