@@ -177,6 +177,12 @@ def test_everything_drawn_is_in_the_legend_once() -> None:
         assert text.count(' '.join(artist.get_label().split())) >= 1
     below = next(each for each in figure.axes if each.get_gid() == f'legend {id(axes)}').get_legend()
     assert max(Counter(each.get_text() for each in below.get_texts()).values()) == 1
+    assert [each.get_text()[2:6].strip() for each in below.get_texts()[:4]] == sorted_shares(during[5])
+
+
+def sorted_shares(snapshot: Snapshot) -> list[str]:
+    """Return the shares of the candidates in the legend, those without one last."""
+    return [f'{100 * each.likelihood:.0f}' for each in snapshot.candidates] + ['-'] * len(snapshot.unsolved)
 
 
 def layouts() -> dict[str, Any]:

@@ -197,25 +197,26 @@ def draw_candidates(axes: Any, snapshot: Snapshot, slots: Mapping[str, int]) -> 
 
     Motor noise is filled; only the most likely candidate has its total uncertainty, too. Ghosts have their reasons beside them.
     """
-    for lost in snapshot.unsolved:
-        _draw_ghost(axes, lost.path, describe_in_legend(lost), snapshot.describe_ghost(lost))
+    ghosts = [(lost.path, describe_in_legend(lost), snapshot.describe_ghost(lost)) for lost in snapshot.unsolved]
     for rank, each in reversed(list(enumerate(snapshot.candidates))):
         letter = get_letter(slots.get(each.label))
         reason = snapshot.describe_ghost(each)
         if reason:
-            _draw_ghost(axes, each.curve, describe_in_legend(each, letter, reason), reason)
+            ghosts.append((each.curve, describe_in_legend(each, letter, reason), reason))
         else:
             style = get_candidate_style(slots.get(each.label), each.likelihood, each.is_compromised)
             _draw_ellipses(axes, each, style['color'], is_total=rank == 0)
             axes.plot(*each.curve.T, zorder=3, label=describe_in_legend(each, letter), **style)
             draw_tag(axes, each.path[int((0.45 + 0.12 * (rank % 3)) * (len(each.path) - 1))], letter, style['color'])
+    for number, (curve, label, reason) in enumerate(ghosts):
+        _draw_ghost(axes, curve, label, reason, number)
 
 
-def _draw_ghost(axes: Any, curve: Array, label: str, reason: str) -> None:
+def _draw_ghost(axes: Any, curve: Array, label: str, reason: str, number: int) -> None:
     axes.plot(*curve.T, color=GHOST_COLOUR, linewidth=4.0, alpha=0.3, solid_capstyle='round', zorder=2, label=label)
     look = {'fontsize': 7, 'color': '0.35', 'xytext': (0, 5), 'textcoords': 'offset points', 'ha': 'center', 'zorder': 6}
     look['bbox'] = {'facecolor': 'white', 'alpha': 0.7, 'linewidth': 0.0, 'pad': 1.0}
-    axes.annotate(reason, curve[len(curve) // 2], annotation_clip=True, **look)
+    axes.annotate(reason, curve[int((0.5 + 0.15 * (number % 3)) * (len(curve) - 1))], annotation_clip=True, **look)
 
 
 def _draw_ellipses(axes: Any, candidate: CandidateView, colour: str, is_total: bool) -> None:
@@ -252,7 +253,8 @@ def draw_legend(axes: Any, title: str | None = None) -> None:
         earlier.remove()
     slot, place = _PLACES.setdefault(axes, (axes.get_subplotspec(), axes.get_position(original=True)))
     named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
-    candidates = [label for label in named if '%  ' in label][::-1]
+    candidates = [label for label in named if '%  ' in label]
+    candidates.sort(key=lambda label: float(label.partition('%')[0][1:].strip().replace('-', '-1')), reverse=True)
     labels = candidates + [label for label in named if label not in candidates]
     width_in, height_in = figure.get_figwidth() * place.width, figure.get_figheight() * place.height
     columns = NARROW_COLUMNS if width_in < NARROW_IN else COLUMNS

@@ -45,6 +45,8 @@ let isReplaced = false;
 let lastMs = null;
 let waitingEvents = [];
 const frames = [];
+let predictedMs = 0;
+const OLD_MS = 1000; // after which a prediction is not shown any more
 const REFUSED_MS = 6000; // for which the status line says that something was refused
 let task = { phase: 'none' };
 let job = null;
@@ -140,10 +142,10 @@ const handlers = {
   },
   status({ level, text }) {
     showStatus(level, text);
-    if (level === 'failing') view.candidates = [];
   },
   prediction({ event, candidates }) {
     view.candidates = candidates.map(decode);
+    predictedMs = performance.now();
     measured.predictions += 1;
     if (event !== null) waitingEvents.push(event);
   },
@@ -274,6 +276,7 @@ function frame(time) {
     send({ type: 'scene', ...arranging.scene });
     isSceneChanged = false;
   }
+  if (time - predictedMs > OLD_MS) view.candidates = [];
   [view.scene, view.selected] = [arranging.scene, arranging.selected];
   draw(time);
   measure(time);

@@ -157,7 +157,7 @@ class Scene {
 
   // Draws candidates, the most likely last, and their letters at different places; alphaOf: of each.
   candidates(list, alphaOf = () => 1) {
-    for (const each of list.filter(({ ghost }) => ghost)) this.candidate(each, alphaOf(each));
+    list.filter(({ ghost }) => ghost).forEach((each, row) => this.candidate(each, alphaOf(each), 0.5 + 0.15 * (row % 3)));
     [...list].reverse().filter(({ ghost }) => !ghost).forEach((each) => this.candidate(each, alphaOf(each), 0.45 + 0.12 * (list.indexOf(each) % 3)));
   }
 
