@@ -54,9 +54,6 @@ def test_an_ellipse_is_the_level_set_of_the_covariance(seed: int) -> None:
     ellipse = make_stddev_ellipse(centre, covariance, 2.0)
     edge = ellipse.get_patch_transform().transform(np.array([[1.0, 0.0], [0.0, 1.0], [-0.6, 0.8]])) - centre
     np.testing.assert_allclose(np.einsum('ki,ij,kj->k', edge, np.linalg.inv(covariance), edge), 4.0, rtol=1e-9)
-
-
-def test_an_ellipse_of_no_uncertainty_is_a_point() -> None:
     ellipse = make_stddev_ellipse(NOWHERE, np.array([[0.0, 0.0], [0.0, -1e-18]]))
     assert (ellipse.width, ellipse.height) == (0.0, 0.0)
 
@@ -77,11 +74,17 @@ def test_colours_show_on_white_and_differ_for_the_colour_blind() -> None:
         assert gaps.min() > 0.1
 
 
-def test_the_likely_candidate_is_the_thickest_and_a_compromised_one_alone_is_dotted() -> None:
+def test_the_likely_candidate_is_the_thickest_and_a_compromised_one_alone_is_dotted_and_says_its_eta() -> None:
     widths = [get_candidate_style(0, likelihood)['linewidth'] for likelihood in np.linspace(0.0, 1.0, 20)]
     assert np.all(np.diff(widths) > 0.0)
     assert {get_candidate_style(slot, 0.5)['linestyle'] for slot in (None, 0, 5, 6, 11)} == {'-'}
     assert get_candidate_style(0, 0.5, is_compromised=True)['linestyle'] == ':'
+    made = prediction(START_NS, NOWHERE)
+    (first, *rest) = made.candidates
+    changed = replace(first, solution=replace(first.solution, status=Status.COMPROMISED))
+    axes = axes_of(replace(made, candidates=(changed, *rest)))
+    assert legend_of(axes).count('compromised: eta 0.900') == 1
+    assert [line.get_linestyle() for line in axes.lines if line.get_label().startswith('A')] == [':']
 
 
 def axes_of(made: Prediction) -> Any:
@@ -224,15 +227,6 @@ def test_boxes_are_drawn_with_their_outlines_and_fit_into_the_picture() -> None:
     np.testing.assert_allclose(measure_offsets(ring, obstacles)[1][:, 0], 0.01)
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     assert left < ring[:, 0].min() and ring[:, 0].max() < right and bottom < ring[:, 1].min() and ring[:, 1].max() < top
-
-
-def test_a_compromised_candidate_is_dotted_and_says_its_eta() -> None:
-    made = prediction(START_NS, NOWHERE)
-    (first, *rest) = made.candidates
-    changed = replace(first, solution=replace(first.solution, status=Status.COMPROMISED))
-    axes = axes_of(replace(made, candidates=(changed, *rest)))
-    assert legend_of(axes).count('compromised: eta 0.900') == 1
-    assert [line.get_linestyle() for line in axes.lines if line.get_label().startswith('A')] == [':']
 
 
 def test_the_share_without_a_likelihood_is_hatched() -> None:

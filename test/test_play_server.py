@@ -31,7 +31,6 @@ from foc_ros.play.predictor import Predictor
 from foc_ros.play.server import FILES, is_own_host, listen
 from foc_ros.play.session import Session
 
-SCENE = {'type': 'scene', 'obstacles': [], 'goals': [{'x': 0.1, 'y': 0.1, 'file': '/x'}]}
 HAND = {'type': 'hand', 't': 10.0, 'x': 0.1, 'y': 0.0, 'event': None}
 
 
@@ -121,8 +120,6 @@ def test_bad_messages_are_refused_and_harm_nothing(tmp_path: Path) -> None:
         for text, error in (
             ('', 'message: expected JSON'),
             (json.dumps(HAND | {'x': 1e300}), 'hand.x: expected less than or equal to 0.38, got 1e+300'),
-            ('{"type": "hand", "t": NaN, "x": 0, "y": 0, "event": null}', 'hand.t: expected a finite number, got nan'),
-            (json.dumps(SCENE), 'scene.goals[0].file: expected no such field'),
             (json.dumps({'type': 'job', 'name': 'fit'}), 'job: expected a session that was recorded, got fit'),
         ):
             await socket.write_message(text)

@@ -21,7 +21,7 @@ class Scene {
     this.paths = [];
   }
 
-  // Shows limits of x, then of y [m]; zoomed: whether they may be cut to the shape of the canvas.
+  // Shows at least what is within limits of x, then of y [m].
   fit(bounds) {
     this.bounds = bounds;
     this.resize();
@@ -170,7 +170,7 @@ class Scene {
 
   // Draws lines at round lengths with their lengths [m] at the border.
   grid() {
-    const { bounds: [low, high, bottom, top], unit } = this;
+    const { unit } = this;
     const step = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5].find((each) => each > 60 * unit) || 10;
     const places = (from, to) => Array.from({ length: Math.max(0, Math.floor(to / step) - Math.ceil(from / step) + 1) }, (_, row) => step * (Math.ceil(from / step) + row));
     const [left, base] = [-this.origin[0] / this.scale, (this.origin[1] - this.canvas.height) / this.scale];
@@ -185,7 +185,6 @@ class Scene {
       this.text(y.toFixed(digits), [left + 4 * unit, y], ink('--soft'), { size: 10, up: 6, align: 'left' });
     }
     this.text('x, y [m]', [right - 6 * unit, base], ink('--soft'), { size: 10, up: 8, align: 'right' });
-    return [low, high, bottom, top];
   }
 
   // Returns the text of the path under a position [m], or ''.
