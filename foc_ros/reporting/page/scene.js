@@ -178,7 +178,7 @@ class Scene {
     const digits = step < 0.1 ? 2 : 1;
     for (const x of places(left, right)) {
       this.line([[x, base], [x, ceiling]], ink('--line'), 0.6);
-      this.text(x.toFixed(digits), [x, base], ink('--soft'), { size: 10, up: 8 });
+      if (x < right - 70 * unit) this.text(x.toFixed(digits), [x, base], ink('--soft'), { size: 10, up: 8 });
     }
     for (const y of places(base, ceiling)) {
       this.line([[left, y], [right, y]], ink('--line'), 0.6);
