@@ -244,22 +244,26 @@ def move_by_keys(browser: Any, goal: tuple[float, float], near: float = 0.008) -
     until(is_there, f'the hand at {goal}')
 
 
+BARS = """
+const colourAt = (row) => getComputedStyle(row.querySelector('.bar i')).backgroundColor;
+const probe = document.body.appendChild(document.createElement('i'));
+const rows = [...document.querySelectorAll('#ways tr')].map(
+  (row) => [row.querySelector('.letter').innerText, colourAt(row), row.cells[3].innerText]).filter(([letter]) => letter);
+const drawn = play.view.candidates.filter(({ likelihood, slot }) => likelihood !== null && slot !== null).map(({ slot }) => {
+  probe.style.color = colourOf(slot);
+  return [letterOf(slot), getComputedStyle(probe).color];
+});
+return [rows, drawn];
+"""
+"""Letters, colours and words of the bars, and letters and colours of the paths."""
+
+
 def test_bars_have_the_colours_of_their_paths_and_paths_to_one_goal_differ_in_words(page: Any) -> None:
-    wait_for(page, "document.querySelectorAll('#ways tr').length > 2", 'bars')
-    rows = page.execute_script("""
-        const colourAt = (row) => getComputedStyle(row.querySelector('.bar i')).backgroundColor;
-        return [...document.querySelectorAll('#ways tr')].map(
-          (row) => [row.querySelector('.letter').innerText, colourAt(row), row.cells[3].innerText]);
-    """)
-    wanted = page.execute_script("""
-        const probe = document.createElement('i');
-        document.body.append(probe);
-        return play.view.candidates.filter(({ likelihood }) => likelihood !== null).map(({ slot }) => {
-          probe.style.color = colourOf(slot);
-          return [letterOf(slot), getComputedStyle(probe).color];
-        });
-    """)
-    assert {tuple(row[:2]) for row in rows} == {tuple(each) for each in wanted}
+    def are_same() -> Any:
+        rows, drawn = page.execute_script(BARS)
+        return len(rows) > 2 and [row[:2] for row in rows] == drawn and rows
+
+    rows = until(are_same, 'bars like the paths', 20)
     words = [row[2] for row in rows]
     assert len(set(words)) == len(words) and all(text.startswith('goal') for text in words)
 
