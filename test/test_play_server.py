@@ -173,11 +173,18 @@ def test_the_command_ends_when_it_is_stopped(tmp_path: Path, number: int) -> Non
         assert started.process.wait(30) == 0
 
 
-def test_without_tornado_the_message_says_what_to_install(tmp_path: Path) -> None:
-    (tmp_path / 'tornado.py').write_text('raise ImportError')
+@pytest.mark.parametrize(
+    ('name', 'words'),
+    [
+        ('tornado', "play needs tornado: install python3-tornado, or pip install 'foc_ros[play]'"),
+        ('pydantic', "play needs pydantic of version 2: pip install 'foc_ros[play]'"),
+    ],
+)
+def test_without_a_library_the_message_says_what_to_install(tmp_path: Path, name: str, words: str) -> None:
+    (tmp_path / f'{name}.py').write_text('raise ImportError')
     paths = os.pathsep.join([str(tmp_path), str(Path(__file__).parents[1]), *filter(None, [os.environ.get('PYTHONPATH')])])
-    command = [sys.executable, '-m', 'foc_ros', 'play', '--port', '0']
+    command = [sys.executable, '-m', 'foc_ros', 'play', '--port', '0', '--data', str(tmp_path / 'data')]
     environment = os.environ | {'PYTHONPATH': paths}
     result = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100, check=False)
     assert result.returncode == 2
-    assert result.stderr == "foc_ros play: play needs tornado: install python3-tornado, or pip install 'foc_ros[play]'\n"
+    assert result.stderr == f'foc_ros play: {words}\n'

@@ -147,7 +147,8 @@ def compute_recording_bounds(hand: HandTrajectory, snapshots: Sequence[Snapshot]
     points = [hand.positions]
     for each in snapshots:
         points += [each.goals, *find_limits(each.obstacles, STDDEVS * each.obstacles.radius_stddev)]
-    paths = [view.path for each in snapshots for view in (*each.candidates, *each.unsolved)]
+    paths = [candidate.path for each in snapshots for candidate in each.candidates]
+    paths += [lost.path for each in snapshots for lost in each.unsolved]
     points += [np.percentile(np.concatenate(paths), DRAWN_PERCENTILES, axis=0)] if paths else []
     return compute_bounds(make_obstacles(), np.zeros((0, 2)), (), *points, margin=0.06)
 
