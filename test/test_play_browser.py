@@ -64,29 +64,6 @@ def text_of(browser: Any, name: str) -> str:
     return str(browser.execute_script(f"return document.getElementById('{name}').innerText"))
 
 
-def press(browser: Any, *keys: str) -> None:
-    browser.execute_script("document.getElementById('scene').focus()")
-    for key in keys:
-        browser.switch_to.active_element.send_keys(key)
-
-
-def check_steering(browser: Any) -> None:
-    """Assert that the likelihood of the way that the hand takes rises, and that the page measures frames and delay."""
-    wait_for(browser, 'globalThis.play && play.view.candidates.length > 0', 'predictions', 20)
-    assert [each for each in browser.get_log('browser') if each['level'] == 'SEVERE'] == []
-    steer(browser, (0.0, 0.0))
-    wait_for(browser, 'play.view.candidates.length > 1', 'candidates at the start', 20)
-    until(lambda: 0.0 < share_above(browser) < 0.25, 'a likelihood of the way above at the start', 20)
-    steer(browser, ABOVE[0], speed=0.2)
-    until(lambda: 0.25 < share_above(browser) < 1.0, 'a larger likelihood of the way above', 20)
-    steer(browser, ABOVE[1], speed=0.2)
-    until(lambda: share_above(browser) > 0.99, 'no doubt of the way taken', 20)
-    steer(browser, *ON)
-    wait_for(browser, 'Math.abs(play.view.hand.position[0] - 0.3) < 0.003', 'the hand at the goal', 20)
-    until(lambda: has_numbers(browser), 'numbers', 20)
-    assert 'frames a second' in browser.execute_script("return document.getElementById('numbers').textContent")
-
-
 def has_numbers(browser: Any) -> bool:
     """Move the hand a little, and tell whether frames and delay have been measured."""
     steer(browser, (0.29, 0.085), ON[-1])
@@ -103,8 +80,20 @@ def share_above(browser: Any) -> float:
     return sum(each['likelihood'] or 0.0 for each, above in zip(candidates, is_above, strict=True) if above)
 
 
-def test_the_likelihood_of_the_way_taken_rises(page: Any) -> None:
-    check_steering(page)
+def test_the_likelihood_of_the_path_taken_rises_and_frames_and_delay_are_measured(page: Any) -> None:
+    wait_for(page, 'globalThis.play && play.view.candidates.length > 0', 'predictions', 20)
+    assert [each for each in page.get_log('browser') if each['level'] == 'SEVERE'] == []
+    steer(page, (0.0, 0.0))
+    wait_for(page, 'play.view.candidates.length > 1', 'candidates at the start', 20)
+    until(lambda: 0.0 < share_above(page) < 0.25, 'a likelihood of the way above at the start', 20)
+    steer(page, ABOVE[0], speed=0.2)
+    until(lambda: 0.25 < share_above(page) < 1.0, 'a larger likelihood of the way above', 20)
+    steer(page, ABOVE[1], speed=0.2)
+    until(lambda: share_above(page) > 0.99, 'no doubt of the way taken', 20)
+    steer(page, *ON)
+    wait_for(page, 'Math.abs(play.view.hand.position[0] - 0.3) < 0.003', 'the hand at the goal', 20)
+    until(lambda: has_numbers(page), 'numbers', 20)
+    assert 'frames a second' in page.execute_script("return document.getElementById('numbers').textContent")
 
 
 def test_a_pointer_event_is_sent_at_once_and_only_once(page: Any) -> None:
@@ -158,11 +147,8 @@ def test_an_obstacle_that_is_dragged_changes_the_prediction(page: Any) -> None:
     straight = 'play.view.candidates.some((each) => each.goal === 1 && each.path.every(([x, y]) => Math.abs(y) < 0.01))'
     wait_for(page, straight, 'a straight way to goal 1', 20)
     assert page.execute_script('return play.view.hand.position') == pytest.approx([0.0, 0.0], abs=1e-3)
-    press(page, 'n', 'g', 'b', '+', 'r')
-    wait_for(page, 'play.view.scene.obstacles.length === 4 && play.view.scene.goals.length === 4', 'objects added by keys', 20)
-    wait_for(page, 'play.view.candidates.some((each) => each.goal === 3)', 'a way to the new goal', 20)
-    press(page, '\ue017')  # Delete: the box, which is selected
-    wait_for(page, 'play.view.scene.obstacles.length === 3', 'the box is removed', 20)
+    page.execute_script("document.getElementById('add-goal').click()")
+    wait_for(page, 'play.view.candidates.some((each) => each.goal === 3)', 'a path to the new goal', 20)
     page.refresh()
     wait_for(page, 'play.view.scene.obstacles.length === 3 && play.view.scene.goals.length === 4', 'the scene is kept', 20)
 
