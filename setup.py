@@ -7,7 +7,7 @@ from setuptools import find_packages, setup
 
 PACKAGE = 'foc_ros'
 PAGES = ('play/page', 'reporting/page')
-REPORT = ['Jinja2>=3.1', 'matplotlib>=3.6', 'plotly>=5.24']
+REPORT = ['Jinja2>=3.1', 'matplotlib>=3.6']
 
 setup(
     name=PACKAGE,
@@ -53,7 +53,7 @@ setup(
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
         'report': REPORT,
         # the page on which one tries it with one's own hand
-        'play': [*REPORT, 'tornado>=6.2'],
+        'play': [*REPORT, 'pydantic>=2', 'tornado>=6.2'],
         # recordings on the workers of a Dask cluster
         'cluster': ['distributed>=2024.1'],
         # the documentation as a web site

@@ -57,7 +57,7 @@ class Solution(types.Solution):
 
     def plot(self, axes: Any = None) -> Any:
         """Draw the solution in its scene; see `Prediction.plot`."""
-        from foc_ros.reporting.snapshots import parse_label
+        from foc_ros.reporting.views import parse_label
 
         _, sides = parse_label(self.label, self.obstacles.ids)
         candidate = Candidate(self.label, 0, tuple(sides.items()), self.path, 0.0)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from accuracy import algorithm1, bounds, effort_over_eta, guarantee, page, reference
 from matplotlib.figure import Figure
 
-from foc_ros.reporting.plots import save_figure
+from foc_ros.reporting.draw import save_figure
 
 Blocks = dict[str, str]
 

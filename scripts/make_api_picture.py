@@ -14,7 +14,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from foc_ros.reporting.plots import save_figure
+from foc_ros.reporting.draw import save_figure
 
 ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / 'doc' / 'images' / 'api.png'

@@ -28,9 +28,17 @@ from foc_ros.core.plant.plants import build_triple_integrator_horizon
 from foc_ros.core.predict import build_scene_problems, solve_scene
 from foc_ros.core.types import Array, Obstacles, Solution, make_obstacles
 from foc_ros.io.scene_file import guess_path, load_scene
-from foc_ros.reporting.drawing import draw_candidates, draw_scene, draw_tag, get_class_style, make_stddev_ellipse, open_figure
-from foc_ros.reporting.plots import compute_bounds, number_labels, save_figure
-from foc_ros.reporting.snapshots import build_candidate_views
+from foc_ros.reporting.draw import (
+    compute_bounds,
+    draw_scene,
+    draw_snapshot,
+    draw_tag,
+    get_class_style,
+    make_stddev_ellipse,
+    open_figure,
+    save_figure,
+)
+from foc_ros.reporting.views import Snapshot, build_candidate_views
 
 PICTURES = Path(__file__).resolve().parents[1] / 'doc' / 'images'
 SCENE = Path(__file__).resolve().parents[1] / 'doc' / 'examples' / 'scene.yaml'
@@ -130,10 +138,8 @@ def classes() -> Figure:
     scene = load_scene(SCENE)
     candidates = build_candidate_views(solve_scene(scene, build_scene_problems(scene)))
     with open_figure(7.4, 5.6) as figure:
-        axes = figure.subplots()
-        draw_scene(axes, scene.obstacles, scene.goals, compute_bounds(scene.obstacles, scene.goals, candidates))
-        draw_candidates(axes, candidates, number_labels(candidates))
-        axes.plot(*scene.hand.mean[:2], marker='o', color='black')
+        snapshot = Snapshot(0, scene.obstacles, scene.goals, candidates, None, hand=scene.hand.mean[:2])
+        draw_snapshot(figure.subplots(), snapshot, compute_bounds(scene.obstacles, scene.goals, candidates))
     return figure
 
 

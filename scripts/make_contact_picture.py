@@ -22,8 +22,7 @@ from foc_ros.core.ocp.start import cold_start, warm_start
 from foc_ros.core.plant.plants import build_triple_integrator_horizon
 from foc_ros.core.types import Array, Solution, Status, make_obstacles
 from foc_ros.io.scene_file import guess_path
-from foc_ros.reporting.drawing import get_class_style, open_figure
-from foc_ros.reporting.plots import save_figure
+from foc_ros.reporting.draw import get_class_style, open_figure, save_figure
 
 PICTURE = Path(__file__).resolve().parents[1] / 'doc' / 'images' / 'contacts.png'
 STEPS, DURATION_S = 50, 1.0

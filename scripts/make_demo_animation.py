@@ -18,10 +18,8 @@ from PIL import Image
 
 from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS
-from foc_ros.reporting.drawing import draw_candidates, draw_hand, draw_scene, open_figure
-from foc_ros.reporting.plots import compute_bounds, draw_likelihoods
-from foc_ros.reporting.snapshots import HandTrajectory, Snapshot
-from foc_ros.reporting.track_association import build_candidate_tracks
+from foc_ros.reporting.draw import compute_bounds, draw_candidates, draw_hand, draw_likelihoods, draw_scene, open_figure
+from foc_ros.reporting.views import HandTrajectory, Snapshot, build_candidate_tracks
 
 ANIMATION = Path(__file__).resolve().parents[1] / 'doc' / 'images' / 'demo.gif'
 MOVEMENTS = (0, 4, 6)
@@ -51,11 +49,11 @@ def pictures(
         rows = np.unique(np.linspace(0, len(tracks.snapshots) - 1, PICTURES).round().astype(int))
         for row in rows:
             snapshot = tracks.snapshots[row]
+            snapshot = snapshot.begin_at(hand.position_at(snapshot.stamp_ns))
             with open_figure(8.4, 4.2) as figure:
                 scene, shares = figure.subplots(1, 2, width_ratios=(1.55, 1.0))
                 draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
-                draw_candidates(scene, snapshot.candidates, tracks.slots_at(row), snapshot.unsolved)
-                scene.get_legend().remove()
+                draw_candidates(scene, snapshot, tracks.slots_at(row))
                 draw_hand(scene, hand, snapshot.stamp_ns, (start_ns, end_ns))
                 draw_likelihoods(shares, tracks.between(start_ns, snapshot.stamp_ns), start_ns)
                 limits = (0.0, (end_ns - start_ns) / NANOSECONDS)

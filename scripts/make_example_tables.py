@@ -17,7 +17,7 @@ from foc_ros.core.config import Config
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, Array, HandSample
 from foc_ros.io.bags import BagReader
-from foc_ros.reporting.snapshots import HandTrajectory, build_hand_trajectory
+from foc_ros.reporting.views import HandTrajectory, build_hand_trajectory
 from foc_ros.ros.intake import Intake
 
 ROOT = Path(__file__).resolve().parents[1]

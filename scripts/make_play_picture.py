@@ -29,7 +29,7 @@ def main() -> None:
         folder = Path(name)
         file = folder / 'foc.yaml'
         file.write_text(dump_parameter_file(Config(budget_s=0.0)), encoding='utf-8')
-        with play(folder, '--no-ros', '--params', str(file)) as started, chromium(folder / 'profile') as browser:
+        with play(folder, '--params', str(file)) as started, chromium(folder / 'profile') as browser:
             visit(browser, started, 1100, 860)
             steer(browser, (0.0, 0.0))
             steer(browser, (0.06, -0.012), speed=0.15)

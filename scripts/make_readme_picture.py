@@ -15,10 +15,18 @@ from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import BagReader
-from foc_ros.reporting.drawing import draw_candidates, draw_hand, draw_scene, open_figure
-from foc_ros.reporting.plots import compute_bounds, number_labels, save_figure
+from foc_ros.reporting.draw import (
+    compute_bounds,
+    draw_candidates,
+    draw_hand,
+    draw_legend,
+    draw_scene,
+    number_labels,
+    open_figure,
+    save_figure,
+)
 from foc_ros.reporting.report import ReportCollector
-from foc_ros.reporting.snapshots import HandTrajectory, Snapshot, build_hand_trajectory
+from foc_ros.reporting.views import HandTrajectory, Snapshot, build_hand_trajectory
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORDING = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'
@@ -41,12 +49,14 @@ def picture(hand: HandTrajectory, snapshots: list[Snapshot]) -> Figure:
     span = hand.find_movements(Config().estimator.onset_speed)[MOVEMENT - 1]
     wanted_ns = span[0] + int(AFTER_S * NANOSECONDS)
     snapshot = min(snapshots, key=lambda each: abs(each.stamp_ns - wanted_ns))
+    snapshot = snapshot.begin_at(hand.position_at(snapshot.stamp_ns))
     bounds = compute_bounds(snapshot.obstacles, snapshot.goals, snapshot.candidates, hand.positions[hand.between(*span)])
     with open_figure(7.6, 6.6) as figure:
         scene = figure.subplots()
         draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
-        draw_candidates(scene, snapshot.candidates, number_labels(snapshot.candidates), snapshot.unsolved)
+        draw_candidates(scene, snapshot, number_labels(snapshot.candidates))
         draw_hand(scene, hand, snapshot.stamp_ns, span)
+        draw_legend(scene)
     return figure
 
 

@@ -30,8 +30,7 @@ from foc_ros.cli.arguments import add_worker_arguments
 from foc_ros.core.config import Config
 from foc_ros.core.types import Array, Obstacles
 from foc_ros.io.bags import Item
-from foc_ros.reporting.drawing import get_class_style, make_obstacle_patch, open_figure
-from foc_ros.reporting.plots import save_figure
+from foc_ros.reporting.draw import get_class_style, make_obstacle_patch, open_figure, save_figure
 
 RUNS = [(D3IL, setting, learning) for setting in ('defaults', 'thumb_stick.yaml') for learning in ('none', 'online')]
 RUNS.append((HLP, 'defaults', 'none'))

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measure `foc_ros play` in a headless Chromium: frames per second, and the time from a pointer event to the drawn prediction.
 
-    python scripts/measure_play.py [--no-ros] [--scene rows|grid] [--seconds 20] [--budget 0.01]
+    python scripts/measure_play.py [--scene rows|grid] [--seconds 20] [--budget 0.01]
 
 The scene has 16 obstacles. Up to 8 ways are followed, and those that were followed before; their mean number is printed.
 Synthetic pointer events move the hand to and fro. The page measures both numbers: frames by the times of the browser, and the
@@ -50,7 +50,6 @@ TURNS = ((0.05, 0.03), (0.0, -0.03))
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])
-    parser.add_argument('--no-ros', action='store_true', help='with the library behind the page, not the node')
     parser.add_argument('--seconds', type=float, default=20.0, help='time to measure (default: %(default)s)')
     words = 'budget_s of the predictions [s] (default: %(default)s)'
     parser.add_argument('--budget', type=float, default=Config().budget_s, help=words)
@@ -62,8 +61,7 @@ def main() -> None:
         file.write_text(
             dump_parameter_file(Config(budget_s=given.budget).with_values({'homotopy.max_candidates': WAYS})), encoding='utf-8'
         )
-        options = ['--no-ros'] if given.no_ros else []
-        with play(folder, '--params', str(file), *options) as started, chromium(folder / 'profile') as browser:
+        with play(folder, '--params', str(file)) as started, chromium(folder / 'profile') as browser:
             visit(browser, started)
             scene = f'const obstacles = []; {SCENES[given.scene]} play.setScene({{ obstacles, goals: play.view.scene.goals }});'
             browser.execute_script(scene)

@@ -77,16 +77,11 @@ def screenshot(browser: Any) -> bytes:
 
 
 DRAWN = """
-const box = document.getElementById('likelihoods');
-const [xaxis, yaxis] = [box._fullLayout.xaxis, box._fullLayout.yaxis];
-const traces = [...box.querySelectorAll('.scatterlayer .trace')];
-return box.data.map((trace, row) => !trace.meta || trace.meta.track === undefined ? null : {
-  track: trace.meta.track,
-  points: [...traces[row].querySelectorAll('.points path')].map((mark) => {
-    const place = mark.transform.baseVal.consolidate().matrix;
-    return [xaxis.p2d(place.e), yaxis.p2d(place.f)];
-  }),
-}).filter((each) => each !== null);
+const { likelihoods } = report.charts;
+return [...document.querySelectorAll('#likelihoods g[data-name]')].map((line) => ({
+  points: [...line.querySelectorAll(':scope > circle')].map(({ cx, cy }) => [
+    likelihoods.timeAt(cx.baseVal.value), (likelihoods.base - cy.baseVal.value) / (likelihoods.base - 6) * likelihoods.top]),
+}));
 """
 """The likelihoods as drawn: positions of the marks, converted from pixels to seconds and likelihoods."""
 MOVE = """
@@ -100,10 +95,11 @@ return [...document.querySelectorAll('#candidates tr[data-track]')].map(
   (row) => [row.cells[3].textContent, Number(row.dataset.share), row.cells[1].textContent]);
 """
 PATHS = """
-const box = document.getElementById('scene');
-return [box.data.filter((trace) => trace.meta && trace.meta.candidate !== undefined).length,
-        [...box.querySelectorAll('.scatterlayer .trace .js-line')].filter((line) => line.getAttribute('d')).length];
+const { canvas, paths } = report.scene;
+const pixels = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+return [paths.length, new Set(pixels).size];
 """
+"""The number of paths that were drawn, and of different values of the pixels."""
 
 
 def check_report(browser: Any, directory: Path) -> None:
@@ -152,6 +148,6 @@ def _check_slider(browser: Any, numbers: list[dict[str, Any]]) -> None:
         ]
         for _, share, text in rows:
             assert abs(float(text.removesuffix(' %')) - 100 * share) <= 0.5
-        candidates, lines = browser.execute_script(PATHS)
-        assert candidates == len(wanted['candidates'])
-        assert lines >= candidates
+        paths, values = browser.execute_script(PATHS)
+        assert paths == len(wanted['candidates']) + len(wanted['unsolved'])
+        assert values > 50

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from foc_ros.core.types import (
@@ -101,3 +103,10 @@ def predictions(of: list[HandSample], every: int = 4) -> list[Prediction]:
 
 def scene() -> tuple[Obstacles, Array]:
     return OBSTACLES, GOALS
+
+
+def widen(made: Prediction) -> Prediction:
+    """Return a prediction whose total uncertainty is greater than its motor noise, as that of the predictor."""
+    wide = [each.solution.with_covariance(3.0 * each.solution.covariance) for each in made.candidates]
+    pairs = zip(made.candidates, wide, strict=True)
+    return replace(made, candidates=tuple(replace(each, solution=solution) for each, solution in pairs))

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.config import Config
-from foc_ros.play.page_messages import parse_message
-from foc_ros.play.predictors import LivePredictor, State
+from foc_ros.play.messages import parse_message
+from foc_ros.play.predictor import Predictor, State
 from foc_ros.play.scene import FIRST_SCENE, START
 from foc_ros.play.session import Session
 
@@ -24,26 +24,29 @@ def parse(message: object) -> Any:
     return parse_message(json.dumps(message))
 
 
-class Silent(LivePredictor):
+class Silent(Predictor):
     """A predictor that keeps what it is given."""
 
-    name = 'silent'
+    def __init__(self, config: Config, receive: Any) -> None:
+        super().__init__(config, receive)
+        self.sent: list[tuple[str, Any]] = []
+        self.configs: list[Config] = []
+        self.state = State('well', 'silent')
 
     def start(self) -> None:
-        self.sent: list[tuple[str, bytes]] = []
-        self.configs: list[Config] = []
+        pass
 
     def stop(self) -> None:
         pass
 
-    def send(self, role: str, raw: bytes) -> None:
-        self.sent.append((role, raw))
+    def send(self, role: str, message: Any) -> None:
+        self.sent.append((role, message))
 
     def configure(self, config: Config) -> None:
         self.configs.append(config)
 
     def check(self) -> State:
-        return State(True, 'silent')
+        return self.state
 
 
 class Page:
@@ -75,7 +78,7 @@ def reach(page: Page) -> None:
     """Do one trial, straight to the goal at 0.25 m/s."""
     page.move(START, 60)
     assert page.last('task')['phase'] == 'reach'
-    goal = FIRST_SCENE.goals[page.last('task')['goal']]
+    goal = FIRST_SCENE.points[page.last('task')['goal']]
     for share in np.linspace(0.0, 1.0, 60):
         page.move((share * goal[0], share * goal[1]))
     page.move(goal, 20)

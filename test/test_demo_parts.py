@@ -26,7 +26,7 @@ from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.types import Prediction
 from foc_ros.io.bags import TYPESTORE, Item
-from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
+from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
 from foc_ros.ros import isolated_node
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud

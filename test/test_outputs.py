@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
-pytest.importorskip('plotly', reason='plotly is not installed')
 
 from matplotlib.figure import Figure
 from report_samples import START_NS, prediction, predictions, samples, scene
@@ -16,10 +15,10 @@ from report_samples import START_NS, prediction, predictions, samples, scene
 from foc_ros.cli.main import main
 from foc_ros.core.errors import InputError
 from foc_ros.io.outputs import check_replaceable, check_report
+from foc_ros.reporting.draw import plot_outcomes
 from foc_ros.reporting.page import write_page
-from foc_ros.reporting.plots import plot_outcomes
 from foc_ros.reporting.report import write_report
-from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
+from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
 
 SCENE = '{"start": [0, 0], "goal": [0.3, 0], "duration_s": 1, "steps": 10, "noise": [0.05, 0.05], "eta": 0.9, "obstacles": []}'
 

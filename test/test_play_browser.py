@@ -1,10 +1,8 @@
-"""The page of `foc_ros play` in a browser: steered by synthetic events, with a node and without ROS; broken pages."""
+"""The page of `foc_ros play` in a browser: steered by synthetic events, loaded again, on a phone; and broken pages."""
 
 from __future__ import annotations
 
 import math
-import os
-import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,15 +12,12 @@ import pytest
 
 pytest.importorskip('tornado', reason='tornado is not installed')
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
-pytest.importorskip('plotly', reason='plotly is not installed')
 
 from browser_helpers import check_report, chromium, screenshot
 from play_helpers import Play, find_point, play, press_keys, steer, tab_to, until, visit, wait_for, wait_for_answer
-from ros_helpers import require_ros
 
 from foc_ros.core.config import Config
 from foc_ros.io.bags import BagReader
-from foc_ros.play import server
 from foc_ros.ros.parameters import dump_parameter_file
 
 ABOVE = (0.07, 0.035), (0.13, 0.056)
@@ -48,7 +43,7 @@ def parameters(tmp_path_factory: pytest.TempPathFactory) -> str:
 @pytest.fixture(scope='module')
 def library(tmp_path_factory: pytest.TempPathFactory, parameters: str) -> Iterator[Play]:
     """Start a server without ROS."""
-    with play(tmp_path_factory.mktemp('library'), '--no-ros', '--params', parameters) as started:
+    with play(tmp_path_factory.mktemp('library'), '--params', parameters) as started:
         yield started
 
 
@@ -69,29 +64,6 @@ def text_of(browser: Any, name: str) -> str:
     return str(browser.execute_script(f"return document.getElementById('{name}').innerText"))
 
 
-def press(browser: Any, *keys: str) -> None:
-    browser.execute_script("document.getElementById('scene').focus()")
-    for key in keys:
-        browser.switch_to.active_element.send_keys(key)
-
-
-def check_steering(browser: Any) -> None:
-    """Assert that the likelihood of the way that the hand takes rises, and that the page measures frames and delay."""
-    wait_for(browser, 'globalThis.play && play.view.candidates.length > 0', 'predictions', 20)
-    assert [each for each in browser.get_log('browser') if each['level'] == 'SEVERE'] == []
-    steer(browser, (0.0, 0.0))
-    wait_for(browser, 'play.view.candidates.length > 1', 'candidates at the start', 20)
-    until(lambda: 0.0 < share_above(browser) < 0.25, 'a likelihood of the way above at the start', 20)
-    steer(browser, ABOVE[0], speed=0.2)
-    until(lambda: 0.25 < share_above(browser) < 1.0, 'a larger likelihood of the way above', 20)
-    steer(browser, ABOVE[1], speed=0.2)
-    until(lambda: share_above(browser) > 0.99, 'no doubt of the way taken', 20)
-    steer(browser, *ON)
-    wait_for(browser, 'Math.abs(play.view.hand.position[0] - 0.3) < 0.003', 'the hand at the goal', 20)
-    until(lambda: has_numbers(browser), 'numbers', 20)
-    assert 'frames a second' in text_of(browser, 'numbers')
-
-
 def has_numbers(browser: Any) -> bool:
     """Move the hand a little, and tell whether frames and delay have been measured."""
     steer(browser, (0.29, 0.085), ON[-1])
@@ -105,11 +77,23 @@ def share_above(browser: Any) -> float:
     candidates = browser.execute_script('return play.view.candidates')
     paths = [np.array(each['path']) for each in candidates]
     is_above = [np.interp(0.14, path[:, 0], path[:, 1]) > 0.015 for path in paths]
-    return sum(each['likelihood'] for each, above in zip(candidates, is_above, strict=True) if above)
+    return sum(each['likelihood'] or 0.0 for each, above in zip(candidates, is_above, strict=True) if above)
 
 
-def test_the_likelihood_of_the_way_taken_rises(page: Any) -> None:
-    check_steering(page)
+def test_the_likelihood_of_the_path_taken_rises_and_frames_and_delay_are_measured(page: Any) -> None:
+    wait_for(page, 'globalThis.play && play.view.candidates.length > 0', 'predictions', 20)
+    assert [each for each in page.get_log('browser') if each['level'] == 'SEVERE'] == []
+    steer(page, (0.0, 0.0))
+    wait_for(page, 'play.view.candidates.length > 1', 'candidates at the start', 20)
+    until(lambda: 0.0 < share_above(page) < 0.25, 'a likelihood of the way above at the start', 20)
+    steer(page, ABOVE[0], speed=0.2)
+    until(lambda: 0.25 < share_above(page) < 1.0, 'a larger likelihood of the way above', 20)
+    steer(page, ABOVE[1], speed=0.2)
+    until(lambda: share_above(page) > 0.99, 'no doubt of the way taken', 20)
+    steer(page, *ON)
+    wait_for(page, 'Math.abs(play.view.hand.position[0] - 0.3) < 0.003', 'the hand at the goal', 20)
+    until(lambda: has_numbers(page), 'numbers', 20)
+    assert 'frames a second' in page.execute_script("return document.getElementById('numbers').textContent")
 
 
 def test_a_pointer_event_is_sent_at_once_and_only_once(page: Any) -> None:
@@ -163,11 +147,8 @@ def test_an_obstacle_that_is_dragged_changes_the_prediction(page: Any) -> None:
     straight = 'play.view.candidates.some((each) => each.goal === 1 && each.path.every(([x, y]) => Math.abs(y) < 0.01))'
     wait_for(page, straight, 'a straight way to goal 1', 20)
     assert page.execute_script('return play.view.hand.position') == pytest.approx([0.0, 0.0], abs=1e-3)
-    press(page, 'n', 'g', 'b', '+', 'r')
-    wait_for(page, 'play.view.scene.obstacles.length === 4 && play.view.scene.goals.length === 4', 'objects added by keys', 20)
-    wait_for(page, 'play.view.candidates.some((each) => each.goal === 3)', 'a way to the new goal', 20)
-    press(page, '\ue017')  # Delete: the box, which is selected
-    wait_for(page, 'play.view.scene.obstacles.length === 3', 'the box is removed', 20)
+    page.execute_script("document.getElementById('add-goal').click()")
+    wait_for(page, 'play.view.candidates.some((each) => each.goal === 3)', 'a path to the new goal', 20)
     page.refresh()
     wait_for(page, 'play.view.scene.obstacles.length === 3 && play.view.scene.goals.length === 4', 'the scene is kept', 20)
 
@@ -192,7 +173,7 @@ def test_keys_and_a_gamepad_steer_and_guidance_pulls(page: Any) -> None:
     click(page, 'guidance')
 
 
-def test_tasks_are_recorded_and_reported(page: Any, library: Play, tmp_path: Path) -> None:
+def test_tasks_are_recorded_and_reported_and_all_of_it_survives_a_reload(page: Any, library: Play, tmp_path: Path) -> None:
     page.execute_script("""
         document.getElementById('trials').value = 2;
         document.getElementById('assistance').value = 'without';
@@ -218,8 +199,14 @@ def test_tasks_are_recorded_and_reported(page: Any, library: Play, tmp_path: Pat
     seconds = np.array([stamp.sec + 1e-9 * stamp.nanosec for stamp in stamps])
     assert np.diff(seconds).min() > 0.0
     assert len(list((folder / 'unguided').iterdir())) == 2
+    kept = [text_of(page, name) for name in ('score', 'session', 'job', 'result')]
+    page.refresh()
+    wait_for(page, 'globalThis.play && play.view.candidates.length > 0', 'predictions')
+    assert [text_of(page, name) for name in ('score', 'session', 'job', 'result')] == kept
+    assert not page.execute_script("return document.getElementById('download').hidden")
     page.get('about:blank')
     check_report(page, folder / 'report')
+    assert '<h2>Score</h2>' in fetched
 
 
 RIGHT, LEFT, UP, DOWN, DELETE, ENTER, SPACE = '\ue014', '\ue012', '\ue013', '\ue015', '\ue017', '\ue007', ' '
@@ -241,6 +228,39 @@ def move_by_keys(browser: Any, goal: tuple[float, float], near: float = 0.008) -
         return math.hypot(*left) <= near
 
     until(is_there, f'the hand at {goal}')
+
+
+BARS = """
+const colourAt = (row) => getComputedStyle(row.querySelector('.bar i')).backgroundColor;
+const probe = document.body.appendChild(document.createElement('i'));
+const rows = [...document.querySelectorAll('#ways tr')].map(
+  (row) => [row.querySelector('.letter').innerText, colourAt(row), row.cells[3].innerText]).filter(([letter]) => letter);
+const drawn = play.view.candidates.filter(({ likelihood, slot }) => likelihood !== null && slot !== null).map(({ slot }) => {
+  probe.style.color = colourOf(slot);
+  return [letterOf(slot), getComputedStyle(probe).color];
+});
+return [rows, drawn];
+"""
+"""Letters, colours and words of the bars, and letters and colours of the paths."""
+
+
+def test_bars_have_the_colours_of_their_paths_and_paths_to_one_goal_differ_in_words(page: Any) -> None:
+    def are_same() -> Any:
+        rows, drawn = page.execute_script(BARS)
+        return len(rows) > 2 and [row[:2] for row in rows] == drawn and rows
+
+    rows = until(are_same, 'bars like the paths', 20)
+    words = [row[2] for row in rows]
+    assert len(set(words)) == len(words) and all(text.startswith('goal') for text in words)
+
+
+def test_the_status_line_is_not_green_while_something_is_refused(page: Any) -> None:
+    page.execute_script("document.getElementById('record').click(); document.getElementById('fit').disabled = false")
+    click(page, 'fit')
+    wait_for(page, "document.getElementById('status').className === 'status failing'", 'the status line')
+    assert text_of(page, 'status').startswith('refused: job: expected a session that has ended')
+    wait_for(page, "document.getElementById('status').className === 'status well'", 'the status line is green again')
+    click(page, 'record')
 
 
 def test_everything_can_be_done_by_keys(page: Any, library: Play, tmp_path: Path) -> None:
@@ -272,7 +292,7 @@ def test_everything_can_be_done_by_keys(page: Any, library: Play, tmp_path: Path
     press_keys(page, ENTER)
     wait_for(page, "document.getElementById('task').innerText.startsWith('1 of 1: ')", 'the task')
     assert page.execute_script('return document.activeElement.id') == 'scene'
-    assert text_of(page, 'record') == 'record without tasks', 'the button does not offer to end what the tasks record'
+    assert text_of(page, 'record') == 'record', 'the button does not offer to end what the tasks record'
     move_by_keys(page, (0.0, 0.0))
     wait_for(page, "play.view.phase === 'reach'", 'the light')
     goal = page.execute_script('return [play.view.scene.goals[play.view.goal].x, play.view.scene.goals[play.view.goal].y]')
@@ -301,6 +321,11 @@ PHONE = 360, 640
 def test_the_page_fits_on_a_phone(browser: Any, library: Play, dark: bool) -> None:
     """It has the width of the phone, whatever it shows, and the colours of the system until the button changes them."""
     visit(browser, library, *PHONE, dark)
+    place = """return ['scene', 'buttons'].map((name) => document.getElementById(name).getBoundingClientRect())
+        .map(({ top, bottom }) => [top, bottom])"""
+    for top, bottom in browser.execute_script(place):
+        assert 0.0 <= top < bottom <= PHONE[1], 'scene and buttons are on one screen'
+    assert browser.execute_script("return document.querySelector('details').open") is False, 'help is folded'
     colour = 'return getComputedStyle(document.body).backgroundColor'
     before = browser.execute_script(colour)
     assert before == ('rgb(20, 24, 28)' if dark else 'rgb(255, 255, 255)')
@@ -351,78 +376,12 @@ def test_a_finger_moves_the_hand_and_drags_obstacles_and_goals_on_a_phone(browse
 
 
 def test_the_page_says_that_the_server_is_gone_and_recovers(browser: Any, tmp_path: Path) -> None:
-    with play(tmp_path, '--no-ros') as started:
+    with play(tmp_path) as started:
         visit(browser, started)
         port = started.url.rpartition(':')[2]
     wait_for(browser, "document.getElementById('status').innerText === 'The server is gone; trying again.'", 'the message')
     assert browser.execute_script('return play.view.candidates.length') == 0
-    with play(tmp_path, '--no-ros', '--port', port):
+    with play(tmp_path, '--port', port):
         wait_for(browser, 'play.view.candidates.length > 0', 'predictions after a new start of the server')
-        wait_for(browser, "!document.getElementById('status').classList.contains('gone')", 'the message is gone')
-        browser.get('about:blank')
-
-
-def test_over_dds_a_killed_node_is_reported_and_started_again(browser: Any, tmp_path: Path, parameters: str) -> None:
-    require_ros()
-    with play(tmp_path, '--params', parameters) as started:
-        visit(browser, started)
-        check_steering(browser)
-        click(browser, 'guidance')
-        (node,) = find_nodes(started.process.pid)
-        os.kill(node, signal.SIGKILL)
-        wait_for(browser, "document.getElementById('status').classList.contains('gone')", 'the page says that the node is gone')
-        assert 'the node' in text_of(browser, 'status')
-        wait_for(browser, "!document.getElementById('status').classList.contains('gone')", 'the node is back')
-        assert find_nodes(started.process.pid) != [node]
-        wait_for(browser, 'play.view.candidates.length > 0', 'predictions of the new node')
-        browser.get('about:blank')
-    assert started.process.returncode == 0
-
-
-def find_nodes(parent: int) -> list[int]:
-    """Return the process ids of the nodes that a process has started."""
-    nodes = []
-    for folder in Path('/proc').iterdir():
-        if folder.name.isdigit():
-            try:
-                state = (folder / 'stat').read_text().rpartition(')')[2].split()
-                words = (folder / 'cmdline').read_text().split('\0')
-            except OSError:
-                continue
-            if int(state[1]) == parent and state[0] != 'Z' and 'node' in words:
-                nodes.append(int(folder.name))
-    return nodes
-
-
-BROKEN = [
-    ('hand.js', "'pointermove', ", ''),
-    ('hand.js', 'this.followed = this.followed.map(', 'this.ignored = this.followed.map('),
-    ('play.js', 'view.candidates = candidates;', ''),
-    ('play.js', "send({ type: 'hand'", "send({ type: 'hands'"),
-    ('play.js', 'connect();\nrequest', 'request'),
-    ('drawing.js', 'class Drawing {', 'class Drawing {{'),
-    ('drawing.js', 'drawCandidate(candidate) {', 'drawCandidate(candidate) { null.x;'),
-]
-
-
-@pytest.mark.parametrize(
-    ('file', 'old', 'new'), BROKEN, ids=['pointer', 'hand', 'candidates', 'message', 'socket', 'syntax', 'draw']
-)
-def test_the_check_finds_a_broken_page(browser: Any, tmp_path: Path, file: str, old: str, new: str) -> None:
-    """Serve the page with one text changed, in a process of its own; then the check of steering fails."""
-    source = (server.FOLDER / file).read_text(encoding='utf-8')
-    assert old in source
-    (tmp_path / file).write_text(source.replace(old, new), encoding='utf-8')
-    program = f"""
-import sys
-from pathlib import Path
-from foc_ros.cli.main import main
-from foc_ros.play import server
-server.FILES['/{file}'] = Path({str(tmp_path / file)!r})
-sys.exit(main(sys.argv[1:]))
-"""
-    with play(tmp_path, '--no-ros', program=program) as started:
-        browser.get(started.url)
-        with pytest.raises(AssertionError):
-            check_steering(browser)
+        wait_for(browser, "document.getElementById('status').className === 'status well'", 'the message is gone')
         browser.get('about:blank')

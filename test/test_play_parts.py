@@ -1,4 +1,4 @@
-"""The parts of `foc_ros play` that need neither a browser nor ROS: messages, clock, scene, tasks and views."""
+"""The parts of `foc_ros play` that need neither a browser nor a session: messages, clock, scene, tasks and the predictor."""
 
 from __future__ import annotations
 
@@ -11,56 +11,55 @@ import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
-pytest.importorskip('plotly', reason='plotly is not installed')
 
+from play_helpers import until
+from report_samples import START_NS, prediction, widen
 from session_helpers import BOX, CIRCLE, SCENE, TASKS, parse
 
+from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
 from foc_ros.io.bags import TYPESTORE
-from foc_ros.play.page_clock import PageClock
-from foc_ros.play.page_messages import HandMessage, SceneMessage, TasksMessage, parse_message
-from foc_ros.play.prediction_view import Slots
-from foc_ros.play.predictors import describe_health
-from foc_ros.play.scene import FIRST_SCENE, START, TARGET_RADIUS, PlayScene, make_box, make_circle, make_random_scene
+from foc_ros.play.messages import PageClock, parse_message
+from foc_ros.play.predictor import Predictor, State
+from foc_ros.play.scene import FIRST_SCENE, START, TARGET_RADIUS, Slots, make_random_scene, view_candidates
 from foc_ros.play.tasks import Phase, Tasks, make_trials, tabulate_scores
+from foc_ros.reporting.views import build_snapshot
 from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud
 from foc_ros.ros.messages.decode_poses import decode_goals
+from foc_ros.ros.messages.encode_inputs import encode_hand_pose
 from foc_ros.ros.messages.types import RosbagsTypes
 
+TYPES, NOW_NS = RosbagsTypes(TYPESTORE), 10**15
 HAND = {'type': 'hand', 't': 10.0, 'x': 0.1, 'y': 0.0, 'event': 8.0}
 
 
 @pytest.mark.parametrize(
     ('message', 'error'),
     [
-        ('{', r'message: expected JSON, got .*\{'),
+        ('{', r"message: expected JSON, got '\{'"),
         ('[' * 20_000, 'message: expected JSON'),
-        ('[]', r'message: expected an object, got \[\]'),
-        ({'type': 'open', 'file': '/etc/passwd'}, "type: expected one of hand, scene, .* got 'open'"),
-        ({'type': ['hand']}, 'type: expected one of'),
-        (HAND | {'x': 9.0}, r'hand\.x: expected a number in \[-0\.06, 0\.38\], got 9\.0'),
-        (HAND | {'x': math.nan}, r'hand\.x: expected a number in .* got nan'),
-        (HAND | {'y': '0'}, r"hand\.y: expected a number in .* got '0'"),
-        (HAND | {'t': -1}, r'hand\.t: expected a number in \[0, 1e\+10\], got -1'),
-        (HAND | {'event': True}, r'hand\.event: expected a number'),
-        (HAND | {'topic': '/x'}, "hand: expected the fields t, x, y, event, got 'topic'"),
+        ('[]', r'message: expected .*, got \[\]'),
+        ({'type': 'open', 'file': '/etc/passwd'}, "message: expected .* 'hand', 'scene', .* got .*'open'"),
+        (HAND | {'x': 9.0}, r'hand\.x: expected less than or equal to 0\.38, got 9\.0'),
+        (HAND | {'x': math.nan}, r'hand\.x: expected a finite number, got nan'),
+        (HAND | {'y': '0'}, r"hand\.y: expected a valid number, got '0'"),
+        (HAND | {'t': -1}, r'hand\.t: expected greater than or equal to 0, got -1'),
+        (HAND | {'event': True}, r'hand\.event: expected a valid number, got True'),
+        (HAND | {'topic': '/x'}, r"hand\.topic: expected no such field, got '/x'"),
         ({'type': 'hand', 't': 1.0}, r'hand\.x: expected a value, got none'),
-        (SCENE | {'goals': []}, 'goals: expected a list of 1 to 8, got 0'),
-        (SCENE | {'goals': {}}, r'goals: expected a list of 1 to 8, got \{\}'),
-        (SCENE | {'obstacles': [CIRCLE] * 33}, 'obstacles: expected a list of 0 to 32, got 33'),
-        (
-            SCENE | {'obstacles': [CIRCLE, BOX | {'size_y': 5}]},
-            r'obstacles\[1\]\.size_y: expected a number in .* 0\.3\], got 5',
-        ),
-        (SCENE | {'obstacles': [CIRCLE | {'kind': 'hull'}]}, "kind: expected one of circle, box, got 'hull'"),
-        (SCENE | {'obstacles': [7]}, r'obstacles\[0\]: expected an object, got 7'),
-        ({'type': 'shuffle', 'seed': 1.5}, r'seed: expected a whole number in \[0, 2147483647\], got 1\.5'),
-        (TASKS | {'trials': 0}, r'trials: expected a whole number in \[1, 200\], got 0'),
-        (TASKS | {'assistance': 'some'}, "assistance: expected one of mixed, with, without, got 'some'"),
-        ({'type': 'guidance', 'on': 1}, 'on: expected true or false, got 1'),
-        ({'type': 'job', 'name': '../../x'}, 'name: expected one of report, fit, compare'),
-        ({'type': 'parameters', 'name': '/etc/x.yaml'}, 'name: expected one of standard, mine'),
-        ({'type': 'stop', 'on': True}, "message: expected the fields none, got 'on'"),
+        (SCENE | {'goals': []}, r'scene\.goals: expected .* at least 1 item .*, got \[\]'),
+        (SCENE | {'goals': {}}, r'scene\.goals: expected a valid (list|array), got \{\}'),
+        (SCENE | {'obstacles': [CIRCLE] * 33}, r'scene\.obstacles: expected .* at most 32 items'),
+        (SCENE | {'obstacles': [CIRCLE, BOX | {'size_y': 5}]}, r'obstacles\[1\]\.box\.size_y: expected less than .* 0\.3, got 5'),
+        (SCENE | {'obstacles': [CIRCLE | {'kind': 'hull'}]}, r"obstacles\[0\]: expected .* 'circle', 'box'"),
+        (SCENE | {'obstacles': [7]}, r'obstacles\[0\]: expected .*, got 7'),
+        ({'type': 'shuffle', 'seed': 1.5}, r'shuffle\.seed: expected a valid integer, got 1\.5'),
+        (TASKS | {'trials': 0}, r'tasks\.trials: expected greater than or equal to 1, got 0'),
+        (TASKS | {'assistance': 'some'}, r"tasks\.assistance: expected 'mixed', 'with' or 'without', got 'some'"),
+        ({'type': 'guidance', 'on': 1}, r'guidance\.on: expected a valid boolean, got 1'),
+        ({'type': 'job', 'name': '../../x'}, r"job\.name: expected 'report', 'fit' or 'compare'"),
+        ({'type': 'parameters', 'name': '/etc/x.yaml'}, r"parameters\.name: expected 'standard' or 'mine'"),
+        ({'type': 'stop', 'on': True}, r'stop\.on: expected no such field, got True'),
     ],
 )
 def test_a_bad_message_is_refused_with_field_value_and_bound(message: Any, error: str) -> None:
@@ -69,9 +68,9 @@ def test_a_bad_message_is_refused_with_field_value_and_bound(message: Any, error
 
 
 def test_a_scene_reaches_the_node_as_it_was_arranged() -> None:
-    scene = parse(SCENE).scene
-    assert parse({'type': 'scene', **scene.as_json()}) == SceneMessage(scene)
-    messages = scene.encode(RosbagsTypes(TYPESTORE), 5)
+    scene = parse(SCENE)
+    assert parse(scene.model_dump()) == scene
+    messages = scene.encode(TYPES, 5)
     decoded, given = decode_point_cloud(messages['obstacles'], 'xy'), scene.tabulate()
     assert (decoded.obstacles.ids, decoded.stamp_ns, decoded.frame_id) == (given.ids, 5, 'play')
     for name in ('centre', 'radius', 'radius_stddev', 'corners', 'vertices'):
@@ -80,10 +79,10 @@ def test_a_scene_reaches_the_node_as_it_was_arranged() -> None:
 
 
 def test_clearance_is_negative_inside_an_obstacle() -> None:
-    scene = PlayScene((make_circle((0.1, 0.0), 0.02), make_box((0.2, 0.0), (0.04, 0.02), 0.0)), ((0.3, 0.0),))
+    scene = parse(SCENE | {'obstacles': [CIRCLE, BOX | {'y': 0.0, 'yaw': 0.0}]})
     for position, clearance in (((0.1, 0.03), 0.01), ((0.1, 0.015), -0.005), ((0.2, 0.012), 0.002), ((0.2, 0.004), -0.006)):
         assert scene.measure_clearance(position) == pytest.approx(clearance)
-    assert PlayScene((), ((0.3, 0.0),)).measure_clearance((0.0, 0.0)) == math.inf
+    assert parse(SCENE | {'obstacles': []}).measure_clearance((0.0, 0.0)) == math.inf
 
 
 def test_random_scenes_leave_room_and_repeat_by_seed() -> None:
@@ -91,8 +90,8 @@ def test_random_scenes_leave_room_and_repeat_by_seed() -> None:
         scene = make_random_scene(np.random.default_rng(seed), FIRST_SCENE.goals)
         assert scene == make_random_scene(np.random.default_rng(seed), FIRST_SCENE.goals)
         assert 3 <= len(scene.obstacles) <= 5
-        assert parse({'type': 'scene', **scene.as_json()}).scene == scene  # within the bounds of the page
-        for point in (START, *scene.goals):
+        assert parse({'type': 'scene', **scene.model_dump()}).obstacles == scene.obstacles  # within the bounds of the page
+        for point in (START, *scene.points):
             assert scene.measure_clearance(point) > TARGET_RADIUS
     assert scene != make_random_scene(np.random.default_rng(0), FIRST_SCENE.goals)
 
@@ -114,19 +113,19 @@ def test_stamps_follow_the_quickest_message_and_never_step_back() -> None:
 
 
 def test_a_sequence_is_balanced_and_repeats_by_seed() -> None:
-    settings = TasksMessage(12, 3, 'mixed', False, True)
+    settings = parse(TASKS | {'trials': 12, 'shuffled': True})
     trials = make_trials(settings, FIRST_SCENE)
-    assert trials == make_trials(settings, FIRST_SCENE) != make_trials(replace(settings, seed=4), FIRST_SCENE)
+    assert trials == make_trials(settings, FIRST_SCENE) != make_trials(settings.model_copy(update={'seed': 4}), FIRST_SCENE)
     kinds = [(each.goal, each.is_guided) for each in trials]
     assert {kind: kinds.count(kind) for kind in set(kinds)} == {(goal, on): 2 for goal in range(3) for on in (False, True)}
-    assert len({each.scene for each in trials}) == 12
-    assert not any(each.is_guided for each in make_trials(replace(settings, assistance='without'), FIRST_SCENE))
+    assert len({each.scene.model_dump_json() for each in trials}) == 12
+    assert not any(each.is_guided for each in make_trials(settings.model_copy(update={'assistance': 'without'}), FIRST_SCENE))
 
 
 def test_a_trial_is_scored() -> None:
     """The hand moves along x at 0.1 m/s through a circle, and the way of number 7 is the most likely one from x = 0.1 m on."""
-    scene = PlayScene((make_circle((0.15, 0.0), 0.02),), ((0.3, 0.0),))
-    tasks = Tasks(TasksMessage(1, 0, 'without', False, False), scene)
+    scene = parse(SCENE | {'obstacles': [CIRCLE | {'x': 0.15}]})
+    tasks = Tasks(parse(TASKS | {'trials': 1, 'assistance': 'without'}), scene)
     assert [tasks.follow(0.0, (0.2, 0.0)), tasks.follow(0.1, START)] == [None, Phase.WAIT]
     assert tasks.follow(0.2, (0.1, 0.0)) is Phase.RETURN
     begin = next(t for t in (0.3 + 0.01 * step for step in range(200)) if tasks.follow(t, START) is Phase.REACH)
@@ -149,18 +148,44 @@ def test_a_trial_is_scored() -> None:
     assert tabulate_scores([score]) == [('without guidance', '1', *numbers)]
 
 
-@pytest.mark.parametrize(
-    ('message', 'words'),
-    [
-        ('predicting', 'predicting'),
-        ('no prediction: no hand pose yet', 'no prediction: no hand pose yet'),
-        ('hand_superseded 3', 'predicting; positions were passed over, because this computer is busy: 3'),
-        ('busy: a; hand_late 2; predict_nothing_solved 1', 'busy: a; hand_late 2; predictions found no way: 1'),
-        ('scene_hand_inside 2', 'predicting; predictions began within the margin of an obstacle: 2'),
-    ],
-)
-def test_counters_of_the_node_are_shown_in_words(message: str, words: str) -> None:
-    assert describe_health(message) == words
+def test_the_state_is_well_only_while_predictions_succeed() -> None:
+    """It fails where the pipeline fails, no path is found, all paths are from before, or the thread is gone."""
+    predictor = Predictor(Config(budget_s=0.0), lambda _: None)
+    assert predictor.check().level == 'failing', 'not started'
+    predictor.start()
+    try:
+        assert (predictor.check().level, 'hand' in predictor.check().text) == ('waiting', True)
+        for role, message in FIRST_SCENE.encode(TYPES, NOW_NS).items():
+            predictor.send(role, message)
+        predictor.send('hand_pose', encode_hand_pose(TYPES, NOW_NS, 'play', (0.0, 0.0, 0.0)))
+        until(lambda: predictor.check() == State('well', 'predicting'), 'predictions', 20)
+        made = prediction(START_NS, np.zeros(2))
+        lost = replace(made, candidates=made.candidates[-1:])
+        held = replace(made, candidates=tuple(replace(each, age_s=0.1) for each in made.candidates[:3]))
+        for recent, level, words in (
+            ([made], 'well', 'predicting'),
+            ([made, lost], 'failing', 'no path to any goal can be found'),
+            ([held] * 11 + [made] * 9, 'failing', 'this computer is too busy'),
+            ([held] * 10 + [made] * 10, 'well', 'predicting'),
+        ):
+            predictor._recent.clear()
+            predictor._recent.extend(recent)
+            assert predictor.check().level == level and predictor.check().text.startswith(words)
+        predictor._note_error(ValueError('x'))
+        assert predictor.check() == State('failing', 'internal error: x')
+    finally:
+        predictor.stop()
+    assert predictor.check().text.startswith('predictions have ended')
+
+
+def test_the_page_is_given_words_ghosts_and_the_total_uncertainty_of_the_most_likely_path_only() -> None:
+    views = view_candidates(build_snapshot(widen(prediction(START_NS, np.zeros(2)))), Slots())
+    assert [each['slot'] for each in views] == [0, 1, 2, None]
+    assert [each['goal'] for each in views] == [0, 0, 1, 1]
+    assert views[0]['description'] == 'goal0: left of 1' != views[1]['description'] == 'goal0: right of 1'
+    assert [each['ghost'] for each in views] == ['', '', 'leads through obstacle post', 'eta unreachable']
+    assert [bool(each['total']) for each in views] == [True, False, False, False]
+    assert [each['likelihood'] for each in views] == [0.6, 0.3, 0.1, None]
 
 
 def test_a_class_keeps_its_slot_while_it_is_followed() -> None:
@@ -170,7 +195,3 @@ def test_a_class_keeps_its_slot_while_it_is_followed() -> None:
     assert slots.assign([4]) == [2]
     assert slots.assign([4, 5]) == [2, 3]  # slot 0 is free for a short time only: the others come first
     assert slots.assign(list(range(20)))[12:] == [None] * 8
-
-
-def test_a_hand_message_is_read() -> None:
-    assert parse(HAND) == HandMessage(10.0, (0.1, 0.0), 8.0)

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
-pytest.importorskip('plotly', reason='plotly is not installed')
 
 from report_samples import predictions, samples
 from session_helpers import SCENE, TASKS, Page, Silent, reach, wait_until
@@ -20,14 +19,13 @@ from foc_ros.analysis.recordings import find_recordings
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import InputError
-from foc_ros.io.bags import TYPESTORE, BagReader
+from foc_ros.io.bags import BagReader
 from foc_ros.io.topics import TYPES
-from foc_ros.play import jobs, recorder
-from foc_ros.play.predictors import LibraryPredictor, LivePredictor
+from foc_ros.play import jobs, recording
+from foc_ros.play.predictor import Predictor, State
 from foc_ros.play.scene import BOUNDS, FIRST_SCENE, START
 from foc_ros.play.session import Session
-from foc_ros.ros.messages.encode_prediction import encode_prediction_cloud
-from foc_ros.ros.messages.types import RosbagsTypes
+from foc_ros.reporting.encode import LENGTH
 from foc_ros.ros.parameters import dump_parameter_file
 
 
@@ -37,7 +35,8 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Page:
     session = Session(Silent, Config(), tmp_path / 'data')
     session.predictor.start()
     page = Page(session)
-    monkeypatch.setattr('foc_ros.play.session.time_ns', lambda: 10**15 + round(page.t_ms * 1e6))
+    for module in ('session', 'recording'):
+        monkeypatch.setattr(f'foc_ros.play.{module}.time_ns', lambda: 10**15 + round(page.t_ms * 1e6))
     return page
 
 
@@ -51,14 +50,14 @@ def test_tasks_leave_bags_that_fit_and_evaluate_read(page: Page) -> None:
     assert sorted(row[0] for row in page.last('score')['rows']) == ['with guidance', 'without guidance']
     assert [each.guidance.enabled for each in page.session.predictor.configs] in ([True, False], [True])
     folder = Path(page.last('settings')['session'])
-    (name,) = recordings = find_recordings(folder / recorder.UNGUIDED)
+    (name,) = recordings = find_recordings(folder / recording.UNGUIDED)
     replay = Replay(Config(rate_hz=5.0))
     steps = list(replay.steps(recordings[name].items()))
     stamps = [step.sample.stamp_ns for step in steps if step.sample is not None]
     assert {round(gap) for gap in np.diff(stamps)} == {20_000_000}
     assert any(step.prediction is not None and step.prediction.candidates_with_likelihood for step in steps)
     assert replay.describe_losses() == ''
-    with BagReader(folder / recorder.SESSION) as reader:
+    with BagReader(folder / recording.SESSION) as reader:
         assert sum(item.role == 'hand_pose' for item in reader) > len(stamps)
 
 
@@ -79,8 +78,7 @@ def test_a_blinded_page_learns_nothing_from_what_it_receives(page: Page) -> None
         page.send(TASKS | {'assistance': assistance, 'blinded': True})
         begin = len(page.received)
         page.move(START, 100)
-        prediction = encode_prediction_cloud(predictions(samples())[0], 'xy', RosbagsTypes(TYPESTORE))
-        page.session._receive('/foc/prediction', bytes(TYPESTORE.serialize_cdr(prediction, prediction.__msgtype__)))
+        page.session._receive(predictions(samples())[0])
         received[assistance] = page.received[begin:]
         page.send({'type': 'stop'})
     assert received['with'] == received['without']
@@ -133,7 +131,8 @@ def fit_with_errors(
 ) -> dict[str, Any]:
     """Press the button of the fit; in place of the command, write FITTED, with the errors of positions before and after it."""
 
-    async def fit(*arguments: str | Path) -> str:
+    async def fit(note: Any, *arguments: str | Path) -> str:
+        note('replays: 20 of 40')
         given = list(map(str, arguments))
         assert given[0] == 'fit' and given[given.index('--allow') + 1] == 'positions'
         Path(given[given.index('--output') + 1]).write_text(dump_parameter_file(replace_values(Config(), FITTED)))
@@ -146,39 +145,43 @@ def fit_with_errors(
     return asyncio.run(work(page, 'fit'))
 
 
-def test_the_page_predicts_with_the_fit_if_positions_become_no_worse(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
-    record_trials(page, 1)
-    fitted = fit_with_errors(page, monkeypatch, 0.063, 0.060)
-    assert fitted['text'] == 'Predictions now use your parameters.'
-    assert fitted['rows'] == [['likelihood.beta', '4', '7.5']]
-    assert (page.last('settings')['parameters'], page.last('settings')['fitted']) == ('mine', True)
-    assert page.session.predictor.configs[-1] == replace_values(Config(), FITTED)
+BETTER = 'Predictions now use your parameters.'
+WORSE = (
+    'Predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm. '
+    'Predictions use the standard parameters, unless you choose yours.'
+)
+UNUSED = {'trial_002': 'nothing could be predicted'}
 
 
-def test_the_page_keeps_the_standard_parameters_if_positions_become_worse_and_says_so(
-    page: Page, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(('after_m', 'text', 'used'), [(0.060, BETTER, 'mine'), (0.096, WORSE, 'standard')])
+def test_the_page_predicts_with_the_fit_unless_positions_become_worse_and_says_so(
+    page: Page, monkeypatch: pytest.MonkeyPatch, after_m: float, text: str, used: str
 ) -> None:
     record_trials(page, 1)
-    fitted = fit_with_errors(page, monkeypatch, 0.063, 0.096)
-    assert fitted['text'] == (
-        'Predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm. '
-        'Predictions use the standard parameters, unless you choose yours above.'
-    )
-    assert (page.last('settings')['parameters'], page.last('settings')['fitted']) == ('standard', True)
-    assert page.session.predictor.configs[-1] == Config()
+    configs = {'standard': Config(), 'mine': replace_values(Config(), FITTED)}
+    fitted = fit_with_errors(page, monkeypatch, 0.063, after_m, UNUSED)
+    assert fitted['text'] == f'{text} Not used: trial_002 (nothing could be predicted).'
+    assert fitted['rows'] == [['likelihood.beta', '4', '7.5']]
+    assert (page.last('settings')['parameters'], page.last('settings')['fitted']) == (used, True)
+    assert page.session.predictor.configs[-1] == configs[used]
     page.send({'type': 'parameters', 'name': 'mine'})
-    assert page.session.predictor.configs[-1] == replace_values(Config(), FITTED)
-    # the next fit is worse, too: its parameters are not used because those before it were
-    fit_with_errors(page, monkeypatch, 0.063, 0.096)
-    assert page.last('settings')['parameters'] == 'standard'
-    assert page.session.predictor.configs[-1] == Config()
+    assert page.session.predictor.configs[-1] == configs['mine']
+    # the next fit is as good: its parameters are not used because those before it were
+    fit_with_errors(page, monkeypatch, 0.063, after_m)
+    assert page.last('settings')['parameters'] == used and page.session.predictor.configs[-1] == configs[used]
+
+    async def evaluate(*_: object) -> str:
+        return json.dumps({'questions': {}, 'positions': NO_POSITIONS, 'failed': UNUSED})
+
+    monkeypatch.setattr(jobs, 'run_command', evaluate)
+    assert asyncio.run(work(page, 'compare'))['text'].endswith(' Not used: trial_002 (nothing could be predicted).')
 
 
 def test_a_fit_that_ends_during_tasks_changes_the_parameters_after_them(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
     record_trials(page, 1)
     page.send(TASKS | {'assistance': 'with'})
     page.session.predictor.configs.clear()
-    operator = page.session._after.operator = page.session._after.folder / jobs.OPERATOR
+    operator = page.session._jobs.operator = page.session._jobs.recording.folder / recording.OPERATOR
     operator.write_text(dump_parameter_file(replace_values(Config(), FITTED)))
     page.session._note_fitted(True)
     reach(page)
@@ -186,9 +189,6 @@ def test_a_fit_that_ends_during_tasks_changes_the_parameters_after_them(page: Pa
     page.send({'type': 'stop'})
     assert page.session.predictor.configs[-1] == replace_values(Config(), FITTED)
     assert page.last('settings')['parameters'] == 'mine'
-
-
-UNUSED = {'trial_002': 'nothing could be predicted'}
 
 
 @pytest.mark.parametrize('printed', ['{"failed": {}}', ''], ids=['answer', 'nothing'])
@@ -200,23 +200,12 @@ def test_a_command_that_could_not_use_all_trials_has_an_answer(
     program.write_text(f"#!/bin/sh\necho 'foc_ros fit: trial_002: reason' >&2\nprintf '%s' '{printed}'\nexit 2\n")
     program.chmod(0o755)
     monkeypatch.setattr(jobs.sys, 'executable', str(program))
+    noted: list[str] = []
     if printed:
-        assert asyncio.run(jobs.run_command('fit')) == printed
+        assert asyncio.run(jobs.run_command(noted.append, 'fit')) == printed
     else:
         with pytest.raises(jobs.CommandError, match='foc_ros fit: trial_002: reason'):
-            asyncio.run(jobs.run_command('fit'))
-
-
-def test_the_page_says_which_trials_were_not_used(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
-    record_trials(page, 1)
-    fitted = fit_with_errors(page, monkeypatch, 0.063, 0.060, UNUSED)
-    assert fitted['text'] == 'Predictions now use your parameters. Not used: trial_002 (nothing could be predicted).'
-
-    async def evaluate(*_: str | Path) -> str:
-        return json.dumps({'questions': {}, 'positions': NO_POSITIONS, 'failed': UNUSED})
-
-    monkeypatch.setattr(jobs, 'run_command', evaluate)
-    assert asyncio.run(work(page, 'compare'))['text'].endswith(' Not used: trial_002 (nothing could be predicted).')
+            asyncio.run(jobs.run_command(noted.append, 'fit'))
 
 
 NO_POSITIONS = {
@@ -240,6 +229,49 @@ def test_what_is_impossible_is_refused(page: Page) -> None:
     assert page.last('settings')['recording'] is False
 
 
+def test_a_page_that_is_loaded_again_finds_everything_as_it_was(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    record_trials(page, 1)
+    fitted = fit_with_errors(page, monkeypatch, 0.063, 0.060)
+    asyncio.run(work(page, 'report'))
+    score, before = page.last('score'), page.last('settings')
+    again = Page(page.session)
+    assert (again.last('score'), again.last('settings')) == (score, before)
+    assert before['report'] and before['session'] and before['parameters'] == 'mine'
+    assert again.last('job')['name'] == 'report'
+    assert again.last('result') == {'type': 'result', 'columns': fitted['columns'], 'rows': fitted['rows']}
+    report = page.session.report.read_text(encoding='utf-8')
+    assert '<h2>Score</h2>' in report and f'<td>{score["rows"][0][2]}</td>' in report, 'the score is in the report'
+
+
+def test_a_fit_shows_its_progress_and_can_be_cancelled(page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    record_trials(page, 1)
+    program, ended = tmp_path / 'program', tmp_path / 'ended'
+    program.write_text(
+        f"#!/bin/sh\ntrap 'touch {ended}; exit 1' TERM\necho 'replays: 20 of 60' >&2\nwhile :; do sleep 0.05; done\n"
+    )
+    program.chmod(0o755)
+    monkeypatch.setattr(jobs.sys, 'executable', str(program))
+
+    async def run() -> None:
+        page.send({'type': 'job', 'name': 'fit'})
+        await wait_until(lambda: page.last('job')['text'] == 'replays: 20 of 60')
+        assert page.last('job')['state'] == 'running'
+        page.send({'type': 'cancel'})
+        await wait_until(lambda: page.last('job')['state'] == 'cancelled')
+        await wait_until(ended.exists)
+
+    asyncio.run(run())
+    assert page.last('settings')['fitted'] is False
+
+
+def test_the_page_is_told_what_fails(page: Page) -> None:
+    page.session.tick()
+    assert (page.last('status')['level'], page.last('status')['text']) == ('well', 'silent')
+    page.session.predictor.state = State('failing', 'no path to any goal can be found')
+    page.session.tick()
+    assert page.last('status')['level'] == 'failing'
+
+
 def test_only_the_newest_page_steers(page: Page) -> None:
     other = Page(page.session)
     assert page.last('replaced') == {'type': 'replaced'}
@@ -250,28 +282,21 @@ def test_only_the_newest_page_steers(page: Page) -> None:
     assert [role for role, _ in page.session.predictor.sent[before:]] == ['hand_pose']
 
 
-def test_a_full_disk_ends_the_recording_and_nothing_else(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize('begin', [{'type': 'record', 'on': True}, TASKS | {'assistance': 'with'}], ids=['recording', 'tasks'])
+def test_a_full_disk_ends_recording_and_tasks_and_nothing_else(
+    page: Page, monkeypatch: pytest.MonkeyPatch, begin: dict[str, Any]
+) -> None:
     def fail(*_: object) -> None:
         raise OSError(28, 'No space left on device')
 
-    page.send({'type': 'record', 'on': True})
+    page.send(begin)
     monkeypatch.setattr('rosbags.rosbag2.Writer.write', fail)
     page.move(START)
     assert 'No space left' in page.last('error')['text']
-    assert page.last('settings')['recording'] is False
+    settings = page.last('settings')
+    assert (settings['recording'], settings['guided'], page.last('task')['phase']) == (False, False, 'none')
+    assert [each.guidance.enabled for each in page.session.predictor.configs] in ([], [True, False])
     page.move(START)
-
-
-def test_a_full_disk_ends_the_tasks_and_restores_guidance(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: object) -> None:
-        raise OSError(28, 'No space left on device')
-
-    page.send(TASKS | {'assistance': 'with'})
-    monkeypatch.setattr('rosbags.rosbag2.Writer.write', fail)
-    page.move(START)
-    assert page.last('task') == {'type': 'task', 'phase': 'none'}
-    assert [each.guidance.enabled for each in page.session.predictor.configs] == [True, False]
-    assert page.last('settings')['guided'] is False
 
 
 def test_the_library_predicts_and_reports_the_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -280,8 +305,8 @@ def test_the_library_predicts_and_reports_the_session(tmp_path: Path, monkeypatc
     async def run() -> tuple[Page, Session]:
         loop = asyncio.get_running_loop()
 
-        def make(config: Config, receive: Any) -> LivePredictor:
-            return LibraryPredictor(config, lambda topic, raw: loop.call_soon_threadsafe(receive, topic, raw))
+        def make(config: Config, receive: Any) -> Predictor:
+            return Predictor(config, lambda outcome: loop.call_soon_threadsafe(receive, outcome))
 
         session = Session(make, Config(budget_s=0.0, rate_hz=20.0), tmp_path)
         session.predictor.start()
@@ -309,13 +334,13 @@ def test_the_library_predicts_and_reports_the_session(tmp_path: Path, monkeypatc
     assert numbers['hand_samples'] == 60
     assert numbers['predictions'], 'how many depends on how busy the machine is'
     shown = page.last('prediction')
-    assert sum(each['likelihood'] for each in shown['candidates']) == pytest.approx(1.0, abs=1e-3)
+    assert sum(each['likelihood'] or 0.0 for each in shown['candidates']) == pytest.approx(1.0, abs=1e-3)
     low_x, high_x, low_y, high_y = BOUNDS
     for each in shown['candidates']:
-        path = np.array(each['path'])
+        path = np.cumsum([each['x'], each['y']], axis=1).T * LENGTH
         assert ((path >= [low_x, low_y]) & (path <= [high_x, high_y])).all()
-        np.testing.assert_allclose(path[-1], FIRST_SCENE.goals[each['goal']], atol=2e-3)
-    with BagReader(Path(page.last('settings')['session']) / recorder.SESSION) as reader:
+        np.testing.assert_allclose(path[-1], FIRST_SCENE.points[each['goal']], atol=2e-3)
+    with BagReader(Path(page.last('settings')['session']) / recording.SESSION) as reader:
         topics = {each.topic for each in reader._channels}
         assert {TYPES[item.role] for item in reader} == {TYPES[role] for role in ('hand_pose', 'obstacles', 'goals')}
     assert topics == {'/hand_pose', '/obstacles', '/goals', '/foc/prediction', '/foc/likelihoods'}

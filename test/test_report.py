@@ -12,17 +12,15 @@ import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
-pytest.importorskip('plotly', reason='plotly is not installed')
 
-from report_samples import OBSTACLES, START_NS, prediction, predictions, samples
+from report_samples import OBSTACLES, START_NS, prediction, predictions, samples, widen
 
 from foc_ros.core.errors import InputError
 from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
-from foc_ros.core.types import HandSample, Prediction, Status
-from foc_ros.reporting.page import load_plotly
+from foc_ros.core.types import HandSample, Status
+from foc_ros.reporting.encode import LENGTH, MOST_TIMES, select_evenly
 from foc_ros.reporting.report import write_report
-from foc_ros.reporting.report_data import MOST_FRAMES, select_evenly
-from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
+from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
 from foc_ros.ros.messages.ranking import find_drawn_curve
 
 
@@ -55,56 +53,42 @@ def report(directory: Path, reaches: int = 1, title: str = 'A title') -> list[Pa
     return write_report(directory, title, build_hand_trajectory(made), snapshots, {'recording': 'some <bag> & more'})
 
 
-def test_all_files_are_written(tmp_path: Path) -> None:
-    files = report(tmp_path / 'new' / 'report')
-    assert {file.name for file in files} == {
-        'index.html',
-        'predictions.json',
-        'overview.png',
-        *(f'moment_{n:02d}.png' for n in (1, 2, 3, 4)),
-    }
+def test_the_report_is_a_page_without_other_files_and_pictures_beside_it(tmp_path: Path) -> None:
+    """Text is escaped, facts are shown, and nothing is loaded from anywhere; the input is left alone."""
+    before = OBSTACLES.centre.copy()
+    files = report(tmp_path / 'new' / 'report', title='<img src=x onerror=alert(1)>')
+    np.testing.assert_array_equal(OBSTACLES.centre, before)
+    pictures = 'overview.png', *(f'moment_{number:02d}.png' for number in (1, 2, 3, 4))
+    assert {file.name for file in files} == {'index.html', 'predictions.json', *pictures}
     assert set((tmp_path / 'new' / 'report').iterdir()) == set(files)
-
-
-def test_the_page_refers_to_no_other_file(tmp_path: Path) -> None:
-    report(tmp_path)
-    page = Page(tmp_path / 'index.html')
-    for _, attributes in page.tags:
-        assert not {'href', 'src', 'srcset', 'action'} & attributes.keys()
+    page = Page(files[0])
+    for tag, attributes in page.tags:
+        assert tag != 'img' and not {'href', 'src', 'srcset', 'action'} & attributes.keys()
     policy = next(attributes['content'] for _, attributes in page.tags if 'http-equiv' in attributes)
     assert policy.startswith("default-src 'none'") and 'http' not in policy
-    assert 'Licensed under the MIT license' in (tmp_path / 'index.html').read_text(encoding='utf-8')
     assert ('meta', {'name': 'viewport', 'content': 'width=device-width, initial-scale=1'}) in page.tags
+    for words in ('some <bag> & more', '4.0 ms (median)', '38 candidates ended with status eta_unreachable'):
+        assert words in page.text
 
 
-def test_text_is_escaped_and_facts_are_shown(tmp_path: Path) -> None:
-    report(tmp_path, title='<img src=x onerror=alert(1)>')
-    page = Page(tmp_path / 'index.html')
-    assert 'img' not in [tag for tag, _ in page.tags]
-    assert 'some <bag> & more' in page.text
-    assert '4.0 ms (median)' in page.text
-    assert '38 candidates ended with status eta_unreachable' in page.text
-
-
-def test_page_holds_the_likelihoods_of_all_predictions(tmp_path: Path) -> None:
-    report(tmp_path, 2)
-    data = page_data_of(tmp_path)
-    numbers = json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))['predictions']
-    assert data['times'] == pytest.approx([each['t_s'] for each in numbers], abs=1e-4)
-    for row, frame in enumerate(data['frames']):
+def test_page_and_numbers_agree_with_the_predictions(tmp_path: Path) -> None:
+    made = samples(2)
+    expected = predictions(made)
+    write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in expected], {})
+    numbers, data = json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8')), page_data_of(tmp_path)
+    assert numbers['hand_samples'] == len(made)
+    assert data['times'] == pytest.approx([each['t_s'] for each in numbers['predictions']], abs=1e-4)
+    for row, (frame, written, known) in enumerate(zip(data['frames'], numbers['predictions'], expected, strict=True)):
         assert frame['at'] == row
-        shares = {}
+        assert (written['stamp_ns'], written['most_likely']) == (known.stamp_ns, known.most_likely)
+        assert written['t_s'] == pytest.approx((known.stamp_ns - START_NS) * 1e-9)
+        shares = {each.label: pytest.approx(each.likelihood, rel=1e-5) for each in known.solved_candidates}
+        assert {each['label']: each['likelihood'] for each in written['candidates']} == shares
         for candidate in frame['candidates']:
             track = data['tracks'][candidate['track']]
-            shares[data['labels'][candidate['label']]] = track['share'][row - track['first']]
-        assert shares == {each['label']: each['likelihood'] for each in numbers[row]['candidates']}
-
-
-def widen(made: Prediction) -> Prediction:
-    """Return a prediction whose total uncertainty is greater than its motor noise, as that of the predictor."""
-    wide = [each.solution.with_covariance(3.0 * each.solution.covariance) for each in made.candidates]
-    pairs = zip(made.candidates, wide, strict=True)
-    return replace(made, candidates=tuple(replace(each, solution=solution) for each, solution in pairs))
+            assert shares[data['labels'][candidate['label']]] == track['share'][row - track['first']]
+        assert written['candidates'][0]['end'] == pytest.approx(known.solved_candidates[0].solution.path[-1], abs=1e-6)
+        assert written['unsolved'] == {'goal1:+1+post': 'eta_unreachable'}
 
 
 def test_paths_on_the_page_are_those_predicted(tmp_path: Path) -> None:
@@ -114,31 +98,56 @@ def test_paths_on_the_page_are_those_predicted(tmp_path: Path) -> None:
     data = page_data_of(tmp_path)
     for frame, known in zip(data['frames'], expected, strict=True):
         for candidate, outcome in zip(frame['candidates'], known.solved_candidates, strict=True):
-            drawn = np.cumsum([candidate['x'], candidate['y']], axis=1).T * data['unit']['length']
+            drawn = np.cumsum([candidate['x'], candidate['y']], axis=1).T * LENGTH
             curve = find_drawn_curve(outcome)
             np.testing.assert_allclose(drawn, curve[select_evenly(len(curve), len(drawn))], atol=0.51e-4)
-            for name, covariance in (('motor', outcome.motor_covariance), ('total', outcome.covariance)):
-                spread = np.array(candidate[name])[-1, 2:4] * data['unit']['length']
+            shown = {'motor': outcome.motor_covariance, 'total': outcome.covariance}
+            assert bool(candidate['total']) is (candidate is frame['candidates'][0])
+            for name, covariance in [each for each in shown.items() if candidate[each[0]]]:
+                spread = np.array(candidate[name])[-1, 2:4] * LENGTH
                 wanted = np.sqrt(np.linalg.eigvalsh(covariance[-1, :2, :2]))[::-1]
                 np.testing.assert_allclose(spread, wanted, atol=0.51e-4)
         (lost,) = frame['unsolved']
         assert data['labels'][lost['reason']].endswith(f'remedy: {Status.ETA_UNREACHABLE.remedy}')
-        drawn = np.cumsum([lost['x'], lost['y']], axis=1).T * data['unit']['length']
+        drawn = np.cumsum([lost['x'], lost['y']], axis=1).T * LENGTH
         np.testing.assert_allclose(drawn[[0, -1]], known.candidates[-1].solution.path[[0, -1]], atol=0.51e-4)
     assert data['unknown'] == [0.25] * len(expected)
 
 
-def test_a_long_recording_is_thinned_out(tmp_path: Path) -> None:
-    made = samples(5)
-    snapshots = [build_snapshot(each) for each in predictions(made, every=1)]
+def test_a_long_recording_is_thinned_out_and_its_page_stays_below_a_megabyte_and_a_half(tmp_path: Path) -> None:
+    """45 s at 100 Hz with six candidates: the slider stops at fewer of the predictions, evenly spread."""
+    made = samples(30)
+    many = [replace(each, candidates=each.candidates[:3] * 2) for each in predictions(made, every=1)]
+    snapshots = []
+    for view in map(build_snapshot, many):
+        named = tuple(replace(each, way=row, label=f'{each.label}{row}') for row, each in enumerate(view.candidates))
+        snapshots.append(replace(view, candidates=named))
     write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {})
+    assert (tmp_path / 'index.html').stat().st_size < 1_500_000
     data = page_data_of(tmp_path)
-    assert len(data['times']) == len(snapshots) == 750 > len(data['frames']) == MOST_FRAMES
-    assert data['frames'][0]['at'] == 0 and data['frames'][-1]['at'] == 749
-    # Obstacles and goals that do not change are stored once.
+    # obstacles and goals that do not change are stored once
     assert len(data['scenes']) == len(data['goals']) == 1
-    size = (tmp_path / 'index.html').stat().st_size
-    assert size - len(load_plotly()) < 700 * len(data['frames']) * 3
+    assert data['count'] == len(snapshots) == 4_500 and len(data['times']) == MOST_TIMES
+    at = [data['times'][frame['at']] for frame in data['frames']]
+    assert len(at) > 50 and at[0] == 0.0 and at[-1] == data['times'][-1]
+    assert np.ptp(np.diff(at)) < 0.025, 'evenly, up to two samples'
+    assert len(json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))['predictions']) == 4_500
+
+
+def test_paths_begin_at_the_measured_hand_and_ghosts_say_why(tmp_path: Path) -> None:
+    """The second half of the predictions is of answers from before: they begin where the hand was 0.2 s ago."""
+    made = samples()
+    known = predictions(made, every=2)
+    late = [replace(old, stamp_ns=new.stamp_ns) for old, new in zip(known[:-10], known[10:], strict=True)]
+    write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in late], {})
+    data = page_data_of(tmp_path)
+    hand = np.cumsum([data['hand']['t'], data['hand']['x'], data['hand']['y']], axis=1)
+    for frame in data['frames']:
+        at = hand[1:, np.searchsorted(hand[0], round(1e3 * data['times'][frame['at']]))]
+        for each in (*frame['candidates'], *frame['unsolved']):
+            np.testing.assert_allclose([each['x'][0], each['y'][0]], at, atol=1.0)
+    ghosts = {data['labels'][each['ghost']] for frame in data['frames'] for each in (*frame['candidates'], *frame['unsolved'])}
+    assert {'', 'leads through obstacle post', 'eta unreachable'} <= ghosts
 
 
 def test_the_vertices_of_a_box_are_behind_the_numbers_of_a_circle(tmp_path: Path) -> None:
@@ -158,73 +167,35 @@ def page_data_of(directory: Path) -> dict[str, Any]:
     return json.loads(text.partition('id="report-data">')[2].partition('</script>')[0])
 
 
-def test_numbers_agree_with_the_predictions(tmp_path: Path) -> None:
-    made = samples()
-    expected = predictions(made)
-    write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in expected], {})
-    numbers = json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))
-    assert numbers['hand_samples'] == len(made)
-    assert len(numbers['predictions']) == len(expected)
-    for written, known in zip(numbers['predictions'], expected, strict=True):
-        assert written['stamp_ns'] == known.stamp_ns
-        assert written['t_s'] == pytest.approx((known.stamp_ns - START_NS) * 1e-9)
-        assert written['most_likely'] == known.most_likely
-        assert [each['label'] for each in written['candidates']] == [each.candidate.label for each in known.solved_candidates]
-        assert [each['likelihood'] for each in written['candidates']] == pytest.approx(
-            [each.likelihood for each in known.solved_candidates], rel=1e-5
-        )
-        assert written['candidates'][0]['end'] == pytest.approx(known.solved_candidates[0].solution.path[-1], abs=1e-6)
-        assert written['unsolved'] == {'goal1:+1+post': 'eta_unreachable'}
-
-
 @pytest.mark.parametrize(('reaches', 'pictures'), [(1, 4), (3, 3), (10, 8)])
 def test_every_movement_is_shown_up_to_a_number(tmp_path: Path, reaches: int, pictures: int) -> None:
     report(tmp_path, reaches)
     assert len(list(tmp_path.glob('moment_*.png'))) == pictures
 
 
-def test_a_report_without_predictions_says_so(tmp_path: Path) -> None:
-    files = write_report(tmp_path, 'x', build_hand_trajectory(samples()), [], {})
+def test_unusual_recordings_have_a_report_that_says_what_is_missing(tmp_path: Path) -> None:
+    """Without predictions, without a solved candidate, with a hand that never moves, and with a number that is not finite."""
+    hand, made = build_hand_trajectory(samples()), prediction(START_NS, np.zeros(2))
+    files = write_report(tmp_path / 'none', 'x', hand, [], {})
     assert [file.name for file in files] == ['index.html', 'predictions.json']
-    assert 'There is no prediction.' in Page(tmp_path / 'index.html').text
+    assert 'There is no prediction.' in Page(files[0]).text
+    lost = tuple(each for each in made.candidates if not each.is_solved)
+    files = write_report(tmp_path / 'lost', 'x', hand, 3 * [build_snapshot(replace(made, candidates=lost, most_likely=None))], {})
+    assert 'In 3 of 3 predictions no candidate could be solved.' in Page(files[0]).text
+    still = build_hand_trajectory([HandSample(START_NS + n * 10_000_000, np.zeros(2)) for n in range(50)])
+    view = build_snapshot(prediction(int(still.stamps_ns[20]), np.zeros(2)))
+    unknown = replace(view, candidates=(replace(view.candidates[0], eta=float('nan')), *view.candidates[1:]))
+    files = write_report(tmp_path / 'still', 'x', still, [unknown], {})
+    assert (tmp_path / 'still' / 'moment_01.png') in files
+    text = files[1].read_text(encoding='utf-8')
+    assert 'NaN' not in text and json.loads(text)['predictions'][0]['candidates'][0]['eta'] is None
 
 
-def test_a_report_without_solved_candidates_says_so(tmp_path: Path) -> None:
-    lost = [each for each in prediction(START_NS, np.zeros(2)).candidates if not each.is_solved]
-    snapshots = [build_snapshot(Prediction(START_NS + n, 'world', 0.0, tuple(lost), None)) for n in range(3)]
-    write_report(tmp_path, 'x', build_hand_trajectory(samples()), snapshots, {})
-    assert 'In 3 of 3 predictions no candidate could be solved.' in Page(tmp_path / 'index.html').text
-
-
-def test_a_hand_that_never_moves(tmp_path: Path) -> None:
-    still = [HandSample(START_NS + n * 10_000_000, np.zeros(2)) for n in range(50)]
-    write_report(tmp_path, 'x', build_hand_trajectory(still), [build_snapshot(prediction(still[20].stamp_ns, np.zeros(2)))], {})
-    assert (tmp_path / 'moment_01.png').exists()
-
-
-def test_numbers_that_are_not_finite_become_null(tmp_path: Path) -> None:
-    made = build_snapshot(prediction(START_NS, np.zeros(2)))
-    lost = replace(made, candidates=(replace(made.candidates[0], eta=float('nan')), *made.candidates[1:]))
-    write_report(tmp_path, 'x', build_hand_trajectory(samples()), [lost], {})
-    text = (tmp_path / 'predictions.json').read_text(encoding='utf-8')
-    assert 'NaN' not in text
-    assert json.loads(text)['predictions'][0]['candidates'][0]['eta'] is None
-
-
-def test_no_hand_is_refused(tmp_path: Path) -> None:
+def test_no_hand_and_a_folder_that_is_a_file_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match='hand pose'):
         write_report(tmp_path / 'report', 'x', build_hand_trajectory([]), [], {})
     assert not (tmp_path / 'report').exists()
-
-
-def test_directory_that_is_a_file(tmp_path: Path) -> None:
     (tmp_path / 'report').write_text('mine')
     with pytest.raises(InputError, match='--report: expected a folder'):
         report(tmp_path / 'report')
     assert (tmp_path / 'report').read_text() == 'mine'
-
-
-def test_report_leaves_its_input_alone(tmp_path: Path) -> None:
-    before = OBSTACLES.centre.copy()
-    report(tmp_path)
-    np.testing.assert_array_equal(OBSTACLES.centre, before)

@@ -12,16 +12,15 @@ import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
-pytest.importorskip('plotly', reason='plotly is not installed')
 
 from browser_helpers import check_report, chromium, screenshot, show
 from report_samples import predictions, samples
 
-from foc_ros.core.obstacles.geometry import find_limits, measure_offsets
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, collect_obstacles
+from foc_ros.reporting.encode import MOST_FRAMES
 from foc_ros.reporting.report import write_report
-from foc_ros.reporting.report_data import MOST_FRAMES
-from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
+from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
 
 WALL = Box((0.2, 0.1), (0.4, 0.02), 0.3, radius=0.01, radius_stddev=0.005)
 HOSTILE = '</script><img src=x onerror=alert(1)><b>&amp;'
@@ -51,23 +50,36 @@ def test_the_page_shows_the_numbers(browser: Any, report: Path) -> None:
 
 
 def test_the_page_draws_outlines_of_boxes_and_circles(browser: Any, tmp_path: Path) -> None:
+    """A pixel has the colour of an obstacle where the obstacle is, and not elsewhere, up to its border."""
     made = samples()
     shapes = collect_obstacles([Circle((0.15, 0.0), 0.03, 0.003), WALL, Capsule((0.0, 0.1), (0.1, 0.2), radius=0.02)])
     snapshots = [build_snapshot(replace(each, obstacles=shapes)) for each in predictions(made)]
     write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {})
     assert show(browser, tmp_path / 'index.html') == []
-    for trace, growth in ((0, 1.0), (1, 0.0)):
-        drawn = browser.execute_script(f'return [0, 1].map((axis) => document.getElementById("scene").data[{trace}]["xy"[axis]])')
-        points = np.array(drawn, dtype=float).T
-        outlines = np.split(points, np.flatnonzero(np.isnan(points[:, 0])))[:-1]
-        assert len(outlines) == len(shapes)
-        for row, outline in enumerate(outlines):
-            outline = outline[~np.isnan(outline[:, 0])]
-            np.testing.assert_array_equal(outline[0], outline[-1])
-            radius = shapes.radius[row] + growth * shapes.radius_stddev[row]
-            np.testing.assert_allclose(measure_offsets(outline, shapes)[1][:, row], radius, atol=1.5e-4)
-            low, high = find_limits(shapes, growth * shapes.radius_stddev)
-            np.testing.assert_allclose([outline.min(axis=0), outline.max(axis=0)], [low[row], high[row]], atol=5e-4)
+    points = np.random.default_rng(0).uniform([-0.02, -0.06], [0.32, 0.22], (3000, 2))
+    drawn = browser.execute_script(COLOURED, points.tolist())
+    depth = (shapes.radius - measure_offsets(points, shapes)[1]).max(axis=1)
+    ring = (shapes.radius + shapes.radius_stddev - measure_offsets(points, shapes)[1]).max(axis=1)
+    is_clear = np.abs(depth) > 2.5e-3
+    np.testing.assert_array_equal(np.array(drawn['disc'])[is_clear], (depth > 0.0)[is_clear])
+    assert np.array(drawn['ring'])[(ring > 2.5e-3) & (depth < -2.5e-3)].all()
+
+
+COLOURED = """
+const { scene } = report;
+scene.begin();
+
+report.scenes[0].forEach((each) => scene.obstacle({ ...each, name: '' }));
+const pen = scene.canvas.getContext('2d');
+const channels = (name) => ink(name).match(/[0-9a-f]{2}/gi).map((each) => parseInt(each, 16));
+const isAt = ([x, y], colour) => {
+  const place = [scene.origin[0] + scene.scale * x, scene.origin[1] - scene.scale * y].map(Math.floor);
+  const pixel = pen.getImageData(...place, 1, 1).data;
+  return pixel[3] > 0 && colour.every((value, row) => Math.abs(pixel[row] - value) < 3);
+};
+const [disc, ring] = [channels('--disc'), channels('--ring')];
+return { disc: arguments[0].map((point) => isAt(point, disc)), ring: arguments[0].map((point) => isAt(point, ring)) };
+"""
 
 
 def test_hostile_text_is_escaped(browser: Any, report: Path) -> None:
@@ -121,23 +133,46 @@ def test_a_candidate_can_be_highlighted(browser: Any, report: Path) -> None:
     assert len(browser.find_elements('css selector', '#candidates tr.faded')) == 2
 
 
-def test_paths_are_smooth_and_candidates_are_named_in_words(browser: Any, report: Path) -> None:
+def test_paths_begin_at_the_hand_and_are_named_in_words_in_the_table_and_under_the_pointer(browser: Any, report: Path) -> None:
     show(browser, report / 'index.html')
-    drawn = browser.execute_script("""
-        const lines = [...document.querySelectorAll('#scene .scatterlayer .trace')].filter((each) => {
-          const { meta } = each.__data__[0].trace;
-          return meta && meta.candidate !== undefined;
-        });
-        return lines.map((each) => each.querySelector('.js-line').getAttribute('d'));
-    """)
-    assert drawn and all('C' in line and 'L' not in line for line in drawn), 'curves, and no straight lines'
-    number = browser.execute_script("return JSON.parse(document.getElementById('report-data').textContent).frames[0].at")
-    predictions = json.loads((report / 'predictions.json').read_text(encoding='utf-8'))['predictions']
+    paths = browser.execute_script('return report.scene.paths.map((each) => [each.kind, each.text, each.points])')
+    assert [kind for kind, _, _ in paths].count('ghost') == 2
+    begins = np.array([points[0] for _, _, points in paths])
+    np.testing.assert_allclose(begins, np.tile(begins[0], (len(begins), 1)), atol=2e-4)
+    number = browser.execute_script('return report.data.frames[report.state.frame].at')
+    known = json.loads((report / 'predictions.json').read_text(encoding='utf-8'))['predictions'][number]
     words = browser.execute_script(
         "return [...document.querySelectorAll('#candidates tr[data-track]')].map((row) => row.cells[4].textContent)"
     )
-    assert words == [each['description'] for each in predictions[number]['candidates']]
-    assert any('right of 1' in each for each in words)
+    assert [text.split('; ')[0] for text in words] == [each['description'] for each in known['candidates']]
+    assert any('right of 1' in each for each in words) and any('leads through obstacle post' in each for each in words)
+    kind, text, points = paths[-1]
+    assert (kind, browser.execute_script('return report.scene.find(arguments[0])', points[12])) == ('path', text)
+    signs = browser.find_element('id', 'signs').text
+    assert all(
+        name in signs for name in ('hand before', 'hand later', 'motor noise', 'total uncertainty', 'obstacle', 'goal', 'pale')
+    )
+
+
+def test_a_click_on_a_chart_leads_to_its_time_and_the_scene_zooms(browser: Any, report: Path) -> None:
+    from selenium.webdriver import ActionChains
+
+    show(browser, report / 'index.html')
+    chart = browser.find_element('id', 'likelihoods')
+    browser.execute_script("arguments[0].scrollIntoView({ block: 'center' })", chart)
+    ActionChains(browser).move_to_element_with_offset(chart, 100, 0).click().perform()
+    wanted = browser.execute_script('const c = report.charts.likelihoods; return c.timeAt(c.box.clientWidth / 2 + 100)')
+    assert float(browser.find_element('id', 'clock').text.removesuffix(' s')) == pytest.approx(wanted, abs=0.05)
+    scale = browser.execute_script("""
+        const [canvas, before] = [report.scene.canvas, report.scene.scale];
+        const box = canvas.getBoundingClientRect();
+        const place = { clientX: box.left + 50, clientY: box.top + 50 };
+        canvas.dispatchEvent(new WheelEvent('wheel', { deltaY: -1, ctrlKey: true, ...place }));
+        const zoomed = report.scene.scale / before;
+        canvas.dispatchEvent(new MouseEvent('dblclick'));
+        return [zoomed, report.scene.scale / before];
+    """)
+    assert scale == pytest.approx([1.25, 1.0])
 
 
 def test_a_warning_leads_to_its_first_moment(browser: Any, tmp_path: Path) -> None:
@@ -181,12 +216,12 @@ def changed(report: Path, copy: Path, old: str, new: str) -> Path:
     ('old', 'new'),
     [
         ("byId('time').addEventListener('input'", "byId('time').addEventListener('never'"),
-        ('y: share, type', 'y: share.map((value) => value * 0.99), type'),
-        ('times: data.times.slice(begin, end)', 'times: data.times.slice(begin + 1, end + 1)'),
-        ("cell(row, percent(share), 'number')", "cell(row, percent(share / 2), 'number')"),
-        ("cell(row, data.labels[candidate.label], 'label')", "cell(row, data.labels[0], 'label')"),
+        ('track.share[begin - track.first + row]]);', 'track.share[begin - track.first + row] * 0.99]);'),
+        ('const points = data.times.slice(begin, ', 'const points = data.times.slice(begin + 1, 1 + '),
+        ("cell(row, percent(view.share), 'number')", "cell(row, percent(view.share / 2), 'number')"),
+        ("cell(row, data.labels[each.label], 'label')", "cell(row, data.labels[0], 'label')"),
         ('const hand = { t:', 'const hand = {{ t:'),
-        ('drawn.map((each) => each.path)', 'drawn.map(() => nothing)'),
+        ('[...frame.candidates, ...frame.unsolved].map', '[...frame.unsolved].map'),
         ('</body>', '<script src="https://foc-ros.invalid/x.js"></script></body>'),
     ],
     ids=['slider', 'likelihoods', 'times', 'percent', 'labels', 'syntax', 'paths', 'network'],

@@ -16,7 +16,6 @@ from shown_commands import ENDLESS, NOT_RUN, PAGES, ROOT, find_commands, find_un
 from foc_ros.ros.isolated_node import reserve_domain
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
-pytest.importorskip('plotly', reason='plotly is not installed')
 
 RUN = {page: [line for line in find_commands(page) if line not in NOT_RUN] for page in PAGES}
 ENDLESS_S = 6

@@ -119,7 +119,6 @@ def add_play_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--host', default=HOST, metavar='HOST', help=words)
     number = _WholeNumber('--port', 0, LARGEST_PORT)
     parser.add_argument('--port', type=number, default=PORT, metavar='PORT', help='port (default: %(default)s; 0: a free one)')
-    parser.add_argument('--no-ros', action='store_true', help='predict with the library, without a node and DDS')
     words = 'folder for recordings, reports and fitted parameters (default: %(default)s)'
     parser.add_argument('--data', type=Path, default=Path('play_data'), metavar='DIR', help=words)
     _add_parameter_file(parser)

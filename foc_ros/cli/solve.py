@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     candidates = solve_scene(scene, problems)
     encoded = [_encode(each, problems[each.candidate.goal], samples) for each in candidates]
     if arguments.plot is not None:
-        from foc_ros.reporting.plots import plot_outcomes
+        from foc_ros.reporting.draw import plot_outcomes
 
         plot_outcomes(arguments.plot, scene.obstacles, scene.goals, candidates, scene.hand.mean[:2])
     if arguments.json:

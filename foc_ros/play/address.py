@@ -11,6 +11,10 @@ try:
     from tornado.netutil import bind_sockets
 except ImportError as error:
     raise FocError("play needs tornado: install python3-tornado, or pip install 'foc_ros[play]'") from error
+try:
+    from pydantic import BaseModel as BaseModel  # for the messages of the page: what is missing is said before anything is loaded
+except ImportError as error:
+    raise FocError("play needs pydantic of version 2: pip install 'foc_ros[play]'") from error
 
 
 def is_loopback(host: str) -> bool:

@@ -1,4 +1,7 @@
-"""What the buttons after a session start: commands of foc_ros in processes of their own, of low priority."""
+"""What the page offers after a session: its report, a fit to it, and the scores before and after the fit; one at a time.
+
+Fit and scores are commands of foc_ros in processes of their own, of low priority, which can be cancelled.
+"""
 
 from __future__ import annotations
 
@@ -6,29 +9,30 @@ import asyncio
 import contextlib
 import json
 import os
+import signal
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 from foc_ros.analysis.fitting.comparison import find_worse_positions
-from foc_ros.core.errors import FocError
+from foc_ros.core.errors import FocError, InputError
 
-from .recorder import UNGUIDED
+from .recording import OPERATOR, PARAMETERS, UNGUIDED, Recording
 
-PARAMETERS, OPERATOR = 'parameters.yaml', 'operator.yaml'
-"""Files of a session: the parameters that it began with, and those that were fitted to it."""
 NICENESS = 10
-COMPARE_COLUMNS = ('', 'before', 'after')
-FITTED_COLUMNS = ('parameter', 'before', 'after')
+COMPARE_COLUMNS, FITTED_COLUMNS = ('', 'before', 'after'), ('parameter', 'before', 'after')
 QUESTIONS = {'way': 'path class', 'goal': 'goal'}
+Note = Callable[[str], None]
+"""Takes a line about the progress of a command."""
 
 
 class CommandError(FocError):
     """A command that failed; the message is its last line."""
 
 
-async def run_command(*arguments: str | Path) -> str:
+async def run_command(note: Note, *arguments: str | Path) -> str:
     """Run a command of foc_ros and return its standard output; raises CommandError. It is ended when this is cancelled.
 
     A command that could not use some of the recordings has an answer all the same, and is no error.
@@ -39,50 +43,120 @@ async def run_command(*arguments: str | Path) -> str:
         stdin=asyncio.subprocess.DEVNULL,
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,
-        start_new_session=True,  # an interrupt of the terminal reaches this process, which then ends the other
+        start_new_session=True,  # an interrupt of the terminal reaches this process, which then ends the other with its children
     )
+    assert process.stdout is not None and process.stderr is not None
+    lines = ['']
     try:
         with contextlib.suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, process.pid, NICENESS)
-        output, errors = await process.communicate()
+        output = asyncio.ensure_future(process.stdout.read())
+        async for line in process.stderr:
+            if text := line.decode(errors='replace').strip():
+                lines.append(text)
+                note(text)
+        await process.wait()
     finally:
         if process.returncode is None:
-            process.terminate()
-    if process.returncode and not output:
-        lines = errors.decode(errors='replace').strip().splitlines()
-        raise CommandError(lines[-1] if lines else f'foc_ros {arguments[0]} ended with exit code {process.returncode}')
-    return output.decode()
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGTERM)
+            await process.wait()
+        answer = (await output).decode()
+    if process.returncode and not answer:
+        raise CommandError(lines[-1] or f'foc_ros {arguments[0]} ended with exit code {process.returncode}')
+    return answer
 
 
-async def fit_operator(folder: Path) -> tuple[list[tuple[str, str, str]], list[str], str]:
-    """Fit the parameters to the trials without guidance, and write OPERATOR.
+class Jobs:
+    """Runs one job at a time and tells the page how it goes.
 
-    Return a row of FITTED_COLUMNS for each parameter that has changed, a sentence for each horizon at which positions become
-    worse with OPERATOR, and one about trials that could not be used.
+    Attributes: recording, of the last session, None before the first; report, the page of the last report; operator, the
+    parameter file of the last fit.
+
+    Parameters
+    ----------
+    say
+        Sends the page a message of a kind, with values.
+    note_fitted
+        Called when there are new fitted parameters, with whether they are to be used: no position becomes worse.
     """
-    options = '--params', folder / PARAMETERS, '--output', folder / OPERATOR, '--allow', 'positions', '--json'
-    answer = json.loads(await run_command('fit', folder / UNGUIDED, *options))
-    fitted = {**answer['parameters'], **answer['chosen']}
-    rows = [(name, _format(each['given']), _format(each['value'])) for name, each in fitted.items()]
-    return (
-        [row for row in rows if row[1] != row[2]],
-        find_worse_positions(answer['comparison']),
-        _describe_unused(answer['failed']),
-    )
 
+    def __init__(self, say: Callable[..., None], note_fitted: Callable[[bool], None]) -> None:
+        self.recording: Recording | None = None
+        self.report: Path | None = None
+        self.operator: Path | None = None
+        self._say, self._note_fitted = say, note_fitted
+        self._job: asyncio.Task[None] | None = None
 
-async def compare_parameters(folder: Path, operator: Path) -> tuple[list[tuple[str, str, str]], str]:
-    """Score the trials without guidance of a session, before and after a fit.
+    def begin(self, name: str) -> None:
+        """Begin a job by its name; raises InputError where it is impossible."""
+        if self._job is not None and not self._job.done():
+            raise InputError('job', 'one at a time', name)
+        if self.recording is None:
+            raise InputError('job', 'a session that was recorded', name)
+        if name != 'report' and not (self.recording.folder / UNGUIDED).is_dir():
+            raise InputError('job', 'a session with trials without guidance', name)
+        if name == 'compare' and self.operator is None:
+            raise InputError('job', 'a fit before', name)
+        self._say('job', name=name, state='running', text='working', seconds=0.0)
+        self._job = asyncio.ensure_future(self._run(name, self.recording))
 
-    Return rows of COMPARE_COLUMNS, and a sentence about trials that could not be used.
-    """
-    answers = [
-        json.loads(await run_command('evaluate', folder / UNGUIDED, '--params', file, '--json'))
-        for file in (folder / PARAMETERS, operator)
-    ]
-    before, after = map(summarise_evaluation, answers)
-    rows = [(name, before[name], after.get(name, '-')) for name in before]
-    return rows, _describe_unused({**answers[0]['failed'], **answers[1]['failed']})
+    def cancel(self) -> None:
+        """End the job that runs."""
+        if self._job is not None:
+            self._job.cancel()
+
+    async def _run(self, name: str, recording: Recording) -> None:
+        began = monotonic()
+
+        def say(state: str, text: str, **values: Any) -> None:
+            self._say('job', name=name, state=state, text=text, seconds=round(monotonic() - began, 1), **values)
+
+        try:
+            work = {'report': self._write_report, 'fit': self._fit, 'compare': self._compare}[name]
+            say('done', **await work(recording, lambda text: say('running', text)))
+        except asyncio.CancelledError:
+            say('cancelled', 'cancelled')
+            raise
+        except Exception as error:
+            say('failed', str(error))
+            if not isinstance(error, FocError):
+                raise
+
+    async def _write_report(self, recording: Recording, _: Note) -> dict[str, Any]:
+        self.report = await asyncio.to_thread(recording.write_report)
+        return {'text': 'The report is ready.'}
+
+    async def _fit(self, recording: Recording, note: Note) -> dict[str, Any]:
+        """Fit the parameters to the trials without guidance, and write OPERATOR."""
+        folder = recording.folder
+        options = '--params', folder / PARAMETERS, '--output', folder / OPERATOR, '--allow', 'positions', '--json'
+        answer = json.loads(await run_command(note, 'fit', folder / UNGUIDED, *options))
+        losses = find_worse_positions(answer['comparison'])
+        self.operator = folder / OPERATOR
+        self._note_fitted(not losses)
+        text = 'predictions now use your parameters.'
+        if losses:
+            text = f'{"; ".join(losses)}. Predictions use the standard parameters, unless you choose yours.'
+        fitted = {**answer['parameters'], **answer['chosen']}
+        rows = [(name, _format(each['given']), _format(each['value'])) for name, each in fitted.items()]
+        changed = [row for row in rows if row[1] != row[2]]
+        return {'text': text[0].upper() + text[1:] + _name_unused(answer['failed']), 'columns': FITTED_COLUMNS, 'rows': changed}
+
+    async def _compare(self, recording: Recording, note: Note) -> dict[str, Any]:
+        """Score the trials without guidance of a session, before and after a fit."""
+        folder, operator = recording.folder, self.operator
+        assert operator is not None
+        answers = [
+            json.loads(await run_command(note, 'evaluate', folder / UNGUIDED, '--params', file, '--json'))
+            for file in (folder / PARAMETERS, operator)
+        ]
+        before, after = map(summarise_evaluation, answers)
+        rows = [(name, before[name], after.get(name, '-')) for name in before]
+        is_same = folder == operator.parent
+        text = 'on the trials of the fit; record new trials for an independent comparison' if is_same else 'on new trials'
+        unused = _name_unused({**answers[0]['failed'], **answers[1]['failed']})
+        return {'text': f'Before and after the fit, {text}.{unused}', 'columns': COMPARE_COLUMNS, 'rows': rows}
 
 
 def summarise_evaluation(answer: Mapping[str, Any]) -> dict[str, str]:
@@ -101,7 +175,7 @@ def summarise_evaluation(answer: Mapping[str, Any]) -> dict[str, str]:
     return rows
 
 
-def _describe_unused(failed: Mapping[str, str]) -> str:
+def _name_unused(failed: Mapping[str, str]) -> str:
     """Return a sentence that names trials and why they were not used, empty if all were."""
     return f' Not used: {", ".join(f"{name} ({reason})" for name, reason in failed.items())}.' if failed else ''
 

@@ -1,17 +1,19 @@
-"""The scene of the page: obstacles and goals that a user arranges, and random ones for the tasks."""
+"""The scene of the page: obstacles and goals that a user arranges, random ones for the tasks, and the predictions in it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
 
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
 from foc_ros.core.types import Array, Obstacles
+from foc_ros.reporting.encode import encode_candidate, encode_unsolved
+from foc_ros.reporting.views import SLOTS, Snapshot, parse_label
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_obstacles
 from foc_ros.ros.messages.types import MessageTypes
 
@@ -33,18 +35,68 @@ GAP = 0.025
 ATTEMPTS = 200
 
 Point = tuple[float, float]
+X = Annotated[float, Field(ge=BOUNDS[0], le=BOUNDS[1])]
+Y = Annotated[float, Field(ge=BOUNDS[2], le=BOUNDS[3])]
+Size = Annotated[float, Field(ge=0.002, le=0.3)]
+"""Radius or full length of an obstacle [m]."""
 
 
-@dataclass(frozen=True)
-class PlayScene:
-    """Obstacles, of which each has the number of its row as name, and goals [m]."""
+class Fields(BaseModel):
+    """Values of a message of the page: exactly the declared fields, of exactly their types, and finite."""
 
-    obstacles: tuple[Circle | Box, ...]
-    goals: tuple[Point, ...]
+    model_config = ConfigDict(extra='forbid', frozen=True, strict=True, allow_inf_nan=False)
+
+
+class Place(Fields):
+    """A goal [m]."""
+
+    x: X
+    y: Y
+
+
+class PlacedCircle(Place):
+    """An obstacle [m]."""
+
+    kind: Literal['circle'] = 'circle'
+    radius: Size
+
+    @property
+    def shape(self) -> Circle:
+        """The obstacle with the standard deviation that all obstacles of the page have."""
+        return Circle((self.x, self.y), self.radius, RADIUS_STDDEV)
+
+
+class PlacedBox(Place):
+    """An obstacle: full lengths [m], and angle [rad] of the first of them."""
+
+    kind: Literal['box'] = 'box'
+    size_x: Size
+    size_y: Size
+    yaw: Annotated[float, Field(ge=-math.pi, le=math.pi)]
+
+    @property
+    def shape(self) -> Box:
+        """The obstacle with the standard deviation that all obstacles of the page have."""
+        return Box((self.x, self.y), (self.size_x, self.size_y), self.yaw, radius_stddev=RADIUS_STDDEV)
+
+
+Placed = Annotated[PlacedCircle | PlacedBox, Field(discriminator='kind')]
+
+
+class PlayScene(Fields):
+    """Obstacles, of which each has the number of its row as name, and goals."""
+
+    obstacles: Annotated[list[Placed], Field(max_length=MOST_OBSTACLES)]
+    goals: Annotated[list[Place], Field(min_length=1, max_length=MOST_GOALS)]
+
+    @property
+    def points(self) -> list[Point]:
+        """The goals [m]."""
+        return [(each.x, each.y) for each in self.goals]
 
     def tabulate(self) -> Obstacles:
         """Return the obstacles as a table."""
-        return collect_obstacles(self.obstacles)
+        return collect_obstacles([each.shape for each in self.obstacles])
 
     def measure_clearance(self, position: Point) -> float:
         """Return the distance of a position from the nearest obstacle [m], negative within it."""
@@ -55,65 +107,77 @@ class PlayScene:
     def encode(self, types: MessageTypes, stamp_ns: int) -> dict[str, Any]:
         """Return the messages of the inputs `obstacles` and `goals`."""
         rows = [
-            (*np.asarray(each.centre), 0.0, each.radius, each.radius_stddev, row, *_measure_box(each))
+            (each.x, each.y, 0.0, each.shape.radius, RADIUS_STDDEV, row, *_measure_box(each))
             for row, each in enumerate(self.obstacles)
         ]
-        goals: Array = np.array([(*goal, 0.0) for goal in self.goals])
+        goals: Array = np.array([(*point, 0.0) for point in self.points])
         return {
             'obstacles': encode_obstacles(types, stamp_ns, FRAME, rows),
             'goals': encode_goals(types, stamp_ns, FRAME, goals),
         }
 
-    def as_json(self) -> dict[str, Any]:
-        """Return the scene as the page sends it."""
-        obstacles = []
-        for each in self.obstacles:
-            x, y = np.asarray(each.centre).tolist()
-            if isinstance(each, Box):
-                size_x, size_y, yaw = _measure_box(each)
-                obstacles.append({'kind': 'box', 'x': x, 'y': y, 'size_x': size_x, 'size_y': size_y, 'yaw': yaw})
-            else:
-                obstacles.append({'kind': 'circle', 'x': x, 'y': y, 'radius': each.radius})
-        return {'obstacles': obstacles, 'goals': [{'x': x, 'y': y} for x, y in self.goals]}
 
-
-def _measure_box(shape: Circle | Box) -> tuple[float, float, float]:
+def _measure_box(obstacle: PlacedCircle | PlacedBox) -> tuple[float, float, float]:
     """Return full lengths [m] and yaw [rad] of a box, zeros for a circle."""
-    if isinstance(shape, Circle):
-        return 0.0, 0.0, 0.0
-    size_x, size_y = np.asarray(shape.size).tolist()
-    return size_x, size_y, shape.yaw
-
-
-def make_circle(centre: Point, radius: float) -> Circle:
-    """Return a circle with the standard deviation that all obstacles of the page have."""
-    return Circle(centre, radius, RADIUS_STDDEV)
-
-
-def make_box(centre: Point, size: Sequence[float], yaw: float) -> Box:
-    """Return a box with the standard deviation that all obstacles of the page have."""
-    return Box(centre, size, yaw, radius_stddev=RADIUS_STDDEV)
+    return (0.0, 0.0, 0.0) if isinstance(obstacle, PlacedCircle) else (obstacle.size_x, obstacle.size_y, obstacle.yaw)
 
 
 FIRST_SCENE = PlayScene(
-    (make_circle((0.14, 0.015), 0.025), make_circle((0.17, -0.085), 0.02), make_box((0.2, 0.095), (0.02, 0.06), 0.3)),
-    ((0.3, -0.09), (0.31, 0.0), (0.3, 0.09)),
+    obstacles=[
+        PlacedCircle(x=0.14, y=0.015, radius=0.025),
+        PlacedCircle(x=0.17, y=-0.085, radius=0.02),
+        PlacedBox(x=0.2, y=0.095, size_x=0.02, size_y=0.06, yaw=0.3),
+    ],
+    goals=[Place(x=0.3, y=-0.09), Place(x=0.31, y=0.0), Place(x=0.3, y=0.09)],
 )
 
 
-def make_random_scene(random: np.random.Generator, goals: tuple[Point, ...]) -> PlayScene:
+def make_random_scene(random: np.random.Generator, goals: Sequence[Place]) -> PlayScene:
     """Return random circles and boxes between the start and some goals, with gaps that a hand fits through."""
     wanted = int(random.integers(*RANDOM_OBSTACLES, endpoint=True))
-    taken = [(*START, TARGET_RADIUS), *((*goal, TARGET_RADIUS) for goal in goals)]
-    obstacles: list[Circle | Box] = []
+    taken = [(*START, TARGET_RADIUS), *((goal.x, goal.y, TARGET_RADIUS) for goal in goals)]
+    obstacles: list[PlacedCircle | PlacedBox] = []
     for _ in range(ATTEMPTS):
         if len(obstacles) == wanted:
             break
         x, y = random.uniform(RANDOM_AREA[0], RANDOM_AREA[1]), random.uniform(RANDOM_AREA[2], RANDOM_AREA[3])
-        lengths, yaw = random.uniform(0.02, 0.05, 2), random.uniform(-math.pi / 2.0, math.pi / 2.0)
+        lengths, yaw = random.uniform(0.02, 0.05, 2).tolist(), random.uniform(-math.pi / 2.0, math.pi / 2.0)
         is_box = bool(random.random() < 1.0 / 3.0)
-        extent = float(np.hypot(*lengths)) / 2.0 if is_box else float(lengths[0]) / 2.0
+        extent = math.hypot(*lengths) / 2.0 if is_box else lengths[0] / 2.0
         if all(math.hypot(x - other_x, y - other_y) >= extent + reach + GAP for other_x, other_y, reach in taken):
-            obstacles.append(make_box((x, y), lengths.tolist(), yaw) if is_box else make_circle((x, y), extent))
+            box = PlacedBox(x=x, y=y, size_x=lengths[0], size_y=lengths[1], yaw=yaw)
+            obstacles.append(box if is_box else PlacedCircle(x=x, y=y, radius=extent))
             taken.append((x, y, extent))
-    return PlayScene(tuple(obstacles), goals)
+    return PlayScene(obstacles=obstacles, goals=list(goals))
+
+
+class Slots:
+    """Gives each class a slot of letter and colour, which it keeps while it is among the candidates."""
+
+    def __init__(self) -> None:
+        self._slots: dict[int, int] = {}
+        self._free = list(range(SLOTS))
+
+    def assign(self, ways: Sequence[int]) -> list[int | None]:
+        """Return the slots of the present classes; a class that finds none has None."""
+        for way in set(self._slots) - set(ways):
+            self._free.append(self._slots.pop(way))  # the slot that has been free for longest is used first
+        for way in ways:
+            if way not in self._slots and self._free:
+                self._slots[way] = self._free.pop(0)
+        return [self._slots.get(way) for way in ways]
+
+
+def view_candidates(snapshot: Snapshot, slots: Slots) -> list[dict[str, Any]]:
+    """Return the candidates of a prediction as the page draws them, the most likely one first, those without a likelihood last.
+
+    Each has, besides what `reporting.encode` says, its slot, class number (way), goal and likelihood, None where it is not known.
+    """
+    given = slots.assign([each.way for each in snapshot.candidates])
+    views: list[dict[str, Any]] = [
+        {'slot': slot, 'way': each.way, 'likelihood': round(each.likelihood, 4), **encode_candidate(snapshot, each, rank == 0)}
+        for rank, (each, slot) in enumerate(zip(snapshot.candidates, given, strict=True))
+    ]
+    nothing: dict[str, Any] = {'slot': None, 'way': None, 'likelihood': None, 'motor': [], 'total': []}
+    views += [nothing | encode_unsolved(snapshot, each) for each in snapshot.unsolved]
+    return [each | {'goal': int(parse_label(each['label'], ())[0].removeprefix('goal'))} for each in views]

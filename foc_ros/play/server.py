@@ -9,6 +9,8 @@ from __future__ import annotations
 import asyncio
 import ipaddress
 import json
+import signal
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from socket import socket
@@ -19,22 +21,27 @@ from tornado.ioloop import PeriodicCallback
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
+from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError
 from foc_ros.reporting import page as report_page
 
-from .page_messages import LONGEST_MESSAGE, parse_message
+from .address import describe_page, is_loopback
+from .messages import LONGEST_MESSAGE, parse_message
+from .predictor import Outcome, Predictor, Receive
 from .session import Session
 
 FOLDER = Path(__file__).parent / 'page'
 TYPES = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript'}
 FILES = {
     '/': FOLDER / 'index.html',
-    **{f'/{name}': FOLDER / name for name in ('style.css', 'play.js', 'hand.js', 'drawing.js', 'arranging.js')},
-    **{f'/{name}': report_page.FOLDER / name for name in ('frame.css', 'frame.js')},
+    **{f'/{name}': FOLDER / name for name in ('style.css', 'play.js', 'hand.js', 'arranging.js')},
+    **{f'/{name}': report_page.FOLDER / name for name in ('frame.css', 'frame.js', 'scene.js')},
 }
 POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:"
 HEADERS = {'X-Content-Type-Options': 'nosniff', 'Referrer-Policy': 'no-referrer', 'Cache-Control': 'no-store'}
 TICK_MS = 500
+SWITCH_S = 0.001
+"""Longest time for which a thread keeps Python's global lock while another one waits for it [s]."""
 
 
 class _Handler(RequestHandler):
@@ -108,26 +115,51 @@ def is_own_host(name: str, host: str) -> bool:
     return True
 
 
-def make_application(session: Session, host: str) -> Application:
-    """Return the application for a session."""
+def listen(session: Session, host: str, sockets: Sequence[socket]) -> HTTPServer:
+    """Start to serve a session on the sockets of a host (`open_sockets`); return the server."""
     given = {'session': session, 'host': host}
     routes: list[Any] = [(path, _PageHandler, given) for path in FILES]
     routes += [('/report', _ReportHandler, given), ('/socket', _SocketHandler, given)]
-    return Application(routes, websocket_max_message_size=LONGEST_MESSAGE, log_function=lambda _: None)
-
-
-def listen(session: Session, host: str, sockets: Sequence[socket]) -> HTTPServer:
-    """Start to serve on the sockets of a host (`open_sockets`); return the server."""
-    server = HTTPServer(make_application(session, host))
+    server = HTTPServer(Application(routes, websocket_max_message_size=LONGEST_MESSAGE, log_function=lambda _: None))
     server.add_sockets(sockets)
     return server
 
 
-async def serve(session: Session, ended: asyncio.Event) -> None:
-    """Serve until an event."""
+async def serve(config: Config, data: Path, host: str, sockets: Sequence[socket]) -> None:
+    """Serve the page until an interrupt, and say where it is.
+
+    Parameters
+    ----------
+    config
+        The parameters to begin with.
+    data
+        The folder for recordings.
+    host, sockets
+        Where to serve (`open_sockets`).
+    """
+    loop, ended = asyncio.get_running_loop(), asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
+    sys.setswitchinterval(SWITCH_S)
+
+    def make_predictor(given: Config, receive: Receive) -> Predictor:
+        def pass_on(outcome: Outcome) -> None:
+            loop.call_soon_threadsafe(receive, outcome)
+
+        return Predictor(given, pass_on)
+
+    session = Session(make_predictor, config, data)
+    server = listen(session, host, sockets)
     ticking = PeriodicCallback(session.tick, TICK_MS)
-    ticking.start()
     try:
+        session.predictor.start()
+        ticking.start()
+        if not is_loopback(host):
+            words = f'everybody who reaches {host} can steer the hand and start recordings; there is no password'
+            print(f'foc_ros play: warning: {words}', file=sys.stderr)
+        print(f'foc_ros play: open {describe_page(host, sockets[0].getsockname()[1])}; Ctrl-C ends it', flush=True)
         await ended.wait()
     finally:
         ticking.stop()
+        server.stop()
+        session.close()

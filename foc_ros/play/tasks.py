@@ -9,7 +9,7 @@ from enum import Enum
 
 import numpy as np
 
-from .page_messages import TasksMessage
+from .messages import TasksMessage
 from .scene import START, TARGET_RADIUS, PlayScene, Point, make_random_scene
 
 REST_S = 0.3
@@ -37,20 +37,46 @@ class Trial:
     is_guided: bool
 
 
-@dataclass(frozen=True)
-class Score:
-    """What a trial came to.
+class Reach:
+    """One movement from the light to the goal, and what it came to.
 
-    time_s: from the light to the arrival, without the rest at the goal; touched: how often the hand entered an obstacle; path_m:
-    length of its path; ahead_s: how long before the arrival the way taken had become the most likely one for good, nan if the
-    trial was over before.
+    Attributes: is_guided; touched: how often the hand entered an obstacle; path_m: length of its path; time_s: from the light to
+    the arrival, without the rest at the goal; ahead_s: how long before the arrival the class taken had become the most likely one
+    for good, nan if the trial was over before. The times are nan before the arrival.
     """
 
-    is_guided: bool
-    time_s: float
-    touched: int
-    path_m: float
-    ahead_s: float
+    def __init__(self, trial: Trial, t: float, position: Point) -> None:
+        self.is_guided, self._scene, self._goal = trial.is_guided, trial.scene, trial.scene.points[trial.goal]
+        self.touched, self.path_m = 0, 0.0
+        self._begin_s, self._arrival_s, self._position = t, math.nan, position
+        self._is_inside, self._most_likely = False, (math.nan, -1)
+
+    @property
+    def time_s(self) -> float:
+        """From the light to the arrival [s]."""
+        return self._arrival_s - self._begin_s
+
+    @property
+    def ahead_s(self) -> float:
+        """From the right prediction to the arrival [s]."""
+        return self._arrival_s - self._most_likely[0]
+
+    def add(self, t: float, position: Point) -> bool:
+        """Take a position at a time [s]; return whether the hand has rested at its goal for REST_S."""
+        is_inside = self._scene.measure_clearance(position) < 0.0
+        self.touched += is_inside and not self._is_inside
+        self.path_m += math.dist(position, self._position)
+        self._is_inside, self._position = is_inside, position
+        if math.dist(position, self._goal) > TARGET_RADIUS:
+            self._arrival_s = math.nan
+        elif math.isnan(self._arrival_s):
+            self._arrival_s = t
+        return t - self._arrival_s >= REST_S
+
+    def note_most_likely(self, t: float, way: int) -> None:
+        """Take the number of the class that is the most likely one from a time [s] on."""
+        if math.isnan(self._arrival_s) and way != self._most_likely[1]:
+            self._most_likely = (t, way)
 
 
 def make_trials(settings: TasksMessage, scene: PlayScene) -> list[Trial]:
@@ -61,7 +87,7 @@ def make_trials(settings: TasksMessage, scene: PlayScene) -> list[Trial]:
     trials: list[Trial] = []
     while len(trials) < settings.trials:
         for row in random.permutation(len(kinds)).tolist():
-            shown_scene = make_random_scene(random, scene.goals) if settings.is_shuffled else scene
+            shown_scene = make_random_scene(random, scene.goals) if settings.shuffled else scene
             trials.append(Trial(shown_scene, *kinds[row]))
     return trials[: settings.trials]
 
@@ -69,7 +95,8 @@ def make_trials(settings: TasksMessage, scene: PlayScene) -> list[Trial]:
 class Tasks:
     """A sequence of trials that follows the hand.
 
-    Attributes: trials; number, of the present one; phase; scores, of the trials that are over.
+    Attributes: settings; trials; number, of the present one; phase; scores, of the trials that are over; touched, how often the
+    hand has entered an obstacle in the present trial.
 
     Parameters
     ----------
@@ -81,92 +108,44 @@ class Tasks:
         self.settings = settings
         self.trials = make_trials(settings, scene)
         self.number, self.phase = 0, Phase.RETURN
-        self.scores: list[Score] = []
+        self.scores: list[Reach] = []
         self._waits = np.random.default_rng([settings.seed, 1]).uniform(*WAIT_S, len(self.trials))
         self._since_s = 0.0
-        self._reach = _Reach(0.0, START)
+        self._reach: Reach | None = None
 
     @property
     def trial(self) -> Trial:
         """The present trial, the last one when the tasks are over."""
         return self.trials[min(self.number, len(self.trials) - 1)]
 
-    def follow(self, t: float, position: Point) -> Phase | None:
-        """Take a position of the hand at a time [s]; return the phase that begins with it, if one does."""
-        phase = self.phase
-        if phase is Phase.OVER:
-            return None
-        if phase in (Phase.RETURN, Phase.WAIT):
-            self._follow_to_start(t, math.dist(position, START) <= TARGET_RADIUS)
-        else:
-            self._follow_to_goal(t, position)
-        if self.phase is Phase.REACH and phase is not Phase.REACH:
-            self._reach = _Reach(t, position)
-        return self.phase if self.phase is not phase else None
-
-    def note_most_likely(self, t: float, way: int) -> None:
-        """Take the number of the class that is the most likely one from a time [s] on."""
-        if self.phase is Phase.REACH:
-            self._reach.note_most_likely(t, way)
-
     @property
     def touched(self) -> int:
         """How often the hand has entered an obstacle in the present trial."""
-        return self._reach.touched
+        return 0 if self._reach is None else self._reach.touched
 
-    def _follow_to_start(self, t: float, is_at_start: bool) -> None:
-        if not is_at_start:
+    def follow(self, t: float, position: Point) -> Phase | None:
+        """Take a position of the hand at a time [s]; return the phase that begins with it, if one does."""
+        before, is_at_start = self.phase, math.dist(position, START) <= TARGET_RADIUS
+        if before is Phase.REACH and self._reach is not None:
+            if self._reach.add(t, position):
+                self.scores.append(self._reach)
+                self.number += 1
+                self.phase = Phase.RETURN if self.number < len(self.trials) else Phase.OVER
+        elif before is not Phase.OVER and not is_at_start:
             self.phase = Phase.RETURN
-        elif self.phase is Phase.RETURN:
+        elif before is Phase.RETURN:
             self.phase, self._since_s = Phase.WAIT, t
-        elif t - self._since_s >= self._waits[self.number]:
-            self.phase = Phase.REACH
-
-    def _follow_to_goal(self, t: float, position: Point) -> None:
-        trial = self.trial
-        self._reach.add(position, trial.scene)
-        if self._reach.has_arrived(t, position, trial.scene.goals[trial.goal]):
-            self.scores.append(self._reach.score(trial.is_guided))
-            self.number += 1
-            self.phase = Phase.RETURN if self.number < len(self.trials) else Phase.OVER
-
-
-class _Reach:
-    """One movement from the light to the goal."""
-
-    def __init__(self, t: float, position: Point) -> None:
-        self.touched = 0
-        self._begin_s, self._position, self._path_m = t, position, 0.0
-        self._is_inside = False
-        self._arrival_s: float | None = None
-        self._way: int | None = None
-        self._way_since_s = math.nan
-
-    def add(self, position: Point, scene: PlayScene) -> None:
-        is_inside = scene.measure_clearance(position) < 0.0
-        self.touched += is_inside and not self._is_inside
-        self._is_inside = is_inside
-        self._path_m += math.dist(position, self._position)
-        self._position = position
-
-    def has_arrived(self, t: float, position: Point, goal: Point) -> bool:
-        """Return whether the hand has rested at its goal for REST_S."""
-        if math.dist(position, goal) > TARGET_RADIUS:
-            self._arrival_s = None
-        elif self._arrival_s is None:
-            self._arrival_s = t
-        return self._arrival_s is not None and t - self._arrival_s >= REST_S
+        elif before is Phase.WAIT and t - self._since_s >= self._waits[self.number]:
+            self.phase, self._reach = Phase.REACH, Reach(self.trial, t, position)
+        return self.phase if self.phase is not before else None
 
     def note_most_likely(self, t: float, way: int) -> None:
-        if self._arrival_s is None and way != self._way:
-            self._way, self._way_since_s = way, t
-
-    def score(self, is_guided: bool) -> Score:
-        assert self._arrival_s is not None
-        return Score(is_guided, self._arrival_s - self._begin_s, self.touched, self._path_m, self._arrival_s - self._way_since_s)
+        """Take the number of the class that is the most likely one from a time [s] on."""
+        if self.phase is Phase.REACH and self._reach is not None:
+            self._reach.note_most_likely(t, way)
 
 
-def tabulate_scores(scores: Sequence[Score]) -> list[tuple[str, ...]]:
+def tabulate_scores(scores: Sequence[Reach]) -> list[tuple[str, ...]]:
     """Return a row of SCORE_COLUMNS for the trials without and with guidance: medians, and the number of touches in all."""
     rows: list[tuple[str, ...]] = []
     for name, is_guided in (('without guidance', False), ('with guidance', True)):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -15,9 +14,8 @@ from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS
 from foc_ros.analysis.evaluation.tables import GAP_TITLE, make_tables
 from foc_ros.io.outputs import EVALUATION_PAGE
 
-from .drawing import open_figure
-from .page import render_list, render_page, render_picture, render_pictures, render_table, write_page
-from .plots import save_figure
+from .draw import open_figure
+from .page import render_figure, render_list, render_page, render_pictures, render_table, write_page
 
 WIDTH_IN, HEIGHT_IN = 6.4, 4.2
 COUNTS = f'with intervals of 95 % by bootstrap over recordings, and the numbers of predictions of {PUBLISHED}'
@@ -39,16 +37,13 @@ def write_report(directory: Path, title: str, answer: Mapping[str, Any]) -> None
 
 def _draw_questions(questions: Mapping[str, Any]) -> Iterator[str]:
     """Yield two pictures for each question."""
-    with TemporaryDirectory() as scratch:
-        for name, caption in CAPTIONS.items():
-            if name in questions:
-                reliability = f'{name}: how often the likeliest answer is true, over its probability, {COUNTS}.'
-                for draw, words in ((_draw_tenths, caption), (_draw_reliability, reliability)):
-                    with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
-                        draw(figure.subplots(), name, questions[name])
-                    file = Path(scratch) / 'picture.png'
-                    save_figure(figure, file)
-                    yield render_picture(file, words)
+    for name, caption in CAPTIONS.items():
+        if name in questions:
+            reliability = f'{name}: how often the likeliest answer is true, over its probability, {COUNTS}.'
+            for draw, words in ((_draw_tenths, caption), (_draw_reliability, reliability)):
+                with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
+                    draw(figure.subplots(), name, questions[name])
+                yield render_figure(figure, words)
 
 
 def _draw_tenths(axes: Any, name: str, by_predictor: Mapping[str, Any]) -> None:

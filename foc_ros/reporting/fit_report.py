@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from foc_ros.analysis.fitting.tables import (
@@ -18,9 +17,8 @@ from foc_ros.analysis.fitting.tables import (
 )
 from foc_ros.io.outputs import FIT_PAGE
 
-from .drawing import get_class_style, open_figure
-from .page import render_list, render_page, render_picture, render_pictures, render_table, write_page
-from .plots import save_figure
+from .draw import get_class_style, open_figure
+from .page import render_figure, render_list, render_page, render_pictures, render_table, write_page
 
 WIDTH_IN, LINE_IN = 6.4, 0.34
 CAPTION = (
@@ -60,7 +58,4 @@ def _draw_parameters(parameters: Mapping[str, Any]) -> str:
         for set_format in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
             set_format('{x:g}')
         axes.tick_params(axis='x', which='minor', labelsize=7)
-    with TemporaryDirectory() as scratch:
-        file = Path(scratch) / 'fit.png'
-        save_figure(figure, file)
-        return render_pictures([render_picture(file, CAPTION)])
+    return render_pictures([render_figure(figure, CAPTION)])

@@ -12,8 +12,16 @@ from foc_ros.analysis.paper.reaching import PaperScene, compute_speed
 from foc_ros.analysis.paper.studies import PAPER_ETA, PAPER_RATIOS, Studies, Study
 from foc_ros.core.types import Solution
 
-from .drawing import ELLIPSES_PER_CANDIDATE, Bounds, draw_scene, get_class_style, make_stddev_ellipse, open_figure
-from .plots import compute_bounds, save_figure
+from .draw import (
+    ELLIPSES_PER_CANDIDATE,
+    Bounds,
+    compute_bounds,
+    draw_scene,
+    get_class_style,
+    make_stddev_ellipse,
+    open_figure,
+    save_figure,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,25 +5,20 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from foc_ros.analysis.replay import Step
-from foc_ros.core.errors import FocError, InputError
+from foc_ros.core.errors import InputError
 from foc_ros.core.types import NANOSECONDS, HandSample, Status
 from foc_ros.io.outputs import MARK, OVERVIEW, REPORT_FILES, check_report
 
+from .draw import Span, make_recording_figure, make_snapshot_figure, save_figure
+from .encode import compute_recording_bounds, encode_report, round_number
 from .page import render
-from .plots import make_recording_figure, make_snapshot_figure, save_figure
-from .report_data import PageData, compute_recording_bounds, round_number
-from .snapshots import HandTrajectory, Snapshot, build_hand_trajectory, build_snapshot
-from .track_association import CandidateTracks, build_candidate_tracks
-
-if find_spec('plotly') is None:
-    raise FocError("reports need plotly: pip install plotly, or pip install 'foc_ros[report]'")
+from .views import CandidateTracks, HandTrajectory, Snapshot, build_candidate_tracks, build_hand_trajectory, build_snapshot
 
 MOST_PICTURES = 8
 SINGLE_MOVEMENT_FRACTIONS = (0.1, 0.3, 0.5, 0.7)
@@ -34,8 +29,8 @@ ONSET_SPEED = 0.05
 """Speed [m/s] above which the hand counts as moving."""
 COUNTERS = ('rejected', 'candidates compromised', 'candidates not solved', 'counters of the node')
 """Facts that the page folds: raw counts, of which the warnings name what matters."""
-Span = tuple[int, int]
-"""Start and end of a movement [ns]."""
+Table = tuple[str, Sequence[str], Sequence[Sequence[str]]]
+"""Heading, columns and rows of a table of the page."""
 
 
 @dataclass(frozen=True)
@@ -66,23 +61,30 @@ class ReportCollector:
 
 
 def write_report(
-    directory: Path, title: str, hand: HandTrajectory, snapshots: Sequence[Snapshot], summary: Mapping[str, str]
+    directory: Path,
+    title: str,
+    hand: HandTrajectory,
+    snapshots: Sequence[Snapshot],
+    summary: Mapping[str, str],
+    tables: Sequence[Table] = (),
 ) -> list[Path]:
     """Write index.html, predictions.json and pictures into a directory, replacing those of an earlier report; return the files.
 
-    hand: the measured movement; snapshots: the predictions in order of their stamps; summary: facts for a table of the page.
-    Raises InputError if the directory cannot be written or contains other files of those names, or if the hand has no sample.
+    hand: the measured movement; snapshots: the predictions in order of their stamps; summary: facts for a table of the page;
+    tables: further ones. Raises InputError if the directory cannot be written or contains other files of those names, or if the
+    hand has no sample.
     """
     check_report('--report', directory)
     if not len(hand.stamps_ns):
         raise InputError('report', 'a recording with a hand pose', 'none')
     spans = hand.find_movements(ONSET_SPEED) or [(int(hand.stamps_ns[0]), int(hand.stamps_ns[-1]))]
+    snapshots = [each.begin_at(hand.position_at(each.stamp_ns)) for each in snapshots]
     tracks = build_candidate_tracks(snapshots)
     facts, warnings = {**_collect_facts(snapshots), **summary}, _collect_warnings(snapshots, int(hand.stamps_ns[0]))
-    data = PageData(hand, tracks).build(spans, compute_recording_bounds(hand, snapshots))
+    data = encode_report(hand, tracks, spans, compute_recording_bounds(hand, snapshots))
     folded = {name: facts[name] for name in COUNTERS if name in facts}
     shown = {name: text for name, text in facts.items() if name not in folded}
-    html = render('report.html', title=title, warnings=warnings, facts=shown, counters=folded, data=data)
+    html = render('report.html', title=title, warnings=warnings, facts=shown, tables=tables, counters=folded, data=data)
     numbers = {
         'generator': MARK,
         'title': title,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -16,9 +15,8 @@ from foc_ros.analysis.simulation.tables import COLUMNS, make_tables
 from foc_ros.analysis.simulation.trial import Trial
 from foc_ros.io.outputs import SIMULATION_PAGE
 
-from .drawing import draw_scene, get_class_style, open_figure
-from .page import render_page, render_picture, render_pictures, render_table, write_page
-from .plots import save_figure
+from .draw import draw_scene, get_class_style, open_figure
+from .page import render_figure, render_page, render_pictures, render_table, write_page
 
 DRAWN = ('collision_rate', 'completion_s', 'opposing_impulse')
 """Measures with a figure."""
@@ -33,20 +31,16 @@ BORDER_M = 0.04
 def write_report(directory: Path, cells: Sequence[Mapping[str, Any]], results: Sequence[PairResult]) -> None:
     """Write the page; cells: of `simulate --json`. Raises InputError where that cannot be done."""
     tables = ''.join(render_table(columns, rows, heading) for heading, columns, rows in make_tables(cells))
-    with TemporaryDirectory() as scratch:
-        file = Path(scratch) / 'picture.png'
-        figures = render_pictures(_render_measures(cells, file))
-        trials = render_pictures(_render_trials(results, file))
+    figures, trials = render_pictures(_render_measures(cells)), render_pictures(_render_trials(results))
     body = f'{figures}{tables}<h2>Single trials</h2>{trials}'
     write_page(directory, SIMULATION_PAGE, render_page('Closed-loop study of guidance', body))
 
 
-def _render_measures(cells: Sequence[Mapping[str, Any]], file: Path) -> Iterator[str]:
+def _render_measures(cells: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     for name in DRAWN:
         with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
             _draw_measure(figure.subplots(), cells, name)
-        save_figure(figure, file)
-        yield render_picture(file, f'{COLUMNS[name][0]}: mean over the paired trials, with its bootstrap interval of 95 %.')
+        yield render_figure(figure, f'{COLUMNS[name][0]}: mean over the paired trials, with its bootstrap interval of 95 %.')
 
 
 def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> None:
@@ -66,16 +60,15 @@ def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> N
     axes.legend(fontsize='small')
 
 
-def _render_trials(results: Sequence[PairResult], file: Path) -> Iterator[str]:
+def _render_trials(results: Sequence[PairResult]) -> Iterator[str]:
     """Yield a picture of every trial that was kept."""
     for result in results:
         if result.task is None:
             continue
         with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
             _draw_trial(figure.subplots(), result.task, result.trials)
-        save_figure(figure, file)
         words = 'Intended path dashed; arrows: force of foc; crosses: within an obstacle.'
-        yield render_picture(file, f'Operator {result.operator}. {words}')
+        yield render_figure(figure, f'Operator {result.operator}. {words}')
 
 
 def _draw_trial(axes: Any, task: Task, trials: Mapping[str, Trial]) -> None:

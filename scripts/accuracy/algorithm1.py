@@ -11,7 +11,7 @@ from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 
 from foc_ros.core.types import Array, Solution, Status
-from foc_ros.reporting.drawing import get_class_style, open_figure
+from foc_ros.reporting.draw import get_class_style, open_figure
 
 from .page import format_table
 from .scenes import Scene, build_one_obstacle, build_random

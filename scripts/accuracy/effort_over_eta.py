@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from foc_ros.core.types import Array, Status
-from foc_ros.reporting.drawing import get_class_style, open_figure
+from foc_ros.reporting.draw import get_class_style, open_figure
 
 from .page import format_table
 from .scenes import Scene, build_one_obstacle, build_random

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from foc_ros.core.obstacles.risk import k_of_eta
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.types import Array, Status
-from foc_ros.reporting.drawing import get_class_style, open_figure
+from foc_ros.reporting.draw import get_class_style, open_figure
 
 from .page import format_table
 from .scenes import build_varied, solve

@@ -21,7 +21,7 @@ from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import BagReader, BagWriter, Item
 from foc_ros.io.terminal import show_address, show_table, show_text
-from foc_ros.reporting.snapshots import build_hand_trajectory
+from foc_ros.reporting.views import build_hand_trajectory
 from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, private_environment, reserve_domain, set_environment
 
 from .recorder import Recorder, show_live

@@ -22,8 +22,8 @@ from foc_ros.core.scene import Scene
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
 from foc_ros.io.bags import Item
-from foc_ros.reporting.drawing import Bounds
-from foc_ros.reporting.snapshots import CandidateView, Snapshot, is_same_prediction, read_snapshot
+from foc_ros.reporting.draw import Bounds
+from foc_ros.reporting.views import CandidateView, Snapshot, is_same_prediction, read_snapshot
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.decode_poses import decode_stamp
 

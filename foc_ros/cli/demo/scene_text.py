@@ -6,9 +6,8 @@ import numpy as np
 
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import Array
-from foc_ros.reporting.drawing import Bounds
-from foc_ros.reporting.plots import compute_bounds
-from foc_ros.reporting.snapshots import Snapshot
+from foc_ros.reporting.draw import Bounds, compute_bounds
+from foc_ros.reporting.views import Snapshot
 
 WIDTH, HEIGHT = 72, 13
 """Size of the drawing [characters]; with the table it fits into 24 lines."""

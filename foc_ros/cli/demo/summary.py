@@ -8,7 +8,7 @@ import numpy as np
 
 from foc_ros.core.learning.movements import AT_GOAL_M, find_goal_at_end
 from foc_ros.core.types import NANOSECONDS
-from foc_ros.reporting.snapshots import HandTrajectory, Snapshot, parse_label
+from foc_ros.reporting.views import HandTrajectory, Snapshot, parse_label
 
 ONSET_SPEED = 0.05
 """Speed [m/s] above which the hand counts as moving."""

@@ -1,6 +1,5 @@
 // The page: one connection to the server, one frame after the other, and the controls.
 import { Arranging } from './arranging.js';
-import { Drawing, letterOf } from './drawing.js';
 import { Hand } from './hand.js';
 
 const byId = (name) => document.getElementById(name);
@@ -11,18 +10,21 @@ const DELAYS = 200;
 // Time since the last position that was sent [ms] after which an event or a frame sends one.
 const EVENT_MS = 6;
 const FRAME_MS = 12;
+const METRES_PER_NEWTON = 0.02;
+const HAND_RADIUS = 0.006;
+const [START_COLOUR, FORCE_COLOUR, TOUCHED_COLOUR] = ['#009E73', '#009E73', '#D55E00'];
 const TASK_WORDS = {
   none: '', return: 'Go to the green start and rest there.', wait: 'Rest at the start until a goal is lit.', reach: 'Reach the lit goal, and stay there.',
   over: '',
 };
 
 const canvas = byId('scene');
-const drawing = new Drawing(canvas);
-const toScene = (event) => drawing.toScene(event);
+const scene = new Scene(canvas);
+const toScene = (event) => scene.toScene(event);
 const hand = new Hand(canvas, toScene, (time) => moveHand(time, EVENT_MS));
 let isSceneChanged = false;
 const arranging = new Arranging(canvas, toScene, () => { isSceneChanged = true; });
-const view = { scene: arranging.scene, selected: null, goal: null, phase: 'none', candidates: [], hand, hidden: false, touchedMs: -Infinity };
+const view = { unknown: 0, scene: arranging.scene, selected: null, goal: null, phase: 'none', candidates: [], hand, hidden: false, touchedMs: -Infinity };
 // What the page measures: frames per second, the median time from an input to the drawn prediction that was made from it [ms], and
 // how many predictions were drawn.
 const measured = { fps: 0, delayMs: null, predictions: 0, delays: [] };
@@ -43,6 +45,9 @@ let isReplaced = false;
 let lastMs = null;
 let waitingEvents = [];
 const frames = [];
+let predictedMs = 0;
+const OLD_MS = 1000; // after which a prediction is not shown any more
+const REFUSED_MS = 6000; // for which the status line says that something was refused
 let task = { phase: 'none' };
 let job = null;
 
@@ -50,11 +55,48 @@ const send = (message) => {
   if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
 };
 
-function showStatus(isAlive, text) {
+// level: whether all is well, it waits for something, or something fails, as long as the job that failed is shown.
+let failure = '';
+function showStatus(level, text) {
   const box = byId('status');
-  if (box.textContent !== text) box.textContent = text;
-  box.classList.toggle('gone', !isAlive);
-  if (!isAlive) view.candidates = [];
+  const words = failure ? `${failure}${level === 'well' ? '' : `; ${text}`}` : text;
+  if (box.textContent !== words) box.textContent = words;
+  box.className = `status ${failure ? 'failing' : level}`;
+}
+
+function fail(text) {
+  failure = text;
+  showStatus('well', text);
+}
+
+// Returns the corners of an obstacle from its centre, none for a circle.
+function cornersOf({ kind, size_x: length, size_y: width, yaw }) {
+  if (kind !== 'box') return [];
+  const [c, s] = [Math.cos(yaw) / 2, Math.sin(yaw) / 2];
+  return [[1, 1], [-1, 1], [-1, -1], [1, -1]].map(([u, v]) => [u * length * c - v * width * s, u * length * s + v * width * c]);
+}
+
+function draw(now) {
+  scene.begin();
+  if (view.phase !== 'none') scene.disc(settings.start, settings.target_radius, START_COLOUR, { filled: view.phase === 'reach' ? 0 : 0.5 });
+  view.scene.obstacles.forEach((each, row) => scene.obstacle({
+    name: `${row}`, x: each.x, y: each.y, radius: each.radius || 0, stddev: settings.radius_stddev, corners: cornersOf(each),
+  }, each === view.selected));
+  view.scene.goals.forEach((goal, row) => scene.goal([goal.x, goal.y], row, { lit: view.goal === row, selected: goal === view.selected, radius: settings.target_radius }));
+  if (!view.hidden) scene.candidates(view.candidates);
+  const { position, target, force } = hand;
+  if (!view.hidden) { // the distance between pointer and hand tells whether there is guidance
+    if (Math.hypot(...force) > 0.01) scene.line([position, position.map((value, axis) => value + METRES_PER_NEWTON * force[axis])], FORCE_COLOUR, 4);
+    scene.line([target, position], ink('--soft'), 1);
+    scene.disc(target, 0.6 * HAND_RADIUS, ink('--soft'), { width: 1 });
+  }
+  scene.disc(position, HAND_RADIUS, now - view.touchedMs < 400 ? TOUCHED_COLOUR : ink('--ink'), { filled: 1, width: 0 });
+}
+
+// Returns a candidate as the scene draws it.
+function decode(each) {
+  const words = each.description || 'no obstacle in the way';
+  return { ...each, words, text: words, path: decodePath(each), motor: decodeEllipses(each.motor), total: decodeEllipses(each.total) };
 }
 
 function makeTable(columns, rows) {
@@ -74,13 +116,15 @@ const handlers = {
   hello(message) {
     settings = message;
     globalThis.play.settings = message;
-    for (const each of [hand, arranging, drawing]) each.configure(message);
-    byId('status').dataset.predictor = message.predictor;
+    for (const each of [hand, arranging]) each.configure(message);
+    scene.fit(message.bounds);
+    failure = '';
   },
   replaced() {
     isReplaced = true;
     socket.close();
-    showStatus(false, 'Another page has taken over. Load this page again to take it back.');
+    view.candidates = [];
+    fail('Another page has taken over. Load this page again to take it back.');
   },
   scene({ obstacles, goals }) {
     arranging.setScene({ obstacles, goals });
@@ -94,12 +138,15 @@ const handlers = {
     for (const name of ['report', 'fit', 'compare']) byId(name).disabled = message.recording || !message.session;
     byId('compare').disabled ||= !message.fitted;
     if (message.session) byId('session').textContent = `${message.recording ? 'Recording' : 'Recorded'} to ${message.session}`;
+    byId('download').hidden = !message.report;
   },
-  status({ alive, text }) {
-    showStatus(alive, `${byId('status').dataset.predictor}: ${text}`);
+  status({ level, text }) {
+    showStatus(level, text);
   },
-  prediction({ event, candidates }) {
-    view.candidates = candidates;
+  prediction({ event, candidates, unknown }) {
+    view.unknown = unknown;
+    view.candidates = candidates.map(decode);
+    predictedMs = performance.now();
     measured.predictions += 1;
     if (event !== null) waitingEvents.push(event);
   },
@@ -115,7 +162,7 @@ const handlers = {
     view.phase = message.phase;
     view.goal = isRunning ? message.goal : null;
     view.hidden = isRunning && message.blinded;
-    byId('begin').textContent = isRunning ? 'end' : 'begin';
+    byId('begin').textContent = isRunning ? 'end tasks' : 'begin tasks';
     for (const name of ['arrange', 'shuffle', 'restore', 'guidance', 'record', 'parameters']) byId(name).disabled = isRunning;
     if (isRunning) setArranging(false);
     nameRecordButton();
@@ -125,29 +172,38 @@ const handlers = {
     byId('score').replaceChildren(rows.length ? makeTable(columns, rows) : 'No trial was finished.');
   },
   job({ name, state, text, columns, rows, seconds }) {
-    job = state === 'running' ? { name, begunMs: performance.now() } : null;
+    job = state === 'running' ? { name, text, begunMs: performance.now() - 1000 * seconds } : null;
+    failure = state === 'failed' ? `${name} failed` : '';
     showJob();
     if (!job) byId('job').textContent = `${name}: ${text}${seconds ? ` (${seconds} s)` : ''}`;
-    if (name === 'report') byId('download').hidden = state !== 'done';
-    if (columns) byId('result').replaceChildren(makeTable(columns, rows));
+    for (const each of ['cancel', 'progress']) byId(each).hidden = !job || job.name === 'report';
+    if (name === 'report' && state === 'done') byId('download').hidden = false;
+    if (columns) handlers.result({ columns, rows });
+  },
+  result({ columns, rows }) {
+    byId('result').replaceChildren(makeTable(columns, rows));
   },
   error({ text }) {
     byId('job').textContent = `refused: ${text}`;
+    fail(`refused: ${text}`);
+    setTimeout(() => { failure = ''; }, REFUSED_MS);
   },
 };
 
 // Tasks end the recording that belongs to them.
 function nameRecordButton() {
-  byId('record').textContent = byId('record').dataset.on === 'true' && task.phase === 'none' ? 'end the recording' : 'record without tasks';
+  byId('record').textContent = byId('record').dataset.on === 'true' && task.phase === 'none' ? 'end recording' : 'record';
 }
 
-// Says that a job is running, and every 10 s for how long.
+// Says what a job does, and for how long; a share of a whole in its words, such as `20 of 60`, moves the bar.
 function showJob() {
   if (!job) return;
-  const seconds = 10 * Math.floor((performance.now() - job.begunMs) / 10_000);
-  const time = seconds ? ` for ${seconds} s` : job.name === 'report' ? '' : ', for some minutes';
-  const text = `${job.name}: working${time}; you can go on playing`;
+  const seconds = Math.floor((performance.now() - job.begunMs) / 1000);
+  const text = `${job.name}: ${job.text}, for ${seconds} s${job.name === 'report' ? '' : ' of some minutes'}; you can go on playing`;
   if (byId('job').textContent !== text) byId('job').textContent = text;
+  const [, done, whole] = job.text.match(/(\d+) of (\d+)/) || [];
+  if (whole) [byId('progress').max, byId('progress').value] = [Number(whole), Number(done)];
+  else byId('progress').removeAttribute('value');
 }
 
 function connect() {
@@ -158,7 +214,8 @@ function connect() {
   });
   socket.addEventListener('close', () => {
     if (isReplaced) return;
-    showStatus(false, 'The server is gone; trying again.');
+    view.candidates = [];
+    fail('The server is gone; trying again.');
     setTimeout(connect, RETRY_MS);
   });
 }
@@ -172,19 +229,20 @@ function setArranging(on) {
 }
 
 let shownWays = '';
-// Writes the table of candidates if it has changed.
+// Writes the table of candidates, with bars in the colours of their paths, if it has changed.
 function showWays() {
-  const rows = view.hidden ? [] : view.candidates.map((each) => [letterOf(each.slot), each.likelihood, `goal ${each.goal}`]);
-  const key = JSON.stringify(rows.map(([letter, likelihood, goal]) => [letter, Math.round(100 * likelihood), goal]));
+  const rows = view.hidden ? [] : view.candidates.filter(({ likelihood }) => likelihood !== null);
+  if (rows.length && view.unknown >= 0.005) rows.push({ slot: null, likelihood: view.unknown, words: 'no likelihood is known', ghost: '' });
+  const key = JSON.stringify(rows.map(({ slot, likelihood, words, ghost }) => [slot, Math.round(100 * likelihood), words, ghost]));
   if (key === shownWays) return;
   shownWays = key;
-  byId('ways').tBodies[0].replaceChildren(...rows.map(([letter, likelihood, goal]) => {
+  byId('ways').tBodies[0].replaceChildren(...rows.map(({ slot, likelihood, words, ghost }) => {
     const line = document.createElement('tr');
-    const meter = document.createElement('meter');
-    [meter.value, meter.ariaLabel] = [likelihood, 'likelihood'];
-    for (const content of [letter, meter, `${Math.round(100 * likelihood)} %`, goal]) {
-      line.insertCell().append(content);
-    }
+    const [letter, bar, filling] = ['span', 'span', 'i'].map((tag) => document.createElement(tag));
+    [letter.className, letter.textContent, letter.style.borderColor] = ['letter', letterOf(slot), colourOf(slot)];
+    [bar.className, filling.style.width, filling.style.background] = ['bar', `${100 * likelihood}%`, colourOf(slot)];
+    bar.append(filling);
+    for (const content of [letter, bar, percent(likelihood), `${words}${ghost ? `; ${ghost}` : ''}`]) line.insertCell().append(content);
     return line;
   }));
 }
@@ -220,8 +278,9 @@ function frame(time) {
     send({ type: 'scene', ...arranging.scene });
     isSceneChanged = false;
   }
+  if (time - predictedMs > OLD_MS) view.candidates = [];
   [view.scene, view.selected] = [arranging.scene, arranging.selected];
-  drawing.draw(view, time);
+  draw(time);
   measure(time);
   if (time - shownMs > 250) {
     shownMs = time;
@@ -252,7 +311,8 @@ byId('begin').addEventListener('click', () => {
   canvas.focus();
 });
 for (const name of ['report', 'fit', 'compare']) byId(name).addEventListener('click', () => send({ type: 'job', name }));
-addEventListener('resize', () => settings && drawing.resize());
-redraws.push(() => drawing.readColours()); // of frame.js, which switches between dark and light
+byId('cancel').addEventListener('click', () => send({ type: 'cancel' }));
+addEventListener('resize', () => settings && scene.resize());
+writeLegend(byId('signs'), ['hand', 'pointer', 'force', 'path', 'compromised', 'ghost', 'motor', 'total', 'obstacle', 'goal']);
 connect();
 requestAnimationFrame(frame);

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterable, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -28,15 +29,8 @@ def read_part(name: str) -> str:
     return (FOLDER / name).read_text(encoding='utf-8')
 
 
-def load_plotly() -> str:
-    """Return the source of plotly.js with its licence header."""
-    from plotly.offline import get_plotlyjs
-
-    return str(get_plotlyjs())
-
-
 _TEMPLATES = Environment(autoescape=True, undefined=StrictUndefined, loader=FileSystemLoader(FOLDER), trim_blocks=True)
-_TEMPLATES.globals.update(policy=POLICY, mark=MARK, source=read_part, plotly=load_plotly)
+_TEMPLATES.globals.update(policy=POLICY, mark=MARK, source=read_part)
 _TEMPLATES.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
 _PARTS: Any = _TEMPLATES.get_template('parts.html').module
 
@@ -74,9 +68,11 @@ def render_list(sentences: Iterable[str]) -> str:
     return str(_PARTS.list(sentences))
 
 
-def render_picture(file: Path, caption: str) -> str:
-    """Return a figure as HTML that contains a PNG file."""
-    return str(_PARTS.picture(base64.b64encode(file.read_bytes()).decode('ascii'), caption))
+def render_figure(figure: Any, caption: str) -> str:
+    """Return a matplotlib figure with its caption as HTML that contains it as PNG."""
+    png = BytesIO()
+    figure.savefig(png, format='png', bbox_inches='tight', pad_inches=0.08, metadata={'Software': MARK})
+    return str(_PARTS.picture(base64.b64encode(png.getvalue()).decode('ascii'), caption))
 
 
 def render_pictures(figures: Iterable[str]) -> str:

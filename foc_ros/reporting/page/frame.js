@@ -1,11 +1,16 @@
 'use strict';
-const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+// Colours of the page by name, which are read again after a switch between dark and light.
+let inks = {};
+const ink = (name) => (inks[name] ??= getComputedStyle(document.documentElement).getPropertyValue(name).trim());
 const readData = (name) => JSON.parse(document.getElementById(name).textContent);
 // Functions that draw the charts again after a switch between dark and light.
 const redraws = [];
 const root = document.documentElement;
 const systemDark = matchMedia('(prefers-color-scheme: dark)');
-const redraw = () => redraws.forEach((each) => each());
+const redraw = () => {
+  inks = {};
+  redraws.forEach((each) => each());
+};
 document.getElementById('theme').addEventListener('click', () => {
   const dark = root.dataset.theme ? root.dataset.theme === 'dark' : systemDark.matches;
   root.dataset.theme = dark ? 'light' : 'dark';

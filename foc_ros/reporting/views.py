@@ -1,15 +1,16 @@
-"""Snapshots of predictions for display: plain arrays, built from the predictor's records or from the node's messages."""
+"""Predictions for display: plain arrays, from the predictor's records or the node's messages; and their tracks over time."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from foc_ros.core.errors import MessageError
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.plant.response import compute_curve
 from foc_ros.core.types import (
     LEFT,
@@ -28,6 +29,10 @@ from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS
 from foc_ros.ros.messages.plane import project
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate, find_drawn_curve, order_candidates
 
+COLOURS, SLOTS = 6, 12
+"""Numbers of colours, and of the letters that tell candidates apart: the letters beyond F have the same colours again."""
+GRAZE_M = 1e-3
+"""Depth [m] up to which a path within an obstacle counts as one along its boundary."""
 Sides = dict[str, int]
 """Side (LEFT or RIGHT) of each obstacle by its id."""
 
@@ -72,6 +77,15 @@ class CandidateView(Record):
         """The path as a smooth curve (l, 2) [m], l >= m."""
         return compute_curve(self.path, self.velocity, float(self.times[1] - self.times[0]) if len(self.times) > 1 else 0.0)
 
+    def begin_at(self, hand: Array) -> CandidateView:
+        """Return the view with a path from a position (2,) [m], which merges into the old one as by a minimum-jerk movement."""
+        if len(self.path) < 2:
+            return self
+        s, rate = np.linspace(0.0, 1.0, len(self.path)), 1.0 / float(self.times[-1])
+        fall, slope = 1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2), -30.0 * rate * s**2 * (1.0 - s) ** 2
+        apart = hand - self.path[0]
+        return replace(self, path=self.path + np.outer(fall, apart), velocity=self.velocity + np.outer(slope, apart))
+
 
 @dataclass(frozen=True, eq=False)
 class UnsolvedView(Record):
@@ -92,7 +106,8 @@ class Snapshot(Record):
     """One prediction and its scene.
 
     candidates: those with a likelihood, most likely first; most_likely: label, None if no candidate has one; unsolved: the other
-    candidates; solve_s: wall time [s], None if it is unknown; unknown_share: of the likelihood, which no candidate has.
+    candidates; solve_s: wall time [s], None if it is unknown; hand (2,): position of the hand [m], None if it is unknown;
+    cleared: names of the obstacles that the hand passes above or below; unknown_share: of the likelihood, which no candidate has.
     """
 
     stamp_ns: int
@@ -102,7 +117,44 @@ class Snapshot(Record):
     most_likely: str | None
     unsolved: tuple[UnsolvedView, ...] = ()
     solve_s: float | None = None
+    hand: Array | None = None
+    cleared: Collection[str] = ()
     unknown_share: float = 0.0
+
+    def begin_at(self, hand: Array) -> Snapshot:
+        """Return the snapshot with paths that begin at the hand (2,) [m].
+
+        An answer that is kept for a moment after the last one, because the computer was too busy for a new one, begins where the
+        hand was expected then. The filtered hand, where all others begin, is about a millimetre beside the measured one.
+        """
+        candidates = tuple(each.begin_at(hand) for each in self.candidates)
+        unsolved = tuple(replace(each, path=np.concatenate([hand[None], each.path[1:]])) for each in self.unsolved)
+        return replace(self, candidates=candidates, unsolved=unsolved, hand=hand)
+
+    def find_entered(self, view: CandidateView) -> str:
+        """Return the name of the first obstacle that a path leads through, empty if it leads through none.
+
+        The obstacles have their mean sizes and move on at their velocities. The beginning of a path within an obstacle that the
+        hand is in does not count, nor do depths of less than GRAZE_M.
+        """
+        rows = [row for row, name in enumerate(self.obstacles.ids) if name not in self.cleared]
+        curve, blocking = view.curve, self.obstacles.take(rows)
+        if not rows or not len(curve):
+            return ''
+        times = np.linspace(view.times[0], view.times[-1], len(curve))
+        centres = blocking.centre + times[:, None, None] * blocking.velocity
+        depths = blocking.radius - measure_offsets(curve, blocking, centres)[1]
+        is_inside = depths > GRAZE_M
+        has_left = np.maximum.accumulate(~is_inside, axis=0)
+        entered = np.argwhere(is_inside & has_left)
+        return blocking.ids[int(entered[0, 1])] if len(entered) else ''
+
+    def describe_ghost(self, view: CandidateView | UnsolvedView) -> str:
+        """Return why a path is no proper prediction: it could not be solved, or leads through an obstacle; otherwise ''."""
+        if isinstance(view, UnsolvedView):
+            return view.status.replace('_', ' ')
+        name = self.find_entered(view)
+        return f'leads through obstacle {name}' if name else ''
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +191,12 @@ class HandTrajectory(Record):
         """Return the rows with start_ns <= stamp <= end_ns."""
         return slice(int(np.searchsorted(self.stamps_ns, start_ns)), int(np.searchsorted(self.stamps_ns, end_ns, side='right')))
 
+    def position_at(self, stamp_ns: int) -> Array:
+        """Return the position (2,) [m] at a stamp: the last one until then, the first one before all."""
+        row = int(np.searchsorted(self.stamps_ns, stamp_ns, side='right')) - 1
+        position: Array = self.positions[max(row, 0)]
+        return position
+
     def find_movements(self, onset_speed: float, gap_s: float = 0.15, least_m: float = 0.03) -> list[tuple[int, int]]:
         """Return start and end [ns] of every movement.
 
@@ -173,15 +231,19 @@ def build_candidate_views(candidates: Sequence[PredictedCandidate], goals: int =
 
 def _build_candidate_view(candidate: PredictedCandidate, cost_ratio: float, goals: int) -> CandidateView:
     solution = candidate.solution
-    numbers = candidate.likelihood, solution.effort, cost_ratio, solution.eta
-    arrays = solution.path, solution.mean[:, 2:4], solution.covariance[:, :2, :2], candidate.motor_covariance[:, :2, :2]
     return CandidateView(
         candidate.label,
         describe_candidate(candidate, goals),
         not candidate.is_solved,
-        *numbers,
+        candidate.likelihood,
+        solution.effort,
+        cost_ratio,
+        solution.eta,
         solution.times,
-        *arrays,
+        solution.path,
+        solution.mean[:, 2:4],
+        solution.covariance[:, :2, :2],
+        candidate.motor_covariance[:, :2, :2],
         candidate.way,
     )
 
@@ -211,12 +273,22 @@ def _describe_label(label: str, ids: Collection[str], goals: int) -> str:
 
 
 def build_snapshot(prediction: Prediction) -> Snapshot:
-    """Return the snapshot of a prediction; raises FocError if the prediction holds a number that is not finite."""
-    unsolved = build_unsolved_views(prediction.candidates, len(prediction.goals))
-    candidates = build_candidate_views(order_candidates(prediction), len(prediction.goals))
-    scene = prediction.obstacles, prediction.goals
-    best, solve_s = prediction.most_likely, prediction.solve_s
-    return Snapshot(prediction.stamp_ns, *scene, candidates, best, unsolved, solve_s, prediction.unknown)
+    """Return the snapshot of a prediction; raises FocError if the prediction holds a number that is not finite.
+
+    The hand is where the guesses of the search begin.
+    """
+    return Snapshot(
+        prediction.stamp_ns,
+        prediction.obstacles,
+        prediction.goals,
+        build_candidate_views(order_candidates(prediction), len(prediction.goals)),
+        prediction.most_likely,
+        build_unsolved_views(prediction.candidates, len(prediction.goals)),
+        prediction.solve_s,
+        next((each.candidate.guess[0] for each in sorted(prediction.candidates, key=lambda each: each.age_s)), None),
+        tuple(name for name, is_cleared in zip(prediction.obstacles.ids, prediction.cleared, strict=False) if is_cleared),
+        prediction.unknown,
+    )
 
 
 def is_same_prediction(cloud: Any, likelihoods: Any) -> bool:
@@ -232,7 +304,7 @@ def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles
     """
     if not is_same_prediction(cloud, likelihoods):
         raise MessageError('likelihoods', 'those of the prediction', 'those of another prediction')
-    rows, columns = _read_cloud(cloud), _read_likelihoods(likelihoods)
+    rows, columns = _read_cloud(cloud), np.asarray(likelihoods.data, dtype=float).reshape(-1, len(LIKELIHOOD_COLUMNS))
     labels = likelihoods.layout.dim[0].label.split(';') if len(columns) else []
     unknown = 0.0 if labels else 1.0
     if labels and labels[-1] == UNKNOWN:
@@ -241,8 +313,15 @@ def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles
     for number, (label, values) in enumerate(zip(labels, columns, strict=True)):
         name = label, _describe_label(label, obstacles.ids, len(goals))
         candidates.append(_read_candidate(name, values, rows[rows['candidate'] == number], plane))
-    best = candidates[0].label if candidates else None
-    return Snapshot(decode_stamp(cloud.header), obstacles, goals, tuple(candidates), best, unknown_share=unknown)
+    cleared = []
+    if len(rows) and len(obstacles):
+        height = project(np.stack([rows[axis].astype(float) for axis in 'xyz'], axis=-1), plane)[1]
+        is_cleared = (height.min() > obstacles.heights[:, 1]) | (height.max() < obstacles.heights[:, 0])
+        cleared = [name for name, is_out in zip(obstacles.ids, is_cleared, strict=True) if is_out]
+    most_likely = candidates[0].label if candidates else None
+    return Snapshot(
+        decode_stamp(cloud.header), obstacles, goals, tuple(candidates), most_likely, cleared=cleared, unknown_share=unknown
+    )
 
 
 def _read_candidate(name: tuple[str, str], values: Array, rows: Any, plane: str) -> CandidateView:
@@ -267,5 +346,68 @@ def _read_cloud(cloud: Any) -> Any:
     return np.frombuffer(cloud.data, dtype=CLOUD_ROW) if len(cloud.data) else np.zeros(0, dtype=CLOUD_ROW)
 
 
-def _read_likelihoods(likelihoods: Any) -> Array:
-    return np.asarray(likelihoods.data, dtype=float).reshape(-1, len(LIKELIHOOD_COLUMNS))
+@dataclass(frozen=True)
+class CandidateTracks:
+    """Snapshots with their candidates associated over time: a track has the candidates whose class has the same number.
+
+    tracks: for each snapshot, the number of the track of each candidate, by label; slots: of each track, the slot that gives its
+    letter and colour. Tracks without a slot are missing there.
+    """
+
+    snapshots: Sequence[Snapshot]
+    tracks: Sequence[Mapping[str, int]]
+    slots: Mapping[int, int]
+
+    def between(self, start_ns: int, end_ns: int) -> CandidateTracks:
+        """Return the part with start_ns <= stamp <= end_ns."""
+        rows = [row for row, each in enumerate(self.snapshots) if start_ns <= each.stamp_ns <= end_ns]
+        return CandidateTracks([self.snapshots[row] for row in rows], [self.tracks[row] for row in rows], self.slots)
+
+    def slots_at(self, row: int) -> dict[str, int]:
+        """Return the slots of the candidates of one snapshot, by label."""
+        return {label: self.slots[track] for label, track in self.tracks[row].items() if track in self.slots}
+
+    def likelihoods(self) -> dict[int, tuple[int, Array]]:
+        """Return, for each track, its first row and its likelihoods from there on, NaN where it has no candidate."""
+        known: dict[int, dict[int, float]] = {}
+        for row, (snapshot, tracks) in enumerate(zip(self.snapshots, self.tracks, strict=True)):
+            for each in snapshot.candidates:
+                known.setdefault(tracks[each.label], {})[row] = each.likelihood
+        return {
+            track: (min(rows), np.array([rows.get(row, np.nan) for row in range(min(rows), max(rows) + 1)]))
+            for track, rows in sorted(known.items())
+        }
+
+
+def build_candidate_tracks(snapshots: Sequence[Snapshot]) -> CandidateTracks:
+    """Return the candidates of successive snapshots by track, and give the tracks their letters and colours.
+
+    A track has the candidates of one class. Tracks are numbered from 0 in order of their appearance, whatever the classes were
+    numbered before the first snapshot.
+    """
+    numbers: dict[int, int] = {}
+    tracks = [{each.label: numbers.setdefault(each.way, len(numbers)) for each in snapshot.candidates} for snapshot in snapshots]
+    return CandidateTracks(snapshots, tracks, assign_slots(snapshots, tracks))
+
+
+def assign_slots(
+    snapshots: Sequence[Snapshot], tracks: Sequence[Mapping[str, int]], count: int = SLOTS, colours: int = COLOURS
+) -> dict[int, int]:
+    """Return the slot in [0, count) of each track; simultaneous tracks have different slots.
+
+    Tracks that begin together receive their slots in order of likelihood. A slot whose colour (slot modulo colours) is unused at
+    that time is preferred, then the one that has been free for longest. A track that finds no free slot has none.
+    """
+    last_row = {track: row for row, numbers in enumerate(tracks) for track in numbers.values()}
+    slots: dict[int, int] = {}
+    begun: set[int] = set()
+    taken_until = dict.fromkeys(range(count), -1)
+    for row, (snapshot, numbers) in enumerate(zip(snapshots, tracks, strict=True)):
+        for track in (numbers[each.label] for each in snapshot.candidates):
+            free = [slot for slot, until in taken_until.items() if until < row]
+            if track not in begun and free:
+                used = {slot % colours for slot, until in taken_until.items() if until >= row}
+                slots[track] = min(free, key=lambda slot: (slot % colours in used, taken_until[slot], slot))
+                taken_until[slots[track]] = last_row[track]
+            begun.add(track)
+    return slots

@@ -1,4 +1,4 @@
-"""The page of a fit: fitted values beside given ones, with escaped text."""
+"""The pages of evaluations and fits: pictures with their intervals, fitted values beside given ones, with escaped text."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
+from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PUBLISHED, REFITTED
 from foc_ros.core.errors import InputError
+from foc_ros.reporting.draw import open_figure
+from foc_ros.reporting.evaluation_report import _draw_reliability
 from foc_ros.reporting.fit_report import write_report
 
 ANSWER = {
@@ -39,12 +42,29 @@ def test_the_page_holds_values_intervals_scores_and_warnings(tmp_path: Path) -> 
     assert page.count('<img') == 1
 
 
-def test_a_fit_without_parameters_has_tables_only(tmp_path: Path) -> None:
+def test_a_fit_without_parameters_has_tables_only_and_a_folder_that_cannot_be_written_is_rejected(tmp_path: Path) -> None:
     write_report(tmp_path, 'x', ANSWER | {'parameters': {}})
     assert '<img' not in (tmp_path / 'fit.html').read_text(encoding='utf-8')
-
-
-def test_a_folder_that_cannot_be_written_is_rejected(tmp_path: Path) -> None:
     (tmp_path / 'file').write_text('mine')
     with pytest.raises(InputError, match='--report'):
         write_report(tmp_path / 'file', 'x', ANSWER)
+
+
+BINS = [
+    {'count': 3, 'confidence': 0.45, 'right': 0.5, 'interval': [0.2, 0.7]},
+    {'count': 0, 'confidence': None, 'right': None, 'interval': None},
+    {'count': 40, 'confidence': 0.85, 'right': 0.9, 'interval': [0.8, 0.95]},
+]
+
+
+def test_a_reliability_plot_has_error_bars_and_counts() -> None:
+    names = PUBLISHED, REFITTED, BOLTZMANN
+    with open_figure(3.0, 3.0) as figure:
+        axes = figure.subplots()
+        _draw_reliability(axes, 'way', {name: {'reliability': BINS} for name in names})
+    assert len(axes.containers) == len(names)
+    for container in axes.containers:
+        _, _, (bars,) = container.lines
+        ends = [segment[:, 1].tolist() for segment in bars.get_segments()]
+        assert ends == [pytest.approx([0.2, 0.7]), pytest.approx([0.8, 0.95])]
+    assert [text.get_text() for text in axes.texts] == ['3', '40']

@@ -1,0 +1,144 @@
+"""The pipeline and the guidance of the node, without a node, in two threads of this process."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from logging import getLogger
+from queue import SimpleQueue
+from threading import Thread
+from time import monotonic
+from typing import Any, Literal
+
+from foc_ros.core.config import Config
+from foc_ros.core.deadline import Deadline
+from foc_ros.core.guidance.step import GuidanceOutput
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.predict import warm_up
+from foc_ros.core.types import Prediction
+from foc_ros.io.class_library import load_library
+from foc_ros.io.topics import HAND
+from foc_ros.ros.guidance_loop import GuidanceLoop
+from foc_ros.ros.intake import Intake
+from foc_ros.ros.messages.encode_guidance import Place
+
+REMEMBERED = 20
+"""Number of predictions from which the state is told."""
+LATE_SHARE = 0.5
+"""Share of them that came too late, from which the computer is called busy."""
+Outcome = Prediction | tuple[GuidanceOutput, Place]
+"""A prediction, or guidance and where it holds."""
+Receive = Callable[[Outcome], None]
+
+
+@dataclass(frozen=True)
+class State:
+    """What the predictor does, in words; level: whether all is well, it waits for something, or something fails."""
+
+    level: Literal['well', 'waiting', 'failing']
+    text: str
+
+
+class Predictor:
+    """Takes messages of the inputs, and passes on predictions and guidance, between `start` and `stop`.
+
+    Parameters
+    ----------
+    config
+        The parameters with which it begins.
+    receive
+        Called with every outcome, in another thread.
+    """
+
+    def __init__(self, config: Config, receive: Receive) -> None:
+        self.config = config
+        self._receive = receive
+        self._intake = Intake(Pipeline(config, load_library(config.homotopy.library)))
+        self._queue: SimpleQueue[tuple[str, Any] | Config | None] = SimpleQueue()
+        self._error = ''
+        self._recent: deque[Prediction] = deque(maxlen=REMEMBERED)
+        self._guidance = GuidanceLoop(config, self._send_guidance, self._note_error, getLogger(__name__).warning)
+        self._thread = Thread(target=self._run, name='prediction', daemon=True)
+
+    def start(self) -> None:
+        """Begin to predict."""
+        warm_up(self.config)
+        self._guidance.set_released(False)
+        self._guidance.start()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End both threads; nothing is received after that."""
+        self._queue.put(None)
+        self._thread.join()
+        self._guidance.stop()
+
+    def send(self, role: str, message: Any) -> None:
+        """Take a message of an input."""
+        self._queue.put((role, message))
+
+    def configure(self, config: Config) -> None:
+        """Use other parameters, after the messages that were sent before; movement and scene are kept."""
+        self._queue.put(config)
+
+    def check(self) -> State:
+        """Return the state; an internal error ends a prediction, and not the thread."""
+        recent, reason = list(self._recent), self._intake.pipeline.not_ready_reason()
+        if not self._thread.is_alive():
+            return State('failing', 'predictions have ended: start `foc_ros play` again')
+        if self._error:
+            return State('failing', self._error)
+        if reason:
+            return State('waiting', reason)
+        if recent and not recent[-1].candidates_with_likelihood:
+            return State('failing', 'no path to any goal can be found')
+        if sum(_is_late(each) for each in recent) > LATE_SHARE * REMEMBERED:
+            return State('failing', 'this computer is too busy for new paths: those from before are shown; end other programs')
+        return State('well', 'predicting')
+
+    def _run(self) -> None:
+        while True:
+            waiting = [self._queue.get()]
+            while not self._queue.empty():
+                waiting.append(self._queue.get())
+            for each in waiting:
+                if each is None:
+                    return
+                self._take(each)
+            try:
+                self._predict()
+            except Exception as error:
+                self._note_error(error)
+                self._intake.pipeline.reset()
+
+    def _take(self, given: tuple[str, Any] | Config) -> None:
+        if isinstance(given, Config):
+            self.config = given
+            self._intake.pipeline.reconfigure(given)
+            self._guidance.reconfigure(given)
+            return
+        role, message = given
+        self._intake.take(role, message)
+        if role == HAND:
+            self._guidance.note_hand(self._intake.pipeline.hand_state, monotonic())
+
+    def _predict(self) -> None:
+        pipeline, received_s = self._intake.pipeline, monotonic()
+        prediction = pipeline.predict(Deadline(pipeline.config.budget_s or None)) if pipeline.is_due else None
+        if prediction is not None:
+            self._error = ''
+            self._recent.append(prediction)
+            self._guidance.note_prediction(prediction, received_s)
+            self._receive(prediction)
+
+    def _send_guidance(self, output: GuidanceOutput, place: Place) -> None:
+        self._receive((output, place))
+
+    def _note_error(self, error: Exception) -> None:
+        self._error = f'internal error: {error}'
+
+
+def _is_late(prediction: Prediction) -> bool:
+    """Return whether no path of a prediction is new."""
+    return bool(prediction.candidates_with_likelihood) and all(each.age_s for each in prediction.candidates_with_likelihood)

@@ -1,0 +1,150 @@
+"""The recording of a session: its files, and its report.
+
+DIR/2026-01-31_12-00-00/parameters.yaml   what it began with
+DIR/2026-01-31_12-00-00/session           inputs and outputs of the whole session
+DIR/2026-01-31_12-00-00/unguided/         trials without guidance: trial_001, trial_002, ...; `fit` and `evaluate` read them
+DIR/2026-01-31_12-00-00/guided/           trials with guidance
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from datetime import datetime
+from pathlib import Path
+from time import time_ns
+from typing import Any
+
+import numpy as np
+
+from foc_ros.core.config import Config
+from foc_ros.core.errors import InputError, RecordingError
+from foc_ros.core.guidance.step import GuidanceOutput
+from foc_ros.core.types import NANOSECONDS, HandSample, Prediction, as_readonly
+from foc_ros.io.bags import TYPESTORE, BagWriter
+from foc_ros.io.topics import TYPES
+from foc_ros.reporting.report import Table, write_report
+from foc_ros.reporting.views import Snapshot, build_hand_trajectory
+from foc_ros.ros.messages.encode_guidance import GUIDANCE_OUTPUTS, Place
+from foc_ros.ros.messages.encode_prediction import encode_outputs
+from foc_ros.ros.messages.types import MessageTypes
+from foc_ros.ros.parameters import write_parameter_file
+
+from .scene import FRAME, Point
+
+SESSION, UNGUIDED, GUIDED = 'session', 'unguided', 'guided'
+PARAMETERS, OPERATOR = 'parameters.yaml', 'operator.yaml'
+"""Files of a session: the parameters that it began with, and those that were fitted to it."""
+NODE = '/foc'
+"""Name of the node in the topics of the outputs."""
+SENT = ('prediction', 'likelihoods')
+"""Outputs of a prediction that are recorded; markers and path say nothing more."""
+PERIOD_NS = NANOSECONDS // 20
+"""Shortest time between two predictions that are reported [ns]; a page of an hour would be too large otherwise."""
+
+
+class Recording:
+    """Writes the bags of one session, and keeps what its report shows.
+
+    Attributes: folder; scores, a table of the report, None before tasks have ended.
+
+    Parameters
+    ----------
+    data
+        The folder for the folders of sessions.
+    config
+        The parameters at the beginning.
+    scene
+        The present message of `obstacles` and of `goals`, so that the bag has a scene before the first hand.
+    types
+        Makes the messages of the outputs.
+    """
+
+    def __init__(self, data: Path, config: Config, scene: Mapping[str, Any], types: MessageTypes) -> None:
+        self.folder = _make_folder(data)
+        self.scores: Table | None = None
+        self._types, self._scene = types, dict[str, bytes]()
+        self._trial: list[tuple[str, bytes, int]] | None = None
+        self._trials = {UNGUIDED: 0, GUIDED: 0}
+        self._samples: list[HandSample] = []
+        self._snapshots: list[Snapshot] = []
+        write_parameter_file('--data', self.folder / PARAMETERS, config)
+        self._bag = BagWriter(self.folder / SESSION).__enter__()
+        for role, message in scene.items():
+            self.add_input(role, message)
+
+    def add_hand(self, stamp_ns: int, position: Point) -> None:
+        """Keep a hand sample for the report."""
+        self._samples.append(HandSample(stamp_ns, as_readonly(np.array(position)), 0.0, FRAME))
+
+    def add_input(self, role: str, message: Any) -> None:
+        """Record a message to the predictor."""
+        now_ns, raw = time_ns(), _serialize(message)
+        self._bag.write_raw(f'/{role}', TYPES[role], raw, now_ns)
+        if role in ('obstacles', 'goals'):
+            self._scene[role] = raw
+        if self._trial is not None:
+            self._trial.append((role, raw, now_ns))
+
+    def add_prediction(self, prediction: Prediction, snapshot: Snapshot) -> None:
+        """Record a prediction, and keep its snapshot for the report."""
+        if not self._snapshots or snapshot.stamp_ns - self._snapshots[-1].stamp_ns >= PERIOD_NS:
+            self._snapshots.append(snapshot)
+        self._add_outputs(encode_outputs(prediction, prediction.obstacles, 'xy', self._types, SENT))
+
+    def add_guidance(self, output: GuidanceOutput, place: Place) -> None:
+        """Record guidance."""
+        self._add_outputs({name: encode(output, place, self._types) for name, (_, encode) in GUIDANCE_OUTPUTS.items()})
+
+    def begin_trial(self) -> None:
+        """Record the inputs for a trial from now on."""
+        self._trial = [(role, raw, time_ns()) for role, raw in self._scene.items()]
+
+    def end_trial(self, is_guided: bool) -> None:
+        """Write the bag of the trial."""
+        assert self._trial is not None
+        kind = GUIDED if is_guided else UNGUIDED
+        self._trials[kind] += 1
+        (self.folder / kind).mkdir(exist_ok=True)
+        with BagWriter(self.folder / kind / f'trial_{self._trials[kind]:03d}') as bag:
+            for role, raw, log_ns in self._trial:
+                bag.write_raw(f'/{role}', TYPES[role], raw, log_ns)
+        self._trial = None
+
+    def discard(self, error: RecordingError) -> None:
+        """Remove the bag of the session, after an error in writing; the bags of trials stay."""
+        with suppress(RecordingError):
+            self._bag.__exit__(type(error), error, None)
+
+    def close(self) -> None:
+        """End the session; a trial that is not over has no bag of its own."""
+        self._bag.__exit__(None, None, None)
+
+    def write_report(self) -> Path:
+        """Write the report and return its page; raises InputError where that is impossible."""
+        directory, tables = self.folder / 'report', [] if self.scores is None else [self.scores]
+        title = f'Session {self.folder.name}'
+        files: Sequence[Path] = write_report(directory, title, build_hand_trajectory(self._samples), self._snapshots, {}, tables)
+        return files[0]
+
+    def _add_outputs(self, messages: Mapping[str, Any]) -> None:
+        for name, message in messages.items():
+            self._bag.write_raw(f'{NODE}/{name}', message.__msgtype__, _serialize(message), time_ns())
+
+
+def _serialize(message: Any) -> bytes:
+    return bytes(TYPESTORE.serialize_cdr(message, message.__msgtype__))
+
+
+def _make_folder(data: Path) -> Path:
+    """Make a folder for a session, named by the time of day; raises InputError."""
+    name = datetime.now().astimezone().strftime('%Y-%m-%d_%H-%M-%S')
+    try:
+        data.mkdir(parents=True, exist_ok=True)
+        number = 1
+        while (folder := data / (name if number == 1 else f'{name}_{number}')).exists():
+            number += 1
+        folder.mkdir()
+    except OSError as error:
+        raise InputError('--data', 'a folder that can be written', f'{data}: {error.strerror}') from error
+    return folder

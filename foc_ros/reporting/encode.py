@@ -1,0 +1,193 @@
+"""Predictions as plain values for pages, small enough for a phone; `page/scene.js` draws them.
+
+Lengths are whole tenths of a millimetre, speeds whole millimetres per second. A list of them holds the first value and then the
+differences.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from foc_ros.core.obstacles.geometry import find_limits
+from foc_ros.core.types import NANOSECONDS, Array, Obstacles, make_obstacles
+
+from .draw import ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, STDDEVS, Bounds, Span, compute_bounds, compute_ellipse_axes
+from .views import CandidateTracks, CandidateView, HandTrajectory, Snapshot, UnsolvedView
+
+LENGTH, SPEED, TIME = 1e-4, 1e-3, 1e-3
+"""Units [m], [m/s], [s]."""
+MOST_FRAMES, MOST_TIMES, MOST_HAND_SAMPLES = 500, 4000, 4000
+"""Numbers of predictions, evenly spread, at which the slider of a report stops, and of which likelihoods are drawn."""
+MOST_BYTES = 1_250_000
+"""Size of the data of a report, beyond which the slider stops at fewer predictions."""
+PATH_POINTS, UNSOLVED_POINTS = 26, 13
+DRAWN_PERCENTILES = (0.5, 99.5)
+"""Percentiles of the paths' coordinates that fit into the scene: a single outlying prediction does not change its scale."""
+
+
+def encode_report(hand: HandTrajectory, tracks: CandidateTracks, spans: Sequence[Span], bounds: Bounds) -> dict[str, Any]:
+    """Return everything that the page of a report draws, of at most MOST_BYTES; spans: of the movements.
+
+    count: of the predictions; times [s] after the first hand sample, solve_ms and unknown share of those that are drawn; tracks:
+    for each its slot, the row of its first prediction and its likelihoods from there on; frames: the predictions at which the
+    slider stops. Obstacles, goals and labels are stored once and referred to by their row.
+    """
+    count, most = len(tracks.snapshots), MOST_FRAMES
+    kept = select_evenly(count, MOST_TIMES).tolist() if count else []
+    tracks = CandidateTracks([tracks.snapshots[row] for row in kept], [tracks.tracks[row] for row in kept], tracks.slots)
+    while True:
+        data = _ReportData(hand, tracks).build(spans, bounds, most) | {'count': count}
+        size = len(json.dumps(data, separators=(',', ':')))
+        if size <= MOST_BYTES or most <= 1:
+            return data
+        most = max(1, int(0.95 * most * MOST_BYTES / size))
+
+
+class _ReportData:
+    """Builder of the data of a report."""
+
+    def __init__(self, hand: HandTrajectory, tracks: CandidateTracks) -> None:
+        self._hand, self._tracks = hand, tracks
+        self._origin_ns = int(hand.stamps_ns[0])
+        self._scenes: dict[str, int] = {}
+        self._goals: dict[str, int] = {}
+        self._labels: dict[str, int] = {'': 0}
+
+    def build(self, spans: Sequence[Span], bounds: Bounds, most: int) -> dict[str, Any]:
+        """Return the data with at most so many frames."""
+        snapshots, hand = self._tracks.snapshots, self._hand
+        frames = [self._encode_frame(row) for row in (select_evenly(len(snapshots), most).tolist() if snapshots else [])]
+        samples = select_evenly(len(hand.stamps_ns), MOST_HAND_SAMPLES)
+        return {
+            'unit': {'speed': SPEED, 'time': TIME},
+            'named_obstacles': NAMED_OBSTACLES,
+            'bounds': [round(each, 4) for each in bounds],
+            'times': [self._seconds(each.stamp_ns) for each in snapshots],
+            'solve_ms': [None if each.solve_s is None else round(1e3 * each.solve_s, 2) for each in snapshots],
+            'tracks': [
+                {'slot': self._tracks.slots.get(track), 'first': first, 'share': [round_number(value) for value in values]}
+                for track, (first, values) in self._tracks.likelihoods().items()
+            ],
+            'unknown': [round(each.unknown_share, 3) for each in snapshots],
+            'movements': [[self._seconds(stamp) for stamp in span] for span in spans],
+            'hand': {
+                't': _quantise_differences(hand.seconds_after(self._origin_ns)[samples], TIME),
+                'v': _quantise_differences(hand.speed[samples], SPEED),
+                **_encode_points(hand.positions[samples], MOST_HAND_SAMPLES),
+            },
+            'scenes': [json.loads(scene) for scene in self._scenes],
+            'goals': [json.loads(goals) for goals in self._goals],
+            'labels': list(self._labels),
+            'frames': frames,
+        }
+
+    def _encode_frame(self, row: int) -> dict[str, Any]:
+        snapshot, tracks = self._tracks.snapshots[row], self._tracks.tracks[row]
+        scene = json.dumps(_encode_obstacles(snapshot.obstacles))
+        goals = json.dumps([_quantise(goal, LENGTH) for goal in snapshot.goals])
+        candidates = [
+            self._store_texts({'track': tracks[each.label], **encode_candidate(snapshot, each, rank == 0)})
+            for rank, each in enumerate(snapshot.candidates)
+        ]
+        return {
+            'at': row,
+            'scene': self._scenes.setdefault(scene, len(self._scenes)),
+            'goals': self._goals.setdefault(goals, len(self._goals)),
+            'candidates': candidates,
+            'unsolved': [self._store_texts(encode_unsolved(snapshot, each)) for each in snapshot.unsolved],
+        }
+
+    def _store_texts(self, encoded: dict[str, Any]) -> dict[str, Any]:
+        return {
+            name: self._labels.setdefault(value, len(self._labels)) if isinstance(value, str) else value
+            for name, value in encoded.items()
+        }
+
+    def _seconds(self, stamp_ns: int) -> float:
+        return round((stamp_ns - self._origin_ns) / NANOSECONDS, 4)
+
+
+def encode_candidate(snapshot: Snapshot, candidate: CandidateView, is_most_likely: bool) -> dict[str, Any]:
+    """Return one candidate of a snapshot.
+
+    ghost: why it is no proper prediction, or ''; t and v: at some of the steps; motor: ellipses of the motor noise; total: of the
+    total uncertainty of the most likely candidate, none if that is the same. An ellipse has x, y, greater and smaller standard
+    deviation, and the angle of the greater one [degrees].
+    """
+    points = select_evenly(len(candidate.path), PATH_POINTS)
+    marks = select_evenly(len(candidate.path), ELLIPSES_PER_CANDIDATE + 1)[1:]
+    is_drawn = is_most_likely and candidate.is_widened
+    return {
+        'label': candidate.label,
+        'description': candidate.description,
+        'ghost': snapshot.describe_ghost(candidate),
+        'ratio': round_number(candidate.cost_ratio),
+        'eta': round_number(candidate.eta),
+        'compromised': candidate.is_compromised,
+        **_encode_points(candidate.curve, PATH_POINTS),
+        't': _quantise_differences(candidate.times[points], TIME),
+        'v': _quantise_differences(candidate.speed[points], SPEED),
+        'motor': _encode_ellipses(candidate.path[marks], candidate.motor_covariance[marks]),
+        'total': _encode_ellipses(candidate.path[marks], candidate.covariance[marks]) if is_drawn else [],
+    }
+
+
+def encode_unsolved(snapshot: Snapshot, view: UnsolvedView) -> dict[str, Any]:
+    """Return one candidate without a likelihood."""
+    texts = {name: getattr(view, name) for name in ('label', 'description', 'reason')}
+    return {**texts, 'ghost': snapshot.describe_ghost(view), **_encode_points(view.path, UNSOLVED_POINTS)}
+
+
+def compute_recording_bounds(hand: HandTrajectory, snapshots: Sequence[Snapshot]) -> Bounds:
+    """Return limits of x and y [m] around the hand, all obstacles and goals, and all but outlying paths."""
+    points = [hand.positions]
+    for each in snapshots:
+        points += [each.goals, *find_limits(each.obstacles, STDDEVS * each.obstacles.radius_stddev)]
+    paths = [candidate.path for each in snapshots for candidate in each.candidates]
+    paths += [lost.path for each in snapshots for lost in each.unsolved]
+    points += [np.percentile(np.concatenate(paths), DRAWN_PERCENTILES, axis=0)] if paths else []
+    return compute_bounds(make_obstacles(), np.zeros((0, 2)), (), *points, margin=0.06)
+
+
+def round_number(value: float) -> float | None:
+    """Return a number with six significant digits, None if it is not finite: JSON has no such numbers."""
+    return float(f'{value:.6g}') if np.isfinite(value) else None
+
+
+def select_evenly(count: int, most: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    """Return at most so many rows of `count`, evenly spread, the first and the last among them."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.intp))
+
+
+def _encode_obstacles(obstacles: Obstacles) -> list[list[str | int]]:
+    """Return obstacles: name, centre, radius and its standard deviation, then two vertices or more, relative to the centre."""
+    rows = np.column_stack([obstacles.centre, obstacles.radius, STDDEVS * obstacles.radius_stddev])
+    polygons = [obstacles.vertices[row, : corners if corners > 1 else 0] for row, corners in enumerate(obstacles.corners)]
+    return [
+        [name, *_quantise(row, LENGTH), *_quantise(polygon.ravel(), LENGTH)]
+        for name, row, polygon in zip(obstacles.ids, rows, polygons, strict=True)
+    ]
+
+
+def _encode_ellipses(centres: Array, covariance: Array) -> list[list[int]]:
+    greater, smaller, angle = compute_ellipse_axes(covariance)
+    lengths = np.column_stack([centres, STDDEVS * greater, STDDEVS * smaller])
+    return [[*_quantise(each, LENGTH), round(degrees)] for each, degrees in zip(lengths, angle.tolist(), strict=True)]
+
+
+def _encode_points(path: Array, most: int) -> dict[str, list[int]]:
+    points = path[select_evenly(len(path), most)]
+    return {'x': _quantise_differences(points[:, 0], LENGTH), 'y': _quantise_differences(points[:, 1], LENGTH)}
+
+
+def _quantise(values: Array, unit: float) -> list[int]:
+    return [int(value) for value in np.rint(values / unit)]
+
+
+def _quantise_differences(values: Array, unit: float) -> list[int]:
+    """Return the first value and then the differences, in whole units."""
+    return [int(value) for value in np.diff(np.rint(values / unit).astype(np.int64), prepend=0)]

@@ -1,0 +1,309 @@
+"""Pictures for print: what is drawn is what was computed, and it can be told apart, read and placed anywhere."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip('matplotlib', reason='matplotlib is not installed')
+
+from matplotlib import pyplot as plt
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Ellipse, Polygon
+from report_samples import START_NS, prediction, predictions, samples, scene, widen
+
+from foc_ros.core.errors import InputError
+from foc_ros.core.obstacles import shapes
+from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.obstacles.geometry import trace_obstacle
+from foc_ros.core.types import Prediction, Status, make_obstacles
+from foc_ros.reporting.draw import (
+    CLASS_COLOURS,
+    ELLIPSES_PER_CANDIDATE,
+    GHOST_COLOUR,
+    compute_bounds,
+    draw_likelihoods,
+    get_candidate_style,
+    make_scene_figure,
+    make_snapshot_figure,
+    make_stddev_ellipse,
+    plot_outcomes,
+    plot_prediction,
+    save_figure,
+)
+from foc_ros.reporting.views import Snapshot, build_candidate_tracks, build_hand_trajectory, build_snapshot
+
+ROOT = Path(__file__).resolve().parents[1]
+WALL = shapes.Box((0.1, 0.0), (0.6, 0.02), 0.3, radius_stddev=0.01)
+PNG = b'\x89PNG\r\n\x1a\n'
+NOWHERE = np.zeros(2)
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_an_ellipse_is_the_level_set_of_the_covariance(seed: int) -> None:
+    root = np.random.default_rng(seed).normal(size=(2, 2))
+    covariance, centre = root @ root.T, np.array([0.3, -0.1])
+    ellipse = make_stddev_ellipse(centre, covariance, 2.0)
+    edge = ellipse.get_patch_transform().transform(np.array([[1.0, 0.0], [0.0, 1.0], [-0.6, 0.8]])) - centre
+    np.testing.assert_allclose(np.einsum('ki,ij,kj->k', edge, np.linalg.inv(covariance), edge), 4.0, rtol=1e-9)
+    ellipse = make_stddev_ellipse(NOWHERE, np.array([[0.0, 0.0], [0.0, -1e-18]]))
+    assert (ellipse.width, ellipse.height) == (0.0, 0.0)
+
+
+def luminance(colour: tuple[float, float, float]) -> float:
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in to_rgb(colour)]
+    return float(np.dot([0.2126, 0.7152, 0.0722], linear))
+
+
+def test_colours_show_on_white_and_differ_for_the_colour_blind() -> None:
+    """The colours differ as seen by a deuteranope and a protanope (Vienot, Brettel, Mollon 1999, linear RGB)."""
+    assert all(1.05 / (luminance(colour) + 0.05) > 1.5 for colour in (*CLASS_COLOURS, GHOST_COLOUR))
+    deuteranope = np.array([[0.29275, 0.70725, 0.0], [0.29275, 0.70725, 0.0], [-0.02234, 0.02234, 1.0]])
+    protanope = np.array([[0.11238, 0.88762, 0.0], [0.11238, 0.88762, 0.0], [0.00401, -0.00401, 1.0]])
+    linear = np.array([to_rgb(colour) for colour in CLASS_COLOURS]) ** 2.2
+    for seen in (np.clip(linear @ matrix.T, 0.0, 1.0) ** (1 / 2.2) for matrix in (deuteranope, protanope)):
+        gaps = np.linalg.norm(seen[:, None] - seen[None], axis=2)[np.triu_indices(len(seen), 1)]
+        assert gaps.min() > 0.1
+
+
+def test_the_likely_candidate_is_the_thickest_and_a_compromised_one_alone_is_dotted_and_says_its_eta() -> None:
+    widths = [get_candidate_style(0, likelihood)['linewidth'] for likelihood in np.linspace(0.0, 1.0, 20)]
+    assert np.all(np.diff(widths) > 0.0)
+    assert {get_candidate_style(slot, 0.5)['linestyle'] for slot in (None, 0, 5, 6, 11)} == {'-'}
+    assert get_candidate_style(0, 0.5, is_compromised=True)['linestyle'] == ':'
+    made = prediction(START_NS, NOWHERE)
+    (first, *rest) = made.candidates
+    changed = replace(first, solution=replace(first.solution, status=Status.COMPROMISED))
+    axes = axes_of(replace(made, candidates=(changed, *rest)))
+    assert legend_of(axes).count('compromised: eta 0.900') == 1
+    assert [line.get_linestyle() for line in axes.lines if line.get_label().startswith('A')] == [':']
+
+
+def axes_of(made: Prediction) -> Any:
+    return make_scene_figure(build_snapshot(made)).axes[0]
+
+
+def legend_of(axes: Any) -> str:
+    """Return the text of the legend below axes without its line breaks."""
+    (below,) = [each for each in axes.figure.axes if each.get_gid() == f'legend {id(axes)}']
+    return ' '.join(' '.join(each.get_text().split()) for each in below.get_legend().get_texts())
+
+
+def test_a_scene_holds_every_obstacle_goal_and_candidate() -> None:
+    made = prediction(START_NS, NOWHERE)
+    axes = axes_of(made)
+    radii = sorted(patch.radius for patch in axes.patches if isinstance(patch, Circle))
+    np.testing.assert_allclose(radii, [0.02, 0.03, 0.033], err_msg='a ring where the radius is uncertain only')
+    drawn = [line.get_xydata() for line in axes.lines]
+    for points in (*(each.curve for each in build_snapshot(made).candidates), *made.goals[:, None]):
+        assert any(np.array_equal(line, points) for line in drawn)
+
+
+def test_every_path_begins_at_the_hand_also_that_of_an_answer_from_before() -> None:
+    made, hand = build_snapshot(prediction(START_NS, NOWHERE)), np.array([0.05, -0.04])
+    late = replace(made, hand=hand)
+    axes = make_scene_figure(late).axes[0]
+    paths = [line.get_xydata() for line in axes.lines if len(line.get_xydata()) > 1]
+    assert len(paths) == len(made.candidates) + len(made.unsolved)
+    for path in paths:
+        np.testing.assert_allclose(path[0], hand)
+    for before, after in zip(made.candidates, late.begin_at(hand).candidates, strict=True):
+        np.testing.assert_allclose(after.path[-1], before.path[-1])
+        slopes = np.gradient(after.path, after.times, axis=0) - np.gradient(before.path, before.times, axis=0)
+        np.testing.assert_allclose((after.velocity - before.velocity)[1:-1], slopes[1:-1], atol=5e-3)
+
+
+def test_a_path_through_an_obstacle_is_a_ghost_with_its_reason_beside_it() -> None:
+    made = prediction(START_NS, NOWHERE)  # its third candidate leads through `post`, the last one could not be solved
+    axes = axes_of(made)
+    ghosts = [line for line in axes.lines if line.get_color() == GHOST_COLOUR]
+    assert len(ghosts) == 2 and all(line.get_alpha() < 0.5 for line in ghosts)
+    written = {text.get_text(): text.xy for text in axes.texts if hasattr(text, 'xy')}
+    for words, ghost in (('leads through obstacle post', ghosts[1]), ('eta unreachable', ghosts[0])):
+        assert np.min(np.linalg.norm(ghost.get_xydata() - written[words], axis=1)) < 1e-9
+    lost = made.candidates[-1]
+    assert f'- % {lost.label} {lost.description}; {lost.reason}' in legend_of(axes) and lost.status.remedy in legend_of(axes)
+    assert 'goal1: left of 1, right of post; leads through obstacle post' in legend_of(axes)
+
+
+def test_an_obstacle_that_is_passed_above_or_has_moved_away_makes_no_ghost() -> None:
+    made = build_snapshot(prediction(START_NS, NOWHERE))
+    through = made.candidates[2]
+    assert made.find_entered(through) == 'post'
+    assert replace(made, cleared=('post',)).find_entered(through) == ''
+    away = replace(made.obstacles, velocity=np.array([[0.0, 0.0], [0.0, 0.3]]))
+    assert replace(made, obstacles=away).find_entered(through) == ''
+    around_hand = make_obstacles([[0.0, 0.0]], 0.02, ids=('glove',))
+    assert replace(made, obstacles=around_hand).find_entered(through) == ''
+
+
+def test_only_the_most_likely_candidate_has_its_total_uncertainty_and_no_ellipse_widens_the_axes() -> None:
+    made = build_snapshot(prediction(START_NS, NOWHERE))
+    wide = replace(
+        made,
+        candidates=tuple(
+            replace(each, covariance=1e4 * each.covariance, motor_covariance=each.covariance) for each in made.candidates
+        ),
+    )
+    limits = []
+    for each in (made, wide):
+        axes = make_scene_figure(each).axes[0]
+        limits.append((*axes.get_xlim(), *axes.get_ylim()))
+        ellipses = [patch for patch in axes.patches if type(patch) is Ellipse]
+        dashed = [patch for patch in ellipses if patch.get_linestyle() == '--']
+        assert len(dashed) == (ELLIPSES_PER_CANDIDATE if each is wide else 0)
+        assert len(ellipses) - len(dashed) == 2 * ELLIPSES_PER_CANDIDATE, 'none for the ghost'
+        assert all(patch.get_facecolor()[3] >= 0.3 for patch in ellipses if patch not in dashed)
+    assert limits[0] == limits[1]
+    left, right, bottom, top = limits[0]
+    paths = np.concatenate([each.path for each in (*made.candidates, *made.unsolved)])
+    assert (paths >= [left, bottom]).all() and (paths <= [right, top]).all() and right - left < 0.35
+
+
+def test_everything_drawn_is_in_the_legend_once() -> None:
+    hand = build_hand_trajectory(samples())
+    (span,) = hand.find_movements(0.05)
+    during = [build_snapshot(widen(each)) for each in predictions(samples()) if span[0] <= each.stamp_ns <= span[1]]
+    figure = make_snapshot_figure(hand, build_candidate_tracks(during), 5, span, compute_bounds(*scene(), during[5].candidates))
+    axes, text = figure.axes[0], legend_of(figure.axes[0])
+    assert all(not line.get_label().startswith('_') for line in axes.lines), 'no line without a name'
+    assert all(not patch.get_label().startswith('_') for patch in axes.patches)
+    for artist in (*axes.lines, *axes.patches):
+        assert text.count(' '.join(artist.get_label().split())) >= 1
+    below = next(each for each in figure.axes if each.get_gid() == f'legend {id(axes)}').get_legend()
+    assert max(Counter(each.get_text() for each in below.get_texts()).values()) == 1
+    assert [each.get_text()[2:6].strip() for each in below.get_texts()[:4]] == sorted_shares(during[5])
+
+
+def sorted_shares(snapshot: Snapshot) -> list[str]:
+    """Return the shares of the candidates in the legend, those without one last."""
+    return [f'{100 * each.likelihood:.0f}' for each in snapshot.candidates] + ['-'] * len(snapshot.unsolved)
+
+
+def layouts() -> dict[str, Any]:
+    """Return axes by how they were made, as users do."""
+    return {
+        'new': None,
+        'one': plt.figure().subplots(),
+        'two': plt.figure(figsize=(6.4, 4.8)).subplots(1, 2)[1],
+        'four': plt.figure(figsize=(10.0, 9.0), layout='constrained').subplots(2, 2)[1, 0],
+        'placed': plt.figure().add_axes((0.1, 0.2, 0.8, 0.7)),
+    }
+
+
+@pytest.mark.parametrize('name', ['new', 'one', 'two', 'four', 'placed'])
+def test_a_plot_survives_subplots_and_savefig(name: str, tmp_path: Path) -> None:
+    """The legend is within the figure and covers no other axes, also when it is drawn again."""
+    given, made = layouts()[name], widen(prediction(START_NS, NOWHERE))
+    axes = plot_prediction(made, given)
+    assert given is None or axes is given
+    count = len(axes.figure.axes)
+    plot_prediction(made, axes)
+    assert len(axes.figure.axes) == count
+    axes.figure.savefig(tmp_path / 'plot.png')
+    renderer = axes.figure.canvas.get_renderer()
+    (below,) = [each for each in axes.figure.axes if each.get_gid() == f'legend {id(axes)}']
+    box, whole = below.get_legend().get_window_extent(renderer), axes.figure.bbox
+    assert box.x0 >= whole.x0 and box.x1 <= whole.x1 and box.y0 >= whole.y0 and box.y1 <= whole.y1
+    others = [each.get_tightbbox(renderer) for each in axes.figure.axes if each is not below]
+    assert not any(box.overlaps(other) for other in others)
+    assert axes.get_window_extent(renderer).height > 50.0
+    plt.close('all')
+
+
+def test_boxes_are_drawn_with_their_outlines_and_fit_into_the_picture() -> None:
+    obstacles, goals = shapes.collect_obstacles([WALL, shapes.Circle((0.2, 0.1), 0.02)]), scene()[1]
+    axes = make_scene_figure(Snapshot(0, obstacles, goals, (), None)).axes[0]
+    ring, box = (patch.get_xy() for patch in axes.patches if isinstance(patch, Polygon))
+    np.testing.assert_allclose(box, trace_obstacle(obstacles, 0))
+    np.testing.assert_allclose(measure_offsets(ring, obstacles)[1][:, 0], 0.01)
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    assert left < ring[:, 0].min() and ring[:, 0].max() < right and bottom < ring[:, 1].min() and ring[:, 1].max() < top
+
+
+def test_the_share_without_a_likelihood_is_hatched() -> None:
+    made = predictions(samples())
+    lost = [replace(each, candidates=each.candidates[-1:], most_likely=None) for each in made[20:]]
+    axes = Figure().subplots()
+    draw_likelihoods(axes, build_candidate_tracks([build_snapshot(each) for each in (*made[:20], *lost)]), START_NS)
+    (hatched,) = axes.collections
+    assert hatched.get_hatch()
+    corners = hatched.get_paths()[0].vertices
+    for stamp_ns, lowest in ((made[10].stamp_ns, 0.75), (made[30].stamp_ns, 0.0)):
+        near = np.abs(corners[:, 0] - (stamp_ns - START_NS) * 1e-9) < 0.03
+        assert corners[near, 1].min() == lowest
+
+
+def test_a_snapshot_figure_shows_past_and_future_of_the_hand() -> None:
+    made = samples()
+    hand = build_hand_trajectory(made)
+    (span,) = hand.find_movements(0.05)
+    during = [build_snapshot(each) for each in predictions(made) if span[0] <= each.stamp_ns <= span[1]]
+    row = len(during) // 3
+    bounds = compute_bounds(*scene(), during[row].candidates)
+    figure = make_snapshot_figure(hand, build_candidate_tracks(during), row, span, bounds)
+    before, later = (
+        [line for line in figure.axes[0].lines if line.get_label().startswith(f'hand {name}')] for name in ('b', 'l')
+    )
+    now = hand.positions[hand.stamps_ns == during[row].stamp_ns][0]
+    np.testing.assert_array_equal(before[0].get_xydata()[-1], now)
+    np.testing.assert_array_equal(later[0].get_xydata()[0], now)
+    likelihoods = [line.get_ydata() for line in figure.axes[1].lines if len(line.get_ydata()) == len(during)]
+    expected = sorted(each.likelihood for each in during[row].candidates)
+    np.testing.assert_array_equal(sorted(values[row] for values in likelihoods), expected)
+
+
+@pytest.mark.parametrize(('suffix', 'start'), [('png', PNG), ('pdf', b'%PDF'), ('svg', b'<?xml')])
+def test_equal_input_gives_equal_pictures_in_every_format(tmp_path: Path, suffix: str, start: bytes) -> None:
+    for name in ('one', 'two'):
+        plot_outcomes(tmp_path / f'{name}.{suffix}', *scene(), prediction(START_NS, NOWHERE).candidates, NOWHERE)
+    content = (tmp_path / f'one.{suffix}').read_bytes()
+    assert content.startswith(start)
+    if suffix == 'png':
+        save_figure(make_scene_figure(build_snapshot(prediction(START_NS, NOWHERE))), tmp_path / 'two.png')
+    if suffix != 'svg':  # whose marks have random names
+        assert content == (tmp_path / f'two.{suffix}').read_bytes()
+
+
+def test_a_picture_without_a_solution_or_an_obstacle_shows_the_attempt_and_the_start(tmp_path: Path) -> None:
+    made = prediction(START_NS, NOWHERE)
+    lost = [each for each in made.candidates if not each.is_solved]
+    plot_outcomes(tmp_path / 'none.png', make_obstacles(), scene()[1], lost, NOWHERE)
+    assert (tmp_path / 'none.png').read_bytes().startswith(PNG)
+    snapshot = replace(build_snapshot(replace(made, candidates=tuple(lost))), hand=np.array([-0.1, 0.02]))
+    axes = make_scene_figure(snapshot).axes[0]
+    assert any(np.array_equal(line.get_xydata(), [[-0.1, 0.02]]) for line in axes.lines)
+    assert axes.get_xlim()[0] < -0.1
+
+
+@pytest.mark.parametrize(
+    ('name', 'expected'), [('scene.xyz', r'\.png'), ('scene', r'\.png'), ('no/such/scene.png', 'can be written')]
+)
+def test_a_file_that_cannot_be_written(tmp_path: Path, name: str, expected: str) -> None:
+    with pytest.raises(InputError, match=expected):
+        plot_outcomes(tmp_path / name, *scene(), prediction(START_NS, NOWHERE).candidates, NOWHERE)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(('missing', 'module'), [('matplotlib', 'draw'), ('jinja2', 'report')])
+def test_a_missing_library_is_reported_in_one_line_with_how_to_install_it(missing: str, module: str) -> None:
+    program = f"""
+import sys
+sys.modules['{missing}'] = None
+from foc_ros.core.errors import FocError
+try:
+    import foc_ros.reporting.{module}
+except FocError as error:
+    print(error)
+"""
+    printed = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True, check=True, cwd=ROOT).stdout
+    assert 'pip install' in printed
+    assert printed.count('\n') == 1
