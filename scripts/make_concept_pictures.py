@@ -7,6 +7,7 @@ python scripts/make_concept_pictures.py [DIRECTORY]
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,13 +15,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from foc_ros.analysis.paper.reaching import Method, solve_class
-from foc_ros.analysis.paper.scenes import NOISE as PAPER_NOISE
-from foc_ros.analysis.paper.scenes import STRATEGY_SCENE
 from foc_ros.core.config import FocConfig, LikelihoodConfig
 from foc_ros.core.dynamics.noise import scale_noise, stack_noise
 from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
 from foc_ros.core.likelihood import compute_likelihoods
+from foc_ros.core.obstacles.shapes import collect_obstacles
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
@@ -31,6 +30,10 @@ from foc_ros.io.scene_file import guess_path, load_scene
 from foc_ros.reporting.drawing import draw_candidates, draw_scene, draw_tag, get_class_style, make_stddev_ellipse, open_figure
 from foc_ros.reporting.plots import compute_bounds, number_labels, save_figure
 from foc_ros.reporting.snapshots import build_candidate_views
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'examples' / 'paper'))
+from studies import NOISE as PAPER_NOISE
+from studies import STRATEGY_CLASS, Method
 
 PICTURES = Path(__file__).resolve().parents[1] / 'doc' / 'images'
 SCENE = Path(__file__).resolve().parents[1] / 'doc' / 'examples' / 'scene.yaml'
@@ -110,11 +113,11 @@ def strategies() -> Figure:
     """Return the same scene by three strategies: paths and speeds."""
     with open_figure(8.6, 3.4) as figure:
         paths, speeds = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
-        scene = STRATEGY_SCENE
-        draw_scene(paths, scene.obstacles, scene.goal[None], (-0.02, 0.32, -0.06, 0.14), named=False)
+        obstacles = collect_obstacles(STRATEGY_CLASS[0].obstacles)
+        draw_scene(paths, obstacles, GOAL[None], (-0.02, 0.32, -0.06, 0.14), named=False)
         for number, name in enumerate(('lv', 'hc', 'optimal')):
             colour, dash = get_class_style(number)
-            solution = solve_class(scene, scene.path_classes[0], Method(PAPER_NOISE, name), 0.94)
+            solution = Method(PAPER_NOISE, name).solve(*STRATEGY_CLASS, 0.94)
             paths.plot(*solution.path.T, color=colour, linestyle=dash, linewidth=2.0)
             for row in range(5, STEPS, 8):
                 _ellipse(paths, solution, row, colour)

@@ -33,6 +33,7 @@ def started(*arguments: str, **options: object) -> subprocess.CompletedProcess[s
         (['replay', '.', '--fast'], 'foc_ros replay: unrecognized arguments: --fast'),
         (['replay', '.', '--output', 'a', '--output', 'b'], 'foc_ros replay: argument --output: given twice'),
         (['evaluate', 'x' * 300], 'foc_ros evaluate: [Errno 36] File name too long'),
+        (['paper'], 'foc_ros paper: the studies of the paper are an example now: python examples/paper/paper.py\n'),
         (['replay', 'no_such_bag'], 'foc_ros replay: no_such_bag: no such file or directory'),
     ],
 )
@@ -151,7 +152,6 @@ INPUTS = 'hand_pose, obstacles, obstacle_markers, collision_objects, detections,
             ['evaluate', '.', '--scheduler', 'here'],
             ['--scheduler: expected the address of a Dask scheduler, as in tcp://host:8786, got here'],
         ),
-        (['paper', '--output', 'scene.yaml'], ['--output: expected a folder, got scene.yaml, which is a file']),
         (['play', '--data', '/proc/sys/a'], ['--data: expected a directory that can be written, got /proc/sys/a']),
         (['learn', '.', '--output', '/proc/sys/a'], ['--output: expected a file that can be written, got /proc/sys/a']),
     ],
@@ -189,9 +189,9 @@ class Fake:
     [
         (0, 0, ''),
         (3, 3, ''),
-        (InputError('start', 'two\n  numbers', 'one'), 2, 'foc_ros paper: start: expected two numbers, got one\n'),
-        (InputError('topic', 'a name', '/\x1b[31mhand'), 2, 'foc_ros paper: topic: expected a name, got /\\x1b[31mhand\n'),
-        (OSError(5, 'Input/output error', 'a'), 2, "foc_ros paper: [Errno 5] Input/output error: 'a'\n"),
+        (InputError('start', 'two\n  numbers', 'one'), 2, 'foc_ros warm-up: start: expected two numbers, got one\n'),
+        (InputError('topic', 'a name', '/\x1b[31mhand'), 2, 'foc_ros warm-up: topic: expected a name, got /\\x1b[31mhand\n'),
+        (OSError(5, 'Input/output error', 'a'), 2, "foc_ros warm-up: [Errno 5] Input/output error: 'a'\n"),
         (KeyboardInterrupt(), 130, ''),
     ],
 )
@@ -199,7 +199,7 @@ def test_exit_codes(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], outcome: int | BaseException, code: int, line: str
 ) -> None:
     monkeypatch.setattr(command_line, 'import_module', lambda name, package: Fake(outcome))
-    assert command_line.main(['paper']) == code
+    assert command_line.main(['warm-up']) == code
     assert capsys.readouterr() == ('', line)
 
 
@@ -234,7 +234,7 @@ def test_a_name_that_standard_output_cannot_show_is_escaped() -> None:
         'class Named:\n'
         ' run = staticmethod(lambda arguments: print("b\\udcff", "\u2500") or 0)\n'
         'command_line.import_module = lambda name, package: Named\n'
-        'sys.exit(command_line.main(["paper"]))'
+        'sys.exit(command_line.main(["warm-up"]))'
     )
     environment = {**os.environ, 'PYTHONIOENCODING': 'ascii', 'PYTHONUTF8': '1'}
     command = [sys.executable, '-c', program]
@@ -251,7 +251,7 @@ class Loud:
         {}
         return 0
 command_line.import_module = lambda name, package: Loud
-sys.exit(command_line.main(["paper"]))
+sys.exit(command_line.main(["warm-up"]))
 """
 MANY_LINES, A_LINE = 'for _ in range(100000): print("x" * 100)', 'print("x")'
 A_TABLE = 'from foc_ros.io.terminal import show_table; show_table(("a", "b"), [("c", "d")] * 10000)'
@@ -280,7 +280,7 @@ def test_a_pipe_whose_reader_has_closed_it_gives_141_and_no_traceback(what: str)
 def test_a_full_standard_output_gives_2_and_one_line(what: str) -> None:
     with Path('/dev/full').open('w') as full:
         result = printed_to(full.fileno(), what)
-    assert (result.returncode, result.stderr) == (2, 'foc_ros paper: [Errno 28] No space left on device\n')
+    assert (result.returncode, result.stderr) == (2, 'foc_ros warm-up: [Errno 28] No space left on device\n')
 
 
 @pytest.mark.parametrize('what', [A_LINE, A_TABLE])

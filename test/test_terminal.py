@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 import pytest
 from fit_recordings import write_tables
 
 from foc_ros.analysis.fitting.tables import COMPARISON_TITLES
-from foc_ros.cli import fit, paper
+from foc_ros.cli import fit
 from foc_ros.cli.main import main
 from foc_ros.io.terminal import COLUMNS, show_counter, show_table
 
@@ -44,15 +43,6 @@ def test_the_output_of_a_command_fits(
     if 'data' in arguments:
         write_tables(Path('data'), count=2)
     assert main(arguments) == 0
-    assert 0 < find_widest(capsys.readouterr().out) <= COLUMNS
-
-
-def test_the_table_of_the_paper_fits(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    rows = [('7', 'a statement', 'ratio of LV to HC is far above one at every eta', '1.234 to 5.678 at eta 0.90 to 0.99', 'yes')]
-    monkeypatch.setattr(paper, 'perform', lambda _: {})
-    monkeypatch.setattr(paper, 'check_trends', lambda _: rows)
-    monkeypatch.setattr(paper, '_format_cells', lambda cells: cells)
-    assert paper.run(argparse.Namespace(output=Path('output'))) == 0
     assert 0 < find_widest(capsys.readouterr().out) <= COLUMNS
 
 

@@ -32,12 +32,6 @@ def add_node_arguments(parser: argparse.ArgumentParser) -> None:
     parser.usage = '%(prog)s [-h] [--ros-args ...]'
 
 
-def add_paper_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `paper`."""
-    words = 'folder for figures, numbers and table (default: %(default)s); files of the same names are replaced'
-    parser.add_argument('--output', type=Path, default=Path('paper_output'), metavar='DIR', help=words)
-
-
 def add_solve_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `solve`."""
     parser.add_argument('scene', type=_read_existing_path, metavar='SCENE', help='YAML or JSON file')

@@ -110,7 +110,6 @@ def _read_play(arguments: argparse.Namespace) -> None:
 READERS: dict[str, Callable[[argparse.Namespace], None]] = {
     'demo': _check_folder_of_output,
     'play': _read_play,
-    'paper': _check_folder_of_output,
     'solve': _read_solve,
     'replay': _read_replay,
     'learn': _read_learn,

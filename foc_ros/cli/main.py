@@ -27,18 +27,20 @@ COMMANDS = {
     'demo': 'play the packaged recording to the node and show its predictions',
     'node': 'run the node; further arguments are passed to ROS, as in --ros-args -r hand_pose:=/PSM1/measured_cp',
     'play': 'steer the hand yourself, on a page in the browser',
-    'paper': "repeat the paper's studies: figures, numbers, a table",
     'solve': 'solve one scene from a YAML or JSON file',
     'replay': 'compute predictions from a recording, without ROS and faster than real time',
     'learn': 'write the recordings of a scene as experience for predictions in this scene',
     'fit': 'find the parameters that explain recordings best',
     'evaluate': 'compare predictions with recordings of people, beside simple baselines',
-    'simulate': 'compare guidance with other assistance for simulated operators',
+    'simulate': 'compare simulated operators with and without guidance',
     'convert': 'convert motion capture in CSV tables to bags',
     'warm-up': 'nothing any more: the command will be removed',
 }
 """Purpose of each command. With an underscore for a hyphen, `arguments` declares its arguments in `add_NAME_arguments(parser)`,
 and the module of its name defines `run(arguments) -> exit code`."""
+
+MOVED = {'paper': 'the studies of the paper are an example now: python examples/paper/paper.py'}
+"""Commands of earlier releases, and what took their place."""
 
 
 class _StoreOnce(argparse.Action):
@@ -116,6 +118,8 @@ def _parse_and_run(given: list[str]) -> int:
         words = f'{", ".join(COMMANDS)} are the commands (foc_ros --help explains them)'
         if not given:
             parser.error(f'no command is given; {words}')
+        if given[0] in MOVED:
+            raise FocError(MOVED[given[0]])
         if not given[0].startswith('-') and given[0] not in COMMANDS:
             parser.error(f'there is no command {given[0]}{suggest(given[0], COMMANDS)}; {words}')
         parsed, rest = parser.parse_known_args(given)

@@ -1,4 +1,4 @@
-"""`simulate`: the closed-loop study of guidance with simulated operators, beside other assistance rules."""
+"""`simulate`: the closed-loop study of simulated operators with and without guidance."""
 
 from __future__ import annotations
 

@@ -1,9 +1,18 @@
-"""Assistance rules of others, from their papers: hindsight optimization, blending by confidence, and the potential field."""
+"""Assistance rules of others, from their papers: hindsight optimization, blending by confidence, and the potential field.
+
+All have the same estimate of the hand and the same limits of force and slew as the guidance of this package.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 import numpy as np
 
+from foc_ros.analysis.simulation.assistance import Assistance
+from foc_ros.analysis.simulation.operators import Task
+from foc_ros.core.config import Config
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import Array, Obstacles
 
@@ -94,3 +103,45 @@ def compute_field_force(position: Array, obstacles: Obstacles, strongest: float)
     sizes = np.where(rho <= INFLUENCE_M, eta * (1.0 / rho - 1.0 / INFLUENCE_M) / rho**2, 0.0)
     force: Array = np.minimum(sizes, strongest) @ gradients
     return force
+
+
+class _GoalAssistance(Assistance):
+    """A rule that knows goals only: `blends` says which of the two."""
+
+    blends: ClassVar[bool]
+
+    def __init__(self, task: Task, config: Config) -> None:
+        super().__init__(task, config)
+        self._inference = GoalInference(task.goals, task.path.position[0])
+
+    def compute_force(self, step: int, position: Array, velocity: Array, acceleration: Array) -> Array:  # noqa: ARG002
+        """Return the force of the rule for the present probabilities of the goals."""
+        probabilities = self._inference.update(position)
+        self.is_wrong = int(probabilities.argmax()) != self.task.goal_row
+        rule = compute_blending_force if self.blends else compute_hindsight_force
+        return rule(position, self.task.goals, probabilities)
+
+
+class Hindsight(_GoalAssistance):
+    """Hindsight optimization."""
+
+    blends = False
+
+
+class Blend(_GoalAssistance):
+    """Blending by confidence."""
+
+    blends = True
+
+
+class PotentialField(Assistance):
+    """The potential field of the obstacles."""
+
+    def compute_force(self, step: int, position: Array, velocity: Array, acceleration: Array) -> Array:  # noqa: ARG002
+        """Return the force of the field."""
+        grown = self.task.obstacles.grow(self.task.hand_radius)
+        return compute_field_force(position, grown, self.config.guidance.f_max)
+
+
+RIVALS: Mapping[str, type[Assistance]] = {'hindsight': Hindsight, 'blend': Blend, 'potential_field': PotentialField}
+"""The rules of others by name."""

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Find the scenes of `foc_ros.analysis.paper.scenes`: the paper gives no coordinates, so they are searched for, with seeds.
+"""Find the two scenes of `studies.py`: the paper gives no coordinates, so they are searched for, with seeds.
 
-python scripts/find_paper_scenes.py strategies|classes [--seeds FIRST LAST] [--refine]
+python examples/paper/find_scenes.py strategies|classes [--seeds FIRST LAST] [--refine]
 
 For each seed the script takes a random scene (with --refine: the present one) and changes it at random while that lowers its
 score: the |log| distances of effort ratios from those of the paper, and penalties for trends that are missing. It prints the end
@@ -21,11 +21,21 @@ from collections.abc import Callable, Iterable, Iterator
 from itertools import product
 
 import numpy as np
+from studies import (
+    CLASSES_SCENE,
+    NOISE,
+    PAPER_ETA,
+    PAPER_RATIOS,
+    SMALL_NOISE,
+    STRATEGY_SCENE,
+    Array,
+    Method,
+    PathClass,
+    Scene,
+    measure_solution,
+)
 
-from foc_ros.analysis.paper.reaching import Method, PaperScene, PathClass, measure_solution, solve_class
-from foc_ros.analysis.paper.scenes import CLASSES_SCENE, NOISE, SMALL_NOISE, STRATEGY_SCENE
-from foc_ros.analysis.paper.studies import PAPER_ETA, PAPER_RATIOS
-from foc_ros.core.types import LEFT, RIGHT, Array, Status
+from foc_ros import Status
 
 GOAL_X = 0.3
 ETAS = (0.6, 0.7, 0.8, 0.86, 0.9, 0.93, 0.95, PAPER_ETA, 0.965)
@@ -43,28 +53,28 @@ PATIENCE = 12
 HOPELESS = 12.0
 """First score above which no search begins."""
 
-Faults = Callable[[PaperScene], Iterator[float]]
+Faults = Callable[[Scene], Iterator[float]]
 
 
-def compute_log_ratio(scene: PaperScene, eta: float, over: tuple[PathClass, Method], under: tuple[PathClass, Method]) -> float:
+def compute_log_ratio(scene: Scene, eta: float, over: tuple[PathClass, Method], under: tuple[PathClass, Method]) -> float:
     """Return the logarithm of the ratio of two efforts, NaN where one is not solved."""
     efforts = []
     for path_class, method in (over, under):
-        solution = solve_class(scene, path_class, method, eta)
+        solution = method.solve(scene, path_class, eta)
         if solution.status is not Status.SOLVED:
             return np.nan
         efforts.append(solution.effort)
     return float(np.log(efforts[0] / efforts[1]))
 
 
-def strategies_scene(generator: np.random.Generator) -> PaperScene:
+def strategies_scene(generator: np.random.Generator) -> Scene:
     """Return a random scene with one class, to the left of most of its circles."""
     n = int(generator.integers(1, 4))
     circles = generator.uniform((0.04, -0.06, 0.015, 0.001), (0.18, 0.04, 0.035, 0.004), (n, 4))
-    return _make_scene(circles, (PathClass('left', 0.06, ()),))
+    return _make_scene(circles, (PathClass('left', 0.06),))
 
 
-def strategies_faults(scene: PaperScene) -> Iterator[float]:
+def strategies_faults(scene: Scene) -> Iterator[float]:
     """Yield penalties for the trends of studies 1, 3 and 4 that a scene lacks."""
     path_class = scene.path_classes[0]
     found: dict[tuple[float, float], float] = {}
@@ -75,12 +85,12 @@ def strategies_faults(scene: PaperScene) -> Iterator[float]:
     if np.isfinite([*rising, *low]).all():
         yield 10 * np.maximum(-np.diff(rising), 0).sum() + 10 * max(rising[0] + 0.02, 0) + max(0.5 - rising[ETAS.index(0.95)], 0)
         yield 10 * max(low[-1] + 0.05, 0) + 2 * np.maximum(np.diff(low), 0).sum()
-    solutions = (solve_class(scene, path_class, Method(NOISE, strategy), 0.94) for strategy in ('lv', 'hc'))
+    solutions = (Method(NOISE, strategy).solve(scene, path_class, 0.94) for strategy in ('lv', 'hc'))
     slow, fast = (measure_solution(scene, each)['speed_to_obstacles'] for each in solutions)
     yield 3 * max(slow / fast - 0.75, 0)
 
 
-def classes_scene(generator: np.random.Generator) -> PaperScene:
+def classes_scene(generator: np.random.Generator) -> Scene:
     """Return a random scene: H1 passes the first circle on the left, H2 on the right, between it and the others."""
     x, y, radius = generator.uniform((0.06, -0.006, 0.015), (0.15, -0.001, 0.03))
     others = []
@@ -89,10 +99,10 @@ def classes_scene(generator: np.random.Generator) -> PaperScene:
         below = np.sqrt(max((radius + wide + gap) ** 2 - ahead**2, 0.0))
         others.append((x + ahead, y - below, wide, generator.uniform(0.001, 0.004)))
     circles = np.array([(x, y, radius, generator.uniform(0.001, 0.004)), *others])
-    return _make_scene(circles, (PathClass('H1', 0.06, (('0', LEFT),)), PathClass('H2', -0.05, (('0', RIGHT), ('1', LEFT)))))
+    return _make_scene(circles, (PathClass('H1', 0.06), PathClass('H2', -0.05)))
 
 
-def classes_faults(scene: PaperScene) -> Iterator[float]:
+def classes_faults(scene: Scene) -> Iterator[float]:
     """Yield penalties for the trends of studies 5 and 6 that a scene lacks."""
     first, second = scene.path_classes
     found: dict[tuple[str, float], float] = {}
@@ -114,10 +124,10 @@ def classes_faults(scene: PaperScene) -> Iterator[float]:
         yield 2 * float(np.maximum(np.diff(late), 0).sum()) if np.isfinite(late).all() else 0.0
 
 
-def compute_crowding(scene: PaperScene, path_class: PathClass, method: Method) -> float:
+def compute_crowding(scene: Scene, path_class: PathClass, method: Method) -> float:
     """Return the logarithm of the factor of the circles after the first on the effort of a class at PAPER_ETA; 0 if unsolved."""
-    alone = PaperScene(scene.goal_x, scene.circles[:1], (PathClass(path_class.name, path_class.amplitude, path_class.sides[:1]),))
-    efforts = [solve_class(*each, method, PAPER_ETA) for each in ((scene, path_class), (alone, alone.path_classes[0]))]
+    alone = Scene(scene.goal_x, scene.circles[:1], (path_class,))
+    efforts = [method.solve(each, path_class, PAPER_ETA) for each in (scene, alone)]
     solved = all(each.status is Status.SOLVED for each in efforts)
     return float(np.log(efforts[0].effort / efforts[1].effort)) if solved else 0.0
 
@@ -132,7 +142,7 @@ def sum_up(faults: Iterable[float], bound: float) -> float:
     return total
 
 
-def improve(scene: PaperScene, faults: Faults, generator: np.random.Generator) -> tuple[float, PaperScene]:
+def improve(scene: Scene, faults: Faults, generator: np.random.Generator) -> tuple[float, Scene]:
     """Change a scene at random as long as that lowers its score."""
     best, failures = sum_up(faults(scene), HOPELESS), 0
     while failures < PATIENCE and best < HOPELESS:
@@ -145,9 +155,9 @@ def improve(scene: PaperScene, faults: Faults, generator: np.random.Generator) -
     return best, scene
 
 
-def _make_scene(circles: Array, ways: tuple[PathClass, ...]) -> PaperScene:
+def _make_scene(circles: Array, ways: tuple[PathClass, ...]) -> Scene:
     held = np.clip(circles, LOW, HIGH)
-    return PaperScene(GOAL_X, tuple((x, y, radius, stddev) for x, y, radius, stddev in held.round(4).tolist()), ways)
+    return Scene(GOAL_X, tuple((x, y, radius, stddev) for x, y, radius, stddev in held.round(4).tolist()), ways)
 
 
 SEARCHES = {
