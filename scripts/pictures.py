@@ -12,8 +12,7 @@ import io
 import re
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,30 +22,19 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from page import IMAGES, ROOT
 
+import foc_ros
 from foc_ros.analysis.replay import Replay
-from foc_ros.core.config import Config, FocConfig, LikelihoodConfig
-from foc_ros.core.dynamics.noise import scale_noise, stack_noise
-from foc_ros.core.dynamics.plants import build_triple_integrator_horizon
+from foc_ros.core.config import Config, LikelihoodConfig
+from foc_ros.core.dynamics.noise import stack_noise
 from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.obstacles.shapes import collect_obstacles
-from foc_ros.core.ocp.monte_carlo import monte_carlo
-from foc_ros.core.ocp.problem import Problem, rest_to_goal
-from foc_ros.core.ocp.solve import solve_problem
-from foc_ros.core.ocp.start import cold_start, warm_start
 from foc_ros.core.scene_solver import build_scene_problems, solve_scene
-from foc_ros.core.types import NANOSECONDS, Array, Obstacles, Solution, Status, make_obstacles
+from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.bags import BagReader
 from foc_ros.io.scene_file import guess_path, load_scene
-from foc_ros.reporting.drawing import (
-    draw_candidates,
-    draw_hand,
-    draw_scene,
-    draw_tag,
-    get_class_style,
-    make_stddev_ellipse,
-    open_figure,
-)
-from foc_ros.reporting.plots import compute_bounds, draw_likelihoods, number_labels, save_figure
+from foc_ros.reporting import drawing, plots
+from foc_ros.reporting.drawing import draw_scene, get_class_style, open_figure
+from foc_ros.reporting.plots import compute_bounds, save_figure
 from foc_ros.reporting.report import ReportCollector
 from foc_ros.reporting.snapshots import HandTrajectory, Snapshot, build_candidate_views, build_hand_trajectory
 from foc_ros.reporting.track_association import build_candidate_tracks
@@ -63,19 +51,19 @@ MOVEMENT, AFTER_S = 5, 0.02
 """The movement, counted from 1, and the time after its beginning [s] of the scene: early, with several candidates."""
 SHOWN_MOVEMENTS = (0, 4, 6)
 """Rows of the movements of the recording that the animation shows."""
-PICTURES, LAST_S, STEP_MS, COLOURS = 22, 0.9, 110, 128
-"""Pictures of a movement, duration of the last [s] and of each other picture [ms], about a third of the real speed; colours."""
+PICTURES, LAST_MS, STEP_MS, COLOURS = 22, 900, 110, 128
+"""Pictures of a movement, durations of the last and of each other picture [ms], about a third of the real speed; colours."""
 STEPS, GOAL = 50, np.array([0.3, 0.0])
-NOISE, REFERENCE_S = 0.1, 0.02
-"""Noise coefficient c, and the step [s] that it holds for."""
-NOTHING, CIRCLE = make_obstacles(), make_obstacles([[0.15, -0.01]], 0.03, 0.003)
+NOISE = 0.1
+CIRCLE = foc_ros.Circle((0.15, -0.01), radius=0.03, radius_stddev=0.003)
 SLANTED = np.array([0.3, 0.12])
 """A goal that needs effort on both axes."""
 SAMPLES = 20_000
-CENTRE, RADIUS, RADIUS_STDDEV, CONTACT_NOISE, CONTACT_ETA = (0.12, 0.0), 0.03, 0.003, 0.15, 0.89
+TOUCHED, TOUCHED_ETA, TOUCHED_NOISE = foc_ros.Circle((0.12, 0.0), radius=0.03, radius_stddev=0.003), 0.89, 0.15
+"""The scene of the contacts."""
 ETAS = np.linspace(0.8, 0.95, 61)
-STRIDE, LAST_S = 0.05, 27.0
-"""Distance in s between two points of the curve with rows at the steps, and its end."""
+CURVE = np.arange(0.0, 27.0, 0.1)
+"""Points s of the curve with rows at the steps."""
 
 
 def replayed() -> tuple[HandTrajectory, list[Snapshot]]:
@@ -96,8 +84,8 @@ def scene(hand: HandTrajectory, snapshots: list[Snapshot]) -> Figure:
     with open_figure(7.6, 6.6) as figure:
         axes = figure.subplots()
         draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds)
-        draw_candidates(axes, snapshot.candidates, number_labels(snapshot.candidates), snapshot.unsolved)
-        draw_hand(axes, hand, snapshot.stamp_ns, span)
+        drawing.draw_candidates(axes, snapshot.candidates, plots.number_labels(snapshot.candidates), snapshot.unsolved)
+        drawing.draw_hand(axes, hand, snapshot.stamp_ns, span)
     return figure
 
 
@@ -116,14 +104,14 @@ def pictures(
             with open_figure(8.4, 4.2) as figure:
                 scene, shares = figure.subplots(1, 2, width_ratios=(1.55, 1.0))
                 draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
-                draw_candidates(scene, snapshot.candidates, tracks.slots_at(row), snapshot.unsolved)
+                drawing.draw_candidates(scene, snapshot.candidates, tracks.slots_at(row), snapshot.unsolved)
                 scene.get_legend().remove()
-                draw_hand(scene, hand, snapshot.stamp_ns, (start_ns, end_ns))
-                draw_likelihoods(shares, tracks.between(start_ns, snapshot.stamp_ns), start_ns)
+                drawing.draw_hand(scene, hand, snapshot.stamp_ns, (start_ns, end_ns))
+                plots.draw_likelihoods(shares, tracks.between(start_ns, snapshot.stamp_ns), start_ns)
                 limits = (0.0, (end_ns - start_ns) / NANOSECONDS)
                 shares.set(xlim=limits, xlabel='time [s]', title='likelihood of each candidate', ylabel='')
                 shares.tick_params(labelbottom=True)
-            yield figure, STEP_MS if row != rows[-1] else int(1000 * LAST_S)
+            yield figure, STEP_MS if row != rows[-1] else LAST_MS
 
 
 def save_animation(drawn: list[tuple[Figure, int]], file: Path) -> None:
@@ -171,18 +159,26 @@ def play_page() -> bytes:
 
 
 def reach(
-    seconds: float, obstacles: Obstacles, eta: float = 0.9, strategy: str = 'optimal', goal: Array = GOAL
-) -> tuple[Problem, Solution]:
-    """Return a reach from rest to rest at a goal, past the obstacles on the left, and its problem."""
-    horizon = build_triple_integrator_horizon(seconds / STEPS, STEPS)
-    c = scale_noise(np.full(2, NOISE), REFERENCE_S, horizon.dt)
-    problem = rest_to_goal(horizon, np.zeros(6), goal, obstacles, c, eta)
-    return problem, solve_problem(problem, cold_start(guess_path(np.zeros(2), goal, STEPS, 0.05)), FocConfig(strategy=strategy))
+    obstacles: Sequence[foc_ros.Circle],
+    eta: float = 0.9,
+    strategy: str = 'optimal',
+    *,
+    seconds: float = 1.0,
+    goal: Array = GOAL,
+    c: float = NOISE,
+    **penalties: float,
+) -> foc_ros.Solution:
+    """Return a reach from rest to rest at a goal, past the obstacles on the left."""
+    values = {'foc.noise_x': c, 'foc.noise_y': c, 'likelihood.shortfall': np.inf}
+    config = Config().with_values(values | {f'foc.{name}': value for name, value in penalties.items()})
+    guess = guess_path(np.zeros(2), goal, STEPS, 0.05)
+    return foc_ros.solve((0.0, 0.0), goal, obstacles, eta, strategy, seconds, config, guess)
 
 
-def rolled(problem: Problem, solution: Solution, count: int) -> Array:
+def rolled(solution: foc_ros.Solution, count: int) -> Array:
     """Return noisy movements under the control of a solution, (count, N, 2) [m]."""
-    control = solution.control.T.ravel()
+    control, problem = solution.control.T.ravel(), solution.problem
+    assert problem is not None
     draws = np.random.default_rng(0).standard_normal((count, control.size))
     noise = stack_noise(problem.noise, STEPS) * np.abs(control) * draws
     movements: Array = problem.positions(control) + np.einsum('atu,su->sta', problem.horizon.position, noise)
@@ -195,9 +191,9 @@ def noise() -> Figure:
         paths, spread = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
         for number, (seconds, shift) in enumerate(((0.5, 0.05), (1.2, -0.05))):
             colour, _ = get_class_style(number)
-            problem, solution = reach(seconds, NOTHING, goal=SLANTED)
+            solution = reach([], seconds=seconds, goal=SLANTED)
             up = np.array([0.0, shift])
-            for movement in rolled(problem, solution, 30):
+            for movement in rolled(solution, 30):
                 paths.plot(*(movement + up).T, color=colour, linewidth=0.5, alpha=0.35)
             paths.plot(*(solution.path + up).T, color=colour, linewidth=2.2)
             for row in range(5, STEPS + 1, 5):
@@ -216,15 +212,15 @@ def surrogate() -> Figure:
     """Return paths for more and more eta, and how often noisy movements really stay clear."""
     with open_figure(8.6, 3.4) as figure:
         paths, shares = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
-        draw_scene(paths, CIRCLE, GOAL[None], (-0.02, 0.32, -0.07, 0.12), named=False)
+        draw_scene(paths, collect_obstacles([CIRCLE]), GOAL[None], (-0.02, 0.32, -0.07, 0.12), named=False)
         for number, eta in enumerate((0.5, 0.8, 0.95)):
             colour, dash = get_class_style(number)
-            _, solution = reach(1.0, CIRCLE, eta)
+            solution = reach([CIRCLE], eta)
             paths.plot(*solution.path.T, color=colour, linestyle=dash, linewidth=2.0, label=f'η = {eta:g}')
             _ellipse(paths, solution, STEPS // 2, colour)
         paths.legend(frameon=False, loc='upper left', ncols=3)
         etas = np.array([0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95])
-        clear = [_clear(eta) for eta in etas]
+        clear = [foc_ros.monte_carlo(reach([CIRCLE], float(eta)), SAMPLES).step[0] for eta in etas]
         shares.plot(etas, clear, marker='o', color=get_class_style(2)[0], label='share of movements\nclear at the worst step')
         shares.plot((0.5, 1.0), (0.5, 1.0), color='0.4', linestyle='--', label='what was asked for')
         shares.set(xlabel='wanted η', ylabel='share', ylim=(0.48, 1.02))
@@ -258,7 +254,7 @@ def classes() -> Figure:
     with open_figure(7.4, 5.6) as figure:
         axes = figure.subplots()
         draw_scene(axes, scene.obstacles, scene.goals, compute_bounds(scene.obstacles, scene.goals, candidates))
-        draw_candidates(axes, candidates, number_labels(candidates))
+        drawing.draw_candidates(axes, candidates, plots.number_labels(candidates))
         axes.plot(*scene.hand.mean[:2], marker='o', color='black')
     return figure
 
@@ -276,7 +272,7 @@ def likelihood() -> Figure:
             ratios = np.geomspace(1.0, 10.0, 60)
             first = [compute_likelihoods(np.array([1.0, ratio]), config)[0] for ratio in ratios]
             pair.plot(ratios, first, color=colour, linestyle=dash, linewidth=2.0)
-            draw_tag(pair, (ratios[40], first[40]), f'{beta:g}', colour)
+            drawing.draw_tag(pair, (ratios[40], first[40]), f'{beta:g}', colour)
         shares.set_xticks(range(len(costs)), [f'{cost:g}' for cost in costs])
         shares.set(xlabel='cost of a candidate relative to the cheapest', ylabel='likelihood')
         shares.legend(frameon=False)
@@ -286,45 +282,25 @@ def likelihood() -> Figure:
     return figure
 
 
-def _clear(eta: float) -> float:
-    problem, solution = reach(1.0, CIRCLE, eta)
-    return monte_carlo(problem, solution.control.T.ravel(), SAMPLES).step[0]
-
-
-def _ellipse(axes: Any, solution: Solution, row: int, colour: str, shift: Array | float = 0.0) -> None:
-    ellipse = make_stddev_ellipse(solution.path[row] + shift, solution.covariance[row, :2, :2])
+def _ellipse(axes: Any, solution: foc_ros.Solution, row: int, colour: str, shift: Array | float = 0.0) -> None:
+    ellipse = drawing.make_stddev_ellipse(solution.path[row] + shift, solution.covariance[row, :2, :2])
     ellipse.set(facecolor='none', edgecolor=colour, linewidth=0.9, alpha=0.8, zorder=3)
     axes.add_patch(ellipse)
 
 
-def build_contact(eta: float) -> Problem:
-    """Return a reach of 0.3 m past one circle."""
-    horizon = build_triple_integrator_horizon(1.0 / STEPS, STEPS)
-    obstacles = make_obstacles([CENTRE], RADIUS, RADIUS_STDDEV)
-    return rest_to_goal(horizon, np.zeros(6), GOAL, obstacles, np.full(2, CONTACT_NOISE), eta)
-
-
-def solve_sliding(eta: float) -> Solution:
-    """Return the solution of `lv`, whose contacts slide."""
-    return solve_problem(build_contact(eta), cold_start(guess_path(np.zeros(2), GOAL, STEPS, 0.05)), FocConfig(strategy='lv'))
-
-
-def follow_with_rows_at_steps() -> tuple[Array, Array]:
-    """Return eta and effort along the curve of `lv` where the constraint holds at the steps only, as in `fixed`."""
-    problem, settings = build_contact(CONTACT_ETA), FocConfig(strategy='fixed')
-    start, etas, efforts = cold_start(guess_path(np.zeros(2), GOAL, STEPS, 0.05)), [], []
-    for s in np.arange(0.0, LAST_S, STRIDE):
-        penalties = replace(settings, tau=settings.lv_delta * s, lam=settings.growth**s)
-        solution = solve_problem(problem, start, penalties)
-        if solution.status is not Status.SOLVED:
+def follow_with_rows_at_steps() -> Array:
+    """Return eta and effort (m, 2) along the curve of `lv` where the constraint holds at the steps only, as in `fixed`."""
+    foc, found = Config().foc, []
+    for s in CURVE:
+        penalties = {'tau': foc.lv_delta * s, 'lam': foc.growth**s}
+        solution = reach([TOUCHED], TOUCHED_ETA, 'fixed', c=TOUCHED_NOISE, **penalties)
+        if solution.status is not foc_ros.Status.SOLVED:
             break
-        start = warm_start(solution, problem)
-        etas.append(solution.eta)
-        efforts.append(solution.effort)
-    return np.array(etas), np.array(efforts)
+        found.append((solution.eta, solution.effort))
+    return np.array(found)
 
 
-def interpolate(solution: Solution, times: Array) -> Array:
+def interpolate(solution: foc_ros.Solution, times: Array) -> Array:
     """Return the mean (k, 2) [m] at times in steps: the cubic through positions and velocities at the steps."""
     step = np.minimum(times.astype(int), STEPS - 1)
     a = (times - step)[:, None]
@@ -335,31 +311,26 @@ def interpolate(solution: Solution, times: Array) -> Array:
     return mean
 
 
-def draw_circle(axes: Any, kept: float) -> None:
-    """Draw the obstacle and the circle that the mean has to keep clear of."""
-    axes.add_patch(Circle((float(CENTRE[0]), float(CENTRE[1])), RADIUS, facecolor='0.75', edgecolor='0.4'))
-    axes.add_patch(Circle((float(CENTRE[0]), float(CENTRE[1])), kept, facecolor='none', edgecolor='0.4', linestyle='--'))
-
-
 def contacts() -> Figure:
     """Return the picture: the mean against the circle, a close-up of the contact, effort over eta."""
-    solution = solve_sliding(CONTACT_ETA)
+    solution = reach([TOUCHED], TOUCHED_ETA, 'lv', c=TOUCHED_NOISE)
     _, time, multiplier = max(solution.multipliers, key=lambda contact: contact[2])
-    kept = float(np.sqrt(RADIUS**2 + RADIUS_STDDEV**2 + solution.tau))
+    centre, radius = np.array(TOUCHED.centre), TOUCHED.radius
+    kept = float(np.sqrt(radius**2 + TOUCHED.radius_stddev**2 + solution.tau))
     blue, orange = get_class_style(0)[0], get_class_style(1)[0]
     fine = interpolate(solution, np.linspace(0.0, STEPS, 20 * STEPS + 1))
     contact = interpolate(solution, np.array([time]))[0]
-    normal = (contact - CENTRE) / np.linalg.norm(contact - CENTRE)
+    normal = (contact - centre) / np.linalg.norm(contact - centre)
     with open_figure(10.0, 3.4) as figure:
         overview, close_up, curves = figure.subplots(1, 3, width_ratios=(1.35, 1.0, 1.15))
         for axes in (overview, close_up):
-            draw_circle(axes, kept)
+            axes.add_patch(Circle((0.12, 0.0), radius, facecolor='0.75', edgecolor='0.4'))
+            axes.add_patch(Circle((0.12, 0.0), kept, facecolor='none', edgecolor='0.4', linestyle='--'))
             axes.plot(*fine.T, color=blue, linewidth=1.6)
             axes.plot(*solution.path.T, color=blue, marker='o', markersize=3.5, linestyle='none')
             axes.plot(*contact, color=orange, marker='D', markersize=7, zorder=5)
-        overview.annotate(
-            '', contact + 0.035 * normal, contact, arrowprops={'arrowstyle': '->', 'color': orange, 'linewidth': 1.8}
-        )
+        arrow = {'arrowstyle': '->', 'color': orange, 'linewidth': 1.8}
+        overview.annotate('', contact + 0.035 * normal, contact, arrowprops=arrow)
         overview.annotate(f'y = {multiplier:,.0f} m/s⁶', contact + 0.037 * normal, color=orange, fontsize=8, ha='center')
         overview.plot(*GOAL, marker='*', markersize=12, color='black', markerfacecolor='white')
         overview.set(title='The mean touches the circle', xlabel='x [m]', ylabel='y [m]')
@@ -373,12 +344,10 @@ def contacts() -> Figure:
         close_up.set(title='Close-up of the contact', xticks=(), yticks=())
         close_up.set(xlim=contact[0] + half * np.array([-1, 1]), ylim=contact[1] + half * np.array([-1.0, 1.0]))
         close_up.set_aspect('equal')
-        etas, efforts = follow_with_rows_at_steps()
-        shown = etas > ETAS[0]
-        curves.plot(
-            etas[shown], efforts[shown], color=orange, marker='.', markersize=3, linestyle='none', label='rows at the steps'
-        )
-        sliding = [solve_sliding(float(eta)).effort for eta in ETAS]
+        along = follow_with_rows_at_steps()
+        look = {'color': orange, 'marker': '.', 'markersize': 3, 'linestyle': 'none'}
+        curves.plot(*along[along[:, 0] > ETAS[0]].T, label='rows at the steps', **look)
+        sliding = [reach([TOUCHED], float(eta), 'lv', c=TOUCHED_NOISE).effort for eta in ETAS]
         curves.plot(ETAS, sliding, color=blue, linewidth=1.8, label='sliding contacts (lv)')
         curves.set(title='Effort over η', xlabel='η', ylabel='effort [m²/s⁶]', yscale='log', xlim=(ETAS[0], ETAS[-1]))
         curves.set_yticks([5e3, 1e4, 2e4, 4e4], ['5 000', '10 000', '20 000', '40 000'])
