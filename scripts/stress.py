@@ -283,14 +283,15 @@ def run_node(parameters: Mapping[str, object], number: signal.Signals = signal.S
             ended.errors = log.read()
 
 
+def read_status(pid: int) -> dict[str, str]:
+    """Return what Linux says of a process, by name."""
+    return dict(line.split(':', 1) for line in Path(f'/proc/{pid}/status').read_text('ascii').splitlines())
+
+
 def measure_process(pid: int) -> dict[str, float]:
-    """Return resident memory [MB], threads, open files, and whether a process handles SIGTERM, after which its node starts."""
-    lines = Path(f'/proc/{pid}/status').read_text('ascii').splitlines()
-    status = dict(line.split(':', 1) for line in lines)
-    handles = int(status['SigCgt'], 16) >> (signal.SIGTERM - 1) & 1
-    files = len(list(Path(f'/proc/{pid}/fd').iterdir()))
-    memory = int(status['VmRSS'].split()[0]) / 1024.0
-    return {'memory': memory, 'threads': float(status['Threads']), 'files': float(files), 'handles': float(handles)}
+    """Return resident memory [MB], threads and open files of a process."""
+    status, files = read_status(pid), len(list(Path(f'/proc/{pid}/fd').iterdir()))
+    return {'memory': int(status['VmRSS'].split()[0]) / 1024.0, 'threads': float(status['Threads']), 'files': float(files)}
 
 
 def read_cpu_s(pid: int) -> float:
@@ -312,10 +313,10 @@ def play_until_predicted(player: Player) -> float:
 def watch(pid: int, player: Player, seconds: float) -> list[dict[str, float]]:
     """Publish for a while, with faults; return one row of measurements for every REPORT_S."""
     table, began = [], time.monotonic()
-    while (now := time.monotonic()) - began < seconds:
+    while time.monotonic() - began < seconds:
         player.play(REPORT_S, faulty=True)
         p99 = player.health.get('cycle time p50, p99 [ms]', '').partition(', ')[2]
-        table.append({'time': now - began, **measure_process(pid), 'p99': float(p99 or 'nan')})
+        table.append({'time': time.monotonic() - began, **measure_process(pid), 'p99': float(p99 or 'nan')})
         print('  '.join(f'{name} {value:.1f}' for name, value in table[-1].items()), flush=True)
     return table
 
@@ -347,7 +348,7 @@ def stop_one_node(player: Player, number: signal.Signals, after_s: float) -> str
     """Start a node and stop it; return what went wrong, None if nothing did."""
     with run_node({'foc.steps': 20, 'homotopy.max_candidates': 2}, number) as (pid, ended):
         began = time.monotonic()
-        while not measure_process(pid)['handles'] and time.monotonic() - began < LIMIT_S:
+        while not int(read_status(pid)['SigCgt'], 16) >> (signal.SIGTERM - 1) & 1 and time.monotonic() - began < LIMIT_S:
             time.sleep(0.005)
         player.play(after_s)
     return (
