@@ -21,7 +21,6 @@ import yaml
 from numpy.typing import NDArray
 from page import ROOT, SHARED, format_table
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
-from scipy.spatial import ConvexHull
 
 from foc_ros.analysis.recordings import Recording, find_recordings
 from foc_ros.core.config import Config
@@ -39,12 +38,8 @@ CHANGE = 0.1
 """Change of a likelihood from one tick to the next that counts."""
 SHORT_TICKS, RETURN_S, LONGEST_S = 10, 0.2, 0.05
 """Absences of fewer ticks and leads that return within this time count. Ticks farther apart than LONGEST_S are not compared."""
-OUTSIDE_M = 0.05
 FINE = 6
 """Points for each step of a path, so that its chords are no part of a distance."""
-EDGE = 1e-6
-"""Size that every point gets [m], because a hull needs an area."""
-ANGLES = np.linspace(0.0, 2.0 * np.pi, 33)[:-1]
 
 
 @dataclass
@@ -52,8 +47,7 @@ class Steadiness:
     """What happened over the ticks of several recordings.
 
     ticks: pairs of predictions that were compared; changed: those in which a likelihood changed by more than CHANGE; returns:
-    leads A-B-A within RETURN_S; absences: of a class, shorter than SHORT_TICKS; sideways: move of each mean path [m]; paths and
-    outside: mean paths, and those that leave the hull of scene, hand and goals by more than OUTSIDE_M.
+    leads A-B-A within RETURN_S; absences: of a class, shorter than SHORT_TICKS; sideways: move of each mean path [m].
     """
 
     seconds: float = 0.0
@@ -61,8 +55,6 @@ class Steadiness:
     changed: int = 0
     returns: int = 0
     absences: int = 0
-    paths: int = 0
-    outside: int = 0
     sideways: list[float] = field(default_factory=list)
 
     def summarise(self) -> list[str]:
@@ -76,7 +68,6 @@ class Steadiness:
             f'{self.absences / minutes:.1f}',
             f'{percentile:.2f}',
             f'{largest:.1f}',
-            f'{100 * self.outside / max(self.paths, 1):.3f}',
         ]
 
 
@@ -87,7 +78,6 @@ HEAD = (
     'short absences [1/min]',
     'sideways 95 % [mm]',
     'largest [mm]',
-    'outside [%]',
 )
 
 
@@ -148,8 +138,6 @@ def measure_steadiness(predictions: Iterable[Prediction], total: Steadiness) -> 
             total.absences += absences
             total.changed += _compute_largest_change(last, found) > CHANGE
             total.sideways += [compute_sideways_move(last[each], found[each]) for each in last.keys() & found.keys()]
-        total.paths += len(found)
-        total.outside += count_outside(now, found.values())
         leads += [(now.t, number) for number, each in found.items() if each.label == now.most_likely]
         total.returns += _has_returned(leads)
         before, last = now, found
@@ -198,23 +186,6 @@ def measure_distances(points: Array, line: Array) -> Array:
     nearest = np.clip(share, 0.0, 1.0)[..., None] * along
     distances: Array = np.hypot(*(offset - nearest).transpose(2, 0, 1)).min(axis=1)
     return distances
-
-
-def count_outside(prediction: Prediction, candidates: Iterable[PredictedCandidate]) -> int:
-    """Return how many mean paths leave the hull of scene, hand and goals by more than OUTSIDE_M."""
-    hand = prediction.candidates[0].mean[:1, :2] if prediction.candidates else np.zeros((0, 2))
-    circle = np.stack((np.cos(ANGLES), np.sin(ANGLES)), axis=1)
-    obstacles = prediction.obstacles
-    edges = (obstacles.centre[:, None] + obstacles.radius[:, None, None] * circle).reshape(-1, 2)
-    points = np.concatenate((edges, hand, prediction.goals))
-    hull = ConvexHull(np.concatenate((points, points + EDGE * np.array([1.0, 0.0]), points + EDGE * np.array([0.0, 1.0]))))
-    corners = hull.points[[*hull.vertices, hull.vertices[0]]]
-    return sum(_find_distance_outside(each.mean[:, :2], hull.equations, corners) > OUTSIDE_M for each in candidates)
-
-
-def _find_distance_outside(path: Array, edges: Array, corners: Array) -> float:
-    is_outside = (path @ edges[:, :2].T + edges[:, 2] > 0.0).any(axis=1)
-    return float(measure_distances(path[is_outside], corners).max()) if is_outside.any() else 0.0
 
 
 @dataclass(frozen=True, eq=False)
