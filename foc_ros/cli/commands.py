@@ -15,11 +15,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from foc_ros.core.config import ONLINE
-from foc_ros.core.errors import FocError, InputError
-from foc_ros.io.outputs import check_file, check_folder, check_picture, check_report
+from foc_ros.core.errors import FocError
+from foc_ros.io.outputs import check_folder, check_picture, check_report
 
-from .options import DEFAULTS, PREDICT, TRY, Existing, Params, Port, Remaps, Samples, app, warn_all
+from .options import DEFAULTS, NO_LEARNING, PREDICT, TRY, Existing, Learning, Params, Port, Remaps, Samples, app, warn_all
 
 
 @app.command(group=TRY)
@@ -140,8 +139,7 @@ def replay(
     output: Path | None = None,
     report: Path | None = None,
     params: Params = DEFAULTS,
-    learn: Path | None = None,
-    operator: Path | None = None,
+    learning: Learning = NO_LEARNING,
     guidance: bool = False,
     json: bool = False,
     remap: Remaps = (),
@@ -158,10 +156,6 @@ def replay(
         Folder for a page with pictures.
     params
         The node's parameter file (default: every parameter has its default).
-    learn
-        Learn the movements, with experience.learning, and add them to this class library, for homotopy.library.
-    operator
-        File for the parameters with the durations of this operator, for --params.
     guidance
         Compute guidance as well, at guidance.rate_hz: into the output bag and, with --json, as a list `guidance`.
     json
@@ -173,12 +167,7 @@ def replay(
 
     if report is not None:
         check_report('--report', report)
-    for option, file in (('--learn', learn), ('--operator', operator)):
-        if file is not None:
-            check_file(option, file)
-    library = params.homotopy.library
-    if learn is not None and library and Path(library) != learn:
-        raise InputError('--learn', 'no other class library in homotopy.library', library)
+    learning.check(params)
     check_bag(bag)
     if output is not None:
         check_new_bag(output)
@@ -192,10 +181,7 @@ def replay(
 
     if report is not None:
         from foc_ros.reporting.report import ReportCollector
-    if learn is not None:  # in addition to the movements of a class library that exists
-        given = {'homotopy.library': str(learn)} if learn.exists() else {}
-        params = params.with_values({'experience.learning': ONLINE, **given})
-    played, summary = Replay(params), Summary()
+    played, summary = Replay(learning.prepare(params)), Summary()
     collector = None if report is None else ReportCollector()
     consumers: list[files.Consumer] = [summary.add, *([] if collector is None else [collector.add])]
     # The answers wait in files: nothing is printed of a recording that turns out to be damaged.
@@ -206,10 +192,10 @@ def replay(
             guiding = GuidanceReplay(played.pipeline) if guidance else None
             files.replay_to(output, reader, played, guiding, consumers, guided)
             answer = summary.answer(played.intake.counts, reader.duration_s)
-        if learn is not None:
-            answer['learned'] = files.save_learnt(learn, played.pipeline)
-        if operator is not None:
-            write_parameter_file('--operator', operator, played.pipeline.adapted_config)
+        if learning.learn is not None:
+            answer['learned'] = files.save_learnt(learning.learn, played.pipeline)
+        if learning.operator is not None:
+            write_parameter_file('--operator', learning.operator, played.pipeline.adapted_config)
         if report is not None and collector is not None:
             collector.write(report, bag.resolve().name, facts(answer))
         if json:

@@ -20,9 +20,9 @@ from cyclopts import App, Group, Parameter, Token
 
 import foc_ros
 from foc_ros.analysis.simulation.names import ASSISTANCE, OPERATORS
-from foc_ros.core.config import Config
+from foc_ros.core.config import ONLINE, Config
 from foc_ros.core.errors import InputError, RecordingError, collect_all, suggest
-from foc_ros.io.outputs import check_page
+from foc_ros.io.outputs import check_file, check_page
 from foc_ros.io.topics import TYPES
 from foc_ros.ros.parameters import load_parameter_file
 
@@ -127,6 +127,42 @@ Seed = Annotated[int, _whole(0, MOST_TRIALS)]
 Operators = Annotated[tuple[str, ...], _names(OPERATORS)]
 Assistance = Annotated[tuple[str, ...], _names(ASSISTANCE)]
 Allowed = Annotated[tuple[str, ...], _names(ALLOWED)]
+
+
+@Parameter(name='*')
+@dataclass(frozen=True)
+class Learning:
+    """What is kept of the movements of a recording.
+
+    Parameters
+    ----------
+    learn
+        Learn the movements, with experience.learning, and add them to this class library, for homotopy.library.
+    operator
+        File for the parameters with the durations of this operator, for --params.
+    """
+
+    learn: Path | None = None
+    operator: Path | None = None
+
+    def check(self, config: Config) -> None:
+        """Raise InputError for a file that cannot be written, and for two class libraries."""
+        for option, file in (('--learn', self.learn), ('--operator', self.operator)):
+            if file is not None:
+                check_file(option, file)
+        library = config.homotopy.library
+        if self.learn is not None and library and Path(library) != self.learn:
+            raise InputError('--learn', 'no other class library in homotopy.library', library)
+
+    def prepare(self, config: Config) -> Config:
+        """Return the config with which movements are learnt, in addition to those of a class library that exists."""
+        if self.learn is None:
+            return config
+        given = {'homotopy.library': str(self.learn)} if self.learn.exists() else {}
+        return config.with_values({'experience.learning': ONLINE, **given})
+
+
+NO_LEARNING = Learning()
 
 
 @Parameter(name='*')
