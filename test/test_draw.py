@@ -22,8 +22,7 @@ from report_samples import START_NS, prediction, predictions, samples, scene, wi
 
 from foc_ros.core.errors import InputError
 from foc_ros.core.obstacles import shapes
-from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.obstacles.geometry import trace_obstacle
+from foc_ros.core.obstacles.geometry import measure_offsets, trace_obstacle
 from foc_ros.core.types import Prediction, Status, make_obstacles
 from foc_ros.reporting.draw import (
     CLASS_COLOURS,

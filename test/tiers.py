@@ -30,7 +30,7 @@ LONG = (
     'test_least_loss.py::test_likelihoods_are_continuous*',
     'test_guidance_safety.py::test_ten_thousand_hostile_hands',
     # all steps of a fit, of the paper's studies and of long reports
-    'test_fit.py::test_strategy_fixed_has_its_tau_and_lambda_fitted',
+    'test_fit.py::test_strategy_fixed_keeps_its_tau_and_lambda_and_says_so',
     'test_fit.py::test_without_obstacles_goals_*',
     'test_paper.py::test_same_files_each_time',
     'test_report.py::test_a_long_recording_is_thinned_out*',
@@ -61,6 +61,7 @@ PROCESS = (
     'test_fit_*.py::test_a_setting_that_predicts_nothing_*',
     'test_evaluate.py::test_the_number_of_workers_does_not_matter',
     'test_paper.py::*',
+    'test_plan_recovery.py::test_recovered_*',
     # a dozen programs with a picture each
     'test_examples.py::test_the_example_runs_and_makes_a_figure',
 )
