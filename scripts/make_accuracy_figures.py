@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 
-from accuracy import algorithm1, bounds, effort_over_eta, guarantee, page, reference
+from accuracy import bounds, effort_over_eta, guarantee, page, reference
 from matplotlib.figure import Figure
 
 from foc_ros.reporting.plots import save_figure
@@ -34,17 +34,9 @@ def measure_curves() -> Blocks:
     return {'curves': effort_over_eta.format_curves(effort_over_eta.measure())}
 
 
-def measure_algorithm1() -> Blocks:
-    """Measure the ends of the paper's algorithm."""
-    ends = algorithm1.measure()
-    _draw('algorithm1', algorithm1.draw(ends))
-    return {'algorithm1': algorithm1.format_ends(ends)}
-
-
 PARTS: dict[str, Callable[[], Blocks]] = {
     'reference': lambda: {'reference': reference.format_agreement(), 'shapes': reference.format_shapes()},
     'guarantee': measure_guarantee,
-    'algorithm1': measure_algorithm1,
     'bounds': lambda: {'bounds': bounds.format_costs(bounds.measure())},
     'curves': measure_curves,
 }
@@ -58,10 +50,7 @@ def main() -> None:
     if unknown := set(chosen) - set(PARTS):
         parser.error(f'no part is named {", ".join(sorted(unknown))}')
     for name in chosen:
-        texts = PARTS[name]()
-        page.write_blocks(texts)
-        for block, text in texts.items():
-            print(f'{block}\n{text}\n', flush=True)
+        page.write_blocks(PARTS[name]())
 
 
 if __name__ == '__main__':

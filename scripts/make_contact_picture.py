@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Make the picture of doc/solver.md: a contact between two steps, and effort over eta with and without sliding contacts.
+"""Make the picture of doc/model.md: a contact between two steps, and effort over eta with and without sliding contacts.
 
 python scripts/make_contact_picture.py [FILE]
 """
@@ -127,7 +127,7 @@ def make_figure() -> Figure:
 
 
 if __name__ == '__main__':
-    parser = argparse.ArgumentParser(description='Make the picture of doc/solver.md.')
+    parser = argparse.ArgumentParser(description='Make the picture of doc/model.md.')
     parser.add_argument('file', nargs='?', type=Path, default=PICTURE)
     file = parser.parse_args().file
     file.parent.mkdir(parents=True, exist_ok=True)
