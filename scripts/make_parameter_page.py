@@ -10,10 +10,10 @@ PAGE = Path(__file__).parents[1] / 'doc' / 'parameters.md'
 
 HEAD = """# Parameters
 
-Every parameter of the node, of the commands (`--params`) and of `foc_ros.Config`. This page is made from `foc_ros/core/config.py` by
-`scripts/make_parameter_page.py`; `config/foc.yaml` holds the same defaults as a ROS 2 parameter file. A value outside its range, of the
-wrong type, or of an unknown name is refused with name, value and bound. Read-only parameters are set at the start. The node alone also has
-`autostart` (default true, read-only).
+Every parameter of the node, of the commands (`--params`) and of `foc_ros.Config`. This page is made from
+`foc_ros/core/config.py` by `scripts/make_parameter_page.py`; `config/foc.yaml` holds the same defaults as a ROS 2 parameter file.
+A value outside its range, of the wrong type, or of an unknown name is refused with name, value and bound. Read-only parameters
+are set at the start. The node alone also has `autostart` (default true, read-only).
 """
 
 TABLE = """
