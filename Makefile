@@ -10,13 +10,10 @@
 # make doc         the documentation as HTML, in build/doc/index.html
 # make bench       the benchmark; OPTIONS=--quick for a first look, --json, --markdown, '--only NAME'
 # make people      predictions of people, where their recordings are beside the checkout: doc/people.md; OPTIONS=--every 4
-# make pages       files that are derived from the parameters in foc_ros/core/config.py
 # make colcon      build, start, lint and test with colcon, as in a ROS workspace
 # make dist        build the source distribution and the wheel in build/dist, and try the wheel in an empty environment
-# make fuzz        100,000 random messages
-# make soak        ten minutes of a node among faulty publishers
-# make stops       a node that is stopped 200 times
-# make hostile     a node in scenes that are hard to predict in
+# make stress      a live node: ten minutes among faulty publishers, 200 stops, scenes that are hard to predict in;
+#                  'OPTIONS=soak --minutes 1' for a part (scripts/stress.py --help)
 # make clean       remove everything that these targets have made
 
 # a pipeline fails if any of its commands fails
@@ -63,7 +60,7 @@ CHECK_PYTHON = $(PYTHON) -c '' 2>/dev/null || { $(EXPLAIN_PYTHON); exit 1; }
 
 TEST = ROS_PYTHON_CHECK_FIELDS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
 
-.PHONY: setup help check test test-long lint demo doc bench people pages colcon dist fuzz soak stops hostile clean
+.PHONY: setup help check test test-long lint demo doc bench people stress colcon dist clean
 
 setup: $(STAMP)
 ifneq ($(origin PYTHON),file)
@@ -118,17 +115,8 @@ $(VENV)/.dist: $(STAMP)
 	@$(PIP) install --quiet --editable '.[dist]'
 	@touch $@
 
-fuzz: $(STAMP)
-	FOC_ROS_FUZZ=100000 $(TEST) --timeout 3600 test/test_fuzz.py
-
-soak: $(STAMP)
-	$(BIN)/python scripts/soak.py --minutes 10
-
-stops: $(STAMP)
-	$(BIN)/python scripts/stops.py --count 100
-
-hostile: $(STAMP)
-	$(BIN)/python scripts/hostile.py
+stress: $(STAMP)
+	$(if $(OPTIONS),$(BIN)/python scripts/stress.py $(OPTIONS),for part in soak stops hostile; do $(BIN)/python scripts/stress.py $$part || exit; done)
 
 # a warning of Sphinx, such as a link to a page that does not exist, is a failure
 doc: $(VENV)/.doc
@@ -150,12 +138,6 @@ $(VENV)/.bench: $(STAMP)
 
 people: $(STAMP)
 	$(BIN)/python scripts/people.py $(OPTIONS)
-	$(BIN)/python scripts/measure_learning.py $(OPTIONS)
-	$(BIN)/python scripts/measure_order.py $(OPTIONS)
-
-pages: $(STAMP)
-	$(BIN)/python -m foc_ros.ros.parameters > config/foc.yaml
-	$(BIN)/python scripts/make_parameter_page.py
 
 clean:
 	rm -rf doc/auto_examples doc/sg_execution_times.rst

@@ -38,6 +38,7 @@ setup(
     zip_safe=False,
     python_requires='>=3.11',
     install_requires=[
+        'cyclopts>=5.1',
         'mcap>=1.1',
         'numpy>=1.23',
         'pebble>=5',

@@ -1,4 +1,4 @@
-"""Measure predictions of people: ways, positions, persons left out and what is learnt of them; `make people` runs it.
+"""Measure predictions of people: ways and positions; `make people` runs it.
 
 It uses D3IL and HLP, which have to be beside the checkout (`shared/data`), and writes the tables of doc/people.md. Each setting
 is scored on those recordings of D3IL and persons of HLP that no setting was chosen on.
@@ -7,32 +7,24 @@ is scored on those recordings of D3IL and persons of HLP that no setting was cho
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor
+import os
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-from accuracy.data_sets import SHARED
-from accuracy.page import ROOT, format_table, write_blocks
+from page import ROOT, SHARED, format_table, write_blocks
 
-from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, make_plain_rules
-from foc_ros.analysis.evaluation.cross_validation import choose_held_out, compute_log_likelihoods
-from foc_ros.analysis.evaluation.forecasts import power_rule_shares, published_shares
+from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares
+from foc_ros.analysis.evaluation.forecasts import published_shares
 from foc_ros.analysis.evaluation.ground_truth import HORIZONS_S
-from foc_ros.analysis.evaluation.metrics import Scores, score_forecasts, summarise
+from foc_ros.analysis.evaluation.metrics import score_forecasts, summarise
 from foc_ros.analysis.evaluation.observations import ObservedRecording, observe_in_order
 from foc_ros.analysis.evaluation.position_metrics import compute_position_scores
 from foc_ros.analysis.evaluation.questions import PATH_CLASS, ask_all
-from foc_ros.analysis.fitting.duration_fit import find_samples
-from foc_ros.analysis.fitting.recorded_hand import RecordedHand, read_hand
-from foc_ros.analysis.parallel import collect, collect_all, open_executor
+from foc_ros.analysis.parallel import collect_all, open_executor
 from foc_ros.analysis.recordings import Recording, find_recordings, group_by_operator
-from foc_ros.cli.arguments import add_worker_arguments
 from foc_ros.core.config import Config
 from foc_ros.core.errors import RecordingError
-from foc_ros.core.estimation.duration import estimate_times_to_go
-from foc_ros.core.learning.pace import Pace
 from foc_ros.ros.parameters import load_parameter_file
 
 PAGE, EXAMPLES = ROOT / 'doc' / 'people.md', ROOT / 'doc' / 'examples'
@@ -50,10 +42,6 @@ SETTINGS = {
     (HLP, 'free_hand.yaml'): load_parameter_file(EXAMPLES / 'free_hand.yaml').with_values({'rate_hz': 4.0}),
 }
 PUBLISHED = Baseline('published', partial(forecast_shares, published_shares), (None,))
-CURVE = (0, 1, 2, 4, 8)
-"""Numbers of earlier movements after which the time to go is scored."""
-
-Persons = dict[str, list[Recording]]
 
 
 def is_held_out(name: str) -> bool:
@@ -61,7 +49,7 @@ def is_held_out(name: str) -> bool:
     return int(name) % 2 == 0
 
 
-def find_persons(data: Path) -> Persons:
+def find_persons(data: Path) -> dict[str, list[Recording]]:
     """Return the recordings of each person that no setting was chosen on; D3IL does not tell its persons apart.
 
     Settings were chosen on the recordings of D3IL with odd numbers, and on every other person of HLP from the first.
@@ -72,18 +60,14 @@ def find_persons(data: Path) -> Persons:
     return {person: found[person] for person in sorted(found)[1::2]}
 
 
-def score_ways(recordings: Sequence[ObservedRecording], baseline: Baseline, chosen: Sequence[int]) -> Scores:
-    """Score forecasts of the ways, each with the setting chosen for its recording."""
-    return score_forecasts(
-        (number, each.truth.progress, question, baseline.forecast(each, question, baseline.settings[chosen[number]]))
-        for number, recording in enumerate(recordings)
-        for each, question in ask_all(recording, PATH_CLASS)
+def format_ways(recordings: Sequence[ObservedRecording]) -> tuple[str, ...]:
+    """Return gain, share correct, calibration error and the worst tenth of the forecasts of the ways."""
+    asked = [(n, each, question) for n, seen in enumerate(recordings) for each, question in ask_all(seen, PATH_CLASS)]
+    found = summarise(
+        score_forecasts(
+            (n, each.truth.progress, question, PUBLISHED.forecast(each, question, None)) for n, each, question in asked
+        )
     )
-
-
-def format_ways(scores: Scores) -> tuple[str, ...]:
-    """Return gain, share correct, calibration error and the worst tenth."""
-    found = summarise(scores)
     worst = min(each['gain'] for each in found['by_tenth'] if each['gain'] is not None)
     values = found['gain'], 100 * found['right'], found['expected_calibration_error'], worst
     return tuple(f'{value:.{digits}f}' for value, digits in zip(values, (3, 1, 3, 2), strict=True))
@@ -99,79 +83,26 @@ def format_positions(recordings: Sequence[ObservedRecording]) -> tuple[str, ...]
     return tuple(' '.join(f'{value:.{digits}f}' for value in row) for row, digits in rows)
 
 
-def compare_pace(hands: Sequence[RecordedHand]) -> Iterator[tuple[int, float, float]]:
-    """Yield the number of movements judged before each movement of a person, and the mean errors of its time to go [s].
-
-    The first error is that of the defaults, the second one that with the pace learnt so far.
-    """
-    config, pace = Config(), Pace()
-    for hand in hands:
-        first, *others = hand.estimate_states(config)
-        pace = pace.follow(first, hand.goals, config.duration)  # this ends the movement of the recording before
-        if samples := find_samples(hand, config):
-            before, after = (
-                np.mean([abs(estimate_times_to_go(state, goal[None], each)[0] - left) for state, goal, left in samples])
-                for each in (config.duration, pace.adapt(config.duration))
-            )
-            yield pace.movements, float(before), float(after)
-        for state in others:
-            pace = pace.follow(state, hand.goals, config.duration)
-
-
-def measure_pace(persons: Persons, executor: Executor) -> list[tuple[str, ...]]:
-    """Return the rows of the learning curve."""
-    found = []
-    for recordings in persons.values():
-        hands, _ = collect(partial(read_hand, config=Config()), [(each.name, each) for each in recordings], executor, 'read')
-        found += list(compare_pace(hands))
-    table, rows = np.array(found), []
-    for low, high in zip(CURVE, (*CURVE[1:], np.inf), strict=True):
-        part = table[(table[:, 0] >= low) & (table[:, 0] < high)]
-        if len(part):
-            errors = [f'{each:.3f}' for each in part[:, 1:].mean(axis=0)]
-            rows.append((f'{low}' if high <= low + 1 else f'from {low}', f'{len(part)}', *errors))
-    return rows
-
-
 def main() -> None:
     """Measure and write the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--every', type=int, default=1, help='use every n-th recording of a person only')
-    add_worker_arguments(parser)
+    parser.add_argument('--workers', type=int, default=len(os.sched_getaffinity(0)), metavar='N', help='worker processes')
     arguments = parser.parse_args()
-    ways, positions, left_out, pace = [], [], [], []
-    with open_executor(arguments) as executor:
+    ways, positions = [], []
+    with open_executor(arguments.workers) as executor:
         for (data, setting), config in SETTINGS.items():
-            persons = find_persons(SHARED / data)
-            items = [(person, found[:: arguments.every]) for person, found in persons.items()]
+            items = [(person, found[:: arguments.every]) for person, found in find_persons(SHARED / data).items()]
             observed = collect_all(partial(observe_in_order, config=config), items, executor, f'{data}: {setting}')
             recordings = [recording for each, _ in observed for recording in each]
             for name, reason in [failure for _, failed in observed for failure in failed.items()]:
                 raise RecordingError(f'{name}: {reason}')
-            ways.append((data, setting, *format_ways(score_ways(recordings, PUBLISHED, [0] * len(recordings)))))
+            ways.append((data, setting, *format_ways(recordings)))
             positions.append((data, setting, *format_positions(recordings)))
-            if data == HLP:
-                rules = Baseline(
-                    'foc', partial(forecast_shares, power_rule_shares), make_plain_rules(recordings, config.likelihood)
-                )
-                table = np.array([compute_log_likelihoods(ask_all(each, PATH_CLASS), rules) for each in recordings])
-                chosen = choose_held_out(table, [each.name.rpartition('_')[0] for each in recordings])
-                left_out.append((setting, *format_ways(score_ways(recordings, rules, chosen.tolist()))))
-        for data in (D3IL, HLP):
-            pace += [(data, *row) for row in measure_pace(find_persons(SHARED / data), executor)]
-    titles = 'gain [nat]', 'right [%]', 'ECE', 'worst tenth [nat]'
-    write_blocks(
-        {
-            'ways': format_table(('data', 'parameters', *titles), ways),
-            'positions': format_table(
-                ('data', 'parameters', 'error [mm]', 'NLPD', 'NLPD, Singer', 'in 50 % region [%]', 'in 90 % region [%]'),
-                positions,
-            ),
-            'persons': format_table(('parameters', *titles), left_out),
-            'pace': format_table(('data', 'movements before', 'movements', 'defaults [s]', 'pace learnt [s]'), pace),
-        },
-        PAGE,
-    )
+    heads = 'gain [nat]', 'right [%]', 'ECE', 'worst tenth [nat]'
+    measures = 'error [mm]', 'NLPD', 'NLPD, Singer', 'in 50 % region [%]', 'in 90 % region [%]'
+    tables = {'ways': (heads, ways), 'positions': (measures, positions)}
+    write_blocks({name: format_table(('data', 'parameters', *head), rows) for name, (head, rows) in tables.items()}, PAGE)
 
 
 if __name__ == '__main__':

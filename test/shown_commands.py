@@ -62,8 +62,8 @@ NOT_RUN = {
     'ros2 run foc_ros foc_node --ros-args --enclave /foc': ROS,
     # measuring
     'make people': f'{LONG}, and needs recordings that are not part of the checkout',
-    '.venv/bin/python scripts/measure_flicker.py': REPLAYED,
-    '.venv/bin/python scripts/make_accuracy_figures.py': f'{LONG}; test_accuracy_page.py checks the page',
+    '.venv/bin/python scripts/flicker.py': REPLAYED,
+    '.venv/bin/python benchmarks/accuracy.py': f'{LONG}; test_accuracy_page.py checks the page',
     # guidance
     'foc_ros simulate --operators accurate,noisy,laggy,changes_way,unannounced_goal --trials 200 --params rate.yaml': PARTLY,
     # CONTRIBUTING
@@ -76,10 +76,7 @@ NOT_RUN = {
     'make colcon': BY_CI,
     'make dist': BY_CI,
     'scripts/tf2_check': 'clones and compiles tf2; run it before a release',
-    'make fuzz': LONG,
-    'make soak': LONG,
-    'make stops': LONG,
-    'make hostile': LONG,
+    'make stress': LONG,
     '.ci/run': 'it runs this test',
 }
 ENDLESS = (

@@ -7,15 +7,17 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT / 'scripts'))
 
-page = importlib.import_module('accuracy.page')
+page = importlib.import_module('page')
+PAGE = ROOT / 'doc' / 'accuracy.md'
 MEASURED = {'guarantee', 'outcomes', 'reference', 'shapes', 'bounds'}
+"""The blocks that `benchmarks/accuracy.py` measures."""
 
 
 def test_the_page_shows_the_main_measurements_with_their_pictures():
-    text = page.PAGE.read_text(encoding='utf-8')
+    text = PAGE.read_text(encoding='utf-8')
     blocks = page.find_blocks(text)
-    assert set(blocks) == MEASURED
-    for name, block in blocks.items():
+    assert set(blocks) >= MEASURED
+    for name, block in ((name, blocks[name]) for name in MEASURED):
         rows = block.strip().splitlines()
         assert len(rows) >= 7, name
         assert len({row.count('|') for row in rows}) == 1, f'{name}: the rows differ in length'
@@ -25,7 +27,7 @@ def test_the_page_shows_the_main_measurements_with_their_pictures():
 
 
 def test_replacing_a_block_leaves_the_rest_of_the_page_unchanged():
-    text = page.PAGE.read_text(encoding='utf-8')
+    text = PAGE.read_text(encoding='utf-8')
     table = page.format_table(['a', 'b'], [['1', '2']])
     assert table == '| a | b |\n| --- | --- |\n| 1 | 2 |'
     once = page.replace_blocks(text, {'bounds': table})

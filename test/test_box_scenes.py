@@ -81,7 +81,7 @@ def test_bags_of_the_folder_hold_cubes_that_are_read_back(folder: Path, tmp_path
 def test_evaluate_and_its_report_take_the_folder(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr('foc_ros.cli.evaluate.open_executor', lambda _: ThreadPoolExecutor(1))
+    monkeypatch.setattr('foc_ros.analysis.parallel.open_executor', lambda *_: ThreadPoolExecutor(1))
     assert main(['evaluate', str(folder), '--params', str(folder / 'parameters.yaml'), '--json']) == 0
     answer = json.loads(capsys.readouterr().out)
     assert (answer['recordings'], answer['failed'], answer['labels_not_taken']) == (2, {}, {})

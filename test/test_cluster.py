@@ -1,6 +1,5 @@
 """A Dask cluster of two worker processes on this machine gives the same results; a killed worker fails one recording only."""
 
-import argparse
 from collections.abc import Iterator
 
 import pytest
@@ -27,12 +26,12 @@ def address() -> Iterator[str]:
 
 
 def test_the_cluster_gives_the_same_results(address: str) -> None:
-    with open_executor(argparse.Namespace(scheduler=address)) as executor:
+    with open_executor(1, address) as executor:
         assert list(run(worker_tasks.squared, ITEMS, executor)) == SQUARES
 
 
 def test_a_killed_worker_of_the_cluster_fails_what_it_was_doing_and_nothing_else(address: str) -> None:
-    with open_executor(argparse.Namespace(scheduler=address)) as executor:
+    with open_executor(1, address) as executor:
         found = dict(run(worker_tasks.deadly, ITEMS, executor))
     for name, square in SQUARES:
         if name in ('r3', 'r5'):
@@ -43,7 +42,7 @@ def test_a_killed_worker_of_the_cluster_fails_what_it_was_doing_and_nothing_else
 
 def test_a_scheduler_that_dies_ends_the_run_in_words() -> None:
     local = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=':0')
-    with local as cluster, open_executor(argparse.Namespace(scheduler=cluster.scheduler_address)) as executor:
+    with local as cluster, open_executor(1, cluster.scheduler_address) as executor:
         results = run(worker_tasks.sleepy, [('a', 0.0), ('b', 1.0), ('c', 1.0)], executor)
         assert next(results) == ('a', 0.0)
         cluster.close()
@@ -55,4 +54,4 @@ def test_a_scheduler_without_workers_is_refused(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr('foc_ros.analysis.dask_cluster.CONNECT_S', 0.3)
     refused = pytest.raises(InputError, match='--scheduler: expected a Dask scheduler with workers, got none at')
     with distributed.LocalCluster(n_workers=0, dashboard_address=':0') as cluster, refused:
-        open_executor(argparse.Namespace(scheduler=cluster.scheduler_address))
+        open_executor(1, cluster.scheduler_address)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 
+import foc_ros
 from foc_ros.cli import main as command_line
 from foc_ros.core.errors import InputError
 from foc_ros.io.terminal import show_table
@@ -28,11 +29,16 @@ def started(*arguments: str, **options: object) -> subprocess.CompletedProcess[s
         ([], 'foc_ros: no command is given; demo, '),
         (['fly'], 'foc_ros: there is no command fly; demo, '),
         (['evalute', 'bags'], 'foc_ros: there is no command evalute (did you mean evaluate?)'),
-        (['convert'], 'foc_ros convert: the following arguments are required: CSV, --output'),
-        (['replay', '.', '--prams', 'a'], 'foc_ros replay: unrecognized arguments: --prams (did you mean --params?) a\n'),
+        (['convert'], 'foc_ros convert: CSV: expected a value, got none'),
+        (['convert', '.'], 'foc_ros convert: --output: expected a value, got none'),
+        (['replay', '.', '--prams', 'a'], 'foc_ros replay: unrecognized arguments: --prams (did you mean --params?)\n'),
+        (['replay', '.', 'a'], 'foc_ros replay: unrecognized arguments: a\n'),
+        (['replay', '.', '--json=maybe'], 'foc_ros replay: Invalid value for --json: unable to convert "maybe" into bool.'),
+        (['evaluate', '.', '--workers', '2', '--scheduler', 'host:8786'], 'foc_ros evaluate: --scheduler: expected either '),
         (['replay', '.', '--fast'], 'foc_ros replay: unrecognized arguments: --fast'),
         (['replay', '.', '--output', 'a', '--output', 'b'], 'foc_ros replay: argument --output: given twice'),
         (['evaluate', 'x' * 300], 'foc_ros evaluate: [Errno 36] File name too long'),
+        (['paper'], 'foc_ros paper: the studies of the paper are an example now: python examples/paper/paper.py\n'),
         (['replay', 'no_such_bag'], 'foc_ros replay: no_such_bag: no such file or directory'),
     ],
 )
@@ -47,7 +53,7 @@ def run_without_heavy_imports(*arguments: str) -> subprocess.CompletedProcess[st
     """Run the program, and check that it has imported nothing that takes long."""
     program = (
         'import sys\nfrom foc_ros.cli.main import main\ncode = main(sys.argv[1:])\n'
-        'print("heavy:", sorted({"numpy", "rclpy", "rosbags", "rich", "piqp"} & set(sys.modules)))\nsys.exit(code)'
+        'print("heavy:", sorted({"numpy", "rclpy", "rosbags", "piqp"} & set(sys.modules)))\nsys.exit(code)'
     )
     command = [sys.executable, '-c', program, *arguments]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=100, check=False)
@@ -70,10 +76,28 @@ def test_wrong_parameters_of_the_node_are_answered_before_anything_is_imported(t
 def test_help_names_every_command_and_imports_nothing_heavy() -> None:
     result = run_without_heavy_imports('--help')
     assert result.returncode == 0, result.stderr
-    assert all(f'  {name} ' in result.stdout for name in command_line.COMMANDS)
+    assert all(f' {name} ' in result.stdout for name in command_line.list_commands())
 
 
-@pytest.mark.parametrize('command', [name for name in command_line.COMMANDS if name != 'node'])
+def test_the_version_is_printed() -> None:
+    assert run_without_heavy_imports('--version').stdout.splitlines()[0] == foc_ros.__version__
+
+
+@pytest.mark.parametrize('command', command_line.list_commands())
+def test_the_help_of_a_command_explains_every_argument(command: str) -> None:
+    result = run_without_heavy_imports(command, '--help')
+    assert result.returncode == 0, result.stderr
+    for argument in command_line.app[command].assemble_argument_collection(parse_docstring=True):
+        if argument.name != '*':  # options that several commands have, which follow one by one
+            assert argument.parameter.help, f'{argument.name} has no help'
+            assert argument.name in result.stdout
+
+
+def test_a_shell_learns_to_complete_the_options() -> None:
+    assert '--monte-carlo' in command_line.app.generate_completion(shell='bash')
+
+
+@pytest.mark.parametrize('command', [name for name in command_line.list_commands() if name != 'node'])
 def test_wrong_arguments_are_answered_before_anything_is_imported(command: str) -> None:
     result = run_without_heavy_imports(command, '--no-such-option', *(['.'] if command in ('solve', 'replay') else ()))
     assert result.returncode == 2
@@ -151,7 +175,6 @@ INPUTS = 'hand_pose, obstacles, obstacle_markers, collision_objects, detections,
             ['evaluate', '.', '--scheduler', 'here'],
             ['--scheduler: expected the address of a Dask scheduler, as in tcp://host:8786, got here'],
         ),
-        (['paper', '--output', 'scene.yaml'], ['--output: expected a folder, got scene.yaml, which is a file']),
         (['play', '--data', '/proc/sys/a'], ['--data: expected a directory that can be written, got /proc/sys/a']),
         (['learn', '.', '--output', '/proc/sys/a'], ['--output: expected a file that can be written, got /proc/sys/a']),
     ],
@@ -172,16 +195,20 @@ def test_wrong_inputs_are_answered_before_the_solver_is_imported(
     assert result.stderr.splitlines() == [f'foc_ros {arguments[0]}: {line}' for line in lines]
 
 
-class Fake:
-    """A command with a given outcome."""
+@pytest.fixture
+def ends(monkeypatch: pytest.MonkeyPatch) -> Callable[[int | BaseException], None]:
+    """Return a function that adds a command `end` with a given outcome."""
 
-    def __init__(self, outcome: int | BaseException) -> None:
-        self.outcome = outcome
+    def add(outcome: int | BaseException) -> None:
+        def end() -> int:
+            if isinstance(outcome, BaseException):
+                raise outcome
+            return outcome
 
-    def run(self, arguments: object) -> int:
-        if isinstance(self.outcome, BaseException):
-            raise self.outcome
-        return self.outcome
+        command_line.app.command(end, name='end')
+
+    yield add
+    del command_line.app['end']
 
 
 @pytest.mark.parametrize(
@@ -189,17 +216,21 @@ class Fake:
     [
         (0, 0, ''),
         (3, 3, ''),
-        (InputError('start', 'two\n  numbers', 'one'), 2, 'foc_ros paper: start: expected two numbers, got one\n'),
-        (InputError('topic', 'a name', '/\x1b[31mhand'), 2, 'foc_ros paper: topic: expected a name, got /\\x1b[31mhand\n'),
-        (OSError(5, 'Input/output error', 'a'), 2, "foc_ros paper: [Errno 5] Input/output error: 'a'\n"),
+        (InputError('start', 'two\n  numbers', 'one'), 2, 'foc_ros end: start: expected two numbers, got one\n'),
+        (InputError('topic', 'a name', '/\x1b[31mhand'), 2, 'foc_ros end: topic: expected a name, got /\\x1b[31mhand\n'),
+        (OSError(5, 'Input/output error', 'a'), 2, "foc_ros end: [Errno 5] Input/output error: 'a'\n"),
         (KeyboardInterrupt(), 130, ''),
     ],
 )
 def test_exit_codes(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], outcome: int | BaseException, code: int, line: str
+    ends: Callable[[int | BaseException], None],
+    capsys: pytest.CaptureFixture[str],
+    outcome: int | BaseException,
+    code: int,
+    line: str,
 ) -> None:
-    monkeypatch.setattr(command_line, 'import_module', lambda name, package: Fake(outcome))
-    assert command_line.main(['paper']) == code
+    ends(outcome)
+    assert command_line.main(['end']) == code
     assert capsys.readouterr() == ('', line)
 
 
@@ -210,13 +241,8 @@ def test_warm_up_says_that_there_is_nothing_to_do(capsys: pytest.CaptureFixture[
 
 def test_arguments_of_node_are_passed_to_ros(monkeypatch: pytest.MonkeyPatch) -> None:
     taken = []
-
-    class Node(Fake):
-        def run(self, arguments: object) -> int:
-            taken.append(arguments.rest)
-            return 0
-
-    monkeypatch.setattr(command_line, 'import_module', lambda name, package: Node(0))
+    monkeypatch.setattr('foc_ros.ros.main.main', lambda given: taken.append(list(given)) or 0)
+    monkeypatch.setattr('foc_ros.cli.commands.find_spec', lambda name: object())
     ros = ['--ros-args', '-r', 'hand_pose:=/PSM1/measured_cp', '-p', 'rate_hz:=20.0', '--params-file', 'foc.yaml']
     assert command_line.main(['node', *ros]) == 0
     assert taken == [ros]
@@ -231,10 +257,9 @@ def test_every_text_of_a_table_is_shown_as_it_is(capsys: pytest.CaptureFixture[s
 def test_a_name_that_standard_output_cannot_show_is_escaped() -> None:
     program = (
         'import sys\nfrom foc_ros.cli import main as command_line\n'
-        'class Named:\n'
-        ' run = staticmethod(lambda arguments: print("b\\udcff", "\u2500") or 0)\n'
-        'command_line.import_module = lambda name, package: Named\n'
-        'sys.exit(command_line.main(["paper"]))'
+        '@command_line.app.command\n'
+        'def end(): print("b\\udcff", "\u2500")\n'
+        'sys.exit(command_line.main(["end"]))'
     )
     environment = {**os.environ, 'PYTHONIOENCODING': 'ascii', 'PYTHONUTF8': '1'}
     command = [sys.executable, '-c', program]
@@ -245,13 +270,10 @@ def test_a_name_that_standard_output_cannot_show_is_escaped() -> None:
 LOUD = """
 import sys
 from foc_ros.cli import main as command_line
-class Loud:
-    @staticmethod
-    def run(arguments):
-        {}
-        return 0
-command_line.import_module = lambda name, package: Loud
-sys.exit(command_line.main(["paper"]))
+@command_line.app.command
+def loud():
+    {}
+sys.exit(command_line.main(["loud"]))
 """
 MANY_LINES, A_LINE = 'for _ in range(100000): print("x" * 100)', 'print("x")'
 A_TABLE = 'from foc_ros.io.terminal import show_table; show_table(("a", "b"), [("c", "d")] * 10000)'
@@ -280,7 +302,7 @@ def test_a_pipe_whose_reader_has_closed_it_gives_141_and_no_traceback(what: str)
 def test_a_full_standard_output_gives_2_and_one_line(what: str) -> None:
     with Path('/dev/full').open('w') as full:
         result = printed_to(full.fileno(), what)
-    assert (result.returncode, result.stderr) == (2, 'foc_ros paper: [Errno 28] No space left on device\n')
+    assert (result.returncode, result.stderr) == (2, 'foc_ros loud: [Errno 28] No space left on device\n')
 
 
 @pytest.mark.parametrize('what', [A_LINE, A_TABLE])

@@ -37,7 +37,7 @@ def counted(bag: Path) -> Counter[str]:
 
 
 def test_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from foc_ros.cli.demo.command import perform
+    from foc_ros.cli.demo import perform
 
     before = dict(os.environ)
     assert perform(tmp_path / 'out', last_s=LAST_S) == 0
@@ -65,7 +65,7 @@ def test_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_the_live_predictions_are_those_of_the_recording(tmp_path: Path) -> None:
     """Every prediction has the stamp of a hand pose that was sent; the stamps increase."""
-    from foc_ros.cli.demo.command import perform
+    from foc_ros.cli.demo import perform
 
     perform(tmp_path / 'out', last_s=1.0)
     stamps: dict[str, list[int]] = {'/hand_pose': [], '/foc/prediction': []}
@@ -84,7 +84,7 @@ def start(output: Path) -> tuple[subprocess.Popen[str], int]:
     program = f"""
 import sys
 from pathlib import Path
-from foc_ros.cli.demo import command
+from foc_ros.cli import demo
 from foc_ros.ros import isolated_node
 entered = isolated_node.NodeProcess.__enter__
 def enter(self):
@@ -92,7 +92,7 @@ def enter(self):
     print({STARTED!r} + str(node.pid), flush=True)
     return node
 isolated_node.NodeProcess.__enter__ = enter
-sys.exit(command.perform(Path({str(output)!r})))
+sys.exit(demo.perform(Path({str(output)!r})))
 """
     demo = subprocess.Popen(
         [sys.executable, '-u', '-c', program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT

@@ -17,15 +17,14 @@ import pytest
 from report_samples import START_NS, prediction, predictions, samples
 from rich.console import Console
 
-from foc_ros.cli.demo import command
-from foc_ros.cli.demo.recorder import Recorder, show_live
-from foc_ros.cli.demo.scene_text import GOAL, HAND, HEIGHT, OBSTACLE, WIDTH, draw_scene, extend_bounds
-from foc_ros.cli.demo.summary import describe_lead
+from foc_ros.cli import demo
+from foc_ros.cli.demo import Recorder, describe_lead
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, InputError
-from foc_ros.core.types import Prediction
+from foc_ros.core.types import NANOSECONDS, Prediction
 from foc_ros.io.bags import TYPESTORE, Item
+from foc_ros.reporting.live_text import GOAL, HAND, HEIGHT, OBSTACLE, WIDTH, draw_scene, extend_bounds, show_live
 from foc_ros.reporting.snapshots import build_hand_trajectory, build_snapshot
 from foc_ros.ros import isolated_node
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
@@ -106,9 +105,10 @@ def test_recorder_counts_messages_of_the_last_second() -> None:
 def shown(recorder: Recorder, terminal: bool, times: np.ndarray) -> str:
     screen = io.StringIO()
     console = Console(file=screen, force_terminal=terminal, width=80, height=24)
-    with show_live(recorder, START_NS, 5.0, console) as show:
-        for now in times:
-            show(float(now))
+    items = [Item('goals', '/goals', START_NS + after_ns, None, b'') for after_ns in (0, 5 * NANOSECONDS)]
+    with show_live(console) as show:
+        for now in times if recorder.snapshots else ():
+            show(float(now), recorder.snapshots[-1], recorder.describe(float(now), items), recorder.samples[-1].position)
     return screen.getvalue()
 
 
@@ -140,19 +140,15 @@ def test_nothing_solved_is_shown(terminal: bool) -> None:
     assert 'no solved candidate' in shown(recorder, terminal, np.array([1.0]))
 
 
-def test_display_waits_for_the_first_prediction() -> None:
-    assert shown(Recorder(Config()), False, np.array([0.0, 2.0])) == ''
-
-
 def test_output_directory_is_made_and_an_earlier_demo_is_replaced(tmp_path: Path) -> None:
     output = tmp_path / 'new' / 'demo_output'
-    command.prepare(output)
+    demo.prepare(output)
     for name in ('bag', 'report'):
         (output / name).mkdir()
         (output / name / 'old').write_text('')
     (output / 'notes.txt').write_text('mine')
-    command.prepare(output)
-    assert {file.name for file in output.iterdir()} == {command.MARK, 'notes.txt'}
+    demo.prepare(output)
+    assert {file.name for file in output.iterdir()} == {demo.MARK, 'notes.txt'}
 
 
 @pytest.mark.parametrize('what', ['directory', 'file'])
@@ -163,14 +159,14 @@ def test_output_directory_with_other_contents_is_refused(tmp_path: Path, what: s
     else:
         output.write_text('mine')
     with pytest.raises(InputError, match='--output'):
-        command.prepare(output)
+        demo.prepare(output)
     assert (output / 'bag').exists() or output.read_text() == 'mine'
 
 
 def test_without_rclpy_one_line_says_how_to_install_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(command, 'find_spec', lambda name: None)
+    monkeypatch.setattr('foc_ros.cli.commands.find_spec', lambda name: None)
     assert main(['demo', '--output', str(tmp_path / 'out')]) == 2
     error = capsys.readouterr().err
     assert error.count('\n') == 1

@@ -18,7 +18,7 @@ PACKAGED = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'
 
 @pytest.fixture(scope='module')
 def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location('make_demo_recording', ROOT / 'scripts' / 'make_demo_recording.py')
+    spec = importlib.util.spec_from_file_location('recordings', ROOT / 'scripts' / 'recordings.py')
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
@@ -55,7 +55,7 @@ def test_size() -> None:
 
 
 def test_equals_a_fresh_run(script: ModuleType, recorded: list[tuple[str, int, Any]], tmp_path: Path) -> None:
-    script.write(tmp_path / 'fresh.mcap')
+    script.write_recording(tmp_path / 'fresh.mcap')
     fresh = read(tmp_path / 'fresh.mcap')
     assert [item[:2] for item in fresh] == [item[:2] for item in recorded]
     np.testing.assert_allclose(hand(fresh), hand(recorded), rtol=0, atol=1e-6)

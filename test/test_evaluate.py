@@ -25,7 +25,7 @@ GOAL = [(0.3, 0.0)]
 def use_one_thread(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Compute in this process, unless a test is about processes, because starting one takes a second."""
     if 'workers' not in request.fixturenames:
-        monkeypatch.setattr('foc_ros.cli.evaluate.open_executor', lambda _: ThreadPoolExecutor(1))
+        monkeypatch.setattr('foc_ros.analysis.parallel.open_executor', lambda *_: ThreadPoolExecutor(1))
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,6 @@ from foc_ros.analysis.fitting.setting_search import Replays
 from foc_ros.analysis.fitting.tables import make_verdict
 from foc_ros.analysis.parallel import IsolatedProcessPool
 from foc_ros.analysis.recordings import find_recordings
-from foc_ros.cli import fit as fit_command
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.estimation.kalman_filter import compute_transition
@@ -205,7 +205,7 @@ def test_without_a_terminal_worse_positions_are_written_only_if_allowed(
 ) -> None:
     fit, output = Fit(CONFIG), tmp_path / 'operator.yaml'
     fit.comparison = {'error_m 0.5': {'before': 0.063, 'after': 0.096}}
-    monkeypatch.setattr(fit_command, 'fit_parameters', lambda *_, **__: fit)
+    monkeypatch.setattr('foc_ros.analysis.fitting.fit.fit_parameters', lambda *_, **__: fit)
     data = write_tables(tmp_path / 'data', count=1)
     assert main(['fit', str(data), '--output', str(output), '--workers', '1', *options]) == code
     error = capsys.readouterr().err
@@ -225,11 +225,13 @@ def test_a_terminal_is_asked_before_worse_positions_are_written(
         asked.append(question)
         return answer
 
-    output = tmp_path / 'operator.yaml'
-    monkeypatch.setattr(fit_command.sys.stdin, 'isatty', lambda: True)
-    monkeypatch.setattr(fit_command.sys.stdout, 'isatty', lambda: True)
+    output, fit = tmp_path / 'operator.yaml', Fit(CONFIG)
+    fit.comparison = {'error_m 0.5': {'before': 0.063, 'after': 0.096}}
+    monkeypatch.setattr('foc_ros.analysis.fitting.fit.fit_parameters', lambda *_, **__: fit)
+    monkeypatch.setattr(sys.stdin, 'isatty', lambda: True)
+    monkeypatch.setattr(sys.stdout, 'isatty', lambda: True)
     monkeypatch.setattr('builtins.input', ask)
-    losses = ['predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm']
-    assert fit_command._confirm(losses, False, output) is is_written
+    data = write_tables(tmp_path / 'data', count=1)
+    code = main(['fit', str(data), '--output', str(output), '--workers', '1'])
+    assert (code, output.exists()) == ((0, True) if is_written else (2, False))
     assert asked == [f'Write {output} all the same? [y/N] ']
-    assert fit_command._confirm([], False, output) and fit_command._confirm(losses, True, output) and len(asked) == 1

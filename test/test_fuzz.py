@@ -1,6 +1,6 @@
 """Any messages in any order: no exception, no number that is not finite, and no prediction without a new pose.
 
-FOC_ROS_FUZZ: the number of messages, 2,000 by default and 100,000 in `make fuzz`; a running node gets a twentieth of them.
+FOC_ROS_FUZZ: the number of messages, 2,000 by default; a running node gets a twentieth of them.
 """
 
 from __future__ import annotations

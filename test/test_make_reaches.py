@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,18 +12,16 @@ import pytest
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.core.learning.goal_reached import find_reached_goal
 
-SCRIPT = Path(__file__).parents[1] / 'scripts' / 'make_reaches.py'
+sys.path.append(str(Path(__file__).resolve().parents[1] / 'scripts'))
+
+recordings_script = importlib.import_module('recordings')
 
 
 @pytest.mark.parametrize(('kind', 'noise_m', 'largest_m'), [('grid', 5e-4, 0.03), ('star', 3e-4, 0.015)])
 def test_every_reach_begins_at_rest_and_ends_near_its_goal(kind: str, noise_m: float, largest_m: float, tmp_path: Path) -> None:
-    found = importlib.util.spec_from_file_location('make_reaches', SCRIPT)
-    assert found is not None and found.loader is not None
-    script = importlib.util.module_from_spec(found)
-    found.loader.exec_module(script)
-    script.main(tmp_path, 2, kind)
+    recordings_script.write_reaches(tmp_path, 2, kind)
     recordings = find_recordings(tmp_path)
-    assert len(recordings) == script.COUNT
+    assert len(recordings) == recordings_script.COUNT
     for number, recording in enumerate(recordings.values()):
         path = recording.read_movement().positions[:, :2]
         assert find_reached_goal(path, recording.scene.goals[:, :2])[0] == number % len(recording.scene.goals)

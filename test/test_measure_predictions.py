@@ -1,4 +1,4 @@
-"""The studies of predictions on recordings: data sets, and what counts as unsteady, on small and made-up input."""
+"""The study of the steadiness of predictions: what counts as unsteady, on small and made-up input."""
 
 from __future__ import annotations
 
@@ -10,18 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foc_ros.core.config import Config
+from foc_ros.analysis.recordings import find_recordings
 from foc_ros.core.types import Candidate, PredictedCandidate, Prediction, Solution, Status, make_obstacles
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT / 'scripts'))
 
-data_sets = importlib.import_module('accuracy.data_sets')
-steadiness = importlib.import_module('accuracy.steadiness')
-tracks = importlib.import_module('accuracy.tracks')
-measure_candidates = importlib.import_module('measure_candidates')
-measure_flicker = importlib.import_module('measure_flicker')
-measure_order = importlib.import_module('measure_order')
+flicker = importlib.import_module('flicker')
 
 STEPS = 20
 
@@ -56,31 +51,17 @@ def make_prediction(tick: int, shares: dict[str, float], bows: dict[str, float] 
     return Prediction(tick * 20_000_000, '', 0.0, tuple(candidates), best, obstacles=obstacles, goals=goals)
 
 
-def measure(*shares: dict[str, float]) -> steadiness.Steadiness:
-    total = steadiness.Steadiness()
-    steadiness.measure_steadiness((make_prediction(tick, each) for tick, each in enumerate(shares)), total)
+def measure(*shares: dict[str, float]) -> flicker.Steadiness:
+    total = flicker.Steadiness()
+    flicker.measure_steadiness((make_prediction(tick, each) for tick, each in enumerate(shares)), total)
     return total
 
 
-def test_candidates_of_a_reach_are_counted_and_scored(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    settings = [f'--set={each}' for each in ('rate_hz=10', 'foc.steps=20', 'foc.eta=0.1')]
-    measure_candidates.main([str(write_reach(tmp_path)), *settings])
-    cells = dict(zip(measure_candidates.HEAD, capsys.readouterr().out.splitlines()[-1].strip('| ').split(' | '), strict=False))
-    assert int(cells['predictions']) == 10
-    # one way is left when the box is passed
-    assert 10 < int(cells['candidates']) < 20
-    assert float(cells['take part [%]']) == 100.0
-    assert float(cells['empty [%]']) == 0.0
-    # one box leaves two ways, and the hand shows early which it takes
-    assert float(cells['uniform']) == pytest.approx(-np.log(2.0), abs=1e-3)
-    assert -np.log(2.0) < float(cells['log-likelihood with it']) <= 0.0
-
-
 def test_a_track_is_resampled_and_gets_the_noise_that_was_asked_for(tmp_path: Path) -> None:
-    (recording,) = data_sets.load_data_set(write_reach(tmp_path, 20.0)).recordings.values()
+    (recording,) = find_recordings(write_reach(tmp_path, 20.0)).values()
     (tmp_path / 'fine').mkdir()
-    (fine,) = data_sets.load_data_set(write_reach(tmp_path / 'fine', 100.0)).recordings.values()
-    track, true = tracks.read_track(recording).resample(100.0), tracks.read_track(fine)
+    (fine,) = find_recordings(write_reach(tmp_path / 'fine', 100.0)).values()
+    track, true = flicker.read_track(recording).resample(100.0), flicker.read_track(fine)
     assert track.stamps_ns.tolist() == true.stamps_ns[: len(track.stamps_ns)].tolist()
     assert np.abs(track.positions - true.positions[: len(track.positions)]).max() < 1e-3
     noisy = true.add_noise(0.001, 1)
@@ -90,7 +71,7 @@ def test_a_track_is_resampled_and_gets_the_noise_that_was_asked_for(tmp_path: Pa
 
 def test_steadiness_of_a_reach_is_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = str(write_reach(tmp_path))
-    measure_flicker.main([folder, '--strategy', 'lv', '--noise', '0', '--set', 'foc.steps=20', '--set', 'rate_hz=25'])
+    flicker.main([folder, '--strategy', 'lv', '--noise', '0', '--set', 'foc.steps=20', '--set', 'rate_hz=25'])
     cells = capsys.readouterr().out.splitlines()[-1].strip('| ').split(' | ')
     assert cells[1:3] == ['`lv`', '0']
     assert int(cells[3]) == 24
@@ -98,7 +79,7 @@ def test_steadiness_of_a_reach_is_measured(tmp_path: Path, capsys: pytest.Captur
 
 def test_a_steady_class_counts_nothing() -> None:
     total = measure(*[{'+a': 0.6, '-a': 0.4}] * 20)
-    assert (total.ticks, total.changed, total.returns, total.absences, total.outside) == (19, 0, 0, 0, 0)
+    assert (total.ticks, total.changed, total.returns, total.absences) == (19, 0, 0, 0)
     assert max(total.sideways) < 1e-12
     assert total.seconds == pytest.approx(19 * 0.02)
 
@@ -126,33 +107,16 @@ def test_an_absence_of_fewer_than_ten_ticks_counts() -> None:
     assert measure(both, both, one, one).absences == 0
 
 
-def test_a_path_that_moves_sideways_and_out_of_the_scene_is_measured() -> None:
-    total = steadiness.Steadiness()
+def test_a_path_that_moves_sideways_is_measured() -> None:
+    total = flicker.Steadiness()
     bows = [0.0, 0.02, 0.09]
     made = [make_prediction(tick, {'+a': 1.0}, {'+a': bow}) for tick, bow in enumerate(bows)]
-    steadiness.measure_steadiness(made, total)
+    flicker.measure_steadiness(made, total)
     assert total.sideways == pytest.approx([0.02, 0.07], rel=0.02)
-    assert (total.paths, total.outside) == (3, 1)
 
 
 def test_a_change_of_the_goals_begins_anew() -> None:
     first, second = make_prediction(0, {'+a': 1.0}), make_prediction(1, {'-a': 1.0})
-    total = steadiness.Steadiness()
-    steadiness.measure_steadiness([first, replace(second, goals=np.array([[0.0, 0.3]]))], total)
+    total = flicker.Steadiness()
+    flicker.measure_steadiness([first, replace(second, goals=np.array([[0.0, 0.3]]))], total)
     assert (total.ticks, total.changed) == (0, 0)
-
-
-def test_the_worst_prediction_of_a_recording_is_found_and_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = measure_order.find_recordings(write_reach(tmp_path))
-    config = Config().with_values({'rate_hz': 5.0, 'foc.steps': 20})
-    ((observed, miss),) = measure_order.observe_person(list(found.values()), config)
-    asked = measure_order.ask_all(observed, 'way')
-    gains = [
-        np.log(question.possible * measure_order.PUBLISHED.forecast(each, question, None).true_probability(question))
-        for each, question in asked
-    ]
-    assert miss.gain == pytest.approx(min(gains)) and len(gains) > 1
-    assert miss.sketch.obstacles.ids == miss.observation.ids
-    monkeypatch.setattr(measure_order, 'IMAGES', tmp_path)
-    measure_order.draw_misses([miss], 'worst.png')
-    assert (tmp_path / 'worst.png').stat().st_size > 5000

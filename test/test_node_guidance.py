@@ -146,7 +146,7 @@ def test_the_clutch_releases_the_hand_and_guidance_falls_silent(ros: Graph) -> N
 
     bench = begin(ros)
     bench.node._engage(SetBool.Request(data=False), SetBool.Response())
-    # how long that takes is measured by scripts/measure_guidance.py
+    # how long that takes is measured by scripts/stress.py rates
     bench.drive_until(lambda: not bench.forces[-2:].any(), 'a force of zero, twice')
     bench.drive(20)
     count = len(bench.wrenches)

@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 import foc_ros
-from foc_ros.cli.main import COMMANDS
+from foc_ros.cli.main import list_commands
 from foc_ros.io.topics import OPTIONAL, TYPES
 
 ROOT = Path(__file__).parents[1]
@@ -99,7 +99,7 @@ def test_wheel_contains_all_files_of_the_program(wheel: zipfile.ZipFile) -> None
 def test_ros2_run_finds_every_command(wheel: zipfile.ZipFile) -> None:
     """`ros2 run` starts files of lib/foc_ros: one executable per command, which is not on PATH."""
     scripts = {Path(info.filename).name: info for info in wheel.infolist() if '.data/data/lib/foc_ros/' in info.filename}
-    assert set(scripts) == {*COMMANDS, 'foc_node'}
+    assert set(scripts) == {*list_commands(), 'foc_node'}
     assert all(info.external_attr >> 16 & 0o111 == 0o111 for info in scripts.values())
     entry_points = wheel.read(next(n for n in wheel.namelist() if n.endswith('/entry_points.txt'))).decode()
     assert re.findall(r'^(\w+) =', entry_points, re.MULTILINE) == ['foc_node', 'foc_ros']
@@ -111,7 +111,7 @@ def test_ros2_run_starts_the_command(script: Path, monkeypatch: pytest.MonkeyPat
     with pytest.raises(SystemExit) as ended:
         runpy.run_path(str(script), run_name='__main__')
     assert not ended.value.code
-    assert f' {script.name.replace("foc_node", "node")} ' in capsys.readouterr().out
+    assert f'Usage: foc_ros {script.name.replace("foc_node", "node")}' in capsys.readouterr().out
 
 
 def test_ros2_run_starts_a_script_without_the_working_directory(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The studies of the paper: trends appear, files are reproducible, and an output that cannot be written is rejected."""
+"""`examples/paper`: trends appear, files are reproducible, and an output that cannot be written is rejected."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
-from foc_ros.analysis.paper.reaching import compute_speed, measure_solution
-from foc_ros.analysis.paper.studies import PAPER_ETA, QUICK, EffortCurve, RatioCurve, Studies
-from foc_ros.analysis.paper.trends import check_trends, find_crossings
-from foc_ros.cli.paper import perform
-from foc_ros.core.types import Status
+import figures
+from checks import check_trends, find_crossings
+from paper import perform
+from studies import PAPER_ETA, QUICK, EffortCurve, RatioCurve, Studies, compute_speed, measure_solution
 
+from foc_ros import Status
+
+EXAMPLE = Path(__file__).resolve().parents[1] / 'examples' / 'paper'
 FILES = {f'study{number}.{suffix}' for number in range(1, 8) for suffix in ('png', 'pdf')} | {'numbers.json', 'table.md'}
 
 
@@ -145,9 +147,7 @@ def test_files_hold_the_computed_numbers(found: Studies, output: Path) -> None:
 
 def test_same_files_each_time(found: Studies, output: Path, tmp_path: Path) -> None:
     """The pictures are equal to the byte, without dates and in the order of the studies; the drawings up to rounding."""
-    from foc_ros.reporting import paper_figures
-
-    paper_figures.write_figures(found, tmp_path, ('png', 'pdf'))
+    figures.write_figures(found, tmp_path)
     for file in tmp_path.iterdir():
         assert list_contents(file) == list_contents(output / file.name), file.name
 
@@ -167,9 +167,16 @@ def list_contents(file: Path) -> list[bytes]:
 def test_output_that_cannot_be_written_exits_2_before_anything_is_computed(tmp_path: Path) -> None:
     file = tmp_path / 'file'
     file.write_text('mine', encoding='utf-8')
-    command = [sys.executable, '-m', 'foc_ros', 'paper', '--output', str(file)]
-    root = Path(__file__).resolve().parents[1]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False, cwd=root)
+    command = [sys.executable, str(EXAMPLE / 'paper.py'), '--output', str(file)]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False, cwd=EXAMPLE.parents[1])
     assert (result.returncode, result.stdout) == (2, '')
-    assert result.stderr == f'foc_ros paper: --output: expected a folder, got {file}, which is a file\n'
+    assert result.stderr == f'paper: --output: expected a folder that can be written, got {file}: File exists\n'
     assert file.read_text(encoding='utf-8') == 'mine'
+
+
+def test_the_search_for_scenes_scores_the_scene_that_it_found() -> None:
+    import find_scenes
+
+    make, faults, present = find_scenes.SEARCHES['strategies']
+    assert len(make(np.random.default_rng(0)).path_classes) == len(present.path_classes) == 1
+    assert find_scenes.sum_up(faults(present), find_scenes.HOPELESS) < 2.0

@@ -1,6 +1,5 @@
 """Recordings in parallel: results do not depend on the workers, and a killed worker fails one recording only."""
 
-import argparse
 import subprocess
 import sys
 import time
@@ -11,7 +10,8 @@ import pytest
 import worker_tasks
 
 from foc_ros.analysis.parallel import Failure, IsolatedProcessPool, open_executor, run
-from foc_ros.cli.arguments import add_worker_arguments
+from foc_ros.cli.main import app
+from foc_ros.cli.options import Study
 from foc_ros.core.errors import InputError
 
 ITEMS = [(f'r{number}', number) for number in range(8)]
@@ -19,15 +19,15 @@ SQUARES = [(name, number**2) for name, number in ITEMS]
 KILLED = [(name, Failure('its worker process was killed') if number in (3, 5) else number**2) for name, number in ITEMS]
 
 
-def _arguments(*given: str) -> argparse.Namespace:
-    parser = argparse.ArgumentParser()
-    add_worker_arguments(parser)
-    return parser.parse_args(given)
+def parse_study(*given: str) -> Study:
+    """Return the options of a study, as a command reads them."""
+    _, bound, _ = app.parse_args(['simulate', *given], exit_on_error=False, print_error=False)
+    return bound.arguments['study']
 
 
 @pytest.mark.parametrize('count', [1, 2, 3])
 def test_results_come_in_order_and_do_not_depend_on_the_number_of_workers(count: int) -> None:
-    with open_executor(_arguments('--workers', str(count))) as executor:
+    with open_executor(count) as executor:
         assert list(run(worker_tasks.squared, ITEMS, executor)) == SQUARES
 
 
@@ -94,7 +94,7 @@ def _run_interrupted() -> None:
 @pytest.mark.parametrize('given', [('--workers', '0'), ('--workers', '2000')])
 def test_a_wrong_number_of_workers_is_refused(given: tuple[str, ...]) -> None:
     with pytest.raises(InputError, match=r'--workers: expected a whole number in \[1, 1024\], got'):
-        _arguments(*given)
+        parse_study(*given)
 
 
 def test_a_scheduler_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -102,4 +102,4 @@ def test_a_scheduler_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr('foc_ros.analysis.dask_cluster.CONNECT_S', 0.3)
     for address in ('tcp://127.0.0.1:9', 'nonsense://host'):
         with pytest.raises(InputError, match='--scheduler: expected the address of a Dask scheduler'):
-            open_executor(_arguments('--scheduler', address))
+            parse_study('--scheduler', address).open_executor()

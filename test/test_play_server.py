@@ -198,7 +198,7 @@ def test_the_command_ends_when_it_is_stopped(tmp_path: Path, number: int) -> Non
 def test_without_rclpy_the_message_names_the_option(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr('foc_ros.cli.play.find_spec', lambda _: None)
+    monkeypatch.setattr('foc_ros.cli.commands.find_spec', lambda _: None)
     assert main(['play', '--data', str(tmp_path), '--port', '0']) == 2
     assert 'rclpy is not installed: use --no-ros, or ' in capsys.readouterr().err
 

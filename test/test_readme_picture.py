@@ -37,23 +37,23 @@ def test_the_pictures_are_in_the_readme(name: str, start: bytes) -> None:
 
 
 def test_the_animation_covers_a_movement(tmp_path: Path) -> None:
-    moving = script('make_demo_animation')
+    moving = script('pictures')
     made = samples(1)
     drawn = list(moving.pictures(build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made)], (0,)))
     assert 10 < len(drawn) <= moving.PICTURES
     lengths = [len(figure.axes[1].lines[0].get_xdata()) for figure, _ in drawn]
     assert all(np.diff(lengths) > 0)
-    moving.save(drawn[:3], tmp_path / 'demo.gif')
+    moving.save_animation(drawn[:3], tmp_path / 'demo.gif')
     assert (tmp_path / 'demo.gif').read_bytes().startswith(b'GIF89a')
 
 
 def test_the_readme_picture_shows_the_beginning_of_its_movement() -> None:
-    still = script('make_readme_picture')
+    still = script('pictures')
     made = samples(still.MOVEMENT)
     hand, snapshots = build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made, every=2)]
     start_ns = hand.find_movements(0.05)[still.MOVEMENT - 1][0]
     shown = min(snapshots, key=lambda each: abs(each.stamp_ns - start_ns - still.AFTER_S * 1e9))
-    drawn = [line.get_xydata() for line in still.picture(hand, snapshots).axes[0].lines]
+    drawn = [line.get_xydata() for line in still.scene(hand, snapshots).axes[0].lines]
     for each in shown.candidates:
         assert any(np.array_equal(line, each.curve) for line in drawn)
     # the hand's past, its future, and where it is
@@ -62,17 +62,15 @@ def test_the_readme_picture_shows_the_beginning_of_its_movement() -> None:
 
 @pytest.mark.parametrize('name', ['noise', 'surrogate', 'strategies', 'classes', 'likelihood'])
 def test_concepts_have_their_pictures(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    concepts = script('make_concept_pictures')
+    concepts = script('pictures')
     monkeypatch.setattr(concepts, 'SAMPLES', 500)
-    figure = concepts.PARTS[name]()
+    figure = concepts.FIGURES[f'concept_{name}']()
     assert all(axes.has_data() or axes.texts for axes in figure.axes)
     assert f'](images/concept_{name}.png)' in (ROOT / 'doc' / 'concepts.md').read_text(encoding='utf-8')
     assert (ROOT / 'doc' / 'images' / f'concept_{name}.png').exists()
 
 
-def test_example_tables_equal_those_of_the_script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    tables = script('make_example_tables')
-    monkeypatch.setattr(sys, 'argv', ['make_example_tables.py', str(tmp_path)])
-    tables.main()
+def test_example_tables_equal_those_of_the_script(tmp_path: Path) -> None:
+    script('recordings').write_tables(tmp_path)
     for file in tmp_path.iterdir():
         assert file.read_bytes() == (ROOT / 'doc' / 'examples' / file.name).read_bytes(), file.name

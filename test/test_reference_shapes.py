@@ -1,4 +1,4 @@
-"""Ten scenes of boxes, capsules, hulls and circles, solved by IPOPT: see `scripts/make_reference_shapes.py`."""
+"""Ten scenes of boxes, capsules, hulls and circles, solved by IPOPT: see `benchmarks/reference_shapes.py`."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""The closed-loop study: peers on cases with known answers, operators, measures, and the command."""
+"""The closed-loop study: operators, measures, and the command."""
 
 from __future__ import annotations
 
@@ -10,20 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foc_ros.analysis.simulation.assistance import make_assistance
+from foc_ros.analysis.simulation.assistance import RULES
 from foc_ros.analysis.simulation.intended_path import DT, FREE_M, interpolate_minimum_jerk, plan_path
 from foc_ros.analysis.simulation.names import ASSISTANCE, NOISY, OPERATORS, UNANNOUNCED_GOAL
 from foc_ros.analysis.simulation.operators import Arm, SimulatedArm, Task, draw_task
-from foc_ros.analysis.simulation.peers import (
-    ASSISTANCE_N,
-    FULL_FORCE_M,
-    INFLUENCE_M,
-    RATIONALITY,
-    GoalInference,
-    compute_blending_force,
-    compute_field_force,
-    compute_hindsight_force,
-)
 from foc_ros.analysis.simulation.study import estimate_mean, make_pairs, simulate, summarise
 from foc_ros.analysis.simulation.trial import Trial, measure_trial, run_trial
 from foc_ros.cli.main import main
@@ -31,7 +21,6 @@ from foc_ros.core.config import Config
 from foc_ros.core.types import Array, make_obstacles
 
 GOALS = np.array([[0.3, 0.1], [0.3, -0.1]])
-POST = make_obstacles([(0.0, 0.0)], [0.02])
 QUICK = Config(budget_s=0.0).with_values({'foc.steps': 20, 'homotopy.max_candidates': 2, 'rate_hz': 10.0})
 AT_REST = (np.zeros(2), np.zeros(2))
 
@@ -40,45 +29,6 @@ def cross(goal_row: int = 0) -> Task:
     """Return a straight movement to a goal, without obstacles."""
     path = interpolate_minimum_jerk(np.array([[0.0, 0.0], GOALS[goal_row]]), np.array([0.0, 1.2]), AT_REST)
     return Task(Arm(noise=0.0), make_obstacles(), GOALS, GOALS[goal_row], goal_row, path)
-
-
-def test_goals_at_the_same_distance_are_equally_likely_until_the_hand_turns() -> None:
-    inference = GoalInference(GOALS, np.zeros(2))
-    assert inference.update(np.array([0.05, 0.0])) == pytest.approx([0.5, 0.5])
-    assert inference.update(np.array([0.06, 0.01]))[0] > 0.5
-
-
-def test_a_detour_costs_a_goal_its_likelihood() -> None:
-    goals = np.array([[0.3, 0.0], [-0.3, 0.0]])
-    probabilities = GoalInference(goals, np.zeros(2)).update(np.array([0.02, 0.0]))
-    assert probabilities[1] / probabilities[0] == pytest.approx(np.exp(-RATIONALITY * 0.04))
-
-
-def test_hindsight_is_the_mean_of_the_policies() -> None:
-    assert compute_hindsight_force(np.array([0.3, 0.0]), GOALS, np.array([0.5, 0.5])) == pytest.approx([0.0, 0.0], abs=1e-12)
-    alone = compute_hindsight_force(np.zeros(2), np.array([[0.3, 0.0]]), np.ones(1))
-    assert alone == pytest.approx([ASSISTANCE_N, 0.0])
-    weighted = compute_hindsight_force(np.array([0.3, 0.0]), GOALS, np.array([0.75, 0.25]))
-    assert weighted == pytest.approx([0.0, 0.5 * ASSISTANCE_N])
-
-
-@pytest.mark.parametrize(('lead', 'share'), [(0.0, 0.0), (0.2, 0.0), (0.4, 0.5), (0.6, 1.0), (1.0, 1.0)])
-def test_blending_begins_and_is_complete_at_its_confidences(lead: float, share: float) -> None:
-    probabilities = np.array([0.5 + lead / 2, 0.5 - lead / 2])
-    force = compute_blending_force(np.array([0.3, 0.0]), GOALS, probabilities)
-    assert force == pytest.approx([0.0, share * ASSISTANCE_N], abs=1e-9)
-
-
-def test_the_potential_field_pushes_outward_within_its_influence_only() -> None:
-    at = lambda rho: compute_field_force(np.array([0.02 + rho, 0.0]), POST, 100.0)  # noqa: E731
-    assert at(FULL_FORCE_M) == pytest.approx([ASSISTANCE_N, 0.0])
-    assert at(INFLUENCE_M + 1e-6).tolist() == [0.0, 0.0]
-    assert compute_field_force(np.array([0.0, -0.0201]), POST, 3.0) == pytest.approx([0.0, -3.0])
-    # the force is minus the gradient of the potential, eta / 2 (1 / rho - 1 / rho_0)^2
-    rho, step = 0.012, 1e-7
-    eta = ASSISTANCE_N * FULL_FORCE_M**2 / (1 / FULL_FORCE_M - 1 / INFLUENCE_M)
-    potential = lambda rho: 0.5 * eta * (1 / rho - 1 / INFLUENCE_M) ** 2  # noqa: E731
-    assert at(rho)[0] == pytest.approx(-(potential(rho + step) - potential(rho - step)) / (2 * step), rel=1e-5)
 
 
 def test_a_path_of_minimum_jerk_between_two_points_is_the_known_polynomial() -> None:
@@ -134,21 +84,16 @@ def test_measures_of_a_trial_with_known_answers() -> None:
 def test_every_rule_keeps_force_and_slew_within_the_limits(rule: str) -> None:
     task = draw_task(NOISY, np.random.default_rng(2))
     noise = np.random.default_rng(3).normal(size=(900, 2, 2))
-    trial = run_trial(task, rule, QUICK, noise)
+    trial = run_trial(task, RULES[rule], QUICK, noise)
     sizes = np.hypot(*trial.assistance.T)
     assert sizes.max() <= QUICK.guidance.f_max + 1e-9
     assert np.hypot(*np.diff(trial.assistance, axis=0).T).max() <= QUICK.guidance.slew * DT + 1e-9
     assert (sizes.max() > 0.0) == (rule != 'none')
 
 
-def test_a_rule_without_reason_leaves_the_hand_alone() -> None:
-    task = cross()
-    assert not make_assistance('potential_field', task, QUICK).update(0, np.zeros(2)).any()
-
-
 def run_study(workers: int) -> list[dict[str, object]]:
     with ThreadPoolExecutor(workers) as executor:
-        results = simulate(make_pairs(['noisy', 'changes_way'], ['foc', 'blend'], 2, 7), QUICK, executor)
+        results = simulate(make_pairs(['noisy', 'changes_way'], ['foc'], 2, 7), QUICK, executor)
     return summarise(results, 7)
 
 
@@ -156,7 +101,7 @@ def test_equal_seeds_give_equal_studies_whatever_the_executor() -> None:
     cells = run_study(1)
     assert cells == run_study(2)
     assert [(cell['operator'], cell['assistance'], cell['trials']) for cell in cells] == [
-        (operator, rule, 2) for operator in ('noisy', 'changes_way') for rule in ('none', 'foc', 'blend')
+        (operator, rule, 2) for operator in ('noisy', 'changes_way') for rule in ('none', 'foc')
     ]
 
 
@@ -175,14 +120,14 @@ def test_intervals_contain_the_mean_and_shrink_with_the_number_of_trials() -> No
 
 def test_the_command_prints_cells_and_writes_a_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip('matplotlib', reason='matplotlib is not installed')
-    options = ['--operators', 'noisy', '--assistance', 'none,potential_field', '--trials', '2', '--workers', '1']
+    options = ['--operators', 'noisy', '--assistance', 'none,foc', '--trials', '2', '--workers', '1']
     assert main(['simulate', *options, '--json', '--report', str(tmp_path)]) == 0
     answer = json.loads(capsys.readouterr().out)
     cell = answer['cells'][1]
-    assert (cell['operator'], cell['assistance'], cell['trials']) == ('noisy', 'potential_field', 2)
+    assert (cell['operator'], cell['assistance'], cell['trials']) == ('noisy', 'foc', 2)
     assert cell['completion_s_interval'][0] <= cell['completion_s'] <= cell['completion_s_interval'][1]
     page = (tmp_path / 'simulation.html').read_text('utf-8')
-    assert page.count('<figure>') == 3 + 2 and 'potential_field' in page
+    assert page.count('<figure>') == 3 + 2 and 'foc' in page
 
 
 @pytest.mark.parametrize(

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 import pytest
 from fit_recordings import write_tables
 
-from foc_ros.analysis.fitting.tables import COMPARISON_TITLES
-from foc_ros.cli import fit, paper
+from foc_ros.analysis.fitting.tables import COMPARISON_TITLES, make_sentences, make_tables
 from foc_ros.cli.main import main
+from foc_ros.cli.options import Study
 from foc_ros.io.terminal import COLUMNS, show_counter, show_table
 
 ROOT = Path(__file__).parents[1]
@@ -47,15 +46,6 @@ def test_the_output_of_a_command_fits(
     assert 0 < find_widest(capsys.readouterr().out) <= COLUMNS
 
 
-def test_the_table_of_the_paper_fits(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    rows = [('7', 'a statement', 'ratio of LV to HC is far above one at every eta', '1.234 to 5.678 at eta 0.90 to 0.99', 'yes')]
-    monkeypatch.setattr(paper, 'perform', lambda _: {})
-    monkeypatch.setattr(paper, 'check_trends', lambda _: rows)
-    monkeypatch.setattr(paper, '_format_cells', lambda cells: cells)
-    assert paper.run(argparse.Namespace(output=Path('output'))) == 0
-    assert 0 < find_widest(capsys.readouterr().out) <= COLUMNS
-
-
 def test_the_tables_of_a_fit_fit(capsys: pytest.CaptureFixture[str]) -> None:
     estimate = {'given': 0.123456, 'value': 1234.56, 'interval': [1.23456e-7, 1.23456e7], 'how': 'covariance of the predictions'}
     measures = {name: {'before': 0.0634, 'after': 0.0961} for name in COMPARISON_TITLES}
@@ -69,7 +59,7 @@ def test_the_tables_of_a_fit_fit(capsys: pytest.CaptureFixture[str]) -> None:
         'output': 'o.yaml',
         'node': ['python -m foc_ros node --ros-args --params-file o.yaml'],
     }
-    fit._show(answer)
+    Study().show(answer, make_tables(answer), make_sentences(answer), 'fit.html')
     assert 0 < find_widest(capsys.readouterr().out) <= COLUMNS
 
 

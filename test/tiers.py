@@ -30,7 +30,7 @@ LONG = (
     'test_least_loss.py::test_likelihoods_are_continuous*',
     'test_guidance_safety.py::test_ten_thousand_hostile_hands',
     # all steps of a fit, of the paper's studies and of long reports
-    'test_fit.py::test_strategy_fixed_has_its_tau_and_lambda_fitted',
+    'test_fit.py::test_strategy_fixed_keeps_its_tau_and_lambda_and_says_so',
     'test_fit.py::test_without_obstacles_goals_*',
     'test_paper.py::test_same_files_each_time',
     'test_report.py::test_a_long_recording_is_thinned_out*',

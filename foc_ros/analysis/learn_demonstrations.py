@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from foc_ros.core.classes.library import Demonstration
 from foc_ros.core.config import ONLINE, Config
-from foc_ros.core.errors import RecordingError, warn
+from foc_ros.core.errors import FocError, RecordingError, warn
+from foc_ros.io.terminal import show_progress
 
 from .recordings import Recording
 from .replay import Replay
@@ -27,3 +30,14 @@ def learn_recording(recording: Recording, config: Config) -> tuple[Demonstration
     if losses:
         warn(f'{recording.name}: {losses}')
     return movements.learnt
+
+
+def learn_recordings(recordings: Mapping[str, Recording], config: Config) -> tuple[list[Demonstration], dict[str, str]]:
+    """Return the movements of all recordings, with a progress bar, and why recordings could not be used, by name."""
+    learnt, failed = list[Demonstration](), dict[str, str]()
+    for name, recording in show_progress(recordings.items(), 'learn', len(recordings)):
+        try:
+            learnt.extend(learn_recording(recording, config))
+        except FocError as error:
+            failed[name] = str(error)
+    return learnt, failed

@@ -6,7 +6,6 @@ a worker process that is killed, becomes the :class:`Failure` of this item alone
 
 from __future__ import annotations
 
-import argparse
 import os
 import pickle
 import threading
@@ -161,8 +160,9 @@ def _run_alone(
         return Failure(f'its worker was lost: {type(error).__name__}: {" ".join(str(error).split())}'), []
 
 
-def open_executor(arguments: argparse.Namespace) -> Executor:
-    """Return the executor of the arguments `workers` and `scheduler`, as a context; raise InputError where there is none."""
-    if arguments.scheduler is not None:
-        return DaskExecutor(arguments.scheduler)
-    return IsolatedProcessPool(arguments.workers)
+def open_executor(workers: int, scheduler: str | None = None) -> Executor:
+    """Return the executor of a number of worker processes, or of the Dask cluster of a scheduler, as a context.
+
+    Raises InputError where there is no such cluster.
+    """
+    return IsolatedProcessPool(workers) if scheduler is None else DaskExecutor(scheduler)

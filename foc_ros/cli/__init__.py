@@ -1,4 +1,1 @@
-"""The command line: arguments enter; exit codes, tables and files leave. One module for each command.
-
-May import every other folder.
-"""
+"""The command line: arguments enter; exit codes, tables and files leave. May import every other folder."""

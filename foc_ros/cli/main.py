@@ -1,4 +1,4 @@
-"""The program `foc_ros` and its commands. A command's module is imported only when the command is run.
+"""The program `foc_ros`.
 
 Exit codes: 0 done; 2 the input is wrong, and a line on standard error for each error names field, value and bound; 3 no candidate
 could be solved; 130 after an interrupt and 141 if the reader of standard output has closed it, both as in a shell. If standard
@@ -7,67 +7,26 @@ output cannot be written, for example because its disk is full, the code is 2.
 
 from __future__ import annotations
 
-import argparse
 import os
-import re
+import signal
 import sys
-from collections.abc import Sequence
-from importlib import import_module
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from io import TextIOWrapper
 from pathlib import Path
-from typing import Any, NoReturn
+from types import FrameType
+from typing import Any
+
+from cyclopts import CycloptsError, MissingArgumentError, RepeatArgumentError, UnknownOptionError, UnusedCliTokensError
 
 from foc_ros.core.errors import FocError, list_messages, print_warnings, suggest
 
-from . import arguments as declarations
-from .inputs import read_inputs
-from .interrupts import INTERRUPTED, handle_interrupts
+from . import commands, studies  # noqa: F401  they declare the commands of the program
+from .options import app
 
-COMMANDS = {
-    'demo': 'play the packaged recording to the node and show its predictions',
-    'node': 'run the node; further arguments are passed to ROS, as in --ros-args -r hand_pose:=/PSM1/measured_cp',
-    'play': 'steer the hand yourself, on a page in the browser',
-    'paper': "repeat the paper's studies: figures, numbers, a table",
-    'solve': 'solve one scene from a YAML or JSON file',
-    'replay': 'compute predictions from a recording, without ROS and faster than real time',
-    'learn': 'write the recordings of a scene as experience for predictions in this scene',
-    'fit': 'find the parameters that explain recordings best',
-    'evaluate': 'compare predictions with recordings of people, beside simple baselines',
-    'simulate': 'compare guidance with other assistance for simulated operators',
-    'convert': 'convert motion capture in CSV tables to bags',
-    'warm-up': 'nothing any more: the command will be removed',
-}
-"""Purpose of each command. With an underscore for a hyphen, `arguments` declares its arguments in `add_NAME_arguments(parser)`,
-and the module of its name defines `run(arguments) -> exit code`."""
-
-
-class _StoreOnce(argparse.Action):
-    """Stores the value of an option; argparse itself uses the last one of an option that is given twice."""
-
-    def __call__(
-        self, _parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: object, _option: str | None = None
-    ) -> None:
-        given = vars(namespace).setdefault('given', set())
-        if self.dest in given:
-            raise argparse.ArgumentError(self, 'given twice')
-        given.add(self.dest)
-        setattr(namespace, self.dest, values)
-
-
-class _Parser(argparse.ArgumentParser):
-    """A parser that reports an error in one line and refuses an option that is given twice."""
-
-    def __init__(self, **options: Any) -> None:
-        super().__init__(**options)
-        self.register('action', None, _StoreOnce)
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(2, f'{self.prog}: {" ".join(message.split())}\n')
-
-    def reject(self, words: Sequence[str]) -> NoReturn:
-        """End with an error that names words that are no arguments, each with the most similar option."""
-        options = re.findall(r'--[a-z-]+', self.format_help())
-        self.error(f'unrecognized arguments: {" ".join(f"{each}{suggest(each, options)}" for each in words)}')
+MOVED = {'paper': 'the studies of the paper are an example now: python examples/paper/paper.py'}
+"""Commands of earlier releases, and what took their place."""
+INTERRUPTED, PIPE_CLOSED = 130, 141
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -80,20 +39,67 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     if arguments is None:  # pictures are files; the backend of a notebook or of a desktop may not exist here
         os.environ['MPLBACKEND'] = 'agg'
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors='backslashreplace')  # a name of a file or topic may have characters that it cannot show
     given = list(sys.argv[1:] if arguments is None else arguments)
+    program = ' '.join(['foc_ros', *given[:1]])
     try:
-        with handle_interrupts(), print_warnings(' '.join(['foc_ros', *given[:1]])):
-            code = _parse_and_run(given)
+        with handle_interrupts(), print_warnings(program):
+            code = _run(given, program)
             sys.stdout.flush()
     except KeyboardInterrupt:
         return INTERRUPTED
     except OSError as error:
         _discard_lost_output()
-        if isinstance(error, BrokenPipeError):
-            return 141
-        print(f'{" ".join(["foc_ros", *given[:1]])}: {_format_line(str(error))}', file=sys.stderr)
-        return 2
+        return PIPE_CLOSED if isinstance(error, BrokenPipeError) else _reject(program, [str(error)])
     return code
+
+
+def _run(given: list[str], program: str) -> int:
+    words = f'{", ".join(list_commands())} are the commands (foc_ros --help explains them)'
+    if not given:
+        return _reject('foc_ros', [f'no command is given; {words}'])
+    if not given[0].startswith('-') and given[0] not in {*list_commands(), *MOVED}:
+        return _reject('foc_ros', [f'there is no command {given[0]}{suggest(given[0], list_commands())}; {words}'])
+    try:
+        if given[0] in MOVED:
+            raise FocError(MOVED[given[0]])
+        if given[0] == 'node' and not {'-h', '--help'} & set(given):
+            return commands.node(*given[1:])  # as they are: ROS parses them
+        command, bound, _ = app.parse_args(given, exit_on_error=False, print_error=False)
+        return int(command(*bound.args, **bound.kwargs) or 0)
+    except CycloptsError as error:
+        return _reject(program, [_describe(error, given[0])])
+    except FocError as error:
+        return _reject(program, list_messages(error))
+
+
+def list_commands() -> list[str]:
+    """Return the names of all commands."""
+    return [name for name in app if not name.startswith('-')]
+
+
+def _describe(error: CycloptsError, command: str) -> str:
+    """Return in words why arguments cannot be used."""
+    error.verbose = False
+    if isinstance(error, MissingArgumentError) and error.argument is not None:
+        return f'{error.keyword or error.argument.name}: expected a value, got none'
+    if isinstance(error, RepeatArgumentError):
+        return f'argument {error.token.keyword}: given twice'
+    if isinstance(error, UnknownOptionError | UnusedCliTokensError):
+        token = error.token if isinstance(error, UnknownOptionError) else None
+        unknown = (error.unused_tokens or []) if token is None else [token.keyword or token.value]
+        options = [each.name for each in app[command].assemble_argument_collection()]
+        return f'unrecognized arguments: {" ".join(f"{each}{suggest(each, options)}" for each in unknown)}'
+    return str(error)
+
+
+def _reject(program: str, messages: Sequence[str]) -> int:
+    """Print each message in one line; a character from a file that would control the terminal is escaped. Return the code."""
+    for message in messages:
+        line = ' '.join(message.split())
+        print(f'{program}: {"".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)}', file=sys.stderr)
+    return 2
 
 
 def _discard_lost_output() -> None:
@@ -104,40 +110,26 @@ def _discard_lost_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _parse_and_run(given: list[str]) -> int:
-    if isinstance(sys.stdout, TextIOWrapper):
-        sys.stdout.reconfigure(errors='backslashreplace')  # a name of a file or topic may have characters that it cannot show
-    parser = _Parser(prog='foc_ros', description='Predict where the hand of an operator is going among obstacles.')
-    commands = parser.add_subparsers(dest='command', required=True)
-    for name, purpose in COMMANDS.items():
-        command = commands.add_parser(name, help=purpose, description=f'{purpose[0].upper()}{purpose[1:]}.')
-        getattr(declarations, f'add_{_get_module_name(name)}_arguments')(command)
+@contextmanager
+def handle_interrupts() -> Iterator[None]:
+    """Raise KeyboardInterrupt on SIGINT within the context; during an import, end the process at once with `INTERRUPTED`.
+
+    Some extension modules lose an exception that is raised while they import another one. An import has nothing to clean up.
+    """
+    before: Callable[..., Any] | int | None = signal.getsignal(signal.SIGINT)
+    if before is not signal.default_int_handler:
+        yield
+        return
+    signal.signal(signal.SIGINT, _interrupt)
     try:
-        words = f'{", ".join(COMMANDS)} are the commands (foc_ros --help explains them)'
-        if not given:
-            parser.error(f'no command is given; {words}')
-        if not given[0].startswith('-') and given[0] not in COMMANDS:
-            parser.error(f'there is no command {given[0]}{suggest(given[0], COMMANDS)}; {words}')
-        parsed, rest = parser.parse_known_args(given)
-        if rest and parsed.command != 'node':
-            commands.choices[parsed.command].reject(rest)
-        parsed.rest = rest
-        read_inputs(parsed)
-        module = import_module(f'.{_get_module_name(parsed.command)}', __package__)
-        return int(module.run(parsed))
-    except SystemExit as leaving:  # after --help, or wrong arguments
-        return int(leaving.code or 0)
-    except FocError as error:
-        for message in list_messages(error):
-            print(f'foc_ros {given[0]}: {_format_line(message)}', file=sys.stderr)
-        return 2
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def _get_module_name(command: str) -> str:
-    return command.replace('-', '_')
-
-
-def _format_line(message: str) -> str:
-    """Return a message in one line; a character from a file that would control the terminal is escaped."""
-    line = ' '.join(message.split())
-    return ''.join(each if each.isprintable() else ascii(each)[1:-1] for each in line)
+def _interrupt(_: int, frame: FrameType | None) -> None:
+    while frame is not None:
+        if frame.f_globals.get('__name__') == 'importlib._bootstrap':
+            os._exit(INTERRUPTED)
+        frame = frame.f_back
+    raise KeyboardInterrupt

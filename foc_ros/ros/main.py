@@ -18,7 +18,7 @@ SPIN_S = 0.1
 """Longest time between two checks of the stop flag [s]."""
 SWITCH_S = 0.0002
 """Longest time for which the thread of the predictions keeps the others waiting for the interpreter [s]. An update of guidance
-gives the interpreter away several times, so with 0.001 it took up to 12 ms (`scripts/measure_guidance.py`)."""
+gives the interpreter away several times, so with 0.001 it took up to 12 ms (`scripts/stress.py rates`)."""
 END_S = 0.5
 """Time after which a prediction that is still being computed does not delay the end of the process [s]."""
 

@@ -5,14 +5,17 @@ A recording is replayed once. How costs become likelihoods can then be tried on 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from foc_ros.analysis.recordings import Recording
+from foc_ros.analysis.parallel import collect
+from foc_ros.analysis.recordings import Recording, group_by_operator
 from foc_ros.analysis.replay import Replay, Step
 from foc_ros.core.classes.rows import Decisions, Rows, find_decisions, find_direction, find_rows
 from foc_ros.core.classes.sides import BranchTimes, compute_branch_times
@@ -153,6 +156,21 @@ def observe_in_order(recordings: Sequence[Recording], config: Config) -> tuple[l
         except FocError as error:
             failed[recording.name] = ' '.join(str(error).split())
     return observed, failed
+
+
+def observe_all(
+    recordings: Mapping[str, Recording], config: Config, executor: Executor, in_order: bool = False
+) -> tuple[list[ObservedRecording], dict[str, str]]:
+    """Observe recordings in parallel, with a progress bar; return the failures by name as well.
+
+    in_order: the recordings of an operator follow one another, with what is learnt from one to the next.
+    """
+    if not in_order:
+        return collect(partial(observe, config=config), list(recordings.items()), executor, 'replay')
+    operators = list(group_by_operator(recordings).items())
+    parts, failed = collect(partial(observe_in_order, config=config), operators, executor, 'replay')
+    failed |= {name: reason for _, reasons in parts for name, reason in reasons.items()}
+    return [each for observed, _ in parts for each in observed], failed
 
 
 def make_observation(step: Step, hand: HandState, path: RecordedPath, config: Config) -> Observation:

@@ -18,7 +18,6 @@ from .comparison import compare_configs, find_worse_positions
 from .duration_fit import fit_duration, fit_wait
 from .estimates import Fit, clip_to_bounds
 from .estimator_fit import fit_estimator, fit_fading
-from .plan_fit import Reach, fit_plans, make_reach
 from .predictor_settings import fit_max_candidates, make_eta_settings, make_movement_settings, make_noise_settings
 from .recorded_hand import RecordedHand, read_hand
 from .setting_search import Replays, observe_by_motor_noise, sample_names, search_settings
@@ -29,6 +28,8 @@ MIN_FOLDS = 3
 """Recordings below which there is no cross-validation."""
 UNSCALED: dict[str, object] = {'covariance.near': 1.0, 'covariance.far': 1.0}
 """A fit sets both factors to 1, because it fits the covariances that they multiply."""
+BY_EXAMPLE = 'examples/plan_recovery'
+"""Where tau and lambda of strategy `fixed` are fitted."""
 LEARNT: dict[str, object] = {'likelihood.adaptation': 'none'}
 """What a fit switches off: choices are known from many movements, and learning them anew from a few makes them worse."""
 
@@ -47,7 +48,7 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, executor
     fit.take(fit_wait(hands, fit.config))
     fit.take(*fit_max_candidates(hands, fit.config))
     if config.foc.strategy == 'fixed':
-        fit.take(*fit_plans(_make_reaches(hands, fit), fit.config))
+        fit.warnings.append(f'foc.tau, foc.lam: kept as they are; {BY_EXAMPLE} finds them from movements')
     duration_s = float(np.median([each.times[-1] for each in hands]))
     rate_hz = clip_to_bounds('rate_hz', min(config.rate_hz, PREDICTIONS / max(duration_s, 1e-3)))
     thinned = {'rate_hz': rate_hz, 'covariance.adaptation': 'none'}
@@ -70,7 +71,7 @@ def _search(hands: Sequence[RecordedHand], fit: Fit, replays: Replays, may_lower
             'margins nor noise: they are kept'
         )
     elif fit.config.foc.strategy != 'fixed':
-        # with strategy `fixed` eta has no effect, and lambda was found for the noise as it is
+        # with strategy `fixed` eta has no effect, and lambda holds for the noise as it is
         search_settings('noise', make_noise_settings(fit.config), replays, fit)
         search_settings('eta', make_eta_settings(fit.config, may_lower_eta), replays, fit)
         if not may_lower_eta:
@@ -85,18 +86,6 @@ def _read_hands(recordings: Mapping[str, Recording], fit: Fit, executor: Executo
         raise RecordingError(f'no recording can be used: {"; ".join(f"{name}: {why}" for name, why in fit.failed.items())}')
     fit.recordings = len(hands)
     return hands
-
-
-def _make_reaches(hands: Sequence[RecordedHand], fit: Fit) -> list[Reach]:
-    reaches = []
-    for each in hands:
-        try:
-            reaches.append(make_reach(each, fit.config))
-        except RecordingError as error:
-            fit.failed[each.name] = str(error)
-    if not reaches:
-        raise RecordingError(f'no movement reaches a goal: {"; ".join(fit.failed.values())}')
-    return reaches
 
 
 def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: Mapping[str, object], executor: Executor) -> None:

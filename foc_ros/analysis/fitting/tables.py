@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
+
+from foc_ros.core.config import Config, flatten
 
 from .comparison import SMALLER_IS_BETTER
 from .covariance_fit import COVERAGE_LEVEL
+from .estimates import Fit
 
 PARAMETER_COLUMNS = ('parameter', 'given', 'fitted', '95 %', 'data')
 SCORE_COLUMNS = ('score', 'setting', 'value')
@@ -77,3 +81,32 @@ def format_scores(answer: Mapping[str, Any]) -> Rows:
         for score, values in answer['scores'].items()
         for setting, value in values.items()
     ]
+
+
+def make_answer(fit: Fit, given: Config, output: Path) -> dict[str, Any]:
+    """Return a fit as plain values; node: the commands that run the node with it, without and with a ROS installation."""
+    before, options = flatten(given), f'--ros-args --params-file {output}'
+    return {
+        'recordings': fit.recordings,
+        'failed': fit.failed,
+        'parameters': {name: {**each.as_json(), 'given': before[name]} for name, each in fit.estimates.items()},
+        'chosen': {name: {'value': value, 'given': before[name]} for name, value in fit.chosen.items()},
+        'scores': fit.scores,
+        'comparison': fit.comparison,
+        'warnings': fit.warnings,
+        'output': str(output),
+        'node': [f'python -m foc_ros node {options}', f'ros2 run foc_ros foc_node {options}'],
+    }
+
+
+def make_tables(answer: Mapping[str, Any]) -> Iterator[tuple[None, tuple[str, ...], Rows]]:
+    """Yield the tables of an answer of `fit --json`."""
+    yield None, PARAMETER_COLUMNS, format_parameters(answer)
+    yield None, SCORE_COLUMNS, format_scores(answer)
+    yield None, COMPARISON_COLUMNS, format_comparison(answer)
+
+
+def make_sentences(answer: Mapping[str, Any]) -> list[str]:
+    """Return the notes of an answer of `fit --json`, what became better and worse, and how the node is run with it."""
+    words = f'{answer["recordings"]} recordings; parameters written to {answer["output"]}. Run the node with them:'
+    return [*(f'note: {warning}' for warning in answer['warnings']), *make_verdict(answer), words, *answer['node']]

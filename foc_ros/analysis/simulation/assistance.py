@@ -6,7 +6,7 @@ All rules have the same estimate of the hand and the same limits of force and sl
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -18,9 +18,8 @@ from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Prediction
 
 from .intended_path import DT
-from .names import BLEND, FOC, HINDSIGHT, NONE, POTENTIAL_FIELD
+from .names import FOC, NONE
 from .operators import Task
-from .peers import GoalInference, compute_blending_force, compute_field_force, compute_hindsight_force
 
 POSE_STEPS = 2
 """Time steps between two measured poses: 100 Hz."""
@@ -85,40 +84,6 @@ class FocAssistance(Assistance):
         return output.force
 
 
-class _GoalAssistance(Assistance):
-    """A rule that knows goals only."""
-
-    def __init__(self, task: Task, config: Config, rule: Callable[[Array, Array, Array], Array]) -> None:
-        super().__init__(task, config)
-        self._rule, self._inference = rule, GoalInference(task.goals, task.path.position[0])
-
-    def compute_force(self, step: int, position: Array, velocity: Array, acceleration: Array) -> Array:  # noqa: ARG002
-        """Return the force of the rule for the present probabilities of the goals."""
-        probabilities = self._inference.update(position)
-        self.is_wrong = int(probabilities.argmax()) != self.task.goal_row
-        return self._rule(position, self.task.goals, probabilities)
-
-
-class _FieldAssistance(Assistance):
-    """The potential field of the obstacles."""
-
-    def compute_force(self, step: int, position: Array, velocity: Array, acceleration: Array) -> Array:  # noqa: ARG002
-        """Return the force of the field."""
-        grown = self.task.obstacles.grow(self.task.hand_radius)
-        return compute_field_force(position, grown, self.config.guidance.f_max)
-
-
-def make_assistance(name: str, task: Task, config: Config) -> Assistance:
-    """Return a rule of `ASSISTANCE` for a trial."""
-    if name == HINDSIGHT:
-        return _GoalAssistance(task, config, compute_hindsight_force)
-    if name == BLEND:
-        return _GoalAssistance(task, config, compute_blending_force)
-    kinds: dict[str, Callable[[Task, Config], Assistance]]
-    kinds = {NONE: NoAssistance, FOC: FocAssistance, POTENTIAL_FIELD: _FieldAssistance}
-    return kinds[name](task, config)
-
-
 def is_wrong_way(prediction: Prediction, task: Task, step: int) -> bool:
     """Return whether the likeliest candidate leads to another goal, or passes an obstacle on another side, than intended."""
     likeliest = next((each for each in prediction.candidates_with_likelihood if each.label == prediction.most_likely), None)
@@ -129,3 +94,7 @@ def is_wrong_way(prediction: Prediction, task: Task, step: int) -> bool:
     rest = task.path.position[min(step, len(task.path.position) - 2) :]
     intended = find_path_sides(np.ascontiguousarray(rest), task.obstacles)
     return any(intended.get(name, side) != side for name, side in likeliest.sides.items())
+
+
+RULES: Mapping[str, type[Assistance]] = {NONE: NoAssistance, FOC: FocAssistance}
+"""The rules of `simulate` by name. A study may have others: they need a task and a configuration, as `Assistance` has them."""

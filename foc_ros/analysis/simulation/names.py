@@ -3,5 +3,5 @@
 ACCURATE, NOISY, LAGGY = 'accurate', 'noisy', 'laggy'
 CHANGES_WAY, UNANNOUNCED_GOAL, HUMAN_PATHS = 'changes_way', 'unannounced_goal', 'human_paths'
 OPERATORS = (ACCURATE, NOISY, LAGGY, CHANGES_WAY, UNANNOUNCED_GOAL, HUMAN_PATHS)
-NONE, FOC, HINDSIGHT, BLEND, POTENTIAL_FIELD = 'none', 'foc', 'hindsight', 'blend', 'potential_field'
-ASSISTANCE = (NONE, FOC, HINDSIGHT, BLEND, POTENTIAL_FIELD)
+NONE, FOC = 'none', 'foc'
+ASSISTANCE = (NONE, FOC)

@@ -14,6 +14,7 @@ from foc_ros.analysis.parallel import collect_all
 from foc_ros.core.config import Config
 from foc_ros.core.types import Array
 
+from .assistance import RULES, Assistance
 from .names import HUMAN_PATHS, NONE, OPERATORS
 from .operators import Task, draw_task
 from .trial import Trial, count_steps, measure_trial, run_trial
@@ -36,6 +37,8 @@ LEVEL = 0.95
 SHOWN_TRIALS = 3
 """Number of trials of each operator that are kept with their paths."""
 Row = dict[str, float | None]
+Rules = Mapping[str, type[Assistance]]
+"""Assistance rules by name."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +68,10 @@ class PairResult:
     trials: Mapping[str, Trial]
 
 
-def simulate(pairs: Sequence[Pair], config: Config, executor: Executor) -> list[PairResult]:
+def simulate(pairs: Sequence[Pair], config: Config, executor: Executor, rules: Rules = RULES) -> list[PairResult]:
     """Run all pairs with a progress bar; raise RecordingError where one fails. The results do not depend on the executor."""
     items = [(f'{pair.operator} {pair.number}', pair) for pair in pairs]
-    return collect_all(partial(run_pair, config=config), items, executor, 'simulate')
+    return collect_all(partial(run_pair, config=config, rules=rules), items, executor, 'simulate')
 
 
 def make_pairs(
@@ -83,10 +86,10 @@ def make_pairs(
     ]
 
 
-def run_pair(pair: Pair, config: Config) -> PairResult:
+def run_pair(pair: Pair, config: Config, rules: Rules = RULES) -> PairResult:
     """Run all rules of a pair."""
     task, noise = pair.draw()
-    trials = {rule: run_trial(task, rule, config, noise) for rule in pair.assistance}
+    trials = {rule: run_trial(task, rules[rule], config, noise) for rule in pair.assistance}
     raw = {rule: measure_trial(trial, task, config.guidance.f_max) for rule, trial in trials.items()}
     measures = {rule: _add_harm(values, raw[NONE]) for rule, values in raw.items()}
     is_shown = pair.number < SHOWN_TRIALS

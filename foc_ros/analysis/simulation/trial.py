@@ -11,7 +11,7 @@ from foc_ros.core.config import Config
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import Array, Record
 
-from .assistance import make_assistance
+from .assistance import Assistance
 from .intended_path import DT
 from .operators import SimulatedArm, Task
 
@@ -59,9 +59,9 @@ def count_steps(task: Task) -> int:
     return len(task.path.position) + round(EXTRA_S / DT)
 
 
-def run_trial(task: Task, assistance: str, config: Config, noise: Array) -> Trial:
+def run_trial(task: Task, assistance: type[Assistance], config: Config, noise: Array) -> Trial:
     """Run a trial. noise (n, 2, 2): standard normal numbers for arm and measurement, the same ones for each rule of a pair."""
-    arm, rule = SimulatedArm(task.arm, task.path, noise[:, 0]), make_assistance(assistance, task, config)
+    arm, rule = SimulatedArm(task.arm, task.path, noise[:, 0]), assistance(task, config)
     rows = []
     for step in range(count_steps(task)):
         force = rule.update(step, arm.position + MEASURED_STDDEV_M * noise[step, 1])

@@ -1,1 +1,0 @@
-"""The paper's studies redone: scenes enter; efforts, ratios and trends leave."""

@@ -1,0 +1,46 @@
+"""A scene from a file: its solved candidates as plain values, and as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from foc_ros.core.ocp.monte_carlo import monte_carlo
+from foc_ros.core.reaching_scene import ReachingScene
+from foc_ros.core.scene_solver import build_scene_problems, solve_scene
+from foc_ros.core.types import PredictedCandidate
+from foc_ros.io.json_output import encode_candidate, encode_solution
+
+COLUMNS = {
+    'description': '{}',
+    'status': '{}',
+    'likelihood': '{:.3f}',
+    'effort': '{:.6g}',
+    'cost': '{:.6g}',
+    'eta': '{:.4f}',
+    'tau': '{:.4g}',
+    'lambda': '{:.4g}',
+    'qp_solves': '{}',
+    'solve_ms': '{:.2f}',
+    'mc_step': '{:.4f}',
+    'mc_path': '{:.4f}',
+}
+"""Columns of the table and the formats of their values."""
+
+
+def solve_to_values(scene: ReachingScene, samples: int | None) -> tuple[list[PredictedCandidate], list[dict[str, Any]]]:
+    """Return the candidates of a scene, and each as plain values. samples: of roll-outs, None for none."""
+    problems = build_scene_problems(scene)
+    candidates = solve_scene(scene, problems)
+    encoded = [encode_candidate(each) | encode_solution(each.solution) for each in candidates]
+    for values, each in zip(encoded, candidates, strict=True) if samples is not None else ():
+        estimate = monte_carlo(problems[each.candidate.goal], each.solution.control.T.ravel(), samples or 0)
+        for name, (share, low, high) in (('mc_step', estimate.step), ('mc_path', estimate.path)):
+            values |= {name: share, f'{name}_interval': [low, high]}
+    return candidates, encoded
+
+
+def make_table(encoded: Sequence[dict[str, Any]]) -> tuple[list[str], list[list[str]]]:
+    """Return columns and rows of a table of candidates."""
+    shown = [name for name in COLUMNS if any(name in each for each in encoded)]
+    return shown, [['-' if each[name] is None else COLUMNS[name].format(each[name]) for name in shown] for each in encoded]

@@ -1,0 +1,219 @@
+"""The commands: each signature declares its arguments, each docstring explains them in `--help`.
+
+A command checks its arguments, and reads small files, before it imports what computes: that takes seconds.
+"""
+
+from __future__ import annotations
+
+import json as json_format
+import shutil
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from foc_ros.core.errors import FocError
+from foc_ros.io.outputs import check_folder, check_picture, check_report
+
+from .options import DEFAULTS, NO_LEARNING, PREDICT, TRY, Existing, Learning, Params, Port, Remaps, Samples, app, warn_all
+
+
+@app.command(group=TRY)
+def demo(*, output: Path = Path('demo_output')) -> int:
+    """Play the packaged recording to the node and show its predictions.
+
+    Parameters
+    ----------
+    output
+        Directory for bag and report; an earlier demo's are replaced, other files are kept.
+    """
+    check_folder('--output', output)
+    if find_spec('rclpy') is None:
+        raise FocError('rclpy is not installed: run `make setup`, or source a ROS 2 installation, or install the extra `ros`')
+    print('A recorded hand moves among a box, three posts and a wall; the node predicts where it goes. Loading ...', flush=True)
+    from .demo import perform  # not before: its import takes seconds
+
+    return perform(output)
+
+
+@app.command(group=TRY)
+def play(
+    *, host: str = '127.0.0.1', port: Port = 8420, no_ros: bool = False, data: Path = Path('play_data'), params: Params = DEFAULTS
+) -> int:
+    """Steer the hand yourself, on a page in the browser.
+
+    Parameters
+    ----------
+    host
+        Address to serve on: by default this computer only; any other lets everybody there steer the hand.
+    port
+        Port to serve on; 0: a free one.
+    no_ros
+        Predict with the library, without a node and DDS.
+    data
+        Folder for recordings, reports and fitted parameters.
+    params
+        The node's parameter file (default: every parameter has its default).
+    """
+    from foc_ros.play.address import open_sockets
+
+    check_folder('--data', data)
+    sockets = open_sockets(host, port)
+    if not no_ros and find_spec('rclpy') is None:
+        raise FocError('rclpy is not installed: use --no-ros, or source a ROS 2 installation, or install the extra `ros`')
+    print('foc_ros play: loading ...', flush=True)
+    from foc_ros.play.program import run
+
+    run(params, data, host, sockets, is_live=not no_ros)
+    return 0
+
+
+@app.command(group=PREDICT)
+def node(*arguments: Annotated[str, Parameter(allow_leading_hyphen=True, metavar='--ros-args ...')]) -> int:
+    """Run the node.
+
+    Parameters
+    ----------
+    arguments
+        They are passed to ROS, as in --ros-args -r hand_pose:=/PSM1/measured_cp.
+    """
+    if find_spec('rclpy') is None:
+        raise FocError('rclpy is not installed: source a ROS 2 installation, or install the extra `ros`')
+    from foc_ros.ros.main import main
+
+    return main(arguments)
+
+
+@app.command(group=PREDICT)
+def solve(scene: Existing, /, *, json: bool = False, monte_carlo: Samples | None = None, plot: Path | None = None) -> int:
+    """Solve one scene from a YAML or JSON file.
+
+    Parameters
+    ----------
+    scene
+        YAML or JSON file.
+    json
+        Print one JSON object.
+    monte_carlo
+        Estimate the probability of avoidance from so many noisy movements.
+    plot
+        Draw the candidates (PNG, PDF or SVG); a picture that foc_ros drew is replaced.
+    """
+    from foc_ros.io.scene_file import load_scene
+
+    if plot is not None:
+        check_picture('--plot', plot)
+    problem = load_scene(scene)
+    if plot is not None:
+        from foc_ros.reporting.plots import plot_outcomes  # a missing library is reported before the work
+    from foc_ros.analysis.solve import make_table, solve_to_values
+    from foc_ros.io.terminal import show_table, show_text
+
+    candidates, encoded = solve_to_values(problem, monte_carlo)
+    if plot is not None:
+        plot_outcomes(plot, problem.obstacles, problem.goals, candidates, problem.hand.mean[:2])
+    if json:
+        print(json_format.dumps({'candidates': encoded}, allow_nan=False))
+    else:
+        show_table(*make_table(encoded))
+    reasons = [f'{each.description}: {each.reason}' for each in candidates if not each.is_solved]
+    if any(each.has_likelihood for each in candidates):
+        for reason in reasons if not json else ():
+            show_text(reason)
+        return 0
+    lost = (
+        f'no candidate could be solved: {"; ".join(reasons)}' if reasons else 'no path was found between the start and any goal'
+    )
+    warn_all('solve', [lost])
+    return 3
+
+
+@app.command(group=PREDICT)
+def replay(
+    bag: Existing,
+    /,
+    *,
+    output: Path | None = None,
+    report: Path | None = None,
+    params: Params = DEFAULTS,
+    learning: Learning = NO_LEARNING,
+    guidance: bool = False,
+    json: bool = False,
+    remap: Remaps = (),
+) -> int:
+    """Compute predictions from a recording, without ROS and faster than real time.
+
+    Parameters
+    ----------
+    bag
+        Bag directory, or a .mcap or .db3 file.
+    output
+        New bag for inputs and predictions.
+    report
+        Folder for a page with pictures.
+    params
+        The node's parameter file (default: every parameter has its default).
+    guidance
+        Compute guidance as well, at guidance.rate_hz: into the output bag and, with --json, as a list `guidance`.
+    json
+        Print one JSON object.
+    remap
+        Take an input from a topic, as in hand_pose:=/PSM1/measured_cp (default: by name, else by type).
+    """
+    from foc_ros.io.bags import check_bag, check_new_bag
+
+    if report is not None:
+        check_report('--report', report)
+    learning.check(params)
+    check_bag(bag)
+    if output is not None:
+        check_new_bag(output)
+    from foc_ros.analysis import replay_files as files
+    from foc_ros.analysis.replay import Replay
+    from foc_ros.analysis.replay_guidance import GuidanceReplay
+    from foc_ros.analysis.replay_summary import Summary, facts
+    from foc_ros.io.bags import BagReader
+    from foc_ros.io.terminal import show_address, show_table
+    from foc_ros.ros.parameters import write_parameter_file
+
+    if report is not None:
+        from foc_ros.reporting.report import ReportCollector
+    played, summary = Replay(learning.prepare(params)), Summary()
+    collector = None if report is None else ReportCollector()
+    consumers: list[files.Consumer] = [summary.add, *([] if collector is None else [collector.add])]
+    # The answers wait in files: nothing is printed of a recording that turns out to be damaged.
+    with TemporaryFile('w+', encoding='utf-8') as predictions, TemporaryFile('w+', encoding='utf-8') as updates:
+        guided = [files.list_guidance(updates)] if json else []
+        consumers += [files.list_steps(predictions)] if json else []
+        with BagReader(bag, dict(remap)) as reader:
+            guiding = GuidanceReplay(played.pipeline) if guidance else None
+            files.replay_to(output, reader, played, guiding, consumers, guided)
+            answer = summary.answer(played.intake.counts, reader.duration_s)
+        if learning.learn is not None:
+            answer['learned'] = files.save_learnt(learning.learn, played.pipeline)
+        if learning.operator is not None:
+            write_parameter_file('--operator', learning.operator, played.pipeline.adapted_config)
+        if report is not None and collector is not None:
+            collector.write(report, bag.resolve().name, facts(answer))
+        if json:
+            print(f'{{"summary": {json_format.dumps(answer)}', end='')
+            for name, part in (('predictions', predictions), ('guidance', updates))[: 1 + guidance]:
+                print(f', "{name}": [', end='')
+                part.seek(0)
+                shutil.copyfileobj(part, sys.stdout)
+                print(']', end='')
+            print('}')
+        else:
+            show_table(('', str(bag)), facts(answer).items())
+            if report is not None:
+                show_address(report / 'index.html')
+    losses = list(filter(None, [played.describe_losses(), played.intake.describe_still_hand()]))
+    if summary.solved:
+        warn_all('replay', losses)
+        return 0
+    reason = '; '.join([*losses, played.pipeline.not_ready_reason() or 'see the candidates not solved'])
+    warn_all('replay', [f'no prediction has a solved candidate: {reason}'])
+    return 3

@@ -1,0 +1,235 @@
+"""`demo`: plays the packaged recording over DDS in real time to the real node, which runs in a process of its own.
+
+It shows the predictions, and leaves a bag and a report.
+"""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import sys
+import tempfile
+import threading
+import time
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from foc_ros.core.config import Config
+from foc_ros.core.errors import InputError
+from foc_ros.core.learning.goal_reached import AT_GOAL_M, find_goal_at_end
+from foc_ros.core.obstacles.scene import Scene
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.types import NANOSECONDS, HandSample
+from foc_ros.io import topics
+from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter, Item
+from foc_ros.io.terminal import show_address, show_table, show_text
+from foc_ros.reporting.live_text import show_live
+from foc_ros.reporting.report import write_report
+from foc_ros.reporting.snapshots import HandTrajectory, Snapshot, build_hand_trajectory, parse_label, read_snapshot
+from foc_ros.ros.intake import Intake
+from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, private_environment, reserve_domain, set_environment
+from foc_ros.ros.messages.decode_poses import decode_stamp
+from foc_ros.ros.messages.encode_prediction import OUTPUTS, STAMP
+
+RECORDING = Path(__file__).resolve().parents[1] / 'recordings' / 'reaching.mcap'
+MARK = '.foc_ros_demo'
+"""File that marks the output directory of a demo: the next demo may replace its bag and report."""
+RECEIVED = {f'/foc/{name}': kind for name, (kind, _) in OUTPUTS.items()} | {'/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray'}
+"""Types of the outputs of the node."""
+PAIR, DIAGNOSTICS = ('prediction', 'likelihoods'), 'diagnostics'
+WINDOW_S = 1.0
+"""Seconds over which rates are counted."""
+ONSET_SPEED = 0.05
+"""Speed [m/s] above which the hand counts as moving."""
+
+
+class Recorder:
+    """Keeps all messages of a demo.
+
+    Attributes: samples, the hand samples sent; snapshots, the predictions received; delays [s], from sending a hand sample to
+    receiving its prediction; health, the values of the node's diagnostics by name.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self.samples: list[HandSample] = []
+        self.snapshots: list[Snapshot] = []
+        self.delays: list[float] = []
+        self.health: dict[str, str] = {}
+        # This pipeline never predicts. It decodes the inputs and holds the scene at each of them.
+        self._intake = Intake(Pipeline(config))
+        self._sent: dict[int, tuple[float, Scene]] = {}
+        self._times: tuple[list[float], list[float]] = ([], [])
+        self._halves: dict[str, Any] = {}
+
+    def add_sent(self, item: Item, now: float) -> None:
+        """Record a message to the node; now [s]: of a monotonic clock."""
+        self._intake.take(item.role, item.message)
+        if item.role == topics.HAND and self._intake.sample is not None:
+            self.samples.append(self._intake.sample)
+            self._sent[self._intake.sample.stamp_ns] = (now, self._intake.pipeline.scene)
+            self._times[0].append(now)
+
+    def add_received(self, name: str, message: Any, now: float) -> None:
+        """Record an output of the node by its name; the two messages of a prediction may come in any order, or be lost."""
+        if name == DIAGNOSTICS:
+            self.health = {each.key: each.value for status in message.status for each in status.values}
+        if name not in PAIR:
+            return
+        if name == PAIR[0]:
+            self._times[1].append(now)
+            self.delays.append(now - self._sent.get(decode_stamp(message.header), (now, None))[0])
+        key = f'{STAMP}{decode_stamp(message.header)}' if name == PAIR[0] else message.layout.dim[2].label
+        other = self._halves.pop(key, None)
+        if other is None:
+            self._halves[key] = message
+            return
+        cloud, likelihoods = (message, other) if name == PAIR[0] else (other, message)
+        stamp_ns, pipeline = decode_stamp(cloud.header), self._intake.pipeline
+        scene = self._sent.get(stamp_ns, (0.0, pipeline.scene))[1]
+        if scene.goals is not None:
+            known = pipeline.config.plane, scene.obstacles(stamp_ns), scene.goals
+            self.snapshots.append(read_snapshot(cloud, likelihoods, *known))
+
+    @property
+    def is_scene_known(self) -> bool:
+        """Whether the node's diagnostics count goals and obstacles, where zero obstacles are a count, too."""
+        return self.health.get('goals', 'none yet') != 'none yet' and any(name.startswith('obstacles of') for name in self.health)
+
+    def rates(self, now: float) -> tuple[int, int]:
+        """Return how many hand samples were sent and how many predictions were received within the last second."""
+        sent, received = (len(times) - bisect_right(times, now - WINDOW_S) for times in self._times)
+        return sent, received
+
+    def describe(self, now: float, items: Sequence[Item]) -> str:
+        """Return how far the recording has been played, with rates and delay."""
+        progress = f'{(self.snapshots[-1].stamp_ns - items[0].log_ns) / NANOSECONDS:4.1f} of {_measure_duration_s(items):.1f} s'
+        rates = 'hand samples {}/s, predictions {}/s'.format(*self.rates(now))
+        return f'{progress}   {rates}, delay {1e3 * float(np.median(self.delays[-50:])):.0f} ms'
+
+
+def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf) -> int:
+    """Run the demo; return 1 if the node fails, 130 after an interrupt. last_s: seconds of the recording to play."""
+    with BagReader(recording) as reader:
+        items = list(reader)
+    items = [item for item in items if item.log_ns - items[0].log_ns <= last_s * NANOSECONDS]
+    recorder = Recorder(Config())
+    prepare(output)
+    print('The node starts ...', flush=True)
+    try:
+        with _catch_interrupts() as stopped, BagWriter(output / 'bag') as bag:
+            _play(items, bag, recorder, stopped)
+        if not recorder.snapshots and not stopped.is_set():
+            raise NodeDiedError('the node sent no prediction')
+    except NodeDiedError as error:
+        print(f'foc_ros demo: {error}', file=sys.stderr)
+        return 1
+    if stopped.is_set():
+        print(f'interrupted; the messages recorded so far are in {output / "bag"}')
+        return 130
+    print('The recording has ended. The report is written ...', flush=True)
+    median, late = 1e3 * np.percentile(recorder.delays, [50, 99])
+    counts = [f'{name.removeprefix("count ")} {value}' for name, value in recorder.health.items() if name.startswith('count ')]
+    facts = {
+        'recording': f'{_measure_duration_s(items):.1f} s, played over DDS to the node in real time',
+        'hand samples': str(len(recorder.samples)),
+        'delay from hand sample to prediction': f'{median:.1f} ms (median), {late:.1f} ms (99th percentile)',
+        'counters of the node': ', '.join(counts),
+    }
+    hand = build_hand_trajectory(recorder.samples)
+    write_report(output / 'report', 'Reaching among obstacles, live', hand, recorder.snapshots, facts)
+    show_table(('', str(output)), [('predictions', str(len(recorder.snapshots))), *facts.items()])
+    print(f'written to {output}: bag (inputs and outputs, MCAP) and the report')
+    show_address(output / 'report' / 'index.html')
+    show_text(describe_lead(hand, recorder.snapshots))
+    return 0
+
+
+def prepare(output: Path) -> None:
+    """Make the output directory and remove bag and report of an earlier demo; refuse a directory with other contents."""
+    if output.exists() and not (output / MARK).exists() and (not output.is_dir() or any(output.iterdir())):
+        raise InputError('--output', 'a new or empty directory, or one of an earlier demo', f'{output}, which has other contents')
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+        (output / MARK).write_text('The next demo replaces bag and report beside this file.\n', encoding='utf-8')
+        for name in ('bag', 'report'):
+            if (output / name).exists():
+                shutil.rmtree(output / name)
+    except OSError as error:
+        raise InputError('--output', 'a directory that can be written', f'{output}: {error.strerror}') from error
+
+
+def _play(items: list[Item], bag: BagWriter, recorder: Recorder, stopped: threading.Event) -> None:
+    began = np.inf
+
+    def note(topic: str, kind: str, raw: Any, now: float) -> None:
+        if now >= began:
+            bag.write_raw(topic, kind, raw, items[0].log_ns + int((now - began) * NANOSECONDS))
+
+    def receive(topic: str, raw: bytes) -> None:
+        now, name = time.monotonic(), topic.rpartition('/')[2]
+        note(topic, RECEIVED[topic], raw, now)
+        if name in (*PAIR, DIAGNOSTICS):
+            recorder.add_received(name, TYPESTORE.deserialize_cdr(raw, RECEIVED[topic]), now)
+
+    with tempfile.TemporaryDirectory(prefix='foc_ros_demo_') as logs, reserve_domain() as domain:
+        environment = private_environment(domain, Path(logs))
+        with set_environment(environment), NodeProcess(environment, Path(logs) / 'node.txt') as node, show_live() as show:
+            from foc_ros.ros.player import Player  # rclpy reads the environment when it is imported
+
+            def tick() -> bool:
+                node.check()
+                now = time.monotonic()
+                if recorder.snapshots:
+                    show(now, recorder.snapshots[-1], recorder.describe(now, items), recorder.samples[-1].position)
+                return not stopped.is_set()
+
+            with Player(items, RECEIVED, receive, tick, domain) as player:
+                if not player.connect(lambda: recorder.is_scene_known):
+                    return
+                began = time.monotonic()
+                for item in player.play():
+                    now = time.monotonic()
+                    recorder.add_sent(item, now)
+                    note(f'/{item.role}', topics.TYPES[item.role], item.raw, now)
+
+
+@contextmanager
+def _catch_interrupts() -> Iterator[threading.Event]:
+    """Yield an event that SIGINT and SIGTERM set within the context, in place of their usual effect."""
+    stopped = threading.Event()
+    before = {number: signal.signal(number, lambda *_: stopped.set()) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stopped
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def describe_lead(hand: HandTrajectory, snapshots: Sequence[Snapshot]) -> str:
+    """Return how long before the end of the movements the goals that were reached had become the most likely ones."""
+    leads = []
+    for start_ns, end_ns in hand.find_movements(ONSET_SPEED):
+        inside = [each for each in snapshots if start_ns <= each.stamp_ns <= end_ns and each.most_likely is not None]
+        if not inside:
+            continue
+        goal, distance = find_goal_at_end(hand.positions[hand.between(start_ns, end_ns)], inside[-1].goals)
+        if distance <= AT_GOAL_M:
+            others = [each.stamp_ns for each in inside if parse_label(str(each.most_likely), ())[0] != f'goal{goal}']
+            first = next((each.stamp_ns for each in inside if not others or each.stamp_ns > others[-1]), end_ns)
+            leads.append(((end_ns - first) / NANOSECONDS, (end_ns - start_ns) / NANOSECONDS))
+    if not leads:
+        return f'{len(snapshots)} predictions were made; no movement ended at a goal.'
+    median, duration_s = np.median(leads, axis=0).tolist()
+    return (
+        f'{len(snapshots)} predictions were made. The hand moved to a goal {len(leads)} times, for {duration_s:.1f} s; this goal '
+        f'was the most likely one from {median:.1f} s before the arrival on (medians).'
+    )
+
+
+def _measure_duration_s(items: Sequence[Item]) -> float:
+    return (items[-1].log_ns - items[0].log_ns) / NANOSECONDS

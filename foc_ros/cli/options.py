@@ -1,0 +1,242 @@
+"""The program, and the types of its commands' arguments: each reads a text, and refuses what cannot be used.
+
+Nothing that computes is imported here, so that a wrong argument is answered at once.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import App, Group, Parameter, Token
+
+import foc_ros
+from foc_ros.analysis.simulation.names import ASSISTANCE, OPERATORS
+from foc_ros.core.config import ONLINE, Config
+from foc_ros.core.errors import InputError, RecordingError, collect_all, suggest
+from foc_ros.io.outputs import check_file, check_page
+from foc_ros.io.topics import TYPES
+from foc_ros.ros.parameters import load_parameter_file
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+app = App(
+    name='foc_ros',
+    help='Predict where the hand of an operator is going among obstacles.',
+    version=foc_ros.__version__,
+    default_parameter=Parameter(negative=(), allow_repeating=False, show_default=lambda value: value or None),
+    help_format='plaintext',
+)
+app.register_install_completion_command('--install-completion')
+TRY = Group.create_ordered('To try it')
+PREDICT = Group.create_ordered('To predict')
+RECORDINGS = Group.create_ordered('For recordings of people')
+OTHER = Group.create_ordered('Other')
+
+MOST_SAMPLES, MOST_TRIALS, MOST_WORKERS, LARGEST_PORT = 10_000_000, 100_000, 1024, 65535
+ALLOWED = ('eta', 'positions')
+"""What `fit` lowers or makes worse only if it is allowed to."""
+Table = tuple[str | None, Sequence[str], Iterable[Sequence[str]]]
+"""Title, columns and rows."""
+_ADDRESS = re.compile(r'(\w+://)?[^\s/]+:\d{1,5}')
+
+
+def _read(read: Callable[[str], Any], **options: Any) -> Parameter:
+    """Return the parameter whose text is read by a function."""
+    return Parameter(converter=lambda _, tokens: read(tokens[0].value), n_tokens=1, accepts_keys=False, **options)
+
+
+def _whole(low: int, high: int, **options: Any) -> Parameter:
+    """Return the parameter of a whole number in [low, high]."""
+
+    def read(_: object, tokens: Sequence[Token]) -> int:
+        text = tokens[0].value
+        value = int(text) if text.removeprefix('-').isdecimal() and len(text) < 20 else None
+        if value is None or not low <= value <= high:
+            raise InputError(str(tokens[0].keyword), f'a whole number in [{low}, {high}]', text)
+        return value
+
+    return Parameter(converter=read, n_tokens=1, allow_leading_hyphen=True, **options)
+
+
+def _names(known: tuple[str, ...]) -> Parameter:
+    """Return the parameter of names with commas between them, each of which is taken once."""
+
+    def read(_: object, tokens: Sequence[Token]) -> tuple[str, ...]:
+        def check(name: str) -> str:
+            if name not in known:
+                expected = f'names of {", ".join(known)}{suggest(name, known)}'
+                raise InputError(str(tokens[0].keyword), expected, name)
+            return name
+
+        return tuple(collect_all(check, [(name,) for name in dict.fromkeys(tokens[0].value.split(','))]))
+
+    return Parameter(converter=read, n_tokens=1, metavar='A,B')
+
+
+def _read_existing_path(text: str) -> Path:
+    if not Path(text).exists():
+        raise RecordingError(f'{text}: no such file or directory')
+    return Path(text)
+
+
+def _read_address(text: str) -> str:
+    if not _ADDRESS.fullmatch(text):
+        raise InputError('--scheduler', 'the address of a Dask scheduler, as in tcp://host:8786', text)
+    return text
+
+
+def _read_remaps(_: object, tokens: Sequence[Token]) -> tuple[tuple[str, str], ...]:
+    """Return the name of each input and the topic from which it is taken."""
+
+    def read(text: str) -> tuple[str, str]:
+        role, separator, topic = text.partition(':=')
+        if not separator or not topic:
+            raise InputError('--remap', 'INPUT:=TOPIC', text)
+        if role not in TYPES:
+            raise InputError('--remap', f'one of the inputs {", ".join(TYPES)}{suggest(role, TYPES)}', role)
+        return role, topic
+
+    remaps = tuple(read(each.value) for each in tokens)
+    roles = [role for role, _ in remaps]
+    if len(set(roles)) < len(roles):
+        raise InputError('--remap', 'INPUT:=TOPIC, once for an input', ', '.join(roles))
+    return remaps
+
+
+DEFAULTS = Config()
+Existing = Annotated[Path, _read(_read_existing_path)]
+Params = Annotated[Config, _read(load_parameter_file, name='--params', metavar='YAML', show_default=False)]
+Remaps = Annotated[
+    tuple[tuple[str, str], ...],
+    Parameter(converter=_read_remaps, n_tokens=1, allow_repeating=True, metavar='INPUT:=TOPIC', show_default=False),
+]
+Samples = Annotated[int, _whole(1, MOST_SAMPLES)]
+Port = Annotated[int, _whole(0, LARGEST_PORT)]
+Trials = Annotated[int, _whole(1, MOST_TRIALS)]
+Seed = Annotated[int, _whole(0, MOST_TRIALS)]
+Operators = Annotated[tuple[str, ...], _names(OPERATORS)]
+Assistance = Annotated[tuple[str, ...], _names(ASSISTANCE)]
+Allowed = Annotated[tuple[str, ...], _names(ALLOWED)]
+
+
+@Parameter(name='*')
+@dataclass(frozen=True)
+class Learning:
+    """What is kept of the movements of a recording.
+
+    Parameters
+    ----------
+    learn
+        Learn the movements, with experience.learning, and add them to this class library, for homotopy.library.
+    operator
+        File for the parameters with the durations of this operator, for --params.
+    """
+
+    learn: Path | None = None
+    operator: Path | None = None
+
+    def check(self, config: Config) -> None:
+        """Raise InputError for a file that cannot be written, and for two class libraries."""
+        for option, file in (('--learn', self.learn), ('--operator', self.operator)):
+            if file is not None:
+                check_file(option, file)
+        library = config.homotopy.library
+        if self.learn is not None and library and Path(library) != self.learn:
+            raise InputError('--learn', 'no other class library in homotopy.library', library)
+
+    def prepare(self, config: Config) -> Config:
+        """Return the config with which movements are learnt, in addition to those of a class library that exists."""
+        if self.learn is None:
+            return config
+        given = {'homotopy.library': str(self.learn)} if self.learn.exists() else {}
+        return config.with_values({'experience.learning': ONLINE, **given})
+
+
+NO_LEARNING = Learning()
+
+
+@Parameter(name='*')
+@dataclass(frozen=True)
+class Study:
+    """Options of the commands that work on many recordings or trials.
+
+    Parameters
+    ----------
+    params
+        The node's parameter file (default: every parameter has its default).
+    json
+        Print one JSON object.
+    report
+        Folder for a page with plots.
+    workers
+        Worker processes (default: one for each core that this process may use).
+    scheduler
+        Address of a Dask scheduler, whose workers are used instead (extra: cluster).
+    """
+
+    params: Params = DEFAULTS
+    json: bool = False
+    report: Path | None = None
+    workers: Annotated[int, _whole(1, MOST_WORKERS)] | None = None
+    scheduler: Annotated[str, _read(_read_address)] | None = None
+
+    def check(self, page: str) -> None:
+        """Raise InputError for a report that cannot be written, and for two kinds of workers. page: file of the report."""
+        if self.workers is not None and self.scheduler is not None:
+            raise InputError('--scheduler', 'either --workers or --scheduler', 'both')
+        if self.report is not None:
+            check_page('--report', self.report, page)
+
+    def open_executor(self) -> Executor:
+        """Return the executor of the workers, as a context; raise InputError where there is none."""
+        from foc_ros.analysis import parallel
+
+        return parallel.open_executor(self.workers or len(os.sched_getaffinity(0)), self.scheduler)
+
+    def load_report(self, module: str) -> Callable[..., None]:
+        """Return what writes the report, so that a missing library is reported before the work; without one it does nothing."""
+        if self.report is None:
+            return lambda *_: None
+        return partial(import_module(f'foc_ros.reporting.{module}').write_report, self.report)
+
+    def show(self, answer: object, tables: Iterable[Table], sentences: Iterable[str], page: str) -> None:
+        """Print an answer as JSON, or as tables and sentences with the address of the report."""
+        from foc_ros.io import terminal
+
+        if self.json:
+            print(json.dumps(answer, allow_nan=False))
+            return
+        for title, columns, rows in tables:
+            terminal.show_table(columns, rows, title)
+        for sentence in sentences:
+            terminal.show_text(sentence)
+        if self.report is not None:
+            terminal.show_address(self.report / page)
+
+
+PLAIN = Study()
+
+
+def warn_all(command: str, messages: Iterable[str]) -> int:
+    """Print what went wrong; return the exit code 2 if anything did."""
+    lines = list(messages)
+    for line in lines:
+        print(f'foc_ros {command}: {line}', file=sys.stderr)
+    return 2 if lines else 0
+
+
+def confirm(question: str) -> bool:
+    """Return whether a terminal, if there is one, agrees."""
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return False
+    return input(f'{question} [y/N] ').strip().lower() in ('y', 'yes')

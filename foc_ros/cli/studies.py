@@ -1,0 +1,210 @@
+"""The commands that work on many recordings or trials, or on tables of them; see `commands`."""
+
+from __future__ import annotations
+
+import json as json_format
+import sys
+from pathlib import Path
+
+from foc_ros.analysis.simulation.names import ASSISTANCE, HUMAN_PATHS, OPERATORS
+from foc_ros.core.errors import InputError, RecordingError
+from foc_ros.io.outputs import EVALUATION_PAGE, FIT_PAGE, SIMULATION_PAGE, check_file, check_folder
+
+from .options import (
+    DEFAULTS,
+    OTHER,
+    PLAIN,
+    RECORDINGS,
+    Allowed,
+    Assistance,
+    Existing,
+    Operators,
+    Params,
+    Seed,
+    Study,
+    Trials,
+    app,
+    confirm,
+    warn_all,
+)
+
+
+@app.command(group=RECORDINGS)
+def learn(data: Existing, /, *, output: Path, params: Params = DEFAULTS, json: bool = False) -> int:
+    """Write the recordings of a scene as experience for predictions in this scene.
+
+    Parameters
+    ----------
+    data
+        Folder of bags, or of recordings.csv, goals.csv and, where there are obstacles, obstacles.csv.
+    output
+        Class library to write, for homotopy.library; an earlier one is replaced.
+    params
+        The node's parameter file (default: every parameter has its default).
+    json
+        Print one JSON object.
+    """
+    from foc_ros.analysis.recordings import find_recordings
+    from foc_ros.io.class_library import MOST_WAYS
+
+    check_file('--output', output)
+    recordings = find_recordings(data)
+    if len(recordings) > MOST_WAYS:
+        raise InputError(f'{data}', f'at most {MOST_WAYS} recordings', len(recordings))
+    from foc_ros.analysis.learn_demonstrations import learn_recordings
+    from foc_ros.io.class_library import save_library
+
+    learnt, failed = learn_recordings(recordings, params)
+    if not learnt:
+        raise RecordingError(f'{data}: no recording could be learnt: {next(iter(failed.values()))}')
+    save_library(output, learnt)
+    words = f'{len(learnt)} movements written to {output}; the parameter homotopy.library names this file for node and replay'
+    print(json_format.dumps({'learned': len(learnt), 'failed': failed, 'output': str(output)}) if json else words)
+    return warn_all('learn', failed.values())
+
+
+@app.command(group=RECORDINGS)
+def fit(data: Existing, /, *, output: Path, allow: Allowed = (), study: Study = PLAIN) -> int:
+    """Find the parameters that explain recordings best.
+
+    Parameters
+    ----------
+    data
+        Folder of bags, or of recordings.csv, goals.csv and, where there are obstacles, obstacles.csv.
+    output
+        Parameter file to write.
+    allow
+        eta lets values of foc.eta below the given one be taken, with which obstacles are avoided with less certainty; with
+        positions, parameters are written even if predicted positions become worse.
+    """
+    from foc_ros.analysis.recordings import find_recordings
+
+    check_file('--output', output)
+    study.check(FIT_PAGE)
+    recordings = find_recordings(data)
+    write_report = study.load_report('fit_report')
+    from foc_ros.analysis.fitting import comparison, fit, tables
+    from foc_ros.ros.parameters import write_parameter_file
+
+    with study.open_executor() as executor:
+        found = fit.fit_parameters(recordings, study.params, executor, may_lower_eta='eta' in allow)
+    answer = tables.make_answer(found, study.params, output)
+    losses = comparison.find_worse_positions(found.comparison)
+    for loss in losses:
+        print(f'foc_ros fit: {loss}', file=sys.stderr)
+    if losses and 'positions' not in allow and not confirm(f'Write {output} all the same?'):
+        print(f'foc_ros fit: {output} is not written; --allow positions writes it all the same', file=sys.stderr)
+        return 2
+    write_parameter_file('--output', output, found.config)
+    write_report(data.resolve().name, answer)
+    study.show(answer, tables.make_tables(answer), tables.make_sentences(answer), FIT_PAGE)
+    return warn_all('fit', [f'{name}: {reason}' for name, reason in found.failed.items()])
+
+
+@app.command(group=RECORDINGS)
+def evaluate(data: Existing, /, *, in_order: bool = False, study: Study = PLAIN) -> int:
+    """Compare predictions with recordings of people, beside simple baselines.
+
+    Parameters
+    ----------
+    data
+        Folder of bags, or of recordings.csv, goals.csv and, where there are obstacles, obstacles.csv.
+    in_order
+        Replay the recordings of an operator one after the other, with what is learnt from one to the next.
+    """
+    from foc_ros.analysis.recordings import find_recordings
+
+    study.check(EVALUATION_PAGE)
+    recordings = find_recordings(data)
+    write_report = study.load_report('evaluation_report')
+    from foc_ros.analysis.evaluation import evaluate, observations, tables
+
+    with study.open_executor() as executor:
+        observed, failed = observations.observe_all(recordings, study.params, executor, in_order)
+        warn_all('evaluate', [f'{name}: {reason}' for name, reason in failed.items()])
+        if not observed:
+            print(f'foc_ros evaluate: none of the {len(failed)} recordings could be evaluated', file=sys.stderr)
+            return 3
+        answer = evaluate.evaluate(observed, study.params, executor)
+    mismatches = evaluate.find_label_mismatches(data, observed)
+    differ = 'the label differs from the recorded path'
+    warn_all('evaluate', [f'{name}: {differ}: {words}' for name, words in mismatches.items()])
+    answer |= {'failed': failed, 'labels_not_taken': mismatches}
+    write_report(data.resolve().name, answer)
+    study.show(answer, tables.make_tables(answer), answer['verdict'], EVALUATION_PAGE)
+    return 2 if failed else 0
+
+
+@app.command(group=OTHER)
+def simulate(
+    *,
+    operators: Operators | None = None,
+    assistance: Assistance = ASSISTANCE,
+    trials: Trials = 20,
+    seed: Seed = 0,
+    recordings: Existing | None = None,
+    study: Study = PLAIN,
+) -> int:
+    """Compare simulated operators with and without guidance.
+
+    Parameters
+    ----------
+    operators
+        Some of accurate, noisy, laggy, changes_way, unannounced_goal, human_paths (default: all; human_paths with --recordings
+        only).
+    assistance
+        none, foc or both.
+    trials
+        Paired trials of each operator.
+    seed
+        Equal seeds give equal results.
+    recordings
+        Recordings of people, as for evaluate, for the operator human_paths.
+    """
+    from foc_ros.analysis.recordings import find_recordings
+
+    study.check(SIMULATION_PAGE)
+    operators = operators or (OPERATORS if recordings is not None else OPERATORS[:-1])
+    if HUMAN_PATHS in operators and recordings is None:
+        raise InputError('--recordings', f'recordings of people for the operator {HUMAN_PATHS}', 'none')
+    found = find_recordings(recordings) if recordings is not None and HUMAN_PATHS in operators else {}
+    write_report = study.load_report('simulation_report')
+    from foc_ros.analysis.simulation import human_paths, tables
+    from foc_ros.analysis.simulation.study import make_pairs, simulate, summarise
+
+    tasks = human_paths.read_tasks(found.values(), study.params) if found else []
+    with study.open_executor() as executor:
+        results = simulate(make_pairs(operators, assistance, trials, seed, tasks), study.params, executor)
+    cells = summarise(results, seed)
+    write_report(cells, results)
+    study.show({'cells': cells, 'seed': seed}, tables.make_tables(cells), (), SIMULATION_PAGE)
+    return 0
+
+
+@app.command(group=OTHER)
+def convert(csv: Existing, /, *, output: Path, obstacles: Existing | None = None, goals: Existing | None = None) -> int:
+    """Convert motion capture in CSV tables to bags.
+
+    Parameters
+    ----------
+    csv
+        Recordings: columns recording, t_s, x_m, y_m[, z_m]; or a folder of all tables, as evaluate takes it.
+    output
+        Directory for the bags, one per recording.
+    obstacles
+        Columns x_m, y_m, radius_m[, radius_stddev_m, id, z_m, recording], for boxes size_x_m, size_y_m[, yaw_rad].
+    goals
+        Columns x_m, y_m[, z_m, recording].
+    """
+    check_folder('--output', output)
+    from foc_ros.analysis.convert import convert_tables
+
+    print(convert_tables(csv, obstacles, goals, output))
+    return 0
+
+
+@app.command(group=OTHER)
+def warm_up() -> int:
+    """Do nothing any more: the command will be removed."""
+    print('there is nothing to do: foc_ros compiles nothing any more')
+    return 0

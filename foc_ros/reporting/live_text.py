@@ -1,0 +1,110 @@
+"""Predictions as they come, on a terminal: the scene as lines of text, and a table of candidates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+
+import numpy as np
+from rich.bar import Bar
+from rich.box import SIMPLE_HEAD
+from rich.console import Console, Group
+from rich.live import Live
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.types import Array
+
+from .drawing import Bounds
+from .plots import compute_bounds
+from .snapshots import Snapshot
+
+WIDTH, HEIGHT = 72, 13
+"""Size of the drawing [characters]; with the table it fits into 24 lines."""
+OBSTACLE, GOAL, HAND = '▒', '*', '@'
+LEGEND = f'{HAND} hand   {GOAL} goal   {OBSTACLE} obstacle   1 2 3 candidates, most likely first'
+REDRAW_S, LINE_S = 0.125, 1.0
+"""Seconds between two updates of the table on a terminal, and between two lines of text elsewhere."""
+ROWS = 4
+"""Rows of the table: the default number of candidates, so that its height stays the same."""
+LISTED = 2
+"""Number of candidates in a line of text."""
+COLUMNS = {'candidate': 46, 'likelihood': 10, '': 5, 'cost': 6, 'eta': 5}
+"""Columns of the table and their widths [characters]."""
+Show = Callable[[float, Snapshot, str, Array], None]
+"""Function that shows a snapshot at a time [s], with a heading and the position of the hand (2,) [m]; it may be called often."""
+
+
+@contextmanager
+def show_live(console: Console | None = None) -> Iterator[Show]:
+    """Yield a function that shows snapshots: as a live scene and table on a terminal, else as a line each second."""
+    console = console or Console()
+    waiting = 'Waiting for the first prediction of the node ...'
+    live = Live(waiting, console=console, auto_refresh=False) if console.is_terminal else None
+    next_update, bounds = -np.inf, None
+
+    def show(now: float, snapshot: Snapshot, heading: str, hand: Array) -> None:
+        nonlocal next_update, bounds
+        if now < next_update:
+            return
+        next_update = now + (LINE_S if live is None else REDRAW_S)
+        if live is not None:
+            bounds = extend_bounds(snapshot, hand, bounds)
+            drawing = Text(draw_scene(snapshot, hand, bounds))
+            live.update(Group(drawing, Text(LEGEND), _make_table(snapshot, heading)), refresh=True)
+            return
+        listed = [f'{100 * each.likelihood:.0f} % {each.description or each.label}' for each in snapshot.candidates[:LISTED]]
+        line = f'{heading}   {"   ".join(listed) or "no solved candidate"}'
+        console.print(line, highlight=False, soft_wrap=True, markup=False)
+
+    with live or nullcontext():
+        yield show
+
+
+def _make_table(snapshot: Snapshot, title: str) -> Table:
+    table = Table(title=title, title_justify='left', caption_justify='left', box=SIMPLE_HEAD, padding=(0, 0))
+    table.caption = '* compromised: eta is below the wanted one'
+    for name, width in COLUMNS.items():
+        table.add_column(name, width=width, no_wrap=True, justify='right' if width < 10 else 'left')
+    for each in snapshot.candidates[:ROWS]:
+        bar = Bar(1.0, 0.0, each.likelihood, color='bright_blue')
+        share, ratio = f'{100 * each.likelihood:.0f} %', f'x {each.cost_ratio:.3g}'
+        eta = f'{each.eta:.2f}' + '*' * each.is_compromised
+        table.add_row(escape(each.description or each.label), bar, share, ratio, eta)
+    for row in range(len(snapshot.candidates), ROWS):
+        table.add_row('' if row else 'no solved candidate')
+    return table
+
+
+def extend_bounds(snapshot: Snapshot, hand: Array, before: Bounds | None) -> Bounds:
+    """Return limits [m] around obstacles, goals and hand (2,) [m], and around those before, so that the drawing rarely moves."""
+    left, right, bottom, top = compute_bounds(snapshot.obstacles, snapshot.goals, (), hand[None], margin=0.02)
+    if before is None:
+        return left, right, bottom, top
+    return min(left, before[0]), max(right, before[1]), min(bottom, before[2]), max(top, before[3])
+
+
+def draw_scene(snapshot: Snapshot, hand: Array, bounds: Bounds) -> str:
+    """Return the drawing; hand (2,) [m]; bounds: left, right, bottom and top [m]."""
+    left, right, bottom, top = bounds
+    x, y = np.linspace(left, right, WIDTH), np.linspace(top, bottom, HEIGHT)
+    cells = np.full((HEIGHT, WIDTH), ' ')
+    if len(snapshot.obstacles):
+        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        is_inside = (measure_offsets(points, snapshot.obstacles)[1] <= snapshot.obstacles.radius).any(axis=1)
+        cells[is_inside.reshape(cells.shape)] = OBSTACLE
+    marks = [(_fill(each.curve), str(row + 1)) for row, each in reversed([*enumerate(snapshot.candidates[:9])])]
+    for points, mark in [*marks, (snapshot.goals, GOAL), (hand[None], HAND)]:
+        column = np.rint((points[:, 0] - left) / (right - left) * (WIDTH - 1)).astype(int)
+        row = np.rint((top - points[:, 1]) / (top - bottom) * (HEIGHT - 1)).astype(int)
+        is_visible = (column >= 0) & (column < WIDTH) & (row >= 0) & (row < HEIGHT)
+        cells[row[is_visible], column[is_visible]] = mark
+    return '\n'.join(''.join(line).rstrip() for line in cells)
+
+
+def _fill(points: Array) -> Array:
+    """Return more points along a line (m, 2) [m], so that it is drawn without gaps."""
+    rows = np.linspace(0.0, len(points) - 1.0, 4 * WIDTH)
+    return np.column_stack([np.interp(rows, np.arange(len(points)), axis) for axis in points.T])

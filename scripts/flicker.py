@@ -1,0 +1,274 @@
+#!/usr/bin/env python3
+"""Measure how steady predictions are from tick to tick, on recordings at 100 Hz, with measurement noise.
+
+    python scripts/flicker.py [DATA ...] [--strategy NAME ...] [--noise M ...] [--set NAME=VALUE ...] [--every N]
+
+DATA: bags, or folders as `foc_ros evaluate` reads them; by default the packaged recording, and D3IL and HLP where they are beside
+the checkout. Positions come at 100 Hz by cubic interpolation, and predictions at 50 Hz. Ticks across a change of the scene are
+left out.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import count, product
+from pathlib import Path
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+from page import ROOT, SHARED, format_table
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
+
+from foc_ros.analysis.recordings import Recording, find_recordings
+from foc_ros.core.config import Config
+from foc_ros.core.obstacles.scene import Scene
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, PredictedCandidate, Prediction
+from foc_ros.io.topics import HAND
+from foc_ros.ros.intake import Intake
+
+DEMO = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'
+RATE_HZ = 100.0
+STRATEGIES, NOISE_M = ('lv', 'hc', 'optimal'), (0.0, 0.0005, 0.001)
+FRAME = 'world'
+CHANGE = 0.1
+"""Change of a likelihood from one tick to the next that counts."""
+SHORT_TICKS, RETURN_S, LONGEST_S = 10, 0.2, 0.05
+"""Absences of fewer ticks and leads that return within this time count. Ticks farther apart than LONGEST_S are not compared."""
+FINE = 6
+"""Points for each step of a path, so that its chords are no part of a distance."""
+
+
+@dataclass
+class Steadiness:
+    """What happened over the ticks of several recordings.
+
+    ticks: pairs of predictions that were compared; changed: those in which a likelihood changed by more than CHANGE; returns:
+    leads A-B-A within RETURN_S; absences: of a class, shorter than SHORT_TICKS; sideways: move of each mean path [m].
+    """
+
+    seconds: float = 0.0
+    ticks: int = 0
+    changed: int = 0
+    returns: int = 0
+    absences: int = 0
+    sideways: list[float] = field(default_factory=list)
+
+    def summarise(self) -> list[str]:
+        """Return the cells under HEAD."""
+        minutes = self.seconds / 60.0
+        percentile, largest = (1e3 * float(np.percentile(self.sideways or [0.0], each)) for each in (95.0, 100.0))
+        return [
+            str(self.ticks),
+            f'{100 * self.changed / max(self.ticks, 1):.2f}',
+            f'{self.returns / minutes:.1f}',
+            f'{self.absences / minutes:.1f}',
+            f'{percentile:.2f}',
+            f'{largest:.1f}',
+        ]
+
+
+HEAD = (
+    'ticks',
+    'changed > 0.1 [%]',
+    'A-B-A [1/min]',
+    'short absences [1/min]',
+    'sideways 95 % [mm]',
+    'largest [mm]',
+)
+
+
+class ClassTracker:
+    """Gives each homotopy class a number that stays when its label changes; remembers classes for SHORT_TICKS ticks."""
+
+    def __init__(self) -> None:
+        self._numbers = count()
+        self._known: dict[int, tuple[int, PredictedCandidate]] = {}
+        self._tick = 0
+
+    def identify(self, candidates: Iterable[PredictedCandidate]) -> tuple[dict[int, PredictedCandidate], int]:
+        """Return the candidates of the next tick by number, and how many of them were absent for a short time."""
+        self._tick += 1
+        self._known = {number: each for number, each in self._known.items() if self._tick - each[0] <= SHORT_TICKS}
+        rest: list[PredictedCandidate] = list(candidates)
+        found: dict[int, PredictedCandidate] = {}
+        for is_same in (_has_same_label, _is_renamed):
+            pairs = [
+                (-tick, compute_sideways_move(before, each), -before.likelihood, number, place)
+                for number, (tick, before) in self._known.items()
+                for place, each in enumerate(rest)
+                if number not in found and is_same(before, each)
+            ]
+            for *_, number, place in sorted(pairs):  # of several names the one whose path is nearest
+                if number not in found and rest[place] not in found.values():
+                    found[number] = rest[place]
+            rest = [each for each in rest if each not in found.values()]
+        absences = sum(self._known[number][0] < self._tick - 1 for number in found)
+        found |= {next(self._numbers): each for each in rest}
+        self._known |= {number: (self._tick, each) for number, each in found.items()}
+        return found, absences
+
+
+def _has_same_label(one: PredictedCandidate, other: PredictedCandidate) -> bool:
+    return one.label == other.label
+
+
+def _is_renamed(one: PredictedCandidate, other: PredictedCandidate) -> bool:
+    """Tell whether the label of one class is that of the other with obstacles left out."""
+    sides, others = set(one.candidate.sides), set(other.candidate.sides)
+    return one.candidate.goal == other.candidate.goal and (sides <= others or others <= sides)
+
+
+def measure_steadiness(predictions: Iterable[Prediction], total: Steadiness) -> None:
+    """Add the ticks of one recording to a total. A change of goals or obstacles begins anew."""
+    before: Prediction | None = None
+    tracker = ClassTracker()
+    last: dict[int, PredictedCandidate] = {}
+    leads: list[tuple[float, int]] = []
+    for now in predictions:
+        if before is None or not _is_same_scene(before, now):
+            tracker, last, leads = ClassTracker(), {}, []
+        found, absences = tracker.identify(now.candidates_with_likelihood)
+        if last or leads:
+            total.ticks += 1
+            total.seconds += now.t - before.t if before is not None else 0.0
+            total.absences += absences
+            total.changed += _compute_largest_change(last, found) > CHANGE
+            total.sideways += [compute_sideways_move(last[each], found[each]) for each in last.keys() & found.keys()]
+        leads += [(now.t, number) for number, each in found.items() if each.label == now.most_likely]
+        total.returns += _has_returned(leads)
+        before, last = now, found
+
+
+def _is_same_scene(before: Prediction, now: Prediction) -> bool:
+    return (
+        now.t - before.t <= LONGEST_S
+        and np.array_equal(before.goals, now.goals)
+        and before.obstacles.ids == now.obstacles.ids
+        and np.array_equal(before.obstacles.centre, now.obstacles.centre)
+    )
+
+
+def _compute_largest_change(last: dict[int, PredictedCandidate], found: dict[int, PredictedCandidate]) -> float:
+    shares = [{number: each.likelihood for number, each in table.items()} for table in (last, found)]
+    return max((abs(shares[0].get(each, 0.0) - shares[1].get(each, 0.0)) for each in last | found), default=0.0)
+
+
+def _has_returned(leads: list[tuple[float, int]]) -> bool:
+    """Tell whether the last lead (time [s], class) has just come back to a class that led within RETURN_S; forget older ones."""
+    if len(leads) < 3 or leads[-1][1] == leads[-2][1]:
+        return False
+    end, leader = leads[-1]
+    return any(number == leader and end - time <= RETURN_S + 1e-9 for time, number in leads[:-2])
+
+
+def refine_path(candidate: PredictedCandidate) -> Array:
+    """Return the mean path of a candidate as points (m, 2) [m] on the cubic through its steps."""
+    times = candidate.times
+    fine = np.linspace(times[0], times[-1], FINE * (len(times) - 1) + 1)
+    points: Array = CubicHermiteSpline(times, candidate.mean[:, :2], candidate.mean[:, 2:4])(fine)
+    return points
+
+
+def compute_sideways_move(before: PredictedCandidate, now: PredictedCandidate) -> float:
+    """Return the largest distance [m] of a mean path from that of the tick before, perpendicular to the latter."""
+    return float(measure_distances(now.mean[:, :2], refine_path(before)).max())
+
+
+def measure_distances(points: Array, line: Array) -> Array:
+    """Return the distance (m,) of points (m, 2) from a line through points (n, 2)."""
+    start, along = line[:-1], np.diff(line, axis=0)
+    offset = points[:, None] - start
+    share = np.einsum('mnk,nk->mn', offset, along) / np.maximum((along**2).sum(axis=1), 1e-30)
+    nearest = np.clip(share, 0.0, 1.0)[..., None] * along
+    distances: Array = np.hypot(*(offset - nearest).transpose(2, 0, 1)).min(axis=1)
+    return distances
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """The hand of a recording: stamps_ns (m,), positions (m, 2) [m], and the scene at each sample, None before there is one."""
+
+    name: str
+    stamps_ns: NDArray[np.int64]
+    positions: Array
+    scenes: tuple[Scene | None, ...]
+
+    def resample(self, rate_hz: float) -> Track:
+        """Return the track at a constant rate, by cubic interpolation."""
+        stamps = np.arange(self.stamps_ns[0], self.stamps_ns[-1] + 1, round(NANOSECONDS / rate_hz))
+        last = np.searchsorted(self.stamps_ns, stamps, side='right') - 1
+        positions = CubicSpline(self.stamps_ns - stamps[0], self.positions)(stamps - stamps[0])
+        return Track(self.name, stamps, positions, tuple(self.scenes[each] for each in last))
+
+    def add_noise(self, stddev: float, seed: int) -> Track:
+        """Return the track with Gaussian noise [m] on every position."""
+        noise = np.random.default_rng(seed).normal(0.0, stddev, self.positions.shape)
+        return replace(self, positions=self.positions + noise)
+
+
+def read_track(recording: Recording) -> Track:
+    """Return the hand of a recording and its scenes; a sample with the stamp of the one before is left out."""
+    pipeline = Pipeline(Config())
+    intake = Intake(pipeline)
+    stamps: list[int] = []
+    positions: list[Array] = []
+    scenes: list[Scene | None] = []
+    for item in recording.items():
+        status = intake.take(item.role, item.message)
+        if item.role == HAND and status is not None and status.is_taken:
+            assert intake.sample is not None
+            stamps.append(intake.sample.stamp_ns)
+            positions.append(intake.sample.position)
+            scenes.append(pipeline.scene if pipeline.not_ready_reason() is None else None)
+    return Track(recording.name, np.array(stamps), np.array(positions), tuple(scenes))
+
+
+def predict_track(track: Track, config: Config) -> Iterator[Prediction]:
+    """Yield the predictions that the pipeline makes from a track."""
+    pipeline, scene = Pipeline(config), None
+    for stamp_ns, position, now in zip(track.stamps_ns.tolist(), track.positions, track.scenes, strict=True):
+        if now is not None and now is not scene:
+            assert now.goals is not None
+            pipeline.set_obstacles('recorded', now.obstacles(stamp_ns), None, FRAME)
+            pipeline.set_goals(now.goals, FRAME)
+            scene = now
+        pipeline.add_hand_sample(HandSample(stamp_ns, position, 0.0, FRAME))
+        prediction = pipeline.predict() if scene is not None and pipeline.is_due else None
+        if prediction is not None:
+            yield prediction
+
+
+def measure(recordings: Sequence[Recording], strategy: str, noise: float, config: Config) -> Steadiness:
+    """Predict recordings with noise [m] on the measured positions; each has its own seed."""
+    total, config = Steadiness(), config.with_values({'foc.strategy': strategy})
+    for seed, recording in enumerate(recordings):
+        track = read_track(recording).resample(RATE_HZ).add_noise(noise, seed)
+        measure_steadiness(predict_track(track, config), total)
+    return total
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Measure the data sets of the command line, and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('data', nargs='*', type=Path, help='bags or folders')
+    parser.add_argument('--set', action='append', default=[], metavar='NAME=VALUE', help='a parameter')
+    parser.add_argument('--strategy', nargs='+', default=STRATEGIES, metavar='NAME')
+    parser.add_argument('--noise', nargs='+', type=float, default=NOISE_M, metavar='M', help='standard deviations [m]')
+    parser.add_argument('--every', type=int, default=1, metavar='N', help='every n-th recording only')
+    chosen = parser.parse_args(arguments)
+    config = Config().with_values({name: yaml.safe_load(text) for name, _, text in (each.partition('=') for each in chosen.set)})
+    print(config)
+    print(format_table(('data', 'strategy', 'noise [mm]', *HEAD), ()), flush=True)
+    paths = chosen.data or [DEMO, *(SHARED / name for name in ('d3il_avoiding', 'hlp_reaching') if (SHARED / name).exists())]
+    for path, strategy, noise in product(paths, chosen.strategy, chosen.noise):
+        recordings = list(find_recordings(path).values())[:: chosen.every]
+        row = path.stem, f'`{strategy}`', f'{1e3 * noise:g}', *measure(recordings, strategy, noise, config).summarise()
+        print(format_table(row, ()).partition('\n')[0], flush=True)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,37 @@
+"""Measured numbers as Markdown tables, and the blocks for them between HTML comments in the pages of doc/."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+IMAGES, SHARED = ROOT / 'doc' / 'images', ROOT.parent / 'shared' / 'data'
+
+
+def format_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a Markdown table."""
+    lines = [head, ['---'] * len(head), *rows]
+    return '\n'.join('| ' + ' | '.join(cells) + ' |' for cells in lines)
+
+
+def find_blocks(page: str) -> dict[str, str]:
+    """Return the text of the measured blocks of a page, by name."""
+    return dict(re.findall(r'<!-- measured: (\w+) -->\n(.*?)<!-- end -->', page, re.DOTALL))
+
+
+def replace_blocks(page: str, texts: Mapping[str, str]) -> str:
+    """Return the page with new texts in those of its blocks that are named; a text for which it has no block is left out."""
+    for name in texts.keys() & find_blocks(page).keys():
+        mark = f'<!-- measured: {name} -->\n'
+        before, _, rest = page.partition(mark)
+        page = f'{before}{mark}\n{texts[name]}\n\n<!-- end -->{rest.partition("<!-- end -->")[2]}'
+    return page
+
+
+def write_blocks(texts: Mapping[str, str], page: Path) -> None:
+    """Print all texts, and write those into the page for which it has a block: it shows the main results only."""
+    for name, text in texts.items():
+        print(f'{name}\n{text}\n', flush=True)
+    page.write_text(replace_blocks(page.read_text(encoding='utf-8'), texts), encoding='utf-8')

@@ -1,0 +1,388 @@
+#!/usr/bin/env python3
+"""Make the pictures of README and doc/, all of which the program computes.
+
+python scripts/pictures.py [NAME ...] [--to DIRECTORY], with NAME of scene, demo, api, play, concept_noise, concept_surrogate,
+concept_strategies, concept_classes, concept_likelihood, contacts. `play` needs Chromium, its driver and selenium, `demo` Pillow.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import re
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from page import IMAGES, ROOT
+
+import foc_ros
+from foc_ros.analysis.replay import Replay
+from foc_ros.core.config import Config, LikelihoodConfig
+from foc_ros.core.dynamics.noise import stack_noise
+from foc_ros.core.likelihood import compute_likelihoods
+from foc_ros.core.obstacles.shapes import collect_obstacles
+from foc_ros.core.scene_solver import build_scene_problems, solve_scene
+from foc_ros.core.types import NANOSECONDS, Array
+from foc_ros.io.bags import BagReader
+from foc_ros.io.scene_file import guess_path, load_scene
+from foc_ros.reporting import drawing, plots
+from foc_ros.reporting.drawing import draw_scene, get_class_style, open_figure
+from foc_ros.reporting.plots import compute_bounds, save_figure
+from foc_ros.reporting.report import ReportCollector
+from foc_ros.reporting.snapshots import HandTrajectory, Snapshot, build_candidate_views, build_hand_trajectory
+from foc_ros.reporting.track_association import build_candidate_tracks
+from foc_ros.ros.parameters import dump_parameter_file
+
+sys.path.append(str(ROOT / 'test'))
+sys.path.append(str(ROOT / 'examples' / 'paper'))
+
+from studies import NOISE as PAPER_NOISE
+from studies import STRATEGY_CLASS, Method
+
+RECORDING, SCENE = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap', ROOT / 'doc' / 'examples' / 'scene.yaml'
+MOVEMENT, AFTER_S = 5, 0.02
+"""The movement, counted from 1, and the time after its beginning [s] of the scene: early, with several candidates."""
+SHOWN_MOVEMENTS = (0, 4, 6)
+"""Rows of the movements of the recording that the animation shows."""
+PICTURES, LAST_MS, STEP_MS, COLOURS = 22, 900, 110, 128
+"""Pictures of a movement, durations of the last and of each other picture [ms], about a third of the real speed; colours."""
+STEPS, GOAL = 50, np.array([0.3, 0.0])
+NOISE = 0.1
+CIRCLE = foc_ros.Circle((0.15, -0.01), radius=0.03, radius_stddev=0.003)
+SLANTED = np.array([0.3, 0.12])
+"""A goal that needs effort on both axes."""
+SAMPLES = 20_000
+TOUCHED, TOUCHED_ETA, TOUCHED_NOISE = foc_ros.Circle((0.12, 0.0), radius=0.03, radius_stddev=0.003), 0.89, 0.15
+"""The scene of the contacts."""
+ETAS = np.linspace(0.8, 0.95, 61)
+CURVE = np.arange(0.0, 27.0, 0.1)
+"""Points s of the curve with rows at the steps."""
+
+
+def replayed() -> tuple[HandTrajectory, list[Snapshot]]:
+    """Return the hand's trajectory and all predictions of the recording."""
+    collected = ReportCollector()
+    with BagReader(RECORDING) as reader:
+        for step in Replay(Config()).steps(reader):
+            collected.add(step)
+    return build_hand_trajectory(collected.samples), collected.snapshots
+
+
+def scene(hand: HandTrajectory, snapshots: list[Snapshot]) -> Figure:
+    """Return the picture of the chosen prediction."""
+    span = hand.find_movements(Config().estimator.onset_speed)[MOVEMENT - 1]
+    wanted_ns = span[0] + int(AFTER_S * NANOSECONDS)
+    snapshot = min(snapshots, key=lambda each: abs(each.stamp_ns - wanted_ns))
+    bounds = compute_bounds(snapshot.obstacles, snapshot.goals, snapshot.candidates, hand.positions[hand.between(*span)])
+    with open_figure(7.6, 6.6) as figure:
+        axes = figure.subplots()
+        draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds)
+        drawing.draw_candidates(axes, snapshot.candidates, plots.number_labels(snapshot.candidates), snapshot.unsolved)
+        drawing.draw_hand(axes, hand, snapshot.stamp_ns, span)
+    return figure
+
+
+def pictures(
+    hand: HandTrajectory, snapshots: list[Snapshot], chosen: tuple[int, ...] = SHOWN_MOVEMENTS
+) -> Iterator[tuple[Figure, int]]:
+    """Yield the pictures, each with its duration [ms]."""
+    spans = hand.find_movements(Config().estimator.onset_speed)
+    goals = np.unique(np.concatenate([each.goals for each in snapshots]), axis=0)
+    bounds = compute_bounds(snapshots[0].obstacles, goals, (), hand.positions)
+    for start_ns, end_ns in (spans[number] for number in chosen):
+        tracks = build_candidate_tracks([each for each in snapshots if start_ns <= each.stamp_ns <= end_ns and each.candidates])
+        rows = np.unique(np.linspace(0, len(tracks.snapshots) - 1, PICTURES).round().astype(int))
+        for row in rows:
+            snapshot = tracks.snapshots[row]
+            with open_figure(8.4, 4.2) as figure:
+                scene, shares = figure.subplots(1, 2, width_ratios=(1.55, 1.0))
+                draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
+                drawing.draw_candidates(scene, snapshot.candidates, tracks.slots_at(row), snapshot.unsolved)
+                scene.get_legend().remove()
+                drawing.draw_hand(scene, hand, snapshot.stamp_ns, (start_ns, end_ns))
+                plots.draw_likelihoods(shares, tracks.between(start_ns, snapshot.stamp_ns), start_ns)
+                limits = (0.0, (end_ns - start_ns) / NANOSECONDS)
+                shares.set(xlim=limits, xlabel='time [s]', title='likelihood of each candidate', ylabel='')
+                shares.tick_params(labelbottom=True)
+            yield figure, STEP_MS if row != rows[-1] else LAST_MS
+
+
+def save_animation(drawn: list[tuple[Figure, int]], file: Path) -> None:
+    """Write an animated GIF."""
+    from PIL import Image
+
+    images = []
+    for figure, _ in drawn:
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format='png', dpi=80)
+        images.append(Image.open(buffer).convert('RGB').quantize(COLOURS, dither=Image.Dither.NONE))
+    images[0].save(
+        file, save_all=True, append_images=images[1:], duration=[duration_ms for _, duration_ms in drawn], loop=0, optimize=True
+    )
+
+
+def api() -> Figure:
+    """Return the figure that the Python code of the README draws."""
+    found = re.search(r'^```python\n(.*?)^```', (ROOT / 'README.md').read_text('utf-8'), re.MULTILINE | re.DOTALL)
+    if found is None:
+        raise ValueError('README.md shows no Python code')
+    names: dict[str, object] = {}
+    exec(compile(found.group(1), 'README.md', 'exec'), names)
+    axes: Any = names['axes']
+    figure: Figure = axes.figure
+    return figure
+
+
+def play_page() -> bytes:
+    """Return the page of `foc_ros play` in a headless Chromium, with a hand on its way, as a PNG file."""
+    from browser_helpers import chromium, screenshot  # type: ignore[import-not-found]
+    from play_helpers import play, steer, visit, wait_for_answer  # type: ignore[import-not-found]
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        file = folder / 'foc.yaml'
+        file.write_text(dump_parameter_file(Config(budget_s=0.0)), encoding='utf-8')
+        with play(folder, '--no-ros', '--params', str(file)) as started, chromium(folder / 'profile') as browser:
+            visit(browser, started, 1100, 860)
+            steer(browser, (0.0, 0.0))
+            steer(browser, (0.06, -0.012), speed=0.15)
+            wait_for_answer(browser)
+            picture: bytes = screenshot(browser)
+    return picture
+
+
+def reach(
+    obstacles: Sequence[foc_ros.Circle],
+    eta: float = 0.9,
+    strategy: str = 'optimal',
+    *,
+    seconds: float = 1.0,
+    goal: Array = GOAL,
+    c: float = NOISE,
+    **penalties: float,
+) -> foc_ros.Solution:
+    """Return a reach from rest to rest at a goal, past the obstacles on the left."""
+    values = {'foc.noise_x': c, 'foc.noise_y': c, 'likelihood.shortfall': np.inf}
+    config = Config().with_values(values | {f'foc.{name}': value for name, value in penalties.items()})
+    guess = guess_path(np.zeros(2), goal, STEPS, 0.05)
+    return foc_ros.solve((0.0, 0.0), goal, obstacles, eta, strategy, seconds, config, guess)
+
+
+def rolled(solution: foc_ros.Solution, count: int) -> Array:
+    """Return noisy movements under the control of a solution, (count, N, 2) [m]."""
+    control, problem = solution.control.T.ravel(), solution.problem
+    assert problem is not None
+    draws = np.random.default_rng(0).standard_normal((count, control.size))
+    noise = stack_noise(problem.noise, STEPS) * np.abs(control) * draws
+    movements: Array = problem.positions(control) + np.einsum('atu,su->sta', problem.horizon.position, noise)
+    return movements
+
+
+def noise() -> Figure:
+    """Return the picture of a quick and a slow reach: noise grows with effort."""
+    with open_figure(8.6, 3.4) as figure:
+        paths, spread = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
+        for number, (seconds, shift) in enumerate(((0.5, 0.05), (1.2, -0.05))):
+            colour, _ = get_class_style(number)
+            solution = reach([], seconds=seconds, goal=SLANTED)
+            up = np.array([0.0, shift])
+            for movement in rolled(solution, 30):
+                paths.plot(*(movement + up).T, color=colour, linewidth=0.5, alpha=0.35)
+            paths.plot(*(solution.path + up).T, color=colour, linewidth=2.2)
+            for row in range(5, STEPS + 1, 5):
+                _ellipse(paths, solution, row, colour, up)
+            paths.annotate(f'in {seconds:g} s', (0.0, shift), xytext=(-4, 16), textcoords='offset points', color=colour)
+            deviation = 1e3 * np.sqrt(solution.covariance[:, 0, 0])
+            spread.plot(solution.times, deviation, color=colour, linewidth=2.2, label=f'in {seconds:g} s')
+        paths.set(xlabel='x [m]', ylabel='y [m]')
+        paths.set_aspect('equal', adjustable='datalim')
+        spread.set(xlabel='time [s]', ylabel='standard deviation of x [mm]', ylim=(0.0, None))
+        spread.legend(frameon=False)
+    return figure
+
+
+def surrogate() -> Figure:
+    """Return paths for more and more eta, and how often noisy movements really stay clear."""
+    with open_figure(8.6, 3.4) as figure:
+        paths, shares = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
+        draw_scene(paths, collect_obstacles([CIRCLE]), GOAL[None], (-0.02, 0.32, -0.07, 0.12), named=False)
+        for number, eta in enumerate((0.5, 0.8, 0.95)):
+            colour, dash = get_class_style(number)
+            solution = reach([CIRCLE], eta)
+            paths.plot(*solution.path.T, color=colour, linestyle=dash, linewidth=2.0, label=f'η = {eta:g}')
+            _ellipse(paths, solution, STEPS // 2, colour)
+        paths.legend(frameon=False, loc='upper left', ncols=3)
+        etas = np.array([0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95])
+        clear = [foc_ros.monte_carlo(reach([CIRCLE], float(eta)), SAMPLES).step[0] for eta in etas]
+        shares.plot(etas, clear, marker='o', color=get_class_style(2)[0], label='share of movements\nclear at the worst step')
+        shares.plot((0.5, 1.0), (0.5, 1.0), color='0.4', linestyle='--', label='what was asked for')
+        shares.set(xlabel='wanted η', ylabel='share', ylim=(0.48, 1.02))
+        shares.legend(frameon=False, loc='lower right')
+    return figure
+
+
+def strategies() -> Figure:
+    """Return the same scene by three strategies: paths and speeds."""
+    with open_figure(8.6, 3.4) as figure:
+        paths, speeds = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
+        obstacles = collect_obstacles(STRATEGY_CLASS[0].obstacles)
+        draw_scene(paths, obstacles, GOAL[None], (-0.02, 0.32, -0.06, 0.14), named=False)
+        for number, name in enumerate(('lv', 'hc', 'optimal')):
+            colour, dash = get_class_style(number)
+            solution = Method(PAPER_NOISE, name).solve(*STRATEGY_CLASS, 0.94)
+            paths.plot(*solution.path.T, color=colour, linestyle=dash, linewidth=2.0)
+            for row in range(5, STEPS, 8):
+                _ellipse(paths, solution, row, colour)
+            speed = np.linalg.norm(solution.mean[:, 2:4], axis=1)
+            speeds.plot(solution.times, speed, color=colour, linewidth=2.0, label=f'{name}, effort {solution.effort:,.0f}')
+        speeds.set(xlabel='time [s]', ylabel='speed [m/s]', ylim=(0.0, 1.5))
+        speeds.legend(frameon=False, loc='upper left', fontsize=8)
+    return figure
+
+
+def classes() -> Figure:
+    """Return the solved candidates of the scene of the examples."""
+    scene = load_scene(SCENE)
+    candidates = build_candidate_views(solve_scene(scene, build_scene_problems(scene)))
+    with open_figure(7.4, 5.6) as figure:
+        axes = figure.subplots()
+        draw_scene(axes, scene.obstacles, scene.goals, compute_bounds(scene.obstacles, scene.goals, candidates))
+        drawing.draw_candidates(axes, candidates, plots.number_labels(candidates))
+        axes.plot(*scene.hand.mean[:2], marker='o', color='black')
+    return figure
+
+
+def likelihood() -> Figure:
+    """Return the picture of likelihoods over cost ratios for three values of beta."""
+    costs = np.array([1.0, 1.3, 2.0, 4.0])
+    with open_figure(8.6, 3.2) as figure:
+        shares, pair = figure.subplots(1, 2)
+        for number, beta in enumerate((0.5, 1.0, 2.0)):
+            colour, dash = get_class_style(number)
+            config = LikelihoodConfig(beta=beta)
+            places = np.arange(len(costs)) + 0.27 * (number - 1)
+            shares.bar(places, compute_likelihoods(costs, config), 0.25, color=colour, label=f'β = {beta:g}')
+            ratios = np.geomspace(1.0, 10.0, 60)
+            first = [compute_likelihoods(np.array([1.0, ratio]), config)[0] for ratio in ratios]
+            pair.plot(ratios, first, color=colour, linestyle=dash, linewidth=2.0)
+            drawing.draw_tag(pair, (ratios[40], first[40]), f'{beta:g}', colour)
+        shares.set_xticks(range(len(costs)), [f'{cost:g}' for cost in costs])
+        shares.set(xlabel='cost of a candidate relative to the cheapest', ylabel='likelihood')
+        shares.legend(frameon=False)
+        pair.set(xscale='log', xlabel='cost ratio of two candidates', ylabel='likelihood of the cheaper one', ylim=(0.48, 1.02))
+        pair.set_xticks([1, 2, 5, 10], ['1', '2', '5', '10'])
+        pair.minorticks_off()
+    return figure
+
+
+def _ellipse(axes: Any, solution: foc_ros.Solution, row: int, colour: str, shift: Array | float = 0.0) -> None:
+    ellipse = drawing.make_stddev_ellipse(solution.path[row] + shift, solution.covariance[row, :2, :2])
+    ellipse.set(facecolor='none', edgecolor=colour, linewidth=0.9, alpha=0.8, zorder=3)
+    axes.add_patch(ellipse)
+
+
+def follow_with_rows_at_steps() -> Array:
+    """Return eta and effort (m, 2) along the curve of `lv` where the constraint holds at the steps only, as in `fixed`."""
+    foc, found = Config().foc, []
+    for s in CURVE:
+        penalties = {'tau': foc.lv_delta * s, 'lam': foc.growth**s}
+        solution = reach([TOUCHED], TOUCHED_ETA, 'fixed', c=TOUCHED_NOISE, **penalties)
+        if solution.status is not foc_ros.Status.SOLVED:
+            break
+        found.append((solution.eta, solution.effort))
+    return np.array(found)
+
+
+def interpolate(solution: foc_ros.Solution, times: Array) -> Array:
+    """Return the mean (k, 2) [m] at times in steps: the cubic through positions and velocities at the steps."""
+    step = np.minimum(times.astype(int), STEPS - 1)
+    a = (times - step)[:, None]
+    position, velocity = solution.mean[:, :2], solution.mean[:, 2:4] * solution.dt
+    weights = 2 * a**3 - 3 * a**2 + 1, a**3 - 2 * a**2 + a, 3 * a**2 - 2 * a**3, a**3 - a**2
+    parts = position[step], velocity[step], position[step + 1], velocity[step + 1]
+    mean: Array = sum(weight * part for weight, part in zip(weights, parts, strict=True))
+    return mean
+
+
+def contacts() -> Figure:
+    """Return the picture: the mean against the circle, a close-up of the contact, effort over eta."""
+    solution = reach([TOUCHED], TOUCHED_ETA, 'lv', c=TOUCHED_NOISE)
+    _, time, multiplier = max(solution.multipliers, key=lambda contact: contact[2])
+    centre, radius = np.array(TOUCHED.centre), TOUCHED.radius
+    kept = float(np.sqrt(radius**2 + TOUCHED.radius_stddev**2 + solution.tau))
+    blue, orange = get_class_style(0)[0], get_class_style(1)[0]
+    fine = interpolate(solution, np.linspace(0.0, STEPS, 20 * STEPS + 1))
+    contact = interpolate(solution, np.array([time]))[0]
+    normal = (contact - centre) / np.linalg.norm(contact - centre)
+    with open_figure(10.0, 3.4) as figure:
+        overview, close_up, curves = figure.subplots(1, 3, width_ratios=(1.35, 1.0, 1.15))
+        for axes in (overview, close_up):
+            axes.add_patch(Circle((0.12, 0.0), radius, facecolor='0.75', edgecolor='0.4'))
+            axes.add_patch(Circle((0.12, 0.0), kept, facecolor='none', edgecolor='0.4', linestyle='--'))
+            axes.plot(*fine.T, color=blue, linewidth=1.6)
+            axes.plot(*solution.path.T, color=blue, marker='o', markersize=3.5, linestyle='none')
+            axes.plot(*contact, color=orange, marker='D', markersize=7, zorder=5)
+        arrow = {'arrowstyle': '->', 'color': orange, 'linewidth': 1.8}
+        overview.annotate('', contact + 0.035 * normal, contact, arrowprops=arrow)
+        overview.annotate(f'y = {multiplier:,.0f} m/s⁶', contact + 0.037 * normal, color=orange, fontsize=8, ha='center')
+        overview.plot(*GOAL, marker='*', markersize=12, color='black', markerfacecolor='white')
+        overview.set(title='The mean touches the circle', xlabel='x [m]', ylabel='y [m]')
+        overview.set(xlim=(-0.01, 0.31), ylim=(-0.07, 0.17))
+        overview.set_aspect('equal')
+        before, after = solution.path[int(time)], solution.path[int(time) + 1]
+        half = 1.2 * float(np.linalg.norm(after - before))
+        for point, number in ((before, int(time)), (after, int(time) + 1)):
+            close_up.annotate(f'step {number}', point, xytext=(0, 10), textcoords='offset points', fontsize=8, ha='center')
+        close_up.annotate(f's = {time:.2f}', contact, xytext=(0, -18), textcoords='offset points', fontsize=8, ha='center')
+        close_up.set(title='Close-up of the contact', xticks=(), yticks=())
+        close_up.set(xlim=contact[0] + half * np.array([-1, 1]), ylim=contact[1] + half * np.array([-1.0, 1.0]))
+        close_up.set_aspect('equal')
+        along = follow_with_rows_at_steps()
+        look = {'color': orange, 'marker': '.', 'markersize': 3, 'linestyle': 'none'}
+        curves.plot(*along[along[:, 0] > ETAS[0]].T, label='rows at the steps', **look)
+        sliding = [reach([TOUCHED], float(eta), 'lv', c=TOUCHED_NOISE).effort for eta in ETAS]
+        curves.plot(ETAS, sliding, color=blue, linewidth=1.8, label='sliding contacts (lv)')
+        curves.set(title='Effort over η', xlabel='η', ylabel='effort [m²/s⁶]', yscale='log', xlim=(ETAS[0], ETAS[-1]))
+        curves.set_yticks([5e3, 1e4, 2e4, 4e4], ['5 000', '10 000', '20 000', '40 000'])
+        curves.minorticks_off()
+        curves.legend(fontsize=8, loc='upper left')
+    return figure
+
+
+FIGURES: dict[str, Callable[[], Figure]] = {
+    'scene': lambda: scene(*replayed()),
+    'api': api,
+    **{f'concept_{each.__name__}': each for each in (noise, surrogate, strategies, classes, likelihood)},
+    'contacts': contacts,
+}
+
+
+def main() -> None:
+    """Make the pictures of the command line."""
+    mpl.use('Agg')
+    names = [*FIGURES, 'demo', 'play']
+    parser = argparse.ArgumentParser(description='Make the pictures of README and doc/.')
+    parser.add_argument('names', nargs='*', metavar='NAME', help=f'some of {", ".join(names)}; all if none is named')
+    parser.add_argument('--to', type=Path, default=IMAGES, metavar='DIRECTORY', help='default: doc/images')
+    given = parser.parse_args()
+    if unknown := set(given.names) - set(names):
+        parser.error(f'no picture is named {", ".join(sorted(unknown))}')
+    given.to.mkdir(parents=True, exist_ok=True)
+    for name in given.names or names:
+        if name == 'demo':
+            save_animation(list(pictures(*replayed())), given.to / 'demo.gif')
+        elif name == 'play':
+            (given.to / 'play.png').write_bytes(play_page())
+        else:
+            save_figure(FIGURES[name](), given.to / f'{name}.png')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,328 @@
+#!/usr/bin/env python3
+"""Make recordings of simulated hands.
+
+    python scripts/recordings.py packaged [FILE]
+    python scripts/recordings.py tables [DIRECTORY]
+    python scripts/recordings.py reaches FOLDER [SEED] [KIND]
+
+packaged: the recording of the package. An operator carries objects to and fro among obstacles, on a different path each time. The
+movements are independent of the predictor. Each reach is the minimum-jerk movement through hand-picked via points: a quintic
+spline, continuous up to the fourth derivative, with the passing times that minimise its squared jerk (Flash and Hogan 1985). Its
+jerk with proportional noise drives a triple integrator, and a weak feedback brings the hand to the target. The recorded positions
+have the noise of a tracker in addition. All random numbers come from one seed.
+
+tables: doc/examples/*.csv, two movements of the packaged recording as motion-capture tables, for `convert`.
+
+reaches: 48 reaches among several goals without obstacles, as tables for `evaluate` and `fit`, of one of three kinds.
+grid: from near the origin to 25 goals on a grid of 0.4 x 0.3 m, sampled at 120 Hz with 0.5 mm of noise. Each waits 0.2 to
+0.6 s, takes a duration that varies by 20 % about a law, bends, falls short and corrects, and ends about 6 mm beside its goal; one
+in seven starts towards another goal first.
+star: from near the origin to 8 goals all round, 0.1 to 0.3 m away, sampled at 100 Hz with 0.3 mm of noise. Each waits 0.1 to
+0.4 s, takes 0.4 to 1 s however far it goes, bends a little, and ends about 3 mm beside its goal.
+"""
+
+from __future__ import annotations
+
+import csv
+import tempfile
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from cyclopts import App
+from page import ROOT
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.optimize import minimize
+
+from foc_ros.core.config import Config
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.types import NANOSECONDS, Array, HandSample
+from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
+from foc_ros.reporting.snapshots import HandTrajectory, build_hand_trajectory
+from foc_ros.ros.intake import Intake
+from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
+from foc_ros.ros.messages.types import RosbagsTypes
+
+EXAMPLES = ROOT / 'doc' / 'examples'
+MOVEMENTS = (4, 6)
+"""Rows of the movements of the recording that the tables have."""
+LEAD_NS, EVERY = 200_000_000, 2
+"""Time by which a table begins before its movement, and the number of samples of which one is kept: 50 per second."""
+COUNT, SIDE = 48, 5
+STAR_M = np.array([0.1, 0.2, 0.3, 0.15, 0.25, 0.1, 0.2, 0.3])
+PACKAGED = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'
+SEED = 20
+FRAME = 'world'
+HEIGHT = 0.12
+STEP_S = 0.01
+START_NS = 1_767_225_600_000_000_000
+"""Stamp of the first message: the first second of 2026, UTC."""
+MOTOR_NOISE = 0.25
+"""Standard deviation of the jerk's noise per unit of jerk, drawn once per step."""
+SENSOR_NOISE_M = 0.0007
+FEEDBACK_RATE = 3.5
+"""The three poles of the feedback [1/s]: slow compared with a reach, so that the noise is visible, but faster than a rest."""
+
+NEAR = np.array([[0.0, -0.06], [0.0, 0.07]])
+FAR = np.array([[0.36, -0.065], [0.35, 0.08]])
+OBSTACLES = [  # x, y, z, radius, radius_stddev, id, size_x, size_y, yaw: a box, three circles, and a wall beside the workspace
+    (0.170, 0.003, HEIGHT, 0.004, 0.003, 1, 0.064, 0.036, 0.6),
+    (0.135, 0.125, HEIGHT, 0.030, 0.002, 2, 0.0, 0.0, 0.0),
+    (0.200, -0.125, HEIGHT, 0.030, 0.002, 3, 0.0, 0.0, 0.0),
+    (0.255, 0.075, HEIGHT, 0.020, 0.002, 4, 0.0, 0.0, 0.0),
+    (0.180, 0.240, HEIGHT, 0.003, 0.002, 5, 0.360, 0.010, 0.0),
+]
+
+
+@dataclass(frozen=True)
+class Reach:
+    """A reach to one of the opposite sites: `via` (m, 2) points [m], duration [s], rest before it [s]."""
+
+    outward: bool
+    target: int
+    via: tuple[tuple[float, float], ...]
+    duration_s: float
+    rest_s: float
+
+
+REACHES = (
+    Reach(True, 0, ((0.180, -0.065),), 1.05, 1.2),
+    Reach(False, 1, ((0.165, 0.072),), 1.20, 1.3),
+    Reach(True, 1, ((0.150, 0.068), (0.245, 0.125)), 1.10, 1.2),
+    Reach(False, 1, ((0.145, 0.185),), 1.25, 1.3),
+    Reach(True, 0, ((0.100, -0.010), (0.190, -0.064)), 1.20, 1.2),
+    Reach(False, 0, ((0.190, -0.185),), 1.30, 1.4),
+    Reach(True, 1, ((0.190, -0.060),), 1.10, 1.2),
+    Reach(False, 0, ((0.225, 0.042), (0.150, 0.062)), 1.25, 1.3),
+)
+REST_AT_END_S = 1.0
+SWITCH_S = 0.4
+"""Time after an arrival at which the goals change: the object is put down."""
+
+
+def minimum_jerk(points: Array, duration_s: float) -> BSpline:
+    """Return the movement through `points` (m, 2), at rest at both ends, with the smallest integral of squared jerk."""
+
+    def through(inner: Array) -> BSpline:
+        times = np.concatenate([[0.0], inner, [duration_s]])
+        rest = [(1, np.zeros(2)), (2, np.zeros(2))]
+        return make_interp_spline(times, points, k=5, bc_type=(rest, rest))
+
+    grid = np.linspace(0.0, duration_s, 501)
+
+    def cost(inner: Array) -> float:
+        if np.any(np.diff([0.0, *inner, duration_s]) < 0.05):
+            return np.inf
+        return float(np.mean(through(inner)(grid, nu=3) ** 2))
+
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    first = duration_s * length[1:-1] / length[-1]
+    return through(minimize(cost, first, method='Nelder-Mead', options={'xatol': 1e-7, 'fatol': 1e-10}).x)
+
+
+def reference() -> tuple[Array, list[tuple[float, bool]]]:
+    """Return the intended movement (n, 3, 2): position, velocity, acceleration at every step; and the changes of the goals.
+
+    A change is the time [s] from which on the goals are the far sites (True) or the near ones (False).
+    """
+    parts: list[Array] = []
+    goals = [(0.0, True)]
+    at, elapsed = NEAR[0], 0.0
+    for reach in REACHES:
+        target = (FAR if reach.outward else NEAR)[reach.target]
+        parts.append(_resting(at, reach.rest_s))
+        movement = minimum_jerk(np.vstack([at, *reach.via, target]), reach.duration_s)
+        times = STEP_S * np.arange(round(reach.duration_s / STEP_S))
+        parts.append(np.stack([movement(times, nu=order) for order in range(3)], axis=1))
+        elapsed += reach.rest_s + reach.duration_s
+        goals.append((elapsed + SWITCH_S, not reach.outward))
+        at = target
+    parts.append(_resting(at, REST_AT_END_S))
+    return np.concatenate(parts), goals
+
+
+def _resting(at: Array, seconds: float) -> Array:
+    return np.stack([np.array([at, np.zeros(2), np.zeros(2)])] * round(seconds / STEP_S))
+
+
+def moved(intended: Array, random: np.random.Generator) -> Array:
+    """Return the positions of the hand (n, 2): the triple integrator driven by intended jerk, feedback and noise."""
+    dt, rate = STEP_S, FEEDBACK_RATE
+    a = np.array([[1.0, dt, dt**2 / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
+    b = np.array([dt**3 / 6, dt**2 / 2, dt])
+    gain = np.array([rate**3, 3 * rate**2, 3 * rate])
+    state = intended[0].copy()
+    positions = [state[0].copy()]
+    for now, following in pairwise(intended):
+        jerk = (following[2] - now[2]) / dt + gain @ (now - state)
+        jerk = jerk + MOTOR_NOISE * np.abs(jerk) * random.standard_normal(2)
+        state = a @ state + np.outer(b, jerk)
+        positions.append(state[0].copy())
+    return np.array(positions)
+
+
+def messages() -> list[tuple[int, str, Any]]:
+    """Return all messages of the recording in order: stamp [ns], topic, message."""
+    types, random = RosbagsTypes(TYPESTORE), np.random.default_rng(SEED)
+    intended, switches = reference()
+    truth = moved(intended, random)
+    measured = np.column_stack([truth, np.full(len(truth), HEIGHT)]) + SENSOR_NOISE_M * random.standard_normal((len(truth), 3))
+    end_s = STEP_S * len(truth)
+    out: list[tuple[int, str, Any]] = []
+    for seconds in sorted({*np.arange(0.0, end_s, 1.0), *(time for time, _ in switches)}):
+        far = [outward for time, outward in switches if time <= seconds][-1]
+        sites = np.column_stack([FAR if far else NEAR, np.full(2, HEIGHT)])
+        out.append((_stamp(seconds), '/goals', encode_goals(types, _stamp(seconds), FRAME, sites)))
+    stamps = [_stamp(seconds) for seconds in np.arange(0.0, end_s, 0.2)]
+    out += [(stamp_ns, '/obstacles', encode_obstacles(types, stamp_ns, FRAME, OBSTACLES)) for stamp_ns in stamps]
+    stamps = [_stamp(STEP_S * step) for step in range(len(measured))]
+    out += [
+        (stamp_ns, '/hand_pose', encode_hand_pose(types, stamp_ns, FRAME, at))
+        for stamp_ns, at in zip(stamps, measured, strict=True)
+    ]
+    return sorted(out, key=lambda item: item[0])
+
+
+def _stamp(seconds: float) -> int:
+    return START_NS + round(seconds * 1e3) * 1_000_000
+
+
+def write_recording(file: Path) -> None:
+    """Write the recording as one MCAP file, replacing an existing file."""
+    with tempfile.TemporaryDirectory() as directory:
+        bag = Path(directory) / 'reaching'
+        with BagWriter(bag) as writer:
+            for stamp_ns, topic, message in messages():
+                writer.write(topic, message, stamp_ns)
+        (made,) = bag.glob('*.mcap')
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(made.read_bytes())
+
+
+def write_tables(directory: Path) -> None:
+    """Write recordings.csv, obstacles.csv and goals.csv of two movements of the packaged recording."""
+    hand, goals = read()
+    spans = hand.find_movements(Config().estimator.onset_speed)
+    samples = []
+    for name, number in zip('ab', MOVEMENTS, strict=True):
+        begin_ns, end_ns = spans[number][0] - LEAD_NS, spans[number][1]
+        rows = hand.between(begin_ns, end_ns)
+        for stamp, (x, y) in list(zip(hand.stamps_ns[rows], hand.positions[rows], strict=True))[::EVERY]:
+            samples.append((name, f'{(stamp - begin_ns) / NANOSECONDS:.3f}', f'{x:.4f}', f'{y:.4f}'))
+    obstacles = [
+        (str(name), *(f'{value:.4f}' for value in (x, y, radius, stddev, *box)))
+        for x, y, _, radius, stddev, name, *box in OBSTACLES
+    ]
+    _write(directory / 'recordings.csv', ('recording', 't_s', 'x_m', 'y_m'), samples)
+    columns = ('id', 'x_m', 'y_m', 'radius_m', 'radius_stddev_m', 'size_x_m', 'size_y_m', 'yaw_rad')
+    _write(directory / 'obstacles.csv', columns, obstacles)
+    _write(directory / 'goals.csv', ('x_m', 'y_m'), [tuple(f'{value:.4f}' for value in goal) for goal in goals])
+
+
+def read() -> tuple[HandTrajectory, Array]:
+    """Return the hand and the goals of the recording, decoded as in the node."""
+    intake = Intake(Pipeline(Config()))
+    samples: list[HandSample] = []
+    with BagReader(PACKAGED) as reader:
+        for item in reader:
+            intake.take(item.role, item.message)
+            if intake.sample is not None and (not samples or intake.sample is not samples[-1]):
+                samples.append(intake.sample)
+    assert intake.pipeline.scene.goals is not None
+    return build_hand_trajectory(samples), intake.pipeline.scene.goals
+
+
+def _write(file: Path, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    with file.open('w', newline='', encoding='utf-8') as stream:
+        csv.writer(stream, lineterminator='\n').writerows([columns, *rows])
+
+
+def grid_goals() -> Array:
+    """Return the goals (25, 2) [m]."""
+    return np.stack(np.meshgrid(np.linspace(-0.2, 0.2, SIDE), np.linspace(0.2, 0.5, SIDE)), -1).reshape(-1, 2)
+
+
+def grid_reach(goals: Array, aim: int, draws: np.random.Generator) -> tuple[Array, Array]:
+    """Return times (m,) [s] and positions (m, 2) [m] of one reach."""
+    start, end = draws.normal(0.0, 0.005, 2), goals[aim] + draws.normal(0.0, 0.006, 2)
+    distance = float(np.hypot(*(end - start)))
+    lasts = (0.25 + 0.13 * np.log2(distance / 0.02 + 1.0)) * np.exp(draws.normal(0.0, 0.2))
+    waits = draws.uniform(0.2, 0.6)
+    t = np.arange(0.0, waits + lasts + 0.6, 1.0 / 120.0)
+    primary, along = draws.uniform(0.85, 1.02), (end - start) / distance
+    bow = draws.normal(0.0, 0.04) * distance
+    first = _minimum_jerk(np.clip((t - waits) / lasts, 0.0, 1.0) ** draws.uniform(0.85, 1.05))
+    second = _minimum_jerk((t - waits - 0.75 * lasts) / (0.5 * lasts))
+    path = start + np.outer(first * primary + (1.0 - primary) * second, end - start)
+    path += np.outer(bow * np.sin(np.pi * first), [-along[1], along[0]])
+    if draws.random() < 0.15:
+        other = goals[draws.integers(len(goals))] - start
+        path += np.outer(0.06 * _minimum_jerk((t - waits + 0.15) / 0.25) * (1.0 - _minimum_jerk((t - waits - 0.05) / 0.4)), other)
+    return t, path + draws.normal(0.0, 5e-4, path.shape)
+
+
+def star_goals() -> Array:
+    """Return the goals (8, 2) [m]."""
+    angles = np.arange(len(STAR_M)) * 2.0 * np.pi / len(STAR_M)
+    return np.column_stack([STAR_M * np.cos(angles), STAR_M * np.sin(angles)])
+
+
+def star_reach(goals: Array, aim: int, draws: np.random.Generator) -> tuple[Array, Array]:
+    """Return times (m,) [s] and positions (m, 2) [m] of one reach."""
+    end, start = goals[aim] + draws.normal(0.0, 0.003, 2), draws.normal(0.0, 0.002, 2)
+    lasts, waits = draws.uniform(0.4, 1.0), draws.uniform(0.1, 0.4)
+    t = np.arange(0.0, waits + lasts + 0.4, 0.01)
+    done = _minimum_jerk(np.clip((t - waits) / lasts, 0.0, 1.0) ** draws.uniform(0.9, 1.0))
+    across = np.array([start[1] - end[1], end[0] - start[0]])
+    path = start + np.outer(done, end - start) + np.outer(draws.normal(0.0, 0.02) * np.sin(np.pi * done), across)
+    return t, path + draws.normal(0.0, 3e-4, path.shape)
+
+
+KINDS = {'grid': (grid_goals, grid_reach), 'star': (star_goals, star_reach)}
+
+
+def _minimum_jerk(share: Array) -> Array:
+    s = np.clip(share, 0.0, 1.0)
+    done: Array = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    return done
+
+
+def write_reaches(folder: Path, seed: int = 2, kind: str = 'grid') -> None:
+    """Write recordings of 48 simulated reaches without obstacles, as tables for `evaluate` and `fit`; see KINDS."""
+    draws, (made, reach) = np.random.default_rng(seed), KINDS[kind]
+    goals = made()
+    lines = ['recording,t_s,x_m,y_m']
+    for number in range(COUNT):
+        t, path = reach(goals, number % len(goals), draws)
+        lines += [f'r{number:02d},{when:.4f},{x:.6f},{y:.6f}' for when, (x, y) in zip(t, path, strict=True)]
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / 'recordings.csv').write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    (folder / 'goals.csv').write_text('x_m,y_m\n' + ''.join(f'{x:.4f},{y:.4f}\n' for x, y in goals), encoding='utf-8')
+
+
+app = App(name='recordings', help=__doc__, help_format='plaintext')
+
+
+@app.command
+def packaged(file: Path = PACKAGED, /) -> None:
+    """Make the packaged recording."""
+    write_recording(file)
+
+
+@app.command
+def tables(directory: Path = EXAMPLES, /) -> None:
+    """Make the tables of doc/examples."""
+    write_tables(directory)
+
+
+@app.command
+def reaches(folder: Path, seed: int = 2, kind: str = 'grid', /) -> None:
+    """Make tables of simulated reaches."""
+    write_reaches(folder, seed, kind)
+
+
+if __name__ == '__main__':
+    app()

@@ -1,0 +1,524 @@
+"""A live node in its own process under stress. Other programs of the machine lengthen all times: run it alone.
+
+    python scripts/stress.py soak [--minutes 10]
+    python scripts/stress.py stops [--count 100]
+    python scripts/stress.py hostile [--seconds 6] [--only SCENE] [--strategy NAME]
+    python scripts/stress.py rates [--seconds 10]
+
+soak: inputs at 100 Hz and random faults. The exit code is 0 if the memory does not grow after the warm-up, no thread or file
+remains open, no valid pose is lost, the 99th percentile of the cycle time does not grow, and the node has no internal error
+and stops without one. A valid pose is lost if the node never receives it or refuses it; due poses before the newest one are
+counted as dropped cycles and are not lost.
+
+stops: by SIGTERM and SIGINT, at random times up to SPREAD_S after the node installed its handlers. The exit code is 0 if all
+nodes ended with exit code 0 and without a traceback.
+
+hostile: scenes that are hard to predict in. The exit code is 0 if, for each scene and strategy, the longest gap between two
+diagnostics is below GAP_S and the longest answer of `~/engage` below ANSWER_S; no prediction is published later than
+`estimator.hand_timeout_s` after the stamp of its pose; PUNCTUAL of the predictions are computed within `budget_s` and 2 ms;
+the memory does not grow after the first third; and the node has no internal error and stops without one.
+
+rates: a hand at 1 kHz and 50 obstacles, with guidance. It prints how soon and how often the node predicts, the ages of
+predictions, the period of the wrench over the nominal one, the longest answer of the clutch, and what the hand costs: the CPU
+time of a node that predicts once in ten seconds, with the hand and without, as a share of one core.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from cyclopts import App, Parameter
+
+from foc_ros.core.config import Config
+from foc_ros.core.types import NANOSECONDS, Array
+from foc_ros.ros.isolated_node import private_environment, reserve_domain, set_environment
+from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
+from foc_ros.ros.messages.types import RclpyTypes
+
+PERIOD_S, FAST_S, REPORT_S = 0.01, 0.001, 5.0
+FRAME = 'world'
+GOALS = np.array([[0.3, 0.0, 0.0], [0.3, 0.1, 0.0]])
+Rows = Sequence[tuple[float, ...]]
+ROWS: Rows = [(0.15, 0.02, 0.0, 0.03, 0.002, 7), (0.2, 0.08, 0.0, 0.02, 0.002, 8)]
+CROWD: Rows = [(0.0, 1.0 + 0.001 * i, 0.0, 0.001, 0.0, i) for i in range(10_000)]
+BAD_POSES = {'nan': 'hand_lost', 'camera': 'hand_wrong_frame', 'again': 'hand_duplicate', 'late': 'hand_late'}
+"""The node's count of each kind of bad pose; a late pose right after a reset starts a movement, and is not counted."""
+FAULTS = (*BAD_POSES, 'burst', 'truncated', 'negative', 'flip', 'parameter', 'wrong parameter', 'crowd', 'clutch', 'reset')
+BURST, BURST_NS, LATE_NS = 20, 100_000, 50_000_000
+"""Number of poses sent at once, as after a stall of the network; least difference of their stamps; how late a late one is."""
+WARM_UP, GROWTH, SLOWER = 0.2, 1.05, 1.5
+"""Share of the time that is not judged; largest accepted growth of the memory, and of the 99th percentile."""
+SPREAD_S, LIMIT_S, START_S = 2.0, 30.0, 120.0
+"""Largest time before a stop, and times within which a node has to end and to start."""
+STRATEGIES = ('lv', 'hc', 'optimal')
+GAP_S, ANSWER_S, PUNCTUAL = 1.3, 0.05, 0.999
+ASK_EVERY = 10
+"""Number of periods between two calls of the service."""
+
+
+@contextmanager
+def isolated_graph() -> Iterator[None]:
+    """Join a ROS graph of its own within the context, with the processes that are started there."""
+    with (
+        tempfile.TemporaryDirectory(prefix='foc_ros_graph_') as logs,
+        reserve_domain() as domain,
+        set_environment(private_environment(domain, Path(logs))),
+    ):
+        yield
+
+
+class Player:
+    """Publishes hand poses, the scene and faults to a running node, and keeps what it hears. Use as a context manager.
+
+    rows, goals: the scene; period_s: of the hand; asks: whether the clutch is called all the time.
+    Attributes: sent: number of poses by kind; health: the newest diagnostics; predictions and not_finite: numbers of them;
+    ages_s of predictions, when they were published; wrenches_s: when each wrench was; gap_s, answer_s: the longest gap between
+    diagnostics, and answer of the clutch.
+    """
+
+    def __init__(self, rows: Rows = ROWS, goals: Array = GOALS, period_s: float = PERIOD_S, asks: bool = False) -> None:
+        import rclpy
+        from diagnostic_msgs.msg import DiagnosticArray
+        from geometry_msgs.msg import PoseArray, PoseStamped, WrenchStamped
+        from rcl_interfaces.srv import SetParametersAtomically
+        from rclpy.executors import SingleThreadedExecutor
+        from rclpy.qos import qos_profile_sensor_data
+        from rclpy.signals import SignalHandlerOptions
+        from sensor_msgs.msg import PointCloud2
+        from std_srvs.srv import SetBool, Trigger
+
+        # The tracker has its own context: in one with the scene, large clouds would fill the memory that DDS shares with the
+        # node, and the poses, which are published as best effort, would be lost before they are sent.
+        self._contexts = [rclpy.Context(), rclpy.Context()]
+        for context in self._contexts:
+            rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
+        names = zip(('player', 'tracker'), self._contexts, strict=True)
+        self._node, self._tracker = (rclpy.create_node(name, context=context) for name, context in names)
+        self._executor = SingleThreadedExecutor(context=self._contexts[0])
+        self._executor.add_node(self._node)
+        kinds = {'obstacles': PointCloud2, 'goals': PoseArray}
+        self._publishers = {name: self._node.create_publisher(kind, name, 10) for name, kind in kinds.items()}
+        self._publishers['hand_pose'] = self._tracker.create_publisher(PoseStamped, 'hand_pose', qos_profile_sensor_data)
+        self._node.create_subscription(PointCloud2, 'foc/prediction', self._receive_prediction, 100)
+        self._node.create_subscription(WrenchStamped, 'foc/guidance/wrench', self._receive_wrench, 100)
+        self._node.create_subscription(DiagnosticArray, '/diagnostics', self._receive_health, 10)
+        services = {'set_parameters_atomically': SetParametersAtomically, 'engage': SetBool, 'reset': Trigger}
+        self._clients = {name: self._node.create_client(kind, f'foc/{name}') for name, kind in services.items()}
+        self._types, self._random, self._rows, self._goals = RclpyTypes(), random.Random(1), rows, goals
+        self._start = self._next = time.monotonic()
+        self._turn, self._stamp_ns, self._period_s, self._asks = 0, 0, period_s, asks
+        self._heard_s: float | None = None
+        self._asked_s: float | None = None
+        self.sent = dict.fromkeys(('good', *BAD_POSES), 0)
+        self.health: Mapping[str, str] = {}
+        self.forget()
+
+    def __enter__(self) -> Player:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._executor.shutdown()
+        for node, context in zip((self._node, self._tracker), self._contexts, strict=True):
+            node.destroy_node()
+            context.try_shutdown()
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether the node subscribes to every input."""
+        return all(publisher.get_subscription_count() for publisher in self._publishers.values())
+
+    def forget(self) -> None:
+        """Forget what was measured so far."""
+        self.predictions, self.not_finite, self.gap_s, self.answer_s = 0, 0, 0.0, 0.0
+        self.ages_s: list[float] = []
+        self.wrenches_s: list[float] = []
+
+    def spin(self, seconds: float) -> None:
+        """Process messages for a while [s]."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self._executor.spin_once(timeout_sec=max(end - time.monotonic(), 0.0))
+
+    def play(self, seconds: float, faulty: bool = False) -> None:
+        """Publish for a while [s], and count the waiting times that have not ended then."""
+        end = time.monotonic() + seconds
+        while (now_s := time.monotonic()) < end:
+            self._tick(faulty)
+        self.gap_s = max(self.gap_s, now_s - (self._heard_s or now_s))
+        self.answer_s = max(self.answer_s, now_s - (self._asked_s or now_s))
+
+    def _tick(self, faulty: bool) -> None:
+        """Publish the messages of one period, and process messages for the rest of it."""
+        stamp_ns = max(self._node.get_clock().now().nanoseconds, self._stamp_ns + BURST_NS)
+        scene_turns = round(0.1 / self._period_s)
+        if self._turn % scene_turns == 0:
+            self._publish_obstacles(stamp_ns, self._rows)
+        if self._turn % (5 * scene_turns) == 0:
+            self._publishers['goals'].publish(encode_goals(self._types, stamp_ns, FRAME, self._goals))
+        self._publish_pose(stamp_ns)
+        if faulty and self._turn % 20 == 7:
+            self._publish_fault(self._random.choice(FAULTS), stamp_ns)
+        if self._asks and self._asked_s is None and self._turn % ASK_EVERY == 0:
+            self._ask()
+        self._turn += 1
+        self._next = max(self._next + self._period_s, time.monotonic() - PERIOD_S)
+        self._executor.spin_once(timeout_sec=0.0)  # even if this program is late
+        self.spin(max(self._next - time.monotonic(), 0.0))
+
+    def _publish_obstacles(self, stamp_ns: int, rows: Rows, cut: int = 0) -> None:
+        message = encode_obstacles(self._types, stamp_ns, FRAME, rows)
+        message.data = message.data[: len(message.data) - cut]
+        self._publishers['obstacles'].publish(message)
+
+    def _publish_pose(self, stamp_ns: int, kind: str = 'good') -> None:
+        progress = 0.5 - 0.5 * np.cos(2.0 * np.pi * (time.monotonic() - self._start) / 1.5)
+        position = np.array([np.nan if kind == 'nan' else 0.28 * progress, 0.05 * progress, 0.1])
+        frame, late_ns = 'camera' if kind == 'camera' else FRAME, LATE_NS if kind == 'late' else 0
+        self._publishers['hand_pose'].publish(encode_hand_pose(self._types, stamp_ns - late_ns, frame, position))
+        self.sent[kind] += 1
+        self._stamp_ns = max(self._stamp_ns, stamp_ns - late_ns)
+
+    def _publish_fault(self, name: str, stamp_ns: int) -> None:
+        from rclpy.parameter import Parameter as RosParameter
+
+        if name in BAD_POSES:
+            self._publish_pose(stamp_ns, name)
+        elif name == 'burst':
+            for i in range(1, BURST + 1):
+                self._publish_pose(stamp_ns + i * BURST_NS)
+        elif name == 'flip':
+            self._publishers['goals'].publish(encode_goals(self._types, stamp_ns, FRAME, GOALS[::-1]))
+        elif name in ('parameter', 'wrong parameter'):
+            eta = 5.0 if name == 'wrong parameter' else self._random.uniform(0.5, 0.9)
+            self._call('set_parameters_atomically', parameters=[RosParameter('foc.eta', value=eta).to_parameter_msg()])
+        elif name == 'clutch':
+            self._call('engage', data=False)
+            self._call('engage', data=True)
+        elif name == 'reset':
+            self._call('reset')
+        else:
+            rows = {'crowd': CROWD, 'negative': [(0.0, 0.0, 0.0, -1.0, 0.0, 1)], 'truncated': ROWS}[name]
+            self._publish_obstacles(stamp_ns, rows, cut=3 if name == 'truncated' else 0)
+
+    def _call(self, name: str, **fields: Any) -> Any:
+        """Call a service if it is there; return the future."""
+        client = self._clients[name]
+        return client.call_async(client.srv_type.Request(**fields)) if client.service_is_ready() else None
+
+    def _ask(self) -> None:
+        asked_s = time.monotonic()
+
+        def note(_: object) -> None:
+            self.answer_s, self._asked_s = max(self.answer_s, time.monotonic() - asked_s), None
+
+        if (future := self._call('engage', data=True)) is not None:
+            self._asked_s = asked_s
+            future.add_done_callback(note)
+
+    def _receive_prediction(self, cloud: Any, information: Mapping[str, int]) -> None:
+        self.predictions += 1
+        rows = np.frombuffer(cloud.data, dtype=np.uint8).reshape(-1, cloud.point_step)
+        self.not_finite += not np.isfinite(np.ascontiguousarray(rows[:, :52]).view('<f4')).all()
+        stamp_ns = cloud.header.stamp.sec * NANOSECONDS + cloud.header.stamp.nanosec
+        self.ages_s.append((information['source_timestamp'] - stamp_ns) / NANOSECONDS)
+
+    def _receive_wrench(self, _: object, information: Mapping[str, int]) -> None:
+        self.wrenches_s.append(information['source_timestamp'] / NANOSECONDS)
+
+    def _receive_health(self, array: Any) -> None:
+        self.health = {entry.key: entry.value for entry in array.status[0].values}
+        now_s = time.monotonic()
+        self.gap_s, self._heard_s = max(self.gap_s, now_s - (self._heard_s or now_s)), now_s
+
+    def count(self, name: str) -> int:
+        """Return a count of the diagnostics."""
+        return int(self.health.get(f'count {name}', 0))
+
+    def count_received(self) -> int:
+        """Return how many poses the node has received."""
+        return int(self.health['hand_pose refused'].split(' of ')[1])
+
+
+@dataclass
+class Ended:
+    """How a node ended: exit code and output."""
+
+    code: int | None = None
+    errors: str = ''
+
+    @property
+    def is_clean(self) -> bool:
+        """Whether it ended without an error."""
+        return self.code == 0 and 'Traceback' not in self.errors
+
+
+@contextmanager
+def run_node(parameters: Mapping[str, object], number: signal.Signals = signal.SIGTERM) -> Iterator[tuple[int, Ended]]:
+    """Start a node with parameters, and stop it by a signal; yield its process id, and how it will have ended."""
+    options = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
+    command, ended = [sys.executable, '-m', 'foc_ros.ros.main', '--ros-args', *options], Ended()
+    with tempfile.TemporaryFile('w+') as log, subprocess.Popen(command, stdout=log, stderr=log, text=True) as process:
+        try:
+            yield process.pid, ended
+        finally:
+            process.send_signal(number)
+            try:
+                ended.code = process.wait(LIMIT_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+            log.seek(0)
+            ended.errors = log.read()
+
+
+def read_status(pid: int) -> dict[str, str]:
+    """Return what Linux says of a process, by name."""
+    return dict(line.split(':', 1) for line in Path(f'/proc/{pid}/status').read_text('ascii').splitlines())
+
+
+def measure_process(pid: int) -> dict[str, float]:
+    """Return resident memory [MB], threads and open files of a process."""
+    status, files = read_status(pid), len(list(Path(f'/proc/{pid}/fd').iterdir()))
+    return {'memory': int(status['VmRSS'].split()[0]) / 1024.0, 'threads': float(status['Threads']), 'files': float(files)}
+
+
+def read_cpu_s(pid: int) -> float:
+    """Return the CPU time of a process [s]."""
+    fields = Path(f'/proc/{pid}/stat').read_text('ascii').rpartition(')')[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
+
+
+def play_until_predicted(player: Player) -> float:
+    """Publish until the node predicts; return the time that this took [s]. RuntimeError if it does not."""
+    began = time.monotonic()
+    while not player.predictions:
+        player.play(PERIOD_S)
+        if time.monotonic() - began > START_S:
+            raise RuntimeError('the node did not predict')
+    return time.monotonic() - began
+
+
+def watch(pid: int, player: Player, seconds: float) -> list[dict[str, float]]:
+    """Publish for a while, with faults; return one row of measurements for every REPORT_S."""
+    table, began = [], time.monotonic()
+    while time.monotonic() - began < seconds:
+        player.play(REPORT_S, faulty=True)
+        p99 = player.health.get('cycle time p50, p99 [ms]', '').partition(', ')[2]
+        table.append({'time': time.monotonic() - began, **measure_process(pid), 'p99': float(p99 or 'nan')})
+        print('  '.join(f'{name} {value:.1f}' for name, value in table[-1].items()), flush=True)
+    return table
+
+
+def judge(table: list[dict[str, float]], player: Player) -> dict[str, bool]:
+    """Return every requirement of a soak as a text, and whether it is met, after the last diagnostics."""
+    sent = sum(player.sent.values())
+    for _ in range(50):
+        player.spin(0.2)
+        if player.count_received() >= sent:
+            break
+    lost = sent - player.count_received()
+    refused = sum(max(player.count(kind) - player.sent[name], 0) for name, kind in BAD_POSES.items())
+    after = [row for row in table if row['time'] >= WARM_UP * table[-1]['time']]
+    third = max(len(after) // 3, 1)
+    parts = after[:third], after[-third:]
+    start, end = ({key: statistics.median(row[key] for row in part) for key in table[0]} for part in parts)
+    limits = {'memory': GROWTH, 'threads': 1.0, 'files': 1.0, 'p99': SLOWER}
+    return {f'{name} {start[name]:.1f} to {end[name]:.1f}': end[name] <= most * start[name] for name, most in limits.items()} | {
+        f'{lost} of {sent} poses lost, {refused} valid ones refused': lost == refused == 0,
+        f'{player.predictions} predictions, {player.health["dropped cycles"]} dropped cycles, {player.not_finite} not finite': (
+            player.predictions > 0 and not player.not_finite
+        ),
+        f'internal error: {player.health["last internal error"]}': player.health['last internal error'] == 'none',
+    }
+
+
+def stop_one_node(player: Player, number: signal.Signals, after_s: float) -> str | None:
+    """Start a node and stop it; return what went wrong, None if nothing did."""
+    with run_node({'foc.steps': 20, 'homotopy.max_candidates': 2}, number) as (pid, ended):
+        began = time.monotonic()
+        while not int(read_status(pid)['SigCgt'], 16) >> (signal.SIGTERM - 1) & 1 and time.monotonic() - began < LIMIT_S:
+            time.sleep(0.005)
+        player.play(after_s)
+    return (
+        None if ended.is_clean else f'{number.name} after {after_s:.2f} s: exit code {ended.code}, {ended.errors.strip()[-400:]}'
+    )
+
+
+def scatter(count: int, radius: float, low: tuple[float, float], high: tuple[float, float]) -> Rows:
+    """Return circles whose centres are uniformly distributed in a rectangle, always the same."""
+    centres = np.random.default_rng(0).uniform(low, high, (count, 2)).tolist()
+    return [(x, y, 0.0, radius, 0.001, number) for number, (x, y) in enumerate(centres)]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene, the hand moving from (0, 0) to (0.3, 0) m and back, and parameters of the node besides the strategy."""
+
+    rows: Rows
+    goals: Array = field(default_factory=lambda: GOALS[:1])
+    parameters: Mapping[str, object] = field(default_factory=dict)
+
+
+MANY_GOALS = np.array([[0.3 + 0.02 * (i // 8), 0.03 * (i % 8 - 3.5), 0.0] for i in range(64)])
+CASES = {
+    '32 on the hand': Case(scatter(32, 0.03, (-0.02, -0.02), (0.02, 0.02))),
+    '64 on the hand': Case(scatter(64, 0.03, (-0.02, -0.02), (0.02, 0.02))),
+    'crowd of 60 %': Case(scatter(66, 0.02, (0.0, -0.15), (0.3, 0.15))),
+    '256 near': Case(scatter(256, 0.004, (0.02, -0.1), (0.28, 0.1)), parameters={'scene.max_obstacles': 256}),
+    'K = 64': Case(scatter(12, 0.012, (0.05, -0.08), (0.25, 0.08)), parameters={'homotopy.max_candidates': 64}),
+    'N = 400': Case(scatter(6, 0.015, (0.05, -0.06), (0.25, 0.06)), parameters={'foc.steps': 400}),
+    '64 goals x 64': Case(scatter(64, 0.006, (0.03, -0.1), (0.27, 0.1)), MANY_GOALS, {'homotopy.max_candidates': 64}),
+}
+
+
+def measure_case(case: Case, strategy: str, seconds: float) -> dict[str, float]:
+    """Run a node in a scene for some seconds and return what was measured."""
+    names = 'predictions', 'predict_too_late', 'predict_over_budget'
+    with (
+        Player(case.rows, case.goals, asks=True) as player,
+        run_node({'foc.strategy': strategy, **case.parameters}) as (pid, ended),
+    ):
+        play_until_predicted(player)
+        player.forget()
+        before = [player.count(name) for name in names]
+        player.play(seconds / 3.0)
+        memory = measure_process(pid)['memory']
+        player.play(2.0 * seconds / 3.0)
+        grown = measure_process(pid)['memory'] / memory
+    made, late, over = (player.count(name) - count for name, count in zip(names, before, strict=True))
+    p50, _, p99 = player.health['solve time p50, p99 [ms]'].partition(', ')
+    return {
+        'made': made + late,
+        'p50 [ms]': float(p50 if p99 else 'nan'),
+        'p99 [ms]': float(p99 or 'nan'),
+        'over': over,
+        'gap [s]': player.gap_s,
+        'answer [s]': player.answer_s,
+        'age [s]': max(player.ages_s, default=0.0),
+        'memory': grown,
+        'errors': player.count('internal_errors') + (not ended.is_clean),
+    }
+
+
+def find_failures(row: Mapping[str, float]) -> list[str]:
+    """Return the names of the values of a row that are beyond their limits."""
+    late, most = Config().estimator.hand_timeout_s, (1.0 - PUNCTUAL) * row['made']
+    limits = {'gap [s]': GAP_S, 'answer [s]': ANSWER_S, 'age [s]': late, 'over': most, 'memory': GROWTH, 'errors': 0}
+    return [name for name, limit in limits.items() if not row[name] <= limit] + ['made'] * (row['made'] == 0)
+
+
+def measure_rates(seconds: float) -> dict[str, float]:
+    """Measure predictions and guidance under a hand at 1 kHz."""
+    rows = scatter(50, 0.008, (0.03, -0.15), (0.27, 0.15))
+    parameters = {'guidance.enabled': 'true', 'guidance.clearance': 0.0}
+    with Player(rows, GOALS[:1], FAST_S, asks=True) as player, run_node(parameters):
+        start_s = play_until_predicted(player)
+        player.play(2.0)
+        player.forget()
+        player.play(seconds)
+    ages, periods = np.array(player.ages_s or [np.nan]), np.diff(player.wrenches_s or [np.nan] * 2)
+    return {
+        'from start to the first prediction [s]': start_s,
+        'predictions [Hz]': len(player.ages_s) / seconds,
+        'median age [s]': float(np.median(ages)),
+        'largest age [s]': float(ages.max()),
+        'wrenches [Hz]': len(player.wrenches_s) / seconds,
+        'period of the wrench, p99 / nominal': float(np.percentile(periods, 99)) * Config().guidance.rate_hz,
+        'longest answer of the clutch [s]': player.answer_s,
+    }
+
+
+def measure_intake(seconds: float) -> dict[str, float]:
+    """Measure the CPU time of a node that hardly predicts, with a hand at 1 kHz and without."""
+    with Player(period_s=FAST_S) as player, run_node({'rate_hz': 0.1}) as (pid, _):
+        while not player.is_connected:
+            player.spin(0.1)
+        player.play(2.0)
+        before, sent = read_cpu_s(pid), player.sent['good']
+        player.play(seconds)
+        used, hertz = read_cpu_s(pid) - before, (player.sent['good'] - sent) / seconds
+        player.spin(1.0)
+        before = read_cpu_s(pid)
+        player.spin(seconds)
+        idle = read_cpu_s(pid) - before
+    cost = (used - idle) / seconds * 1e3 / hertz
+    return {'poses published [Hz]': hertz, 'cost of 1 kHz [cores]': cost, 'without a hand [cores]': idle / seconds}
+
+
+app = App(name='stress', help=__doc__, help_format='plaintext', default_parameter=Parameter(negative=()))
+
+
+@app.command
+def soak(*, minutes: float = 10.0) -> int:
+    """Run a node for a long time among faulty publishers and judge it."""
+    with isolated_graph(), Player() as player, run_node({'homotopy.max_candidates': 2}) as (pid, ended):
+        play_until_predicted(player)
+        while 'hand_pose refused' not in player.health:
+            player.play(PERIOD_S)
+        player.spin(REPORT_S)
+        player.sent['good'] = player.count_received()  # earlier ones may be lost
+        found = judge(watch(pid, player, 60.0 * minutes), player)
+    found[f'exit code {ended.code}'] = ended.is_clean
+    for requirement, is_met in found.items():
+        print(f'{"holds" if is_met else "FAILS"}: {requirement}')
+    return 0 if all(found.values()) else 1
+
+
+@app.command
+def stops(*, count: int = 100) -> int:
+    """Stop so many nodes by each signal and print how they ended."""
+    generator, failures = random.Random(0), 0
+    with isolated_graph(), Player() as player:
+        for turn in range(2 * count):
+            number = (signal.SIGTERM, signal.SIGINT)[turn % 2]
+            error = stop_one_node(player, number, generator.uniform(0.0, SPREAD_S))
+            failures += error is not None
+            if error is not None or (turn + 1) % 20 == 0:
+                print(f'{turn + 1} of {2 * count}: {error or "no error"}', flush=True)
+    print(f'{2 * count - failures} of {2 * count} stops with exit code 0 and no traceback')
+    return min(failures, 1)
+
+
+@app.command
+def hostile(
+    *,
+    seconds: float = 6.0,
+    only: Annotated[tuple[str, ...], Parameter(choices=tuple(CASES))] = tuple(CASES),
+    strategy: Annotated[tuple[str, ...], Parameter(choices=STRATEGIES)] = STRATEGIES,
+) -> int:
+    """Run a node in every scene with every strategy and print a table."""
+    failed = 0
+    with isolated_graph():
+        for name, each in ((name, each) for name in only for each in strategy):
+            row = measure_case(CASES[name], each, seconds)
+            failures = find_failures(row)
+            failed += bool(failures)
+            values = '  '.join(f'{key} {value:.4g}' for key, value in row.items())
+            print(f'{name:15} {each:8} {values}  {"FAILS: " + ", ".join(failures) if failures else "holds"}', flush=True)
+    return min(failed, 1)
+
+
+@app.command
+def rates(*, seconds: float = 10.0) -> int:
+    """Print rates, delays and costs under a hand at 1 kHz."""
+    with isolated_graph():
+        for measure in (measure_rates, measure_intake):
+            for name, value in measure(seconds).items():
+                print(f'{name:40} {value:.4g}', flush=True)
+    return 0
+
+
+if __name__ == '__main__':
+    app()
