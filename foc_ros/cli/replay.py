@@ -15,10 +15,9 @@ from typing import TextIO
 from foc_ros.analysis.replay import Replay, Step
 from foc_ros.analysis.replay_guidance import GuidanceReplay, GuidanceStep
 from foc_ros.analysis.replay_summary import Summary, facts
-from foc_ros.core.classes.library import is_same_recording
 from foc_ros.core.config import ONLINE, Config
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
-from foc_ros.io.class_library import save_library
+from foc_ros.io.class_library import extend_library
 from foc_ros.io.json_output import encode_guidance, encode_prediction
 from foc_ros.io.terminal import show_address, show_progress, show_table
 from foc_ros.ros.messages.encode_guidance import GUIDANCE_OUTPUTS
@@ -53,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         duration_s = _play(arguments, replay, consumers, guided)
         answer = summary.answer(replay.intake.counts, duration_s)
         if arguments.learn is not None:
-            answer['learned'] = _save_learnt(arguments.learn, replay)
+            answer['learned'] = extend_library(arguments.learn, replay.pipeline.learnt.movements.finish().learnt)
         if arguments.operator is not None:
             write_parameter_file('--operator', arguments.operator, replay.pipeline.adapted_config)
         if report is not None:
@@ -85,14 +84,6 @@ def _prepare_learning(config: Config, library: Path) -> Config:
     """Return the config with which movements are learnt, in addition to those in a class library that exists."""
     given = {'homotopy.library': str(library)} if library.exists() else {}
     return config.with_values({'experience.learning': ONLINE, **given})
-
-
-def _save_learnt(library: Path, replay: Replay) -> int:
-    """Write the class library of a replay with the movements that were learnt; return how many it did not contain before."""
-    given, learnt = replay.pipeline.given, replay.pipeline.learnt.movements.finish().learnt
-    new = [each for each in learnt if not any(is_same_recording(each, known) for known in given)]
-    save_library(library, [*given, *new])
-    return len(new)
 
 
 def _play(arguments: argparse.Namespace, replay: Replay, consumers: list[Consumer], guided: list[GuidanceConsumer]) -> float:

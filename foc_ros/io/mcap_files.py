@@ -16,7 +16,7 @@ from mcap.exceptions import EndOfFile
 from mcap.reader import make_reader
 from mcap.records import Channel as ChannelRecord
 from mcap.records import Message, Schema, Statistics
-from mcap.stream_reader import MAGIC_SIZE, StreamReader
+from mcap.stream_reader import StreamReader
 from mcap.summary import Summary
 
 from foc_ros.core.errors import RecordingError
@@ -25,13 +25,16 @@ from .channels import Channel
 from .checksums import check_checksums
 
 MAGIC = b'\x89MCAP0\r\n'
+FOOTER, FOOTER_SIZE = b'\x02' + struct.pack('<Q', 20), 29
+"""Code and length of the last record, and its whole size [bytes]."""
 
 
 class McapFile:
     """A file, to be closed after use.
 
     Attributes: channels; message_count, of all channels; times_ns, of the first and the last message; loss, why messages that the
-    recorder received are missing, empty if the file is whole; doubt, why they may be missing where nothing states their number.
+    recorder received are missing, empty if the file is whole; doubt, why they may be missing where nothing states their number;
+    is_counted, whether the file itself states how many messages it has, and has them.
     """
 
     def __init__(self, path: Path) -> None:
@@ -68,7 +71,7 @@ class McapFile:
         self.doubt = ''
         self.loss = 'the recorder was killed; read up to the last whole chunk' if is_cut else ''
         summary = None if is_cut else self._read_summary()
-        self._is_indexed = summary is not None
+        self._is_indexed = self.is_counted = summary is not None
         if summary is None:
             summary = self._scan()
         statistics, schemas = summary.statistics, summary.schemas
@@ -107,8 +110,11 @@ class McapFile:
             elif isinstance(record, Message):
                 counts[record.channel_id] += 1
                 start_ns, end_ns = min(start_ns, record.log_time), max(end_ns, record.log_time)
-            elif isinstance(record, Statistics) and record.message_count != counts.total():
-                raise RecordingError(f'damaged or cut short: {counts.total()} of its {record.message_count} messages can be read')
+            elif isinstance(record, Statistics):
+                self.is_counted = True
+                if record.message_count != counts.total():
+                    words = f'{counts.total()} of its {record.message_count} messages can be read'
+                    raise RecordingError(f'damaged or cut short: {words}')
         if lost := sum(count for key, count in counts.items() if key not in summary.channels):
             raise RecordingError(f'damaged: {lost} of its {counts.total()} messages belong to no channel')
         sizes = len(summary.schemas), len(summary.channels)
@@ -119,10 +125,10 @@ class McapFile:
 def _has_footer(stream: BinaryIO) -> bool:
     """Return whether the file ends as a whole one does."""
     size = stream.seek(0, 2)
-    stream.seek(max(size - MAGIC_SIZE, 0))
-    has_magic = stream.read() == MAGIC and size > MAGIC_SIZE
+    stream.seek(max(size - len(MAGIC) - FOOTER_SIZE, 0))
+    end = stream.read()
     stream.seek(0)
-    return has_magic
+    return size > len(MAGIC) + FOOTER_SIZE and end.startswith(FOOTER) and end.endswith(MAGIC)
 
 
 def _is_complete(summary: Summary) -> bool:
