@@ -295,7 +295,7 @@ def _find_gap(names: Iterable[str]) -> str:
         return ''
     numbers = {int(part[2]) for part in parts if part}
     missing = next((number for number in range(max(numbers)) if number not in numbers), None)
-    ((stem, end),) = stems - {None}
+    stem, end = next(each for each in stems if each)
     return '' if missing is None else f'{stem}_{missing}{end} is missing, by the numbers of the other files'
 
 
