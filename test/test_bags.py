@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from bag_helpers import START_NS, TYPES, messages, write_bag, write_by_rosbags, write_mcap
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import StoragePlugin, Writer
 
 from foc_ros.analysis.recordings import BagRecording
 from foc_ros.core.errors import FocWarning, RecordingError
