@@ -62,6 +62,7 @@ PROCESS = (
     'test_fit_*.py::test_a_setting_that_predicts_nothing_*',
     'test_evaluate.py::test_the_number_of_workers_does_not_matter',
     'test_paper.py::*',
+    'test_plan_recovery.py::test_recovered_*',
     # a dozen programs with a picture each
     'test_examples.py::test_the_example_runs_and_makes_a_figure',
 )
