@@ -57,8 +57,16 @@ setup(
         'play': [*REPORT, 'pydantic>=2', 'tornado>=6.2'],
         # recordings on the workers of a Dask cluster
         'cluster': ['distributed>=2024.1'],
-        # the documentation as a web site
-        'doc': ['furo>=2024.8', 'matplotlib>=3.6', 'myst-parser>=4', 'numpydoc>=1.7', 'sphinx>=8', 'sphinx-gallery>=0.17'],
+        # the documentation as a web site; django-static-mathjax is MathJax as a wheel, without Django
+        'doc': [
+            'django-static-mathjax>=3.2',
+            'furo>=2024.8',
+            'matplotlib>=3.6',
+            'myst-parser>=4',
+            'numpydoc>=1.7',
+            'sphinx>=8',
+            'sphinx-gallery>=0.17',
+        ],
         # what the benchmark compares with
         'bench': ['casadi>=3.7'],
         # the linters, and what builds and checks the distributions

@@ -3,9 +3,14 @@
 import sys
 from pathlib import Path
 
+import mathjax  # the files of MathJax, from the package django-static-mathjax; Django is not needed
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from foc_ros import __version__
+
 project = 'foc_ros'
+release = __version__
 author = 'the foc_ros developers'
 copyright = f'{author}, Apache-2.0'  # noqa: A001 (the name that Sphinx wants)
 
@@ -27,7 +32,11 @@ nitpicky = True
 nitpick_ignore_regex = [('py:.*', '.*')]
 
 autodoc_default_options = {'member-order': 'bysource'}
-autodoc_typehints = 'none'
+autodoc_typehints = 'signature'
+autodoc_typehints_format = 'short'
+autodoc_type_aliases = {'ArrayLike': 'ArrayLike'}
+autodoc_preserve_defaults = True
+python_maximum_signature_line_length = 88
 add_module_names = False
 numpydoc_show_class_members = False
 numpydoc_attributes_as_param_list = True
@@ -48,7 +57,16 @@ sphinx_gallery_conf = {
 }
 
 html_theme = 'furo'
-html_title = 'foc_ros'
+html_title = f'foc_ros {release}'
+html_logo = 'images/logo.svg'
+html_favicon = 'images/logo.svg'
+myst_html_meta = {
+    'description': 'foc_ros predicts where the hand of a teleoperator is going, on ROS 2 and in Python'
+}
+# One file holds the program and the fonts of MathJax. It becomes part of the site, so that formulas need no network.
+mathjax_path = 'tex-svg.js'
+html_static_path = ['_static', str(Path(mathjax.__path__[0]) / 'static' / 'mathjax' / 'es5' / mathjax_path)]
+html_css_files = ['site.css']
 
 
 def escape_bars(*arguments: object) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from mcap.writer import Writer
+from rosbags.rosbag2 import Writer as BagByRosbags
 
 from foc_ros.core.config import Config, replace_values
 from foc_ros.io.bags import TYPESTORE, BagWriter
@@ -57,6 +58,17 @@ def write_bag(path: Path, items: Iterable[tuple[str, int, Any]] | None = None, r
             if names.get(topic, topic):
                 writer.write(names.get(topic, topic), message, stamp_ns)
     return path
+
+
+def write_by_rosbags(path: Path, items: Iterable[tuple[str, int, Any]], **options: Any) -> None:
+    """Write a bag with the library rosbags alone; options: of its writer."""
+    with BagByRosbags(path, **options) as writer:
+        connections: dict[str, Any] = {}
+        for topic, stamp_ns, message in items:
+            kind = message.__msgtype__
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=STORE)
+            writer.write(connections[topic], stamp_ns, STORE.serialize_cdr(message, kind))
 
 
 def write_mcap(

@@ -36,7 +36,7 @@ NOT_RUN = {
     'export AMENT_PREFIX_PATH=$VIRTUAL_ENV': SHELL,
     'foc_ros evaluate bags --report evaluation': FIT,
     'foc_ros fit recordings --output operator.yaml': FIT,
-    # calibration
+    # calibrate
     'foc_ros fit recordings --params foc.yaml --output operator.yaml': FIT,
     'foc_ros evaluate recordings --params operator.yaml --report report': FIT,
     'foc_ros node --ros-args --params-file operator.yaml': 'test_fit.py starts the node with the fitted parameters',
@@ -55,23 +55,17 @@ NOT_RUN = {
     'ros2 launch foc_ros foc.launch.py hand_pose:=/MTMR/measured_cp obstacles:=/perception/obstacles plane:=xz': LAUNCH,
     'ros2 launch foc_ros two_arms.launch.py left_hand:=/MTML/measured_cp right_hand:=/MTMR/measured_cp': LAUNCH,
     'ros2 launch foc_ros foc_rviz.launch.py hand_pose:=/MTMR/measured_cp': LAUNCH,
-    # security
     'ros2 security create_keystore keystore': ROS,
     'ros2 security create_enclave keystore /foc': ROS,
     'ros2 security create_permission keystore /foc sros2_policy.xml': ROS,
     'export ROS_SECURITY_KEYSTORE=$PWD/keystore ROS_SECURITY_ENABLE=true ROS_SECURITY_STRATEGY=Enforce': ROS,
     'ros2 run foc_ros foc_node --ros-args --enclave /foc': ROS,
     # measuring
-    '.venv/bin/python scripts/measure_candidates.py': REPLAYED,
-    '.venv/bin/python scripts/measure_candidates.py hlp_reaching --set scene.hand_radius=0.0125 --budget 0.01': REPLAYED,
-    '.venv/bin/python scripts/measure_flicker.py': REPLAYED,
-    '.venv/bin/python scripts/measure_clutter.py': f'{LONG}; test_measure_clutter.py measures a part',
-    '.venv/bin/python scripts/make_accuracy_figures.py': f'{LONG}; test_accuracy_page.py checks the page',
-    'foc_ros paper --output paper_output': 'takes half a minute; test_paper.py runs the studies on a coarser grid',
+    'make people': f'{LONG}, and needs recordings that are not part of the checkout',
+    '.venv/bin/python scripts/flicker.py': REPLAYED,
+    '.venv/bin/python benchmarks/accuracy.py': f'{LONG}; test_accuracy_page.py checks the page',
     # guidance
     'foc_ros simulate --operators accurate,noisy,laggy,changes_way,unannounced_goal --trials 200 --params rate.yaml': PARTLY,
-    'foc_ros simulate --operators human_paths --assistance foc --trials 48 --recordings d3il_avoiding --params rate.yaml': PARTLY,
-    'foc_ros simulate --operators human_paths --assistance foc --trials 209 --recordings hlp_reaching --params hlp.yaml': PARTLY,
     # CONTRIBUTING
     'make check': BY_CI,
     'make test': BY_CI,
@@ -82,10 +76,7 @@ NOT_RUN = {
     'make colcon': BY_CI,
     'make dist': BY_CI,
     'scripts/tf2_check': 'clones and compiles tf2; run it before a release',
-    'make fuzz': LONG,
-    'make soak': LONG,
-    'make stops': LONG,
-    'make hostile': LONG,
+    'make stress': LONG,
     '.ci/run': 'it runs this test',
 }
 ENDLESS = (

@@ -8,12 +8,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from bag_helpers import messages, write_bag
-from rosbags.rosbag2 import StoragePlugin, Writer
+from bag_helpers import messages, write_bag, write_by_rosbags
+from rosbags.rosbag2 import StoragePlugin
 
 from foc_ros.core.errors import RecordingError
-from foc_ros.io.bags import TYPESTORE, BagReader
-from foc_ros.io.checksums import add_checksums, check_checksums
+from foc_ros.io.bags import BagReader
+from foc_ros.io.checksums import add_checksums
+from foc_ros.io.mcap_files import McapFile
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGED = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'
@@ -105,17 +106,11 @@ def test_the_checksums_are_those_of_an_independent_writer(tmp_path: Path) -> Non
             writer.add_message(channel, number, bytes(100 * [number]), number)
         writer.finish()
     written = file.read_bytes()
-    check_checksums(file)
+    McapFile(file).close()
     add_checksums(file)
     assert file.read_bytes() == written
 
 
 def test_a_file_without_checksums_is_read(tmp_path: Path, bag: Path) -> None:
-    with Writer(tmp_path / 'old', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connections = {}
-        for topic, stamp_ns, message in messages():
-            kind = message.__msgtype__
-            if topic not in connections:
-                connections[topic] = writer.add_connection(topic, kind, typestore=TYPESTORE)
-            writer.write(connections[topic], stamp_ns, TYPESTORE.serialize_cdr(message, kind))
+    write_by_rosbags(tmp_path / 'old', messages(), version=9, storage_plugin=StoragePlugin.MCAP)
     assert read(tmp_path / 'old') == read(bag)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -299,6 +300,45 @@ def test_units_that_cannot_be_right_are_named(
     single = ['convert', str(folder / 'recordings.csv'), '--obstacles', str(folder / 'obstacles.csv')]
     assert main([*single, '--output', str(tmp_path / 'others')]) == 0
     assert capsys.readouterr().err == table_words
+
+
+@pytest.mark.parametrize(
+    ('units', 'words'),
+    [
+        ({'seconds': 1e6}, 't_s of recording a seems to be in us: the median time between two poses is 2e+04 s'),
+        ({'seconds': 1e9}, 't_s of recording a seems to be in ns: the median time between two poses is 2e+07 s'),
+        ({'metres': 1e6}, 'the position of recording a seems to be in um: the hand moves at 5.76e+05 m/s'),
+    ],
+)
+def test_units_that_exceed_a_bound_are_named_before_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], units: dict[str, float], words: str
+) -> None:
+    assert main(['convert', str(write_folder(tmp_path / 'tables', **units)), '--output', str(tmp_path / 'bags')]) == 2
+    first, *others = capsys.readouterr().err.splitlines()
+    assert first.endswith(words) and others and all('expected a number in [' in each for each in others)
+
+
+def test_times_that_repeat_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = '\n'.join(f'a,{0.02 * (i // 2):.2f},{0.001 * i},0' for i in range(20))
+    assert convert(tmp_path, recordings=f'recording,t_s,x_m,y_m\n{rows}\n') == 0
+    assert 't_s of recording a repeats: 10 of 19 rows have the time of the row before' in capsys.readouterr().err
+
+
+def test_a_header_may_follow_empty_lines_and_the_name_of_the_separator(tmp_path: Path) -> None:
+    folder = write_folder(tmp_path / 'tables', ';', True)
+    for file in folder.iterdir():
+        file.write_text('sep=;\n\n' + file.read_text())
+    assert len(next(iter(read_tables(folder).values())).read_movement().stamps_ns) == 50
+
+
+@pytest.mark.parametrize(
+    ('cell', 'words'), [('"0,5"', "a number with a decimal point in .*, got '0,5'"), ('1_0', "a number in .*, got '1_0'")]
+)
+def test_a_number_of_another_country_or_language_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], cell: str, words: str
+) -> None:
+    assert convert(tmp_path, goals=f'x_m,y_m\n{cell},0\n') == 2
+    assert re.search(f'row 2, column x_m: expected {words}', capsys.readouterr().err)
 
 
 @pytest.mark.parametrize(

@@ -74,36 +74,67 @@ def test_every_command_is_documented() -> None:
         assert re.search(rf'^\| `{command}\b', text, re.MULTILINE), f'doc/interfaces.md does not list {command}'
 
 
+def read_failures() -> dict[str, list[list[str]]]:
+    """Return the cells of each row of the table of failures, by the heading within the table under which it stands."""
+    text = (ROOT / 'doc' / 'troubleshoot.md').read_text('utf-8').partition('\n## All failures\n')[2]
+    header, _, *lines = [line for line in text.splitlines() if line.startswith('|')]
+    assert header == '| case | level | what happens, what you see, what to do |'
+    parts: dict[str, list[list[str]]] = {}
+    for line in lines:
+        cells = [cell.strip() for cell in line.rstrip()[1:-1].split(' |')]
+        if cells[0].startswith('**'):
+            parts[cells[0].strip('*')] = []
+        else:
+            parts[list(parts)[-1]].append(cells)
+    return parts
+
+
+UNTESTED = 'Installation', 'Predictions are not what you expect'
+"""What is no failure of the program, but of its installation or of an expectation."""
+
+
 def test_failures_are_tested_as_they_say() -> None:
-    """Every row of doc/failures.md has tests, and they exist."""
-    lines = (ROOT / 'doc' / 'failures.md').read_text('utf-8').splitlines()
-    rows = [line[2:].partition(' | ')[0] for line in lines if re.match(r'\| (?!when|-)', line)]
+    """Every row of the table of failures has tests, and they exist."""
+    rows = [cells[0] for part, found in read_failures().items() if part not in UNTESTED for cells in found]
     named_tests = yaml.safe_load((ROOT / 'test' / 'failure_tests.yaml').read_text('utf-8'))
+    assert len(rows) > 100
     assert rows == list(named_tests)
     for row, names in named_tests.items():
         assert names and not set(names) - TESTS, f'{row}: no such test: {set(names) - TESTS}'
 
 
-def test_troubleshooting_quotes_texts_that_exist() -> None:
-    """What the page quotes in its first column is in the sources, perhaps with a value between."""
-    lines = (ROOT / 'doc' / 'troubleshooting.md').read_text('utf-8').splitlines()
-    quoted = [text for line in lines if line.startswith('| ') for text in re.findall(r'`([^`]+)`', line.split(' | ')[0])]
+def test_failures_quote_texts_that_exist() -> None:
+    """What the table quotes is in the sources, perhaps with values between."""
     sources = [ROOT / 'Makefile', *(ROOT / 'foc_ros').rglob('*.py')]
     text = '\n'.join(file.read_text('utf-8') for file in sources)
-    composed = {'hand_wrong_frame', 'obstacles_wrong_frame', 'goals_wrong_frame', 'scene_goal_inside', 'scene_no_way'}
-    assert len(quoted) > 20 and composed <= set(quoted)
+    quoted = [each for found in read_failures().values() for cells in found for each in re.findall(r'"([^"]+)"', cells[-1])]
+    assert len(quoted) > 40
     for each in quoted:
-        wanted = each.partition('_')[2] if each in composed else each
-        assert wanted in text, f'no source has the text {each}'
+        for part in each.split(' ... '):
+            assert part in text, f'no source has the text {part}'
 
 
-def test_failures_of_the_node_name_the_level_of_its_diagnostics() -> None:
-    sections = (ROOT / 'doc' / 'failures.md').read_text('utf-8').split('\n## ')[1:]
-    node_sections = [section for section in sections if not section.startswith('Files')]
-    assert len(node_sections) == 4
-    for section in node_sections:
-        header, _, *rows = [line for line in section.splitlines() if line.startswith('|')]
-        assert header == '| when | what happens | level | where you see it |'
-        for row in rows:
-            level = row.split(' | ')[2]
-            assert re.match(r'(OK|WARN|ERROR|unchanged|none)\b', level), row
+INPUTS = '(?:hand_pose|hand|obstacle_markers|obstacles|collision_objects|detections|goals|predict|scene)'
+
+
+def test_failures_count_what_they_say() -> None:
+    """A count that the table names is in the sources, as a whole or as what follows the name of the input."""
+    text = '\n'.join(file.read_text('utf-8') for file in (ROOT / 'foc_ros').rglob('*.py'))
+    rows = [cells[-1] for found in read_failures().values() for cells in found]
+    counts = {match.groups() for row in rows for match in re.finditer(rf'`({INPUTS}_(?:dropped_)?([a-z_]+))`', row)}
+    assert len(counts) > 20
+    for count, reason in counts:
+        assert count in text or re.search(rf"['_]{reason}\b", text), f'no source counts {count}'
+
+
+def test_failures_name_the_level_of_the_diagnostics_or_the_exit_code() -> None:
+    for found in read_failures().values():
+        for cells in found:
+            assert len(cells) == 3, cells
+            assert re.match(r'(OK|WARN|ERROR|unchanged|none|exit \d+)\b|$', cells[1]), cells
+
+
+def test_the_documentation_is_short() -> None:
+    """A reader has an hour: README and pages together have at most 25,000 words."""
+    words = {page.name: len(page.read_text('utf-8').split()) for page in [ROOT / 'README.md', *(ROOT / 'doc').glob('*.md')]}
+    assert sum(words.values()) <= 25_000, words

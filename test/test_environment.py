@@ -8,9 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from bag_helpers import messages, write_bag
+from bag_helpers import CONFIG, messages, write_bag, write_parameters
 
+from foc_ros.core.config import replace_values
 from foc_ros.io.bags import BagReader
+from foc_ros.io.class_library import load_library
 
 HOMELESS = {'HOME': '/dev/null', 'XDG_CACHE_HOME': '/dev/null', 'XDG_CONFIG_HOME': '/dev/null'}
 ASCII = {'LC_ALL': 'C', 'PYTHONUTF8': '0', 'PYTHONCOERCECLOCALE': '0'}
@@ -41,6 +43,19 @@ def test_a_node_without_a_place_for_its_log_says_so() -> None:
     process = start('node', **HOMELESS, ROS_LOG_DIR='/dev/null/log')
     assert process.communicate()[1].splitlines()[-1] == 'foc_node: ROS_LOG_DIR names another directory for the log'
     assert process.returncode == 2
+
+
+def test_processes_that_learn_into_one_library_at_once_lose_nothing(tmp_path: Path) -> None:
+    library = tmp_path / 'library.json'
+    parameters = write_parameters(tmp_path, replace_values(CONFIG, {'rate_hz': 2.0}))
+    started = []
+    for number in range(3):  # three movements, which differ in their speed
+        bag = write_bag(tmp_path / str(number), messages(seconds=1.02, rate_hz=50.0 + 10 * number))
+        started.append(start('replay', str(bag), '--params', parameters, '--learn', str(library)))
+    assert [process.communicate()[1] for process in started] == [''] * 3
+    assert [process.returncode for process in started] == [0] * 3
+    assert len(load_library(str(library))) == 3
+    assert [each.name for each in tmp_path.iterdir() if each.name.startswith('library')] == ['library.json']
 
 
 def test_of_two_processes_with_one_output_one_writes_it(tmp_path: Path) -> None:

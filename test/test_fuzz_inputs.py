@@ -21,6 +21,7 @@ from foc_ros.io.bags import BagReader
 
 FEW, MANY = 40, 500
 LONGEST_S = 10.0
+"""Time of the processor for one command: other programs may keep it waiting for longer."""
 GIVEN = messages(seconds=0.3)
 POSES = sum(topic == '/hand_pose' for topic, _, _ in GIVEN)
 WRITERS = (
@@ -101,10 +102,10 @@ def check_recording(folder: Path, number: int, capsys: pytest.CaptureFixture[str
         file.write_bytes(change_bytes(file.read_bytes(), source))
     else:
         change_records(file, source)
-    begin = time.monotonic()
+    begin = time.process_time()
     path = source.choice((file, file.parent))
     code = main(['replay', str(path), '--json', '--params', parameters])
-    assert time.monotonic() - begin < LONGEST_S
+    assert time.process_time() - begin < LONGEST_S
     out, err = capsys.readouterr()
     assert code in (0, 2, 3) and (code == 0 or err) and 'Traceback' not in err
     if code == 0 and not err:
@@ -126,9 +127,9 @@ def check_tables(folder: Path, number: int, capsys: pytest.CaptureFixture[str]) 
     for name, text in texts.items():
         data = text.replace(',', source.choice(',,;\t')).encode()
         (tables / name).write_bytes(change_bytes(data, source) if name == changed else data)
-    begin = time.monotonic()
+    begin = time.process_time()
     code = main(['convert', str(tables), '--output', str(tables / 'bags')])
-    assert time.monotonic() - begin < LONGEST_S
+    assert time.process_time() - begin < LONGEST_S
     out, err = capsys.readouterr()
     assert code in (0, 2) and (code == 0 or err) and 'Traceback' not in err
     if code == 0:

@@ -1,4 +1,4 @@
-"""Scenes at the edge of what can be predicted: each has a decided answer, finite and never a guess (doc/failures.md)."""
+"""Scenes at the edge of what can be predicted: each has a decided answer, finite and never a guess (doc/troubleshoot.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The simulated reaches of doc/calibration.md: `evaluate` reads them, and each ends near its own goal."""
+"""The simulated reaches of doc/calibrate.md: `evaluate` reads them, and each ends near its own goal."""
 
 from __future__ import annotations
 

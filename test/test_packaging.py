@@ -47,7 +47,7 @@ def test_package_xml_agrees_with_the_wheel(package_xml: ET.Element, wheel: zipfi
     assert text['name'] == metadata['Name'] == ROOT.joinpath('resource', 'foc_ros').name
     assert text['version'] == metadata['Version'] == foc_ros.__version__
     assert yaml.safe_load((ROOT / 'CITATION.cff').read_text('utf-8'))['version'] == foc_ros.__version__
-    assert f'`foc_ros {foc_ros.__version__}`' in (ROOT / 'doc' / 'cite.md').read_text('utf-8')
+    assert f'`foc_ros {foc_ros.__version__}`' in (ROOT / 'README.md').read_text('utf-8')
     assert f'\n{foc_ros.__version__} (' in (ROOT / 'CHANGELOG.rst').read_text('utf-8')
     assert text['license'] == metadata['License'] == 'Apache-2.0'
     assert text['description'] == metadata['Summary']

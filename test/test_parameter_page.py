@@ -14,17 +14,15 @@ REMEDY = 'run: python test/test_parameter_page.py'
 
 HEAD = """# Parameters
 
-Every parameter of the node, of `replay` and of the configuration in Python. `python test/test_parameter_page.py` makes this page
-from `foc_ros/core/config.py`, and `config/foc.yaml`, which holds the same defaults as a ROS 2 parameter file.
-
-A value outside its range, of the wrong type, or of an unknown name is refused with name, value and bound, and nothing is changed.
-Read-only parameters are set at the start. The node alone also has `autostart` (true or false, default true, read-only).
-In Python, `likelihood.beta` is `Config().likelihood.beta`.
+Every parameter of the node, of the commands (`--params`) and of `foc_ros.Config`. `python test/test_parameter_page.py` makes this
+page from `foc_ros/core/config.py`, and `config/foc.yaml`, which holds the same defaults as a ROS 2 parameter file.
+A value outside its range, of the wrong type, or of an unknown name is refused with name, value and bound. Read-only parameters
+are set at the start. The node alone also has `autostart` (default true, read-only).
 """
 
 TABLE = """
-| parameter | default | unit | range | meaning |
-|---|---|---|---|---|
+| parameter | default | range | meaning |
+|---|---|---|---|
 """
 
 
@@ -47,15 +45,16 @@ def _describe_group(group: str) -> str:
 
 
 def _build_row(parameter: Parameter) -> str:
+    """Return the row of a parameter; its unit stands behind its range."""
     bound = parameter.bound
     choices = tuple(bound.choices)
     if choices:
         span = ', '.join(f'`{choice}`' for choice in choices)
     else:
-        span = '' if bound.low is None else f'{bound.low:g} .. {bound.high:g}'
+        span = bound.unit if bound.low is None else f'[{bound.low:g}, {bound.high:g}] {bound.unit}'.strip()
     default = f'`{parameter.default}`' if parameter.default != '' else 'empty'
     meaning = bound.meaning + (' (read-only)' if bound.read_only else '')
-    return f'| `{parameter.name}` | {default} | {bound.unit} | {span} | {meaning} |\n'
+    return f'| `{parameter.name}` | {default} | {span} | {meaning} |\n'
 
 
 def test_the_page_is_current() -> None:

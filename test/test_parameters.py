@@ -173,7 +173,6 @@ def node_with(ros: Graph, **overrides: object) -> Any:
     [
         ['-p', 'arm:rate_hz:=-1.0'],
         ['-p', 'rate_hz:={'],
-        ['--params-file', 'no.yaml'],
         ['-p', 'budget_s:=1e-3', '-p', 'likelihood.shortfall:=.inf'],
         ['-p', 'frame_id:=2026-11-24'],
         ['-p', 'frame_id:=1_0'],
@@ -228,6 +227,36 @@ def test_a_section_that_does_not_apply_is_named(tmp_path: Path) -> None:
             check_parameters([*arguments, *others])
 
 
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('foc: {ros__parameters: {rate_hz: 5}}\nfoc: {ros__parameters: {rate_hz: 6}}', 'the key foc is given twice'),
+        ('foc: {ros__parameters: {rate_hz: 5, rate_hz: 6}}', 'the key rate_hz is given twice'),
+        ('foc:\n\tros__parameters:\n\t\trate_hz: 5', "found character '\\t'"),
+        ('foc: {ros__parameters: {<<: {rate_hz: 5}}}', 'merging (<<) is not supported'),
+        ('foc: {rate_hz: 5}', '/foc: expected ros__parameters with parameters below it'),
+        ('ros__parameters: {rate_hz: 5}', 'expected the name of a node'),
+        ('arm: {/foc: {ros__parameters: {rate_hz: 5}}}', 'above ros__parameters, got /arm//foc'),
+        *((f'{name}: {{ros__parameters: {{rate_hz: 5}}}}', f'got /{name}') for name in ('fo*', 'foc/', 'foc-x', '"***"', '2foc')),
+    ],
+)
+def test_node_and_commands_refuse_the_same_files(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / 'params.yaml'
+    file.write_text(text)
+    for read in (load_parameter_file, lambda each: check_parameters(['--ros-args', '--params-file', str(each)])):
+        with pytest.raises(FocError, match=re.escape(words.replace('"', ''))):
+            read(file)
+
+
+def test_a_node_needs_no_parameters_in_a_file(tmp_path: Path) -> None:
+    (tmp_path / 'params.yaml').write_text('# nothing yet\n')
+    check_parameters(['--ros-args', '--params-file', str(tmp_path / 'params.yaml')])
+
+
+def test_a_section_may_be_below_the_root(tmp_path: Path) -> None:
+    assert load(tmp_path, '/: {foc: {ros__parameters: {rate_hz: 5.0}}}').rate_hz == 5.0
+
+
 def test_a_later_argument_replaces_an_earlier_one(tmp_path: Path) -> None:
     file = tmp_path / 'foc.yaml'
     file.write_text('foc: {ros__parameters: {rate_hz: -1.0}}')
@@ -238,9 +267,12 @@ def test_a_later_argument_replaces_an_earlier_one(tmp_path: Path) -> None:
 
 def test_numbers_with_an_exponent_need_no_point(tmp_path: Path) -> None:
     file = tmp_path / 'foc.yaml'
-    file.write_text('foc: {ros__parameters: {budget_s: 1e-3, scene.timeout_s: 2E1}}')
+    file.write_text('foc: {ros__parameters: {budget_s: 1e-3, scene.timeout_s: 2E1, rate_hz: .5e2}}')
     config = load_parameter_file(file)
-    assert (config.budget_s, config.scene.timeout_s) == (0.001, 20.0)
+    assert (config.budget_s, config.scene.timeout_s, config.rate_hz) == (0.001, 20.0, 50.0)
+    file.write_text('foc: {ros__parameters: {rate_hz: 1_0}}')  # a text for ROS
+    with pytest.raises(ParameterError, match=r"rate_hz: expected a finite number in .*, got '1_0'"):
+        load_parameter_file(file)
 
 
 def test_a_node_declares_every_parameter_with_description_and_range(ros: Graph) -> None:

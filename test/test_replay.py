@@ -188,6 +188,15 @@ def test_transforms_and_markers_that_are_left_out_are_counted(tmp_path: Path, ca
     assert '2 parts of obstacle_markers left out (not_a_shape); no obstacles received' in capsys.readouterr().err
 
 
+def test_a_scene_in_another_frame_than_the_first_pose_is_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    marker = TYPES.make('visualization_msgs/msg/Marker', header=make_header(TYPES, ns(0), 'camera'), type=2)
+    array = TYPES.make('visualization_msgs/msg/MarkerArray', markers=[marker])
+    assert run(write_bag(tmp_path / 'odd', by_stamp(messages(seconds=FEW), [('/obstacle_markers', ns(-0.08), array)]))) == 0
+    assert capsys.readouterr().err == (
+        'foc_ros replay: 1 messages before the first hand pose left out: they are in another frame than it\n'
+    )
+
+
 def test_a_table_is_printed_without_json(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(bag) == 0
     out, err = capsys.readouterr()

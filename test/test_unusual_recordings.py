@@ -18,6 +18,7 @@ from mcap.writer import CompressionType, IndexType
 from foc_ros.analysis.recordings import BagRecording, find_recordings
 from foc_ros.cli.main import main
 from foc_ros.core.errors import FocWarning, MessageError, RecordingError
+from foc_ros.io import bags
 from foc_ros.io.bags import BagReader
 
 Content = list[tuple[str, int, bytes]]
@@ -131,6 +132,16 @@ def test_a_scan_counts_what_the_statistics_state(tmp_path: Path) -> None:
         read(tmp_path / 'less.mcap')
 
 
+def test_a_file_may_end_without_a_footer(tmp_path: Path) -> None:
+    """Its recorder has written the last bytes of a whole file, but neither summary nor footer before them."""
+    write_mcap(tmp_path / 'whole.mcap', SHORT, per_chunk=7)
+    data = (tmp_path / 'whole.mcap').read_bytes()
+    end = data.index(struct.pack('<BQ', 0x0F, 4)) + 13  # of the data section
+    (tmp_path / 'short.mcap').write_bytes(data[:end] + data[-8:])
+    with pytest.warns(FocWarning, match='the recorder was killed'):
+        assert read(tmp_path / 'short.mcap') == WHOLE
+
+
 def test_a_folder_of_sqlite_files_without_metadata_is_a_bag(tmp_path: Path) -> None:
     write_sqlite(tmp_path / 'one_0.db3', WHOLE[:9]).close()
     write_sqlite(tmp_path / 'one_1.db3', WHOLE[9:]).close()
@@ -182,6 +193,36 @@ def test_wrong_metadata_is_named_and_hides_nothing(tmp_path: Path, metadata: str
     (bag / 'metadata.yaml').write_text(metadata)
     with pytest.warns(FocWarning, match=words):
         assert read(bag) == WHOLE
+
+
+@pytest.mark.parametrize('count', [3, 99])
+def test_a_wrong_number_hides_no_file_that_states_its_own(tmp_path: Path, count: int) -> None:
+    bag = write_bag(tmp_path / 'one', SHORT)
+    write_metadata(bag, ['one.mcap'], count)
+    with pytest.warns(FocWarning, match=f'metadata.yaml is wrong: it states {count} messages, and the files hold {len(WHOLE)}'):
+        assert len(list(BagRecording('one', bag).items())) == len(WHOLE)
+    write_mcap(bag / 'one.mcap', SHORT, use_statistics=False)
+    with pytest.warns(FocWarning, match=f'states {count} messages'):
+        assert read(bag) == WHOLE
+    if count > len(WHOLE):  # the file states nothing, so that messages may have been lost
+        with pytest.raises(RecordingError, match=r'metadata\.yaml states 99 messages'):
+            list(BagRecording('one', bag).items())
+
+
+@pytest.mark.parametrize('has_metadata', [True, False])
+@pytest.mark.parametrize('lost', [0, 1])
+def test_a_missing_part_of_a_split_recording_is_named(tmp_path: Path, lost: int, has_metadata: bool) -> None:
+    parts = [f'split_{part}.db3' for part in range(3)]
+    for part, name in enumerate(parts):
+        write_sqlite(tmp_path / name, [*WHOLE[part::3]]).close()
+    if has_metadata:
+        write_metadata(tmp_path, parts, len(WHOLE))
+    assert read(tmp_path) == WHOLE
+    (tmp_path / parts[lost]).unlink()
+    with pytest.warns(FocWarning, match=rf'split_{lost}\.db3(, which metadata\.yaml names,)? is missing'):
+        assert len(read(tmp_path)) == len(WHOLE) - len(WHOLE[lost::3])
+    with pytest.raises(RecordingError, match=rf'split_{lost}\.db3.* is missing'):
+        list(BagRecording('split', tmp_path).items())
 
 
 def test_a_file_that_the_metadata_do_not_name_is_named(tmp_path: Path) -> None:
@@ -312,6 +353,28 @@ def test_a_bag_of_ros_1_is_named(tmp_path: Path) -> None:
     (tmp_path / 'old.bag').write_bytes(b'#ROSBAG V2.0\n')
     with pytest.raises(RecordingError, match='a bag of ROS 1: convert it to ROS 2'):
         read(tmp_path / 'old.bag')
+
+
+@pytest.mark.parametrize('time', [None, 'noon', 0.5])
+def test_a_message_without_a_time_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str], time: object) -> None:
+    database = write_sqlite(tmp_path / 'one.db3')
+    database.execute('UPDATE messages SET timestamp = ? WHERE id = 4', (time,))
+    database.commit()
+    database.close()
+    assert main(['replay', str(tmp_path / 'one.db3')]) == 2
+    assert capsys.readouterr().err.endswith(f'damaged: 1 of its {len(WHOLE)} messages have no time\n')
+
+
+def test_a_compressed_message_does_not_fill_the_memory(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bags, 'LARGEST_MESSAGE', 100_000)
+    packed = [(topic, stamp_ns, zstandard.compress(raw)) for topic, stamp_ns, raw in WHOLE]
+    place = [each[0] for each in packed].index('/hand_pose') + 3
+    packed[place] = (*packed[place][:2], zstandard.compress(bytes(200_000)))
+    write_sqlite(tmp_path / 'one.db3', packed).close()
+    assert main(['replay', str(tmp_path / 'one.db3')]) == 0
+    assert 'hand_pose_invalid 1' in capsys.readouterr().out
 
 
 def test_a_value_that_is_no_message_is_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The program `foc_ros` with a strategy of one's own: the one of `lv` and `hc` that needs less effort; see extending.md."""
+"""The program `foc_ros` with a strategy of one's own: the one of `lv` and `hc` that needs less effort; see extend.md."""
 
 import sys
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sized
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Sized
 from dataclasses import dataclass, field
 from heapq import merge
 from pathlib import Path
@@ -31,9 +31,12 @@ LATEST_S, LONGEST_S = 2e9, 86400.0
 """Bounds on a time (a stamp has 31 bits for seconds) and on a recording's length (beyond a day, two clocks are mixed up) [s]."""
 SHORTEST_STEP_S, LONGEST_STEP_S, FASTEST = 1e-4, 1.0, 20.0
 """Median times between two poses that a tracker has [s], and a speed that no hand has [m/s]; beyond them, a unit is wrong."""
-USUAL_STEP_S, FASTEST_CM = 0.01, 200.0
-"""Step with which units of time are compared [s], and speed beyond which a position is rather in mm than in cm [m/s]."""
+USUAL_STEP_S, USUAL_SPEED = 0.01, 0.5
+"""Step [s] and speed [m/s] with which units of time and length are compared."""
+FEWEST_STEPS = 2
+"""Steps from which the unit of a recording can be told."""
 TIME_UNITS = {'ns': 1e-9, 'us': 1e-6, 'ms': 1e-3, 'min': 60.0, 'h': 3600.0, 'days': 86400.0}
+LENGTH_UNITS = {'cm': 1e-2, 'mm': 1e-3, 'um': 1e-6}
 SCENE_PERIOD_NS, SCENE_LEAD_NS = NANOSECONDS // 2, NANOSECONDS // 10
 """The scene is sent twice a second, for the first time a tenth of a second before the first hand pose."""
 
@@ -52,12 +55,11 @@ def read_movements(file: Path) -> list[Movement]:
     found: dict[str, list[Row]] = {}
     errors: list[FocError] = []
     collect(errors, _group_rows, file, found)
+    warn_of_doubts(file, found)
     movements = [collect(errors, parse_movement, name, rows) for name, rows in found.items()]
     if errors:
         raise join_errors(errors)
-    found_movements = [each for each in movements if each is not None]
-    warn_of_units(file, found_movements)
-    return found_movements
+    return [each for each in movements if each is not None]
 
 
 def read_movement_rows(file: Path) -> dict[str, list[Row]]:
@@ -88,33 +90,49 @@ def parse_movement(name: str, table: Iterable[Row]) -> Movement:
     return Movement(name, tuple(EPOCH_NS + round(each[0] * NANOSECONDS) for each in samples), np.array(samples)[:, 1:])
 
 
-def warn_of_units(file: Path, movements: Iterable[Movement]) -> None:
-    """Warn of the recordings of a table whose times or positions cannot be in s and m, once for each unit that is more likely."""
+def warn_of_doubts(file: Path, found: Mapping[str, Sequence[Row]]) -> None:
+    """Warn of recordings whose times or positions cannot be in s and m, or whose times repeat; once for each kind of doubt.
+
+    The rows of each recording are given, also those that cannot be used: a bound that they exceed may be due to their unit.
+    """
     doubts: dict[tuple[str, str], list[tuple[str, str]]] = {}
-    for each in movements:
-        column, unit, reason = _find_likely_unit(each)
-        if unit:
-            doubts.setdefault((column, unit), []).append((each.name, reason))
-    for (column, unit), found in doubts.items():
-        name, reason = found[0]
-        others = f' and {len(found) - 1} others' if found[1:] else ''
-        warn(f'{file}: {column} of recording {name}{others} seems to be in {unit}: {reason}')
+    for name, rows in found.items():
+        columns = [column for column in ('t_s', 'x_m', 'y_m', 'z_m') if column in rows[0].cells]
+        doubt, reason = _find_doubt(np.array([[row.parse_number(column) for column in columns] for row in rows]))
+        if reason:
+            doubts.setdefault(doubt, []).append((name, reason))
+    for (column, words), doubted in doubts.items():
+        name, reason = doubted[0]
+        others = f' and {len(doubted) - 1} others' if doubted[1:] else ''
+        warn(f'{file}: {column} of recording {name}{others} {words}: {reason}')
 
 
-def _find_likely_unit(movement: Movement) -> tuple[str, str, str]:
-    """Return a column, the unit that it is likely in and the reason; empty texts if the numbers can be right."""
-    steps_s = np.diff(movement.stamps_ns) / NANOSECONDS
-    moves_m = np.linalg.norm(np.diff(movement.positions, axis=0), axis=1)[steps_s > 0.0]
-    steps_s = steps_s[steps_s > 0.0]
-    if not len(steps_s):
-        return '', '', ''
-    step_s = float(np.median(steps_s))
+def _find_doubt(rows: Array) -> tuple[tuple[str, str], str]:
+    """Return a column with what is wrong with it, and the reason; empty texts if the numbers can be right.
+
+    rows (n, 3) or (n, 4): time [s] and position [m], NaN where there is no number.
+    """
+    steps = np.diff(rows[np.isfinite(rows).all(axis=1)], axis=0)
+    steps_s, is_moving_on = steps[:, 0], steps[:, 0] > 0.0
+    repeated = int((steps_s == 0.0).sum())
+    if len(steps_s) >= FEWEST_STEPS and 2 * repeated >= len(steps_s):
+        return ('t_s', 'repeats'), f'{repeated} of {len(steps_s)} rows have the time of the row before'
+    if len(steps_s) < FEWEST_STEPS or not is_moving_on.any():
+        return ('', ''), ''
+    step_s = float(np.median(steps_s[is_moving_on]))
     if not SHORTEST_STEP_S <= step_s <= LONGEST_STEP_S:
-        unit = min(TIME_UNITS, key=lambda each: abs(math.log(step_s * TIME_UNITS[each] / USUAL_STEP_S)))
-        return 't_s', unit, f'the median time between two poses is {step_s:.3g} s'
-    speed = float(np.quantile(moves_m / steps_s, 0.99))
-    unit = '' if speed <= FASTEST else 'mm' if speed > FASTEST_CM else 'cm'
-    return 'the position', unit, f'the hand moves at {speed:.3g} m/s'
+        words = f'seems to be in {_find_nearest_unit(TIME_UNITS, step_s, USUAL_STEP_S)}'
+        return ('t_s', words), f'the median time between two poses is {step_s:.3g} s'
+    speed = float(np.quantile(np.linalg.norm(steps[is_moving_on, 1:], axis=1) / steps_s[is_moving_on], 0.99))
+    if speed <= FASTEST:
+        return ('', ''), ''
+    words = f'seems to be in {_find_nearest_unit(LENGTH_UNITS, speed, USUAL_SPEED)}'
+    return ('the position', words), f'the hand moves at {speed:.3g} m/s'
+
+
+def _find_nearest_unit(units: Mapping[str, float], value: float, usual: float) -> str:
+    """Return the unit in which a value is nearest to a usual one, by their ratio."""
+    return min(units, key=lambda each: abs(math.log(value * units[each] / usual)))
 
 
 @dataclass(frozen=True)

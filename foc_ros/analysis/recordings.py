@@ -19,7 +19,7 @@ from .csv_recordings import (
     read_movement_rows,
     read_scenes,
     recorded_messages,
-    warn_of_units,
+    warn_of_doubts,
 )
 
 RECORDINGS, OBSTACLES, GOALS, LABELS = 'recordings.csv', 'obstacles.csv', 'goals.csv', 'labels.csv'
@@ -98,11 +98,11 @@ def read_tables(data: Path) -> dict[str, TableRecording]:
     errors: list[FocError] = []
     scenes = collect(errors, _read_scenes, data)
     rows = collect(errors, read_movement_rows, data / RECORDINGS) or {}
+    warn_of_doubts(data / RECORDINGS, rows)
     movements = {name: _parse_movement(name, each) for name, each in rows.items()}
     failures = [each for each in movements.values() if isinstance(each, RecordingError)]
     if scenes is None or len(failures) == len(movements):
         raise join_errors([*errors, *failures])
-    warn_of_units(data / RECORDINGS, [each for each in movements.values() if isinstance(each, Movement)])
     return {name: TableRecording(name, movement, scenes.find(name)) for name, movement in movements.items()}
 
 

@@ -101,7 +101,13 @@ class Replay:
         ]
         counts = Counter(self.intake.counts) - self._counts_before
         parts = [(count, *name.split(DROPPED)) for name, count in counts.items() if DROPPED in name]
-        return '; '.join([*refused, *(f'{count} parts of {role} left out ({reason})' for count, role, reason in parts)])
+        left_out = [f'{count} parts of {role} left out ({reason})' for count, role, reason in parts]
+        wrong = SampleStatus.WRONG_FRAME.value
+        late = sum(count for name, count in counts.items() if name.endswith(wrong))
+        late -= sum(count for (_, status), count in self._refused.items() if status == wrong)
+        if late > 0:
+            left_out.append(f'{late} messages before the first hand pose left out: they are in another frame than it')
+        return '; '.join([*refused, *left_out])
 
     def _release(self, role: str, now_s: float) -> Iterator[tuple[Item, SampleStatus | None]]:
         for arrival in self._transforms.release(role, self.pipeline.frame_id, self.pipeline.config, now_s):

@@ -8,10 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TextIO
 
-from foc_ros.core.classes.library import is_same_recording
-from foc_ros.core.pipeline import Pipeline
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
-from foc_ros.io.class_library import save_library
 from foc_ros.io.json_output import encode_guidance, encode_prediction
 from foc_ros.io.terminal import show_progress
 from foc_ros.ros.messages.encode_guidance import GUIDANCE_OUTPUTS
@@ -96,11 +93,3 @@ def replay_to(
                     take(step, update)
             for consume in consumers:
                 consume(step)
-
-
-def save_learnt(library: Path, pipeline: Pipeline) -> int:
-    """Write the class library of a replay with the movements that were learnt; return how many it did not contain before."""
-    given, learnt = pipeline.given, pipeline.learnt.movements.finish().learnt
-    new = [each for each in learnt if not any(is_same_recording(each, known) for known in given)]
-    save_library(library, [*given, *new])
-    return len(new)

@@ -171,6 +171,7 @@ def replay(
     from foc_ros.analysis.replay_guidance import GuidanceReplay
     from foc_ros.analysis.replay_summary import Summary, facts
     from foc_ros.io.bags import BagReader
+    from foc_ros.io.class_library import extend_library
     from foc_ros.io.terminal import show_address, show_table
     from foc_ros.ros.parameters import write_parameter_file
 
@@ -188,7 +189,7 @@ def replay(
             files.replay_to(output, reader, played, guiding, consumers, guided)
             answer = summary.answer(played.intake.counts, reader.duration_s)
         if learning.learn is not None:
-            answer['learned'] = files.save_learnt(learning.learn, played.pipeline)
+            answer['learned'] = extend_library(learning.learn, played.pipeline.learnt.movements.finish().learnt)
         if learning.operator is not None:
             write_parameter_file('--operator', learning.operator, played.pipeline.adapted_config)
         if report is not None and collector is not None:

@@ -7,9 +7,10 @@ is missing from a recording that can be read all the same is a :class:`FocWarnin
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from heapq import merge
@@ -36,6 +37,8 @@ COMPRESSED = ('.zstd', '.zst')
 """What follows these suffixes where the file as a whole is compressed."""
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
 """Begin of a message that is compressed by itself; one in CDR begins with a zero."""
+LARGEST_MESSAGE = 100_000_000
+"""Size of a compressed message above which it is not unpacked [bytes]; a cloud of a million points has 32 MB."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,7 @@ class BagReader:
 
     def _open(self) -> None:
         _refuse_unreadable(self.path)
-        paths, stated = _list_files(self.path) if self.path.is_dir() else ([self.path], None)
+        paths, stated, missing = _list_files(self.path) if self.path.is_dir() else ([self.path], None, '')
         self._files = [self._open_file(each) for each in paths]
         self._channels = [each for file in self._files for each in file.channels]
         self.message_count = sum(file.message_count for file in self._files)
@@ -129,10 +132,14 @@ class BagReader:
                 self._report_loss(f'{path.name}: {file.loss}')
             elif file.doubt and stated is None:
                 warn(f'{self.path}: {path.name}: {file.doubt}')
-        if stated is not None and stated > self.message_count:
-            self._report_loss(f'metadata.yaml states {stated} messages, and the files hold {self.message_count}')
-        elif stated is not None and stated < self.message_count:
-            warn(f'{self.path}: metadata.yaml is wrong: it states {stated} messages, and the files hold {self.message_count}')
+        words = f'states {stated} messages, and the files hold {self.message_count}'
+        if missing:
+            self._report_loss(missing if stated is None else f'{missing}; it {words}')
+        elif stated is not None and stated != self.message_count:
+            if stated < self.message_count or all(file.is_counted for file in self._files):
+                warn(f'{self.path}: metadata.yaml is wrong: it {words}')
+            else:
+                self._report_loss(f'metadata.yaml {words}')
         self.roles = self._assign_topics()
         self._transforms = topics.find_transforms({each.topic: each.msgtype for each in self._channels})
 
@@ -240,17 +247,18 @@ def _strip_compression(name: str) -> str:
 
 
 def _decompress(data: bytes) -> bytes:
-    """Return the content of compressed bytes, which may not state its size; the bytes themselves where they are damaged."""
+    """Return the content of compressed bytes; the bytes themselves where they are damaged, or would fill the memory."""
     try:
-        return zstandard.ZstdDecompressor().decompressobj().decompress(data)
+        content = zstandard.ZstdDecompressor().stream_reader(data).read(LARGEST_MESSAGE + 1)
     except zstandard.ZstdError:
         return data
+    return content if len(content) <= LARGEST_MESSAGE else data
 
 
-def _list_files(folder: Path) -> tuple[list[Path], int | None]:
-    """Return the files of a bag directory and the number of messages that its metadata.yaml states, None if it has none.
+def _list_files(folder: Path) -> tuple[list[Path], int | None, str]:
+    """Return the files of a bag directory, the number of messages that its metadata.yaml states, and in words which files lack.
 
-    The file is not needed to read a bag, so a wrong one is only named.
+    The number is None without a metadata.yaml. That is not needed to read a bag, so a wrong one is only named.
     """
     found: dict[str, Path] = {}
     for path in sorted(folder.iterdir()):
@@ -258,25 +266,37 @@ def _list_files(folder: Path) -> tuple[list[Path], int | None]:
             found.setdefault(_strip_compression(path.name), path)
     metadata = folder / 'metadata.yaml'
     if not metadata.exists():
-        return list(found.values()), None
+        return list(found.values()), None, _find_gap(found)
     try:
         stated = yaml.safe_load(metadata.read_text('utf-8'))['rosbag2_bagfile_information']
         count = stated['message_count']
         names = list(dict.fromkeys(_strip_compression(PurePath(each).name) for each in stated['relative_file_paths']))
-        if not names or not isinstance(count, int):
+        if not names or type(count) is not int:
             raise ValueError('it names no file, or no number of messages')
     except Exception as error:  # whatever stands in it
         reason = ' '.join(str(error).split()) or type(error).__name__
         warn(f'{metadata}: not the metadata of a bag, and not used ({type(error).__name__}: {reason})')
-        return list(found.values()), None
+        return list(found.values()), None, _find_gap(found)
     if not set(names) & set(found):
         warn(f'{metadata}: of another bag, and not used: it names {", ".join(names)}, and here is {", ".join(found) or "none"}')
-        return list(found.values()), None
-    if missing := [name for name in names if name not in found]:
-        warn(f'{folder}: {", ".join(missing)}, which metadata.yaml names, is missing')
+        return list(found.values()), None, _find_gap(found)
     if others := [name for name in found if name not in names]:
         warn(f'{folder}: {", ".join(others)}, which metadata.yaml does not name, is not read')
-    return [found[name] for name in names if name in found], count
+    missing = ', '.join(name for name in names if name not in found)
+    words = f'{missing}, which metadata.yaml names, is missing' if missing else ''
+    return [found[name] for name in names if name in found], count, words
+
+
+def _find_gap(names: Iterable[str]) -> str:
+    """Return in words which file lacks among those of a recorder, which numbers the parts of a recording from 0."""
+    parts = [re.fullmatch(r'(.*)_(\d+)(\.\w+)', name) for name in names]
+    stems = {(part[1], part[3]) if part else None for part in parts}
+    if len(parts) < 2 or len(stems) > 1 or None in stems:
+        return ''
+    numbers = {int(part[2]) for part in parts if part}
+    missing = next((number for number in range(max(numbers)) if number not in numbers), None)
+    stem, end = next(each for each in stems if each)
+    return '' if missing is None else f'{stem}_{missing}{end} is missing, by the numbers of the other files'
 
 
 def _refuse_unreadable(path: Path) -> None:

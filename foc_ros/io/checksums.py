@@ -1,83 +1,60 @@
-"""Checksums (CRC-32) of MCAP files: they are added to a file after it has been written, and compared before a file is read.
+"""Checksums (CRC-32) of MCAP files: those that the libraries do not write or compare.
 
 The MCAP specification (https://mcap.dev/spec) has a checksum for every chunk, one for the data section, and one for the summary
-section with the footer. A stored value of 0 means that there is no checksum. The library rosbags compares the checksums of the
-chunks when it reads a file, and writes none.
+section with the footer. A stored value of 0 means that there is no checksum. The library rosbags writes none, and the library
+mcap compares that of the summary never, and that of the data section only after it has used all of it.
 """
 
 from __future__ import annotations
 
 import struct
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO
 from zlib import crc32
 
 from foc_ros.core.errors import RecordingError
 
-_MAGIC = b'\x89MCAP0\r\n'
+MAGIC = b'\x89MCAP0\r\n'
+FOOTER = struct.Struct('<BQQQI8s')
+"""The end of a file: code and length of the footer, begin of the summary section and of its offsets, its checksum, and MAGIC."""
 _HEAD = struct.Struct('<BQ')
 """Code and length of a record."""
 _CRC = struct.Struct('<I')
-_DATA_END, _CHUNK = 0x0F, 0x06
+_FOOTER, _CHUNK, _DATA_END = 0x02, 0x06, 0x0F
+_DATA_END_SIZE = _HEAD.size + _CRC.size
 _CHUNK_CRC, _CHUNK_CONTENT = _HEAD.size + 24, _HEAD.size + 40
 """Offsets of the checksum and of the messages in a chunk that is not compressed."""
 _BLOCK = 1 << 20
 
 
-class _Layout(NamedTuple):
-    """Offsets in a file: the end of the data section, the start of the summary section, and the checksum of the summary section.
-
-    The checksum of the summary covers all bytes from the start of the section to the checksum itself, which is in the footer.
-    """
-
-    data_end: int
-    summary_start: int
-    summary_crc: int
-
-
 def add_checksums(file: Path) -> None:
-    """Write the checksums into a file that has a summary section and no compression. Raises OSError if it cannot be written."""
+    """Write the checksums into a whole file without compression. Raises OSError if it cannot be written."""
     with file.open('r+b') as stream:
-        layout = _find_layout(stream)
-        assert layout is not None
-        place = len(_MAGIC)
-        while place < layout.data_end:
-            code, length = _HEAD.unpack(_read(stream, place, _HEAD.size))
-            end = place + _HEAD.size + length
+        start, summary, code = len(MAGIC), 0, 0
+        while code != _FOOTER:
+            code, length = _HEAD.unpack(_read(stream, start, _HEAD.size))
+            end = start + _HEAD.size + length
             if code == _CHUNK:
-                _write_crc(stream, place + _CHUNK_CRC, _compute_crc(stream, place + _CHUNK_CONTENT, end))
-            place = end
-        _write_crc(stream, layout.data_end + _HEAD.size, _compute_crc(stream, 0, layout.data_end))
-        _write_crc(stream, layout.summary_crc, _compute_crc(stream, layout.summary_start, layout.summary_crc))
+                _write_crc(stream, start + _CHUNK_CRC, _compute_crc(stream, start + _CHUNK_CONTENT, end))
+            elif code == _DATA_END:
+                _write_crc(stream, start + _HEAD.size, _compute_crc(stream, 0, start))
+                summary = end
+            elif code == _FOOTER:
+                _write_crc(stream, end - _CRC.size, _compute_crc(stream, summary, end - _CRC.size))
+            start = end
 
 
-def check_checksums(file: Path) -> None:
-    """Raise RecordingError if a section differs from its checksum. The reader finds damaged chunks and a damaged layout."""
-    with file.open('rb') as stream:
-        layout = _find_layout(stream)
-        if layout is None:
-            return
-        _check_section(stream, 'summary', layout.summary_start, layout.summary_crc, layout.summary_crc)
-        _check_section(stream, 'data', 0, layout.data_end, layout.data_end + _HEAD.size)
-
-
-def _find_layout(stream: BinaryIO) -> _Layout | None:
-    """Return the offsets of the sections, or None if no footer that follows a data section is at the end of the file."""
-    footer = stream.seek(0, 2) - len(_MAGIC) - _HEAD.size - 20
-    if footer < 0 or _read(stream, footer, _HEAD.size) != _HEAD.pack(0x02, 20):
-        return None
-    (start,) = struct.unpack('<Q', _read(stream, footer + _HEAD.size, 8))
-    summary_start = start if 0 < start <= footer else footer
-    data_end = summary_start - _HEAD.size - _CRC.size
-    if data_end < 0 or _read(stream, data_end, _HEAD.size) != _HEAD.pack(_DATA_END, _CRC.size):
-        return None
-    return _Layout(data_end, summary_start, footer + _HEAD.size + 16)
-
-
-def _check_section(stream: BinaryIO, name: str, start: int, end: int, place: int) -> None:
-    (stated,) = _CRC.unpack(_read(stream, place, _CRC.size))
-    if stated and stated != _compute_crc(stream, start, end):
-        raise RecordingError(f'damaged: the {name} section differs from its checksum')
+def check_sections(stream: BinaryIO) -> None:
+    """Raise RecordingError if a section of a file with a footer differs from its checksum; the library reads the chunks' own."""
+    footer = stream.seek(0, 2) - FOOTER.size
+    _, _, start, _, summary_crc, _ = FOOTER.unpack(_read(stream, footer, FOOTER.size))
+    summary = start if _DATA_END_SIZE < start <= footer else footer
+    data = summary - _DATA_END_SIZE
+    if summary_crc and summary_crc != _compute_crc(stream, summary, footer + FOOTER.size - len(MAGIC) - _CRC.size):
+        raise RecordingError('damaged: the summary section differs from its checksum')
+    head, data_crc = struct.unpack('<9sI', _read(stream, data, _DATA_END_SIZE))
+    if head == _HEAD.pack(_DATA_END, _CRC.size) and data_crc and data_crc != _compute_crc(stream, 0, data):
+        raise RecordingError('damaged: the data section differs from its checksum')
 
 
 def _compute_crc(stream: BinaryIO, start: int, end: int) -> int:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+import os
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from foc_ros.core.classes.library import MOST_STATES, POINTS, Demonstration
+from foc_ros.core.classes.library import MOST_STATES, POINTS, Demonstration, is_same_recording
 from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.core.types import LEFT, RIGHT, Array
 
@@ -46,13 +49,43 @@ def save_library(file: Path, ways: Sequence[Demonstration]) -> None:
     text = json.dumps({'ways': [_dump_demonstration(way) for way in ways]}, allow_nan=False) + '\n'
     if len(text) > MAX_BYTES:
         raise InputError(f'{file}: ways', f'at most {MAX_BYTES:,} bytes', f'{len(text):,} of {len(ways)} ways')
-    unfinished = file.with_name(file.name + '.unfinished')
+    unfinished = file.with_name(f'{file.name}.{os.getpid()}.unfinished')  # another process may write its own
     try:
         unfinished.write_text(text, encoding='utf-8')
         unfinished.replace(file)
     except OSError as error:
         unfinished.unlink(missing_ok=True)
         raise RecordingError(f'{file}: cannot be written: {error.strerror}') from error
+
+
+def extend_library(file: Path, ways: Sequence[Demonstration]) -> int:
+    """Add demonstrations to a library, which is made where there is none; return how many of them it did not contain.
+
+    Processes that do so at once wait for each other, so that the file has what all of them add. Raises as `load_library` and
+    `save_library` do.
+    """
+    with _lock(file.parent):
+        given = load_library(str(file)) if file.exists() else ()
+        new = [each for each in ways if not any(is_same_recording(each, known) for known in given)]
+        save_library(file, [*given, *new])
+    return len(new)
+
+
+@contextmanager
+def _lock(folder: Path) -> Iterator[None]:
+    """Let one process at a time continue for a folder, where its system and its file system can; a lock ends with its process."""
+    if sys.platform == 'win32':
+        yield
+        return
+    import fcntl
+
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def _dump_demonstration(way: Demonstration) -> dict[str, Any]:

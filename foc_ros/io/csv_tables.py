@@ -54,13 +54,19 @@ class Row:
         """Return a cell as a number in [low, high]; default: if the table does not have the column."""
         if column not in self.cells and default is not None:
             return default
-        try:
-            value = float(self.cells[column].replace(self.decimal_mark, '.'))
-        except ValueError:
-            value = math.nan
+        value = self.parse_number(column)
         if not low <= value <= high:
-            raise self.make_error(column, f'a number in [{low:.12g}, {high:.12g}]')
+            hint = ' with a decimal point' if self.decimal_mark == '.' and ',' in self.cells[column] else ''
+            raise self.make_error(column, f'a number{hint} in [{low:.12g}, {high:.12g}]')
         return value
+
+    def parse_number(self, column: str) -> float:
+        """Return a cell as a number, NaN where it is none."""
+        text = self.cells.get(column, '').replace(self.decimal_mark, '.')
+        try:
+            return math.nan if '_' in text else float(text)
+        except ValueError:
+            return math.nan
 
     def read_integer(self, column: str, low: int, high: int, default: int) -> int:
         """Return a cell as a whole number in [low, high]; default: if the table does not have the column."""
@@ -97,7 +103,7 @@ def read_rows(
 ) -> Iterator[Row]:
     """Yield the rows of a CSV file with a header; empty lines are skipped, and other columns are allowed.
 
-    The separator is one of :data:`SEPARATORS`, found in the header.
+    The separator is one of :data:`SEPARATORS`, found in the header, before which a spreadsheet may name it (`sep=;`).
 
     optional: columns that may be missing; instead: columns that together replace a needed one.
 
@@ -108,7 +114,7 @@ def read_rows(
         with file.open(newline='', encoding='utf-8-sig') as stream:
             if file.stat().st_size > MAX_BYTES:
                 raise RecordingError(f'{file}: expected at most {MAX_BYTES:,} bytes, got {file.stat().st_size:,}')
-            first = stream.readline()
+            first = next((line for line in stream if line.strip() and not line.startswith('sep=')), '')
             separator = _find_separator(first, {*needed, *optional})
             decimal_mark = '.' if separator == ',' else ','
             reader = csv.reader(chain([first], stream), delimiter=separator, skipinitialspace=True, strict=True)

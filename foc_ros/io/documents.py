@@ -38,6 +38,8 @@ class _StrictLoader(yaml.SafeLoader):
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         """Return the mapping; see :class:`yaml.SafeLoader`."""
         try:
+            if any(key.tag == 'tag:yaml.org,2002:merge' for key, _ in node.value):
+                raise ValueError('merging (<<) is not supported')
             _check_keys(key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode))
         except ValueError as error:
             raise yaml.constructor.ConstructorError(None, None, str(error), node.start_mark) from error
@@ -45,18 +47,19 @@ class _StrictLoader(yaml.SafeLoader):
 
     def construct_yaml_int(self, node: yaml.ScalarNode) -> Any:
         """Return the number; see :data:`MAX_DIGITS`."""
-        return super().construct_yaml_int(node) if len(node.value) <= MAX_DIGITS and ':' not in node.value else node.value
+        is_number = len(node.value) <= MAX_DIGITS and not set(':_') & set(node.value)
+        return super().construct_yaml_int(node) if is_number else node.value
 
     def construct_yaml_float(self, node: yaml.ScalarNode) -> Any:
-        """Return the number; `1:30.0` remains a text, as it is for ROS and YAML 1.2, and does not become 90.0."""
-        return super().construct_yaml_float(node) if ':' not in node.value else node.value
+        """Return the number; `1:30.0` and `1_0.0` remain texts, as they are for ROS and YAML 1.2."""
+        return super().construct_yaml_float(node) if not set(':_') & set(node.value) else node.value
 
 
 _StrictLoader.add_constructor('tag:yaml.org,2002:int', _StrictLoader.construct_yaml_int)
 _StrictLoader.add_constructor('tag:yaml.org,2002:float', _StrictLoader.construct_yaml_float)
-# as for ROS, and YAML 1.2, 1e-3 is a number; for PyYAML only 1.0e-3 is one
-_EXPONENT = re.compile(r'[-+]?[0-9]+e[-+]?[0-9]+$', re.IGNORECASE)
-_StrictLoader.add_implicit_resolver('tag:yaml.org,2002:float', _EXPONENT, list('-+0123456789'))
+# as for ROS, and YAML 1.2, 1e-3 and .5e2 are numbers; for PyYAML only 1.0e-3 and .5e+2 are
+_EXPONENT = re.compile(r'[-+]?([0-9]+\.?|[0-9]*\.[0-9]+)e[-+]?[0-9]+$', re.IGNORECASE)
+_StrictLoader.add_implicit_resolver('tag:yaml.org,2002:float', _EXPONENT, list('-+.0123456789'))
 
 
 def read_document(file: Path) -> Any:

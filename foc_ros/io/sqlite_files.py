@@ -27,6 +27,8 @@ _WAL_FLAG = 18
 class SqliteFile:
     """A file, to be closed after use, with the attributes of :class:`foc_ros.io.mcap_files.McapFile`."""
 
+    is_counted = False
+
     def __init__(self, path: Path) -> None:
         self._stack = ExitStack()
         try:
@@ -66,8 +68,11 @@ class SqliteFile:
         with path.open('rb') as stream:
             is_logged = stream.read(_WAL_FLAG + 1)[_WAL_FLAG:] == b'\2'
         self.channels = list(self._list_channels())
-        query = 'SELECT count(*), max(rowid) - min(rowid) + 1, min(timestamp), max(timestamp) FROM messages NOT INDEXED'
-        self.message_count, written, *times_ns = self._database.execute(query).fetchone()
+        found = "count(*), sum(typeof(timestamp) <> 'integer'), max(rowid) - min(rowid) + 1, min(timestamp), max(timestamp)"
+        row = self._database.execute(f'SELECT {found} FROM messages NOT INDEXED').fetchone()  # noqa: S608
+        self.message_count, untimed, written, *times_ns = row
+        if untimed:
+            raise RecordingError(f'damaged: {untimed} of its {self.message_count} messages have no time')
         self.times_ns = times_ns[0] or 0, times_ns[1] or 0
         gaps = (written or 0) - self.message_count
         self.doubt = f'{gaps} messages between its first and its last are missing' if gaps else ''

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import Any
 
-from foc_ros.core.errors import FocError, ParameterError, list_messages, print_warnings
+from foc_ros.core.errors import FocError, list_messages, print_warnings
 
 from .parameters import check_parameters
 
@@ -71,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with print_warnings('foc_node'):
             check_parameters(given)
-    except ParameterError as error:
+    except FocError as error:
         return _reject(error)
     import rclpy
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor

@@ -16,11 +16,13 @@ from typing import Any
 import yaml
 
 from foc_ros.core.config import Config, Parameter, flatten, list_parameters, replace_values
-from foc_ros.core.errors import FocError, InputError, ParameterError, warn
+from foc_ros.core.errors import InputError, ParameterError, warn
 from foc_ros.io.documents import parse_yaml, read_document
 
 NODE = '/foc'
 """Name of the node, with its namespace, unless it is started with another one."""
+_NAME = re.compile(r'(/(\*\*?|[A-Za-z_]\w*))+', re.ASCII)
+"""Names of nodes in a parameter file as rcl allows them."""
 _REMAP = re.compile(r'__(node|name|ns):=(\S+)')
 AUTOSTART = 'autostart'
 NODE_ONLY = ('use_sim_time', 'start_type_description_service', 'qos_overrides', AUTOSTART)
@@ -40,28 +42,27 @@ def load_parameter_file(path: Path | str) -> Config:
 
 
 def check_parameters(arguments: Sequence[str]) -> None:
-    """Raise ParameterError for wrong parameters in the ROS arguments of a node, before the node is imported, which takes seconds.
+    """Raise FocError for wrong parameters in the ROS arguments of a node, before the node is imported, which takes seconds.
 
+    A parameter file is refused where the commands refuse it, also for a key that is given twice, of which ROS takes the last.
     This leaves to the node what it cannot read as simply as ROS would: parameters of one node among several, and texts that
     PyYAML takes for dates or numbers. The node checks all that it is given.
     """
     values: dict[str, object] = {}
     names = {'node': 'foc', 'ns': ''} | {key.replace('name', 'node'): value for key, value in _REMAP.findall(' '.join(arguments))}
     node = f'/{names["ns"].strip("/")}/{names["node"]}'.replace('//', '/')
-    try:
-        for option, given in pairwise(arguments):
-            if option == '--params-file':
-                values.update(_read_values(given, node, is_needed=False))
-            elif option in ('-p', '--param'):
-                name, _, text = given.partition(':=')
-                if ':' in name:
-                    return
+    for option, given in pairwise(arguments):
+        if option == '--params-file':
+            values.update(_read_values(given, node, is_needed=False))
+        elif option in ('-p', '--param'):
+            name, _, text = given.partition(':=')
+            try:
                 value = parse_yaml(text)
-                if name in KNOWN and isinstance(KNOWN[name].default, str) and not isinstance(value, str):
-                    return
-                values.update(_flatten_group({name: value}))
-    except (FocError, ValueError, yaml.YAMLError):
-        return
+            except (ValueError, yaml.YAMLError):
+                return
+            if ':' in name or (name in KNOWN and isinstance(KNOWN[name].default, str) and not isinstance(value, str)):
+                return
+            values.update(_flatten_group({name: value}))
     replace_values(Config(), values)
 
 
@@ -72,6 +73,8 @@ def _read_values(path: Path | str, node: str, *, is_needed: bool) -> dict[str, o
     """
     document = read_document(Path(path))
     expected = f'a section for the node {node}, such as /** or {node}'
+    if document is None and not is_needed:
+        return {}
     if not isinstance(document, Mapping):
         raise ParameterError(str(path), expected, 'an empty file' if document is None else type(document).__name__)
     values: dict[str, object] = {}
@@ -94,7 +97,10 @@ def _read_values(path: Path | str, node: str, *, is_needed: bool) -> dict[str, o
 def _list_sections(group: Mapping[Any, object], path: str, name: str = '') -> Iterator[tuple[str, Mapping[Any, object]]]:
     """Yield the sections of a parameter file, each with the name of its nodes, which may be nested."""
     for key, value in group.items():
-        inner = name if key == 'ros__parameters' else f'{name}/{str(key).strip("/")}'
+        inner = name if key == 'ros__parameters' else f'{name.rstrip("/")}/{str(key).removeprefix("/" if not name else "")}'
+        if not _NAME.fullmatch(inner) and inner != '/':
+            expected = 'the name of a node, such as /foc, or /** for any number of its parts and /* for one'
+            raise ParameterError(path, f'{expected}, above ros__parameters', inner or 'none')
         if not isinstance(value, Mapping) or (not value and inner != name):
             given = group if name else value
             raise ParameterError(f'{path}: {name or inner}', 'ros__parameters with parameters below it', repr(given)[:_WIDTH])

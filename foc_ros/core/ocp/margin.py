@@ -110,9 +110,9 @@ class Margin(NamedTuple):
 class Turning(NamedTuple):
     """What the second derivatives of q margins follow from.
 
-    k; is_free: whether k changes with the control; worth: -dg/dw of the variance w = s^2; turn: 1 / D where the normal turns, else
-    0 [1/m]; across: dw by the angle of the normal; size: Var[R^2] / 4 where it counts [m^4]; bend: second derivative in time.
-    All are (q,).
+    k; is_free: whether k changes with the control; worth: -dg/dw of the variance w = s^2; turn: 1 / D where the normal turns,
+    else 0 [1/m]; across: dw by the angle of the normal; size: Var[R^2] / 4 where it counts [m^4]; bend: second derivative in
+    time. All are (q,).
     """
 
     k: Array
@@ -372,8 +372,8 @@ class Margins:
     ) -> tuple[Contacts, Array]:
         """Return the minima beside some places of the grid, of movements in rows `at`, and the safety factors there.
 
-        There may be several beside one place, next to the corners of a small obstacle. Those are left out that cannot be below the
-        least factor found for their movement and a bound (r,), if there is one.
+        There may be several beside one place, next to the corners of a small obstacle. Those are left out that cannot be below
+        the least factor found for their movement and a bound (r,), if there is one.
         """
         spacing = self._half * (BRACKET[1] - BRACKET[0])
         times, factors, is_on_edge = self._sample(motion, k, at, places, self._half)

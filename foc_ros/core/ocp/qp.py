@@ -139,8 +139,8 @@ def _hold(lift: Array, unit: Array, y: Array, rate: Array, short: Array, is_free
     """Return the squares (r, h, h) and the pulls (r, h) that hold contacts where they are, along gradients of unit length.
 
     Contacts that hold the mean off are met as equations A p + g = r dk by the solution of the QP, so that a square of what is
-    missing in them changes the Hessian only where the solution does not go: with it, a Hessian that is positive along the contacts
-    is positive everywhere. Where k is free, dk is the mean of (A p + g) / r with the weights y r.
+    missing in them changes the Hessian only where the solution does not go: with it, a Hessian that is positive along the
+    contacts is positive everywhere. Where k is free, dk is the mean of (A p + g) / r with the weights y r.
     """
     force = y * unit
     weight = np.sqrt(lift[:, None] * force / np.maximum(force.max(axis=1, keepdims=True, initial=0.0), np.finfo(float).tiny))
