@@ -60,9 +60,7 @@ html_theme = 'furo'
 html_title = f'foc_ros {release}'
 html_logo = 'images/logo.svg'
 html_favicon = 'images/logo.svg'
-myst_html_meta = {
-    'description': 'foc_ros predicts where the hand of a teleoperator is going, on ROS 2 and in Python'
-}
+myst_html_meta = {'description': 'foc_ros predicts where the hand of a teleoperator is going, on ROS 2 and in Python'}
 # One file holds the program and the fonts of MathJax. It becomes part of the site, so that formulas need no network.
 mathjax_path = 'tex-svg.js'
 html_static_path = ['_static', str(Path(mathjax.__path__[0]) / 'static' / 'mathjax' / 'es5' / mathjax_path)]
