@@ -48,3 +48,14 @@ def test_a_position_in_a_less_likely_class_is_in_the_region_and_not_in_the_ellip
     assert scores['inside_taken']['0.9'] == {'0.25': 1.0, '0.5': 1.0, '1': None}
     assert scores['inside_all']['0.9'] == {'0.25': 1.0, '0.5': 1.0, '1': None}
     assert scores['inside_all']['0.5'] == {'0.25': 0.0, '0.5': 0.0, '1': None}
+
+
+def test_positions_are_scored_given_what_is_known() -> None:
+    """The unknown share has no path, and so no part in the density of positions."""
+    scores = []
+    for known in (1.0, 0.5):
+        two = make_candidates([[LEFT], [RIGHT]], likelihood=[0.6 * known, 0.4 * known])
+        two = replace(two, mean=np.stack([np.zeros((H, 2)), np.full((H, 2), [1.0, 0.0])]))
+        scores.append(compute_position_scores([recorded(observation(two, positions=np.full((H, 2), [0.5, 0.2])))]))
+    for name in ('nlpd', 'inside_all', 'displacement_m'):
+        assert str(scores[0][name]) == str(scores[1][name])

@@ -71,9 +71,14 @@ def test_a_repeated_way_becomes_more_likely() -> None:
     assert last[1] == pytest.approx((prior * last[0] + 3.0) / (prior + 3.0), abs=0.02)
 
 
-def test_by_default_movements_say_nothing_of_ways() -> None:
-    default = CONFIG.with_values({'experience.learning': Config().experience.learning})
-    with_paths, without = Pipeline(default), Pipeline(CONFIG.with_values({'experience.learning': 'none'}))
+def test_it_is_off_by_default() -> None:
+    pipeline = Pipeline(CONFIG.with_values({'experience.learning': Config().experience.learning}))
+    follow(pipeline, reach(ABOVE), reach(ABOVE))
+    assert not pipeline.learnt.movements.learnt and not pipeline.learnt.movements.states
+
+
+def test_learnt_goals_and_paths_say_nothing_of_ways() -> None:
+    with_paths, without = (Pipeline(CONFIG.with_values({'experience.learning': each})) for each in ('goals', 'none'))
     learnt, unlearnt = (follow(each, *[reach(ABOVE)] * 3, is_predicting=True) for each in (with_paths, without))
     assert len(with_paths.learnt.movements.learnt) == 2 and not without.learnt.movements.states
     assert [likelihood_above(each) for each in learnt] == pytest.approx([likelihood_above(each) for each in unlearnt])

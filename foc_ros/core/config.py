@@ -184,7 +184,7 @@ class ExperienceConfig:
     """Use of recordings as evidence: those in the class library (`homotopy.library`), and those that are learnt."""
 
     learning: str = _p(
-        'goals',
+        'none',
         'what movements that end at a goal say of later ones in the running program: nothing; paths and goals; also ways',
         choices=LEARNINGS,
     )

@@ -70,6 +70,12 @@ class CandidateTable(Record):
     def __len__(self) -> int:
         return len(self.labels)
 
+    @property
+    def mixture(self) -> Array:
+        """Weights (k,) of the candidates in the density of positions: what is unknown has none."""
+        total = float(self.likelihood.sum())
+        return self.likelihood / total if total > 0.0 else self.likelihood
+
 
 @dataclass(frozen=True, eq=False)
 class Observation(Record):

@@ -53,13 +53,11 @@ def compute_position_scores(recordings: Sequence[ObservedRecording]) -> dict[str
     observations = [each for recording in recordings for each in recording.observations]
     true = np.array([each.truth.positions for each in observations])
     leading, taken = [_find_leading(each) for each in observations], _find_taken(recordings)
-    denser = np.array(
-        [compute_denser_share(each, each.candidates.likelihood, each.candidates.covariance) for each in observations]
-    )
+    denser = np.array([compute_denser_share(each, each.candidates.mixture, each.candidates.covariance) for each in observations])
     predicted = {
         'most likely': np.array([each.candidates.mean[row] for each, row in zip(observations, leading, strict=True)]),
         'likelihood-weighted': np.array(
-            [np.tensordot(each.candidates.likelihood, each.candidates.mean, 1) for each in observations]
+            [np.tensordot(each.candidates.mixture, each.candidates.mean, 1) for each in observations]
         ),
         'constant velocity': np.array([_continue_velocity(each) for each in observations]),
         'straight minimum jerk': np.array([_continue_minimum_jerk(each) for each in observations]),
@@ -94,7 +92,7 @@ def compute_nlpd(observation: Observation) -> Array:
     offset = observation.truth.positions - candidates.mean[counted]
     covariance = candidates.covariance[counted] + EXACT * np.eye(2)
     entries = covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1]
-    found[HORIZONS] = -log_mixture_density(candidates.likelihood[counted], offset, *entries)[HORIZONS]
+    found[HORIZONS] = -log_mixture_density(candidates.mixture[counted], offset, *entries)[HORIZONS]
     return found
 
 

@@ -129,7 +129,7 @@ def score_observations(recording: ObservedRecording, config: Config) -> ReplaySc
         )
         found.uniform[key] = -sum(np.log(about.possible) for about in questions)
     for observation in recording.observations:
-        densities = compute_log_densities(observation, observation.candidates.likelihood, config, FEW_WIDENINGS)
+        densities = compute_log_densities(observation, observation.candidates.mixture, config, FEW_WIDENINGS)
         if densities is not None:
             found.positions[recording.name, observation.stamp_ns] = densities
     return found
