@@ -228,9 +228,9 @@ def test_boxes_are_drawn_with_their_outlines_and_fit_into_the_picture() -> None:
     assert left < ring[:, 0].min() and ring[:, 0].max() < right and bottom < ring[:, 1].min() and ring[:, 1].max() < top
 
 
-def test_the_share_without_a_likelihood_is_hatched() -> None:
+def test_the_unknown_share_is_hatched() -> None:
     made = predictions(samples())
-    lost = [replace(each, candidates=each.candidates[-1:], most_likely=None) for each in made[20:]]
+    lost = [replace(each, candidates=each.candidates[-1:], most_likely=None, unknown=1.0) for each in made[20:]]
     axes = Figure().subplots()
     draw_likelihoods(axes, build_candidate_tracks([build_snapshot(each) for each in (*made[:20], *lost)]), START_NS)
     (hatched,) = axes.collections

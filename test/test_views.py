@@ -52,13 +52,8 @@ def test_a_snapshot_holds_the_numbers_of_its_prediction_and_names_classes_in_wor
     assert describe_class(()) == 'direct'
 
 
-def test_the_share_without_a_likelihood_counts_what_is_not_known() -> None:
-    made = prediction(START_NS, NOWHERE)
-    assert build_snapshot(made).unknown_share == 1 / 4
-    lost = made.candidates[-1]
-    shut = replace(lost, solution=replace(lost.solution, status=Status.INFEASIBLE))
-    assert build_snapshot(replace(made, candidates=(*made.candidates[:-1], shut))).unknown_share == 0.0
-    assert build_snapshot(replace(made, candidates=(shut,), most_likely=None)).unknown_share == 1.0
+def test_the_unknown_share_is_that_of_the_prediction() -> None:
+    assert build_snapshot(replace(prediction(START_NS, NOWHERE), unknown=0.25)).unknown_share == 0.25
 
 
 def test_the_motor_noise_is_kept_beside_the_total_uncertainty() -> None:
