@@ -386,12 +386,14 @@ class Margins:
         at, places = at[which], Contacts(places.problem[which], places.obstacle[which], times[column, which])
         times, factors, is_on_edge = times[:, which], factors[:, which], is_on_edge[:, which]
         for _ in range(NARROWINGS):
-            time, _least = self._estimate(times, factors, is_on_edge, column, spacing)
-            places, half, spacing = places._replace(time=time), spacing, spacing * (BRACKET[1] - BRACKET[0])
+            places = places._replace(time=self._estimate(times, factors, is_on_edge, column, spacing))
+            half, spacing = spacing, spacing * (BRACKET[1] - BRACKET[0])
             times, factors, is_on_edge = self._sample(motion, k, at, places, half)
             column = factors.argmin(axis=0)
-        time, least = self._estimate(times, factors, is_on_edge, column, spacing)
-        return places._replace(time=time), least
+        found = places._replace(time=self._estimate(times, factors, is_on_edge, column, spacing))
+        best = np.arange(len(column))
+        lowest, least = factors[column, best], self.measure(found, at, motion, k[at]).factor
+        return found._replace(time=np.where(least <= lowest, found.time, times[column, best])), np.minimum(least, lowest)
 
     def _sample(
         self, motion: Motion, k: Array, at: Indices, places: Contacts, half: float
@@ -402,17 +404,13 @@ class Margins:
         margin = self.measure(Contacts(several[0], several[1], times.ravel()), several[2], motion, k[several[2]])
         return times, margin.factor.reshape(times.shape), margin.is_on_edge.reshape(times.shape)
 
-    def _estimate(
-        self, times: Array, factors: Array, is_on_edge: NDArray[np.bool_], column: Indices, spacing: float
-    ) -> tuple[Array, Array]:
-        """Return the times (q,) of minima near the given one of n even samples (n, q) of each, and the safety factors there."""
+    def _estimate(self, times: Array, factors: Array, is_on_edge: NDArray[np.bool_], column: Indices, spacing: float) -> Array:
+        """Return the times (q,) of minima near the given one of n even samples (n, q) of each."""
         row, best = np.clip(column, 2, len(times) - 3), np.arange(len(column))
         near = np.stack([factors[row + step, best] for step in range(-2, 3)])
-        shift, bottom = _find_lowest(near, is_on_edge[row - 2, best] != is_on_edge[row + 2, best])
-        lowest = factors[column, best]
+        shift = _find_lowest(near, is_on_edge[row - 2, best] != is_on_edge[row + 2, best])
         is_inside = (times[0] > 1.0) & (times[-1] < self.steps)
-        time = np.where(is_inside, times[row, best] + spacing * shift, times[column, best])
-        return time, np.where(is_inside, np.minimum(lowest, bottom), lowest)
+        return np.where(is_inside, times[row, best] + spacing * shift, times[column, best])
 
     def find_least_factors(self, control: Array, factors: Array | None = None) -> tuple[Array, Indices, Array]:
         """Return the least safety factors of controls (b, 2N) over all obstacles and times, and where they are.
@@ -580,20 +578,17 @@ def _vary(values: Array) -> Array:
     return np.maximum(changes[..., 1:], changes[..., :-1])
 
 
-def _find_lowest(values: Array, is_kink: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Return where the least of five even values (5, q) is, counted from the middle, and the least value, (q,).
+def _find_lowest(values: Array, is_kink: NDArray[np.bool_]) -> Array:
+    """Return where the least of five even values (5, q) is, counted from the middle, (q,).
 
     It is the vertex of a parabola, or where the lines through the first two and the last two values meet.
     """
     first, low, middle, high, last = values
     bend, fall, rise = low - 2.0 * middle + high, low - first, last - high
-    vertex = np.divide(0.5 * (low - high), bend, out=np.zeros_like(bend), where=bend > 0.0)
-    vertex = np.clip(vertex, -0.5, 0.5)
+    vertex = np.clip(np.divide(0.5 * (low - high), bend, out=np.zeros_like(bend), where=bend > 0.0), -0.5, 0.5)
     meeting = np.divide(low - high + fall + rise, rise - fall, out=np.zeros_like(bend), where=rise > fall)
     is_kink = is_kink & (fall < 0.0) & (rise > 0.0) & (np.abs(meeting) <= 1.0)
-    shift = np.where(is_kink, meeting, vertex)
-    lowest = np.where(is_kink, low + fall * (meeting + 1.0), middle - 0.5 * bend * vertex**2)
-    return shift, np.where(is_kink | (bend > 0.0), lowest, middle)
+    return np.where(is_kink, meeting, vertex)
 
 
 def _spread_start(problem: Problem) -> Array:

@@ -253,7 +253,7 @@ def _meet_everywhere(point: Point, deadline: Deadline) -> tuple[Array, Indices, 
         now.bound[short] = np.inf
         solver.run(now, deadline)
         found = solver.margins.find_least_factors(now.control, now.at.factors)
-    point.k = np.minimum(now.at.factor, np.where(now.at.factor > 0.0, found[0], np.inf))
+    point.k = np.where(now.at.factor > 0.0, found[0], now.at.factor)
     return found
 
 
