@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from fit_recordings import write_tables
 
-from foc_ros.analysis.fitting.tables import COMPARISON_TITLES, make_sentences, make_tables
+from foc_ros.analysis.fitting.tables import COMPARISON_TITLES, list_commands, make_sentences, make_tables
 from foc_ros.cli.main import main
 from foc_ros.cli.options import Study
 from foc_ros.io.terminal import COLUMNS, show_counter, show_table
@@ -59,7 +59,7 @@ def test_the_tables_of_a_fit_fit(capsys: pytest.CaptureFixture[str]) -> None:
         'output': 'o.yaml',
         'node': ['python -m foc_ros node --ros-args --params-file o.yaml'],
     }
-    Study().show(answer, make_tables(answer), make_sentences(answer), 'fit.html')
+    Study().show(answer, make_tables(answer), make_sentences(answer), 'fit.html', list_commands(answer))
     assert 0 < find_widest(capsys.readouterr().out) <= COLUMNS
 
 

@@ -209,8 +209,8 @@ class Study:
             return lambda *_: None
         return partial(import_module(f'foc_ros.reporting.{module}').write_report, self.report)
 
-    def show(self, answer: object, tables: Iterable[Table], sentences: Iterable[str], page: str) -> None:
-        """Print an answer as JSON, or as tables and sentences with the address of the report."""
+    def show(self, answer: object, tables: Iterable[Table], sentences: Iterable[str], page: str, commands: str = '') -> None:
+        """Print an answer as JSON, or as tables, sentences, commands as they are, and the address of the report."""
         from foc_ros.io import terminal
 
         if self.json:
@@ -220,6 +220,8 @@ class Study:
             terminal.show_table(columns, rows, title)
         for sentence in sentences:
             terminal.show_text(sentence)
+        if commands:
+            print(commands)
         if self.report is not None:
             terminal.show_address(self.report / page)
 

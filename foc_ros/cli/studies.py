@@ -97,7 +97,7 @@ def fit(data: Existing, /, *, output: Path, allow: Allowed = (), study: Study = 
         return 2
     write_parameter_file('--output', output, found.config)
     write_report(data.resolve().name, answer)
-    study.show(answer, tables.make_tables(answer), tables.make_sentences(answer), FIT_PAGE)
+    study.show(answer, tables.make_tables(answer), tables.make_sentences(answer), FIT_PAGE, tables.list_commands(answer))
     return warn_all('fit', [f'{name}: {reason}' for name, reason in found.failed.items()])
 
 

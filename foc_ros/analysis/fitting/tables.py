@@ -107,6 +107,11 @@ def make_tables(answer: Mapping[str, Any]) -> Iterator[tuple[None, tuple[str, ..
 
 
 def make_sentences(answer: Mapping[str, Any]) -> list[str]:
-    """Return the notes of an answer of `fit --json`, what became better and worse, and how the node is run with it."""
+    """Return the notes of an answer of `fit --json`, and what became better and worse."""
+    return [*(f'note: {warning}' for warning in answer['warnings']), *make_verdict(answer)]
+
+
+def list_commands(answer: Mapping[str, Any]) -> str:
+    """Return the lines that say how the node is run with the parameters."""
     words = f'{answer["recordings"]} recordings; parameters written to {answer["output"]}. Run the node with them:'
-    return [*(f'note: {warning}' for warning in answer['warnings']), *make_verdict(answer), words, *answer['node']]
+    return '\n  '.join((words, *answer['node']))
