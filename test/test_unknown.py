@@ -101,3 +101,17 @@ def test_the_unknown_share_is_published() -> None:
     texts = [each.text for each in encode_markers(one, one.obstacles, 'xy', TYPES).markers]
     assert any(text.endswith(f'{100 * one.unknown:.0f} % unknown') for text in texts)
     assert encode_prediction(one)['unknown'] == one.unknown
+
+
+def test_a_class_that_the_search_misses_keeps_its_answer_for_a_moment() -> None:
+    one = replace_values(CONFIG, {'homotopy.max_candidates': 1})
+    whole, tracks = predict(CONFIG, HAND, ROW, GOALS, NO_TRACKS)
+    ages = []
+    for tick in range(1, 13):
+        prediction, tracks = predict(one, replace(HAND, stamp_ns=20_000_000 * tick), ROW, GOALS, tracks)
+        ages.append({each.label: each.age_s for each in prediction.candidates if each.age_s})
+        assert total(prediction) == pytest.approx(1.0)
+        assert all(np.hypot(*each.mean[0, :2]) < 1e-9 for each in prediction.candidates)
+    lost = {each.label for each in whole.candidates} - {whole.most_likely}
+    for tick, found in enumerate(ages, 1):
+        assert found == ({label: pytest.approx(0.02 * tick) for label in lost} if tick <= 10 else {})

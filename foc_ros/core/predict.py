@@ -93,6 +93,8 @@ def predict(
     reserve_s = (RESERVE_S + POOLING_S * bool(library.recordings)) * len(candidates)
     solved = _solve(scene, config, candidates, matched, deadline.take_share(SOLVE_SHARE, reserve_s))
     held = [_hold_answer(*each, scene.hand) for each in zip(solved, matched, strict=True)]
+    absent = known.find_absent(candidates, matched, stamp_ns)
+    held += [each for track in absent if (each := _hold_absent(track, scene.hand)) is not None]
     answered = estimate_unsolved(held, scene.near)
     ranked = rank_candidates(answered, config.likelihood, scene.near, scene.hand, goals, planning_spread)
     pooled = pool_recordings(ranked, library, hand, scene.blocking, goals)
@@ -198,12 +200,22 @@ def _hold_answer(solved: PredictedCandidate, track: Track, hand: HandState) -> P
     """Return the rest of the last answer of a class that could not be solved, if it is young enough."""
     if solved.has_likelihood or track.solution is None or not track.is_solved_within(hand.stamp_ns, HOLD_S):
         return solved
+    return _hold_track(track, solved.candidate, hand, solved.solution.message) or solved
+
+
+def _hold_absent(track: Track, hand: HandState) -> PredictedCandidate | None:
+    """Return the rest of the last answer of a class that is no candidate any more."""
+    return _hold_track(track, track.candidate, hand, 'the class is not followed any more')
+
+
+def _hold_track(track: Track, candidate: Candidate, hand: HandState, reason: str) -> PredictedCandidate | None:
+    """Return what remains of the solution of a track, under the name of a candidate; None if nothing remains."""
+    assert track.solution is not None
     age_s = (hand.stamp_ns - track.solved_ns) / NANOSECONDS
-    rest = take_rest(track.solution, age_s, hand.mean[:2], solved.solution.message)
+    rest = take_rest(track.solution, age_s, hand.mean[:2], reason)
     if rest is None:
-        return solved
-    sides = dict(solved.candidate.sides)
-    return replace(solved, solution=rest, sides=sides, cost=rest.expected_effort * rest.dt, age_s=age_s)
+        return None
+    return PredictedCandidate(candidate, rest, dict(candidate.sides), rest.expected_effort * rest.dt, 0.0, age_s, track.number)
 
 
 def warm_up(config: Config) -> None:

@@ -5,8 +5,8 @@ reach and are passed. Of several tracks, a candidate continues the one with its 
 most sides, that was seen last, and is the most likely. No two candidates continue one track.
 
 From its track a class has its number, the solution from which the next one starts, and its likelihood before. A class that could
-not be solved keeps the rest of its last solution for at most `HOLD_S`: of an age a, a movement of duration T over [a, T],
-resampled at N steps of (T - a) / N, that begins where the hand is now and has the cost of that rest.
+not be solved, or that the search has missed, keeps the rest of its last solution for at most `HOLD_S`: of an age a, a movement of
+duration T over [a, T], resampled at N steps of (T - a) / N, that begins where the hand is now and has the cost of that rest.
 
 Likelihoods change gradually: with p_i of this prediction, l_i before (0 for a new class), and the time h between both,
 
@@ -122,11 +122,23 @@ class Tracks(Record):
         numbers = iter(range(self.next_number, self.next_number + len(candidates)))
         return [found.get(place) or Track(next(numbers), each, stamp_ns) for place, each in enumerate(candidates)]
 
+    def find_absent(self, candidates: Sequence[Candidate], matched: Sequence[Track], stamp_ns: int) -> list[Track]:
+        """Return the tracks with a solution of the last `HOLD_S` that are no candidates now, under any name."""
+        numbers = {each.number for each in matched}
+        return [
+            each
+            for each in (*self.followed, *self.absent)
+            if each.number not in numbers
+            and stamp_ns - each.solved_ns > 0
+            and each.is_solved_within(stamp_ns, HOLD_S)
+            and all(count_shared(each.candidate, other) is None for other in candidates)
+        ]
+
     def smooth(
         self, predicted: Sequence[PredictedCandidate], unknown: float, stamp_ns: int
     ) -> tuple[list[PredictedCandidate], float]:
         """Return candidates with numbers and likelihoods p_i with the likelihoods l_i, ranked, and the unknown share likewise."""
-        before = {each.number: each.likelihood for each in self.followed}
+        before = {each.number: each.likelihood for each in (*self.followed, *self.absent)}
         taking_part = [each for each in predicted if each.has_likelihood]
         gain = -math.expm1(-self.measure_time(stamp_ns) / SMOOTHING_S)
         if not any(each.way in before for each in taking_part):
