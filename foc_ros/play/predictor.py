@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.guidance.step import GuidanceOutput
+from foc_ros.core.guidance.guide import GuidanceOutput
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predict import warm_up
 from foc_ros.core.types import Prediction

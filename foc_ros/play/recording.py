@@ -19,7 +19,7 @@ import numpy as np
 
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError, RecordingError
-from foc_ros.core.guidance.step import GuidanceOutput
+from foc_ros.core.guidance.guide import GuidanceOutput
 from foc_ros.core.types import NANOSECONDS, HandSample, Prediction, as_readonly
 from foc_ros.io.bags import TYPESTORE, BagWriter
 from foc_ros.io.topics import TYPES
