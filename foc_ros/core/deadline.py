@@ -43,11 +43,19 @@ class Deadline:
         When that time began, by `time.perf_counter()` [s]; None for now.
     whole
         A deadline that holds as well.
+    patience
+        Steps after which what hardly matters may wait for the next time; None for all that it takes.
     """
 
-    def __init__(self, seconds: float | None = None, began: float | None = None, whole: Deadline | None = None) -> None:
+    def __init__(
+        self,
+        seconds: float | None = None,
+        began: float | None = None,
+        whole: Deadline | None = None,
+        patience: int | None = None,
+    ) -> None:
         self.at = None if seconds is None else (time.perf_counter() if began is None else began) + seconds
-        self._whole = whole
+        self._whole, self.patience = whole, patience
         self.step_times: StepTimes = StepTimes() if whole is None else whole.step_times
 
     @property

@@ -43,6 +43,8 @@ from .types import (
 
 SEARCH_SHARE, SOLVE_SHARE = 0.3, 0.8
 """Shares of the time left after which the search and the solver begin no step. The last step may end later."""
+PATIENCE = 3
+"""Quadratic programmes after which a class that is unlikely goes on in the next prediction."""
 RESERVE_S, POOLING_S = 5e-5, 2e-4
 """Time besides that for each candidate [s]: to rank it, and to pool its path with recordings where there are some."""
 
@@ -191,7 +193,8 @@ def _solve(
     place = config, scene.hand, scene.near
     by_goal = {row: build_problem(*place, scene.goals[row], scene.durations_s[row]) for row in {each.goal for each in candidates}}
     earlier = [each.solution if each.solved_ns == each.seen_ns else None for each in matched]
-    solved = solve_candidates(candidates, [by_goal[each.goal] for each in candidates], config.foc, earlier, deadline)
+    until = Deadline(whole=deadline, patience=PATIENCE)
+    solved = solve_candidates(candidates, [by_goal[each.goal] for each in candidates], config.foc, earlier, until)
     numbered = [replace(each, way=track.number) for each, track in zip(solved, matched, strict=True)]
     return [_widen_covariance(each, scene.covariances, scene.hand, config) for each in numbered]
 

@@ -53,6 +53,8 @@ FORETOLD = 0.1
 """Part of the promised gain that may be left, if the step brought what was foretold."""
 CLOSE = 3e-5
 """Relative excess over the wanted safety factor that is aimed at, so that a step that misses it by rounding still meets it."""
+UNLIKELY, MOST_PROMISED = 9.0, 2.0
+"""How much less likely than the best a class is that can wait, as a logarithm, and the most that a promise counts for."""
 LARGEST_TOLERANCE = 5e-3
 """Largest gain of such a step for classes that are unlikely."""
 STALLED_GAIN = 2e-5
@@ -135,7 +137,8 @@ class Iterates:
     controls; contacts and multipliers (q,) of the last QPs; angles (b, m): swept angles of the class [rad]; is_done (b,): whether
     the sequence has ended, is_settled (b,): at a minimum; gain (b,): what the last QP promised; iterations (b,);
     bound (b,): what the loss must not exceed; is_exact (b,): whether to end only where the next step would change nothing;
-    trial: contacts of the last step that was tried.
+    is_waiting (b,): whether it is so unlikely that it goes on in the next prediction; trial: contacts of the last step that was
+    tried.
     """
 
     control: Array
@@ -150,6 +153,7 @@ class Iterates:
     iterations: Indices
     bound: Array
     is_exact: NDArray[np.bool_]
+    is_waiting: NDArray[np.bool_]
     trial: Contacts = NO_CONTACTS
 
 
@@ -183,10 +187,11 @@ class Solver:
         """
         control, rows = self.objective.meet_goal(control), np.arange(len(control))
         at = self.evaluate(rows, control, k)
-        no, k = np.zeros(len(rows), dtype=np.bool_), np.clip(at.factor, 0.0, self.wanted_k)
+        k = np.clip(at.factor, 0.0, self.wanted_k)
         gain = np.full(len(rows), np.inf)
         bound, is_exact = at.loss + GRACE, is_exact | (not self.margins.is_chance)
-        return Iterates(control, k, at, contacts, multipliers, angles, no, no.copy(), gain, np.zeros_like(rows), bound, is_exact)
+        count, no = np.zeros_like(rows), [np.zeros(len(rows), dtype=np.bool_) for _ in range(3)]
+        return Iterates(control, k, at, contacts, multipliers, angles, no[0], no[1], gain, count, bound, is_exact, no[2])
 
     def evaluate(self, rows: Indices, control: Array, k: Array) -> Evaluation:
         """Return what the sequence has to know of controls (r, 2N) of some problems, linearised at safety factors (r,)."""
@@ -228,6 +233,14 @@ class Solver:
                 break
             deadline.step_times.add()
             self.advance(now)
+            if deadline.patience is not None:
+                self._postpone(now, deadline.patience)
+
+    def _postpone(self, now: Iterates, patience: int) -> None:
+        """Let classes that are unlikely go on in the next prediction, also if they gain what their QPs promise."""
+        promised = now.at.loss - np.minimum(now.gain, MOST_PROMISED)
+        now.is_waiting |= ~now.is_done & (now.iterations >= patience) & (self.objective.compare(promised) > UNLIKELY)
+        now.is_done |= now.is_waiting
 
     def advance(self, now: Iterates) -> None:
         """Advance all problems that are not done by one QP and one step along its solution."""
