@@ -53,7 +53,7 @@ FORETOLD = 0.1
 """Part of the promised gain that may be left, if the step brought what was foretold."""
 CLOSE = 3e-5
 """Relative excess over the wanted safety factor that is aimed at, so that a step that misses it by rounding still meets it."""
-UNLIKELY, MOST_PROMISED = 9.0, 2.0
+UNLIKELY, MOST_PROMISED = 9.0, 10.0
 """How much less likely than the best a class is that can wait, as a logarithm, and the most that a promise counts for."""
 LARGEST_TOLERANCE = 5e-3
 """Largest gain of such a step for classes that are unlikely."""
