@@ -9,6 +9,7 @@ import numpy as np
 from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped
 from ros_helpers import Graph
 
+from foc_ros.ros.messages.encode_prediction import UNKNOWN
 from foc_ros.ros.messages.types import RclpyTypes
 
 TYPES = RclpyTypes()
@@ -123,6 +124,11 @@ class Bench:
     def _statuses(self) -> list[Any]:
         own = self.node.get_fully_qualified_name()
         return [array.status[0] for array in self.diagnostics if array.status[0].hardware_id == own]
+
+
+def list_labels(table: Any) -> list[str]:
+    """Return the labels of the candidates in a table of likelihoods, without the share that is unknown."""
+    return [label for label in table.layout.dim[0].label.split(';') if label not in ('', UNKNOWN)]
 
 
 def figures(status: Any) -> dict[str, str]:

@@ -70,12 +70,13 @@ def test_a_deadline_that_has_passed_leaves_an_estimate_for_every_class(name):
     shares, expected = find_likelihoods(late), find_likelihoods(final)
     assert shares.keys() == expected.keys()
     for each in late.candidates:
-        assert each.status is Status.DEADLINE or each.solution.safety_factor >= 3.0 - 1e-4, 'solved at once'
+        unsettled = each.status in (Status.DEADLINE, Status.ESTIMATED)
+        assert unsettled or each.solution.safety_factor >= 3.0 - 1e-4, 'solved at once'
         assert each.likelihood > 0.0
         assert each.status is Status.SOLVED or 'estimated' in each.solution.message
         assert np.isfinite(each.cost)
     for label, share in shares.items():
-        assert share == pytest.approx(expected[label], abs=0.35)
+        assert share == pytest.approx(expected[label], abs=0.4)
     assert late.notes['unfinished'] == sum(each.status is Status.DEADLINE for each in late.candidates)
 
 

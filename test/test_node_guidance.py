@@ -182,10 +182,15 @@ def test_commands_are_blended_and_pass_unchanged_without_guidance(ros: Graph) ->
         ros.spin_until(lambda: bool(bench.twists), 'a command')
         return bench.twists[-1].twist
 
-    bench.drive(10)
-    blended = answer(0.0, 0.1)
-    assert blended.linear.x > 0.001 and np.hypot(blended.linear.x, blended.linear.y) <= 0.1 + 1e-9
-    assert (blended.linear.z, blended.angular.z) == (0.01, 0.5)
+    def is_blended() -> bool:
+        """Whether guidance turns a command now; it never makes it faster, nor changes what is not in the plane."""
+        twist = answer(0.0, 0.1)
+        assert np.hypot(twist.linear.x, twist.linear.y) <= 0.1 + 1e-9
+        assert (twist.linear.z, twist.angular.z) == (0.01, 0.5)
+        return twist.linear.x > 0.001
+
+    # a hand that was silent on a busy machine, or is at a fork, is not guided for a moment
+    bench.drive_until(is_blended, 'a command that is blended')
     assert answer(0.0, 0.1, frame_id='elsewhere').linear.x == 0.0
     ros.spin_until(lambda: not bench.forces[-1].any(), 'the hand is released')
     ros.spin_for(0.3)

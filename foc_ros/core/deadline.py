@@ -75,7 +75,8 @@ class Deadline:
 
     def allows(self, seconds: float = 0.0) -> bool:
         """Tell whether there is time for a step of so many seconds, and for one as long as the longest so far."""
-        return self.left_s >= max(seconds, self.step_times.longest_s)
+        is_whole = self._whole is None or self._whole.allows(seconds)
+        return is_whole and self.left_s >= max(seconds, self.step_times.longest_s)
 
     def check(self, seconds: float = 0.0) -> None:
         """Raise OutOfTimeError if the deadline does not allow the next step, which takes some seconds if that is known.

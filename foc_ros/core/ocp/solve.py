@@ -120,7 +120,7 @@ def _evaluate_one(problem: Problem, result: StrategyResult, minimum: tuple[float
         violation, violated = compute_violation(problem, mean, result.tau, PARTS if status is Status.INFEASIBLE else 1)
     effort, names = float(control @ control), problem.obstacles.ids
     shortfall, expected = 0.0 if status is Status.SOLVED else max(problem.wanted_k - k, 0.0), None
-    if status is Status.DEADLINE:
+    if status in (Status.DEADLINE, Status.ESTIMATED):
         expected, shortfall = _expect(problem, effort, shortfall, min(REMAINING * result.gain, LARGEST_GAIN))
     obstacles, times, pushes = (each.tolist() for each in result.forces)
     return Solution(

@@ -233,7 +233,7 @@ class Solver:
                 break
             deadline.step_times.add()
             self.advance(now)
-            if deadline.patience is not None:
+            if deadline.patience is not None and self.margins.is_chance:
                 self._postpone(now, deadline.patience)
 
     def _postpone(self, now: Iterates, patience: int) -> None:

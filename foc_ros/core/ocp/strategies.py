@@ -114,8 +114,8 @@ class Point:
     k: Array
 
     def is_late(self, row: int) -> bool:
-        """Return whether the time was up before a problem was solved or had its iterations, or whether it can wait."""
-        return bool(self.now.is_waiting[row] or (not self.now.is_done[row] and self.now.iterations[row] < self.solver.most))
+        """Return whether the time was up before a problem was solved or had its iterations."""
+        return not self.now.is_done[row] and bool(self.now.iterations[row] < self.solver.most)
 
     def is_touching(self) -> NDArray[np.bool_]:
         """Return whether the mean enters an obstacle or its clearance, or leaps over one between two points of the grid, (b,).
@@ -280,7 +280,10 @@ def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult
     problem, now = point.solver.margins.problems[row], point.now
     k = float(point.k[row])
     reached = problem.risk.find_probability(k)
-    if k >= problem.wanted_k * (1.0 - REACHED) and now.is_done[row] and not now.is_waiting[row]:
+    if now.is_waiting[row]:
+        message = f'unlikely, and goes on in the next prediction: eta {reached:.4g} so far, and the likelihood is estimated'
+        return collect(point, row, Status.ESTIMATED, message, aims_at_eta=False)
+    if k >= problem.wanted_k * (1.0 - REACHED) and now.is_done[row]:
         return collect(point, row, Status.SOLVED, 'solved')
     is_late = point.is_late(row)
     if is_touching and not is_late:
