@@ -234,7 +234,8 @@ def test_predictions_and_solutions_are_drawn():
     for drawn in (foc_ros.solve((0, 0), (0.3, 0), [CUP], config=FAST), prediction):
         assert drawn.plot().get_xlabel() == 'x [m]'
     solution = foc_ros.solve((0, 0), (0.3, 0), [CUP], config=FAST)
-    words = solution.plot().get_legend().get_texts()[0].get_text()
+    (legend,) = filter(None, (each.get_legend() for each in solution.plot().figure.axes))
+    words = legend.get_texts()[0].get_text()
     assert solution.label in words and words.endswith('right of cup' if '-' in solution.label else 'left of cup')
     foc_ros.plot_candidates(foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], config=FAST))
     with pytest.raises(foc_ros.InputError, match='candidates'):

@@ -61,7 +61,7 @@ def test_everything_is_fitted_and_written_for_the_node(past_an_obstacle: Path, c
     unfitted = {name: value for name, value in values.items() if name not in answer['parameters'] | answer['chosen']}
     assert unfitted == {name: value for name, value in flatten(replace_values(Config(), QUICK)).items() if name in unfitted}
     assert answer['parameters']['estimator.position_stddev']['value'] == pytest.approx(5e-4, rel=0.2)
-    assert [values[f'{each}.adaptation'] for each in ('duration', 'likelihood', 'covariance')] == ['online', 'none', 'online']
+    assert [values[f'{each}.adaptation'] for each in ('duration', 'covariance')] == ['online', 'online']
     classes = answer['scores']['ways']
     assert classes['fitted'] >= classes['without the recording'] and classes['fitted'] > classes['uniform']
     assert set(classes) == {'uniform', 'as given', 'fitted', 'without the recording', 'without its way'}

@@ -255,7 +255,7 @@ def _compute_ratios(scene: Scene, noise: float, compared: Compared, grid: Grid) 
     def solve_all(label: str, etas: tuple[float, ...], growth: float | None = None) -> RatioCurve:
         curves = []
         for name, (path_class, strategy) in compared.items():
-            stepping = (('foc.algorithm1_delta', DELTA[strategy]), ('foc.algorithm1_growth', growth or 0.0))
+            stepping = (('foc.lv_delta', DELTA[strategy]), ('foc.algorithm1_growth', growth or 0.0))
             method = Method(noise, strategy) if growth is None else Method(noise, 'algorithm1', stepping)
             curves.append(_solve_curve(name, scene, path_class, method, etas))
         return RatioCurve(label, *curves)
