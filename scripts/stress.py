@@ -301,9 +301,12 @@ def read_cpu_s(pid: int) -> float:
 
 
 def play_until_predicted(player: Player) -> float:
-    """Publish until the node predicts; return the time that this took [s]. RuntimeError if it does not."""
+    """Publish until the node predicts; return the time that this took [s]. RuntimeError if it does not.
+
+    A prediction that took longer than `estimator.hand_timeout_s` counts, though the node withholds it.
+    """
     began = time.monotonic()
-    while not player.predictions:
+    while not (player.predictions or player.count('predict_too_late')):
         player.play(PERIOD_S)
         if time.monotonic() - began > START_S:
             raise RuntimeError('the node did not predict')

@@ -60,7 +60,9 @@ def test_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert len(numbers['predictions']) == found['/foc/prediction']
     assert all(each['candidates'] or each['unsolved'] is not None for each in numbers['predictions'])
     assert any(each['candidates'] for each in numbers['predictions'])
-    assert 'data:image/png;base64,' in (tmp_path / 'out' / 'report' / 'index.html').read_text(encoding='utf-8')
+    page = (tmp_path / 'out' / 'report' / 'index.html').read_text(encoding='utf-8')
+    assert 'id="scene"' in page and '"frames"' in page, 'the page draws by itself what the pictures beside it show'
+    assert (tmp_path / 'out' / 'report' / 'overview.png').read_bytes().startswith(b'\x89PNG')
 
 
 def test_the_live_predictions_are_those_of_the_recording(tmp_path: Path) -> None:

@@ -84,6 +84,10 @@ def test_the_likely_candidate_is_the_thickest_and_a_compromised_one_alone_is_dot
     axes = axes_of(replace(made, candidates=(changed, *rest)))
     assert legend_of(axes).count('compromised: eta 0.900') == 1
     assert [line.get_linestyle() for line in axes.lines if line.get_label().startswith('A')] == [':']
+    for status in (Status.DEADLINE, Status.ESTIMATED):
+        unfinished = replace(first, solution=replace(first.solution, status=status))
+        words = legend_of(axes_of(replace(made, candidates=(unfinished, *rest))))
+        assert words.count('estimated: eta 0.900') == 1 and 'compromised' not in words
 
 
 def axes_of(made: Prediction) -> Any:

@@ -19,7 +19,7 @@ from test_unusual_recordings import WHOLE, write_metadata, write_sqlite
 from foc_ros.cli.main import main
 from foc_ros.io.bags import BagReader
 
-FEW, MANY = 40, 500
+FEW, BATCH, BATCHES = 40, 50, 10
 LONGEST_S = 10.0
 """Time of the processor for one command: other programs may keep it waiting for longer."""
 GIVEN = messages(seconds=0.3)
@@ -148,11 +148,13 @@ def test_damaged_tables_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixtu
         check_tables(tmp_path, number, capsys)
 
 
-def test_many_damaged_recordings_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for number in range(FEW, FEW + MANY):
+@pytest.mark.parametrize('batch', range(BATCHES))
+def test_many_damaged_recordings_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str], batch: int) -> None:
+    for number in range(FEW + BATCH * batch, FEW + BATCH * (batch + 1)):
         check_recording(tmp_path, number, capsys, write_parameters(tmp_path))
 
 
-def test_many_damaged_tables_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for number in range(FEW, FEW + MANY):
+@pytest.mark.parametrize('batch', range(BATCHES))
+def test_many_damaged_tables_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str], batch: int) -> None:
+    for number in range(FEW + BATCH * batch, FEW + BATCH * (batch + 1)):
         check_tables(tmp_path, number, capsys)

@@ -52,7 +52,7 @@ class Feeder:
             tick(i)
             while self.sent < pose_hz * 0.01 * (i + 1):
                 stamp_ns = 10 * SECOND + round(self.sent / pose_hz * SECOND)
-                self.publishers['hand_pose'].publish(pose_stamped(TYPES, (1e-3 * (self.sent % 2), 0.0, 0.1), stamp_ns))
+                self.publishers['hand_pose'].publish(pose_stamped(TYPES, (5e-4 * (self.sent % 3), 0.0, 0.1), stamp_ns))
                 self.sent += 1
             self.ros.spin_for(max(began + 0.01 * (i + 1) - time.monotonic(), 0.001))
 

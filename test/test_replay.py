@@ -273,11 +273,22 @@ def test_a_wrong_remap_is_said(bag: Path, capsys: pytest.CaptureFixture[str], re
 
 
 def test_the_summary_names_what_is_compromised_or_not_solved_with_its_remedy() -> None:
-    summary = Summary(samples=3, predictions=3, solved=2, compromised=4, seconds=[0.01])
+    summary = Summary(samples=3, predictions=3, solved=2, compromised=4, estimated=7, seconds=[0.01])
     shown = facts(summary.answer({'candidate_deadline': 5, 'hand_late': 1}, 1.0))
     assert shown['candidates compromised'] == f'compromised ({Status.COMPROMISED.remedy}) 4'
+    assert shown['candidates estimated'] == 'unlikely or late 7'
     assert shown['candidates not solved'] == f'deadline ({Status.DEADLINE.remedy}) 5'
     assert facts(Summary().answer({}, 0.0))['candidates compromised'] == 'none'
+
+
+def test_a_candidate_that_is_estimated_counts_as_such_and_not_as_compromised() -> None:
+    made = predict(START_NS, NOWHERE)
+    (first, *rest) = made.candidates
+    summary, kinds = Summary(), (Status.COMPROMISED, Status.ESTIMATED, Status.DEADLINE, Status.SOLVED)
+    for status in kinds:
+        candidates = replace(first, solution=replace(first.solution, status=status)), *rest
+        summary.add(Step(Item(0, HAND, None), None, replace(made, candidates=candidates), Scene()))
+    assert (summary.predictions, summary.compromised, summary.estimated) == (4, 1, 2)
 
 
 def camera_at(y: float, seconds: float, late_s: float = 0.02) -> tuple[str, int, Any]:

@@ -22,14 +22,16 @@ FAILED = 'candidate_'
 class Summary:
     """Counts over the steps of one replay.
 
-    samples: hand poses read; predictions; solved: predictions with a candidate that has a likelihood; compromised: candidates;
-    cleared_by_height: obstacles that a predicted height cleared, over all predictions; seconds: wall time of each prediction.
+    samples: hand poses read; predictions; solved: predictions with a candidate that has a likelihood; compromised, estimated:
+    candidates with a likelihood; cleared_by_height: obstacles that a predicted height cleared, over all predictions; seconds:
+    wall time of each prediction.
     """
 
     samples: int = 0
     predictions: int = 0
     solved: int = 0
     compromised: int = 0
+    estimated: int = 0
     cleared_by_height: int = 0
     seconds: list[float] = field(default_factory=list)
 
@@ -39,7 +41,9 @@ class Summary:
         if step.prediction is not None:
             self.predictions += 1
             self.solved += bool(step.prediction.candidates_with_likelihood)
-            self.compromised += sum(not each.is_solved for each in step.prediction.candidates_with_likelihood)
+            for each in step.prediction.candidates_with_likelihood:
+                self.compromised += each.status is Status.COMPROMISED
+                self.estimated += each.is_estimated
             self.cleared_by_height += sum(step.prediction.cleared)
             self.seconds.append(step.prediction.solve_s)
 
@@ -56,6 +60,7 @@ class Summary:
             'solved': self.solved,
             'refused': {name: count for name, count in sorted(counts.items()) if not name.startswith(FAILED)},
             'compromised': self.compromised,
+            'estimated': self.estimated,
             'failures': dict(sorted(failures.items())),
             'cleared_by_height': self.cleared_by_height,
             'prediction_ms': {'p50': p50, 'p99': p99},
@@ -72,6 +77,7 @@ def facts(answer: Mapping[str, Any]) -> dict[str, str]:
         'predictions': f'{answer["predictions"]}, {answer["solved"]} with a solved candidate',
         'rejected': _list_counts(answer['refused']),
         'candidates compromised': _list_failures({Status.COMPROMISED.value: answer['compromised']}),
+        'candidates estimated': _list_counts({'unlikely or late': answer['estimated']} if answer['estimated'] else {}),
         'candidates not solved': _list_failures(answer['failures']),
         'obstacles cleared by height': f'{answer["cleared_by_height"]} over all predictions',
         **({'demonstrations learned': str(answer['learned'])} if 'learned' in answer else {}),

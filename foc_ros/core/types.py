@@ -274,7 +274,7 @@ _REMEDIES = {
     'infeasible': 'none for this class, whose gap is closed; check the radii of its obstacles if people pass here',
     'iteration_limit': 'choose another foc.strategy',
     'deadline': 'allow a longer budget_s or fewer homotopy.max_candidates',
-    'estimated': 'choose another foc.strategy',
+    'estimated': 'none where the class is unlikely; otherwise choose another foc.strategy',
     'left_class': 'choose another foc.strategy',
 }
 
@@ -404,6 +404,11 @@ class PredictedCandidate:
     def is_solved(self) -> bool:
         """Whether the solution meets the wanted eta."""
         return self.solution.status is Status.SOLVED
+
+    @property
+    def is_estimated(self) -> bool:
+        """Whether the solution was not found to its end, so that its effort and its safety are estimated."""
+        return self.solution.status in (Status.DEADLINE, Status.ESTIMATED)
 
     @property
     def has_likelihood(self) -> bool:

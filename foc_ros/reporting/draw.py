@@ -239,7 +239,7 @@ def describe_in_legend(view: CandidateView | UnsolvedView, letter: str = ' ', re
     name = f'{view.label}  {view.description}' if len(view.description) <= LONGEST_WORDS else view.label
     if isinstance(view, UnsolvedView):
         return f'{letter}    - %  {name}; {view.reason}'
-    words = f'; compromised: eta {view.eta:.3f}' if view.is_compromised else ''
+    words = f'; {"estimated" if view.is_estimated else "compromised"}: eta {view.eta:.3f}' if view.is_compromised else ''
     return f'{letter}  {100 * view.likelihood:3.0f} %  {name}{words}{f"; {reason}" if reason else ""}'
 
 

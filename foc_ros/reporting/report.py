@@ -18,7 +18,15 @@ from foc_ros.io.outputs import MARK, OVERVIEW, REPORT_FILES, check_report
 from .draw import Span, make_recording_figure, make_snapshot_figure, save_figure
 from .encode import compute_recording_bounds, encode_report, round_number
 from .page import render
-from .views import CandidateTracks, HandTrajectory, Snapshot, build_candidate_tracks, build_hand_trajectory, build_snapshot
+from .views import (
+    CandidateTracks,
+    CandidateView,
+    HandTrajectory,
+    Snapshot,
+    build_candidate_tracks,
+    build_hand_trajectory,
+    build_snapshot,
+)
 
 MOST_PICTURES = 8
 SINGLE_MOVEMENT_FRACTIONS = (0.1, 0.3, 0.5, 0.7)
@@ -27,7 +35,9 @@ FRACTION = 0.3
 """Fraction of its duration at which each of several movements is pictured."""
 ONSET_SPEED = 0.05
 """Speed [m/s] above which the hand counts as moving."""
-COUNTERS = ('rejected', 'candidates compromised', 'candidates not solved', 'counters of the node')
+NOTED = 0.01
+"""Likelihood from which a compromised candidate is worth a warning."""
+COUNTERS = ('rejected', 'candidates compromised', 'candidates estimated', 'candidates not solved', 'counters of the node')
 """Facts that the page folds: raw counts, of which the warnings name what matters."""
 Table = tuple[str, Sequence[str], Sequence[Sequence[str]]]
 """Heading, columns and rows of a table of the page."""
@@ -149,7 +159,7 @@ def _collect_warnings(snapshots: Sequence[Snapshot], origin_ns: int) -> list[Pag
     ended: dict[str, list[float]] = {}
     for time_s, each in zip(times_s, snapshots, strict=True):
         lost = [view.status for view in each.unsolved]
-        for status in lost + [Status.COMPROMISED.value for view in each.candidates if view.is_compromised]:
+        for status in lost + [Status.COMPROMISED.value for view in each.candidates if _is_noted(view)]:
             ended.setdefault(status, []).append(time_s)
     warnings = [] if snapshots else [PageWarning('There is no prediction.')]
     if empty:
@@ -158,6 +168,14 @@ def _collect_warnings(snapshots: Sequence[Snapshot], origin_ns: int) -> list[Pag
         words = f'{len(at)} candidate{"s" if len(at) > 1 else ""} ended with status {status}. Remedy: {Status(status).remedy}.'
         warnings.append(PageWarning(words, at[0]))
     return warnings
+
+
+def _is_noted(view: CandidateView) -> bool:
+    """Return whether a candidate is compromised, and likely enough for a warning.
+
+    Messages of the node do not tell an estimated candidate from a compromised one; most of these are unlikely.
+    """
+    return view.is_compromised and not view.is_estimated and view.likelihood >= NOTED
 
 
 def _encode_snapshot(snapshot: Snapshot, origin_ns: int) -> dict[str, Any]:

@@ -41,7 +41,8 @@ Sides = dict[str, int]
 class CandidateView(Record):
     """One candidate with a likelihood.
 
-    description: its class in words, with the goal where there are several; is_compromised: whether eta is below the wanted one;
+    description: its class in words, with the goal where there are several; is_compromised: whether eta is below the wanted one,
+    or may be, where is_estimated; is_estimated: whether effort and eta are estimates, which is unknown of a message;
     times (m,): seconds after the stamp of the snapshot; path (m, 2) [m]; velocity (m, 2) [m/s]; covariance and motor_covariance
     (m, 2, 2) of the position [m^2]: the total, and the part that motor noise causes, which eta is about; effort [m^2/s^6];
     cost_ratio: cost over the least cost; eta: achieved probability of avoidance; way: number of the class while it is followed.
@@ -60,6 +61,7 @@ class CandidateView(Record):
     covariance: Array
     motor_covariance: Array
     way: int = 0
+    is_estimated: bool = False
 
     @property
     def speed(self) -> Array:
@@ -245,6 +247,7 @@ def _build_candidate_view(candidate: PredictedCandidate, cost_ratio: float, goal
         solution.covariance[:, :2, :2],
         candidate.motor_covariance[:, :2, :2],
         candidate.way,
+        candidate.is_estimated,
     )
 
 

@@ -588,7 +588,8 @@ def _find_lowest(values: Array, is_kink: NDArray[np.bool_]) -> Array:
     vertex = np.clip(np.divide(0.5 * (low - high), bend, out=np.zeros_like(bend), where=bend > 0.0), -0.5, 0.5)
     meeting = np.divide(low - high + fall + rise, rise - fall, out=np.zeros_like(bend), where=rise > fall)
     is_kink = is_kink & (fall < 0.0) & (rise > 0.0) & (np.abs(meeting) <= 1.0)
-    return np.where(is_kink, meeting, vertex)
+    lowest: Array = np.where(is_kink, meeting, vertex)
+    return lowest
 
 
 def _spread_start(problem: Problem) -> Array:

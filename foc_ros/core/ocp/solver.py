@@ -176,6 +176,7 @@ class Solver:
         self.objective = Objective(problems, wanted_k, rate, lam)
         self.gain = np.array([each.horizon.gain for each in problems])
         self.most, self._small_gain = MOST_ITERATIONS, SMALL_GAIN
+        self._is_condition = np.array([each.preference.is_hard for each in problems])
         self._backend = QP_BACKENDS.get(problems[0].qp_backend)
 
     def begin(
@@ -237,9 +238,13 @@ class Solver:
                 self._postpone(now, deadline.patience)
 
     def _postpone(self, now: Iterates, patience: int) -> None:
-        """Let classes that are unlikely go on in the next prediction, also if they gain what their QPs promise."""
+        """Let classes that are unlikely go on in the next prediction, also if they gain what their QPs promise.
+
+        Where the wanted eta is a condition, a class waits for none: whether it meets it decides, not what it costs.
+        """
         promised = now.at.loss - np.minimum(now.gain, MOST_PROMISED)
-        now.is_waiting |= ~now.is_done & (now.iterations >= patience) & (self.objective.compare(promised) > UNLIKELY)
+        is_unlikely = ~self._is_condition & (self.objective.compare(promised) > UNLIKELY)
+        now.is_waiting |= ~now.is_done & (now.iterations >= patience) & is_unlikely
         now.is_done |= now.is_waiting
 
     def advance(self, now: Iterates) -> None:

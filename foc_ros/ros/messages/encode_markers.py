@@ -84,7 +84,8 @@ class _MarkerEncoder:
         if outcome.has_likelihood:
             red, green, blue = UNLIKELY + likelihood * (LIKELY - UNLIKELY)
             colour, text = (red, green, blue, 0.4 + 0.6 * likelihood), f'{100 * likelihood:.0f} %'
-            text += '' if outcome.is_solved else f', compromised: eta {outcome.eta:.3f}'
+            found = 'estimated' if outcome.is_estimated else 'compromised'
+            text += '' if outcome.is_solved else f', {found}: eta {outcome.eta:.3f}'
             for name in ELLIPSE_STYLES:
                 yield from self._encode_ellipses(name, index, outcome, colour)
         else:
