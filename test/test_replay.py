@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 from bag_helpers import CONFIG, FRAME, TYPES, messages, ns, reach, write_bag, write_mcap, write_parameters
+from report_samples import START_NS
+from report_samples import prediction as make_prediction
 
-from foc_ros.analysis.replay import Replay, replay
+from foc_ros.analysis.replay import Replay, Step, replay
 from foc_ros.analysis.replay_summary import Summary, facts
 from foc_ros.cli.main import main
 from foc_ros.core.config import replace_values
+from foc_ros.core.scene import Scene
 from foc_ros.core.types import Status
-from foc_ros.io.bags import BagReader
+from foc_ros.io.bags import BagReader, Item
+from foc_ros.io.topics import HAND
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import make_header
 
@@ -282,12 +287,12 @@ def test_the_summary_names_what_is_compromised_or_not_solved_with_its_remedy() -
 
 
 def test_a_candidate_that_is_estimated_counts_as_such_and_not_as_compromised() -> None:
-    made = predict(START_NS, NOWHERE)
+    made = make_prediction(START_NS, np.zeros(2))
     (first, *rest) = made.candidates
     summary, kinds = Summary(), (Status.COMPROMISED, Status.ESTIMATED, Status.DEADLINE, Status.SOLVED)
     for status in kinds:
         candidates = replace(first, solution=replace(first.solution, status=status)), *rest
-        summary.add(Step(Item(0, HAND, None), None, replace(made, candidates=candidates), Scene()))
+        summary.add(Step(Item(HAND, '', 0, None, b''), None, replace(made, candidates=candidates), Scene()))
     assert (summary.predictions, summary.compromised, summary.estimated) == (4, 1, 2)
 
 
