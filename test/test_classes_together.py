@@ -55,7 +55,7 @@ def test_each_class_is_as_if_it_were_alone_and_the_same_each_time(name, strategy
         np.testing.assert_array_equal(one.mean, other.mean)
         alone = solve_problem(problem, cold_start(candidate.guess), FocConfig(strategy=strategy))
         # beside a better class a class is solved as far as its likelihood tells; `lv` and `hc` look at samples of such solutions
-        inexact = {'fixed': 1e-6, 'lv': 0.03, 'hc': 0.03}.get(strategy, LARGEST_TOLERANCE)
+        inexact = {'fixed': 1e-6, 'lv': 0.1, 'hc': 0.1}.get(strategy, LARGEST_TOLERANCE)
         assert find_loss(one) == pytest.approx(find_loss(alone), abs=inexact)
         assert one.effort == pytest.approx(alone.effort, rel=1e-2)
         np.testing.assert_allclose(one.path, alone.path, atol=5e-4)

@@ -29,8 +29,9 @@ REMAINING = 0.5
 """Part of what a QP promised by which the loss still falls after its step: the median in the random scenes of the tests."""
 LARGEST_GAIN = 1.0
 """Most by which a loss is expected to fall still: far from a solution a QP promises anything."""
-PARTS = 16
-"""Points of each step at which an infeasible path is measured: it may leap over an obstacle between two steps."""
+FINE, MOST_PARTS = 5e-4, 2000
+"""Distance between the points at which an infeasible path is measured, relative to the scene, as far as so many points of each
+step have it: it may leap over an obstacle between two steps."""
 NO_VIOLATION = 1e-7
 """Shortfall of a distance that counts as rounding [m]."""
 
@@ -117,7 +118,9 @@ def _evaluate_one(problem: Problem, result: StrategyResult, minimum: tuple[float
     covariance = propagate_covariance(problem.horizon, problem.free_covariance, problem.noise_variance, control)
     violation, violated = 0.0, None
     if status is Status.INFEASIBLE or result.tau:
-        violation, violated = compute_violation(problem, mean, result.tau, PARTS if status is Status.INFEASIBLE else 1)
+        longest = float(np.abs(np.diff(mean[:, :2], axis=0)).max()) / (FINE * problem.extent)
+        parts = min(max(math.ceil(longest), 1), MOST_PARTS) if status is Status.INFEASIBLE else 1
+        violation, violated = compute_violation(problem, mean, result.tau, parts)
     effort, names = float(control @ control), problem.obstacles.ids
     shortfall, expected = 0.0 if status is Status.SOLVED else max(problem.wanted_k - k, 0.0), None
     if status in (Status.DEADLINE, Status.ESTIMATED):

@@ -53,8 +53,9 @@ FORETOLD = 0.1
 """Part of the promised gain that may be left, if the step brought what was foretold."""
 CLOSE = 3e-5
 """Relative excess over the wanted safety factor that is aimed at, so that a step that misses it by rounding still meets it."""
-UNLIKELY, MOST_PROMISED = 9.0, 10.0
-"""How much less likely than the best a class is that can wait, as a logarithm, and the most that a promise counts for."""
+UNLIKELY, SLOW, REPEATED = 12.0, 0.5, 4.0
+"""How much less likely than the best a class is that can wait, as a logarithm; the promised gain below which it may; and how many
+such gains it is given: far from a solution a QP promises too little or anything."""
 LARGEST_TOLERANCE = 5e-3
 """Largest gain of such a step for classes that are unlikely."""
 STALLED_GAIN = 2e-5
@@ -238,13 +239,13 @@ class Solver:
                 self._postpone(now, deadline.patience)
 
     def _postpone(self, now: Iterates, patience: int) -> None:
-        """Let classes that are unlikely go on in the next prediction, also if they gain what their QPs promise.
+        """Let classes that are unlikely go on in the next prediction: also if they gain several times what their QPs promise.
 
         Where the wanted eta is a condition, a class waits for none: whether it meets it decides, not what it costs.
         """
-        promised = now.at.loss - np.minimum(now.gain, MOST_PROMISED)
-        is_unlikely = ~self._is_condition & (self.objective.compare(promised) > UNLIKELY)
-        now.is_waiting |= ~now.is_done & (now.iterations >= patience) & is_unlikely
+        promised = np.minimum(now.gain, SLOW)
+        is_unlikely = self.objective.compare(now.at.loss - REPEATED * promised) > UNLIKELY
+        now.is_waiting |= ~now.is_done & (now.iterations >= patience) & (promised < SLOW) & is_unlikely & ~self._is_condition
         now.is_done |= now.is_waiting
 
     def advance(self, now: Iterates) -> None:
