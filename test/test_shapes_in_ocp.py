@@ -198,8 +198,8 @@ def well_posed(obstacles: Obstacles, guess, strategy: str) -> Solution:
 def alike(first: Solution, second: Solution, moved) -> None:
     """Within what the samples of the curves of `lv` and `hc` leave open."""
     assert second.status is Status.SOLVED
-    assert second.effort == pytest.approx(first.effort, rel=1e-2)
-    assert np.abs(second.path - moved(first.path)).max() < 2e-3
+    assert second.effort == pytest.approx(first.effort, rel=2e-2)
+    assert np.abs(second.path - moved(first.path)).max() < 4e-3
 
 
 def transform(obstacles: Obstacles, map_: np.ndarray, shift: float = 0.0) -> Obstacles:

@@ -31,7 +31,7 @@ LARGEST_SHARE = 1e6
 """Weight of the variances relative to the effort at which the curve ends: k has stopped growing."""
 NARROW = 1e-5
 """Interval in s at which the search ends, and relative difference of k from the wanted one."""
-FLAT = 1e-2
+FLAT = 2e-3
 """Interval in s at which the search for the least loss ends: the loss differs by its square."""
 PROBE = 1e-2
 """Distance in s from the root at which the loss tells whether it is less before it."""
