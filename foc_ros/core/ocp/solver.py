@@ -313,7 +313,10 @@ class Solver:
         """Return by how much more than that of the best class the loss of some classes may be inexact, (r,).
 
         A likelihood changes by a share of itself: a class that is a hundred times less likely may be a hundred times less exact.
+        The points of a curve of tau and lambda are no answers yet, and have to be exact.
         """
+        if not self.margins.is_chance:
+            return np.ones(len(rows))
         most = LARGEST_TOLERANCE / LAST_GAIN
         return np.exp(np.minimum(self.objective.compare(now.at.loss)[rows], np.log(most)))
 
