@@ -7,7 +7,7 @@ import pytest
 from reach_helpers import bowed, reach, solved
 
 from foc_ros.core.obstacles.geometry import Edges, find_offset
-from foc_ros.core.obstacles.risk import compute_safety_factor
+from foc_ros.core.obstacles.risk import CERTAIN_K, compute_safety_factor
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles
 from foc_ros.core.ocp.margin import Contacts, Gradients, Margins
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
@@ -57,6 +57,13 @@ def linearise(
     none = np.zeros(count, dtype=np.intp)
     controls, is_held = np.tile(control, (count, 1)), np.full(count, slides)
     return margins.linearise(Contacts(none, none, times), controls, np.full(count, k), is_held, np.full(count, is_free))
+
+
+def list_minima(margins: Margins, control: np.ndarray) -> list[float]:
+    """Return the times of the local minima of a margin, to a tenth of a step."""
+    times = np.arange(1.5, STEPS - 0.4, 0.1)
+    values = linearise(margins, control, times).value
+    return times[np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:])) + 1].tolist()
 
 
 def find_least_factor(margins: Margins, control: np.ndarray, time: float) -> tuple[float, float]:
@@ -111,9 +118,8 @@ def test_the_hessian_is_that_of_the_least_margin_which_slides(case):
     make, *given = MADE[case]
     problem, control = make(*given)
     margins, seen = Margins([problem], np.zeros(1), is_chance=True), 0
-    values = linearise(margins, control, np.arange(1.5, STEPS - 0.4, 0.1)).value
-    for place in np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:])) + 1:
-        time, least = find_least(margins, control, 1.5 + 0.1 * place)
+    for near in list_minima(margins, control):
+        time, least = find_least(margins, control, near)
         if not is_smooth(margins, control, time):
             continue
         seen += 1
@@ -134,10 +140,9 @@ def test_where_the_safety_factor_is_free_the_hessian_is_that_of_the_least_one(ca
     make, *given = MADE[case]
     problem, control = make(*given)
     margins, seen = Margins([problem], np.zeros(1), is_chance=True), 0
-    values = linearise(margins, control, np.arange(1.5, STEPS - 0.4, 0.1)).value
-    for place in np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:])) + 1:
-        time, k = find_least_factor(margins, control, 1.5 + 0.1 * place)
-        if abs(time - 1.5 - 0.1 * place) > 0.29 or k <= 0.0 or not is_smooth(margins, control, time):
+    for near in list_minima(margins, control):
+        time, k = find_least_factor(margins, control, near)
+        if abs(time - near) > 0.29 or k <= 0.0 or not is_smooth(margins, control, time):
             continue
         seen += 1
         made = linearise(margins, control, np.array([time]), k, is_free=True)
@@ -158,10 +163,9 @@ def test_the_gradient_of_a_margin_that_is_least_over_a_corner_of_its_course(name
     for tau in (1e-4, 3e-4, 1e-3, 3e-3):
         problem, control = make_problem(name, tau=tau)
         margins = Margins([problem], np.zeros(1), is_chance=True)
-        values = linearise(margins, control, np.arange(1.5, STEPS - 0.4, 0.1)).value
-        for place in np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:])) + 1:
-            time, _ = find_least(margins, control, 1.5 + 0.1 * place)
-            if abs(time - 1.5 - 0.1 * place) > 0.2:
+        for near in list_minima(margins, control):
+            time, _ = find_least(margins, control, near)
+            if abs(time - near) > 0.2:
                 continue  # no minimum of its own
             gradient = linearise(margins, control, np.array([time])).gradient[0]
             pairs = []
@@ -202,6 +206,17 @@ def measure_factors(problem: Problem, control: np.ndarray, points: int = 100) ->
         along = nx * nx * (xx + fixed[0, 0]) + ny * ny * (yy + fixed[1, 1]) + 2 * nx * ny * (xy + fixed[0, 1])
         factors.append(compute_safety_factor(at.distance, along, *(each[row] for each in problem.size)))
     return np.array(factors)
+
+
+def test_a_problem_without_obstacles_is_certain_beside_one_with_some():
+    """The rows that fill up its table are no obstacles."""
+    problem, control = make_problem('circle')
+    empty = replace(problem, obstacles=collect_obstacles([]))
+    controls = np.stack((control, control))
+    k, _, _ = Margins([problem, empty], np.zeros(2), is_chance=True).find_least_factors(controls)
+    alone, _, _ = Margins([problem], np.zeros(1), is_chance=True).find_least_factors(controls[:1])
+    assert k[0] == pytest.approx(float(alone[0]), rel=1e-12)
+    assert k[1] == CERTAIN_K
 
 
 def narrow_scene(seed: int) -> tuple[Problem, np.ndarray]:

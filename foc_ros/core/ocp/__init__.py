@@ -1,6 +1,7 @@
 """The optimal control problem: a problem and a start enter, a solution with its status leaves.
 
-`problem` and `terms` hold the data, `qp`, `working_set` and `backend` one quadratic programme, `sqp` the sequence of them,
-`contacts` the optimality conditions, `strategies` the trade of effort against risk; `solve` puts them together. May import
-`foc_ros.core.classes`, `obstacles`, `plant`, `hand` and the ground modules of `foc_ros.core`.
+`problem` holds the data, `margin` says by how much a movement clears the obstacles, `objective` what it costs, and `qp` and
+`backend` solve one quadratic programme. `solver` is the sequence of them, `strategies` and `lv_hc` trade effort against risk,
+and `solve` evaluates what they find; `monte_carlo` checks it by noisy movements. May import `foc_ros.core.classes`, `obstacles`,
+`plant`, `hand` and the ground modules of `foc_ros.core`.
 """
