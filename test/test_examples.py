@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / 'examples').glob('*.py'))
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'doc').glob('*.md'))]
 EXAMPLE_S = 280
-"""Time limit: an example takes a few seconds, and minutes on a busy machine that has to compile the kernels first."""
+"""Time limit: an example takes a few seconds, and minutes on a busy machine."""
 
 
 def python_blocks(page: Path) -> list[str]:

@@ -14,7 +14,7 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 NOTEBOOK = Path(__file__).parents[1] / 'examples' / 'first_steps.ipynb'
 CELL_S = 280
-"""Time limit of a cell: seconds, and minutes on a busy machine that has to compile the kernels first."""
+"""Time limit of a cell: seconds, and minutes on a busy machine."""
 
 
 @pytest.mark.timeout(2 * CELL_S)

@@ -222,7 +222,7 @@ def _hold_track(track: Track, candidate: Candidate, hand: HandState, reason: str
 
 
 def warm_up(config: Config) -> None:
-    """Predict twice in a made-up scene, so that the first real predictions find the cached matrices and the loaded kernels."""
+    """Predict twice in a made-up scene, so that the first real predictions find the modules loaded and the matrices computed."""
     obstacles, goals = make_obstacles([[0.15, 0.0]], 0.02, 0.001), np.array([[0.3, 0.0]])
     hand, tracks = HandState(0, np.zeros(6), np.zeros((6, 6))), NO_TRACKS
     for _ in range(2):  # the second one begins at a solution

@@ -48,7 +48,7 @@ NARROWINGS = 2
 """Brackets after the one in which minima are told apart: the last points are 4e-3 steps apart, and a parabola or two lines pass
 through them."""
 BOLD = 1.5
-"""How much farther than to its neighbours a safety factor may change between two points."""
+"""Between two points of the grid a safety factor may change by this much more than from one point to the next."""
 FACTORS, GRADIENT = 5, 1
 """Vectors of which the second derivatives of a margin consist, besides a diagonal, and which of them is its gradient."""
 

@@ -54,8 +54,8 @@ FORETOLD = 0.1
 CLOSE = 3e-5
 """Relative excess over the wanted safety factor that is aimed at, so that a step that misses it by rounding still meets it."""
 UNLIKELY, SLOW, REPEATED = 12.0, 0.5, 4.0
-"""How much less likely than the best a class is that can wait, as a logarithm; the promised gain below which it may; and how many
-such gains it is given: far from a solution a QP promises too little or anything."""
+"""A class can wait for the next prediction if its QP promises less than the second number, and if it is less likely than the best
+by more than the first one, as a logarithm, even after as many such gains as the third one says."""
 LARGEST_TOLERANCE = 5e-3
 """Largest gain of such a step for classes that are unlikely."""
 STALLED_GAIN = 2e-5
@@ -239,9 +239,9 @@ class Solver:
                 self._postpone(now, deadline.patience)
 
     def _postpone(self, now: Iterates, patience: int) -> None:
-        """Let classes that are unlikely go on in the next prediction: also if they gain several times what their QPs promise.
+        """Leave classes to the next prediction that stay unlikely even if they gain several times what their QPs promise.
 
-        Where the wanted eta is a condition, a class waits for none: whether it meets it decides, not what it costs.
+        Where the wanted eta is a condition, every class is solved to its end: whether it meets eta decides, not what it costs.
         """
         promised = np.minimum(now.gain, SLOW)
         is_unlikely = self.objective.compare(now.at.loss - REPEATED * promised) > UNLIKELY
