@@ -306,7 +306,7 @@ def draw_movement(axes: Any, positions: Array, number: int) -> None:
 def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None:
     """Draw the likelihoods of the tracks that have a slot over time [s].
 
-    A track has a gap where it has no candidate. The share of the candidates of which no likelihood is known is hatched.
+    A track has a gap where it has no candidate. The share that is unknown is hatched.
     """
     times = (np.array([each.stamp_ns for each in tracks.snapshots]) - origin_ns) / NANOSECONDS
     drawn = {track: values for track, values in tracks.likelihoods().items() if track in tracks.slots}
