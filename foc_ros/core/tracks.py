@@ -18,10 +18,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 
 import numpy as np
 
+from .plant.response import fall_as_minimum_jerk
 from .types import NANOSECONDS, Array, Candidate, PredictedCandidate, Record, Solution, as_readonly
 
 HOLD_S = 0.2
@@ -107,7 +107,7 @@ class Tracks(Record):
 
     def match(self, candidates: Sequence[Candidate], stamp_ns: int) -> list[Track]:
         """Return the track of each candidate, a new one where it continues none; those not seen for `HOLD_S` are forgotten."""
-        alive = [each for each in (*self.followed, *self.absent) if 0 <= stamp_ns - each.seen_ns <= HOLD_S * NANOSECONDS]
+        alive = self._find_recent(stamp_ns)
         pairs = [
             (each.candidate.label == candidate.label, shared, each.seen_ns, each.likelihood, -place, each)
             for place, candidate in enumerate(candidates)
@@ -178,9 +178,11 @@ class Tracks(Record):
             newest = (found.solution, stamp_ns) if found.has_likelihood else (track.solution, track.solved_ns)
             present.append(replace(seen, solution=newest[0], solved_ns=newest[1]))
         numbers = {each.number for each in matched}
-        others = [each for each in (*self.followed, *self.absent) if each.number not in numbers]
-        absent = [each for each in others if 0 <= stamp_ns - each.seen_ns <= HOLD_S * NANOSECONDS]
-        return tuple(present), tuple(absent)
+        return tuple(present), tuple(each for each in self._find_recent(stamp_ns) if each.number not in numbers)
+
+    def _find_recent(self, stamp_ns: int) -> list[Track]:
+        """Return the tracks that were seen in the last `HOLD_S` before a stamp [ns]."""
+        return [each for each in (*self.followed, *self.absent) if 0 <= stamp_ns - each.seen_ns <= HOLD_S * NANOSECONDS]
 
 
 NO_TRACKS = Tracks()
@@ -205,7 +207,7 @@ def take_rest(solution: Solution, age_s: float, position: Array, reason: str) ->
         return None
     begin, motor = age_s / solution.dt, solution.motor_covariance
     mean, covariance = interpolate_rest(solution.mean, begin), as_readonly(interpolate_rest(solution.covariance, begin))
-    aside, fall = position - mean[0, :2], _fall_as_minimum_jerk(steps)
+    aside, fall = position - mean[0, :2], fall_as_minimum_jerk(np.linspace(0.0, 1.0, steps + 1)[:, None])
     for order in range(mean.shape[1] // 2):
         mean[:, 2 * order : 2 * order + 2] += fall[order] * (aside / left_s**order)
     if motor is not None:
@@ -225,11 +227,3 @@ def interpolate_rest(states: Array, begin: float) -> Array:
     share = (at - row).reshape(-1, *(1,) * (states.ndim - 1))
     rest: Array = (1.0 - share) * states[row] + share * states[row + 1]
     return rest
-
-
-@cache
-def _fall_as_minimum_jerk(steps: int) -> Array:
-    """Return phi = 1 - s^3 (10 - 15 s + 6 s^2) and its first two derivatives at s = 0..1 in steps, (3, steps + 1, 1)."""
-    s = np.linspace(0.0, 1.0, steps + 1)[:, None]
-    slope, bend = -30.0 * s**2 * (1.0 - s) ** 2, -60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
-    return np.stack((1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2), slope, bend))

@@ -11,7 +11,7 @@ import numpy as np
 
 from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.plant.response import compute_curve
+from foc_ros.core.plant.response import compute_curve, fall_as_minimum_jerk
 from foc_ros.core.types import (
     LEFT,
     NANOSECONDS,
@@ -84,9 +84,9 @@ class CandidateView(Record):
         if len(self.path) < 2:
             return self
         s, rate = np.linspace(0.0, 1.0, len(self.path)), 1.0 / float(self.times[-1])
-        fall, slope = 1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2), -30.0 * rate * s**2 * (1.0 - s) ** 2
+        fall, slope, _ = fall_as_minimum_jerk(s)
         apart = hand - self.path[0]
-        return replace(self, path=self.path + np.outer(fall, apart), velocity=self.velocity + np.outer(slope, apart))
+        return replace(self, path=self.path + np.outer(fall, apart), velocity=self.velocity + np.outer(rate * slope, apart))
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from foc_ros.core.obstacles.geometry import Edges, find_offset, tabulate_edges
 from foc_ros.core.obstacles.risk import CERTAIN_K, compute_safety_factor
-from foc_ros.core.plant.response import hermite, hermite_quintic, pair_steps
+from foc_ros.core.plant.response import fall_as_minimum_jerk, hermite, hermite_quintic, pair_steps
 from foc_ros.core.types import Array
 
 from .problem import Problem
@@ -316,8 +316,7 @@ class Margins:
     def _allow(recovery_steps: Array, time: Array) -> Array:
         """Return the share of the missing distance that is still allowed: it falls as a minimum-jerk movement does."""
         s = np.divide(time, recovery_steps, out=np.ones(np.broadcast(time, recovery_steps).shape), where=recovery_steps > 0.0)
-        s = np.minimum(s, 1.0)
-        return 1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+        return fall_as_minimum_jerk(np.minimum(s, 1.0))[0]
 
     def sweep(self, rows: Indices, path: Array) -> Array:
         """Return the angles [rad] that the line from each centre to a path (r, 2, T) on the grid sweeps, (r, m)."""

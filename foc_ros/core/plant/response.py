@@ -29,6 +29,15 @@ def hermite_quintic(share: Array) -> Array:
     return np.stack((*begin, *end), axis=-1)
 
 
+def fall_as_minimum_jerk(share: Array) -> tuple[Array, Array, Array]:
+    """Return how a distance falls from 1 to 0 in a minimum-jerk movement, with its first two derivatives.
+
+    It is 1 - s^3 (10 - 15 s + 6 s^2) for a share s (...) of the time, in [0, 1].
+    """
+    s, left = share, 1.0 - share
+    return 1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2), -30.0 * s**2 * left**2, -60.0 * s * left * (1.0 - 2.0 * s)
+
+
 class Response:
     """The response of the position to a control of N steps, for two channels.
 
