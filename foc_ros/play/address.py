@@ -12,9 +12,11 @@ try:
 except ImportError as error:
     raise FocError("play needs tornado: install python3-tornado, or pip install 'foc_ros[play]'") from error
 try:
-    from pydantic import BaseModel as BaseModel  # for the messages of the page: what is missing is said before anything is loaded
+    from pydantic import VERSION  # of the messages of the page: what is missing is said before anything is loaded
 except ImportError as error:
     raise FocError("play needs pydantic of version 2: pip install 'foc_ros[play]'") from error
+if VERSION.startswith('1.'):
+    raise FocError(f"play needs pydantic of version 2, and {VERSION} is installed: pip install 'foc_ros[play]'")
 
 
 def is_loopback(host: str) -> bool:
