@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import sys
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -13,17 +12,10 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.append(str(ROOT / 'scripts'))
+script = importlib.import_module('recordings')
+
 PACKAGED = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'
-
-
-@pytest.fixture(scope='module')
-def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location('recordings', ROOT / 'scripts' / 'recordings.py')
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 def read(file: Path) -> list[tuple[str, int, Any]]:
@@ -54,7 +46,7 @@ def test_size() -> None:
     assert PACKAGED.stat().st_size < 1_000_000
 
 
-def test_equals_a_fresh_run(script: ModuleType, recorded: list[tuple[str, int, Any]], tmp_path: Path) -> None:
+def test_equals_a_fresh_run(recorded: list[tuple[str, int, Any]], tmp_path: Path) -> None:
     script.write_recording(tmp_path / 'fresh.mcap')
     fresh = read(tmp_path / 'fresh.mcap')
     assert [item[:2] for item in fresh] == [item[:2] for item in recorded]
@@ -86,7 +78,7 @@ def test_rates_length_and_frame(recorded: list[tuple[str, int, Any]]) -> None:
     assert [topic for topic, _, _ in recorded[:3]] == ['/goals', '/obstacles', '/hand_pose']
 
 
-def test_movements_are_reaches_without_collision(script: ModuleType, recorded: list[tuple[str, int, Any]]) -> None:
+def test_movements_are_reaches_without_collision(recorded: list[tuple[str, int, Any]]) -> None:
     track, rows = hand(recorded), np.array(script.OBSTACLES)
     away = track[:, None, 1:3] - rows[:, :2]
     across = np.stack([-np.sin(rows[:, 8]), np.cos(rows[:, 8])], axis=1)
@@ -102,7 +94,7 @@ def test_movements_are_reaches_without_collision(script: ModuleType, recorded: l
         assert 0.9 <= reach.duration_s <= 1.4
 
 
-def test_noise_has_the_given_size(script: ModuleType, recorded: list[tuple[str, int, Any]]) -> None:
+def test_noise_has_the_given_size(recorded: list[tuple[str, int, Any]]) -> None:
     intended, _ = script.reference()
     truth = script.moved(intended, np.random.default_rng(script.SEED))
     sensor = hand(recorded)[:, 1:3] - truth
@@ -111,14 +103,14 @@ def test_noise_has_the_given_size(script: ModuleType, recorded: list[tuple[str, 
     assert 0.002 < deviation.max() < 0.02
 
 
-def test_minimum_jerk_without_via_points_is_the_known_quintic(script: ModuleType) -> None:
+def test_minimum_jerk_without_via_points_is_the_known_quintic() -> None:
     movement = script.minimum_jerk(np.array([[0.0, 0.0], [0.3, -0.1]]), 1.2)
     s = np.linspace(0.0, 1.0, 25)
     expected = np.outer(10 * s**3 - 15 * s**4 + 6 * s**5, [0.3, -0.1])
     np.testing.assert_allclose(movement(1.2 * s), expected, atol=1e-12)
 
 
-def test_passing_times_are_optimal(script: ModuleType) -> None:
+def test_passing_times_are_optimal() -> None:
     """The cost is minimal at the passing time of a via point (Flash and Hogan 1985)."""
     from scipy.interpolate import make_interp_spline
 
