@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -162,6 +162,32 @@ def _estimate(candidate: PredictedCandidate, similar: tuple[PredictedCandidate, 
     return replace(candidate, solution=estimated, sides=dict(candidate.candidate.sides), cost=effort * failed.dt)
 
 
+def estimate_unfollowed(
+    unfollowed: Sequence[Candidate], answered: Sequence[PredictedCandidate], durations_s: Sequence[float]
+) -> list[PredictedCandidate]:
+    """Return classes that the search has seen and that are no candidates, with the efforts that similar ones lead to expect.
+
+    They are ranked with the candidates, by the same rule, and what they get is the share that is unknown. answered: the
+    candidates, without whose likelihoods nothing is expected; durations_s: time to go to each goal [s].
+    """
+    known, names = [each for each in answered if each.has_likelihood], {each.label for each in answered}
+    estimated = []
+    for candidate in unfollowed if known else ():
+        if candidate.label not in names:
+            similar, ratio = find_similar(candidate.goal, _measure(candidate), known)
+            dt = durations_s[candidate.goal] / (len(candidate.guess) - 1)
+            cost = ratio * similar.cost
+            mean = np.zeros((len(candidate.guess), similar.solution.mean.shape[1]))
+            mean[:, :2] = candidate.guess
+            solution = replace(
+                similar.solution, status=Status.ESTIMATED, message='not followed', dt=dt, mean=mean, effort=cost / dt
+            )
+            estimated.append(
+                PredictedCandidate(candidate, replace(solution, expected=cost / dt), dict(candidate.sides), cost, 0.0)
+            )
+    return estimated
+
+
 def drop_duplicates(candidates: Sequence[PredictedCandidate]) -> list[PredictedCandidate]:
     """Drop candidates that moved into a class that another candidate solved, so that no class is counted twice."""
     if all(each.status is not Status.LEFT_CLASS for each in candidates):
@@ -202,28 +228,14 @@ def rank_candidates(
     return ranked + [each for each in candidates if not each.has_likelihood]
 
 
-def find_unknown_share(
-    ranked: Sequence[PredictedCandidate],
-    unfollowed: Sequence[tuple[int, float]],
-    distances: Array,
-    config: LikelihoodConfig,
-    planning_spread: float,
-) -> float:
-    """Return the share of classes that the search has seen and that are no candidates: they cannot be told apart.
+def split_unknown(ranked: Sequence[PredictedCandidate], unfollowed: Collection[str]) -> tuple[list[PredictedCandidate], float]:
+    """Return the candidates among ranked classes, with likelihoods that sum to one, and the share of those not followed.
 
-    By their efforts as far as the operator plans the whole way, and evenly as far as they look ahead. 1 where no candidate has a
-    likelihood. unfollowed: goal and length [m] of each; distances (g,): from the hand to the goals [m].
+    unfollowed: labels of the latter. The share is 1 where no candidate has a likelihood.
     """
-    taken = [each for each in ranked if each.has_likelihood]
-    if not taken:
-        return 1.0
-    if not unfollowed:
-        return 0.0
-    similar = [find_similar(goal, (length, float(distances[goal])), taken) for goal, length in unfollowed]
-    costs = [each.cost for each in taken] + [ratio * each.cost for each, ratio in similar]
-    shortfalls = [each.solution.safety_shortfall for each in (*taken, *(each for each, _ in similar))]
-    shares = compute_likelihoods(np.array(costs), config, shortfalls=np.array(shortfalls))
-    time_s = min(float(each.solution.times[-1]) for each in taken)
-    ahead = compute_lookahead_share(time_s, config, planning_spread)
-    planned, even = float(shares[len(taken) :].sum()), len(unfollowed) / len(costs)
-    return (1.0 - ahead) * planned + ahead * even
+    followed = [each for each in ranked if each.label not in unfollowed]
+    known = sum(each.likelihood for each in followed)
+    if known <= 0.0:
+        return followed, 1.0
+    unknown = sum(each.likelihood for each in ranked if each.label in unfollowed)
+    return [replace(each, likelihood=each.likelihood / known) for each in followed], unknown

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .candidates import estimate_unsolved, find_unknown_share, rank_candidates, solve_candidates
+from .candidates import estimate_unfollowed, estimate_unsolved, rank_candidates, solve_candidates, split_unknown
 from .classes import Search, Turn, find_path_sides, search
 from .classes.library import GuessTiming, recall_demonstrations
 from .config import REFERENCE_STEP_S, Config, EstimatorConfig
@@ -98,10 +98,10 @@ def predict(
     absent = known.find_absent(candidates, matched, stamp_ns)
     held += [each for track in absent if (each := _hold_absent(track, scene.hand)) is not None]
     answered = estimate_unsolved(held, scene.near)
-    ranked = rank_candidates(answered, config.likelihood, scene.near, scene.hand, goals, planning_spread)
+    others = estimate_unfollowed(found.unfollowed, answered, scene.durations_s)
+    all_ranked = rank_candidates([*answered, *others], config.likelihood, scene.near, scene.hand, goals, planning_spread)
+    ranked, unknown = split_unknown(all_ranked, {each.label for each in others})
     pooled = pool_recordings(ranked, library, hand, scene.blocking, goals)
-    distances = np.hypot(*(goals - hand.mean[:2]).T)
-    unknown = find_unknown_share(pooled, found.unfollowed, distances, config.likelihood, planning_spread)
     smooth, unknown = known.smooth(
         [replace(each, likelihood=(1.0 - unknown) * each.likelihood) for each in pooled], unknown, stamp_ns
     )

@@ -51,10 +51,6 @@ class PathClass(NamedTuple):
         """The label without the goal."""
         return self.label.partition(':')[2]
 
-    def measure_length(self) -> float:
-        """Return the length of the shortest path [m]."""
-        return float(compute_path_lengths(self.points)[-1]) if self.known is None else self.known.length
-
     @property
     def named(self) -> set[str]:
         """The ids of the obstacles in the name."""
@@ -111,11 +107,14 @@ class SearchScene:
                 classes.append(PathClass(round(key, DIGITS), f'goal{goal}:{name_course(sides)}', goal, sides, points))
             yield from [each for each in sorted(classes) if not self._is_left_out(each.points)]
 
-    def make_candidates(self, classes: Sequence[PathClass], duration_s: Sequence[float], steps: int) -> tuple[Candidate, ...]:
-        """Return the candidates of classes, with guesses for the time to go to each goal [s]."""
+    def make_candidates(
+        self, classes: Sequence[PathClass], duration_s: Sequence[float], steps: int, is_smooth: bool = True
+    ) -> tuple[Candidate, ...]:
+        """Return the candidates of classes, with guesses for the time to go to each goal [s], smooth ones or taut ones."""
         found = [each for each in classes if each.known is None]
-        taut = [timed(each.points, self._velocity, duration_s[each.goal], steps) for each in found]
-        guesses = make_guesses(taut, [each.goal for each in found], self._near, self.names)
+        guesses = [timed(each.points, self._velocity, duration_s[each.goal], steps) for each in found]
+        if is_smooth:
+            guesses = make_guesses(guesses, [each.goal for each in found], self._near, self.names)
         made = {
             each.label: Candidate(
                 each.label, each.goal, each.sides, as_readonly(guess), float(compute_path_lengths(each.points)[-1])

@@ -50,14 +50,14 @@ class Search:
         largest number of states. search_late: searches that the deadline ended or prevented.
     next_goal : int
         Row of the first goal that the deadline left out, at which the next search should begin; 0 if there was time for all.
-    unfollowed : tuple[tuple[int, float], ...]
-        Goal and length [m] of classes that were seen and are no candidates, at most `MOST_UNFOLLOWED` besides goals.
+    unfollowed : tuple[Candidate, ...]
+        Classes that were seen and are no candidates, with taut guesses: at most `MOST_UNFOLLOWED` besides those of goals.
     """
 
     candidates: tuple[Candidate, ...]
     notes: dict[str, int] = field(default_factory=dict)
     next_goal: int = 0
-    unfollowed: tuple[tuple[int, float], ...] = ()
+    unfollowed: tuple[Candidate, ...] = ()
 
 
 def search(
@@ -119,8 +119,9 @@ def search(
     chosen = ranking.choose(count)
     candidates = scene.make_candidates(chosen, duration_s, steps)
     labels = {each.label for each in chosen}
-    unfollowed = [(each.goal, each.measure_length()) for each in ranking.seen if each.label not in labels]
-    return Search(candidates, {name: number for name, number in scene.notes.items() if number}, next_goal, tuple(unfollowed))
+    seen = {each.label: each for each in ranking.seen if each.label not in labels}
+    unfollowed = scene.make_candidates(tuple(seen.values()), duration_s, steps, is_smooth=False)
+    return Search(candidates, {name: number for name, number in scene.notes.items() if number}, next_goal, unfollowed)
 
 
 class _Ranking:
